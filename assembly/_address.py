@@ -41,8 +41,12 @@ def address_of(entry: Any) -> int:
 
 
 def call_address(address: int, arguments: tuple[Any, ...]) -> int:
-    """Call the kernel at an address that `address_of` gave; the arguments have the types of its signature."""
-    return int(_ADDRESSED[int(address)](*arguments))
+    """Call the kernel at an address that `address_of` gave; the arguments have the types of its signature.
+
+    A named tuple passes for a plain one of the same parts, as signatures have it.
+    """
+    plain = (tuple(given) if isinstance(given, tuple) else given for given in arguments)
+    return int(_ADDRESSED[int(address)](*plain))
 
 
 def callback_address(function: Any) -> int:

@@ -90,8 +90,8 @@ class Descents:
 
     def lower(self, pose: tuple[tuple[float, ...], tuple[float, ...]]) -> float:
         """A lower bound of the distance of the first two."""
-        one, other = self.offsets[:2].tolist()
-        return float(tree_distance(self.table, self.pool, one, other, *pose, 1e3, self.stack))
+        trees = tuple(self.offsets[:2].tolist())
+        return float(tree_distance(self.table, self.pool, trees, *pose, 1e3, self.stack))
 
 
 def _seconds(call: Callable[[Any], Any], cases: Sequence[Any]) -> tuple[Array, list[Any]]:

@@ -38,9 +38,10 @@ def lines_without_curvature(count: int, tolerances: Sequence[float]) -> list[lis
 
 
 def main(arguments: Sequence[str]) -> int:
-    from assembly.solve.loop import multipliers
+    from assembly.solve.loop import parameters
 
-    multipliers.WEAK = math.inf
+    # Before what takes its value from there is imported.
+    parameters.WEAK = math.inf
     from benchmarks.contact_errors import Case, ours
     from benchmarks.scenes import linked_wires
 

@@ -13,11 +13,14 @@ from assembly._lanes import lane, load_lanes
 from assembly._record import Store
 from assembly.geometry.splines.evaluate import surface_lanes, surface_point
 from assembly.geometry.vec import add
-from assembly.kinematics.motion import RelativePose, relative_pose, rotation
+from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity.brep.records import FACE
 from assembly.proximity.bvh.tree import pairs_within
 from assembly.proximity.extrema.face_face import pair_frame, solve_pair
+from assembly.proximity.extrema.feature_pair import two_face_frame
+from assembly.proximity.extrema.feature_query import feature_derivatives
 from assembly.proximity.extrema.pair_matrix import pair_matrix
-from assembly.proximity.extrema.rates import RATES, ZED, into_quaternions, pair_derivatives, store_record
+from assembly.proximity.extrema.rates import RATES, ZED, feature_record, into_quaternions
 
 
 @kernel
@@ -51,22 +54,13 @@ def solve_pairs(table, pool, records, q, starts, sizes, close, times, parameters
     for i in range(records.shape[0]):
         start = (starts[i, 0], starts[i, 1], starts[i, 2], starts[i, 3])
         for _ in range(times):
-            turn, shift = relative_pose(q[i], 0, rotation(q[i], 0), 1, rotation(q[i], 1))
-            status, x, count, frame, _curvature = solve_pair(
-                Store(table, pool),
-                records[i, 0],
-                records[i, 1],
-                RelativePose(turn, shift),
-                start,
-                sizes[i],
-                math.inf,
-                close,
-                False,
-            )
-            total += count
-            statuses[i] = status
-            gaps[i] = frame[10]
-            parameters[i, 0], parameters[i, 1], parameters[i, 2], parameters[i, 3] = x
+            pose = relative_pose(q[i], 0, rotation(q[i], 0), 1, rotation(q[i], 1))
+            surfaces = (records[i, 0], records[i, 1])
+            found = solve_pair(Store(table, pool), surfaces, pose, start, sizes[i], math.inf, close, False)
+            total += found.steps
+            statuses[i] = found.status
+            gaps[i] = found.frame.gap
+            parameters[i, 0], parameters[i, 1], parameters[i, 2], parameters[i, 3] = found.parameters
     return total
 
 
@@ -86,7 +80,7 @@ def evaluate_pairs(table, pool, records, parameters, times):
 
 @kernel
 def contact_jacobians(table, pool, records, q, parameters, size, times, record, row, out):
-    """d(u_f, v_f, u_g, v_g) / d(q_f, q_g) of every pair, each `times` over: `pair_derivatives` without the gap's own.
+    """d(u_f, v_f, u_g, v_g) / d(q_f, q_g) of every pair, each `times` over: `feature_derivatives` without the gap's.
 
     record (1, RECORD), row (12,) and out (5, 14) are room to work in.
     """
@@ -95,10 +89,12 @@ def contact_jacobians(table, pool, records, q, parameters, size, times, record, 
         x = (parameters[i, 0], parameters[i, 1], parameters[i, 2], parameters[i, 3])
         for _ in range(times):
             turn = rotation(q[i], 0)
-            relative, shift = relative_pose(q[i], 0, turn, 1, rotation(q[i], 1))
-            frame = pair_frame(Store(table, pool), records[i, 0], records[i, 1], RelativePose(relative, shift), x)
-            curvature = pair_matrix(frame[7], frame[8], frame[10], 1e-9 / size)
-            store_record(turn, shift, frame, curvature, record, 0)
+            pose = relative_pose(q[i], 0, turn, 1, rotation(q[i], 1))
+            frame = pair_frame(Store(table, pool), records[i, 0], records[i, 1], pose, x)
+            curvature = pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9 / size)
+            k11, k12, k22 = curvature.k
+            both = two_face_frame(frame, curvature)
+            feature_record(turn, pose.shift, both, (k11, k12, k12, k22), record, 0)
             for k in range(4):
                 for j in range(12):
                     row[j] = 0.0
@@ -116,7 +112,8 @@ def all_derivatives(table, pool, records, q, parameters, size, times, out, hessi
     for i in range(records.shape[0]):
         x = (parameters[i, 0], parameters[i, 1], parameters[i, 2], parameters[i, 3])
         for _ in range(times):
-            error, _regular = pair_derivatives(table, pool, records[i, 0], records[i, 1], q[i], x, size, out, hessian)
+            features = (FACE, records[i, 0]), (FACE, records[i, 1])
+            error, _regular = feature_derivatives((table, pool), features, q[i], x, (0.0, 0.0, 0.0), size, out, hessian)
             total += error + hessian[11, 0]
     return total
 
@@ -128,10 +125,8 @@ def facing_bodies(table, pool, trees, q, reach, stack, out):
     for j in range(trees.size):
         turn_j = rotation(q, j)
         for i in range(j):
-            turn, shift = relative_pose(q, i, rotation(q, i), j, turn_j)
-            count = pairs_within(
-                Store(table, pool), trees[i], trees[j], RelativePose(turn, shift), reach, stack, out[total:]
-            )
+            pose = relative_pose(q, i, rotation(q, i), j, turn_j)
+            count = pairs_within(Store(table, pool), (trees[i], trees[j]), pose, reach, stack, out[total:])
             if count < 0 or count > out.shape[0] - total:
                 return -1
             total += count

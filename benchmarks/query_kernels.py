@@ -55,7 +55,7 @@ def question_often(ra, qa, a, rb, qb, b, clearance, plane, times, out):
     """As `is_separated` answers; as `minimum_distance` where the clearance is below zero, which saves a kernel."""
     for _ in range(times):
         if clearance < 0.0 or compare_curves(a, b, clearance) == OPEN:
-            curve_distance(ra, qa, rb, qb, 1e-10, clearance, np.int64(200_000), np.bool_(True), plane, out)
+            curve_distance(ra, qa, rb, qb, (1e-10, clearance, np.int64(200_000), np.bool_(True)), plane, out)
 
 
 @kernel
@@ -65,7 +65,8 @@ def point_question_often(record, pool, tree, points, clearance, times, out):
         for i in range(points.shape[0]):
             x, y, z = points[i, 0], points[i, 1], points[i, 2]
             if clearance[i] < 0.0 or compare_point(tree, x, y, z, clearance[i]) == OPEN:
-                point_distance(record, pool, x, y, z, 1e-10, clearance[i], np.int64(1_000_000), out)
+                asked = (1e-10, clearance[i], np.int64(1_000_000), np.bool_(True))
+                point_distance(record, pool, (x, y, z), asked, out)
 
 
 @kernel

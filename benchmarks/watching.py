@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
+from assembly._record import Store, rows_of
 from assembly.constraints.program import records as layout
 from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
-from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import records as watch_memory
 from assembly.proximity.manager import update as watch
 from assembly.proximity.manager.candidates import CROWDED_PART
 
@@ -64,6 +65,10 @@ class Watch:
         self.pairs = [(self.bodies.index(a), self.bodies.index(b)) for a, b in packed.guarded[0]]
         self._pairs_at = watch_memory.MEMORY_HEADER
         self._places_at = self._pairs_at + watch_memory.PAIR_MEMORY * len(self.pairs)
+        manager = watch_memory.ContactManager(Store(packed.table, packed.pool), self._at, packed._memory)
+        self._first = int(watch_memory.record_of(manager).first)
+        lengths = [watch_memory.pair_lengths_of(manager, p) for p in range(len(self.pairs))]
+        self._curved = np.array([each.curved_bound for each in lengths])
         self.forget()
 
     def forget(self) -> None:
@@ -90,19 +95,17 @@ class Watch:
         packed, memory = self._packed, self.memory
         scaled = q.copy()
         scaled[:, :3] = (q[:, :3] - packed.reference) / packed.scale
-        calls = memory[watch_memory.CALLS] + 1.0
+        calls = watch_memory.memory_header_at(memory, 0).calls + 1.0
         how = watch.EVERYTHING if everything else watch.IN_TURNS
         watch.update(packed.table, packed.pool, self._at, memory, scaled, self.tracked, how)
         if memory[watch_memory.CROWDED]:
             raise RuntimeError("contacts are near for which there is no place")
-        pairs = self._pairs()
-        looked = pairs[:, watch_memory.CALLED] == calls
-        places = memory[self._places_at :][: watch_memory.PLACE_MEMORY * packed.guards].reshape(
-            -1, watch_memory.PLACE_MEMORY
-        )
-        owner = places[:, watch_memory.PLACE_PAIR].astype(int)
+        known = rows_of(watch_memory.PAIR_STATE, self._pairs())
+        looked = known.called == calls
+        slots = memory[self._places_at :][: watch_memory.PLACE_MEMORY * packed.guards]
+        owner = rows_of(watch_memory.PLACE_STATE, slots.reshape(-1, watch_memory.PLACE_MEMORY)).pair.astype(int)
         rows = np.flatnonzero((owner >= 0) & looked[owner])
-        tracked = self.tracked[int(packed.table[self._at + watch_memory.FIRST]) + rows]
+        tracked = self.tracked[self._first + rows]
         bodies = np.array(self.pairs)[owner[rows]]
         points = np.empty((rows.size, 2, 3))
         for k, (pair, row) in enumerate(zip(bodies, tracked, strict=True)):
@@ -111,9 +114,7 @@ class Watch:
                 points[k, side] = Rotation.from_quat(q[body, 3:], scalar_first=True).apply(local) + q[body, :3]
         # A look that meets many patches takes what is as near as its allowances, which say what it left out; that of a
         # ball may be less for other reasons, and in a crowd no less than this is looked into.
-        at = int(packed.table[self._at + watch_memory.PAIR_TABLE]) + watch_memory.PAIR_MINIMUM
-        flank = packed.pool[packed.table[at :: watch_memory.PAIR_RECORD][: len(pairs)] + 1]
-        around = np.maximum(pairs[:, watch_memory.BALL_ALLOWANCE], CROWDED_PART * flank)
-        take = np.minimum(watch_memory.TAKE * pairs[:, watch_memory.REACH], pairs[:, watch_memory.ALLOWANCE])
+        around = np.maximum(known.ball_allowance, CROWDED_PART * self._curved)
+        take = np.minimum(watch_memory.TAKE * known.reach, known.allowance)
         take = np.minimum(take, around) * packed.scale
         return Listed(bodies, points, tracked[:, PAIR_GAP] * packed.scale, take, looked)

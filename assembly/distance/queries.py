@@ -95,28 +95,29 @@ def minimum_distance(
         raise InputError(f"bound is {bound!r}; expected one of {', '.join(_BOUNDS)}")
     if not isinstance(polish, (bool, np.bool_)):
         raise InputError(f"polish is {polish!r}; expected True or False")
+    question = (tolerance, limit, max_evaluations, polish)
     if bound == "auto" or bound == "hull":
         out = np.empty(ANSWER)
         if type(a) is np.ndarray and type(b) is NurbsCurve:
-            code = quick_answer(b, a, tolerance, limit, max_evaluations, polish, out)
+            code = quick_answer(b, a, question, out)
             if code >= 0:
-                return turned(written_answer(b, a, code, out, tolerance, limit))
+                return turned(written_answer(b, a, code, out, question))
         else:
-            code = quick_answer(a, b, tolerance, limit, max_evaluations, polish, out)
+            code = quick_answer(a, b, question, out)
             if code >= 0:
-                return written_answer(a, b, code, out, tolerance, limit)
+                return written_answer(a, b, code, out, question)
     a = checked_operand("a", a)
     b = checked_operand("b", b)
     if (d := dimension(a)) != (e := dimension(b)):
         raise InputError(f"a is in {d}-D and b in {e}-D; expected one space")
     if bound in ("auto", "hull") and is_spline(a) and is_spline(b):
-        return spline_distance(a, b, tolerance, limit, max_evaluations, polish)
+        return spline_distance(a, b, question)
     if bound == "hull":
         raise InputError("bound is 'hull'; expected curves and surfaces of control points with it")
     if (is_formula(a) and isinstance(b, NurbsSurface)) or (is_formula(b) and isinstance(a, NurbsSurface)):
         if bound != "auto":
             raise InputError(f"bound is {bound!r}; expected 'auto' with a surface and a formula")
-        return surface_distance(a, b, tolerance, limit, max_evaluations, polish)
+        return surface_distance(a, b, question)
     from assembly.distance.enclosures.queries import enclosed_distance
 
     return enclosed_distance(a, b, tolerance, clearance, bound, polish, max_evaluations)
@@ -140,7 +141,7 @@ def is_separated(a: Any, b: Any, clearance: float, tolerance: float = 1e-10) -> 
         if said != OPEN:
             return said == FARTHER
         out = np.empty(ANSWER)
-        if quick_answer(a, b, tolerance, clearance, _BUDGET, True, out) >= 0:
+        if quick_answer(a, b, (tolerance, clearance, _BUDGET, True), out) >= 0:
             return bool(out[0] > clearance)
     limit = number("clearance", clearance)
     return minimum_distance(a, b, tolerance, clearance=limit).lower > limit
@@ -217,5 +218,5 @@ def minimum_distances(
     record, pool = curve._packed_pieces
     point_distances(record, pool, space, tolerance, budget, codes, out)
     for i in np.flatnonzero(codes == UNFINISHED):
-        from_pairs(curve, rows[i], tolerance, -1.0, budget, True, out[i])
+        from_pairs(curve, rows[i], (tolerance, -1.0, budget, True), out[i])
     return out[:, 0].copy(), out[:, 1].copy(), out[:, 2].copy()

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from assembly.distance.curves.capsules import OPEN, capsule_tree, compare_curves, compare_point
 from assembly.distance.curves.point_curve import UNFINISHED, point_distance
-from assembly.distance.curves.search import ANSWER, MEETING, curve_distance
+from assembly.distance.curves.search import ANSWER, curve_distance
 from assembly.distance.operands import coordinates, is_formula, share_a_point
 from assembly.distance.patches.packing import pack_patches
 from assembly.distance.patches.search import PATCH_ANSWER, patch_distance
+from assembly.distance.piece_search import MEETING
 from assembly.distance.separation import Separation, SeparationStatus
 from assembly.geometry.expression.formula import ROOM
 from assembly.geometry.splines.bezier_packing import pack_point
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 __all__ = ["compared", "from_pairs", "quick_answer", "spline_distance", "surface_distance", "turned", "written_answer"]
 
 Array = NDArray[np.float64]
+# Tolerance, clearance (below zero: none), budget and polish, as kernels take them.
+Question = tuple[float, float, int, bool]
 # By the number a kernel returns.
 _DISTANCE = (
     SeparationStatus.CONVERGED,
@@ -72,7 +75,7 @@ def compared(a: Any, b: Any, clearance: float) -> int:
     return OPEN if place is None else int(compare_point(_capsules(a), *place, clearance))
 
 
-def quick_answer(a: Any, b: Any, tolerance: float, clearance: float, budget: int, polish: bool, out: Array) -> int:
+def quick_answer(a: Any, b: Any, question: Question, out: Array) -> int:
     """What a kernel answers for two curves, or a curve and a point, that need no checks; -1 for anything else."""
     if type(a) is not NurbsCurve:
         return -1
@@ -81,39 +84,36 @@ def quick_answer(a: Any, b: Any, tolerance: float, clearance: float, budget: int
         if d != b.control_points.shape[1]:
             return -1
         record, pool = b._packed_pieces
-        return int(curve_distance(*a._packed_pieces, record, pool, tolerance, clearance, budget, polish, d == 2, out))
+        return int(curve_distance(*a._packed_pieces, record, pool, question, d == 2, out))
     place = coordinates(b, d)
-    if place is None or not polish:
+    if place is None or not question[3]:
         return -1
     record, pool = a._packed_pieces
-    x, y, z = place
-    code = int(point_distance(record, pool, x, y, z, tolerance, clearance, budget, out))
-    return code if code != UNFINISHED else from_pairs(a, b, tolerance, clearance, budget, polish, out)
+    code = int(point_distance(record, pool, place, question, out))
+    return code if code != UNFINISHED else from_pairs(a, b, question, out)
 
 
-def from_pairs(
-    a: NurbsCurve, point: Array, tolerance: float, clearance: float, budget: int, polish: bool, out: Array
-) -> int:
+def from_pairs(a: NurbsCurve, point: Array, question: Question, out: Array) -> int:
     """The search for pairs of curves, one of which is a point."""
     record, pool = pack_point(point)
-    return int(curve_distance(*a._packed_pieces, record, pool, tolerance, clearance, budget, polish, False, out))
+    return int(curve_distance(*a._packed_pieces, record, pool, question, False, out))
 
 
-def spline_distance(a: Any, b: Any, tolerance: float, clearance: float, budget: int, polish: bool) -> Separation:
+def spline_distance(a: Any, b: Any, question: Question) -> Separation:
     """The answer of a kernel for checked operands."""
     if isinstance(a, NurbsSurface) or isinstance(b, NurbsSurface):
-        return surface_distance(a, b, tolerance, clearance, budget, polish)
+        return surface_distance(a, b, question)
     if type(a) is np.ndarray:
         if type(b) is np.ndarray:
-            return _point_point(a.ravel(), b.ravel(), tolerance, clearance)
-        return turned(spline_distance(b, a, tolerance, clearance, budget, polish))
+            return _point_point(a.ravel(), b.ravel(), question)
+        return turned(spline_distance(b, a, question))
     if type(b) is np.ndarray:
         b = b.ravel()
     out = np.empty(ANSWER)
-    code = quick_answer(a, b, tolerance, clearance, budget, polish, out)
+    code = quick_answer(a, b, question, out)
     if code < 0:
-        code = from_pairs(a, b, tolerance, clearance, budget, polish, out)
-    return written_answer(a, b, code, out, tolerance, clearance)
+        code = from_pairs(a, b, question, out)
+    return written_answer(a, b, code, out, question)
 
 
 def _patches(shape: Any) -> tuple[NDArray[np.int64], Array, Formula | None]:
@@ -132,7 +132,7 @@ def _patches(shape: Any) -> tuple[NDArray[np.int64], Array, Formula | None]:
     return kept
 
 
-def surface_distance(a: Any, b: Any, tolerance: float, clearance: float, budget: int, polish: bool) -> Separation:
+def surface_distance(a: Any, b: Any, question: Question) -> Separation:
     """The answer where one is a surface, which goes first, and the other no hull."""
     out = np.empty(PATCH_ANSWER)
     swap = not isinstance(a, NurbsSurface)
@@ -140,17 +140,18 @@ def surface_distance(a: Any, b: Any, tolerance: float, clearance: float, budget:
     record, pool, kept = _patches(second)
     # Room for the formula's runs is a call's own.
     curve = None if kept is None else (*kept, np.empty(int(kept[0][ROOM])))
-    code = int(patch_distance(*_patches(first)[:2], record, pool, curve, tolerance, clearance, budget, polish, out))
+    code = int(patch_distance(*_patches(first)[:2], record, pool, curve, question, out))
     count = 2 if isinstance(second, NurbsSurface) else 0 if type(second) is np.ndarray else 1
     own = out[4 : 4 + count]
     parameters = np.concatenate([own, out[2:4]] if swap else [out[2:4], own])
     points = out[6:12].reshape(2, 3)
-    status = _status(a, b, code, out, tolerance, clearance)
+    status = _status(a, b, code, out, question)
     return Separation(float(out[0]), float(out[1]), parameters, points[::-1] if swap else points, status, int(out[12]))
 
 
-def _status(a: Any, b: Any, code: int, out: Array, tolerance: float, clearance: float) -> SeparationStatus:
+def _status(a: Any, b: Any, code: int, out: Array, question: Question) -> SeparationStatus:
     """What a kernel's number means."""
+    tolerance, clearance, _budget, _polish = question
     if clearance == 0.0:
         status = _COLLISION[code]
         if status is SeparationStatus.UNDECIDED and share_a_point(a, b):
@@ -162,8 +163,9 @@ def _status(a: Any, b: Any, code: int, out: Array, tolerance: float, clearance: 
     return status
 
 
-def written_answer(a: NurbsCurve, b: Any, code: int, out: Array, tolerance: float, clearance: float) -> Separation:
+def written_answer(a: NurbsCurve, b: Any, code: int, out: Array, question: Question) -> Separation:
     """What a kernel wrote, as a result."""
+    tolerance, clearance, _budget, _polish = question
     lower, upper, *_, evaluations = out.tolist()
     if code == MEETING and upper > clearance > 0.0:
         # The distance is zero; how far apart the two points may be is their rounding alone.
@@ -175,7 +177,7 @@ def written_answer(a: NurbsCurve, b: Any, code: int, out: Array, tolerance: floa
     fields["lower"] = lower
     fields["upper"] = upper
     fields["_written"] = out, a.control_points.shape[1], 1 if type(b) is np.ndarray else 2
-    fields["status"] = SeparationStatus.CONVERGED if converged else _status(a, b, code, out, tolerance, clearance)
+    fields["status"] = SeparationStatus.CONVERGED if converged else _status(a, b, code, out, question)
     fields["evaluations"] = int(evaluations)
     return answer
 
@@ -186,8 +188,9 @@ def turned(answer: Separation) -> Separation:
     return answer
 
 
-def _point_point(a: Array, b: Array, tolerance: float, clearance: float) -> Separation:
+def _point_point(a: Array, b: Array, question: Question) -> Separation:
     """Two points; their difference, its square and its root are rounded seven times at most."""
+    tolerance, clearance, _budget, _polish = question
     distance = math.dist(a, b)
     lower, upper = distance * (1.0 - 1e-15), distance * (1.0 + 1e-15)
     if clearance == 0.0:

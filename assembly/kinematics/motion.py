@@ -10,11 +10,13 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import matmul_t, matvec_t, quaternion_matrix, quaternion_product
+from assembly.geometry.vec import matmul_t, matvec, matvec_t, neg, quaternion_matrix, quaternion_product
 
 # The pose of a shape in the axes that a kernel works in, mostly those of another body: a rotation matrix by rows and
 # the place of the shape's origin.
 RelativePose = namedtuple("RelativePose", "rotation shift")
+# Of a shape in its own axes.
+IDENTITY = RelativePose((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
 
 
 @kernel(inline=True)
@@ -36,6 +38,14 @@ def relative_pose(q, i, rotation_i, j, rotation_j):
     """
     shift = matvec_t(rotation_i, (q[j, 0] - q[i, 0], q[j, 1] - q[i, 1], q[j, 2] - q[i, 2]))
     return RelativePose(rotation=matmul_t(rotation_i, rotation_j), shift=shift)
+
+
+@kernel(inline=True)
+def inverse_pose(pose):
+    """The pose of the other body, seen from this one."""
+    m = pose.rotation
+    back = (m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
+    return RelativePose(back, neg(matvec(back, pose.shift)))
 
 
 @kernel(inline=True)

@@ -75,13 +75,14 @@ def _solids(
     q = solution.q[places]
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     tracked = solution._parameters[k : k + 1].copy()
-    scene = (table, packed.pool, table[row + SHELL_F], table[row + SHELL_G], 0, 1, q)
+    shells = table[row + SHELL_F], table[row + SHELL_G]
+    scene = (table, packed.pool), shells, (0, 1), q
     if np.isnan(tracked[0, :4]).any():
-        nearest, deepest = packed.table[NEAREST_AT], packed.table[DEEPEST_AT]
-        if search_solids(*scene, nearest, deepest, tracked, 0) == 0:
+        searches = packed.table[NEAREST_AT], packed.table[DEEPEST_AT]
+        if search_solids(*scene, searches, tracked, 0) == 0:
             return _crossing(solution, k, places)
     records = np.zeros((1, CONTACT_RECORD))
-    status = track_solids(*scene, tracked, np.inf, records, tracked, 0)
+    status = track_solids(*scene, np.inf, (tracked, records, tracked), 0)
     gap, normal = records[0, GAP], records[0, NORMAL : NORMAL + 3]
     there = q[0, :3] + records[0, ARM_F : ARM_F + 3]
     names = tuple(

@@ -26,7 +26,7 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.bvh.facet_tree import FacetTree
 from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
-from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import records as watch_memory
 from assembly.proximity.manager import update as watch
 from assembly.solve.interruption import Interruption
 

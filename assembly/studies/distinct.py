@@ -15,7 +15,7 @@ from assembly.constraints.program.records import WATCH
 from assembly.errors import InputError
 from assembly.kinematics.pose import retract
 from assembly.proximity.features.solid_contact import TRACK
-from assembly.proximity.manager.state import CROSSED, MEMORY_HEADER, PAIR_MEMORY
+from assembly.proximity.manager.records import CROSSED, MEMORY_HEADER, PAIR_MEMORY
 from assembly.proximity.manager.update import EVERYTHING, update
 from assembly.solve.dense.jacobian import rows_of
 from assembly.solve.dense.row_table import gradient_at

@@ -15,21 +15,22 @@ import math
 
 from assembly._kernel import kernel
 from assembly._record import Store
-from assembly.constraints.program.contact import predict_pair, surface_of, track_contact, track_row
-from assembly.constraints.program.records import (
-    ROW,
-    Iterate,
-    contact_row_at,
-    header_at,
-    pool_header_at,
-    row_at,
+from assembly.constraints.program.contact import (
+    contact_of,
+    copy_tracked,
+    is_of_solids,
+    predict_pair,
+    surface_of,
+    track_contact,
+    track_row,
 )
+from assembly.constraints.program.records import Iterate, LiftedPairs, header_at, pool_header_at
 from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.vec import quaternion_product
 from assembly.proximity.extrema.face_face import BEND, CONVERGED, SINGULAR
 from assembly.proximity.extrema.rates import derivatives_at
-from assembly.proximity.features.solid_contact import TRACK, contact_record_at, tracked_at
-from assembly.proximity.manager.state import (
+from assembly.proximity.features.solid_contact import contact_record_at, tracked_at
+from assembly.proximity.manager.records import (
     PAIR_MEMORY,
     PLACE_MEMORY,
     lengths_at,
@@ -41,6 +42,7 @@ from assembly.proximity.manager.state import (
 )
 from assembly.proximity.manager.update import IN_TURNS
 from assembly.solve.loop.clearances import place_clearance_rows, update_around
+from assembly.solve.loop.workspace import Rows
 
 # A correction by more than this part of the prediction and of the surface's domain puts the root in doubt; so does a
 # root as near as this to a fold (det H over |H|^2), where others are born.
@@ -90,21 +92,19 @@ def write_twists(table, before, poses, twists):
 
 
 @kernel(inner=True)
-def predict(store, row, r, tracked, records, twists, guess):
+def predict(store, r, tracked, records, twists, guess):
     """Coordinates of contact r along its bodies' twists."""
-    fields = row_at(store.table, row)
+    contact = contact_of(store.table, r)
     derivatives = derivatives_at(records, r)
-    f = fields.body_f
-    g = fields.body_g
-    for i in range(TRACK):
-        guess[r, i] = tracked[r, i]
+    f, g = contact.body_f, contact.body_g
+    copy_tracked(tracked, r, guess)
     for j in range(4):
         s = 0.0
         for i in range(6):
             s += derivatives.zed[j, i] * twists[f, i] + derivatives.zed[j, 6 + i] * twists[g, i]
         for i in range(4):
             guess[r, i] += derivatives.rates[i, j] * s
-    predict_pair(store, row, r, tracked, guess)
+    predict_pair(store, r, tracked, guess)
 
 
 @kernel(inline=True)
@@ -121,11 +121,11 @@ def part_of_domain(store, surface, u, v, s, t):
 
 
 @kernel(inner=True)
-def is_astray(store, row, r, before, guess, after):
+def is_astray(store, r, before, guess, after):
     """Whether a contact of two surfaces was corrected by so much that it may have come to another root."""
     for side in range(2):
         i = 2 * side
-        surface = surface_of(store.table, row, side)
+        surface = surface_of(contact_of(store.table, r), side)
         moved = part_of_domain(store, surface, before[r, i], before[r, i + 1], guess[r, i], guess[r, i + 1])
         off = part_of_domain(store, surface, guess[r, i], guess[r, i + 1], after[r, i], after[r, i + 1])
         if off > ASTRAY * moved + SLACK:
@@ -134,16 +134,15 @@ def is_astray(store, row, r, before, guess, after):
 
 
 @kernel(inner=True)
-def correct(store, row, r, q, guess, tracked, records):
+def correct(store, r, q, guess, tracked, records):
     """Newton's method from guess[r], into tracked[r] and record r. Whether there is a minimum of the distance."""
     pair = tracked_at(tracked, r)
-    for i in range(TRACK):
-        tracked[r, i] = guess[r, i]
-    if contact_row_at(store.table, row).shell_f >= 0:
-        status = track_row(store, row, q, guess, BEND, records, tracked, r)
+    copy_tracked(guess, r, tracked)
+    if is_of_solids(store.table, r):
+        status = track_row(store, q, guess, BEND, records, tracked, r)
         found = status == CONVERGED or status == SINGULAR
     else:
-        status, x, facing, _distance = track_contact(store, row, q, guess, BEND, records, r)
+        status, x, facing, _distance = track_contact(store, q, guess, BEND, records, r)
         found = status == CONVERGED or status == SINGULAR
         tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
         pair.facing = facing
@@ -182,23 +181,24 @@ def doubt_twins(store, memory, k, records):
 
 
 @kernel(
-    signatures=(
-        "(i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], UniTuple(f8[:, ::1], 5), i8[::1], f8[::1])"
-    ),
+    signatures=("(i8[::1], f8[::1], f8[:, ::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[:, ::1], 5), i8[::1], f8[::1])")
 )
-def follow(table, pool, q, poses, tracked, records, room, free, memory):
+def follow(table, pool, q, last, room, free, memory):
     """Bodies stand at q (n, 7) in the user's coordinates now: carry the listed contacts, look, list what is near.
 
-    `poses`, `tracked` and `records` are those of the last call, and become those of this one; `room` holds (poses,
-    twists), a guess, and two rows of numbers. Returns the number of events, or -1, and nothing has changed, for poses
-    that are not finite or whose quaternions are far from unit.
+    `last` are poses, tracked values and records of the last call, and become those of this one; `room` is for poses,
+    twists, two times tracked values, and two rows of numbers. Returns the number of events, or -1, and nothing has
+    changed, for poses that are not finite or whose quaternions are far from unit.
     """
     store = Store(table, pool)
     header = header_at(table, 0)
     state = memory_header_at(memory, 0)
-    standing, twists, guess, before, rows = room
+    poses, tracked, records = last
+    standing, twists, guess, before, numbers = room
     # Nothing evaluates rows here: what would be their residuals and multipliers is room alone.
-    listed = Iterate(poses, tracked, records, rows[0], rows)
+    listed = Iterate(poses, tracked, records, numbers[0], numbers)
+    lifted = LiftedPairs(free, None, None, None, guess, memory)
+    rows = Rows(header.guards, 0.0, numbers[0], numbers[1], None, None, None, None)
     events = state.event_count
     if not place_bodies(store, q, standing):
         return -1
@@ -209,28 +209,25 @@ def follow(table, pool, q, poses, tracked, records, room, free, memory):
     first = header.first_guard
     for k in range(header.guards):
         r = first + k
-        row = header.row_table + ROW * r
-        if row_at(table, row).body_f < 0:
+        if contact_of(table, r).body_f < 0:
             continue
-        for i in range(TRACK):
-            before[r, i] = tracked[r, i]
-        predict(store, row, r, tracked, records, twists, guess)
-        if not correct(store, row, r, poses, guess, tracked, records):
+        copy_tracked(tracked, r, before)
+        predict(store, r, tracked, records, twists, guess)
+        if not correct(store, r, poses, guess, tracked, records):
             continue
         if abs(contact_record_at(records, r).fold) < NEAR_FOLD:
             look_at_all_of(table, memory, k)
-        elif contact_row_at(table, row).shell_f < 0 and is_astray(store, row, r, before, guess, tracked):
+        elif not is_of_solids(table, r) and is_astray(store, r, before, guess, tracked):
             look_at_all_of(table, memory, k)
         doubt_twins(store, memory, k, records)
     update_around(store, memory, listed, IN_TURNS)
     for k in range(header.guards):
-        before[first + k, 0] = float(contact_row_at(table, header.row_table + ROW * (first + k)).guard_number)
-    place_clearance_rows(table, memory, listed, rows[0], rows[1], free, False)
+        before[first + k, 0] = float(contact_of(table, first + k).guard_number)
+    place_clearance_rows(table, lifted, listed, rows, False)
     for k in range(header.guards):
         r = first + k
-        row = header.row_table + ROW * r
-        if row_at(table, row).body_f >= 0 and float(contact_row_at(table, row).guard_number) != before[r, 0]:
-            for i in range(TRACK):
-                guess[r, i] = tracked[r, i]
-            correct(store, row, r, poses, guess, tracked, records)
+        contact = contact_of(table, r)
+        if contact.body_f >= 0 and float(contact.guard_number) != before[r, 0]:
+            copy_tracked(tracked, r, guess)
+            correct(store, r, poses, guess, tracked, records)
     return int(state.event_count - events)

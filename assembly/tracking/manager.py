@@ -19,7 +19,7 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
 from assembly.proximity.extrema.rates import ARM_F, GAP, NORMAL
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
-from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import records as watch_memory
 from assembly.proximity.manager.events import Event, PairState, events_of
 from assembly.solve.crossings import PosedBodies, find_crossings
 from assembly.solve.interruption import CTRL_C
@@ -154,6 +154,7 @@ class Manager(OwnState):
         self._poses[:, 3:] = [1.0, 0.0, 0.0, 0.0]
         self._tracked = np.full((guards, TRACK), np.nan)
         self._records = np.zeros((guards, CONTACT_RECORD))
+        self._last = (self._poses, self._tracked, self._records)
         self._room = (
             np.empty((count, 7)),
             np.zeros((count, 6)),
@@ -270,19 +271,7 @@ class Manager(OwnState):
     def _follow(self, q: Array) -> int:
         """One call of the kernel."""
         packed = self._packed
-        return int(
-            follow(
-                packed.table,
-                packed.pool,
-                q,
-                self._poses,
-                self._tracked,
-                self._records,
-                self._room,
-                self._free,
-                self._memory,
-            )
-        )
+        return int(follow(packed.table, packed.pool, q, self._last, self._room, self._free, self._memory))
 
     def _is_full(self) -> bool:
         """Whether every place has a contact."""

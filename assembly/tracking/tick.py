@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.proximity.manager.events import Event, events_of
-from assembly.proximity.manager.state import EVENT_COUNT
+from assembly.proximity.manager.records import EVENT_COUNT
 from assembly.solve.loop.settings import COUNT, CURVED, DUAL, HISTORY, OBJECTIVE, VIOLATION
 from assembly.solve.scene import Status
 from assembly.solve.solution import Solution
@@ -60,13 +60,7 @@ class Step(ReadOnlyArrays):
     """
 
     def __init__(
-        self,
-        followed: Followed,
-        state: Array,
-        status: TrackStatus,
-        target: Array,
-        seen: float,
-        seconds: float,
+        self, followed: Followed, state: Array, status: TrackStatus, target: Array, seen: float, seconds: float
     ) -> None:
         self._followed = followed
         self._state = state

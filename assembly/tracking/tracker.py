@@ -19,7 +19,7 @@ from assembly.errors import FARTHEST, InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.proximity.features.solid_contact import STAYS, TRACK
-from assembly.proximity.manager.state import (
+from assembly.proximity.manager.records import (
     CLOCK,
     EVENT_COUNT,
     MARK_AT,
@@ -30,6 +30,7 @@ from assembly.proximity.manager.state import (
     VERTEX_CONTACTS,
 )
 from assembly.solve.loop.augmented_lagrangian import solve_program
+from assembly.solve.loop.parameters import ROUNDING
 from assembly.solve.loop.settings import (
     BUDGET,
     CARRIED,
@@ -43,7 +44,6 @@ from assembly.solve.loop.settings import (
     OUT_OF_TIME,
     RADIUS,
     RECALL,
-    ROUNDING,
     SECOND_ORDER,
     SOLVED,
     STATIONARITY,
@@ -85,6 +85,54 @@ def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
     if packed.table[watch + MARK_AT]:
         pairs = state[packed.memory_at + MEMORY_HEADER :][: PAIR_MEMORY * int(packed.table[watch + PAIRS])]
         pairs.reshape(-1, PAIR_MEMORY)[:, TURN] = np.nan
+
+
+def _held_to(begin: Solution) -> Solution:
+    """A solve that a tracker begins with, which has to hold."""
+    if not begin.success:
+        raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {begin.message}")
+    return begin
+
+
+def _begin(scene: Assembly, q0: ArrayLike | Solution | None, touching: float) -> Array:
+    """The poses to begin at, (n, 7)."""
+    if scene.constraints:
+        return _held_to(scene.solve(q0, touching=touching)).q
+    return scene.q if q0 is None else scene.solve(q0, max_iterations=0).q
+
+
+def _hand_at(follow: Point | Frame | Body, row: Array, weight: float) -> PointDistance | FrameDistance:
+    """The spring to where what it holds is now, on a body whose pose is a row."""
+    pose = Pose(row[:3], row[3:])
+    if isinstance(follow, Point):
+        return PointDistance(follow, pose.apply(follow.coordinates), weight)
+    hand = FrameDistance(follow, pose, weight=weight)
+    hand.target = pose @ Pose(hand.frame.origin, axes_quaternion(hand.frame.axes))
+    return hand
+
+
+def _with_hand(scene: Assembly, hand: PointDistance | FrameDistance) -> Assembly:
+    """The same scene with one more objective."""
+    inner = Assembly(scene.bodies)
+    inner.constrain(*scene.constraints)
+    for sign, objective in scene.objectives:
+        (inner.minimize if sign > 0.0 else inner.maximize)(objective)
+    inner.minimize(hand)
+    return inner
+
+
+def _tick_settings(limit: float, iterations: int, second_order: bool) -> Array:
+    """What a tick is asked for."""
+    settings = Options().settings(warm=True)
+    settings[FEASIBILITY] = limit
+    settings[STATIONARITY] = 1e-9
+    settings[ITERATIONS] = integer("iterations", iterations, 1, 1000)
+    settings[TICK] = 1.0
+    # A tick begins where the last one ended: what bodies may be in each other there was told at the start.
+    settings[TOUCHING] = 0.0
+    settings[LAST_LOOK] = 0.0
+    settings[SECOND_ORDER] = float(second_order)
+    return settings
 
 
 class Tracker(InOneProcess):
@@ -148,58 +196,36 @@ class Tracker(InOneProcess):
         if not isinstance(second_order, (bool, np.bool_)):
             raise InputError(f"second_order is {second_order!r}; expected True or False")
         self._scene_given = scene
-        begin = scene.solve(q0, touching=touching) if scene.constraints else None
-        if begin is not None and not begin.success:
-            raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {begin.message}")
-        if begin is not None:
-            poses = begin.q
-        else:
-            poses = scene.q if q0 is None else scene.solve(q0, max_iterations=0).q
+        poses = _begin(scene, q0, touching)
         held = follow if isinstance(follow, Body) else follow.body
         if held not in scene.bodies:
             raise InputError(f"follow is of body {held.name!r}; expected one of {[body.name for body in scene.bodies]}")
         self._place = scene.bodies.index(held)
-        self._hand: PointDistance | FrameDistance
-        row = poses[self._place]
-        if isinstance(follow, Point):
-            there = Pose(row[:3], row[3:]).apply(follow.coordinates)
-            self._hand = PointDistance(follow, there, weight)
-        else:
-            self._hand = FrameDistance(follow, Pose(row[:3], row[3:]), weight=weight)
-            frame = self._hand.frame
-            self._hand.target = Pose(row[:3], row[3:]) @ Pose(frame.origin, axes_quaternion(frame.axes))
-        inner = Assembly(scene.bodies)
-        inner.constrain(*scene.constraints)
-        for sign, objective in scene.objectives:
-            (inner.minimize if sign > 0.0 else inner.maximize)(objective)
-        inner.minimize(self._hand)
-        self._inner = inner
+        self._hand = _hand_at(follow, poses[self._place], weight)
+        self._inner = inner = _with_hand(scene, self._hand)
         # A solve packs anew where contacts found no place: what it ends with is what ticks go on with.
-        first = inner.solve(poses, touching=touching)
+        first = _held_to(inner.solve(poses, touching=touching))
         if first.disagreeing:
             # What rows disagree by depends on the pose.
             limit = max(limit, Options.fit)
-        if not first.success:
-            raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {first.message}")
         self._packed: Packed = inner.packed()
         assert inner._scene is not None
         self._scene: Scene = inner._scene
-        self._settings = Options().settings(warm=True)
-        self._settings[FEASIBILITY] = limit
-        self._settings[STATIONARITY] = 1e-9
-        self._settings[ITERATIONS] = integer("iterations", iterations, 1, 1000)
-        self._settings[TICK] = 1.0
-        # A tick begins where the last one ended: what bodies may be in each other there was told at the start.
-        self._settings[TOUCHING] = 0.0
-        self._settings[LAST_LOOK] = 0.0
-        self._settings[SECOND_ORDER] = float(second_order)
+        self._settings = _tick_settings(limit, iterations, second_order)
         self._budget = budget
         if budget is not None:
             self._settings[BUDGET] = 1e9 * positive("budget", budget)
             if self._packed.table[CLOCK_AT] == 0:
                 raise InputError("budget is given, but this interpreter has no clock for compiled code; expected None")
+        self._set_up(first)
+        # The loop holds rows to this, or to what rounding of coordinates alone can violate.
+        far = float(np.abs(poses[:, :3]).max()) / self._packed.scale
+        self._tolerance = 1.25 * max(limit, ROUNDING * far) * self._packed.scale
+
+    def _set_up(self, first: Solution) -> None:
+        """What ticks work in, and what they read and write directly."""
+        packed, budget = self._packed, self._budget
         self._history = np.zeros((1, HISTORY))
-        packed = self._packed
         names = [(a.name, b.name) for pairs in packed.guarded for a, b in pairs]
         self._followed = Followed(self._scene, packed, names, self._hand, self._place, first.status)
         # Behind the state of a solve are the rows of the last tick; steps have no copy of those.
@@ -224,9 +250,6 @@ class Tracker(InOneProcess):
         self._others = bool(packed._sources) or len(packed._targets) + len(packed._turns) > 1
         # Other values of constraints may ask for another pose than the one that a tick goes on from, or goes back to.
         self._settings[CARRIES] = float(budget is not None and not packed._sources)
-        # The loop holds rows to this, or to what rounding of coordinates alone can violate.
-        far = float(np.abs(poses[:, :3]).max()) / packed.scale
-        self._tolerance = 1.25 * max(limit, ROUNDING * far) * packed.scale
 
     @property
     def scene(self) -> Assembly:

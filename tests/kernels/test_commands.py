@@ -23,7 +23,7 @@ from assembly.kernels.listing import Item, all_items
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 # Two kernels that take a second.
-SMALL = ("assembly.proximity.manager.wires.point_of", "assembly.geometry.splines.curve_tables.swept_area")
+SMALL = ("assembly.geometry.splines.evaluate.curve_point", "assembly.geometry.splines.curve_tables.swept_area")
 # The command, for these alone.
 COMMAND = f"""
 import sys
@@ -232,11 +232,11 @@ from assembly.kernels.listing import Item
 class Broken(Item):
     types = ("no type",)
 if __name__ == "__main__":
-    compile_all([Broken("assembly.proximity.manager.wires", 0, 0)], 1, {})
+    compile_all([Broken("assembly.geometry.splines.curve_tables", 0, 0)], 1, {})
 """)
     variables = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, str(script)], env=variables, capture_output=True, text=True)
-    assert "RuntimeError: assembly.proximity.manager.wires.point_of cannot be compiled" in done.stderr
+    assert "RuntimeError: assembly.geometry.splines.curve_tables.bezier_tables cannot be compiled" in done.stderr
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3, 100])

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assembly._record import place_of
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.evaluate import (
@@ -20,21 +21,21 @@ from assembly.geometry.splines.evaluate import (
 )
 from assembly.proximity.brep.records import (
     EDGE,
-    EDGE_CURVE,
-    EDGE_END,
     EDGE_POINT,
-    EDGE_RECORD,
-    EDGE_START,
-    EDGE_SURFACE,
     FACE,
     FACE_POINT,
     VERTEX,
 )
+from assembly.proximity.brep.writer import edge_over
 from assembly.proximity.extrema.face_face import CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR
-from assembly.proximity.extrema.feature_query import PAIR, feature_derivatives, find_features
+from assembly.proximity.extrema.feature_query import FEATURE_PAIR, PAIR, feature_derivatives, find_features
 from tests.laws.scenes import dome, inside, quadratic, quaternion_of, random_quaternion
 from tests.laws.witness import rotated
 
+# Places in what `find_features` writes.
+POINT_F, POINT_G, NORMAL, GAP, ISOLATED, PROPER, FOLD = (
+    place_of(FEATURE_PAIR, name) for name in ("point_f", "point_g", "normal", "gap", "isolated", "proper", "fold")
+)
 STATUS = {CONVERGED: "CONVERGED", SINGULAR: "SINGULAR", LEFT_PATCH: "LEFT_PATCH", NOT_CONVERGED: "NOT_CONVERGED"}
 
 
@@ -108,10 +109,7 @@ class Packed:
                 table += [len(pool), 0, 0, 0, 0]
                 pool += feature.point.tolist()
             else:
-                edge = [-1] * EDGE_RECORD
-                edge[EDGE_SURFACE], edge[EDGE_CURVE] = surface, curve
-                edge[EDGE_START] = edge[EDGE_END] = -1 if feature.endless else 0
-                table += edge
+                table += edge_over(surface, curve, feature.endless).tolist()
         self.table, self.pool = np.array(table, np.int64), np.array(pool, float)
         self.at = tuple(at)
 
@@ -119,18 +117,18 @@ class Packed:
         """Status name, and what `find_features` writes."""
         out = np.empty(PAIR)
         q = np.asarray(q, float).reshape(2, 7)
-        features = (self.kinds[0], self.at[0], self.kinds[1], self.at[1])
+        features = tuple(zip(self.kinds, self.at, strict=True))
         x, n = tuple(map(float, x)), tuple(map(float, n))
-        status = find_features(self.table, self.pool, *features, q, x, n, float(size), float(turn), out)
+        status = find_features((self.table, self.pool), features, q, x, n, float(size), float(turn), out)
         return STATUS[status], out
 
     def derivatives(self, q, x, n=(0.0, 0.0, 0.0), size=4.0):
         """Rates of the parameters (4, 14), the gap's gradient (14,), its Hessian (12, 12), and the pair's residual."""
         first, hessian = np.empty((5, 14)), np.empty((12, 12))
         q = np.asarray(q, float).reshape(2, 7)
-        features = (self.kinds[0], self.at[0], self.kinds[1], self.at[1])
+        features = tuple(zip(self.kinds, self.at, strict=True))
         x, n = tuple(map(float, x)), tuple(map(float, n))
-        error, _isolated = feature_derivatives(self.table, self.pool, *features, q, x, n, float(size), first, hessian)
+        error, _isolated = feature_derivatives((self.table, self.pool), features, q, x, n, float(size), first, hessian)
         return first[:4], first[4], hessian, error
 
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._record import Store
-from assembly.constraints.program import evaluate as program
 from assembly.constraints.program import records as layout
 from assembly.constraints.program import row_terms
+from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.hessian_blocks import BLOCKS, COLUMN, COUNT, FIRST, PLACE, is_blocked
 from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
@@ -51,15 +51,16 @@ class LoopPoint:
         at = table[layout.TAPE_WORKSPACE]
         self.room = layout.TapeRoom(*(np.empty(size) for size in table[at : at + 3]))
         arrange(table, free, self.shape, self.rows, self.n)
+        self.program = layout.Program(Store(table, self.pool), self.shape, self.loose, self.room, packed.tips)
         if tracked is None:
             state = np.zeros(packed.results_at)
             state[packed.contacts_at : packed.angles_at] = np.nan
             packed.start_angles(np.array(q, dtype=float), state, False)
             tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
-            start = (Store(table, self.pool), scaled, tracked, free, self.loose.lengths)
+            start = (self.program.store, scaled, tracked, free, self.loose.lengths)
             # Solids that cross are looked for where a scene asks for it.
             assert start_contacts(*start) < 0 or (packed.seek_penetration() and start_contacts(*start) < 0)
-        lost = program.evaluate(Store(table, self.pool), np.array(tracked), np.inf, self.loose, self.room, self.point)
+        lost = evaluate(self.program, np.array(tracked), np.inf, self.point)
         assert lost < 0
 
     @property
@@ -101,33 +102,14 @@ class LoopPoint:
     def goal(self, order=1):
         """Value, gradient (n,) and Hessian (n, n) of the objective."""
         gradient, hessian = np.zeros(self.n), self.room_for_hessian()
-        value = goal(
-            Store(self.table, self.pool),
-            self.shape,
-            self.rows,
-            self.loose,
-            self.room,
-            self.packed.tips,
-            self.point,
-            order,
-            gradient,
-            hessian,
-        )
+        value = goal(self.program, self.rows, self.point, order, gradient, hessian)
         return value, gradient, self.dense(hessian)
 
     def row_terms(self, y, weights=None):
         """Second derivative of y . rows + J^T diag(weights) J, (n, n)."""
         hessian = self.room_for_hessian()
-        row_terms.add_row_terms(
-            Store(self.table, self.pool),
-            self.loose,
-            self.room,
-            self.shape,
-            self.point,
-            np.asarray(y, dtype=float),
-            np.zeros(self.rows) if weights is None else np.asarray(weights, dtype=float),
-            hessian,
-        )
+        weights = np.zeros(self.rows) if weights is None else np.asarray(weights, dtype=float)
+        row_terms.add_row_terms(self.program, self.point, np.asarray(y, dtype=float), weights, hessian)
         return self.dense(hessian)
 
 

@@ -10,6 +10,7 @@ from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.motion import RelativePose
+from assembly.proximity.manager.extrema import Extrema
 from assembly.proximity.manager.posed_pair import PosedPair
 from tests.laws.witness import Pairs, Stack, rotated
 
@@ -167,8 +168,14 @@ def random_group(seed, kind_f, kind_g, count):
     return group.take(tame[:count])
 
 
-def posed(turn, shift, surfaces=(-1, -1), shells=(-1, -1), trees=(-1, -1)):
+def posed(store, turn, shift, surfaces=(-1, -1), shells=(-1, -1), trees=(-1, -1)):
     """A posed pair of bodies, of which kernels read no more than the pose and the shapes."""
+    pose = RelativePose(turn, shift)
     return PosedPair(
-        RelativePose(turn, shift), surfaces, shells, trees, (-1, -1), bodies=(0, 1), poses=None, track_solids=0
+        store, pose, surfaces, shells, trees, (-1, -1), (0.0, 0.0), bodies=(0, 1), poses=None, track_solids=0
     )
+
+
+def list_of(rows, count):
+    """Rows of extrema as a list of the first `count`."""
+    return Extrema(rows, np.array([count]), None, None)

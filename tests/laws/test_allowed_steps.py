@@ -7,37 +7,32 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly._record import Store
+from assembly._record import Store, place_of, rows_of
 from assembly.constraints.program.records import MOVING, WATCH, Iterate
 from assembly.proximity.brep.borders import feature_kind
 from assembly.proximity.brep.records import EDGE, FACE
-from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_FEATURE, tree_at
+from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_DTYPE, tree_at
 from assembly.proximity.features.holding import FEATURES, NOTHING, POINT
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.proximity.manager import update as watch
-from assembly.proximity.manager.extrema import EXTREMUM_BEYOND, EXTREMUM_FOLD, ROOT, VERTEX_CONTACT
+from assembly.proximity.manager.extrema import ROOT, extremum_at
 from assembly.proximity.manager.motion_bounds import part_used, went
 from assembly.proximity.manager.newton_regions import is_known
-from assembly.proximity.manager.state import (
-    ALLOWANCE,
-    BALL_ALLOWANCE,
-    CUT_SHORT,
-    PAIR_F,
-    PAIR_G,
+from assembly.proximity.manager.records import (
     PAIR_MEMORY,
-    PAIR_RECORD,
-    PAIR_TABLE,
+    PAIR_STATE,
     PAIRS,
-    SMALLER,
-    SURE,
+    ContactManager,
     memory_places,
-    pair_at,
+    pair_in,
 )
 from assembly.solve.loop.clearances import allowed_share
 from assembly.solve.loop.residuals import move
-from tests.laws.scenes import posed
+from tests.laws.scenes import list_of, posed
 
 RINGS = 4
+# Of an element, where its feature is.
+FEATURE = place_of(ELEMENT_DTYPE, "feature")
 
 
 class Looked:
@@ -61,7 +56,8 @@ class Looked:
 
     def parts(self, q):
         """Which parts of their allowances pairs have used."""
-        return np.array([part_used(Store(self.table, self.pool), self.watch, self.memory, p, q) for p in self.pairs])
+        manager = ContactManager(Store(self.table, self.pool), self.watch, self.memory)
+        return np.array([part_used(manager, p, q) for p in self.pairs])
 
     def moved(self, q, step, share):
         out = q.copy()
@@ -74,9 +70,10 @@ class Looked:
             Store(self.table, self.pool), self.memory, Iterate(q, *[None] * 4), Iterate(trial, *[None] * 4), step, share
         )
 
-    def column(self, k):
-        at = memory_places(self.table, self.watch)[0]
-        return self.memory[at:][: PAIR_MEMORY * len(self.pairs)].reshape(len(self.pairs), -1)[:, k]
+    def known(self):
+        """What is known of all pairs, a record each."""
+        pairs = self.memory[memory_places(self.table, self.watch)[0] :][: PAIR_MEMORY * len(self.pairs)]
+        return rows_of(PAIR_STATE, pairs.reshape(len(self.pairs), -1))
 
 
 def test_steps_end_within_what_looks_allow(cases):
@@ -100,18 +97,18 @@ def test_steps_end_within_what_looks_allow(cases):
             if cut:
                 cuts += 1
                 # What is asked of the next looks: as far as each pair was to go.
-                np.testing.assert_allclose(looked.column(CUT_SHORT), end * looked.column(ALLOWANCE), rtol=1e-12)
+                np.testing.assert_allclose(looked.known().cut_short, end * looked.known().allowance, rtol=1e-12)
     assert cuts > scenes
 
 
 def test_a_pair_that_is_nearly_spent_and_hardly_moves_is_not_in_the_way():
     looked = Looked(np.random.default_rng(9))
-    at = looked.table[looked.watch + PAIR_TABLE] + PAIR_RECORD * np.array(looked.pairs)
-    bodies = looked.table[np.add.outer(at, [PAIR_F, PAIR_G])]
+    pairs = (pair_in(looked.table, looked.watch, p) for p in looked.pairs)
+    bodies = np.array([(pair.body_f, pair.body_g) for pair in pairs])
     # Of balls, which have allowances of their own, there are none.
-    looked.column(BALL_ALLOWANCE)[:] = np.inf
-    looked.column(SURE)[:] = np.inf
-    allowances = looked.column(ALLOWANCE).copy()
+    looked.known().ball_allowance[:] = np.inf
+    looked.known().sure[:] = np.inf
+    allowances = looked.known().allowance.copy()
     # Of the pair with the least allowance nearly all is used by one body; others of that body have more.
     spent = int(np.argmin(allowances))
     apart = next(p for p in looked.pairs if not set(bodies[p]) & set(bodies[spent]))
@@ -139,9 +136,9 @@ def test_a_point_that_stays_on_an_edge_is_no_root():
     scene.constrain(asm.Clearance())
     packed = scene.packed()
     table, pool = packed.table, packed.pool
-    pair = pair_at(table, table[table[WATCH] + PAIR_TABLE])
+    pair = pair_in(table, table[WATCH], 0)
     trees, shells = (pair.tree_f, pair.tree_g), (pair.shell_f, pair.shell_g)
-    looked_into = posed(None, None, (pair.surface_f, pair.surface_g), shells, trees)
+    looked_into = posed(Store(table, pool), None, None, (pair.surface_f, pair.surface_g), shells, trees)
     elements = [
         [(k, *pool[tree.element_pool + ELEMENT * k :][:ELEMENT]) for k in range(tree.elements)]
         for tree in (tree_at(table, at) for at in trees)
@@ -150,17 +147,18 @@ def test_a_point_that_stays_on_an_edge_is_no_root():
     for e in elements[0]:
         for d in elements[1]:
             kinds = (
-                feature_kind(table, shells[0], int(e[1 + ELEMENT_FEATURE])),
-                feature_kind(table, shells[1], int(d[1 + ELEMENT_FEATURE])),
+                feature_kind(table, shells[0], int(e[1 + FEATURE])),
+                feature_kind(table, shells[1], int(d[1 + FEATURE])),
             )
             if kinds != (FACE, EDGE):
                 continue
             roots = np.zeros((1, ROOT))
-            roots[0, :6] = [*e[1:3], *d[1:3], e[1 + ELEMENT_FEATURE], d[1 + ELEMENT_FEATURE]]
-            roots[0, EXTREMUM_FOLD], roots[0, EXTREMUM_BEYOND] = 1.0, np.nan
+            roots[0, :6] = [*e[1:3], *d[1:3], e[1 + FEATURE], d[1 + FEATURE]]
+            root = extremum_at(roots, 0)
+            root.fold, root.beyond = 1.0, np.nan
             for corner, known in ((NOTHING, True), (FEATURES, True), (POINT, False)):
-                roots[0, VERTEX_CONTACT] = corner
-                assert is_known(Store(table, pool), looked_into, e[0], d[0], roots, 1)[2] == known
+                root.corner = corner
+                assert is_known(looked_into, e[0], d[0], list_of(roots, 1))[2] == known
             seen += 1
     assert seen > 4
 
@@ -180,7 +178,7 @@ def test_no_point_goes_farther_than_is_told():
     scene.constrain(asm.Clearance())
     packed = scene.packed()
     table, pool, at = packed.table, packed.pool, packed.table[WATCH]
-    side = int(table[table[at + PAIR_TABLE] + SMALLER])
+    side = int(pair_in(table, at, 0).smaller)
     (u0, u1), (v0, v1) = surfaces[side].domain
     points = surfaces[side].evaluate(*rng.uniform((u0, v0), (u1, v1), (400, 2)).T) / packed.scale
     tight = 0.0
@@ -193,7 +191,7 @@ def test_no_point_goes_farther_than_is_told():
             for k in range(2):
                 turn = Rotation.from_rotvec(size * rng.normal(size=3))
                 after[k, 3:] = rng.choice([-1.0, 1.0]) * turn.as_quat(scalar_first=True)
-            bound = went(Store(table, pool), at, 0, before, after)
+            bound = went(Store(table, pool), pair_in(table, at, 0), before, after)
             moved = seen(after, side, 1 - side, points) - seen(before, side, 1 - side, points)
             most = np.linalg.norm(moved, axis=1).max()
             # Rounding of places some sizes from the origin.
@@ -203,4 +201,4 @@ def test_no_point_goes_farther_than_is_told():
     # Both together go nowhere, seen from each other.
     q = scene.q.copy()
     q[:, :3] += 1.0
-    assert went(Store(table, pool), at, 0, scene.q.copy(), q) <= 1e-14
+    assert went(Store(table, pool), pair_in(table, at, 0), scene.q.copy(), q) <= 1e-14

@@ -16,6 +16,7 @@ from assembly.distance.patches import nodes as pn
 from assembly.distance.patches import pair as pp
 from assembly.distance.patches.newton import patch_derivatives
 from assembly.distance.patches.packing import pack_patches
+from assembly.distance.piece_search import PieceTree
 from assembly.geometry.splines.bezier_pieces import CENTER, ERROR
 from tests.laws.curve_queries import CURVES, least_distances, piece_values, random_curve
 
@@ -27,35 +28,28 @@ class Tree:
 
     def __init__(self, curve, rng, depth):
         self.record, self.pool = curve._packed_pieces
-        self.stride = bn.node_stride(self.record)
-        self.nodes = np.full(self.stride * (2 * depth + 40), np.nan)
-        self.ints = np.zeros(bn.NODE_INTS * (2 * depth + 40), dtype=np.int64)
-        bn.start_nodes(self.record, self.pool, self.ints, self.nodes)
+        stride = bn.node_stride(self.record)
+        nodes = np.full(stride * (2 * depth + 40), np.nan)
+        tree = PieceTree(self.record, self.pool, np.zeros(bn.NODE_INTS * (2 * depth + 40), dtype=np.int64), nodes)
+        bn.start_nodes(tree)
         k, used = 0, 1
-        while depth > 0 or not self.is_piece(k):
-            depth -= self.is_piece(k)
-            bn.split_node(self.record, self.pool, self.ints, self.nodes, k, used)
+        while depth > 0 or not bn.is_piece(tree, k):
+            depth -= bool(bn.is_piece(tree, k))
+            bn.split_node(tree, k, used)
             k, used = used + int(rng.integers(2)), used + 2
-        self.o = self.stride * k
-        i = bn.NODE_INTS * k
-        self.interval = self.nodes[self.o + bn.BEGIN], self.nodes[self.o + bn.END]
-        self.net = curve.bezier_pieces()[self.ints[i + bn.FIRST]]
+        self.piece, self.node = bn.piece_of(tree, k), bn.node_of(tree, k)
+        self.interval = self.node.begin, self.node.end
+        self.net = curve.bezier_pieces()[bn.links_of(tree, k).first]
         # About the center, as the nodes are.
         self.net = self.net.copy()
         d = self.net.shape[1] - 1
         self.net[:, :d] -= self.net[:, d:] * self.pool[CENTER : CENTER + d]
-
-    def is_piece(self, k):
-        return bool(self.ints[bn.NODE_INTS * k + bn.LAST] - self.ints[bn.NODE_INTS * k + bn.FIRST] == 1)
 
     def values(self, x):
         """Point and derivatives (m, 3) at x in the node's own parameter."""
         low, high = self.interval
         rows = piece_values(np.repeat(self.net[None], len(x), axis=0), low + x * (high - low))
         return [np.pad(row, ((0, 0), (0, 3 - row.shape[1]))) * (high - low) ** k for k, row in enumerate(rows)]
-
-    def field(self, at, size=3):
-        return self.nodes[self.o + at : self.o + at + size]
 
 
 # The oracle's own rounding, a part of the curve's size: the degree times some units of the last place.
@@ -68,16 +62,17 @@ def test_models_of_pieces(kind):
     x = np.linspace(0.0, 1.0, 33)
     d = (x - 0.5)[:, None]
     for depth in (0, 1, 3, 6, 12):
-        node = Tree(random_curve(rng, kind, 3), rng, depth)
-        c, c1, c2 = node.values(x)
-        a0, a1, a2 = (node.field(at) for at in (bn.A0, bn.A1, bn.A2))
-        away = node.nodes[node.o + bn.AWAY] + ORACLE
-        e0, e1, e2, speed = node.field(bn.E0, 4)
+        tree = Tree(random_curve(rng, kind, 3), rng, depth)
+        c, c1, c2 = tree.values(x)
+        node = tree.node
+        a0, a1, a2 = node.a0, node.a1, node.a2
+        away = node.away + ORACLE
+        e0, e1, e2, speed = node.e0, node.e1, node.e2, node.speed
         assert np.linalg.norm(c - (a0 + a1 * d + 0.5 * a2 * d * d), axis=1).max() <= e0 + away
         assert np.linalg.norm(c1 - (a1 + a2 * d), axis=1).max() <= e1 + away
         assert np.linalg.norm(c2 - a2, axis=1).max() <= e2 + 100.0 * away
         assert np.linalg.norm(c1, axis=1).max() <= speed + away
-        assert (np.abs(c - node.field(bn.BOX_CENTER)) <= node.field(bn.BOX_HALF) + away).all()
+        assert (np.abs(c - node.box_center) <= node.box_half + away).all()
         # Remainders are of third order: an eighth at every halving, but for rounding.
         assert e0 <= 5000.0 * 0.2**depth + 1e-13
 
@@ -121,18 +116,18 @@ def test_bounds_of_pairs(kinds, depth, cases):
         # Anywhere, or near: there the distance is convex.
         shift = b.pool[CENTER : CENTER + 3] - a.pool[CENTER : CENTER + 3]
         if round_ % 2:
-            shift = a.field(bn.A0) - b.field(bn.A0) + 1e-3 * rng.normal(size=3)
+            shift = a.node.a0 - b.node.a0 + 1e-3 * rng.normal(size=3)
         shift = tuple(shift.tolist())
         (u, du, hu), (v, dv, hv) = a.values(x), b.values(x)
         d = u[:, None] - v[None] - np.array(shift)
         least = np.linalg.norm(d, axis=2).min()
-        pair = a.nodes, a.o, b.nodes, b.o, shift, SLACK
+        pair = a.node, b.node, shift, SLACK
         box = box_bound(*pair)
         model, s, t = model_bound(*pair)
-        hull = hull_bound(a.record, a.nodes, a.o, b.record, b.nodes, b.o, shift, SLACK, s, t)
+        hull = hull_bound(a.piece, b.piece, shift, SLACK, s, t)
         assert max(box, model, hull) <= least + ORACLE
         tight += max(model, hull) > 0.8 * least
-        lambdas = convexity(a.record, a.nodes, a.o, b.record, b.nodes, b.o, shift)
+        lambdas = convexity(a.node, b.node, False, shift)
         if lambdas[0] > 0.0:
             proven += 1
             ss = (du * du).sum(1)[:, None] + (d * hu[:, None]).sum(2)
@@ -218,30 +213,32 @@ SURFACES = {
 
 
 def patch_node(shape, rng, depth):
-    """Record, pool, nodes, offset of a random node, and its points with derivatives on a grid of its own parameters."""
+    """A packed shape and a random node of it as a patch."""
     record, pool = pack_patches(shape)
     patches = record[pn.PATCHES_U] * record[pn.PATCHES_V]
     stride = pn.patch_stride(record)
     nodes = np.full(stride * (patches + 2 * depth), np.nan)
     ints = np.zeros(pn.NODE_INTS * (patches + 2 * depth), dtype=np.int64)
+    tree = PieceTree(record, pool, ints, nodes)
     for k in range(patches):
-        pn.fill_patch(record, pool, ints, nodes, k)
+        pn.fill_patch(tree, k)
     k, used, m = int(rng.integers(patches)), patches, np.zeros(32)
     pn.describe_patch(record, pool, nodes, stride * k, m)
     for _ in range(depth):
-        pn.split_patch(record, pool, ints, nodes, k, used)
+        pn.split_patch(tree, k, used)
         k, used = used + int(rng.integers(2)), used + 2
         pn.describe_patch(record, pool, nodes, stride * k, m)
-    return record, pool, nodes, stride * k
+    return pool, pn.Patch(record, nodes, stride * k, pp.free_count(record))
 
 
-def grid_values(record, nodes, o, x):
+def grid_values(patch, x):
     """(len(x)^2, 3) points and derivatives u, v, uu, uv, vv."""
+    record = patch.record
     w = np.zeros(pp.BASIS + 6 * (max(record[0], record[1]) + 1))
     rows = []
     for s in x:
         for t in x if record[1] > 0 else [0.0]:
-            point = patch_derivatives(record, nodes, o, s, t, w)
+            point = patch_derivatives(patch, s, t, w)
             rows.append([*point, *w[pp.PATCH_J : pp.PATCH_J + 15]])
     return np.array(rows).reshape(-1, 6, 3)
 
@@ -251,11 +248,12 @@ def grid_values(record, nodes, o, x):
 def test_models_of_patches(name, depth):
     rng = np.random.default_rng(6)
     x = np.linspace(0.0, 1.0, 9)
-    record, _pool, nodes, o = patch_node(SURFACES[name](), rng, depth)
-    values = grid_values(record, nodes, o, x)
+    _pool, patch = patch_node(SURFACES[name](), rng, depth)
+    values = grid_values(patch, x)
     s, t = (row.ravel()[:, None] - 0.5 for row in np.meshgrid(x, x, indexing="ij"))
-    a0, ju, jv, kuu, kuv, kvv = nodes[o + pn.A0 : o + pn.A0 + 18].reshape(6, 3)
-    e0, e1, e2, speed_u, speed_v = nodes[o + pn.E0 : o + pn.E0 + 5]
+    node = pp.node_of(patch)
+    a0, (ju, jv), (kuu, kuv, kvv) = node.a0, node.ju.reshape(2, 3), node.kuu.reshape(3, 3)
+    e0, e1, e2, speed_u, speed_v = node.e0, node.e1, node.e2, node.speed_u, node.speed_v
     model = a0 + ju * s + jv * t + 0.5 * kuu * s * s + kuv * s * t + 0.5 * kvv * t * t
 
     def largest(difference):
@@ -268,7 +266,7 @@ def test_models_of_patches(name, depth):
     )
     assert max(largest(values[:, 3 + i] - k) for i, k in enumerate((kuu, kuv, kvv))) <= e2 + SLACK
     assert largest(values[:, 1]) <= speed_u and largest(values[:, 2]) <= speed_v
-    assert (np.abs(values[:, 0] - nodes[o : o + 3]) <= nodes[o + 3 : o + 6]).all()
+    assert (np.abs(values[:, 0] - node.box_center) <= node.box_half).all()
 
 
 @pytest.mark.parametrize("depth", [0, 4, 14])
@@ -281,25 +279,25 @@ def test_bounds_of_pairs_of_patches(other, depth):
         shape = {"point": lambda: 3.0 * rng.random(3), "torus": SURFACES["torus"]}.get(
             other, lambda: random_curve(rng, "quintic", 3, 3.0)
         )()
-        ra, qa, a, o = patch_node(SURFACES["bicubic" if round_ % 2 else "torus"](), rng, depth)
-        rb, qb, b, p = patch_node(shape, rng, 0 if other == "point" else depth)
-        na, nb = pp.free_count(ra), pp.free_count(rb)
+        qa, a = patch_node(SURFACES["bicubic" if round_ % 2 else "torus"](), rng, depth)
+        qb, b = patch_node(shape, rng, 0 if other == "point" else depth)
+        na, nb = a.free, b.free
         n = na + nb
         shift = qb[CENTER : CENTER + 3] - qa[CENTER : CENTER + 3]
         if round_ > 5:
-            shift = a[o + pn.A0 : o + pn.A0 + 3] - b[p + pn.A0 : p + pn.A0 + 3] + 1e-3 * rng.normal(size=3)
+            shift = pp.node_of(a).a0 - pp.node_of(b).a0 + 1e-3 * rng.normal(size=3)
         shift = tuple(shift.tolist())
-        u, v = grid_values(ra, a, o, x), grid_values(rb, b, p, x) if nb else grid_values(rb, b, p, [0.0])
+        u, v = grid_values(a, x), grid_values(b, x if nb else [0.0])
         d = u[:, None, 0] - v[None, :, 0] - np.array(shift)
         least = np.linalg.norm(d, axis=2).min()
         w = np.zeros(pp.BASIS + 100)
-        pp.load_models(a, o, na, b, p, nb, shift, w)
+        pp.load_models(a, b, shift, w)
         pp.load_hessian(w, n)
-        box = pp.patch_box_bound(a, o, b, p, shift, SLACK)
-        model = pp.patch_model_bound(a, o, b, p, SLACK, n, w)
-        hull = pp.patch_hull_bound(ra, a, o, rb, b, p, shift, SLACK, n, w)
+        box = pp.patch_box_bound(a, b, shift, SLACK)
+        model = pp.patch_model_bound(a, b, SLACK, w)
+        hull = pp.patch_hull_bound(a, b, shift, SLACK, w)
         assert max(box, model, hull) <= least + SLACK
-        if not pp.patch_convexity(a, o, na, b, p, n, w):
+        if not pp.patch_convexity(a, b, w):
             continue
         proven += 1
         floor = pp.MARGIN * np.diag(w[pp.H : pp.H + 16].reshape(4, 4)[:n, :n].diagonal())

@@ -11,29 +11,29 @@ import numpy as np
 import pytest
 
 from assembly._kernel import kernel
-from assembly._record import Store
+from assembly._record import Store, rows_of
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.shapes import solids
 from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.kinematics.motion import RelativePose
+from assembly.kinematics.motion import IDENTITY, RelativePose
 from assembly.proximity.brep.packing import pack_shell
-from assembly.proximity.brep.records import EDGE, EDGE_CURVE, EDGE_RECORD, EDGE_TABLE, EDGES, FACE, FACE_RECORD
+from assembly.proximity.brep.records import EDGE, EDGE_RECORD, FACE, FACE_RECORD, edge_at, shell_at
 from assembly.proximity.brep.topology import topology_of
 from assembly.proximity.extrema.feature_jets import edge_jet
 from assembly.proximity.features import quadratic_model as box
 from assembly.proximity.features.ball_tree import (
     CELL,
-    HAS_MODEL,
+    CELL_NODE,
     INFO,
-    KIND,
-    LEVEL,
-    RECORD,
+    BallTree,
+    cell_in,
+    cell_node_at,
     give_model,
     grow,
+    model_in,
     plant,
-    room,
 )
 from tests.geometry.splines.test_surface import random_surface
 from tests.laws.scenes import random_quaternion
@@ -59,15 +59,9 @@ def edge_points(table, pool, edge, t, out):
 
 
 @kernel
-def fill(table, pool, turn, shift, nodes, info, i, work):
-    give_model(Store(table, pool), RelativePose(turn, shift), nodes, info, i, work)
-
-
-def open_all(table, pool, shell, turn, shift, nodes, info, work):
-    used = plant(Store(table, pool), shell, RelativePose(turn, shift), nodes, info)
-    for i in range(1, used):
-        used = grow(Store(table, pool), shell, RelativePose(turn, shift), nodes, info, i, used)
-    return used
+def fill(table, pool, turn, shift, nodes, info, used, work, i):
+    tree = BallTree(0, RelativePose(turn, shift), nodes, info, used, work)
+    give_model(Store(table, pool), tree, i)
 
 
 def points_of_edge(table, pool, edge, t):
@@ -111,41 +105,47 @@ def random_box(rng, surface):
     return result
 
 
-def new_node(nodes, i, u, v):
-    nodes[i] = 0.0
-    nodes[i, box.U0], nodes[i, box.HALF_U] = u
-    nodes[i, box.V0], nodes[i, box.HALF_V] = v
-    nodes[i, box.RADIUS] = np.inf
+class OneCell:
+    """A tree of one node, a cell of a feature."""
 
+    def __init__(self, table, pool, kind, record):
+        self.store = table, pool
+        self.arrays = (
+            np.zeros((1, box.NODE)),
+            np.zeros((1, INFO), np.int64),
+            np.ones(1, np.int64),
+            np.empty((4, 16, 16)),
+        )
+        self.model = box.model_at(self.arrays[0], 0)
+        self.cell = cell_node_at(self.arrays[1], 0)
+        self.cell.level, self.cell.kind, self.cell.record = CELL, kind, record
 
-def cell_of(kind, record):
-    """What a node is: a cell of a feature, without its model."""
-    info = np.zeros((1, INFO), np.int64)
-    info[0, [LEVEL, KIND, RECORD]] = CELL, kind, record
-    return info
+    def fill(self, u, v, turn, shift):
+        """Give it its model over a box: middle and half width of u, and of v."""
+        self.arrays[0][:] = 0.0
+        (self.model.u0, self.model.half_u), (self.model.v0, self.model.half_v) = u, v
+        self.model.radius = np.inf
+        self.cell.has_model = 0
+        fill(*self.store, turn, shift, *self.arrays, 0)
 
 
 def check(rng, node, s, t, points, rounding):
     """A node against points over (s, t) in [-1, 1]^2."""
-    o, p, q, l, m, k = (
-        node[at : at + 3] for at in (box.POINT, box.LINEAR_U, box.LINEAR_V, box.SQUARE_U, box.MIXED, box.SQUARE_V)
-    )
-    center = node[box.CENTER : box.CENTER + 3]
-    assert np.linalg.norm(points - center, axis=1).max() <= node[box.RADIUS] + rounding
-    if node[box.REST] == np.inf:
+    o, p, q, l, m, k = node.point, node.linear_u, node.linear_v, node.square_u, node.mixed, node.square_v
+    assert np.linalg.norm(points - node.center, axis=1).max() <= node.radius + rounding
+    if node.rest == np.inf:
         return
-    assert np.isfinite(node).all()
+    assert all(np.isfinite(node[name]).all() for name in node.dtype.names)
     s, t = s[:, None], t[:, None]
     model = o + p * s + q * t + l * s**2 + m * s * t + k * t**2
     off = points - model
-    assert np.linalg.norm(off, axis=1).max() <= node[box.REST] + rounding
-    normal = node[box.NORMAL : box.NORMAL + 3]
-    assert np.abs(off @ normal).max() <= node[box.REST_N] + rounding
-    row = node[None]
+    assert np.linalg.norm(off, axis=1).max() <= node.rest + rounding
+    normal = node.normal
+    assert np.abs(off @ normal).max() <= node.rest_n + rounding
     for n in (*rng.normal(size=(DIRECTIONS, 3)), normal, -normal):
         if (length := np.linalg.norm(n)) > 0.0:
             n = n / length
-            assert ((points - o) @ n).max() <= box.support(row, 0, *n) + rounding
+            assert ((points - o) @ n).max() <= box.support(node, n) + rounding
 
 
 @pytest.mark.parametrize("name", SURFACES)
@@ -154,26 +154,21 @@ def test_models_of_faces_hold(name, cases):
     rng = np.random.default_rng(5)
     table, pool = surface.packed()
     # The record of a face after that of its surface, which is at 0.
-    info = cell_of(FACE, table.size)
-    table = np.append(table, np.zeros(FACE_RECORD, np.int64))
-    work = np.empty((4, 16, 16))
-    nodes = np.empty((1, box.NODE))
+    cell = OneCell(np.append(table, np.zeros(FACE_RECORD, np.int64)), pool, FACE, table.size)
     rounding = 4e-15 * (np.abs(surface.control_points).max() + 10.0)
     tight = []
     count = cases(13, 40)
     for _ in range(count):
         turn, shift = pose(rng)
         u, v = random_box(rng, surface)
-        new_node(nodes, 0, u, v)
-        info[0, HAS_MODEL] = 0
-        fill(table, pool, turn, shift, nodes, info, 0, work)
+        cell.fill(u, v, turn, shift)
         s, t = np.concatenate([rng.uniform(-1.0, 1.0, (2, 60)), [[-1, -1, 1, 1], [-1, 1, -1, 1]]], axis=1)
         (a, b), (c, d) = surface.domain
         points = surface.evaluate(np.clip(u[0] + s * u[1], a, b), np.clip(v[0] + t * v[1], c, d))
         points = points @ np.reshape(turn, (3, 3)).T + shift
-        check(rng, nodes[0], s, t, points, rounding)
-        if nodes[0, box.REST] < np.inf:
-            tight.append(nodes[0, box.REST] / nodes[0, box.RADIUS])
+        check(rng, cell.model, s, t, points, rounding)
+        if cell.model.rest < np.inf:
+            tight.append(cell.model.rest / cell.model.radius)
     assert len(tight) > count / 2
     # The law would hold for boundless models too: the remainder is of third order in the width.
     assert np.median(tight) < 0.05
@@ -183,67 +178,63 @@ def test_models_of_faces_hold(name, cases):
 def test_models_of_edges_hold(name, cases):
     rng = np.random.default_rng(6)
     table, pool, shell = pack_shell(topology_of(SOLIDS[name]), 1.0)
-    work = np.empty((4, 16, 16))
-    nodes = np.empty((1, box.NODE))
-    same, origin = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
     tight, count = [], cases(4, 10)
-    for k in range(table[shell + EDGES]):
-        edge = table[shell + EDGE_TABLE] + EDGE_RECORD * k
-        curve = table[edge + EDGE_CURVE]
+    for k in range(shell_at(table, shell).edges):
+        edge = shell_at(table, shell).edge_table + EDGE_RECORD * k
+        cell = OneCell(table, pool, EDGE, edge)
+        curve = edge_at(table, edge).curve
         breaks = pool[table[curve + 2] : table[curve + 2] + table[curve + 1] + 1]
         for _ in range(count):
             piece = rng.integers(breaks.size - 1)
             width = (breaks[piece + 1] - breaks[piece]) * 10.0 ** rng.uniform(-3.0, -0.5)
             low = rng.uniform(breaks[piece], breaks[piece + 1] - width)
-            new_node(nodes, 0, (low + 0.5 * width, 0.5 * width), (0.0, 0.0))
-            fill(table, pool, same, origin, nodes, cell_of(EDGE, edge), 0, work)
+            cell.fill((low + 0.5 * width, 0.5 * width), (0.0, 0.0), *IDENTITY)
             s = np.concatenate([rng.uniform(-1.0, 1.0, 40), [-1.0, 1.0]])
             points = points_of_edge(table, pool, edge, low + 0.5 * width * (1.0 + s))
-            check(rng, nodes[0], s, 0.0 * s, points, 1e-14)
-            if nodes[0, box.REST] < np.inf:
-                tight.append(nodes[0, box.REST] / nodes[0, box.RADIUS])
+            check(rng, cell.model, s, 0.0 * s, points, 1e-14)
+            if cell.model.rest < np.inf:
+                tight.append(cell.model.rest / cell.model.radius)
     assert len(tight) >= count and np.median(tight) < 0.05
 
 
-def tree(faces, turn, shift):
-    """All nodes of a solid's tree down to its cells, with the arrays that made them."""
+def tree(faces, pose):
+    """All nodes of a solid's tree down to its cells, and what they are of."""
     table, pool, shell = pack_shell(topology_of(faces), 1.0)
-    count = room(Store(table, pool), shell)
-    nodes, info, work = np.zeros((count, box.NODE)), np.zeros((count, INFO), np.int64), np.empty((4, 16, 16))
-    used = open_all(table, pool, shell, turn, shift, nodes, info, work)
-    return nodes[:used], info[:used], (table, pool, turn, shift, work)
+    store = Store(table, pool)
+    grown = plant(store, shell, pose)
+    for i in range(1, grown.used[0]):
+        grow(store, grown, i)
+    return store, grown
 
 
-def samples(arrays, nodes, info, i, rng):
+def samples(store, tree, i, rng):
     """Points of a node's feature over its box."""
-    table, pool, turn, shift, _ = arrays
+    cell, model = cell_in(tree, i), model_in(tree, i)
     s, t = rng.uniform(-1.0, 1.0, (2, 25))
-    u, v = nodes[i, 0] + s * nodes[i, 2], nodes[i, 1] + t * nodes[i, 3]
-    kind, record = info[i, 1], info[i, 3]
-    if kind == FACE:
-        points = [surface_point(table, pool, table[record], a, b)[0] for a, b in zip(u, v, strict=True)]
-    elif kind == EDGE:
-        points = points_of_edge(table, pool, record, u)
+    u, v = model.u0 + s * model.half_u, model.v0 + t * model.half_v
+    if cell.kind == FACE:
+        surface = store.table[cell.record]
+        points = [surface_point(*store, surface, a, b)[0] for a, b in zip(u, v, strict=True)]
+    elif cell.kind == EDGE:
+        points = points_of_edge(*store, cell.record, u)
     else:
-        return nodes[i : i + 1, box.POINT : box.POINT + 3]
-    return np.array(points) @ np.reshape(turn, (3, 3)).T + shift
+        return model.point[None]
+    return np.array(points) @ np.reshape(tree.pose.rotation, (3, 3)).T + tree.pose.shift
 
 
 @pytest.mark.parametrize("names", [("cylinder", "plate"), ("bent", "bent"), ("bent", "cylinder")])
 def test_no_samples_are_nearer_than_the_bound(names, cases):
     rng = np.random.default_rng(7)
-    same, origin = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
-    a, ai, one = tree(SOLIDS[names[0]], same, origin)
-    turn, shift = pose(rng)
-    b, bi, other = tree(SOLIDS[names[1]], turn, shift)
-    cells_a, cells_b = np.flatnonzero(ai[:, 0] == 3), np.flatnonzero(bi[:, 0] == 3)
+    trees = tree(SOLIDS[names[0]], IDENTITY), tree(SOLIDS[names[1]], RelativePose(*pose(rng)))
+    ends = [np.flatnonzero(rows_of(CELL_NODE, grown.info[: grown.used[0]]).level == CELL) for _store, grown in trees]
     useful, count = 0, cases(50, 150)
     for _ in range(count):
-        i, j = rng.choice(cells_a), rng.choice(cells_b)
-        for arrays, nodes, info, k in ((one, a, ai, i), (other, b, bi, j)):
-            fill(*arrays[:4], nodes, info, k, arrays[4])
-        bound, _n = box.pair_bound(a, i, b, j, tuple(np.eye(3)[0]), np.inf)
-        p, q = samples(one, a, ai, i, rng), samples(other, b, bi, j, rng)
+        pair = [rng.choice(some) for some in ends]
+        for (store, grown), k in zip(trees, pair, strict=True):
+            fill(*store, *grown.pose, grown.nodes, grown.info, grown.used, grown.work, k)
+        a, b = (model_in(grown, k) for (_store, grown), k in zip(trees, pair, strict=True))
+        bound, _n = box.pair_bound(a, b, tuple(np.eye(3)[0]), np.inf)
+        p, q = (samples(*one, k, rng) for one, k in zip(trees, pair, strict=True))
         nearest = np.sqrt(((p[:, None] - q) ** 2).sum(axis=2)).min()
         assert bound <= nearest + 1e-13
         useful += bound > 0.7 * nearest

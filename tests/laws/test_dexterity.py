@@ -10,7 +10,6 @@ import pytest
 from scipy.optimize import brentq
 
 import assembly as asm
-from assembly._record import Store
 from assembly.constraints.model.dexterity import MEASURES
 from assembly.constraints.program import records as layout
 from assembly.kinematics.pose import rotation_matrix
@@ -44,8 +43,7 @@ def term_at(scene, q, tracked, order=1):
     point = LoopPoint(scene, q, LoopPoint(scene, q, tracked).tracked)
     gradient = np.zeros(point.n)
     term = point.table[layout.TERM_TABLE]
-    places = (Store(point.table, point.pool), term, point.shape, point.rows, point.loose, point.room, point.point)
-    return dexterity(*places, order, gradient), gradient
+    return dexterity(point.program, term, point.rows, point.point, order, gradient), gradient
 
 
 def unknowns(scene):

@@ -11,7 +11,8 @@ from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import OFFSETS, SURFACE_RECORD
 from assembly.proximity import PairStatus, contact_jacobian, extremal_pair
-from assembly.proximity.extrema.rates import pair_derivatives
+from assembly.proximity.brep.records import FACE
+from assembly.proximity.extrema.feature_query import feature_derivatives
 from tests.laws.scenes import placed
 from tests.laws.witness import Pairs, Stack, moved
 
@@ -37,8 +38,9 @@ def rates(x, q):
     record_g = record_g.copy()
     record_g[list(OFFSETS)] += pool.size
     first, hessian = np.empty((5, 14)), np.empty((12, 12))
-    table, pool = np.concatenate([record, record_g]), np.concatenate([pool, pool_g])
-    pair_derivatives(table, pool, 0, SURFACE_RECORD, q.reshape(2, 7), tuple(x), 1.0, first, hessian)
+    store = np.concatenate([record, record_g]), np.concatenate([pool, pool_g])
+    features = (FACE, 0), (FACE, SURFACE_RECORD)
+    feature_derivatives(store, features, q.reshape(2, 7), tuple(x), (0.0, 0.0, 0.0), 1.0, first, hessian)
     return first[:4]
 
 

@@ -21,11 +21,12 @@ from assembly.distance.enclosures.enclosure import (
     PIECE,
     SPEED,
     enclose,
+    enclosed_piece_at,
     separation_along,
 )
-from assembly.distance.enclosures.gjk import APART, INSIDE, ROOM, gjk, witnesses
+from assembly.distance.enclosures.gjk import APART, INSIDE, ROOM, ConvexSet, gjk, witnesses
 from assembly.distance.enclosures.queries import BOUNDS, packed_operand
-from assembly.distance.enclosures.taylor import box_hessian, crossing_proven, taylor_bound
+from assembly.distance.enclosures.taylor import ValuesAt, box_hessian, crossing_proven, taylor_bound
 
 RNG = np.random.default_rng(1)
 KNOTS = [0, 0, 0, 0, 0.3, 0.5, 1, 1, 1, 1]
@@ -200,9 +201,10 @@ def pair_bounds(ka, ta, pa, ra, ia, kb, tb, pb, rb, ib, xa, xb, out):
         xa[FIRST_END], xa[LAST_END], xb[FIRST_END], xb[LAST_END] = 0.0, 0.0, 0.0, 0.0
         hessian = box_hessian(xa, 0, xb, 0)
         s, t = 0.5 * (ia[i, 0] + ia[i, 1]), 0.5 * (ib[i, 0] + ib[i, 1])
-        lower, convex = taylor_bound(xa, 0, xb, 0, hessian, xa, MID, s, xb, MID, t)
-        out[i, 0], out[i, 1], out[i, 2] = lower, convex, hessian[3]
-        out[i, 3] = crossing_proven(xa, 0, xb, 0, xa, MID, xb, MID)
+        a, b = enclosed_piece_at(xa, 0), enclosed_piece_at(xb, 0)
+        lower, convex = taylor_bound(a, b, hessian, ValuesAt(xa, MID, s), ValuesAt(xb, MID, t))
+        out[i, 0], out[i, 1], out[i, 2] = lower, convex, hessian.empty
+        out[i, 3] = crossing_proven(xa, 0, xb, 0)
         n = (1.0, 0.0, 0.0)
         out[i, 4] = separation_along(xa, 0, xb, 0, 0, n, AUTO)
 
@@ -279,11 +281,12 @@ def test_a_crossing_is_proven_where_there_is_one():
 @kernel
 def nearest(full, xa, ca_, wa, xb, cb, wb, first, out):
     g = np.zeros(ROOM)
-    how, v, kept = gjk(full, xa, 0, ca_, wa, xb, 0, cb, wb, (first[0], first[1], first[2]), np.inf, 1e-14, g)
+    a, b = ConvexSet(xa, 0, ca_, wa), ConvexSet(xb, 0, cb, wb)
+    how, v, kept = gjk(full, a, b, (first[0], first[1], first[2]), np.inf, 1e-14, g)
     out[0], out[1], out[2] = v
-    a, b = witnesses(g, kept)
-    out[3], out[4], out[5] = a
-    out[6], out[7], out[8] = b
+    on_a, on_b = witnesses(g, kept)
+    out[3], out[4], out[5] = on_a
+    out[6], out[7], out[8] = on_b
     return how
 
 

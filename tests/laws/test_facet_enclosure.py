@@ -21,7 +21,7 @@ from assembly.proximity import FeatureStatus, PairStatus, closest_features, extr
 from assembly.proximity.bvh.facet_check import edge_point, other_parameter
 from assembly.proximity.bvh.facet_tree import FacetTree
 from assembly.proximity.bvh.packing import pack_tree
-from assembly.proximity.bvh.tree import NODES, facing_pairs, least_distance, pairs_within, tree_distance
+from assembly.proximity.bvh.tree import facing_pairs, least_distance, pairs_within, tree_at, tree_distance
 from tests.geometry.splines.test_surface import random_surface
 
 CLIP = (Face(shapes.paper_clip()),)
@@ -81,7 +81,7 @@ class Descent:
         stack = self.stack if stack is None else stack
         out = self.out if out is None else out
         pose = tuple(turn.ravel().tolist()), tuple(shift.tolist())
-        return facing_pairs(self.table, self.pool, self.f, self.g, *pose, reach, stack, out)
+        return facing_pairs(self.table, self.pool, (self.f, self.g), *pose, reach, stack, out)
 
     def found(self, turn, shift, reach):
         count = self.pairs(turn, shift, reach)
@@ -91,7 +91,7 @@ class Descent:
     def lower(self, turn, shift, upper, stack=None):
         stack = self.stack if stack is None else stack
         pose = tuple(turn.ravel().tolist()), tuple(shift.tolist())
-        return tree_distance(self.table, self.pool, self.f, self.g, *pose, upper, stack)
+        return tree_distance(self.table, self.pool, (self.f, self.g), *pose, upper, stack)
 
 
 def elements_at(tree, feature, parameters):
@@ -315,7 +315,7 @@ def test_what_has_no_room_says_so():
     short = np.full((6, 2), -5)
     assert descent.pairs(turn, shift, 0.3, out=short[:5]) == whole
     assert (short[:5] == descent.out[:5]).all() and (short[5] == -5).all()
-    assert int(descent.table[descent.f + NODES]) == len(descent.trees[0].nodes.child)
+    assert tree_at(descent.table, descent.f).nodes == len(descent.trees[0].nodes.child)
 
 
 def test_plain_python_finds_the_same():
@@ -326,7 +326,7 @@ def test_plain_python_finds_the_same():
         (_, _, f, n), (_, _, g, m) = (sample(tree, rng) for tree in descent.trees)
         turn, shift = placed(rng, f, n, g, m, rng.uniform(-0.1, 0.1))
         pose = RelativePose(tuple(turn.ravel().tolist()), tuple(shift.tolist()))
-        arrays = Store(descent.table, descent.pool), descent.f, descent.g
+        arrays = Store(descent.table, descent.pool), (descent.f, descent.g)
         # An inner kernel is plain Python when it is called from Python.
         count = pairs_within(*arrays, pose, 0.2, descent.stack, room)
         assert {tuple(row) for row in room[:count].tolist()} == descent.found(turn, shift, 0.2)

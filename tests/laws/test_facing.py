@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 from assembly._record import Store
 from assembly.geometry.vec import quaternion_matrix
 from assembly.kinematics.motion import RelativePose
-from assembly.proximity.bvh.tree import magnitudes
+from assembly.proximity.bvh.tree import view_of
 from assembly.proximity.manager.candidates import element_distance
+from tests.laws.scenes import posed
 from tests.laws.test_facet_enclosure import BODIES, Descent, placed, sample
 
 POINTS = 7
@@ -38,15 +39,15 @@ def test_patches_are_no_nearer_than_they_are_said_to_be(names, cases):
         turn, shift = placed(rng, f, n, g, m, rng.uniform(-0.25, 0.25))
         e = Rotation.from_matrix(turn).as_quat(scalar_first=True)
         there, shift = quaternion_matrix(*e), np.array(shift)
-        bulk = magnitudes(there)
         pairs = sorted(descent.found(turn, shift, REACH))
         for i, j in (pairs[k] for k in rng.integers(0, len(pairs), min(40, len(pairs)))):
             p, q = points_of(descent.trees[0], i), points_of(descent.trees[1], j)
             if p is None or q is None:
                 continue
             q = q @ turn.T + shift
-            trees, at = (descent.f, descent.g), tuple(shift.tolist())
-            distance = element_distance(Store(descent.table, descent.pool), trees, RelativePose(there, at), bulk, i, j)
+            at = tuple(shift.tolist())
+            pair = posed(Store(descent.table, descent.pool), there, at, trees=(descent.f, descent.g))
+            distance = element_distance(pair, view_of(RelativePose(there, at)), i, j)
             nearest = np.linalg.norm(p[:, None] - q, axis=2).min()
             if np.isfinite(distance):
                 # Points of nets are no nearer than the patches are; rounding of lengths of order one.

@@ -21,9 +21,20 @@ from assembly.proximity import (
     extremal_curve_pair,
 )
 from assembly.proximity.brep.records import EDGE, EDGE_POINT, FACE, FACE_POINT, VERTEX
-from assembly.proximity.extrema.feature_query import GAP, NORMAL, POINT_F, POINT_G, PROPER
 from tests.laws.curve_witness import CurveStack, SurfaceCurve, errata_jacobian
-from tests.laws.feature_scenes import Feature, Packed, place, plane_curve, random_feature, space_curve
+from tests.laws.feature_scenes import (
+    GAP,
+    NORMAL,
+    POINT_F,
+    POINT_G,
+    PROPER,
+    Feature,
+    Packed,
+    place,
+    plane_curve,
+    random_feature,
+    space_curve,
+)
 from tests.laws.scenes import dome, inside, quadratic, random_gap
 from tests.laws.witness import OFFSETS, SLOPE, Stack, moved, product, rotated
 

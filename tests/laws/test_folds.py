@@ -8,28 +8,30 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly._record import Store
-from assembly.constraints.program.records import FREE_COLUMN, ROWS, WATCH, Iterate
+from assembly._record import Store, rows_of
+from assembly.constraints.program.records import FREE_COLUMN, ROWS, WATCH, Iterate, LiftedPairs
 from assembly.geometry.splines.evaluate import SURFACE_RECORD
 from assembly.kinematics.motion import RelativePose, relative_pose, rotation
 from assembly.proximity.extrema.face_face import SINGULAR, solve_pair
-from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS, free_rows
+from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS, LiftedPair, free_rows
 from assembly.proximity.extrema.pairs import _key, _packed, as_face, extremal_pair
 from assembly.proximity.extrema.singular import fold_beyond
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, PAIR_GAP, TRACK
 from assembly.proximity.manager import extrema as roots
 from assembly.proximity.manager import motion_bounds as allowances
-from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import records as watch_memory
 from assembly.proximity.manager import update as watch
 from assembly.proximity.manager.motion_bounds import MotionBall, allow_ball, mover
+from assembly.proximity.manager.slots import keep_slots_of_given
 from assembly.solve.loop.clearances import place_clearance_rows, update_again, update_around
 from assembly.solve.loop.violation import untouched
+from assembly.solve.loop.workspace import new_rows
 from benchmarks.center_lines import torus_wire
 from benchmarks.running import example
 from benchmarks.scenes import MAJOR, MINOR
 from benchmarks.watching import Watch
 from benchmarks.wire_oracle import WireOracle
-from tests.laws.scenes import posed
+from tests.laws.scenes import list_of, posed
 
 IDENTITY = [1.0, 0.0, 0.0, 0.0]
 
@@ -53,7 +55,8 @@ def test_what_a_gap_gains_by_tangency():
     for size in (1e-3, 1e-4):
         for _ in range(20):
             x = tuple(pair.parameters + size * rng.normal(size=4))
-            free_rows(Store(table, pool), 0, SURFACE_RECORD, 0, 1, q, x, (1.0,) * 4, work, residual, jacobian, 0, 1)
+            lifted = LiftedPair((0, SURFACE_RECORD), (0, 1), x, (1.0,) * 4)
+            free_rows(Store(table, pool), lifted, q, work, residual, jacobian, 0, 1)
             gained = untouched(residual, jacobian, 0, 1, square)
             # The next order is smaller by the step, times third derivatives of some tens.
             assert gained == pytest.approx(2.0 * abs(pair.gap - residual[0]), rel=60.0 * size, abs=1e-15)
@@ -66,11 +69,11 @@ def test_what_a_gap_gains_by_tangency():
 def root_at(table, pool, q, start):
     """A root, and the posed pair it is of."""
     turn, shift = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
-    pair = posed(turn, shift, surfaces=(0, SURFACE_RECORD))
+    pair = posed(Store(table, pool), turn, shift, surfaces=(0, SURFACE_RECORD))
     out = np.full((1, roots.ROOT), np.nan)
-    assert roots.surfaces_extremum(Store(table, pool), pair, tuple(start), out, 0) != roots.NOTHING
-    assert np.isnan(out[0, roots.EXTREMUM_BEYOND])
-    return pair, out[0]
+    assert roots.surfaces_extremum(pair, tuple(start), roots.extremum_at(out, 0)) != roots.NOTHING
+    assert np.isnan(roots.extremum_at(out, 0).beyond)
+    return pair, roots.extremum_at(out, 0)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -93,7 +96,7 @@ def test_a_fold_beyond_a_knot_line_is_that_of_the_pair_there(side):
         q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [*(ring[1] + 0.1 * outward + along_line), *IDENTITY]])
         near_pair, root = root_at(table, pool, q, extremal_pair(clip, q[0], ball, q[1]).parameters)
         near = (0.05, -1.0, -1.0, -1.0)  # no other knot lines
-        folds.append((root[roots.EXTREMUM_FOLD], fold_beyond(Store(table, pool), near_pair, tuple(root[:4]), near)))
+        folds.append((root.fold, fold_beyond(Store(table, pool), near_pair, tuple(root.parameters), near)))
     (here, beyond), (there, behind) = folds
     assert abs(here - there) > 0.05
     # The two places are 2e-6 apart, where curvatures change by some hundreds a unit.
@@ -116,9 +119,8 @@ def test_a_valley_of_fourth_order_is_a_pair_after_few_steps():
     identity = rotation(np.array([[0.0, 0.0, 0.0, *IDENTITY]]), 0)
     for start in (0.3, 0.02):
         x = (start, 0.1, start, 0.1)
-        found = solve_pair(
-            Store(table, pool), 0, SURFACE_RECORD, RelativePose(identity, (0.0, 0.0, 0.01)), x, 1.0, np.inf, 0.0, False
-        )
+        pose = RelativePose(identity, (0.0, 0.0, 0.01))
+        found = solve_pair(Store(table, pool), (0, SURFACE_RECORD), pose, x, 1.0, np.inf, 0.0, False)
         assert found.status == SINGULAR
         # x^4 where the slope 4 x^3 is 1e-9.
         assert found.frame.gap == pytest.approx(0.01, abs=2e-13)
@@ -131,39 +133,39 @@ def test_a_given_contact_goes_from_a_saddle_to_the_nearest_minimum(swapped, list
     packed = chain_under_watch()[1]
     table = packed.table.copy()
     watch, pair = int(table[WATCH]), 1
-    at = table[watch + watch_memory.PAIR_TABLE] + watch_memory.PAIR_RECORD * pair
-    given = table[at + watch_memory.GIVEN]
-    assert table[at + watch_memory.GIVEN_COUNT] == 1
+    record = watch_memory.pair_in(table, watch, pair)
+    given = record.given
+    assert record.given_count == 1
     table[given + 1] = swapped
-    row, place = table[given], table[at + watch_memory.LOW]
+    row, place = table[given], record.low
     memory = packed.new_state()[packed.memory_at :].copy()
     places = watch_memory.memory_places(table, watch)[1]
-    tracked = np.zeros((row + place + int(table[watch + watch_memory.FIRST]) + 30, TRACK))
+    tracked = np.zeros((row + place + int(watch_memory.manager_at(table, watch).first) + 30, TRACK))
     found = np.zeros((3, roots.ROOT))
-    found[:, roots.EXTREMUM_BEYOND] = np.nan
-    found[:, roots.EXTREMUM_FOLD] = -1e-4, 2e-4, 1e-4
-    found[:, roots.GAP] = 0.0, -2e-10, -1e-10
-    found[:, roots.POINT_F] = 0.0, 0.02, 0.01
+    extrema = rows_of(roots.EXTREMUM, found)
+    extrema.beyond, extrema.fold, extrema.gap = np.nan, (-1e-4, 2e-4, 1e-4), (0.0, -2e-10, -1e-10)
+    extrema.point_f[:, 0] = 0.0, 0.02, 0.01
     found[:, :4] = np.arange(12.0).reshape(3, 4)
-    found[:, roots.ORIGIN] = roots.GIVEN_CONTACT, roots.NEW, place if listed else roots.NEW
+    extrema.origin = roots.GIVEN_CONTACT, roots.NEW, place if listed else roots.NEW
     if listed:
         memory[places + watch_memory.PLACE_MEMORY * place] = pair
         memory[places + watch_memory.PLACE_MEMORY * place + watch_memory.PLACE_NUMBER] = 7.0
-    watch_memory.keep_slots_of_given(table, watch, memory, pair, found, 3, tracked)
+    manager = watch_memory.ContactManager(Store(table, packed.pool), watch, memory)
+    keep_slots_of_given(manager, pair, list_of(found, 3), tracked)
     expected = [8.0, 9.0, 10.0, 11.0]
     assert tracked[row, :4].tolist() == (expected[2:] + expected[:2] if swapped else expected)
     assert tracked[row, PAIR_GAP] == -1e-10
-    assert found[:, roots.ORIGIN].tolist() == [roots.USELESS, roots.NEW, roots.GIVEN_CONTACT]
+    assert extrema.origin.tolist() == [roots.USELESS, roots.NEW, roots.GIVEN_CONTACT]
     assert memory[watch_memory.EVENT_COUNT] == 1.0
     if listed:
         assert memory[places + watch_memory.PLACE_MEMORY * place] == -1.0
     # A minimum far below is another contact, and one that is a minimum stays.
     for gap, fold in ((-1e-3, -1e-4), (0.0, 1e-4)):
-        found[:, roots.ORIGIN] = roots.GIVEN_CONTACT, roots.NEW, roots.USELESS
-        found[0, roots.EXTREMUM_FOLD], found[1, roots.GAP] = fold, gap
+        extrema.origin = roots.GIVEN_CONTACT, roots.NEW, roots.USELESS
+        extrema.fold[0], extrema.gap[1] = fold, gap
         before = tracked.copy()
-        watch_memory.keep_slots_of_given(table, watch, memory, pair, found, 3, tracked)
-        assert np.array_equal(before, tracked, equal_nan=True) and found[0, roots.ORIGIN] == roots.GIVEN_CONTACT
+        keep_slots_of_given(manager, pair, list_of(found, 3), tracked)
+        assert np.array_equal(before, tracked, equal_nan=True) and extrema.origin[0] == roots.GIVEN_CONTACT
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-9, 1e-3, 0.2])
@@ -178,21 +180,15 @@ def test_a_given_contact_stands_only_for_the_root_it_is_at(off, swapped):
     tracked[0, :4] = np.roll(pair.parameters + [off, 0.0, 0.0, 0.0], 2 * swapped)
     listed = len(table)
     found = np.full((4, roots.ROOT), np.nan)
-    count = roots.add_given(
-        Store(np.append(table, [0, swapped, 0, -1, -1, -1, -1]), pool),
-        near_pair,
-        tracked,
-        listed,
-        1,
-        1e-6,
-        found,
-        (found, found),
-    )
+    near_pair = near_pair._replace(store=Store(np.append(table, [0, swapped, 0, -1, -1, -1, -1]), pool))
+    extrema = list_of(found, 0)
+    roots.add_given(near_pair, tracked, listed, 1, 1e-6, extrema)
+    count = extrema.count[0]
     # A parameter of the ellipsoid is some tenth of a length long.
     assert count == (off < 1e-6)
     if count:
-        assert found[0, roots.ORIGIN] == roots.GIVEN_CONTACT
-        assert np.allclose(found[0, :4], root[:4], atol=1e-9)
+        assert roots.extremum_at(found, 0).origin == roots.GIVEN_CONTACT
+        assert np.allclose(found[0, :4], root.parameters, atol=1e-9)
 
 
 @pytest.mark.parametrize(("reach", "depth"), [(0.05, 1.2 * MINOR), (0.005, 0.25 * MINOR)])
@@ -235,7 +231,8 @@ def test_a_free_contact_of_a_clearance_goes_to_its_extremum_if_it_is_off_it(off)
     tracked, free = np.full((packed.tracked, TRACK), np.nan), np.full(rows, -1)
     point = Iterate(q, tracked, np.zeros((rows, CONTACT_RECORD)), np.zeros(rows), None)
     assert update_around(Store(table, packed.pool), memory, point, watch.EVERYTHING)
-    place_clearance_rows(table, memory, point, np.zeros(rows), np.zeros(rows), free, True)
+    lifted = LiftedPairs(free, None, None, None, np.empty_like(tracked), memory)
+    place_clearance_rows(table, lifted, point, new_rows(rows, 1.0), True)
     row = int(np.flatnonzero(~np.isnan(tracked[:, 0]))[0])
     extremum = tracked[row].copy()
     free[row] = 0
@@ -243,7 +240,7 @@ def test_a_free_contact_of_a_clearance_goes_to_its_extremum_if_it_is_off_it(off)
     q[1, 0] += 1e-15
     tracked[row, :4] += off
     moved = tracked[row].copy()
-    changed = update_again(Store(table, packed.pool), memory, point, watch.EVERYTHING, free, np.empty_like(tracked))
+    changed = update_again(Store(table, packed.pool), lifted, point, watch.EVERYTHING)
     assert changed == (off > 1e-6)
     assert np.array_equal(tracked[row], moved) if off < 1e-6 else np.abs(tracked[row, :4] - extremum[:4]).max() < 1e-9
 
@@ -276,9 +273,9 @@ class Clips:
 
     def looked(self, how):
         """How many pairs a look looks at."""
-        before = self.memory[watch_memory.LOOKS]
+        before = watch_memory.memory_header_at(self.memory, 0).looks
         watch.update(self.table, self.pool, self.table[WATCH], self.memory, self.q, self.tracked, how)
-        return self.memory[watch_memory.LOOKS] - before
+        return watch_memory.memory_header_at(self.memory, 0).looks - before
 
 
 def test_the_last_look_asks_of_every_pair_whether_it_crosses():
@@ -309,15 +306,15 @@ def test_pairs_are_looked_at_that_need_it(by_spines, part, as_needed, in_turns, 
         clips = Clips()
         table, watch_at = clips.table, clips.table[WATCH]
         if not by_spines:
-            first = int(table[watch_at + watch_memory.PAIR_TABLE])
-            table[first + watch_memory.CENTERLINE_F :: watch_memory.PAIR_RECORD][: clips.count] = -1
+            for p in range(clips.count):
+                watch_memory.pair_in(table, watch_at, p).spine_f = -1
         assert clips.looked(how) == clips.count == 3
         clips.pairs[:, watch_memory.ALLOWANCE] = 1e-3
         for p in range(clips.count):
             # A ball of no size: it goes where the body's origin does.
-            at = watch_memory.MEMORY_HEADER + watch_memory.PAIR_MEMORY * p
-            origin = (0.0, 0.0, 0.0)
-            place = mover(table, watch_at, p, clips.q).shift
-            allow_ball(clips.memory, at, MotionBall(origin, place, 0.0), np.inf, allowances.STILL * 1e-3)
+            manager = watch_memory.ContactManager(Store(table, clips.pool), watch_at, clips.memory)
+            place = mover(watch_memory.pair_of(manager, p), clips.q).shift
+            ball = MotionBall((0.0, 0.0, 0.0), place, 0.0)
+            allow_ball(watch_memory.pair_state_of(manager, p), ball, np.inf, allowances.STILL * 1e-3)
         clips.q[1, 2] += 1e-3 * part
         assert clips.looked(how) == count

@@ -11,6 +11,7 @@ from assembly.distance.patches import formula_nodes as fn
 from assembly.distance.patches import nodes as pn
 from assembly.distance.patches import pair as pp
 from assembly.distance.patches.formula_packing import pack_formula
+from assembly.distance.piece_search import PieceTree
 from assembly.geometry.expression import formula
 from assembly.geometry.splines.bezier_pieces import CENTER, ERROR, REACH
 
@@ -38,10 +39,11 @@ def described(curve, rng, depth):
     record, pool, full = packed(curve)
     nodes = np.full(pn.patch_stride(record) * (2 * depth + 1), np.nan)
     ints = np.zeros(pn.NODE_INTS * (2 * depth + 1), dtype=np.int64)
-    fn.start_formula(full, record, ints, nodes)
+    tree = PieceTree(record, pool, ints, nodes)
+    fn.start_formula(full, tree)
     k, used, side = 0, 1, int(rng.integers(3))
     for _ in range(depth):
-        fn.split_formula(record, ints, nodes, k, used)
+        fn.split_formula(tree, k, used)
         # To either end, or anywhere.
         k, used = used + (side if side < 2 else int(rng.integers(2))), used + 2
     o = pn.patch_stride(record) * k
@@ -120,7 +122,7 @@ def test_pieces_that_count_as_points(curve):
     dots = 0
     for exponent in rng.uniform(-14.0, -2.0, 60):
         t0, t1 = np.clip(10.0**exponent * np.array([-rng.random(), rng.random()]), *curve.domain)
-        fn.set_interval(record, ints, nodes, 0, t0, t1)
+        fn.set_interval(PieceTree(record, pool, ints, nodes), 0, t0, t1)
         with np.errstate(all="ignore"):
             fn.describe_formula(full, 1e-5, nodes, 0, np.zeros(42))
         e0 = nodes[pn.E0]

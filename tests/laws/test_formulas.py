@@ -13,7 +13,7 @@ import pytest
 from assembly._record import Store
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
-from assembly.geometry.splines.evaluate import POLES
+from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.splines.pole import pole_frame
 from assembly.kinematics.pose import angular_velocity_map, multiply, rotation_matrix, skew
 from assembly.proximity import gap_hessian
@@ -344,7 +344,7 @@ def test_the_frame_at_a_pole(surface, curvatures, reverse):
     """To third order on the surface, and to second along it, where S_vv has a part along S_v."""
     face = Face(surface, reversed=reverse)
     record, pool = face.packed()
-    edges = [edge for edge in (1, 2, 4, 8) if record[POLES] & edge]
+    edges = [edge for edge in (1, 2, 4, 8) if surface_at(record, 0).poles & edge]
     assert len(edges) == 2
     for edge in edges:
         across = 0 if edge <= 2 else 1

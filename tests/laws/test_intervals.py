@@ -233,7 +233,7 @@ def test_plain_doubles_never_undercut_a_closed_form(name):
         domain,
         lambda t0, t1: ca.sqrt((t1 - t0) * (antiderivative(t1, ca) - antiderivative(t0, ca))),
     )
-    assert curve.packed()[0][formula.ARC_PLAIN]
+    assert formula.formula_at(curve.packed()[0], 0).arc_plain
     rng = np.random.default_rng(7)
     t0 = rng.uniform(*domain, 100_000)
     # Short ones too: there the difference of the antiderivatives is nothing but rounding.
@@ -260,7 +260,7 @@ def test_many_arcs_as_one_by_one(count):
 
 def test_what_has_no_bound_of_rounding_is_computed_on_intervals():
     curve = asm.FormulaCurve(ca.vertcat(T, T), T, (0.0, 1.0), lambda t0, t1: 2.0 * ca.tanh(t1 - t0))
-    assert not curve.packed()[0][formula.ARC_PLAIN]
+    assert not formula.formula_at(curve.packed()[0], 0).arc_plain
     assert 2.0 * np.tanh(0.25) <= curve.arc_lengths(np.array([0.5]), np.array([0.75]))[0] < 2.0 * np.tanh(0.25) + 1e-14
 
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import records as watch_memory
 from benchmarks.center_lines import paper_clip_wire
 from benchmarks.motions import FLAT, PAIRS, SAME, SHAPES, Errors, compared, wander
 from benchmarks.watching import Watch

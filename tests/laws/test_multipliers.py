@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from assembly.solve.loop.multipliers import EXCHANGES, NEAR, ROUNDS, leave_out, predict_active_set, pushing_multipliers
+from assembly._record import Store
+from assembly.constraints.program.records import Iterate, Program
+from assembly.solve.loop.multipliers import leave_out, predict_active_set, pushing_multipliers
+from assembly.solve.loop.parameters import EXCHANGES, NEAR, ROUNDS
 from assembly.solve.loop.residuals import Structure
+from assembly.solve.loop.workspace import Directions, System, new_rows
 
 
 def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES):
@@ -17,11 +21,12 @@ def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES
     wide[:, :6] = jacobian
     bases = np.tile([0, -1, -1], (rows, 1))
     of_rows = np.arange(rows), np.full(rows, rows - 1)
-    y, active = np.full(rows, np.nan), active.copy()
-    gram, scratch = np.zeros((rows + 1, rows)), np.zeros(6)
-    shape = Structure(bases, one_sided, None, of_rows)
-    pushing_multipliers(shape, rows, residual, wide, active, exchanges, ROUNDS, gradient, scratch, gram, y)
-    return y, active > 0.0
+    given = new_rows(rows, 1.0)._replace(active=active.copy(), gram=np.zeros((rows + 1, rows)))
+    system = System(gradient, Directions(np.zeros(6), None, None), None, None)
+    shape, point = Structure(bases, one_sided, None, of_rows), Iterate(None, None, None, residual, wide)
+    y = np.full(rows, np.nan)
+    pushing_multipliers(shape, point, given, system, exchanges, ROUNDS, y)
+    return y, given.active > 0.0
 
 
 @pytest.mark.parametrize("rank", [2, 3, 6])
@@ -73,12 +78,12 @@ def test_rows_are_foreseen_until_they_agree_and_left_out_again():
         wide = np.zeros((rows, 18))
         wide[:, :6] = rng.normal(size=(rows, 6))
         shape = Structure(np.tile([0, -1, -1], (rows, 1)), np.ones(rows, dtype=np.int64), None, None)
-        residual, y, gradient = rng.uniform(0.01, 1.0, rows), np.zeros(rows), rng.normal(size=6)
-        active, foreseen, descent = np.zeros(rows), np.zeros(rows), -gradient
-        given = (rows, residual, wide, y, mu)
-        step = descent.copy()
+        residual, gradient = rng.uniform(0.01, 1.0, rows), rng.normal(size=6)
+        given, descent, step = new_rows(rows, mu), -gradient, -gradient
+        program, point = Program(Store(table, None), shape, None, None, None), Iterate(None, None, None, residual, wide)
+        system = System(gradient, Directions(descent, step, None), None, None)
         for count in range(100):
-            if predict_active_set(table, shape, *given, step, False, active, foreseen, descent, None) == 0:
+            if predict_active_set(program, point, given, system, False) == 0:
                 rounds.append(count)
                 # The least of |d|^2 / 2 + g.d + sum min(c + J d, 0)^2 / 2 mu, and so downhill all the way.
                 below = np.minimum(residual + wide[:, :6] @ step, 0.0)
@@ -86,10 +91,10 @@ def test_rows_are_foreseen_until_they_agree_and_left_out_again():
                 assert abs(slope).max() < 1e-12 / mu
                 assert gradient @ step < 0.0
                 break
-            pushing = wide[foreseen == 1.0, :6]
-            step = np.linalg.solve(np.eye(6) + pushing.T @ pushing / mu, descent)
-        leave_out(shape, rows, residual, wide, y, mu, False, active, foreseen, descent, None)
-        assert not foreseen.any() and not active.any()
+            pushing = wide[given.foreseen == 1.0, :6]
+            step[:] = np.linalg.solve(np.eye(6) + pushing.T @ pushing / mu, descent)
+        leave_out(shape, point, given, system, False)
+        assert not given.foreseen.any() and not given.active.any()
         # Added and taken off again: rounding of c / mu.
         assert abs(descent + gradient).max() < 1e-15 * 1e2 / mu
     # Some take more rounds than the loop once allowed, and some change places for ever.

@@ -13,10 +13,11 @@ from assembly.constraints.program.evaluate import evaluate
 from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, IDLE, PAIR_GAP, SLACK, TRACK
 from assembly.proximity.manager import update as watch
-from assembly.proximity.manager.state import PAIR_MEMORY, REACH, memory_places
+from assembly.proximity.manager.records import PAIR_MEMORY, REACH, memory_places
 from assembly.solve.loop.clearances import place_clearance_rows
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import arrange, move, record_of_blocks
+from assembly.solve.loop.workspace import new_rows
 from tests.laws.loop_point import room_of_shape
 
 SHAPES = {
@@ -54,7 +55,8 @@ class Near:
         pairs, places, _ = memory_places(table, table[layout.WATCH])
         self.memory[pairs:places].reshape(-1, PAIR_MEMORY)[:, REACH] = 1.0
         watch.update(table, pool, table[layout.WATCH], self.memory, q, self.here.tracked, watch.EVERYTHING)
-        place_clearance_rows(table, self.memory, self.here, np.zeros(rows), np.zeros(rows), self.free, True)
+        self.program = layout.Program(Store(table, pool), self.shape, self.loose, self.room, None)
+        place_clearance_rows(table, self.loose, self.here, new_rows(rows, 1.0), True)
         arrange(table, self.free, self.shape, rows, self.n)
         self.rows = rows
         self.exactly(self.here)
@@ -68,7 +70,7 @@ class Near:
     def exactly(self, point):
         """Every row by its pair."""
         start = point.tracked.copy()
-        return evaluate(Store(self.table, self.pool), start, np.inf, self.loose, self.room, point) < 0
+        return evaluate(self.program, start, np.inf, point) < 0
 
     def step(self, d):
         """The point that a step leads to, as the loop evaluates it, and which rows it took as open."""
@@ -76,7 +78,7 @@ class Near:
         move(self.table, self.here.q, d, 1.0, trial.q)
         predict_pairs(Store(self.table, self.pool), self.shape.bases, self.loose, self.here, trial, d, 1.0)
         idle = self.loose.guess[:, IDLE] == 1.0
-        found = evaluate(Store(self.table, self.pool), self.loose.guess, np.inf, self.loose, self.room, trial) < 0
+        found = evaluate(self.program, self.loose.guess, np.inf, trial) < 0
         return trial, idle, found
 
 

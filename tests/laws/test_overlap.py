@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.constraints.program import records as layout
 from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
-from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import records as watch_memory
 from assembly.proximity.manager import update as watch
 from benchmarks.center_lines import ball_wire, paper_clip_wire, torus_wire
 from benchmarks.wire_oracle import WireOracle

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from assembly._record import Store
 from assembly.geometry.vec import quaternion_matrix
 from assembly.kinematics.motion import RelativePose
-from assembly.proximity.bvh.neighbor_list import COUNT, LIST_INTS, OWNER, listed_pairs
-from assembly.proximity.bvh.tree import CENTER, NODE_POOL, RADIUS, pairs_within
+from assembly.proximity.bvh.neighbor_list import LIST_INTS, ListKey, listed_pairs, neighbor_list_at
+from assembly.proximity.bvh.tree import pairs_within, tree_node
 from assembly.proximity.manager.motion_bounds import Mover
 from tests.laws.test_facet_enclosure import BODIES, Descent, placed, sample
 
@@ -24,11 +24,11 @@ def inverse(turn, shift):
 
 def around(rng, descent, tree, turn, shift):
     """A pose at which no point of a body's ball is farther than RING from where it is at this one."""
-    root = descent.table[tree + NODE_POOL]
-    middle = descent.pool[root + CENTER : root + CENTER + 3]
+    root = tree_node(Store(descent.table, descent.pool), tree, 0)
+    middle = root.center
     share = rng.uniform(0.0, 1.0)
     # A turn by an angle a moves what is at a distance r by a r at most.
-    angle = share * RING / descent.pool[root + RADIUS]
+    angle = share * RING / root.radius
     axis, way = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
     turned = Rotation.from_rotvec(angle * axis).as_matrix() @ turn
     return turned, turn @ middle + shift - turned @ middle + (1.0 - share) * RING * way
@@ -46,7 +46,7 @@ def test_a_list_has_what_is_in_reach_at_poses_near_its_own(names, side):
     for _ in range(2):
         (_, _, f, n), (_, _, g, m) = (sample(tree, rng) for tree in descent.trees)
         pose = placed(rng, f, n, g, m, rng.uniform(0.0, 0.5 * REACH))
-        table[at + OWNER] = -1
+        neighbor_list_at(table, at).owner = -1
         for k in range(4):
             trees = descent.f, descent.g
             # The motion of f is measured seen from g, that of g seen from f.
@@ -57,14 +57,13 @@ def test_a_list_has_what_is_in_reach_at_poses_near_its_own(names, side):
             turn, shift = seen if side == 1 else inverse(*seen)
             there = RelativePose(tuple(turn.ravel().tolist()), tuple(shift.tolist()))
             before = table[at:].copy()
-            count = listed_pairs(
-                Store(table, pool), at, 0, trees, there, moving, REACH, 1.01 * RING, descent.stack, room
-            )
+            key = ListKey(at, 0, moving)
+            count = listed_pairs(Store(table, pool), key, trees, there, REACH, 1.01 * RING, descent.stack, room)
             if count < 0:
-                assert table[at + COUNT] == -1
+                assert neighbor_list_at(table, at).count == -1
                 break
             listed = {tuple(row) for row in room[:count].tolist()}
-            count = pairs_within(Store(table, pool), *trees, there, REACH, descent.stack, room)
+            count = pairs_within(Store(table, pool), trees, there, REACH, descent.stack, room)
             assert {tuple(row) for row in room[:count].tolist()} <= listed
             sifted += len(listed)
             kept += int(k > 0 and (before == table[at:]).all())

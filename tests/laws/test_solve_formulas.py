@@ -12,9 +12,17 @@ from assembly.constraints.program.records import Sparsity
 from assembly.geometry.splines.evaluate import SURFACE_RECORD
 from assembly.kinematics.pose import multiply, retract, rotation_matrix, skew
 from assembly.proximity import gap_hessian
-from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS, coordinate_lengths, free_hessian, free_rows
+from assembly.proximity.extrema.lifted_pair import (
+    VARIABLES,
+    VECTORS,
+    LiftedPair,
+    coordinate_lengths,
+    free_hessian,
+    free_rows,
+)
 from assembly.proximity.extrema.pairs import _packed
 from assembly.solve.loop.residuals import merit
+from assembly.solve.loop.workspace import new_rows
 from tests.laws.test_formulas import Local
 from tests.laws.witness import OFFSETS, SLOPE
 
@@ -46,14 +54,14 @@ class FreePair:
         """Rows (5,) and their gradients (5, 16)."""
         q, x = self.at(step)
         residual, jacobian = np.empty(5), np.empty((5, VARIABLES))
-        places = (0, SURFACE_RECORD, 0, 1, q, tuple(x), tuple(self.lengths), self.work)
-        free_rows(Store(self.table, self.pool), *places, residual, jacobian, 0, 1)
+        pair = LiftedPair((0, SURFACE_RECORD), (0, 1), tuple(x), tuple(self.lengths))
+        free_rows(Store(self.table, self.pool), pair, q, self.work, residual, jacobian, 0, 1)
         return residual, jacobian
 
     def hessian(self, y):
         out = np.empty((VARIABLES, VARIABLES))
-        places = (0, SURFACE_RECORD, 0, 1, self.q, tuple(self.x), tuple(self.lengths), tuple(y), self.work)
-        free_hessian(Store(self.table, self.pool), *places, out)
+        pair = LiftedPair((0, SURFACE_RECORD), (0, 1), tuple(self.x), tuple(self.lengths))
+        free_hessian(Store(self.table, self.pool), pair, self.q, tuple(y), self.work, out)
         return out
 
 
@@ -231,11 +239,13 @@ def test_the_slope_of_the_augmented_lagrangian_is_the_first_order_multiplier(one
         force = y[0] + c[0] / mu
         idle = one_sided == 1 and force >= 0.0
         expected = -0.5 * mu * y[0] ** 2 if idle else y[0] * c[0] + 0.5 * c[0] ** 2 / mu
-        assert merit(c, side, 1, y, mu) == pytest.approx(expected, rel=1e-14, abs=1e-14)
+        rows = new_rows(1, mu)
+        rows.y[:] = y
+        assert merit(c, side, rows) == pytest.approx(expected, rel=1e-14, abs=1e-14)
         # Quadratic on either side of its switch, so central differences are exact there but for rounding.
         h = 1e-4
         if abs(force) > 2.0 * h / mu:
-            slope = (merit(c + h, side, 1, y, mu) - merit(c - h, side, 1, y, mu)) / (2.0 * h)
+            slope = (merit(c + h, side, rows) - merit(c - h, side, rows)) / (2.0 * h)
             assert slope == pytest.approx(0.0 if idle else force, abs=1e-8 / mu)
 
 

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly._record import Store
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.envelope import clear_upper, place_folds
 from assembly.solve.linear_algebra.factorize import factorize_shifted, forward_step, solve_step
 from assembly.solve.loop.multipliers import curve_rows, toward_rows
 from assembly.solve.loop.residuals import Structure, arrange
+from assembly.solve.loop.workspace import new_rows, unknowns
 from tests.laws.loop_point import room_of_shape
 
 
@@ -123,14 +125,24 @@ def test_the_way_back_onto_rows_breaks_no_idle_ones():
     places = np.array([np.full(6, 5), np.arange(6), np.full(6, 5)])
     order = layout.Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
     shape = Structure(bases, np.ones(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
-    residual, active, mu = np.array([-1e-3, 0.0]), np.empty(rows), 1e-6
-    matrices, out = np.empty((2, 6, 6)), np.empty(6)
-    forces = np.empty(rows)
-    toward_rows(shape, 2, rows, residual, jacobian, mu, active, 1e-6, 0.0, matrices[0], matrices[1], 6, forces, out)
+    given, system = new_rows(rows, 1e-6), unknowns(6, order)
+    toward_rows(program_of(shape, rows), point_of([-1e-3, 0.0], jacobian), given, system, 1e-6, 0.0)
+    out, active = system.directions.step, given.active
     # The square of the step, weighed with 1e-6 against a million times that of the rows, leaves 1e-12 of them.
     np.testing.assert_allclose(jacobian[:, :6] @ out, [1e-3, 0.0], rtol=0, atol=1e-14)
     np.testing.assert_allclose(out, [1e-3, 1e-3, 0, 0, 0, 0], rtol=0, atol=1e-14)
     assert active[1] > 0.0
+
+
+def program_of(shape, rows):
+    """A program of so many rows that knows where they stand, and nothing else."""
+    table = np.zeros(layout.HEADER, dtype=np.int64)
+    table[layout.ROWS] = rows
+    return layout.Program(Store(table, None), shape, None, None, None)
+
+
+def point_of(residual, jacobian):
+    return layout.Iterate(None, None, None, np.array(residual), jacobian)
 
 
 def way_back(sides, residual, jacobian, softness=1.0, enough=0.0):
@@ -143,10 +155,9 @@ def way_back(sides, residual, jacobian, softness=1.0, enough=0.0):
     shape = Structure(bases, np.array(sides), order, (np.arange(rows), np.full(rows, rows - 1)))
     whole = np.zeros((rows, layout.EXTRA_COLUMN))
     whole[:, :6] = jacobian
-    active, forces, matrices, out = np.empty(rows), np.empty(rows), np.empty((2, 6, 6)), np.empty(6)
-    back = (np.array(residual), whole, 1e-6, active, softness, enough)
-    toward_rows(shape, rows, rows, *back, matrices[0], matrices[1], 6, forces, out)
-    return out, active > 0.0
+    given, system = new_rows(rows, 1e-6), unknowns(6, order)
+    toward_rows(program_of(shape, rows), point_of(residual, whole), given, system, softness, enough)
+    return system.directions.step, given.active > 0.0
 
 
 @pytest.mark.parametrize("softness", [1.0, 1e-9])
@@ -193,22 +204,21 @@ def test_the_way_back_onto_rows_is_soft_only_where_it_must_be(angle):
     order = layout.Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
     shape = Structure(bases, np.zeros(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
     residual, mu = np.array([1e-10, -1e-10]), 1e-6
-    matrices, out, forces = np.empty((2, 6, 6)), np.empty(6), np.empty(rows)
-    back = (jacobian, mu, np.full(rows, 1.0 / mu), 1.0)
-    matrix = (matrices[0], matrices[1], 6, forces, out)
-    softness = toward_rows(shape, 2, rows, residual, *back, 0.0, *matrix)
-    assert np.abs(residual + jacobian[:, :6] @ out).max() <= 0.1 * 1e-10
+    given, system = new_rows(rows, mu), unknowns(6, order)
+    back = (program_of(shape, rows), point_of(residual, jacobian), given, system, 1.0)
+    softness = toward_rows(*back, 0.0)
+    assert np.abs(residual + jacobian[:, :6] @ system.directions.step).max() <= 0.1 * 1e-10
     # By as much as the angle asks for: the least singular value is half of it.
     assert softness * mu <= 0.25 * angle**2 and (softness == 1.0) == (angle == 1e-1)
     # What is enough is left alone.
-    assert toward_rows(shape, 2, rows, residual, *back, 1e-9, *matrix) == 1.0
+    assert toward_rows(*back, 1e-9) == 1.0
 
 
 def test_restorations_keep_the_curvature_of_small_violations():
-    residual, y, active = np.array([3e-4, -2e-5]), np.array([1e-5, 0.0]), np.array([1.0, 0.0])
-    forces = np.empty(2)
-    curve_rows(2, residual, y, active, True, forces)
-    assert forces.tolist() == [3e-4, 0.0]
+    residual, rows = np.array([3e-4, -2e-5]), new_rows(2, 1.0)
+    rows.y[0], rows.active[0] = 1e-5, 1.0
+    curve_rows(rows, residual, True)
+    assert rows.forces.tolist() == [3e-4, 0.0]
     # Multipliers that small are on their way to zero.
-    curve_rows(2, residual, y, active, False, forces)
-    assert forces.tolist() == [0.0, 0.0]
+    curve_rows(rows, residual, False)
+    assert rows.forces.tolist() == [0.0, 0.0]

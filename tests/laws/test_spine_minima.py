@@ -12,7 +12,7 @@ from assembly.geometry.vec import dot
 from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, apart
 from assembly.proximity.manager.centerlines.minima import MINIMA, near_singular_minima
 from assembly.proximity.manager.centerlines.search import THIN
-from assembly.proximity.manager.wires import HALF, PART_BEND
+from assembly.proximity.manager.wires import centerline_part_at
 from benchmarks.motions import SHAPES
 from benchmarks.watching import Watch
 from tests.laws.test_spines import Two
@@ -22,7 +22,7 @@ CLOSED = (False, False, False, False)
 
 def slopes(two, pose, s, t):
     """F_s, F_t, F_ss, F_tt, of numbers or of arrays of them."""
-    d, f, c, g, e = apart(two.pool, two.o, two.p, pose, s, t)
+    d, f, c, g, e = apart(two.parts(pose), s, t)
     return -dot(d, f), dot(d, g), 1.0 - dot(d, c), 1.0 + dot(d, e)
 
 
@@ -30,8 +30,9 @@ def thin(two, width):
     """The box's middle, and half widths over which no tangent turns by more than half of `width`, nor farther."""
     halves = []
     for at, low, high in ((two.o, *two.box[:2]), (two.p, *two.box[2:])):
-        bend = two.pool[at + PART_BEND]
-        most = min(0.5 * width / bend, two.pool[at + HALF]) if bend > 0.0 else 0.02
+        part = centerline_part_at(two.pool, at)
+        bend = part.bend
+        most = min(0.5 * width / bend, part.half) if bend > 0.0 else 0.02
         halves.append((0.5 * (low + high), min(most, 0.02)))
     return halves
 
@@ -113,9 +114,7 @@ def compare(two, box, open_ends):
         # Of a level valley rounding tells where it has minima.
         return None
     places = np.empty((MINIMA, 2))
-    count, _level, certain = near_singular_minima(
-        two.pool, two.o, two.p, two.pose(), Lengths(*box), FreeEnds(*open_ends), places
-    )
+    count, _level, certain = near_singular_minima(two.parts(), Lengths(*box), FreeEnds(*open_ends), places)
     assert certain
     found = places[:count]
     # Slopes of 1e-15 place a minimum by as much over the curvature of the valley, which may be 1e-4 here.
@@ -135,7 +134,7 @@ def test_minima_of_thin_boxes_are_those_of_samples(cases):
         box = (s - h, s + h, t - k, t + k)
         # Slopes near zero somewhere in the box: else nearly all have no minimum.
         at = rng.uniform(box[0], box[1]), rng.uniform(box[2], box[3])
-        d, f, _, g, _ = (np.array(row) for row in apart(two.pool, two.o, two.p, two.pose(), *at))
+        d, f, _, g, _ = (np.array(row) for row in apart(two.parts(), *at))
         normal = np.cross(f, g)
         if np.linalg.norm(normal) < 1e-6:
             continue
@@ -159,7 +158,7 @@ def test_minima_beside_a_turn_of_the_slope_are_found(cases):
         if side == 1 or curved < 0.2:
             continue
         # Where phi'' vanishes beside the box's middle phi' turns: F_ss F_tt = F_st^2 by the distance of the spines.
-        d, f, c, g, e = (np.array(row) for row in apart(two.pool, two.o, two.p, two.pose(), s, t))
+        d, f, c, g, e = (np.array(row) for row in apart(two.parts(), s, t))
         normal = np.cross(f, g)
         cc, ee = c @ normal, e @ normal
         # (1 - x c.n) (1 + x e.n) = (f.g)^2 for d = x n.

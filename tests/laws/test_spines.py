@@ -15,19 +15,26 @@ from assembly.geometry.shapes.centerline import spine_of
 from assembly.geometry.shapes.path import Path
 from assembly.geometry.vec import dot
 from assembly.kinematics.motion import RelativePose
-from assembly.proximity.manager import state as watch_memory
-from assembly.proximity.manager.centerlines.box import BARREN, CONVEX, EMPTY, FreeEnds, Lengths, apart, box_of
+from assembly.proximity.manager import records as watch_memory
+from assembly.proximity.manager.centerlines.box import (
+    BARREN,
+    CONVEX,
+    EMPTY,
+    FreeEnds,
+    Lengths,
+    PosedParts,
+    apart,
+    box_of,
+)
 from assembly.proximity.manager.centerlines.packing import pack_centerline
 from assembly.proximity.manager.motion_bounds import part_used
 from assembly.proximity.manager.wires import (
-    HALF,
     PART,
-    PART_POOL,
-    PARTS,
+    centerline_at,
+    centerline_part_at,
+    centerline_place,
     centerline_point,
-    parameters_of,
-    place_of,
-    point_of,
+    wire_parameters,
 )
 from benchmarks.center_lines import path_wire
 from benchmarks.motions import HOOK, SHAPES
@@ -49,7 +56,12 @@ VIEWS = {
 
 def part_at(table, at, k):
     """Where part k of the spine at `at` is in the pool."""
-    return int(table[at + PART_POOL]) + PART * k
+    return int(centerline_at(table, at).part_pool) + PART * k
+
+
+def half_of(pool, o):
+    """Half the length of the part at o."""
+    return centerline_part_at(pool, o).half
 
 
 @pytest.mark.parametrize("view", VIEWS)
@@ -69,17 +81,16 @@ def test_points_of_a_wire_are_around_its_spine(name, view, cases):
     for u in np.concatenate([face.surface.breaks()[0], rng.uniform(u0, u1, cases(20, 60))]):
         for v in np.concatenate([face.surface.breaks()[1], rng.uniform(v0, v1, 8)]):
             point = face.surface.evaluate(u, v)
-            part, s = place_of(table, pool, at, 0, u, v)
-            frame = np.empty(9)
-            point_of(table, pool, at, part, s, frame)
-            way = (point - frame[:3]) / spine.radius
+            part, s = centerline_place(Store(table, pool), at, 0, u, v)
+            center, along, _bend = (np.array(row) for row in centerline_point(pool, part_at(table, at, part), s))
+            way = (point - center) / spine.radius
             assert np.linalg.norm(way) == pytest.approx(1.0, abs=1e-11 * size / spine.radius)
-            free = abs(way @ frame[3:6]) > 1e-9
+            free = abs(way @ along) > 1e-9
             beyond += free
             # Only at a free end does a wire go beyond its spine.
-            ends = (0, table[at + PARTS] - 1)
-            assert not free or (not spine.closed and part in ends and abs(s) == pool[part_at(table, at, part) + HALF])
-            back = face.surface.evaluate(*parameters_of(table, pool, at, 0, part, s, *way))
+            ends = (0, centerline_at(table, at).parts - 1)
+            assert not free or (not spine.closed and part in ends and abs(s) == half_of(pool, part_at(table, at, part)))
+            back = face.surface.evaluate(*wire_parameters(Store(table, pool), at, 0, part, s, way))
             assert np.abs(back - point).max() < 1e-11 * size
     assert (beyond > 0) == (not spine.closed)
 
@@ -87,10 +98,10 @@ def test_points_of_a_wire_are_around_its_spine(name, view, cases):
 @pytest.mark.parametrize("name", WIRES)
 def test_frames_of_a_spine_are_its_derivatives(name):
     table, pool, at = pack_centerline(spine_of(Face(WIRES[name])), 1.0)
-    for part in range(table[at + PARTS]):
+    for part in range(centerline_at(table, at).parts):
         o = part_at(table, at, part)
-        for s in np.linspace(-1.5, 1.5, 7) * pool[o + HALF]:
-            h = 1e-3 * pool[o + HALF]
+        for s in np.linspace(-1.5, 1.5, 7) * half_of(pool, o):
+            h = 1e-3 * half_of(pool, o)
             p, t, c = (np.array(row) for row in centerline_point(pool, o, s))
             rows = [[np.array(row) for row in centerline_point(pool, o, s + k * h)] for k in (-2, -1, 1, 2)]
             slopes = [(rows[0][k] - 8.0 * rows[1][k] + 8.0 * rows[2][k] - rows[3][k]) / (12.0 * h) for k in range(2)]
@@ -137,8 +148,10 @@ class Two:
     def __init__(self, rng):
         names = rng.choice(list(WIRES), 2).tolist()
         self.table, self.pool, self.f, self.g = packed_pair(*names)
-        self.o, self.p = (part_at(self.table, at, rng.integers(self.table[at + PARTS])) for at in (self.f, self.g))
-        halves = self.pool[self.o + HALF], self.pool[self.p + HALF]
+        self.o, self.p = (
+            part_at(self.table, at, rng.integers(centerline_at(self.table, at).parts)) for at in (self.f, self.g)
+        )
+        halves = half_of(self.pool, self.o), half_of(self.pool, self.p)
         ends = [np.sort(rng.uniform(-half, half, 2)) for half in halves]
         self.box = tuple(x for end in ends for x in end * 10.0 ** rng.uniform(-1.5, 0.0))
         self.turn = Rotation.random(random_state=int(rng.integers(1 << 30)))
@@ -166,13 +179,16 @@ class Two:
     def pose(self):
         return RelativePose(tuple(self.turn.as_matrix().ravel().tolist()), tuple(self.shift.tolist()))
 
+    def parts(self, pose=None):
+        return PosedParts(self.pool, self.o, self.p, pose or self.pose())
+
     def told(self, ends=(False, False, False, False)):
-        return box_of(self.pool, self.o, self.p, self.pose(), Lengths(*self.box), FreeEnds(*ends), np.inf, self.rho)
+        return box_of(self.parts(), Lengths(*self.box), FreeEnds(*ends), np.inf, self.rho)
 
     def at(self, s, t):
         """Distances, slopes F_s, F_t and second derivatives F_ss, F_st, F_tt at arrays of places."""
         # Plain Python of a kernel, which takes arrays for numbers.
-        d, f, c, g, e = apart(self.pool, self.o, self.p, self.pose(), s, t)
+        d, f, c, g, e = apart(self.parts(), s, t)
         rows = np.sqrt(dot(d, d)), -dot(d, f), dot(d, g), 1.0 - dot(d, c), -dot(f, g), 1.0 + dot(d, e)
         return np.array(np.broadcast_arrays(*rows))
 
@@ -382,6 +398,7 @@ def test_contacts_that_are_born_where_the_curvature_jumps_are_within_what_looks_
     oracle = WireOracle([path_wire(path, 0.1) for path in (bent, rod)])
     rng = np.random.default_rng(0)
     packed, born = watch._packed, 0
+    manager = watch_memory.ContactManager(Store(packed.table, packed.pool), watch._at, watch.memory)
     count = cases(150, 1500)
     for _ in range(count):
         high = 0.2 + 10.0 ** rng.uniform(-3.6, -2.5)
@@ -405,8 +422,8 @@ def test_contacts_that_are_born_where_the_curvature_jumps_are_within_what_looks_
                 continue
             if (np.abs(minima.points[:, 0, 0] + 0.4) < 0.4).any():
                 # It is in the rod already: the look did not allow as much, or not without another one.
-                part = part_used(Store(packed.table, packed.pool), watch._at, watch.memory, 0, scaled)
-                doubt = watch.memory[watch_memory.MEMORY_HEADER + watch_memory.DOUBT]
+                part = part_used(manager, 0, scaled)
+                doubt = watch_memory.pair_state_of(manager, 0).doubt
                 assert max(part, doubt) >= 1.0
                 born += 1
     assert born > count / 75

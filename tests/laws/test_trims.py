@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from assembly._record import rows_of
 from assembly.geometry import shapes
 from assembly.geometry.faces import trim_pieces as pieces
 from assembly.geometry.faces.face import Face
@@ -20,9 +21,10 @@ PLANE = shapes.plane(10.0, 10.0)
 def piece_rows(face):
     """Integers and doubles of a face's pieces."""
     table, pool = face.packed_trim()
-    count = table[pieces.TRIM_PIECES]
-    ints = table[table[pieces.TRIM_PIECE_TABLE] :][: count * pieces.PIECE_INTS].reshape(count, -1)
-    return ints, pool[table[pieces.TRIM_PIECE_POOL] :][: count * pieces.PIECE_DOUBLES].reshape(count, -1)
+    record = pieces.trim_at(table, 0)
+    ints = table[record.piece_table :][: record.pieces * pieces.PIECE_INTS].reshape(-1, pieces.PIECE_INTS)
+    doubles = pool[record.piece_pool :][: record.pieces * pieces.PIECE_DOUBLES].reshape(-1, pieces.PIECE_DOUBLES)
+    return rows_of(pieces.PIECE_LINKS, ints), rows_of(pieces.PIECE_BOUNDS, doubles)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -109,21 +111,21 @@ def test_pieces_run_one_way_within_their_bounds(seed):
     face = random_face(rng, PLANE)
     ints, doubles = piece_rows(face)
     for row, piece in zip(ints, doubles, strict=True):
-        curve = face.boundary[row[pieces.PIECE_CURVE]]
-        t0, t1 = piece[[pieces.PIECE_T0, pieces.PIECE_T1]]
+        curve = face.boundary[row.curve]
+        t0, t1 = piece.t0, piece.t1
         inner = t0 + (t1 - t0) * np.linspace(1e-9, 1.0 - 1e-9, 41)
         point, first, second = curve.evaluate(inner, 2)
         step = 1e-5 * (t1 - t0)
         third = (curve.evaluate(inner[1:-1] + step, 2)[2] - curve.evaluate(inner[1:-1] - step, 2)[2]) / (2.0 * step)
         # One way in u and v (to rounding), and the major coordinate is the one that moves more.
-        signs = row[[pieces.PIECE_SIGN_U, pieces.PIECE_SIGN_V]]
+        signs = row.sign_u, row.sign_v
         assert (np.diff(point, axis=0) * signs >= -1e-15).all()
-        major = row[pieces.PIECE_MAJOR]
+        major = row.major
         tiny = 1e-6 * np.linalg.norm(first, axis=1)
         assert (np.abs(first[:, major]) >= np.abs(first[:, 1 - major]) - tiny).all()
-        low, high = piece[[0, 2]], piece[[1, 3]]
+        low, high = piece.box[::2], piece.box[1::2]
         assert ((point >= low - 1e-15) & (point <= high + 1e-15)).all()
-        for bound, values in zip(piece[pieces.BOUND_1 : pieces.BOUND_3 + 1], (first, second, third), strict=True):
+        for bound, values in zip((piece.bound_1, piece.bound_2, piece.bound_3), (first, second, third), strict=True):
             largest = np.linalg.norm(values, axis=1).max()
             # Differences of second derivatives round at this step to 1e-10 of the scale of the third.
             assert largest <= bound * (1.0 + 1e-9) + 1e-9 * np.linalg.norm(second, axis=1).max() / (t1 - t0)

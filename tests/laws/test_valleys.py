@@ -7,28 +7,25 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly._record import Store
+from assembly._record import Store, rows_of
 from assembly.constraints.program.records import WATCH
 from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V, surface_point
 from assembly.kinematics.motion import RelativePose
 from assembly.proximity.brep.borders import feature_at
-from assembly.proximity.brep.records import FACES
+from assembly.proximity.brep.records import shell_at
 from assembly.proximity.features.holding import HELD_F, HELD_G
 from assembly.proximity.manager.extrema import (
-    CODE_F,
-    CODE_G,
-    EXTREMUM_FOLD,
+    EXTREMUM,
     LISTED,
     NEW,
-    ORIGIN,
     ROOT,
     USELESS,
-    VERTEX_CONTACT,
+    extremum_at,
 )
 from assembly.proximity.manager.near_singular import ARRIVED, across_near_singular, into_near_singular
 from assembly.proximity.manager.near_singular_points import hold_continua, is_next_in_near_singular, sunk
-from assembly.proximity.manager.state import PAIR_SHELL_F, PAIR_SHELL_G, PAIR_TABLE
-from tests.laws.scenes import posed
+from assembly.proximity.manager.records import pair_in
+from tests.laws.scenes import list_of, posed
 
 MAJOR, MINOR = 0.7, 0.1
 WIDE = (np.inf, np.inf, np.inf, np.inf)
@@ -42,10 +39,9 @@ def packed_faces(shape):
     scene.constrain(asm.Clearance())
     packed = scene.packed()
     table = packed.table
-    pair = table[table[WATCH] + PAIR_TABLE]
-    f, g = table[pair + PAIR_SHELL_F], table[pair + PAIR_SHELL_G]
+    f, g = pair_in(table, table[WATCH], 0).shell_f, pair_in(table, table[WATCH], 0).shell_g
     names = [face.name for face in scene.bodies[0].faces]
-    others = [feature_at(table, g, k) for k in range(table[g + FACES])]
+    others = [feature_at(table, g, k) for k in range(shell_at(table, g).faces)]
     return table, packed.pool, feature_at(table, f, names.index("top")), others, packed.scale
 
 
@@ -148,8 +144,8 @@ def ring_on_a_slab(slab=None):
     )
     scene.constrain(asm.Clearance())
     packed = scene.packed()
-    pair = packed.table[packed.table[WATCH] + PAIR_TABLE]
-    shells = (packed.table[pair + PAIR_SHELL_F], packed.table[pair + PAIR_SHELL_G])
+    pair = pair_in(packed.table, packed.table[WATCH], 0)
+    shells = (pair.shell_f, pair.shell_g)
     return packed.table, packed.pool, packed.scale, shells, [face.name for face in scene.bodies[0].faces].index("top")
 
 
@@ -160,9 +156,9 @@ def test_a_point_that_is_held_goes_back_to_the_bottom():
     rng = np.random.default_rng(8)
     for tilt in (0.0, 1e-6, 1e-3):
         turn, shift = tilted(rng, tilt, scale)
-        pair = posed(tuple(turn.ravel()), tuple(shift), shells=tuple(shells))
+        pair = posed(Store(table, pool), tuple(turn.ravel()), tuple(shift), shells=tuple(shells))
         start = (0.0, 0.0, rng.uniform(0.0, u1), v0 + (0.75 + rng.uniform(-0.03, 0.03)) * (v1 - v0))
-        x = sunk(Store(table, pool), pair, (top, 0), HELD_G, start)
+        x = sunk(pair, (top, 0), HELD_G, start)
         p = surface.evaluate(x[2], x[3])
         low, _ = lowest_across(turn, shift, np.arctan2(p[1], p[0]), scale)
         assert (turn @ p / scale + shift)[2] == pytest.approx(low, abs=ARRIVED**2 + 1e-15 + MINOR * tilt**4)
@@ -171,23 +167,23 @@ def test_a_point_that_is_held_goes_back_to_the_bottom():
 def test_a_point_that_is_held_stays_where_its_bottom_is_over_a_hole():
     table, pool, scale, shells, top = ring_on_a_slab(asm.shapes.plate(4.0, 4.0, 0.5, [(MAJOR, 0.0, 0.2)]))
     _, (v0, v1) = asm.shapes.torus(MAJOR, MINOR).domain
-    pair = posed(tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale), shells=tuple(shells))
+    pair = posed(Store(table, pool), tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale), shells=tuple(shells))
     start = (MAJOR, 0.0, 0.0, v0 + 0.77 * (v1 - v0))
     # Of the slab nothing is below it; of the ring there is.
-    assert sunk(Store(table, pool), pair, (top, 0), HELD_F, start) == start
-    assert sunk(Store(table, pool), pair, (top, 0), HELD_G, start)[3] == pytest.approx(v0 + 0.75 * (v1 - v0), abs=1e-9)
+    assert sunk(pair, (top, 0), HELD_F, start) == start
+    assert sunk(pair, (top, 0), HELD_G, start)[3] == pytest.approx(v0 + 0.75 * (v1 - v0), abs=1e-9)
 
 
 def test_few_of_a_continuum_are_held():
     table, pool, scale, shells, top = ring_on_a_slab()
     (_, u1), (v0, v1) = asm.shapes.torus(MAJOR, MINOR).domain
     turn, shift = tuple(np.eye(3).ravel()), (0.0, 0.0, 0.35 / scale)
-    looked_into = posed(turn, shift, shells=tuple(shells))
+    looked_into = posed(Store(table, pool), turn, shift, shells=tuple(shells))
     # Eighths of the ring: two new ones a step apart, what is listed, what is of no use, an isolated one.
     states = [(0.0, NEW, 0.0), (0.05, NEW, 0.0), (2.0, LISTED, 0.0), (4.0, USELESS, 0.0), (4.0, NEW, 0.0)]
     states += [(6.0, NEW, 0.3), (6.05, NEW, 0.0)]
     found = np.zeros((len(states), ROOT))
-    for root, (eighth, origin, fold) in zip(found, states, strict=True):
+    for root, (eighth, _origin, _fold) in zip(found, states, strict=True):
         start = (0.0, 0.0, eighth / 8.0 * u1, v0 + 0.75 * (v1 - v0))
         _found, root[:4], _on_f, _along = into_near_singular(
             Store(table, pool),
@@ -197,13 +193,17 @@ def test_few_of_a_continuum_are_held():
             start,
             WIDE,
         )
-        root[CODE_F], root[CODE_G], root[ORIGIN], root[EXTREMUM_FOLD] = top, 0, origin, fold
+    states = np.array(states)
+    listed = rows_of(EXTREMUM, found)
+    listed.code_f, listed.origin, listed.fold = top, states[:, 1], states[:, 2]
     before = found[[0, 2, 3, 4, 5], :4].copy()
     # What is a step from one that is held, or from the isolated one, is left out.
-    assert hold_continua(Store(table, pool), looked_into, found, len(states)) == 5
+    extrema = list_of(found, len(states))
+    hold_continua(looked_into, extrema)
+    assert extrema.count[0] == 5
     np.testing.assert_array_equal(found[:5, :4], before)
-    assert found[:5, VERTEX_CONTACT].tolist() == [HELD_G, HELD_G, 0.0, HELD_G, 0.0]
-    assert found[:5, ORIGIN].tolist() == [NEW, LISTED, USELESS, NEW, NEW]
+    assert listed.corner[:5].tolist() == [HELD_G, HELD_G, 0.0, HELD_G, 0.0]
+    assert listed.origin[:5].tolist() == [NEW, LISTED, USELESS, NEW, NEW]
 
 
 def test_what_lies_beside_a_point_is_in_another_valley():
@@ -214,8 +214,9 @@ def test_what_lies_beside_a_point_is_in_another_valley():
     start = (0.0, 0.0, 0.1 * u1, v0 + 0.75 * (v1 - v0))
     _found, x, _on_f, along = into_near_singular(Store(table, pool), *surfaces, RelativePose(turn, shift), start, WIDE)
     roots = np.zeros((1, ROOT))
-    roots[0, :4], roots[0, CODE_F], roots[0, ORIGIN], roots[0, VERTEX_CONTACT] = x, top, NEW, HELD_G
-    pair = posed(turn, shift, shells=tuple(shells))
+    root = extremum_at(roots, 0)
+    root.parameters, root.code_f, root.origin, root.corner = x, top, NEW, HELD_G
+    pair = posed(Store(table, pool), turn, shift, shells=tuple(shells))
     # The slab's parameters are lengths. More beside than along is another valley; a turn by 60 degrees is far, too.
     across = np.cross([0.0, 0.0, 1.0], along)
     turned = 0.4 * np.array(along) + np.sqrt(0.84) * across
@@ -226,6 +227,4 @@ def test_what_lies_beside_a_point_is_in_another_valley():
         (0.3 * turned, tuple(turned), True),
     ):
         there = (x[0] + way[0], x[1] + way[1], x[2], x[3])
-        assert (
-            is_next_in_near_singular(Store(table, pool), pair, (top, 0), surfaces, there, direction, roots, 1) == other
-        )
+        assert is_next_in_near_singular(pair, (top, 0), surfaces, there, direction, list_of(roots, 1), 1) == other

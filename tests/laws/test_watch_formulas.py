@@ -6,10 +6,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from assembly.proximity.manager.motion_bounds import turned_by
-from assembly.proximity.manager.state import (
+from assembly.proximity.manager.records import (
     PAIR_MEMORY,
-    PLACE,
-    TURN,
+    pair_state_at,
 )
 
 
@@ -31,8 +30,9 @@ def test_no_point_moves_farther_than_the_bound():
             x, y = rng.normal(size=(2, 3)) * rng.choice([0.0, 1e-3, 1.0])
             radius = rng.uniform(0.1, 2.0)
             memory = np.zeros(PAIR_MEMORY)
-            memory[TURN : TURN + 4], memory[PLACE : PLACE + 3] = e, x
-            bound = np.linalg.norm(y - x) + 2.0 * radius * turned_by(memory, 0, tuple(f))
+            known = pair_state_at(memory, 0)
+            known.turn, known.place = e, x
+            bound = np.linalg.norm(y - x) + 2.0 * radius * turned_by(known, tuple(f))
             points = rng.normal(size=(50, 3))
             points *= radius / np.linalg.norm(points, axis=1)[:, None]
             here = Rotation.from_quat(e, scalar_first=True).apply(points) + x

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 import assembly as asm
-from assembly._record import Store
-from assembly.constraints.program import evaluate as program
 from assembly.constraints.program import records as layout
 from assembly.constraints.program import row_terms
+from assembly.constraints.program.evaluate import evaluate
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.proximity.extrema.lifted_pair import coordinate_lengths
@@ -160,9 +159,9 @@ class FreePoint:
         self.loose = base.loose._replace(free=np.zeros(1, dtype=np.int64), lengths=lengths)
         self.shape = room_of_shape(self.table, self.rows, self.n, self.table[:0])
         arrange(self.table, self.loose.free, self.shape, self.rows, self.n)
-        self.room = base.room
         start = case.tracked(x)
-        assert program.evaluate(Store(self.table, self.pool), start, np.inf, self.loose, self.room, self.point) < 0
+        self.program = base.program._replace(structure=self.shape, lifted=self.loose)
+        assert evaluate(self.program, start, np.inf, self.point) < 0
 
     @property
     def residual(self):
@@ -175,7 +174,5 @@ class FreePoint:
     def row_terms(self, y, weights):
         """Second derivative of y . rows + J^T diag(weights) J, (n, n)."""
         hessian = np.zeros((self.n, self.n))
-        row_terms.add_row_terms(
-            Store(self.table, self.pool), self.loose, self.room, self.shape, self.point, y, weights, hessian
-        )
+        row_terms.add_row_terms(self.program, self.point, y, weights, hessian)
         return np.triu(hessian) + np.triu(hessian, 1).T

@@ -14,7 +14,7 @@ import pytest
 import assembly as asm
 from assembly.constraints.packing.scene import Packed
 from assembly.errors import InputError
-from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import records as watch_memory
 from assembly.solve import interruption
 from assembly.solve.loop import pauses
 from assembly.solve.loop.settings import ASK_AT

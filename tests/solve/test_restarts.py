@@ -10,7 +10,6 @@ import pytest
 import assembly as asm
 from assembly._record import Store
 from assembly.constraints.program.contact import OTHER_SIDE, track_contact
-from assembly.constraints.program.records import ROW_TABLE
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK, tracked_at
 from assembly.solve.attempts.starts import scattered
 from assembly.solve.diagnosis.contradiction import is_certain
@@ -355,7 +354,6 @@ def test_a_pair_on_the_other_side_of_a_ball_is_another_pair(side):
     # The ball is turned so that its top, at (pi/2, pi/2), is no pole.
     start[0, :4] = (*middle, 1.5, 1.6)
     tracked_at(start, 0).facing = side
-    row = int(packed.table[ROW_TABLE])
-    status, _x, facing, _gap = track_contact(Store(packed.table, packed.pool), row, q, start, np.inf, records, 0)
+    status, _x, facing, _gap = track_contact(Store(packed.table, packed.pool), q, start, np.inf, records, 0)
     assert (status == OTHER_SIDE) == (side == 1.0)
     assert facing == (1.0 if side == 1.0 else -1.0)

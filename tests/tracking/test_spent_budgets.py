@@ -9,20 +9,20 @@ import pytest
 
 import assembly as asm
 from assembly._kernel import kernel
+from assembly._record import place_of
 from assembly.constraints.program.records import RESULTS, WATCH
 from assembly.kinematics.body import Point
 from assembly.proximity.manager.events import EventKind
-from assembly.proximity.manager.state import (
+from assembly.proximity.manager.records import (
     DEADLINE,
-    DOUBT,
-    EARLIER,
-    LOOKS,
     MEMORY_HEADER,
     PAIR_MEMORY,
+    PAIR_STATE,
     PAIRS,
+    memory_header_at,
 )
-from assembly.solve.loop.augmented_lagrangian import EXTRA_TIME
-from assembly.solve.loop.deadline import HALF, LOOKS_ALONE, begin_tick
+from assembly.solve.loop.deadline import begin_tick
+from assembly.solve.loop.parameters import EXTRA_TIME, HALF, LOOKS_ALONE
 from assembly.solve.loop.settings import CARRIED, CARRIES, SETTINGS
 from assembly.tracking.tick import TrackStatus
 from benchmarks.hands import WIRE, paper_clips
@@ -66,7 +66,9 @@ def doubts(tracker):
     """How far pairs are beyond where contacts may have been born beside others since they were looked at."""
     packed = tracker._packed
     at = packed.memory_at + MEMORY_HEADER
-    return tracker._state[at : at + PAIR_MEMORY * packed.table[packed.table[WATCH] + PAIRS]][DOUBT::PAIR_MEMORY]
+    return tracker._state[at : at + PAIR_MEMORY * packed.table[packed.table[WATCH] + PAIRS]][
+        place_of(PAIR_STATE, "doubt") :: PAIR_MEMORY
+    ]
 
 
 def settled(tracker, target, ticks):
@@ -233,12 +235,13 @@ def test_looks_alone_do_not_go_on_for_ever():
     table, settings, results = np.zeros(200, np.int64), np.zeros(SETTINGS), np.zeros(RESULTS)
     table[WATCH], table[watch + PAIRS], settings[CARRIES] = watch, pairs, 1.0
     memory = np.zeros(MEMORY_HEADER)
-    memory[LOOKS] = 7.0
-    assert begun(table, settings, results, memory) == (0, 0, 7.0) and memory[EARLIER] == 7.0
+    known = memory_header_at(memory, 0)
+    known.looks = 7.0
+    assert begun(table, settings, results, memory) == (0, 0, 7.0) and known.earlier == 7.0
     for looks, steps in ((4 * pairs - 1, 0), (4 * pairs, 0), (4 * pairs + 5, 2)):
-        results[CARRIED], memory[LOOKS] = 1.0 + steps, 7.0 + looks
+        results[CARRIED], known.looks = 1.0 + steps, 7.0 + looks
         _, done, before = begun(table, settings, results, memory)
-        assert done == steps and memory[EARLIER] == 7.0 and results[CARRIED] == 0.0
+        assert done == steps and known.earlier == 7.0 and results[CARRIED] == 0.0
         assert before == (7.0 + looks if looks < LOOKS_ALONE * pairs else np.inf)
         assert (memory[DEADLINE] < np.inf) == (looks < LOOKS_ALONE * pairs)
 

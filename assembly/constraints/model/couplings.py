@@ -116,12 +116,7 @@ class Gear(Coupling):
     offset = Offset("angle_b where angle_a is zero [rad].")
 
     def __init__(
-        self,
-        a: Joint | Freedom,
-        b: Joint | Freedom,
-        ratio: float,
-        name: str | None = None,
-        offset: float = 0.0,
+        self, a: Joint | Freedom, b: Joint | Freedom, ratio: float, name: str | None = None, offset: float = 0.0
     ) -> None:
         factor = number("ratio", ratio)
         if factor == 0.0:

@@ -157,8 +157,7 @@ class Expression(Constraint, Objective):
             [ca.vertcat(values, ca.vec(jacobian.T)), ca.triu(hessian)], [t], [ca.SX.zeros(6 * bodies)]
         )
         return Tapes(
-            packed(compact("rows", x, rows)),
-            packed(compact("hessian", ca.vertcat(x, y), ca.vec(ca.triu2symm(upper)))),
+            packed(compact("rows", x, rows)), packed(compact("hessian", ca.vertcat(x, y), ca.vec(ca.triu2symm(upper))))
         )
 
     def document(self) -> str:

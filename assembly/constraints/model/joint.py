@@ -147,11 +147,7 @@ class Joint(OwnState, Constraint):
     def equations(self) -> tuple[Equation, ...]:
         """Rows now: the joint's own, then driven values, then limits, both in the order of the freedoms."""
         asked = [row for freedom in self._freedoms.values() for row in freedom.equations]
-        return (
-            *self._own,
-            *(row for row in asked if not row.one_sided),
-            *(row for row in asked if row.one_sided),
-        )
+        return (*self._own, *(row for row in asked if not row.one_sided), *(row for row in asked if row.one_sided))
 
     def _coordinate(self, kind: int, component: int) -> Coordinate:
         return Coordinate(kind, component, self._frames)

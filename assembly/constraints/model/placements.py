@@ -31,13 +31,7 @@ class PointOnLine(Joint):
     limits = Limits("slide")
 
     def __init__(
-        self,
-        point: SidePoint,
-        frame: Side,
-        name: str | None = None,
-        *,
-        slide: Number = None,
-        limits: Range = None,
+        self, point: SidePoint, frame: Side, name: str | None = None, *, slide: Number = None, limits: Range = None
     ) -> None:
         super().__init__(frame, point, name, slide=(slide, limits))
 
@@ -133,12 +127,6 @@ class Angle(Joint):
     limits = Limits("angle")
 
     def __init__(
-        self,
-        frame_a: Side,
-        frame_b: Side,
-        value: Number = None,
-        name: str | None = None,
-        *,
-        limits: Range = None,
+        self, frame_a: Side, frame_b: Side, value: Number = None, name: str | None = None, *, limits: Range = None
     ) -> None:
         super().__init__(frame_a, frame_b, name, angle=(value, limits))

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import rows_of
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import Contact, side_faces
 from assembly.constraints.packing.scene_writer import SceneWriter
@@ -21,7 +22,7 @@ from assembly.proximity.brep.solid import is_one_smooth
 from assembly.proximity.bvh.facet_tree import FacetTree
 from assembly.proximity.bvh.neighbor_list import LIST_INTS
 from assembly.proximity.bvh.packing import pack_tree
-from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import records as watch_memory
 from assembly.proximity.manager.centerlines.packing import pack_centerline
 from assembly.proximity.manager.extrema import GIVEN_RECORD
 
@@ -93,21 +94,20 @@ def pack_watch(
             pairs.add(pair, clearance.minimum, [first, first + count])
         first += count
     count, pair_table = pairs.write()
-    lengths = np.zeros(watch_memory.LENGTH_COUNT)
-    lengths[watch_memory.MERGE_RADIUS] = min(clearance.merge_radius for clearance in clearances)
-    lengths[watch_memory.FIRST_REACH], lengths[watch_memory.LAST_REACH] = FIRST_REACH, LAST_REACH
-    _, lengths_place = writer.add(pool=lengths)
-    lists = min(count, MOST_LISTS)
-    list_table, _ = writer.add([-1] * (LIST_INTS * lists))
-    record = np.zeros(watch_memory.WATCH_RECORD, dtype=np.int64)
-    record[watch_memory.PAIRS], record[watch_memory.PLACES] = count, first
-    record[watch_memory.PAIR_TABLE], record[watch_memory.FIRST] = pair_table, len(contacts)
-    record[watch_memory.LENGTHS] = lengths_place
-    record[watch_memory.LISTS], record[watch_memory.LIST_TABLE] = lists, list_table
-    record[watch_memory.VERTEX_CONTACTS] = any(clearance.corners for clearance in clearances)
+    block = np.zeros(watch_memory.LENGTH_COUNT)
+    lengths = watch_memory.lengths_at(block, 0)
+    lengths.neglect = min(clearance.merge_radius for clearance in clearances)
+    lengths.first_reach, lengths.last_reach = FIRST_REACH, LAST_REACH
+    row = np.zeros(watch_memory.WATCH_RECORD, dtype=np.int64)
+    record = watch_memory.manager_at(row, 0)
+    record.pairs, record.places, record.pair_table, record.first = count, first, pair_table, len(contacts)
+    _, record.lengths = writer.add(pool=block)
+    record.lists = min(count, MOST_LISTS)
+    record.list_table, _ = writer.add([-1] * (LIST_INTS * int(record.lists)))
+    record.corners = any(clearance.corners for clearance in clearances)
     # Where one is asked for, its address is written when the scene is ready.
-    record[watch_memory.MARK_AT] = pairs.any_in_place
-    return writer.add(record)[0]
+    record.mark_address = pairs.any_in_place
+    return writer.add(row)[0]
 
 
 def table_with_guards(table: Table, placed: Sequence[Sequence[int]]) -> Table:
@@ -117,18 +117,14 @@ def table_with_guards(table: Table, placed: Sequence[Sequence[int]]) -> Table:
     one.
     """
     table = table.copy()
-    record = table[layout.WATCH]
     first = table[layout.ROW_TABLE] + layout.ROW * table[layout.FIRST_CLEARANCE_ROW]
     rows = table[first:][: layout.ROW * len(placed)].reshape(-1, layout.ROW)
-    size = watch_memory.PAIR_RECORD * table[record + watch_memory.PAIRS]
-    pairs = table[table[record + watch_memory.PAIR_TABLE] :][:size].reshape(-1, watch_memory.PAIR_RECORD)
     for row, (place, number, given) in zip(rows, placed, strict=True):
         if place >= 0:
-            pair = pairs[place]
-            row[[layout.BODY_F, layout.BODY_G]] = pair[[watch_memory.PAIR_F, watch_memory.PAIR_G]]
-            shapes = pair[watch_memory.PAIR_SURFACE_F : watch_memory.PAIR_SHELL_G + 1]
-            row[layout.SURFACE_F : layout.SHELL_G + 1] = shapes
-            row[layout.MINIMUM] = pair[watch_memory.PAIR_MINIMUM] + watch_memory.IN_PLACE * given
+            pair = watch_memory.pair_in(table, table[layout.WATCH], place)
+            row[[layout.BODY_F, layout.BODY_G]] = pair.body_f, pair.body_g
+            row[layout.SURFACE_F : layout.SHELL_G + 1] = pair.surface_f, pair.surface_g, pair.shell_f, pair.shell_g
+            row[layout.MINIMUM] = pair.minimum + watch_memory.IN_PLACE * given
             row[layout.CLEARANCE_ROW_NUMBER] = number
     return table
 
@@ -214,5 +210,5 @@ class _PairPacking:
         """How many pairs there are, and where their records begin."""
         given_place, _ = self._writer.add(self._given)
         table = np.array(self._records, dtype=np.int64).reshape(-1, watch_memory.PAIR_RECORD)
-        table[:, watch_memory.GIVEN] += given_place
+        rows_of(watch_memory.PAIR_DTYPE, table).given += given_place
         return len(table), self._writer.add(table)[0]

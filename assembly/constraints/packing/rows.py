@@ -19,10 +19,10 @@ from assembly.constraints.model.trim_contact import FORMS, TrimContact
 from assembly.constraints.packing.numbering import gathering_order
 from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.program import records as layout
-from assembly.geometry.faces.trim_pieces import TRIM_FIRST
+from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.evaluate import CURVE_RECORD
 from assembly.kinematics.body import Body, BodyFace
-from assembly.proximity.brep.records import EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE
+from assembly.proximity.brep.writer import edge_over
 
 __all__ = ["RowPacking"]
 
@@ -108,7 +108,7 @@ class RowPacking:
         if form > 0:
             writer.header[layout.VECTOR_TRIMS] = 1
             surface = self._rows[pair][layout.SURFACE_F + trim.side]
-            edges = self._loop_edges(trim, int(table[TRIM_FIRST]), surface)
+            edges = self._loop_edges(trim, int(trim_at(table, 0).first), surface)
         row = [layout.TRIM_ROW, *writer.places_of(trim.bodies), int(trim.unilateral), 0, 1, pair, trim.side, loop, at]
         row += [form, count, edges, int(trim.form in ("parametric", "cartesian"))]
         for _ in range(count):
@@ -116,14 +116,10 @@ class RowPacking:
 
     def _loop_edges(self, trim: TrimContact, first: int, surface: int) -> int:
         """Records of the curves of a trim's loop as edges on its surface; where they begin."""
-        fields: list[int] = []
-        for k, curve in enumerate(trim.region.boundary):
-            record = np.full(EDGE_RECORD, -1, dtype=np.int64)
-            record[EDGE_SURFACE], record[EDGE_CURVE] = surface, first + CURVE_RECORD * k
-            if not curve.closed:
-                record[EDGE_START], record[EDGE_END] = 0, 0
-            fields += record.tolist()
-        return self._writer.add(fields)[0]
+        edges = [
+            edge_over(surface, first + CURVE_RECORD * k, curve.closed) for k, curve in enumerate(trim.region.boundary)
+        ]
+        return self._writer.add(np.concatenate(edges))[0]
 
     def add_joints(self, slots: Table) -> None:
         """Rows of joints and couplings, whose bodies have these places among the unknowns."""
@@ -163,8 +159,8 @@ class RowPacking:
                 bodies = writer.places_of(item.bodies)
                 flags = [int(item.unilateral), 0, 0]
                 tapes.append(writer.tape(item, len(self._rows)))
-                for value in range(item.count):
-                    self._add(item, [layout.TAPE_ROW, *[*bodies, -1][:2], *flags, len(tapes) - 1, value])
+                for _ in range(item.count):
+                    self._add(item, [layout.TAPE_ROW, *[*bodies, -1][:2], *flags])
                 self._extra = max(self._extra, len(bodies) - 2)
         writer.header[layout.TAPE_TABLE], _ = writer.add([field for record in tapes for field in record])
         writer.header[layout.TAPES] = len(tapes)

@@ -35,7 +35,7 @@ from assembly.constraints.program.primitives import RECORD as JOINT_FRAMES
 from assembly.errors import FARTHEST, InputError
 from assembly.kinematics.body import Body
 from assembly.proximity.features.solid_contact import TRACK
-from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import records as watch_memory
 from assembly.proximity.manager.events import fresh_memory, listed_places
 
 __all__ = ["Packed", "structure_of"]
@@ -142,10 +142,7 @@ class Packed:
             self._memory = fresh_memory(sum(map(len, self.guarded)), self.guards, watch_packing.LAST_REACH)
 
     def _write(
-        self,
-        bodies: Sequence[Body],
-        constraints: Sequence[Constraint],
-        objectives: Sequence[tuple[float, Objective]],
+        self, bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
     ) -> None:
         """Write table and pool, part by part, and keep what tells of them."""
         goals = objectives or [(1.0, Posture())]
@@ -303,9 +300,9 @@ class Packed:
             table[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
         if self.guards:
             table[[layout.LOOK_AT, layout.STAYED_AT, layout.PARTS_AT, layout.WENT_AT]] = addresses.watch()
-            table[table[layout.WATCH] + watch_memory.TRACK_SOLIDS] = table[layout.TRACK_AT]
-            at = table[layout.WATCH] + watch_memory.MARK_AT
-            table[at] = addresses.places() if table[at] else 0
+            manager = watch_memory.manager_at(table, table[layout.WATCH])
+            manager.track_solids = table[layout.TRACK_AT]
+            manager.mark_address = addresses.places() if manager.mark_address else 0
         if table[table[layout.TAPE_WORKSPACE]] > 0:
             table[layout.RUN_TAPE_AT] = addresses.tapes()
 

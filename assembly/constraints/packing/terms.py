@@ -135,11 +135,7 @@ def natural_unit(term: Objective, scale: float) -> float:
     columns = [1.0 if freedom.coordinate.is_angle else 1.0 / scale for freedom in task.inputs]
     entry = {"position": linear, "rotation": angular, "pose": sqrt(linear * angular)}[task.task]
     entry *= prod(columns) ** (1.0 / len(columns))
-    powers = {
-        "manipulability": min(task.rows, len(columns)),
-        "smallest_singular_value": 1,
-        "force_transmission": -1,
-    }
+    powers = {"manipulability": min(task.rows, len(columns)), "smallest_singular_value": 1, "force_transmission": -1}
     try:
         return float(entry ** powers.get(term.measure, 0))
     except OverflowError:

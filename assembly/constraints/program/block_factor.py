@@ -15,9 +15,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly._lanes import load_lanes, store_lanes
-from assembly.constraints.program.hessian_blocks import (
-    blocks_at,
-)
+from assembly.constraints.program.hessian_blocks import blocks_at
 
 
 @kernel(inner=True)

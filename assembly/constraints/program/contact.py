@@ -12,27 +12,21 @@ import math
 from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly._record import Store
-from assembly.constraints.program.records import (
-    FREE_COLUMN,
-    ROW,
-    Iterate,
-    contact_row_at,
-    header_at,
-    row_at,
-)
+from assembly.constraints.program.records import FREE_COLUMN, ROW, Iterate, contact_row_at, header_at, jacobian_row_at
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import surface_at, surface_point
 from assembly.geometry.splines.pole import limits, nearest_pole, polar_step
 from assembly.geometry.vec import blend, dot, matvec, scale, sub
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extrema.face_face import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, own_frame, solve_pair
-from assembly.proximity.extrema.rates import RATES, RECORD, derivatives_at, gradient_row, store_record
+from assembly.proximity.extrema.feature_pair import two_face_frame
+from assembly.proximity.extrema.rates import RATES, RECORD, derivatives_at, gradient_row
 from assembly.proximity.features.solid_contact import (
-    CONFORMING,
     CONTACT_RECORD,
     TRACK,
     contact_record_at,
     tracked_at,
+    write_record,
 )
 
 # A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
@@ -46,9 +40,14 @@ OTHER_SIDE = 4
 
 
 @kernel(inline=True)
-def surface_of(table, row, side):
+def contact_of(table, r):
+    """The record of row r, a contact's."""
+    return contact_row_at(table, header_at(table, 0).row_table + ROW * r)
+
+
+@kernel(inline=True)
+def surface_of(contact, side):
     """The surface of a contact on side 0, of f, or 1, of g."""
-    contact = contact_row_at(table, row)
     return contact.surface_f if side == 0 else contact.surface_g
 
 
@@ -86,23 +85,22 @@ def predict_point(store, surface, u, v, du, dv):
 
 
 @kernel(inner=True)
-def predict_pair(store, row, r, tracked, guess):
+def predict_pair(store, r, tracked, guess):
     """Make of guess[r], coordinates that run on from tracked[r] by their rates, where the pair is expected.
 
     A prediction may run over the end of a patch; Newton starts inside. What becomes of edges is up to switching.
     """
-    if contact_row_at(store.table, row).shell_f >= 0:
+    contact = contact_of(store.table, r)
+    if contact.shell_f >= 0:
         return
     for side in range(2):
-        i = 2 * side
+        i, surface = 2 * side, surface_of(contact, side)
         u, v = tracked[r, i], tracked[r, i + 1]
-        guess[r, i], guess[r, i + 1] = predict_point(
-            store, surface_of(store.table, row, side), u, v, guess[r, i] - u, guess[r, i + 1] - v
-        )
+        guess[r, i], guess[r, i + 1] = predict_point(store, surface, u, v, guess[r, i] - u, guess[r, i + 1] - v)
 
 
 @kernel(inner=True)
-def track_contact(store, row, q, start, patience, records, k):
+def track_contact(store, q, start, patience, records, k):
     """Newton on the pair of one row from start[k]; fills its record.
 
     A pair that is followed keeps what its outward normals are to each other: no way leads from opposed ones to equal
@@ -110,94 +108,72 @@ def track_contact(store, row, q, start, patience, records, k):
     Returns status, parameters, how they face each other (`FACING`), the points' signed distance.
     """
     pair = tracked_at(start, k)
-    fields = row_at(store.table, row)
-    contact = contact_row_at(store.table, row)
-    contact_record = contact_record_at(records, k)
-    i = fields.body_f
-    j = fields.body_g
+    contact = contact_of(store.table, k)
+    i, j = contact.body_f, contact.body_g
     turn = rotation(q, i)
     pose = relative_pose(q, i, turn, j, rotation(q, j))
-    f, g = contact.surface_f, contact.surface_g
+    surfaces = (contact.surface_f, contact.surface_g)
     x = (start[k, 0], start[k, 1], start[k, 2], start[k, 3])
-    found = solve_pair(store, f, g, pose, x, 1.0, patience, CLOSE, False)
+    found = solve_pair(store, surfaces, pose, x, 1.0, patience, CLOSE, False)
     status, frame, x = found.status, found.frame, found.parameters
     apart = sub(frame.point_g, frame.point_f)
     distance = math.sqrt(dot(apart, apart))
     facing = pair.facing
     if status == CONVERGED or status == SINGULAR:
-        facing = facing_of(store, g, pose.rotation, frame, x)
+        facing = facing_of(store, surfaces[1], pose.rotation, frame, x)
         if facing * pair.facing < 0.0:
             return OTHER_SIDE, x, pair.facing, distance
-        store_record(turn, pose.shift, frame, found.matrix, records, k)
-        # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
-        h = found.matrix.h
-        det = h[0] * h[3] - h[1] * h[2]
-        norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-        proper = 1.0 if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else 0.0
-        contact_record.proper = CONFORMING if norm2 <= 1e-18 else proper
-        contact_record.fold = det / norm2 if norm2 > 1e-18 else 0.0
+        (k11, k12, k22), both = found.matrix.k, two_face_frame(frame, found.matrix)
+        write_record(turn, pose.shift, both, (k11, k12, k12, k22), records, k)
     return status, x, facing, distance if frame.gap > 0.0 else -distance
 
 
 @kernel(inner=True)
-def start_row(store, row, q, tracked, r):
+def start_row(store, q, tracked, r):
     """The pair of the surfaces of a row wherever it is, into tracked[r]. A status."""
-    contact = contact_row_at(store.table, row)
-    fields = row_at(store.table, row)
-    f, g = contact.surface_f, contact.surface_g
+    contact = contact_of(store.table, r)
+    surfaces = (contact.surface_f, contact.surface_g)
+    bodies = (contact.body_f, contact.body_g)
     return call_address(
-        header_at(store.table, 0).start_address,
-        (store.table, store.pool, f, g, fields.body_f, fields.body_g, q, tracked, r),
+        header_at(store.table, 0).start_address, (store.table, store.pool, surfaces, bodies, q, tracked, r)
     )
 
 
 @kernel(inner=True)
-def restart_contact(store, row, q, tracked, records, k):
+def restart_contact(store, q, tracked, records, k):
     """As `track_contact`, from a global start, without the distance; tracked[k] is written meanwhile."""
     was = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
-    status = start_row(store, row, q, tracked, k)
+    status = start_row(store, q, tracked, k)
     x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
     facing = tracked_at(tracked, k).facing
     if status == CONVERGED or status == SINGULAR:
-        status, x, facing, _distance = track_contact(store, row, q, tracked, math.inf, records, k)
+        status, x, facing, _distance = track_contact(store, q, tracked, math.inf, records, k)
     tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3] = was
     return status, was if status == OTHER_SIDE else x, facing
 
 
 @kernel(inner=True)
-def search_row(store, row, q, tracked, r, crossing):
+def search_row(store, q, tracked, r, crossing):
     """The closest features of the solids of a row wherever they are, into tracked[r]. Whether there are any.
 
     Solids that are in each other have some if `crossing`, which takes a thousand times as long.
     """
     header = header_at(store.table, 0)
-    contact = contact_row_at(store.table, row)
-    fields = row_at(store.table, row)
-    shell_f = contact.shell_f
-    shell_g = contact.shell_g
-    i = fields.body_f
-    j = fields.body_g
-    nearest = header.nearest_address
-    deepest = header.deepest_address if crossing else 0
-    found = call_address(
-        header.search_address, (store.table, store.pool, shell_f, shell_g, i, j, q, nearest, deepest, tracked, r)
-    )
-    return found == 1
+    contact = contact_of(store.table, r)
+    shells = (contact.shell_f, contact.shell_g)
+    bodies = (contact.body_f, contact.body_g)
+    searches = (header.nearest_address, header.deepest_address if crossing else 0)
+    return call_address(header.search_address, (store, shells, bodies, q, searches, tracked, r)) == 1
 
 
 @kernel(inner=True)
-def track_row(store, row, q, start, patience, records, tracked, r):
+def track_row(store, q, start, patience, records, tracked, r):
     """The features of the solids of a row from start[r] on, into tracked[r] and record r. A status."""
-    contact = contact_row_at(store.table, row)
-    fields = row_at(store.table, row)
-    shell_f = contact.shell_f
-    shell_g = contact.shell_g
-    i = fields.body_f
-    j = fields.body_g
-    return call_address(
-        header_at(store.table, 0).track_address,
-        (store.table, store.pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r),
-    )
+    contact = contact_of(store.table, r)
+    shells = (contact.shell_f, contact.shell_g)
+    bodies = (contact.body_f, contact.body_g)
+    rows = (start, records, tracked)
+    return call_address(header_at(store.table, 0).track_address, (store, shells, bodies, q, patience, rows, r))
 
 
 @kernel(inline=True)
@@ -210,16 +186,13 @@ def is_clearance_row(table, r):
 @kernel(inline=True)
 def least_gap(store, r, tracked):
     """The least gap of row r, less by what the bodies were in each other where the solve began and still touched."""
-    return (
-        store.pool[contact_row_at(store.table, header_at(store.table, 0).row_table + ROW * r).minimum]
-        - tracked_at(tracked, r).allowed
-    )
+    return store.pool[contact_of(store.table, r).minimum] - tracked_at(tracked, r).allowed
 
 
 @kernel(inline=True)
 def is_of_solids(table, r):
     """Whether row r is a contact of solids, or has no contact."""
-    return contact_row_at(table, header_at(table, 0).row_table + ROW * r).shell_f >= 0
+    return contact_of(table, r).shell_f >= 0
 
 
 @kernel(inline=True)
@@ -264,13 +237,12 @@ def lost_clearance_row(store, r, start, point, past, goes):
     hold every step. One that is lost already stays as it is. What the neighborhood holds now is for the next look to
     find.
     """
-    row = header_at(store.table, 0).row_table + ROW * r
     least = least_gap(store, r, start)
     gap = tracked_at(start, r).gap - least
     if past:
         gap = max(gap, 0.0)
     elif (
-        not gap > (-TOUCHING if contact_row_at(store.table, row).shell_f >= 0 else 0.0)
+        not gap > (-TOUCHING if contact_of(store.table, r).shell_f >= 0 else 0.0)
         and not goes
         and not math.isnan(start[r, 0])
     ):
@@ -294,8 +266,9 @@ def write_gap_row(store, r, point):
     residual[r] = derivatives.gap - least_gap(store, r, tracked)
     gradient_row(records, r, jacobian, r)
     # A pair that follows the bodies has no unknowns of its own.
+    row = jacobian_row_at(jacobian, r)
     for i in range(4):
-        jacobian[r, FREE_COLUMN + i] = 0.0
+        row.lifted[i] = 0.0
     tracked_at(tracked, r).gap = derivatives.gap
 
 
@@ -309,12 +282,11 @@ def solids_row(store, r, start, patience, point):
     """
     pair = tracked_at(start, r)
     q, tracked, records = point.q, point.tracked, point.records
-    row = header_at(store.table, 0).row_table + ROW * r
     goes = pair.stays <= MAY_GO
     if goes:
         pair.stays = MAY_GO - pair.stays
         tracked_at(tracked, r).stays = pair.stays
-    status = track_row(store, row, q, start, patience, records, tracked, r)
+    status = track_row(store, q, start, patience, records, tracked, r)
     found = (status == CONVERGED or status == SINGULAR) and (
         contact_record_at(records, r).proper != 0.0 or is_clearance_row(store.table, r)
     )
@@ -324,13 +296,13 @@ def solids_row(store, r, start, patience, point):
             return lost_clearance_row(store, r, start, point, past, goes)
         # Near touching a search takes long, and steps are short.
         far = abs(pair.gap) > HARDLY
-        if not (far or row_at(store.table, row).one_sided == 1 or patience == math.inf):
+        if not (far or contact_of(store.table, r).one_sided == 1 or patience == math.inf):
             return False
         # Where an edge is farthest, solids may be deep in each other: a step that leads there is too long.
         lost = status != CONVERGED and status != SINGULAR
-        if not search_row(store, row, q, tracked, r, lost or patience == math.inf):
+        if not search_row(store, q, tracked, r, lost or patience == math.inf):
             return False
-        status = track_row(store, row, q, tracked, math.inf, records, tracked, r)
+        status = track_row(store, q, tracked, math.inf, records, tracked, r)
         if status != CONVERGED and status != SINGULAR:
             return False
     write_gap_row(store, r, point)
@@ -348,19 +320,18 @@ def row_of_pair(store, r, start, patience, point):
     q, tracked, records = point.q, point.tracked, point.records
     derivatives = derivatives_at(records, r)
     contact = contact_record_at(records, r)
-    row = header_at(store.table, 0).row_table + ROW * r
-    if contact_row_at(store.table, row).shell_f >= 0:
+    if is_of_solids(store.table, r):
         return solids_row(store, r, start, patience, point)
-    status, x, facing, distance = track_contact(store, row, q, start, patience, records, r)
+    status, x, facing, distance = track_contact(store, q, start, patience, records, r)
     if status != CONVERGED and status != SINGULAR:
         anywhere = status == OTHER_SIDE and patience == math.inf
-        if row_at(store.table, row).one_sided == 0 and not anywhere:
+        if contact_of(store.table, r).one_sided == 0 and not anywhere:
             return False
         if is_clearance_row(store.table, r):
             return lost_clearance_row(store, r, start, point, False, False)
         # A one-sided contact is of the nearest pair, whichever that is now.
         held = status == LEFT_PATCH and distance > 0.0
-        status, x, facing = restart_contact(store, row, q, tracked, records, r)
+        status, x, facing = restart_contact(store, q, tracked, records, r)
         if status != CONVERGED and status != SINGULAR:
             if not held:
                 return False
@@ -386,10 +357,9 @@ def contact_row(store, r, start, patience, point):
     pair = tracked_at(start, r)
     tracked, records, residual = point.tracked, point.records, point.residual
     contact_record = contact_record_at(records, r)
-    row = header_at(store.table, 0).row_table + ROW * r
-    contact = contact_row_at(store.table, row)
+    contact = contact_of(store.table, r)
     copy_tracked(start, r, tracked)
-    if row_at(store.table, row).body_f < 0:
+    if contact.body_f < 0:
         idle_row(r, 1.0, point)
         return True
     if pair.idle == 1.0:
@@ -409,12 +379,20 @@ def contact_row(store, r, start, patience, point):
 
 
 @kernel(
-    signatures=("(i8[::1], f8[::1], f8[:, ::1], f8, i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])"),
+    signatures=(
+        "(Tuple((i8[::1], f8[::1])), f8[:, ::1], f8, i8[::1], "
+        "Tuple((f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])))"
+    )
 )
-def contact_rows(table, pool, start, patience, free, q, tracked, records, residual, jacobian):
-    """All rows of contacts but those of free pairs, and their gradients. Returns one whose pair was lost, or -1."""
-    point = Iterate(q, tracked, records, residual, jacobian)
+def contact_rows(scene, start, patience, free, at):
+    """All rows of contacts but those of free pairs, and their gradients. Returns one whose pair was lost, or -1.
+
+    `scene` and `at` have the parts of a `Store` and of an `Iterate`.
+    """
+    table, pool = scene
+    q, tracked, records, residual, jacobian = at
+    store, point = Store(table, pool), Iterate(q, tracked, records, residual, jacobian)
     for r in range(header_at(table, 0).contacts):
-        if free[r] < 0 and not contact_row(Store(table, pool), r, start, patience, point):
+        if free[r] < 0 and not contact_row(store, r, start, patience, point):
             return r
     return -1

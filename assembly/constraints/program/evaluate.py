@@ -31,92 +31,60 @@ from assembly.constraints.program.tapes import tape_rows
 
 
 @kernel(inner=True)
-def coordinate_row(pool, kind, component, k, angle, factor, start, tracked, records, jacobian, r, column):
-    """Factor times a coordinate, its gradient into row r from `column` on; its angle is tracked."""
+def coordinate_row(asked, k, factor, start, point, r, column):
+    """Factor times a coordinate by record k, its gradient into row r from `column` on; its angle is tracked."""
+    angle = asked.angle
     near = start[angle, 0] if angle >= 0 else 0.0
-    found = coordinate(kind, component, records, k, near)
+    found = coordinate(asked.kind, asked.component, point.records, k, near)
     if angle >= 0:
-        tracked[angle, 0] = found.value
-    write_gradient(found.n, found.arm_f, found.arm_g, found.h, factor, jacobian, r, column)
+        point.tracked[angle, 0] = found.value
+    write_gradient(found.n, found.arm_f, found.arm_g, found.h, factor, point.jacobian, r, column)
     return factor * found.value
 
 
 @kernel(inner=True)
-def joint_row(store, r, start, tracked, records, residual, jacobian):
+def joint_row(store, r, start, point):
     """Row r, of a joint."""
     header = header_at(store.table, 0)
     row = header.row_table + ROW * r
     joint = joint_row_at(store.table, row)
     o = joint.parameters
-    pairs = header.contacts
     second = joint.second
     value = -store.pool[o + 2]
     for part in range(1 if second < 0 else 2):
         asked = coordinate_at(store.table, row + COORDINATE if part == 0 else second)
-        value += coordinate_row(
-            store.pool,
-            asked.kind,
-            asked.component,
-            pairs + asked.joint,
-            asked.angle,
-            store.pool[o + part],
-            start,
-            tracked,
-            records,
-            jacobian,
-            r,
-            0 if part == 0 else EXTRA_COLUMN,
-        )
-    residual[r] = value
+        column = 0 if part == 0 else EXTRA_COLUMN
+        value += coordinate_row(asked, header.contacts + asked.joint, store.pool[o + part], start, point, r, column)
+    point.residual[r] = value
 
 
 @kernel(inner=True)
-def evaluate(store, start, patience, lifted, workspace, point):
+def evaluate(program, start, patience, point):
     """Evaluate all rows at the point's poses. Returns the contact whose pair was lost, or -1.
 
-    `start` are the tracked values to begin from. Of `point`, an `Iterate`, all but the poses is written. `loose` are
-    `LiftedPairs`.
+    `start` are the tracked values to begin from. Of `point`, an `Iterate`, all but the poses is written.
     """
+    store, lifted = program.store, program.lifted
     header = header_at(store.table, 0)
-    q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
     pairs = header.contacts
-    free = lifted.free
     for r in range(pairs):
-        if free[r] >= 0:
-            one = (
-                store.table,
-                store.pool,
-                r,
-                start,
-                free,
-                lifted.lengths,
-                lifted.vectors,
-                q,
-                tracked,
-                records,
-                residual,
-                jacobian,
-            )
-            call_address(header.free_row_address, one)
+        if lifted.free[r] >= 0:
+            call_address(header.free_row_address, (store, r, start, lifted, point))
     if pairs > 0:
-        others = (store.table, store.pool, start, patience, free, q, tracked, records, residual, jacobian)
-        lost = call_address(header.contact_rows_address, others)
+        lost = call_address(header.contact_rows_address, (store, start, patience, lifted.free, point))
         if lost >= 0:
             return lost
     if header.trims > 0:
-        call_address(
-            header.trim_rows_address,
-            (store.table, store.pool, free, lifted.lengths, q, tracked, records, residual, jacobian),
-        )
+        call_address(header.trim_rows_address, (store, lifted, point))
     for k in range(pairs, header.tracked):
         # Of an angle that no row has, only an input of a dexterity, this is all that is known.
-        copy_tracked(start, k, tracked)
+        copy_tracked(start, k, point.tracked)
     for k in range(header.joints):
         joint = joint_at(store.table, header.joint_table + JOINT_RECORD * k)
-        place_frames(store.pool, joint.frames, q, joint.body_f, joint.body_g, records, pairs + k)
+        place_frames(store.pool, joint.frames, point.q, joint.body_f, joint.body_g, point.records, pairs + k)
     for r in range(pairs, header.rows):
         if row_at(store.table, header.row_table + ROW * r).kind == JOINT_ROW:
-            joint_row(store, r, start, tracked, records, residual, jacobian)
+            joint_row(store, r, start, point)
     for t in range(header.tapes):
-        tape_rows(store, header.tape_table + TAPE_RECORD * t, q, workspace, residual, jacobian)
+        tape_rows(store, header.tape_table + TAPE_RECORD * t, program.tapes, point)
     return -1

@@ -152,16 +152,11 @@ def tape_term(store, term, q, order, workspace, entries, gradient, hessian):
 
 
 @kernel(inner=True)
-def term_by_blocks(pool, o, kind, q, body, s, entries, gradient, hessian):
-    """A term of one body with its derivatives, for a Hessian by blocks."""
-    if s < 0:
-        slope, block, order = gradient[:0], hessian[:0], 0
-    else:
-        at = block_row(entries.blocks, s, s)
-        slope, block, order = gradient[s : s + 6], hessian[at : at + 6], 1
-    if kind == POINT_DISTANCE:
-        return point_distance(pool, o, q, body, 0, order, slope, block)
-    return posture(pool, o, q, body, 0, order, slope, block)
+def body_term(pool, term, q, order, s, gradient, hessian):
+    """A term of one body, whose derivatives are added at s: a point distance or a posture."""
+    if term.kind == POINT_DISTANCE:
+        return point_distance(pool, term.parameters, q, term.body, s, order, gradient, hessian)
+    return posture(pool, term.parameters, q, term.body, s, order, gradient, hessian)
 
 
 @kernel(inner=True)
@@ -192,19 +187,16 @@ def objective(store, q, order, workspace, entries, gradient, hessian):
     blocked = order > 0 and is_blocked(entries)
     value = 0.0
     for t in range(header.terms):
-        term = header.term_table + TERM * t
-        term_record = term_at(store.table, term)
-        kind = term_record.kind
-        body = term_record.body
-        if blocked and (kind == POINT_DISTANCE or kind == POSTURE):
-            s = 6 * store.table[header.slots + body]
-            value += term_by_blocks(store.pool, term_record.parameters, kind, q, body, s, entries, gradient, hessian)
-        elif kind == POINT_DISTANCE:
-            s = 6 * store.table[header.slots + body]
-            value += point_distance(store.pool, term_record.parameters, q, body, s, order, gradient, hessian)
-        elif kind == POSTURE:
-            s = 6 * store.table[header.slots + body]
-            value += posture(store.pool, term_record.parameters, q, body, s, order, gradient, hessian)
-        elif kind == TAPE_TERM:
-            value += tape_term(store, term, q, order, workspace, entries, gradient, hessian)
+        at = header.term_table + TERM * t
+        term = term_at(store.table, at)
+        if term.kind == POINT_DISTANCE or term.kind == POSTURE:
+            s = 6 * store.table[header.slots + term.body]
+            if blocked and s >= 0:
+                block = block_row(entries.blocks, s, s)
+                slopes, curvature = gradient[s : s + 6], hessian[block : block + 6]
+                value += body_term(store.pool, term, q, 1, 0, slopes, curvature)
+            else:
+                value += body_term(store.pool, term, q, order, s, gradient, hessian)
+        elif term.kind == TAPE_TERM:
+            value += tape_term(store, at, q, order, workspace, entries, gradient, hessian)
     return value

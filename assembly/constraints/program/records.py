@@ -111,8 +111,7 @@ RUN_TAPE_AT = place_of(HEADER_RECORD, "run_tape_address")
 HEADER = size_of(HEADER_RECORD)
 # A row, of any kind. Row k is that of contact k. Fields of its kind stand behind these.
 ROW = 14
-ROW_RECORD = record_dtype(
-    "i8",
+EVERY_ROW: dict[str, int | tuple[int, ...]] = dict(
     kind=1,  # CONTACT_ROW, ...
     body_f=1,  # -1: none
     body_g=1,  # -1: none
@@ -120,6 +119,7 @@ ROW_RECORD = record_dtype(
     drive=1,  # 1: it prescribes a joint coordinate
     is_length=1,  # 1: the residual is a length
 )
+ROW_RECORD = record_dtype("i8", **EVERY_ROW)
 row_at = record_view(ROW_RECORD)
 KIND = place_of(ROW_RECORD, "kind")
 BODY_F = place_of(ROW_RECORD, "body_f")
@@ -131,7 +131,7 @@ CONTACT_ROW, JOINT_ROW, TAPE_ROW, TRIM_ROW = 0, 1, 2, 3
 # A row of a contact, given or a clearance's.
 CONTACT_ROW_RECORD = record_dtype(
     "i8",
-    before=6,  # what every row has
+    **EVERY_ROW,
     surface_f=1,  # -1: of solids
     surface_g=1,
     shell_f=1,  # -1: of two surfaces
@@ -149,7 +149,7 @@ CLEARANCE_ROW_NUMBER = place_of(CONTACT_ROW_RECORD, "guard_number")
 # A row of a trim.
 TRIM_ROW_RECORD = record_dtype(
     "i8",
-    before=6,  # what every row has
+    **EVERY_ROW,
     contact=1,  # whose coordinates are kept
     side=1,  # 0: on the face of f, 1: of g
     loop=1,
@@ -157,17 +157,17 @@ TRIM_ROW_RECORD = record_dtype(
     form=1,  # SIGNED, ...
     count=1,  # rows that the trim has; its first one says
     edges=1,  # records of the loop's curves as edges
-    is_length=1,  # 1: a vector counts by its signed length
+    by_length=1,  # 1: a vector counts by its signed length
 )
 trim_row_at = record_view(TRIM_ROW_RECORD)
 TRIM_PAIR = place_of(TRIM_ROW_RECORD, "contact")
-TRIM_LENGTH = place_of(TRIM_ROW_RECORD, "is_length")
+TRIM_LENGTH = place_of(TRIM_ROW_RECORD, "by_length")
 # Forms of trims (`trim.py`).
 SIGNED, PARAMETRIC, CARTESIAN, BETWEEN = 0, 1, 2, 3
 # A row of a joint: factor * coordinate + factor' * second coordinate - value.
 JOINT_ROW_RECORD = record_dtype(
     "i8",
-    before=6,  # what every row has
+    **EVERY_ROW,
     coordinate=1,  # from here on a `COORDINATE_RECORD`: kind
     component=1,
     joint=1,
@@ -197,14 +197,6 @@ BODY_COORDINATE = record_dtype(
     body_g=1,
 )
 body_coordinate_at = record_view(BODY_COORDINATE)
-# A row of a tape.
-TAPE_ROW_RECORD = record_dtype(
-    "i8",
-    before=6,  # what every row has
-    tape=1,
-    value=1,  # which of the tape's values
-)
-tape_row_at = record_view(TAPE_ROW_RECORD)
 # A joint.
 JOINT_FIELDS = record_dtype(
     "i8",
@@ -228,8 +220,15 @@ TAPE_FIELDS = record_dtype(
 )
 tape_at = record_view(TAPE_FIELDS)
 TAPE_RECORD = size_of(TAPE_FIELDS)
-# Columns of the Jacobian: twists of f and g, a lifted pair's coordinates, further bodies.
-FREE_COLUMN, EXTRA_COLUMN = 12, 16
+# Columns of the Jacobian; behind these the twists of further bodies.
+JACOBIAN_ROW = record_dtype(
+    "f8",
+    twist_f=6,
+    twist_g=6,
+    lifted=4,  # coordinates of a lifted pair
+)
+jacobian_row_at = record_view(JACOBIAN_ROW)
+FREE_COLUMN, EXTRA_COLUMN = place_of(JACOBIAN_ROW, "lifted"), size_of(JACOBIAN_ROW)
 # Header of the pool.
 POOL_HEADER_RECORD = record_dtype(
     "f8",
@@ -254,6 +253,9 @@ Iterate = namedtuple("Iterate", "q tracked records residual jacobian")
 # of its coordinates; `vectors` and `variables` are room for its derivatives; `guess` are tracked values that a step
 # expects, `memory` is what the contact manager remembers.
 LiftedPairs = namedtuple("LiftedPairs", "free lengths vectors variables guess memory")
+# What stays as it is for a whole solve. `structure`: where rows and unknowns stand (`solve/loop/residuals.py`; None:
+# that is not known yet); `tips`: None where no term of the objective is a dexterity.
+Program = namedtuple("Program", "store structure lifted tapes tips")
 # What the instructions of tapes work in.
 TapeRoom = namedtuple("TapeRoom", "inputs outputs work")
 # Where the Hessian of the Lagrangian and its factor have entries (`envelope.py`).

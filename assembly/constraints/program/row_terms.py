@@ -14,7 +14,6 @@ from assembly.constraints.program.primitives import add_coordinate_hessian
 from assembly.constraints.program.records import (
     COORDINATE,
     EXTRA_COLUMN,
-    FREE_COLUMN,
     JOINT_ROW,
     ROW,
     TAPE_RECORD,
@@ -29,11 +28,15 @@ from assembly.proximity.extrema.rates import add_gap_terms
 
 
 @kernel(inline=True)
-def block_at(b):
-    """First column and width of block b of a row: twists of f and g, coordinates of a free pair, further twists."""
-    if b < 2:
-        return 6 * b, 6
-    return (FREE_COLUMN, EXTRA_COLUMN - FREE_COLUMN) if b == 2 else (EXTRA_COLUMN + 6 * (b - 3), 6)
+def column_of(b):
+    """First column of block b of a row: twists of f and g, coordinates of a free pair, further twists."""
+    return 6 * b if b <= 2 else EXTRA_COLUMN + 6 * (b - 3)
+
+
+@kernel(inline=True)
+def width(b):
+    """How many columns block b has."""
+    return 4 if b == 2 else 6
 
 
 @kernel(inner=True)
@@ -43,13 +46,13 @@ def add_gram(bases, jacobian, r, weight, hessian):
         at = bases[r, b]
         if at < 0:
             continue
-        column, width = block_at(b)
+        column, height = column_of(b), width(b)
         for c in range(bases.shape[1]):
             other = bases[r, c]
             if other < at:
                 continue
-            across, breadth = block_at(c)
-            for i in range(width):
+            across, breadth = column_of(c), width(c)
+            for i in range(height):
                 s = weight * jacobian[r, column + i]
                 if s != 0.0:
                     for j in range(breadth):
@@ -63,12 +66,12 @@ def add_gram_blocks(blocks, bases, jacobian, r, weight, hessian):
         at = bases[r, b]
         if at < 0:
             continue
-        column, _width = block_at(b)
+        column = column_of(b)
         for c in range(bases.shape[1]):
             other = bases[r, c]
             if other < at:
                 continue
-            across, _breadth = block_at(c)
+            across = column_of(c)
             row = block_row(blocks, at, other)
             for i in range(6):
                 s = weight * jacobian[r, column + i]
@@ -86,50 +89,45 @@ def add_square(order, bases, jacobian, r, weight, hessian):
 
 
 @kernel(inner=True)
-def add_coordinate_blocks(kind, component, records, k, y, order, hessian, f, g):
-    """As `add_coordinate_hessian`, for a Hessian by blocks."""
-    at_f, at_g = clear_patch(order, f, g)
-    add_coordinate_hessian(kind, component, records, k, y, order.scratch[1:], at_f, at_g)
-    add_patch(order, f, g, hessian)
+def add_coordinate(asked, records, k, y, order, hessian, f, g):
+    """As `add_coordinate_hessian`, however the Hessian is kept."""
+    if is_blocked(order):
+        at_f, at_g = clear_patch(order, f, g)
+        add_coordinate_hessian(asked.kind, asked.component, records, k, y, order.scratch[1:], at_f, at_g)
+        add_patch(order, f, g, hessian)
+    else:
+        add_coordinate_hessian(asked.kind, asked.component, records, k, y, hessian, f, g)
 
 
 @kernel(inner=True)
-def add_row_terms(store, lifted, workspace, shape, point, y, weights, hessian):
+def add_row_terms(program, point, y, weights, hessian):
     """Upper triangle of hessian += second derivative of y . rows + J^T diag(weights) J.
 
     The rows of tangency of a free pair go with its row.
     """
+    store, lifted = program.store, program.lifted
     header = header_at(store.table, 0)
-    q, tracked, records, jacobian = point.q, point.tracked, point.records, point.jacobian
-    bases, order = shape.bases, shape.sparsity
+    records, jacobian = point.records, point.jacobian
+    bases, order = program.structure.bases, program.structure.sparsity
     blocked = is_blocked(order)
     pairs = header.contacts
-    free, lengths, vectors, block = lifted.free, lifted.lengths, lifted.vectors, lifted.variables
     for r in range(pairs):
-        if free[r] >= 0:
-            call_address(
-                header.free_terms_address,
-                (store.table, store.pool, r, free, lengths, vectors, block, q, tracked, jacobian, y, weights, hessian),
-            )
+        if lifted.free[r] >= 0:
+            call_address(header.free_terms_address, (store, r, lifted, point, y, weights, hessian))
         elif blocked and (y[r] != 0.0 or weights[r] != 0.0):
             f, g = clear_patch(order, bases[r, 0], bases[r, 1])
-            add_gap_terms(records, r, jacobian, r, y[r], weights[r], order.scratch[1:], f, g)
+            add_gap_terms(records, jacobian, r, y[r], weights[r], order.scratch[1:], f, g)
             add_patch(order, bases[r, 0], bases[r, 1], hessian)
         elif y[r] != 0.0 or weights[r] != 0.0:
-            add_gap_terms(records, r, jacobian, r, y[r], weights[r], hessian, bases[r, 0], bases[r, 1])
+            add_gap_terms(records, jacobian, r, y[r], weights[r], hessian, bases[r, 0], bases[r, 1])
     for r in range(pairs, pairs + header.trims):
         if weights[r] != 0.0:
             add_gram(bases, jacobian, r, weights[r], hessian)
         if y[r] != 0.0:
-            call_address(
-                header.trim_terms_address,
-                (store.table, store.pool, r, free, lengths, bases, tracked, records, jacobian, y[r], hessian),
-            )
+            call_address(header.trim_terms_address, (store, r, lifted, bases, point, y[r], hessian))
     for r in range(pairs + header.trims, header.rows):
-        if weights[r] != 0.0 and blocked:
-            add_gram_blocks(order.blocks, bases, jacobian, r, weights[r], hessian)
-        elif weights[r] != 0.0:
-            add_gram(bases, jacobian, r, weights[r], hessian)
+        if weights[r] != 0.0:
+            add_square(order, bases, jacobian, r, weights[r], hessian)
         row = header.row_table + ROW * r
         joint = joint_row_at(store.table, row)
         if y[r] == 0.0 or row_at(store.table, row).kind != JOINT_ROW:
@@ -141,10 +139,7 @@ def add_row_terms(store, lifted, workspace, shape, point, y, weights, hessian):
             g = bases[r, 1 if part == 0 else 4]
             k = pairs + asked.joint
             factor = y[r] * store.pool[joint.parameters + part]
-            if blocked:
-                add_coordinate_blocks(asked.kind, asked.component, records, k, factor, order, hessian, f, g)
-            else:
-                add_coordinate_hessian(asked.kind, asked.component, records, k, factor, hessian, f, g)
+            add_coordinate(asked, records, k, factor, order, hessian, f, g)
     for t in range(header.tapes):
         tape = header.tape_table + TAPE_RECORD * t
         expression = tape_at(store.table, tape)
@@ -152,4 +147,4 @@ def add_row_terms(store, lifted, workspace, shape, point, y, weights, hessian):
         for v in range(expression.values):
             idle = idle and y[expression.first_row + v] == 0.0
         if not idle:
-            add_tape_hessian(store, tape, q, workspace, order, y, hessian)
+            add_tape_hessian(store, tape, point.q, program.tapes, order, y, hessian)

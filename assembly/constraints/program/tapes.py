@@ -12,14 +12,7 @@ from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.constraints.program.hessian_blocks import spot
-from assembly.constraints.program.records import (
-    EXTRA_COLUMN,
-    ROW,
-    header_at,
-    pool_header_at,
-    row_at,
-    tape_at,
-)
+from assembly.constraints.program.records import EXTRA_COLUMN, ROW, header_at, pool_header_at, row_at, tape_at
 from assembly.geometry.expression.tape import run_tape
 
 
@@ -46,12 +39,13 @@ def place_tape(store, tape, q, workspace):
 
 
 @kernel(inner=True)
-def tape_rows(store, tape, q, workspace, residual, jacobian):
+def tape_rows(store, tape, workspace, point):
     """All rows of a tape; a value or a slope that is not finite is an infinite violation, of one side too."""
     header = header_at(store.table, 0)
     expression = tape_at(store.table, tape)
     inputs, outputs, work = workspace
-    place_tape(store, tape, q, inputs)
+    residual, jacobian = point.residual, point.jacobian
+    place_tape(store, tape, point.q, inputs)
     call_address(header.run_tape_address, (store.table, store.pool, expression.first_order, inputs, work, outputs))
     m = expression.values
     count = expression.bodies

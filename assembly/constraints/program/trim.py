@@ -20,13 +20,12 @@ The loop of a solve calls the two kernels at the end by their addresses.
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 
 import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import Store
-from assembly.constraints.program.contact import surface_of
+from assembly.constraints.program.contact import contact_of, surface_of
 from assembly.constraints.program.records import (
     BETWEEN,
     CARTESIAN,
@@ -35,8 +34,9 @@ from assembly.constraints.program.records import (
     ROW,
     SIGNED,
     Iterate,
+    LiftedPairs,
     header_at,
-    row_at,
+    jacobian_row_at,
     trim_row_at,
 )
 from assembly.constraints.program.row_terms import add_gram
@@ -46,16 +46,21 @@ from assembly.geometry.splines.evaluate import curve_point, surface_point
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.brep.borders import on_surface
-from assembly.proximity.brep.records import EDGE, EDGE_RECORD, FACE, edge_at
+from assembly.proximity.brep.records import EDGE, EDGE_RECORD, FACE, Feature, edge_at
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
-from assembly.proximity.extrema.feature_pair import feature_record, solve_features
-from assembly.proximity.extrema.rates import derivatives_at
+from assembly.proximity.extrema.feature_jets import offset_side
+from assembly.proximity.extrema.feature_pair import solve_features
+from assembly.proximity.extrema.rates import derivatives_at, feature_record
 from assembly.proximity.features.trim_distance import trim_distance
 
 # A vector shorter than this has no direction of its own.
 NO_LENGTH = 1e-9
-# Of contacts: which of them have their coordinates as unknowns (negative: it has not), and lengths of these.
-LiftedCoordinates = namedtuple("LiftedCoordinates", "free lengths")
+
+
+@kernel(inline=True)
+def trim_of(table, r):
+    """The record of row r, a trim's."""
+    return trim_row_at(table, header_at(table, 0).row_table + ROW * r)
 
 
 @kernel(inner=True)
@@ -68,10 +73,8 @@ def clear(jacobian, r):
 @kernel(inner=True)
 def add_coordinate(lifted, records, k, i, factor, jacobian, r):
     """Row r += factor times the derivative of coordinate i of contact k: an unknown, or by the contact velocity."""
-    free = lifted.free
-    lengths = lifted.lengths
-    if free[k] >= 0:
-        jacobian[r, FREE_COLUMN + i] += factor / lengths[k, i]
+    if lifted.free[k] >= 0:
+        jacobian_row_at(jacobian, r).lifted[i] += factor / lifted.lengths[k, i]
     else:
         add_rate(records, k, i, factor, jacobian, r)
 
@@ -90,7 +93,7 @@ def add_rate(records, k, i, factor, jacobian, r):
 def signed_row(store, r, lifted, point):
     """Row r, of a trim in the signed form."""
     tracked, records, residual, jacobian = point.tracked, point.records, point.residual, point.jacobian
-    row = trim_row_at(store.table, header_at(store.table, 0).row_table + ROW * r)
+    row = trim_of(store.table, r)
     k = row.contact
     o = 2 * row.side
     factor = store.pool[row.factor]
@@ -102,46 +105,36 @@ def signed_row(store, r, lifted, point):
 
 
 @kernel(inner=True)
-def loop_extremum(store, row, x, o, turn, pose, records, scratch):
+def loop_extremum(store, trim, x, o, turn, pose, records, scratch):
     """The loop's point that is extremal against the other surface: found near the contact x, its record in `scratch`.
 
     Returns the curve, its parameter, whether it moves (it does not at a corner), and the signed distance of x.
     """
-    trim = trim_row_at(store.table, row)
     loop = trim.loop
     s, number, t, _cu, _cv, _nu, _nv = trim_nearest(store, loop, 0, trim_at(store.table, loop).curves, x[o], x[o + 1])
     edge = trim.edges + EDGE_RECORD * number
-    other = other_surface(store.table, row)
+    on_loop = Feature(EDGE, edge)
+    on_face = Feature(FACE, trimmed_surface(store.table, trim, 1 - trim.side))
     none = (0.0, 0.0, 0.0)
     if o == 0:
         start = (t, 0.0, x[2], x[3])
-        status, y, frame = solve_features(store, EDGE, edge, FACE, other, pose, start, none, 1.0, math.inf)
+        status, y, frame = solve_features(store, on_loop, on_face, pose, start, none, 1.0, math.inf)
         found = y[0]
     else:
         start = (x[0], x[1], t, 0.0)
-        status, y, frame = solve_features(store, FACE, other, EDGE, edge, pose, start, none, 1.0, math.inf)
+        status, y, frame = solve_features(store, on_face, on_loop, pose, start, none, 1.0, math.inf)
         found = y[2]
     moves = status == CONVERGED or status == SINGULAR
     if moves:
         t = found
-        feature_record(turn, pose.shift, frame, records, scratch)
+        feature_record(turn, pose.shift, frame, offset_side(frame.side_f, frame.gap), records, scratch)
     return edge_at(store.table, edge).curve, t, moves, s
 
 
 @kernel(inline=True)
-def own_surface(table, row):
-    """The surface that has the loop of a trim."""
-    trim = trim_row_at(table, row)
-    pair = header_at(table, 0).row_table + ROW * trim.contact
-    return surface_of(table, pair, trim.side)
-
-
-@kernel(inline=True)
-def other_surface(table, row):
-    """The surface that touches the one with the loop."""
-    trim = trim_row_at(table, row)
-    pair = header_at(table, 0).row_table + ROW * trim.contact
-    return surface_of(table, pair, 1 - trim.side)
+def trimmed_surface(table, trim, side):
+    """The surface of a trim's contact on a side."""
+    return surface_of(contact_of(table, trim.contact), side)
 
 
 @kernel(inner=True)
@@ -176,34 +169,30 @@ def vector_rows(store, first, lifted, point):
     """The rows of a trim from `first` on, in one of the paper's forms."""
     header = header_at(store.table, 0)
     q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
-    row = header.row_table + ROW * first
-    trim = trim_row_at(store.table, row)
-    fields = row_at(store.table, row)
+    trim = trim_of(store.table, first)
     k = trim.contact
     derivatives = derivatives_at(records, k)
     side = trim.side
     form = trim.form
     o = 2 * side
-    i = fields.body_f
-    j = fields.body_g
+    i, j = trim.body_f, trim.body_g
     x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
     turn_f = rotation(q, i)
     turn_g = rotation(q, j)
     pose = relative_pose(q, i, turn_f, j, turn_g)
     scratch = header.contacts + header.joints
-    curve, t, moves, s = loop_extremum(store, row, x, o, turn_f, pose, records, scratch)
+    curve, t, moves, s = loop_extremum(store, trim, x, o, turn_f, pose, records, scratch)
     factor = store.pool[trim.factor]
     kept = 1.0 if factor >= 0.0 else -1.0
     factor = abs(factor)
     turn = turn_f if side == 0 else turn_g
-    surface = own_surface(store.table, row)
+    surface = trimmed_surface(store.table, trim, side)
     at, rate, _bend = curve_point(store.table, store.pool, curve, t)
     on_edge = on_surface(store, surface, curve, t)
     c, along = on_edge.point, on_edge.tangent
     p, pu, pv, puu, puv, pvv = surface_point(store.table, store.pool, surface, x[o], x[o + 1])
-    there, du, dv, _uu, _uv, _vv = surface_point(
-        store.table, store.pool, other_surface(store.table, row), x[2 - o], x[3 - o]
-    )
+    away_surface = trimmed_surface(store.table, trim, 1 - side)
+    there, du, dv, _uu, _uv, _vv = surface_point(store.table, store.pool, away_surface, x[2 - o], x[3 - o])
     away = turn_g if side == 0 else turn_f
     origin = position(q, j if side == 0 else i)
     point_w = add(matvec(away, there), origin)
@@ -249,7 +238,7 @@ def vector_rows(store, first, lifted, point):
             add_coordinate(lifted, records, k, 3 - o, dot(axis, dv), jacobian, r)
         if moves:
             add_rate(records, scratch, o, -slope, jacobian, r)
-    if trim.is_length == 1:
+    if trim.by_length == 1:
         signed_length(store, first, trim.count, 1.0 if kept * s >= 0.0 else -1.0, lifted, point)
 
 
@@ -306,7 +295,7 @@ def growth(store, r, j, lifted, point):
     """The derivative along column j of the signed distance, positive on the right side of the loop."""
     tracked = point.tracked
     records = point.records
-    row = trim_row_at(store.table, header_at(store.table, 0).row_table + ROW * r)
+    row = trim_of(store.table, r)
     k = row.contact
     derivatives = derivatives_at(records, k)
     o = 2 * row.side
@@ -322,16 +311,24 @@ def growth(store, r, j, lifted, point):
     return factor * value
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])")
-def trim_rows(table, pool, free, lengths, q, tracked, records, residual, jacobian):
-    """All rows of trims, and their gradients."""
-    store = Store(table, pool)
+@kernel(
+    signatures=(
+        "(Tuple((i8[::1], f8[::1])), "
+        "Tuple((i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[::1])), "
+        "Tuple((f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])))"
+    )
+)
+def trim_rows(scene, pairs, at):
+    """All rows of trims, and their gradients; the arguments have the parts of `Store`, `LiftedPairs` and `Iterate`."""
+    table, pool = scene
+    free, lengths, vectors, variables, guess, memory = pairs
+    q, tracked, records, residual, jacobian = at
+    store, point = Store(table, pool), Iterate(q, tracked, records, residual, jacobian)
+    lifted = LiftedPairs(free, lengths, vectors, variables, guess, memory)
     header = header_at(table, 0)
-    lifted = LiftedCoordinates(free, lengths)
-    point = Iterate(q, tracked, records, residual, jacobian)
     r = header.contacts
     while r < header.contacts + header.trims:
-        row = trim_row_at(table, header.row_table + ROW * r)
+        row = trim_of(table, r)
         if row.form == SIGNED:
             signed_row(store, r, lifted, point)
         else:
@@ -360,19 +357,24 @@ def part_of(jacobian, r, rates, k):
 
 @kernel(
     signatures=(
-        "(i8[::1], f8[::1], i8, i8[::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8[:, ::1])"
-    ),
+        "(Tuple((i8[::1], f8[::1])), i8, "
+        "Tuple((i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[::1])), "
+        "i8[:, ::1], Tuple((f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])), f8, f8[:, ::1])"
+    )
 )
-def trim_terms(table, pool, r, free, lengths, bases, tracked, records, jacobian, y, hessian):
+def trim_terms(scene, r, pairs, bases, point, y, hessian):
     """Upper triangle of hessian += y (second derivative of row r).
 
     Of a signed row of a free contact that is all; else what the change of u_q adds is left out. A vector's row counts
     as the signed distance, times what its gradient has of that one's: at a solution all else in it is the gap's.
     """
-    row = trim_row_at(table, header_at(table, 0).row_table + ROW * r)
+    table, pool = scene
+    free, lengths, vectors, variables, guess, memory = pairs
+    _q, tracked, records, _residual, jacobian = point
+    lifted = LiftedPairs(free, lengths, vectors, variables, guess, memory)
+    row = trim_of(table, r)
     k = row.contact
     o = 2 * row.side
-    lifted = LiftedCoordinates(free, lengths)
     _s, n, bend = trim_distance(Store(table, pool), row.loop, tracked[k, o], tracked[k, o + 1])
     places = np.empty((1, bases.shape[1]), np.int64)
     for b in range(bases.shape[1]):

@@ -14,19 +14,18 @@ Halving is n sums, each off by half a unit: 50 depths of it, by which no piece o
 rounding, are off by 25 n units 2^-52 of the largest number, of both X and w where there are weights, and 128 depths by
 what (64 n + 64) pays for.
 
-Hulls are a tuple: where the vertices of each begin and how many, the vertices, boxes, directions, the supports along
-them, polygons inside.
 """
 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
 from assembly._kernel import kernel
 from assembly.distance.enclosures.enclosure import hull_support
-from assembly.distance.enclosures.gjk import INSIDE, OVERLAP, POINT, ROOM, gjk, simplex_at, support_point, witnesses
+from assembly.distance.enclosures.gjk import INSIDE, OVERLAP, POINT, ROOM, ConvexSet, gjk, simplex_at, support_point
 from assembly.geometry.interval import UNIT, down, up
 from assembly.geometry.vec import dot
 
@@ -34,6 +33,11 @@ from assembly.geometry.vec import dot
 APART, NEAR, OPEN = 0, 1, 2
 # Pieces that wait at once.
 DEPTH = 40
+# Hulls. places: where the vertices of each begin, and how many; boxes: their corners; supports: along directions that
+# all have in common; polygons: inside of them, in the plane.
+Obstacles = namedtuple("Obstacles", "places vertices boxes directions supports polygons")
+# Bezier pieces that wait, homogeneous, of which points in space are looked at; off: how far these may be off.
+WaitingPieces = namedtuple("WaitingPieces", "stack degree rational points off")
 # Points of a curve that are looked at first, and pieces that are parted by fixed directions alone.
 _LOOKS, _PIECES = 15, 4
 
@@ -96,7 +100,7 @@ def inner_polygons(full, hulls, obstacles, directions):
             count = 0
             for k in range(directions.shape[0]):
                 n = (directions[k, 0], directions[k, 1], directions[k, 2])
-                _x, found = support_point(obstacles, hulls[j, 0], hulls[j, 1], -1.0, n)
+                _x, found = support_point(ConvexSet(obstacles, hulls[j, 0], hulls[j, 1], -1.0), n)
                 place = hulls[j, 0] + 3 * found
                 if count == 0 or (place != polygons[j, count] and place != polygons[j, 1]):
                     count += 1
@@ -134,35 +138,47 @@ def look(points, degree, basis, looks):
 
 
 @kernel(inner=True, exact=True)
-def look_is_near(looks, obstacles, boxes, polygons, j, off):
+def look_is_near(looks, hulls, j, off):
     """Whether one of the points that are looked at is proven inside an obstacle of the plane."""
+    boxes = hulls.boxes
     for m in range(_LOOKS):
         x = looks[3 * m]
         y = looks[3 * m + 1]
         if boxes[j, 0] < x < boxes[j, 3] and boxes[j, 1] < y < boxes[j, 4]:
-            if in_polygon(x, y, obstacles, polygons, j, off):
+            if in_polygon(x, y, hulls.vertices, hulls.polygons, j, off):
                 return True
     return False
+
+
+@kernel(inline=True)
+def hull_of(hulls, j):
+    """An obstacle as a convex set."""
+    return ConvexSet(hulls.vertices, hulls.places[j, 0], hulls.places[j, 1], -1.0)
+
+
+@kernel(inline=True)
+def is_beyond(points, o, count, hulls, j, reach):
+    """Whether boxes or one of the fixed directions tell points from an obstacle."""
+    return boxes_apart(points, o, count, hulls.boxes, j, reach) or parted(
+        points, o, count, hulls.directions, hulls.supports, j, reach
+    )
 
 
 @kernel(inner=True, exact=True)
 def end_is_near(full, points, o, hulls, j, clearance, off, g):
     """Whether a point of the curve is within the clearance of a hull, rounding against it."""
-    place, obstacles, boxes, directions, supports, polygons = hulls
-    b, count = place[j, 0], place[j, 1]
     reach = up(clearance + off)
-    if boxes_apart(points, o, 1, boxes, j, reach) or parted(points, o, 1, directions, supports, j, reach):
+    if is_beyond(points, o, 1, hulls, j, reach):
         return False
-    if in_polygon(points[o], points[o + 1], obstacles, polygons, j, off):
+    if in_polygon(points[o], points[o + 1], hulls.vertices, hulls.polygons, j, off):
         return True
-    first = from_center(points, o, boxes, j)
+    first = from_center(points, o, hulls.boxes, j)
     simplex = simplex_at(g, 0)
     for k in range(3):
         simplex.point[k] = points[o + k]
-    how, v, kept = gjk(full, g, POINT, 1, -1.0, obstacles, b, count, -1.0, first, clearance, 1e-12, g)
+    how, v, _kept = gjk(full, ConvexSet(g, POINT, 1, -1.0), hull_of(hulls, j), first, clearance, 1e-12, g)
     if how == INSIDE:
         return True
-    _a, _b = witnesses(g, kept)
     return up(math.sqrt(dot(v, v)) * (1.0 + 8.0 * UNIT)) + off <= clearance
 
 
@@ -177,10 +193,42 @@ def project(stack, o, degree, rational, points):
 
 
 @kernel(inner=True, exact=True)
-def piece_is_near(full, stack, degree, rational, points, hulls, j, clearance, tolerance, off, g):
-    """Whether a piece, at the front of the stack, is apart from, near or open to a hull."""
-    place, obstacles, boxes, directions, supports, _polygons = hulls
-    b, count = place[j, 0], place[j, 1]
+def is_apart(full, curve, hulls, j, clearance, g):
+    """Whether a direction by GJK proves the points of a piece farther than the clearance from an obstacle."""
+    points, degree, off = curve.points, curve.degree, curve.off
+    hull = hull_of(hulls, j)
+    first = from_center(points, 3 * (degree // 2), hulls.boxes, j)
+    how, v, _k = gjk(full, ConvexSet(points, 0, degree + 1, -1.0), hull, first, clearance + off, 1e-3, g)
+    if how == INSIDE or how == OVERLAP:
+        return False
+    length = math.sqrt(dot(v, v))
+    n = (-v[0] / length, -v[1] / length, -v[2] / length)
+    c = (points[0], points[1], points[2])
+    high = hull_support(points, 0, degree + 1, n, c)
+    high += hull_support(hull.points, hull.at, hull.count, (-n[0], -n[1], -n[2]), c)
+    return down(-high - off) * (1.0 - 8.0 * UNIT) > clearance
+
+
+@kernel(inline=True, exact=True)
+def halve_piece(stack, o, degree):
+    """The piece at stack[o:] in halves: the first one there, the second one behind it."""
+    size = 4 * (degree + 1)
+    p = o + size
+    for k in range(size):
+        stack[p + k] = stack[o + k]
+    for r in range(1, degree + 1):
+        for i in range(degree - r + 1):
+            q = p + 4 * i
+            for k in range(4):
+                stack[q + k] = 0.5 * (stack[q + k] + stack[q + 4 + k])
+        for k in range(4):
+            stack[o + 4 * r + k] = stack[p + k]
+
+
+@kernel(inner=True, exact=True)
+def piece_is_near(full, curve, hulls, j, clearance, tolerance, g):
+    """Whether a piece, at the front of the stack, is apart from, near or open to an obstacle."""
+    stack, degree, rational, points, off = curve.stack, curve.degree, curve.rational, curve.points, curve.off
     size = 4 * (degree + 1)
     top = 0
     project(stack, 0, degree, rational, points)
@@ -193,26 +241,12 @@ def piece_is_near(full, stack, degree, rational, points, hulls, j, clearance, to
         o = size * top
         pieces += 1
         project(stack, o, degree, rational, points)
-        reach = up(clearance + off)
-        if boxes_apart(points, 0, degree + 1, boxes, j, reach) or parted(
-            points, 0, degree + 1, directions, supports, j, reach
-        ):
+        if is_beyond(points, 0, degree + 1, hulls, j, up(clearance + off)):
             top -= 1
             continue
-        if pieces > _PIECES:
-            first = from_center(points, 3 * (degree // 2), boxes, j)
-            how, v, _k = gjk(
-                full, points, 0, degree + 1, -1.0, obstacles, b, count, -1.0, first, clearance + off, 1e-3, g
-            )
-            if how != INSIDE and how != OVERLAP:
-                length = math.sqrt(dot(v, v))
-                n = (-v[0] / length, -v[1] / length, -v[2] / length)
-                c = (points[0], points[1], points[2])
-                high = hull_support(points, 0, degree + 1, n, c)
-                high += hull_support(obstacles, b, count, (-n[0], -n[1], -n[2]), c)
-                if down(-high - off) * (1.0 - 8.0 * UNIT) > clearance:
-                    top -= 1
-                    continue
+        if pieces > _PIECES and is_apart(full, curve, hulls, j, clearance, g):
+            top -= 1
+            continue
         extent = 0.0
         for i in range(1, degree + 1):
             d = (points[3 * i] - points[0], points[3 * i + 1] - points[1], points[3 * i + 2] - points[2])
@@ -220,20 +254,8 @@ def piece_is_near(full, stack, degree, rational, points, hulls, j, clearance, to
         shortest = max(tolerance, off)
         if extent <= shortest * shortest or top + 1 >= DEPTH:
             return OPEN
-        # The first half below, the second on top.
-        p = o + size
-        for k in range(size):
-            stack[p + k] = stack[o + k]
-        for r in range(1, degree + 1):
-            for i in range(degree - r + 1):
-                q = p + 4 * i
-                for k in range(4):
-                    stack[q + k] = 0.5 * (stack[q + k] + stack[q + 4 + k])
-            for k in range(4):
-                stack[o + 4 * r + k] = stack[p + k]
-        f = 1.0 / stack[p + 3] if rational else 1.0
-        for k in range(3):
-            points[k] = f * stack[p + k]
+        halve_piece(stack, o, degree)
+        project(stack, o + size, 0, rational, points)
         if end_is_near(full, points, 0, hulls, j, clearance, off, g):
             return NEAR
         top += 1
@@ -282,32 +304,39 @@ def parted(points, o, count, directions, supports, j, reach):
     return False
 
 
-@kernel(signatures="(i8, i8[:, ::1], f8[::1], i8[:, ::1], f8[::1], f8[:, ::1], f8, f8, i8[:, ::1])")
-def near_pairs(full, table, pool, hulls, obstacles, boxes, clearance, tolerance, out):
+@kernel(inner=True, allocates=True)
+def obstacles_of(full, places, vertices, boxes):
+    """Hulls with their supports along fixed directions and polygons inside."""
+    directions = fixed_directions(full)
+    supports = np.empty((places.shape[0], directions.shape[0]))
+    for j in range(places.shape[0]):
+        for k in range(directions.shape[0]):
+            n = (directions[k, 0], directions[k, 1], directions[k, 2])
+            supports[j, k] = hull_support(vertices, places[j, 0], places[j, 1], n, (0.0, 0.0, 0.0))
+    return Obstacles(places, vertices, boxes, directions, supports, inner_polygons(full, places, vertices, directions))
+
+
+@kernel(signatures=("(i8, Tuple((i8[:, ::1], f8[::1])), Tuple((i8[:, ::1], f8[::1], f8[:, ::1])), f8, f8, i8[:, ::1])"))
+def near_pairs(full, pieces, obstacles, clearance, tolerance, out):
     """Whether curve i comes near obstacle j, to out (curves, obstacles).
 
-    table: rows (curve, degree, rational, place) of pieces, whose homogeneous points stand in the pool; hulls: rows
-    (place, count) of obstacles; boxes: lower and upper corner of each, six numbers.
+    pieces: a table of rows (curve, degree, rational, place), and a pool where their homogeneous points stand;
+    obstacles: rows (place, count), vertices, and boxes: lower and upper corner of each, six numbers.
     """
+    table, pool = pieces
+    places, vertices, boxes = obstacles
+    hulls = obstacles_of(full, places, vertices, boxes)
     degree = 0
     for i in range(table.shape[0]):
         degree = max(degree, table[i, 1])
     stack = np.empty(4 * (degree + 1) * (DEPTH + 1))
     points = np.empty(3 * (degree + 1))
     g = np.zeros(ROOM)
-    directions = fixed_directions(full)
-    supports = np.empty((hulls.shape[0], directions.shape[0]))
-    for j in range(hulls.shape[0]):
-        for k in range(directions.shape[0]):
-            n = (directions[k, 0], directions[k, 1], directions[k, 2])
-            supports[j, k] = hull_support(obstacles, hulls[j, 0], hulls[j, 1], n, (0.0, 0.0, 0.0))
-    polygons = inner_polygons(full, hulls, obstacles, directions)
-    shapes = hulls, obstacles, boxes, directions, supports, polygons
     basis = np.empty((_LOOKS, degree + 1))
     looks = np.empty(3 * _LOOKS)
     filled = -1
     for i in range(table.shape[0]):
-        curve, degree, rational, place = table[i, 0], table[i, 1], table[i, 2] != 0, table[i, 3]
+        number, degree, rational, place = table[i, 0], table[i, 1], table[i, 2] != 0, table[i, 3]
         most = 0.0
         for m in range(degree + 1):
             f = 1.0 / pool[place + 4 * m + 3] if rational else 1.0
@@ -321,14 +350,15 @@ def near_pairs(full, table, pool, hulls, obstacles, boxes, clearance, tolerance,
                 fill_basis(degree, basis)
                 filled = degree
             look(points, degree, basis, looks)
-        for j in range(hulls.shape[0]):
-            if out[curve, j] == NEAR:
+        curve = WaitingPieces(stack, degree, rational, points, off)
+        for j in range(places.shape[0]):
+            if out[number, j] == NEAR:
                 continue
-            if looked and look_is_near(looks, obstacles, boxes, polygons, j, off):
-                out[curve, j] = NEAR
+            if looked and look_is_near(looks, hulls, j, off):
+                out[number, j] = NEAR
                 continue
             for k in range(4 * (degree + 1)):
                 stack[k] = pool[place + k]
-            told = piece_is_near(full, stack, degree, rational, points, shapes, j, clearance, tolerance, off, g)
-            if told != APART and out[curve, j] != NEAR:
-                out[curve, j] = told
+            told = piece_is_near(full, curve, hulls, j, clearance, tolerance, g)
+            if told != APART and out[number, j] != NEAR:
+                out[number, j] = told

@@ -54,9 +54,8 @@ def collisions(
     if gap < 0.0:
         raise InputError(f"clearance is {gap:g}; expected zero or a positive number")
     out = np.zeros((count, len(hulls)), dtype=np.int64)
-    collision_batch.near_pairs(
-        dimension + 1, table, pool, hulls, points, boxes, gap, positive("tolerance", tolerance), out
-    )
+    tolerance = positive("tolerance", tolerance)
+    collision_batch.near_pairs(dimension + 1, (table, pool), (hulls, points, boxes), gap, tolerance, out)
     return np.asarray(out != collision_batch.APART)
 
 

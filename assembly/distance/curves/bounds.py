@@ -23,9 +23,6 @@ import math
 
 from assembly._kernel import kernel
 from assembly.distance.curves.nodes import (
-    A0,
-    A1,
-    A2,
     ROWS,
     curve_node_at,
     length,
@@ -35,22 +32,22 @@ from assembly.geometry.splines.bezier_pieces import UNIT, bezier_curve_at
 from assembly.geometry.vec import dot
 
 
+@kernel(inline=True)
+def difference(a, b, shift):
+    """a - b, the second moved by the shift."""
+    return ((a[0] - b[0]) - shift[0], (a[1] - b[1]) - shift[1], (a[2] - b[2]) - shift[2])
+
+
 @kernel(inner=True, exact=True)
-def box_bound(a, o, b, p, shift, slack):
-    """Distance of two boxes, the second moved by the shift."""
-    node = curve_node_at(a, o)
-    node_record = curve_node_at(b, p)
+def box_bound(a, b, shift, slack):
+    """Distance of the boxes of two nodes, the second moved by the shift."""
     total = 0.0
     for j in range(3):
-        gap = (
-            abs((node.box_center[j] - node_record.box_center[j]) - shift[j])
-            - node.box_half[j]
-            - node_record.box_half[j]
-        )
+        gap = abs((a.box_center[j] - b.box_center[j]) - shift[j]) - a.box_half[j] - b.box_half[j]
         gap -= slack
         if gap > 0.0:
             total += gap * gap
-    return math.sqrt(total) * (1.0 - 8.0 * UNIT) - node.away - node_record.away
+    return math.sqrt(total) * (1.0 - 8.0 * UNIT) - a.away - b.away
 
 
 @kernel(inline=True)
@@ -124,17 +121,11 @@ def square_minimum(c, g, h, p, q, r):
 
 
 @kernel(inner=True, exact=True)
-def model_bound(a, o, b, p, shift, slack):
-    """The bound of the quadratic models, and where they are closest, as (d, e)."""
-    node = curve_node_at(a, o)
-    node_record = curve_node_at(b, p)
-    a0 = three(a, o + A0)
-    b0 = three(b, p + A0)
-    d0 = ((a0[0] - b0[0]) - shift[0], (a0[1] - b0[1]) - shift[1], (a0[2] - b0[2]) - shift[2])
-    a1 = three(a, o + A1)
-    b1 = three(b, p + A1)
-    a2 = three(a, o + A2)
-    b2 = three(b, p + A2)
+def model_bound(a, b, shift, slack):
+    """The bound of the quadratic models of two nodes, and where they are closest, as (d, e)."""
+    d0 = difference(a.a0, b.a0, shift)
+    a1, a2 = three(a.a1, 0), three(a.a2, 0)
+    b1, b2 = three(b.a1, 0), three(b.a2, 0)
     c = dot(d0, d0)
     aa = dot(a1, a1)
     bb = dot(b1, b1)
@@ -146,23 +137,35 @@ def model_bound(a, o, b, p, shift, slack):
     size = c + aa + bb + abs(da) + abs(db) + dot(a2, a2) + dot(b2, b2)
     least -= cubic * (1.0 + 1e-12) + 128.0 * UNIT * size
     root = math.sqrt(least) * (1.0 - 8.0 * UNIT) if least > 0.0 else 0.0
-    away = node.away + node_record.away + node.e0 + node_record.e0 + slack
+    away = a.away + b.away + a.e0 + b.e0 + slack
     return root - away * (1.0 + 16.0 * UNIT), x, y
 
 
+@kernel(inline=True, exact=True)
+def farthest(piece, x, y, z):
+    """The control point of a piece that is farthest along a direction: how far it is."""
+    curve = bezier_curve_at(piece.record, 0)
+    nodes = piece.nodes
+    # Where the positions begin.
+    i = piece.at + ROWS + 4 * (curve.degree + 1) * curve.rational
+    most = x * nodes[i] + y * nodes[i + 1] + z * nodes[i + 2]
+    for _ in range(curve.degree):
+        i += 4
+        most = max(most, x * nodes[i] + y * nodes[i + 1] + z * nodes[i + 2])
+    return most
+
+
 @kernel(inner=True, exact=True)
-def hull_bound(ra, a, o, rb, b, p, shift, slack, x, y):
-    """The bound of the control points in the direction between the points of the models at (x, y)."""
-    node = curve_node_at(a, o)
-    node_record = curve_node_at(b, p)
-    n = bezier_curve_at(ra, 0).degree
-    m = bezier_curve_at(rb, 0).degree
-    n0 = (node.a0[0] - node_record.a0[0]) - shift[0]
-    n1 = (node.a0[1] - node_record.a0[1]) - shift[1]
-    n2 = (node.a0[2] - node_record.a0[2]) - shift[2]
-    n0 += x * node.a1[0] - y * node_record.a1[0]
-    n1 += x * node.a1[1] - y * node_record.a1[1]
-    n2 += x * node.a1[2] - y * node_record.a1[2]
+def hull_bound(a, b, shift, slack, x, y):
+    """The bound of the control points of two pieces in the direction between the points of their models at (x, y)."""
+    node_a = curve_node_at(a.nodes, a.at)
+    node_b = curve_node_at(b.nodes, b.at)
+    n0 = (node_a.a0[0] - node_b.a0[0]) - shift[0]
+    n1 = (node_a.a0[1] - node_b.a0[1]) - shift[1]
+    n2 = (node_a.a0[2] - node_b.a0[2]) - shift[2]
+    n0 += x * node_a.a1[0] - y * node_b.a1[0]
+    n1 += x * node_a.a1[1] - y * node_b.a1[1]
+    n2 += x * node_a.a1[2] - y * node_b.a1[2]
     size = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
     if not size > 0.0:
         return 0.0
@@ -170,56 +173,35 @@ def hull_bound(ra, a, o, rb, b, p, shift, slack, x, y):
     n0 *= size
     n1 *= size
     n2 *= size
-    i = positions(ra, o)
-    low = n0 * a[i] + n1 * a[i + 1] + n2 * a[i + 2]
-    for _ in range(n):
-        i += 4
-        low = min(low, n0 * a[i] + n1 * a[i + 1] + n2 * a[i + 2])
-    i = positions(rb, p)
-    high = n0 * b[i] + n1 * b[i + 1] + n2 * b[i + 2]
-    for _ in range(m):
-        i += 4
-        high = max(high, n0 * b[i] + n1 * b[i + 1] + n2 * b[i + 2])
+    low = -farthest(a, -n0, -n1, -n2)
+    high = farthest(b, n0, n1, n2)
     gap = (low - high) - (n0 * shift[0] + n1 * shift[1] + n2 * shift[2])
-    return gap * (1.0 - 16.0 * UNIT) - 4.0 * slack - node.away - node_record.away
-
-
-@kernel(inline=True)
-def positions(record, o):
-    """Where the positions of a node's control points begin."""
-    return o + ROWS + (4 * (bezier_curve_at(record, 0).degree + 1)) * record[2]
+    return gap * (1.0 - 16.0 * UNIT) - 4.0 * slack - node_a.away - node_b.away
 
 
 @kernel(inner=True, exact=True)
-def convexity(ra, a, o, rb, b, p, shift):
-    """Least curvatures (lambda_a, lambda_b) of F over the box of two pieces; zeros where it is not proven convex."""
-    node = curve_node_at(a, o)
-    node_record = curve_node_at(b, p)
-    a0 = three(a, o + A0)
-    b0 = three(b, p + A0)
-    d0 = ((a0[0] - b0[0]) - shift[0], (a0[1] - b0[1]) - shift[1], (a0[2] - b0[2]) - shift[2])
-    a1 = three(a, o + A1)
-    b1 = three(b, p + A1)
-    a2 = three(a, o + A2)
-    b2 = three(b, p + A2)
+def convexity(a, b, flat, shift):
+    """Least curvatures (lambda_a, lambda_b) of F over the box of two nodes; zeros where it is not proven convex.
+
+    The second is of a point if it is `flat`.
+    """
+    d0 = difference(a.a0, b.a0, shift)
+    a1, a2 = three(a.a1, 0), three(a.a2, 0)
+    b1, b2 = three(b.a1, 0), three(b.a2, 0)
     la = length(a1)
     lb = length(b1)
     ka = length(a2)
     kb = length(b2)
-    ea0 = node.e0
-    ea1 = node.e1
-    ea2 = node.e2
-    eb0 = node_record.e0
-    eb1 = node_record.e1
-    eb2 = node_record.e2
-    away = node.away + node_record.away
+    ea0, ea1, ea2 = a.e0, a.e1, a.e2
+    eb0, eb1, eb2 = b.e0, b.e1, b.e2
+    away = a.away + b.away
     far = length(d0) + 0.5 * (la + lb) + 0.125 * (ka + kb) + ea0 + eb0
     bent = 0.125 * abs(dot(a2, b2))
     mixed_a = 0.5 * abs(dot(a2, b1))
     mixed_b = 0.5 * abs(dot(a1, b2))
     slack = 1e-13 * (la + lb + ka + kb) * (la + lb + ka + kb + far)
     error = ea0 + eb0 + away
-    if bezier_curve_at(rb, 0).degree == 0:
+    if flat:
         ss = (
             la * la
             + dot(d0, a2)

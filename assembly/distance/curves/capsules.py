@@ -19,7 +19,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
-from assembly.distance.curves.bounds import square_minimum
+from assembly.distance.curves.bounds import difference, square_minimum
 from assembly.distance.curves.nodes import length, three
 from assembly.geometry.splines.bezier_pieces import (
     UNIT,
@@ -60,7 +60,7 @@ _STACK = 128
 @kernel(signatures="(i8[::1], f8[::1])", allocates=True, exact=True)
 def capsule_tree(record, pool):
     """The tree of a packed curve."""
-    pool_head = bezier_head_at(pool, 0)
+    packed = bezier_head_at(pool, 0)
     curve = bezier_curve_at(record, 0)
     n = curve.degree
     spans = curve.spans
@@ -93,11 +93,11 @@ def capsule_tree(record, pool):
     tree = np.empty(2 * slots * STRIDE)
     head = capsule_head_at(tree, 0)
     head.leaves = slots
-    head.extent = pool_head.reach
+    head.extent = packed.reach
     for j in range(3):
-        head.origin[j] = pool_head.center[j]
+        head.origin[j] = packed.center[j]
     # Halvings (see `distance/curves/nodes.py`), the quotient, and the sums of a radius.
-    away = pool_head.error + (4.0 * n * halvings + 128.0) * UNIT * pool_head.reach
+    away = packed.error + (4.0 * n * halvings + 128.0) * UNIT * packed.reach
     low = slots
     width = 1
     while low > 0:
@@ -184,16 +184,11 @@ def _extent(tree, o):
 @kernel(signatures="(f8[::1], f8[::1], f8)", allocates=True, exact=True)
 def compare_curves(a, b, clearance):
     """Whether two curves are proven farther apart than a clearance, or proven not to be; else OPEN."""
-    head = capsule_head_at(b, 0)
-    tree_head = capsule_head_at(a, 0)
-    shift = (
-        head.origin[0] - tree_head.origin[0],
-        head.origin[1] - tree_head.origin[1],
-        head.origin[2] - tree_head.origin[2],
-    )
-    slack = 16.0 * UNIT * (tree_head.extent + head.extent + length(shift)) + 1e-150
-    leaf_a = int(tree_head.leaves)
-    leaf_b = int(head.leaves)
+    head_a, head_b = capsule_head_at(a, 0), capsule_head_at(b, 0)
+    shift = difference(head_b.origin, head_a.origin, (0.0, 0.0, 0.0))
+    slack = 16.0 * UNIT * (head_a.extent + head_b.extent + length(shift)) + 1e-150
+    leaf_a = int(head_a.leaves)
+    leaf_b = int(head_b.leaves)
     stack = np.empty(2 * _STACK, np.int64)
     stack[0] = 1
     stack[1] = 1

@@ -12,6 +12,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly._lanes import lane
+from assembly.distance.curves.bounds import difference
 from assembly.distance.curves.nodes import ROWS
 from assembly.geometry.splines.bezier_pieces import bezier_curve_at, bezier_derivatives, bezier_value
 from assembly.geometry.splines.evaluate import xyz
@@ -22,30 +23,25 @@ _SHORTENINGS = 12
 
 
 @kernel(inner=True)
-def node_point(record, pool, nodes, o, x):
+def node_point(piece, x):
     """The point of a piece."""
-    curve = bezier_curve_at(record, 0)
-    v = bezier_value(nodes, o + ROWS, pool, curve.binomials, curve.degree, x)
+    curve = bezier_curve_at(piece.record, 0)
+    v = bezier_value(piece.nodes, piece.at + ROWS, piece.pool, curve.binomials, curve.degree, x)
     return xyz((1.0 / lane(v, 3)) * v)
 
 
 @kernel(inner=True)
-def node_derivatives(record, pool, nodes, o, x):
+def node_derivatives(piece, x):
     """Point, first and second derivative of a piece."""
-    curve = bezier_curve_at(record, 0)
+    curve = bezier_curve_at(piece.record, 0)
     if curve.degree == 0:
         zero = (0.0, 0.0, 0.0)
-        return node_point(record, pool, nodes, o, x), zero, zero
-    v, d, h = bezier_derivatives(nodes, o + ROWS, pool, curve.binomials, curve.degree, x)
+        return node_point(piece, x), zero, zero
+    v, d, h = bezier_derivatives(piece.nodes, piece.at + ROWS, piece.pool, curve.binomials, curve.degree, x)
     i = 1.0 / lane(v, 3)
     p = i * v
     q = i * (d - lane(d, 3) * p)
     return xyz(p), xyz(q), xyz(i * (h - (2.0 * lane(d, 3)) * q - lane(h, 3) * p))
-
-
-@kernel(inline=True)
-def difference(a, b, shift):
-    return ((a[0] - b[0]) - shift[0], (a[1] - b[1]) - shift[1], (a[2] - b[2]) - shift[2])
 
 
 @kernel(inline=True)
@@ -78,7 +74,7 @@ def newton_step(gx, gy, p, q, r, x, y):
 
 
 @kernel(inner=True)
-def nearest_points(ra, qa, a, o, rb, qb, b, p, shift, x, y):
+def nearest_points(a, b, shift, x, y):
     """Parameters of a local minimum reached from (x, y)."""
     best = math.inf
     at_x = x
@@ -86,10 +82,10 @@ def nearest_points(ra, qa, a, o, rb, qb, b, p, shift, x, y):
     sx = sy = 0.0
     part = 1.0
     shortenings = 0
-    flat = bezier_curve_at(rb, 0).degree == 0
+    flat = bezier_curve_at(b.record, 0).degree == 0
     for _ in range(_STEPS):
-        u, du, hu = node_derivatives(ra, qa, a, o, x)
-        v, dv, hv = node_derivatives(rb, qb, b, p, y)
+        u, du, hu = node_derivatives(a, x)
+        v, dv, hv = node_derivatives(b, y)
         d = difference(u, v, shift)
         f = dot(d, d)
         if f < best:

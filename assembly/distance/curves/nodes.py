@@ -22,6 +22,7 @@ are twice these bounds or more.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
@@ -49,18 +50,8 @@ CURVE_NODE = record_dtype(
     end=1,
 )
 curve_node_at = record_view(CURVE_NODE)
-BOX_CENTER = place_of(CURVE_NODE, "box_center")
-BOX_HALF = place_of(CURVE_NODE, "box_half")
-A0 = place_of(CURVE_NODE, "a0")
 A1 = place_of(CURVE_NODE, "a1")
-A2 = place_of(CURVE_NODE, "a2")
-E0 = place_of(CURVE_NODE, "e0")
-E1 = place_of(CURVE_NODE, "e1")
-E2 = place_of(CURVE_NODE, "e2")
-SPEED = place_of(CURVE_NODE, "speed")
 AWAY = place_of(CURVE_NODE, "away")
-BEGIN = place_of(CURVE_NODE, "begin")
-END = place_of(CURVE_NODE, "end")
 ROWS = size_of(CURVE_NODE)
 # The same piece, its integers.
 CURVE_NODE_LINKS = record_dtype(
@@ -73,10 +64,9 @@ CURVE_NODE_LINKS = record_dtype(
     tree_node=1,  # box in the tree over the spans
 )
 curve_node_links_at = record_view(CURVE_NODE_LINKS)
-FIRST = place_of(CURVE_NODE_LINKS, "first")
-LAST = place_of(CURVE_NODE_LINKS, "last")
-DEPTH = place_of(CURVE_NODE_LINKS, "depth")
 NODE_INTS = size_of(CURVE_NODE_LINKS)
+# A Bezier piece of a packed curve: its node is at nodes[at].
+CurvePiece = namedtuple("CurvePiece", "record pool nodes at")
 
 
 @kernel(inline=True)
@@ -96,23 +86,47 @@ def node_stride(record):
     return ROWS + 4 * (curve.degree + 1) * (1 + curve.rational)
 
 
+@kernel(inline=True)
+def piece_of(tree, k):
+    """Node k of a tree, which is a piece."""
+    return CurvePiece(tree.record, tree.pool, tree.nodes, node_stride(tree.record) * k)
+
+
+@kernel(inline=True)
+def node_of(tree, k):
+    """The doubles of node k."""
+    return curve_node_at(tree.nodes, node_stride(tree.record) * k)
+
+
+@kernel(inline=True)
+def links_of(tree, k):
+    """The integers of node k."""
+    return curve_node_links_at(tree.ints, NODE_INTS * k)
+
+
+@kernel(inline=True)
+def is_piece(tree, k):
+    """Whether a node is a Bezier piece, and not several spans."""
+    links = links_of(tree, k)
+    return links.last - links.first == 1
+
+
 @kernel(inner=True, exact=True)
-def start_nodes(record, pool, ints, nodes):
+def start_nodes(tree):
     """The root of a curve's tree as node 0."""
-    curve = bezier_curve_at(record, 0)
-    fill_spans(record, pool, ints, nodes, 0, 0, curve.spans, 0)
+    curve = bezier_curve_at(tree.record, 0)
+    fill_spans(tree, 0, 0, curve.spans, 0)
     if curve.spans == 1:
-        describe(record, pool, nodes, 0)
+        describe(piece_of(tree, 0))
 
 
 @kernel(inner=True, exact=True)
-def fill_spans(record, pool, ints, nodes, k, first, last, tree_node):
+def fill_spans(tree, k, first, last, tree_node):
     """Node k for the spans [first, last); that of a single one is not described yet."""
-    curve = bezier_curve_at(record, 0)
-    stride = node_stride(record)
-    i = curve_node_links_at(ints, NODE_INTS * k)
-    o = stride * k
-    node = curve_node_at(nodes, o)
+    curve = bezier_curve_at(tree.record, 0)
+    nodes, pool = tree.nodes, tree.pool
+    i = links_of(tree, k)
+    node = node_of(tree, k)
     i.left = -1
     i.right = -1
     i.first = first
@@ -123,7 +137,7 @@ def fill_spans(record, pool, ints, nodes, k, first, last, tree_node):
     if last - first == 1:
         n = curve.degree
         source = curve.pieces + 4 * (n + 1) * first
-        rows = o + ROWS
+        rows = node_stride(tree.record) * k + ROWS
         for j in range(4 * (n + 1)):
             nodes[rows + j] = pool[source + j]
         node.begin = 0.0
@@ -136,9 +150,9 @@ def fill_spans(record, pool, ints, nodes, k, first, last, tree_node):
 
 
 @kernel(inner=True, exact=True)
-def split_node(record, pool, ints, nodes, k, left):
+def split_node(tree, k, left):
     """Make the halves of node k as nodes left and left + 1."""
-    i = curve_node_links_at(ints, NODE_INTS * k)
+    i = links_of(tree, k)
     i.left = left
     i.right = left + 1
     first = i.first
@@ -146,31 +160,25 @@ def split_node(record, pool, ints, nodes, k, left):
     if last - first > 1:
         middle = (first + last) // 2
         tree_node = i.tree_node
-        fill_spans(record, pool, ints, nodes, left, first, middle, tree_node + 1)
-        fill_spans(record, pool, ints, nodes, left + 1, middle, last, tree_node + 2 * (middle - first))
+        fill_spans(tree, left, first, middle, tree_node + 1)
+        fill_spans(tree, left + 1, middle, last, tree_node + 2 * (middle - first))
     else:
-        halve(record, pool, ints, nodes, k, left)
+        halve(tree, k, left)
     for j in range(left, left + 2):
-        links = curve_node_links_at(ints, NODE_INTS * j)
-        if links.last - links.first == 1:
-            describe(record, pool, nodes, node_stride(record) * j)
+        if is_piece(tree, j):
+            describe(piece_of(tree, j))
 
 
 @kernel(inline=True)
-def halve(record, pool, ints, nodes, k, left):
+def halve(tree, k, left):
     """Rows of the halves of a piece."""
-    curve = bezier_curve_at(record, 0)
+    curve = bezier_curve_at(tree.record, 0)
+    nodes = tree.nodes
     n = curve.degree
-    i = curve_node_links_at(ints, NODE_INTS * k)
-    stride = node_stride(record)
-    o = stride * k
-    node = curve_node_at(nodes, o)
-    a = stride * left
-    node_record = curve_node_at(nodes, a)
-    b = a + stride
-    node_b = curve_node_at(nodes, b)
+    i = links_of(tree, k)
+    node, node_a, node_b = node_of(tree, k), node_of(tree, left), node_of(tree, left + 1)
     for j in range(left, left + 2):
-        c = curve_node_links_at(ints, NODE_INTS * j)
+        c = links_of(tree, j)
         c.left = -1
         c.right = -1
         c.first = i.first
@@ -178,7 +186,9 @@ def halve(record, pool, ints, nodes, k, left):
         c.depth = i.depth + 1
         c.tree_node = i.tree_node
     # de Casteljau at 1/2: the right half in place, the left half of first points.
-    rows, rows_a, rows_b = o + ROWS, a + ROWS, b + ROWS
+    stride = node_stride(tree.record)
+    rows, rows_a = stride * k + ROWS, stride * left + ROWS
+    rows_b = rows_a + stride
     for j in range(4 * (n + 1)):
         nodes[rows_b + j] = nodes[rows + j]
     for r in range(n + 1):
@@ -187,20 +197,21 @@ def halve(record, pool, ints, nodes, k, left):
         for j in range(4 * (n - r)):
             nodes[rows_b + j] = 0.5 * (nodes[rows_b + j] + nodes[rows_b + j + 4])
     middle = 0.5 * (node.begin + node.end)
-    node_record.begin = node.begin
-    node_record.end = middle
+    node_a.begin = node.begin
+    node_a.end = middle
     node_b.begin = middle
     node_b.end = node.end
-    away = node.away + (2.0 + 2.0 * curve.rational) * n * UNIT * bezier_head_at(pool, 0).reach
-    node_record.away = away
+    away = node.away + (2.0 + 2.0 * curve.rational) * n * UNIT * bezier_head_at(tree.pool, 0).reach
+    node_a.away = away
     node_b.away = away
 
 
 @kernel(inner=True, exact=True)
-def describe(record, pool, nodes, o):
+def describe(piece):
     """Box and model of a piece from its rows."""
+    nodes, o = piece.nodes, piece.at
     node = curve_node_at(nodes, o)
-    curve = bezier_curve_at(record, 0)
+    curve = bezier_curve_at(piece.record, 0)
     n = curve.degree
     p = o + ROWS
     if curve.rational == 1:
@@ -212,41 +223,32 @@ def describe(record, pool, nodes, o):
             nodes[p + 4 * i + 1] = nodes[q + 1] * w
             nodes[p + 4 * i + 2] = nodes[q + 2] * w
             nodes[p + 4 * i + 3] = nodes[q + 3]
-    x0 = nodes[p]
-    y0 = nodes[p + 1]
-    z0 = nodes[p + 2]
-    x1 = x0
-    y1 = y0
-    z1 = z0
-    for i in range(1, n + 1):
-        q = p + 4 * i
-        x0 = min(x0, nodes[q])
-        x1 = max(x1, nodes[q])
-        y0 = min(y0, nodes[q + 1])
-        y1 = max(y1, nodes[q + 1])
-        z0 = min(z0, nodes[q + 2])
-        z1 = max(z1, nodes[q + 2])
-    center = (0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1))
-    slack = 8.0 * UNIT * bezier_head_at(pool, 0).reach
-    half = (0.5 * (x1 - x0) + slack, 0.5 * (y1 - y0) + slack, 0.5 * (z1 - z0) + slack)
-    nodes[o], nodes[o + 1], nodes[o + 2] = center
-    nodes[o + 3], nodes[o + 4], nodes[o + 5] = half
+    slack = 8.0 * UNIT * bezier_head_at(piece.pool, 0).reach
+    for j in range(3):
+        low = high = nodes[p + j]
+        for q in range(p + 4 + j, p + 4 * (n + 1), 4):
+            low = min(low, nodes[q])
+            high = max(high, nodes[q])
+        node.box_center[j] = 0.5 * (low + high)
+        node.box_half[j] = 0.5 * (high - low) + slack
+    center = (node.box_center[0], node.box_center[1], node.box_center[2])
     if n == 0:
         node.a0[0], node.a0[1], node.a0[2] = center
         for j in range(A1, AWAY):
             nodes[o + j] = 0.0
         return
-    r = length(half)
+    r = length(node.box_half)
     if curve.rational == 1:
-        rational_model(record, pool, nodes, o, p, center, r)
+        rational_model(piece, p, center, r)
     else:
-        polynomial_model(record, pool, nodes, o, p, center, r)
+        polynomial_model(piece, p, center, r)
 
 
 @kernel(inner=True, exact=True)
-def polynomial_model(record, pool, nodes, o, p, center, r):
-    node = curve_node_at(nodes, o)
-    curve = bezier_curve_at(record, 0)
+def polynomial_model(piece, p, center, r):
+    pool, nodes = piece.pool, piece.nodes
+    node = curve_node_at(nodes, piece.at)
+    curve = bezier_curve_at(piece.record, 0)
     n = curve.degree
     m = curve.middle
     vx = vy = vz = 0.0
@@ -285,15 +287,9 @@ def polynomial_model(record, pool, nodes, o, p, center, r):
         third = max(third, x * x + y * y + z * z)
     u = 4.0 * (n + 8.0) * UNIT * r
     s = n * (n - 1.0) * (n - 2.0) * (math.sqrt(third) + 64.0 * UNIT * r) * (1.0 + 1e-12)
-    node.a0[0] = center[0] + vx
-    node.a0[1] = center[1] + vy
-    node.a0[2] = center[2] + vz
-    node.a1[0] = dx
-    node.a1[1] = dy
-    node.a1[2] = dz
-    node.a2[0] = hx
-    node.a2[1] = hy
-    node.a2[2] = hz
+    node.a0[0], node.a0[1], node.a0[2] = center[0] + vx, center[1] + vy, center[2] + vz
+    node.a1[0], node.a1[1], node.a1[2] = dx, dy, dz
+    node.a2[0], node.a2[1], node.a2[2] = hx, hy, hz
     # The sum with the center is rounded at the size of a coordinate.
     e0 = u + 4.0 * UNIT * bezier_head_at(pool, 0).reach
     e1 = 2.0 * n * u
@@ -304,10 +300,31 @@ def polynomial_model(record, pool, nodes, o, p, center, r):
     node.speed = n * (math.sqrt(first) + 8.0 * UNIT * r) * (1.0 + 1e-12)
 
 
+@kernel(inline=True, exact=True)
+def quotient_bounds(n, r, least, ratio, squares, weights):
+    """Bounds of |C'| and |C'''| of the heading, from the largest differences of X, squared, and of w."""
+    n1 = float(n)
+    n2 = n1 * (n - 1.0)
+    n3 = n2 * (n - 2.0)
+    unit = 32.0 * UNIT * ratio * r
+    weight = 32.0 * UNIT * ratio
+    x1 = n1 * (math.sqrt(squares[0]) / least + unit)
+    x2 = n2 * (math.sqrt(squares[1]) / least + unit)
+    x3 = n3 * (math.sqrt(squares[2]) / least + unit)
+    w1 = n1 * (weights[0] / least + weight)
+    w2 = n2 * (weights[1] / least + weight)
+    w3 = n3 * (weights[2] / least + weight)
+    grow = 1.0 + 1e-12
+    s1 = (x1 + w1 * r) * grow
+    s2 = (x2 + 2.0 * w1 * s1 + w2 * r) * grow
+    return s1, (x3 + 3.0 * w1 * s2 + 3.0 * w2 * s1 + w3 * r) * grow
+
+
 @kernel(inner=True, exact=True)
-def rational_model(record, pool, nodes, o, p, center, r):
-    node = curve_node_at(nodes, o)
-    curve = bezier_curve_at(record, 0)
+def rational_model(piece, p, center, r):
+    pool, nodes = piece.pool, piece.nodes
+    node = curve_node_at(nodes, piece.at)
+    curve = bezier_curve_at(piece.record, 0)
     n = curve.degree
     m = curve.middle
     v = (0.0, 0.0, 0.0)
@@ -354,22 +371,6 @@ def rational_model(record, pool, nodes, o, p, center, r):
         second = two
         first = one
         before = row
-    n1 = float(n)
-    n2 = n1 * (n - 1.0)
-    n3 = n2 * (n - 2.0)
-    ratio = most / least
-    unit = 32.0 * UNIT * ratio * r
-    weight = 32.0 * UNIT * ratio
-    x1 = n1 * (math.sqrt(x1) / least + unit)
-    x2 = n2 * (math.sqrt(x2) / least + unit)
-    x3 = n3 * (math.sqrt(x3) / least + unit)
-    w1 = n1 * (w1 / least + weight)
-    w2 = n2 * (w2 / least + weight)
-    w3 = n3 * (w3 / least + weight)
-    grow = 1.0 + 1e-12
-    s1 = (x1 + w1 * r) * grow
-    s2 = (x2 + 2.0 * w1 * s1 + w2 * r) * grow
-    s3 = (x3 + 3.0 * w1 * s2 + 3.0 * w2 * s1 + w3 * r) * grow
     i = 1.0 / w
     v = (i * v[0], i * v[1], i * v[2])
     d = (i * (d[0] - dw * v[0]), i * (d[1] - dw * v[1]), i * (d[2] - dw * v[2]))
@@ -379,6 +380,9 @@ def rational_model(record, pool, nodes, o, p, center, r):
     node.a1[0], node.a1[1], node.a1[2] = d
     for j in range(3):
         node.a2[j] = i * (h[j] - 2.0 * dw * d[j] - hw * v[j])
+    ratio = most / least
+    grow = 1.0 + 1e-12
+    s1, s3 = quotient_bounds(n, r, least, ratio, (x1, x2, x3), (w1, w2, w3))
     # As above with every term a quotient: |w'| / w <= 2 n ratio and |w''| / w <= 4 n^2 ratio multiply the errors of the
     # lower derivatives.
     u = 8.0 * (n + 8.0) * UNIT * r * ratio

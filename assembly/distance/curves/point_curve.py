@@ -14,23 +14,17 @@ on both sides the coefficients near x* are as large as its value, and the others
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
 from assembly._kernel import kernel
 from assembly._lanes import lane
 from assembly.distance.curves.nodes import length
-from assembly.distance.curves.search import (
-    APART,
-    CONVERGED,
-    NEAR,
-    SPENT,
-    UNDECIDED,
-    curve_answer_at,
-    in_span,
-)
+from assembly.distance.curves.search import curve_answer_at, first_point
 from assembly.distance.curves.squared_distance import (
     SQUARE,
+    SpanPoint,
     convex_least,
     cut,
     form_square,
@@ -38,6 +32,7 @@ from assembly.distance.curves.squared_distance import (
     least_quotient,
     mend,
 )
+from assembly.distance.piece_search import APART, Question, ended, in_span
 from assembly.geometry.splines.bezier_pieces import (
     BOX,
     UNIT,
@@ -53,121 +48,129 @@ _DEEPEST = 40
 # too many digits.
 _PATIENCE = 64
 _EARLY = 6
-# Status of such a query, beside those of `distance/curves/search.py`.
+# Status of such a query, beside those of `distance/piece_search.py`.
 UNFINISHED = 6
 _NEWTON = 12
 _NEAR_END = 1e-3
+# What is asked of a point and a curve. p: the point about the curve's center; reach: no point of the curve is farther
+# from it; error, away: how far an evaluated point, and the packed curve, may be off; step: bounds within this of each
+# other are one; work: intervals of a span.
+PointQuery = namedtuple("PointQuery", "record pool p reach error away step clearance budget work")
 
 
 @kernel(inner=True)
 def curve_at(record, pool, span, x):
-    """w, C, C', C'', w' / w and X' of a span."""
+    """A point of a span with its derivatives."""
     curve = bezier_curve_at(record, 0)
     n = curve.degree
     rows = curve.pieces + 4 * (n + 1) * span
     v, d, h = bezier_derivatives(pool, rows, pool, curve.binomials, n, x)
-    w = lane(v, 3)
+    w, dw = lane(v, 3), lane(d, 3)
     i = 1.0 / w
     p = i * v
-    q = i * (d - lane(d, 3) * p)
-    return w, xyz(p), xyz(q), xyz(i * (h - (2.0 * lane(d, 3)) * q - lane(h, 3) * p)), lane(d, 3)
+    q = i * (d - dw * p)
+    return SpanPoint(x, w, xyz(p), xyz(q), xyz(i * (h - (2.0 * dw) * q - lane(h, 3) * p)), dw)
+
+
+@kernel(inline=True, exact=True)
+def seen_at(query, span, x):
+    """A point of a span as it is seen from the point of the question."""
+    c = curve_at(query.record, query.pool, span, x)
+    return SpanPoint(x, c.weight, sub(c.place, query.p), c.first, c.second, c.weight_rate)
 
 
 @kernel(inner=True)
-def minimize(record, pool, span, p, low, high, x):
-    """A local minimum of the distance on [low, high] by Newton's method from x: x, the distance, w, D and Y'."""
-    best = math.inf
-    at = x
-    step = high - low
-    weight, c, d, h, dw = curve_at(record, pool, span, x)
-    e = sub(c, p)
-    best = dot(e, e)
+def minimize(query, span, low, high, x):
+    """A local minimum of the distance on [low, high] by Newton's method from x."""
+    best = seen_at(query, span, x)
+    least = dot(best.place, best.place)
     for _ in range(_NEWTON):
-        slope = dot(e, d)
-        speed = dot(d, d)
-        curvature = speed + dot(e, h)
+        slope = dot(best.place, best.first)
+        speed = dot(best.first, best.first)
+        curvature = speed + dot(best.place, best.second)
         # Not convex there: as if the curve were straight.
         step = -slope / (curvature if curvature > 0.05 * speed else speed) if speed > 0.0 else 0.0
         if not abs(step) < high - low:
             step = math.copysign(high - low, step)
         shorter = 0
         while True:
-            x = min(max(at + step, low), high)
-            if abs(x - at) <= 1e-16 * (1.0 + abs(at)):
-                return at, weight, e, d, dw
-            w1, c, d1, h1, dw1 = curve_at(record, pool, span, x)
-            e1 = sub(c, p)
-            square = dot(e1, e1)
-            if square < best:
+            x = min(max(best.x + step, low), high)
+            if abs(x - best.x) <= 1e-16 * (1.0 + abs(best.x)):
+                return best
+            found = seen_at(query, span, x)
+            square = dot(found.place, found.place)
+            if square < least:
                 break
             shorter += 1
-            if shorter > 8 or slope * step > -1e-16 * best:
-                return at, weight, e, d, dw
+            if shorter > 8 or slope * step > -1e-16 * least:
+                return best
             step *= 0.25
-        at = x
-        best = square
-        weight, e, d, h, dw = w1, e1, d1, h1, dw1
-    return at, weight, e, d, dw
+        least = square
+        best = found
+    return best
+
+
+@kernel(inline=True)
+def limit_of(query, upper):
+    """Parts of at least this distance are let go."""
+    limit = upper - query.step
+    return min(limit, query.clearance + 2.0 * query.away) if query.clearance >= 0.0 else limit
+
+
+@kernel(inline=True)
+def is_beyond(square, limit):
+    """Whether a bound of a squared distance is not below a limit."""
+    return limit <= 0.0 or square >= limit * limit
 
 
 @kernel(inner=True, exact=True)
-def span_distance(
-    record, pool, span, p, reach, error, away, step, clearance, budget, work, upper, let_go, bounded, out
-):
+def span_distance(query, span, upper, let_go, bounded):
     """Take one span into account: (upper, let_go, pairs bounded, parameter on the span or -1)."""
+    record, work = query.record, query.work
     curve = bezier_curve_at(record, 0)
-    n = curve.degree
-    m = 2 * n + 1
+    m = 2 * curve.degree + 1
     stride = SQUARE + m * (1 + curve.rational)
-    form_square(record, pool, span, p, reach, work)
+    form_square(record, query.pool, span, query.p, query.reach, work)
     found = -1.0
     looks = 0
     o = 0
     while o >= 0:
         bounded += 1
-        limit = upper - step
-        if clearance >= 0.0:
-            limit = min(limit, clearance + 2.0 * away)
         least, k = least_quotient(record, work, o)
-        low = interval_at(work, o).low
-        high = interval_at(work, o).high
-        if limit <= 0.0 or least >= limit * limit:
+        low, high = interval_at(work, o).low, interval_at(work, o).high
+        if is_beyond(least, limit_of(query, upper)):
             let_go = min(let_go, least)
             o -= stride
             continue
         looks += 1
-        if bounded >= budget or looks > _PATIENCE or interval_at(work, o).cuts >= _DEEPEST:
+        if bounded >= query.budget or looks > _PATIENCE or interval_at(work, o).cuts >= _DEEPEST:
             let_go = min(let_go, least)
             o -= stride
             continue
         # From the least coefficient; at an end the cut is in the middle, where its own minimum is not.
-        x = low + (high - low) * k / (m - 1.0)
-        w, c, d, _h, dw = curve_at(record, pool, span, x)
-        e = sub(c, p)
+        point = seen_at(query, span, low + (high - low) * k / (m - 1.0))
         # Bounds alone may answer a question about a clearance.
-        early = clearance >= 0.0 and looks < _EARLY and length(e) > 8.0 * clearance
+        early = query.clearance >= 0.0 and looks < _EARLY and length(point.place) > 8.0 * query.clearance
         if not early:
-            x, w, e, d, dw = minimize(record, pool, span, p, low, high, x)
-        far = length(e) * (1.0 + 16.0 * UNIT) + error + away
+            point = minimize(query, span, low, high, point.x)
+        far = length(point.place) * (1.0 + 16.0 * UNIT) + query.error + query.away
         if far < upper:
             upper = far
-            found = x
-            if upper <= clearance:
+            found = point.x
+            if upper <= query.clearance:
                 break
         if not early:
-            least = max(least, convex_least(record, work, o, x, w, e, d, dw, error, reach))
-        limit = min(limit, upper - step)
-        if limit <= 0.0 or least >= limit * limit:
+            least = max(least, convex_least(record, work, o, point, query.error, query.reach))
+        if is_beyond(least, limit_of(query, upper)):
             let_go = min(let_go, least)
             o -= stride
             continue
-        part = (x - low) / (high - low)
+        part = (point.x - low) / (high - low)
         if not _NEAR_END < part < 1.0 - _NEAR_END:
             part = 0.5
-            w, c, d, _h, dw = curve_at(record, pool, span, low + 0.5 * (high - low))
-            e = sub(c, p)
-        behind = cut(record, work, o, part, reach)
-        mend(record, work, o, behind, w, e, d, dw, error, reach)
+            point = seen_at(query, span, low + 0.5 * (high - low))
+        behind = cut(record, work, o, part, query.reach)
+        mend(record, work, o, behind, point, query.error, query.reach)
         o = behind
     return upper, let_go, bounded, found
 
@@ -184,22 +187,46 @@ def box_square(record, pool, node, p):
     return total * (1.0 - 8.0 * UNIT)
 
 
-@kernel(inner=True, exact=True)
-def nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, work, stack, out):
-    """Bounds of the distance of a point and a curve of degree 1 or more."""
+@kernel(inline=True)
+def about_center(head, point):
+    """A point about the center of a curve."""
+    return (point[0] - head.center[0], point[1] - head.center[1], point[2] - head.center[2])
+
+
+@kernel(inline=True)
+def write_answer(pool, lower, upper, parameter, place, point, out):
+    """Write the bounds, and the nearest point of a curve (about its center) to a point."""
     answer = curve_answer_at(out, 0)
+    answer.lower = lower
+    answer.upper = upper
+    answer.parameter_a = parameter
+    answer.parameter_b = 0.0
+    for j in range(3):
+        answer.point_a[j] = place[j] + bezier_head_at(pool, 0).center[j]
+        answer.point_b[j] = point[j]
+
+
+@kernel(inline=True, exact=True)
+def point_query(record, pool, point, question, work):
+    """A question about a packed curve and a point."""
     head = bezier_head_at(pool, 0)
     curve = bezier_curve_at(record, 0)
-    p = (px - head.center[0], py - head.center[1], pz - head.center[2])
-    n = curve.degree
+    p = about_center(head, point)
     reach = (head.reach + length(p)) * (1.0 + 16.0 * UNIT)
     away = head.error + 4.0 * UNIT * length(p) + 1e-150
-    error = (1.0 + curve.rational) * (8.0 * n + 16.0) * UNIT * head.reach + 2.0 * UNIT * reach
-    step = max(0.999 * tolerance, 8.0 * (away + error))
-    o = curve.pieces
-    w = 1.0 / pool[o + 3]
-    far = length((pool[o] * w - p[0], pool[o + 1] * w - p[1], pool[o + 2] * w - p[2]))
-    upper = far * (1.0 + 16.0 * UNIT) + error + away
+    error = (1.0 + curve.rational) * (8.0 * curve.degree + 16.0) * UNIT * head.reach + 2.0 * UNIT * reach
+    step = max(0.999 * question.tolerance, 8.0 * (away + error))
+    return PointQuery(record, pool, p, reach, error, away, step, question.clearance, question.budget, work)
+
+
+@kernel(inner=True, exact=True)
+def nearest_on_curve(record, pool, point, question, work, stack, out):
+    """Bounds of the distance of a point and a curve of degree 1 or more."""
+    query = point_query(record, pool, point, question, work)
+    p = query.p
+    curve = bezier_curve_at(record, 0)
+    far = length(sub(first_point(record, pool), p))
+    upper = far * (1.0 + 16.0 * UNIT) + query.error + query.away
     let_go = math.inf
     bounded = 0
     best_span = 0
@@ -209,30 +236,24 @@ def nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, wor
     stack[1] = 0
     stack[2] = curve.spans
     # The first point of the curve may be near enough.
-    top = 3 if upper > clearance else 0
+    top = 3 if upper > query.clearance else 0
     while top > 0:
         top -= 3
         node = stack[top]
         first = stack[top + 1]
         last = stack[top + 2]
-        limit = upper - step
-        if clearance >= 0.0:
-            limit = min(limit, clearance + 2.0 * away)
-        square = 0.0
         if curve.spans > 1:
             square = box_square(record, pool, node, p)
             bounded += 1
-            if limit <= 0.0 or square >= limit * limit or bounded >= budget:
+            if is_beyond(square, limit_of(query, upper)) or bounded >= query.budget:
                 let_go = min(let_go, square)
                 continue
         if last - first == 1:
-            upper, let_go, bounded, found = span_distance(
-                record, pool, first, p, reach, error, away, step, clearance, budget, work, upper, let_go, bounded, out
-            )
+            upper, let_go, bounded, found = span_distance(query, first, upper, let_go, bounded)
             if found >= 0.0:
                 best_span = first
                 best = found
-            if upper <= clearance:
+            if upper <= query.clearance:
                 break
             continue
         middle = (first + last) // 2
@@ -247,69 +268,46 @@ def nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, wor
             stack[top + 2] = last if is_left else middle
             top += 3
     lower = 0.0
-    if let_go > 0.0 and upper > clearance:
-        lower = max(min(math.sqrt(let_go) * (1.0 - 8.0 * UNIT) - away, upper), 0.0)
-    w, c, _d, _h, _dw = curve_at(record, pool, best_span, best)
-    answer.lower = lower
-    answer.upper = upper
-    answer.parameter_b = 0.0
-    answer.parameter_a = in_span(pool, curve.breaks + best_span, best)
-    for j in range(3):
-        answer.point_a[j] = c[j] + head.center[j]
-    answer.point_b[0] = px
-    answer.point_b[1] = py
-    answer.point_b[2] = pz
-    answer.count = bounded
-    if clearance >= 0.0:
-        if upper <= clearance:
-            return NEAR
-        if lower > clearance:
-            return APART
-        if upper - lower <= step:
-            return UNDECIDED
-    elif upper - lower <= step:
-        return CONVERGED
-    return SPENT if bounded >= budget else UNFINISHED
+    if let_go > 0.0 and upper > query.clearance:
+        lower = max(min(math.sqrt(let_go) * (1.0 - 8.0 * UNIT) - query.away, upper), 0.0)
+    c = curve_at(record, pool, best_span, best).place
+    write_answer(pool, lower, upper, in_span(pool, curve.breaks + best_span, best), c, point, out)
+    curve_answer_at(out, 0).count = bounded
+    status = ended(query, upper, query.step, lower, 1, bounded)
+    return status if status >= 0 else UNFINISHED
 
 
-@kernel(signatures="(i8[::1], f8[::1], f8, f8, f8, f8, f8, i8, f8[::1])")
-def point_distance(record, pool, px, py, pz, tolerance, clearance, budget, out):
-    """Bounds of the distance of a point and a packed curve; a clearance below zero asks for the distance itself."""
-    answer = curve_answer_at(out, 0)
-    head = bezier_head_at(pool, 0)
+@kernel(inline=True, allocates=True)
+def work_for(record):
+    """Memory for the intervals of a span."""
     curve = bezier_curve_at(record, 0)
-    if clearance >= 0.0:
+    return np.empty((_DEEPEST + 2) * (SQUARE + (2 * curve.degree + 1) * (1 + curve.rational)))
+
+
+@kernel(signatures="(i8[::1], f8[::1], UniTuple(f8, 3), Tuple((f8, f8, i8, b1)), f8[::1])")
+def point_distance(record, pool, point, asked, out):
+    """Bounds of the distance of a point and a packed curve; a clearance below zero asks for the distance itself."""
+    question = Question(*asked)
+    if question.clearance >= 0.0:
         # Apart at once, by the box around all.
-        p = (px - head.center[0], py - head.center[1], pz - head.center[2])
+        head = bezier_head_at(pool, 0)
+        p = about_center(head, point)
         far = math.sqrt(box_square(record, pool, 0, p)) * (1.0 - 8.0 * UNIT)
         far -= head.error + 4.0 * UNIT * length(p) + 1e-150
-        if far > clearance:
-            o = curve.pieces
-            w = 1.0 / pool[o + 3]
-            e = (pool[o] * w, pool[o + 1] * w, pool[o + 2] * w)
-            for j in range(3):
-                answer.point_a[j] = e[j] + head.center[j]
-            answer.point_b[0] = px
-            answer.point_b[1] = py
-            answer.point_b[2] = pz
-            answer.lower = far
-            reach = head.reach + length(p)
-            answer.upper = length(sub(e, p)) * (1.0 + 16.0 * UNIT) + 2.0 * head.error + 16.0 * UNIT * reach
-            answer.parameter_a = pool[curve.breaks]
-            answer.count = 1
+        if far > question.clearance:
+            e = first_point(record, pool)
+            upper = length(sub(e, p)) * (1.0 + 16.0 * UNIT) + 2.0 * head.error + 16.0 * UNIT * (head.reach + length(p))
+            write_answer(pool, far, upper, pool[bezier_curve_at(record, 0).breaks], e, point, out)
+            curve_answer_at(out, 0).count = 1
             return APART
-    work = np.empty((_DEEPEST + 2) * (SQUARE + (2 * curve.degree + 1) * (1 + curve.rational)))
-    stack = np.empty(200, np.int64)
-    return nearest_on_curve(record, pool, px, py, pz, tolerance, clearance, budget, work, stack, out)
+    return nearest_on_curve(record, pool, point, question, work_for(record), np.empty(200, np.int64), out)
 
 
 @kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], f8, i8, i8[::1], f8[:, ::1])")
 def point_distances(record, pool, points, tolerance, budget, codes, out):
     """`point_distance` for the rows of an array (n, 3) into rows of `out` and `codes`."""
-    curve = bezier_curve_at(record, 0)
-    work = np.empty((_DEEPEST + 2) * (SQUARE + (2 * curve.degree + 1) * (1 + curve.rational)))
-    stack = np.empty(200, np.int64)
+    question = Question(tolerance, -1.0, budget, True)
+    work, stack = work_for(record), np.empty(200, np.int64)
     for i in range(points.shape[0]):
-        codes[i] = nearest_on_curve(
-            record, pool, points[i, 0], points[i, 1], points[i, 2], tolerance, -1.0, budget, work, stack, out[i]
-        )
+        point = (points[i, 0], points[i, 1], points[i, 2])
+        codes[i] = nearest_on_curve(record, pool, point, question, work, stack, out[i])

@@ -12,6 +12,7 @@ there, are computed anew from Y(x*) and Y'(x*): q_0 = |Y|^2, q_1 = q_0 + Y.Y' h 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
@@ -32,6 +33,8 @@ INTERVAL_RECORD = record_dtype(
 )
 interval_at = record_view(INTERVAL_RECORD)
 SQUARE = size_of(INTERVAL_RECORD)
+# A point of a span: x, w, C (about the curve's center, or about p), C', C'' and w'.
+SpanPoint = namedtuple("SpanPoint", "x weight place first second weight_rate")
 
 
 @kernel(inline=True)
@@ -126,15 +129,15 @@ def cut(record, work, o, x, reach):
     m = 2 * n + 1
     rational = curve.rational
     low = o + SQUARE + m * (1 + rational)
-    interval_record = interval_at(work, low)
+    behind = interval_at(work, low)
     s = o + SQUARE
     # The two coefficients at an end are combined with one another alone.
     v = min(work[s + m], work[s + m + 1]) if rational == 1 else 1.0
-    interval_record.error_low = interval.error_low + 4.0 * UNIT * (abs(work[s]) + abs(work[s + 1])) / v
+    behind.error_low = interval.error_low + 4.0 * UNIT * (abs(work[s]) + abs(work[s + 1])) / v
     v = min(work[s + 2 * m - 1], work[s + 2 * m - 2]) if rational == 1 else 1.0
     interval.error_high += 4.0 * UNIT * (abs(work[s + m - 1]) + abs(work[s + m - 2])) / v
     interval.error_all += 16.0 * n * UNIT * reach * reach
-    interval_record.error_all = interval.error_all
+    behind.error_all = interval.error_all
     rest = 1.0 - x
     for part in range(1 + rational):
         s = o + SQUARE + m * part
@@ -144,17 +147,19 @@ def cut(record, work, o, x, reach):
             for k in range(m - 1 - r):
                 work[s + k] = rest * work[s + k] + x * work[s + k + 1]
     middle = interval.low + x * (interval.high - interval.low)
-    interval_record.low = interval.low
-    interval_record.high = middle
+    behind.low = interval.low
+    behind.high = middle
     interval.low = middle
     interval.cuts += 1.0
-    interval_record.cuts = interval.cuts
+    behind.cuts = interval.cuts
     return low
 
 
 @kernel(inner=True, exact=True)
-def mend(record, work, o, low, w, e, d, dw, error, reach):
-    """The coefficients beside a cut anew, from the weight, D = C - p, C' and w' there."""
+def mend(record, work, o, low, point, error, reach):
+    """The coefficients beside a cut anew, from the point there."""
+    w, dw = point.weight, point.weight_rate
+    e, d = point.place, point.first
     curve = bezier_curve_at(record, 0)
     n = curve.degree
     m = 2 * n + 1
@@ -182,8 +187,8 @@ def mend(record, work, o, low, w, e, d, dw, error, reach):
 
 
 @kernel(inner=True, exact=True)
-def convex_least(record, work, o, x, w, e, d, dw, error, reach):
-    """A lower bound of the square on an interval where q - |D|^2 v is convex, from its point x; else -1.
+def convex_least(record, work, o, point, error, reach):
+    """A lower bound of the square on an interval where q - |D|^2 v is convex, from a point of it; else -1.
 
     With h = q - |D(x)|^2 v, h(x) = 0 and h'' >= lambda there: |C - p|^2 >= |D|^2 + (h' d + lambda d^2 / 2) / v.
     """
@@ -192,6 +197,8 @@ def convex_least(record, work, o, x, w, e, d, dw, error, reach):
     n = curve.degree
     m = 2 * n + 1
     s = o + SQUARE
+    w, dw = point.weight, point.weight_rate
+    e, d = point.place, point.first
     rational = curve.rational == 1
     square = dot(e, e)
     bend = math.inf
@@ -222,7 +229,7 @@ def convex_least(record, work, o, x, w, e, d, dw, error, reach):
     doubt = far * (rough * (reach + far) + abs(dw) * error) + error * (w * length(d) + rough * reach)
     doubt += (4.0 * far * error + 32.0 * UNIT * square) * (abs(dw) + rough)
     doubt = 4.0 * width * w * doubt + 64.0 * UNIT * abs(slope)
-    part = (x - interval.low) / width
+    part = (point.x - interval.low) / width
     change = least_change(slope, doubt, curvature, part, 1.0 - part)
     near = max(far * (1.0 - 16.0 * UNIT) - error, 0.0)
     return near * near * (1.0 - 8.0 * UNIT) + change / least_v * (1.0 + 1e-12)

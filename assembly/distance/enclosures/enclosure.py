@@ -181,17 +181,17 @@ def split_piece(kind, table, pool, room, x, o, p):
         return False
     for side in range(2):
         q = p + PIECE * side
-        piece_record = enclosed_piece_at(x, q)
-        piece_record.t0 = t0 if side == 0 else middle
-        piece_record.t1 = middle if side == 0 else t1
+        half = enclosed_piece_at(x, q)
+        half.t0 = t0 if side == 0 else middle
+        half.t1 = middle if side == 0 else t1
         for k in range(3):
-            piece_record.p0[k] = piece.p0[k] if side == 0 else piece.pm[k]
-            piece_record.p1[k] = piece.pm[k] if side == 0 else piece.p1[k]
-        piece_record.off_0 = piece.off_0 if side == 0 else piece.off_mid
-        piece_record.off_1 = piece.off_mid if side == 0 else piece.off_1
-        piece_record.span = piece.span
-        piece_record.first_end = piece.first_end if side == 0 else 0.0
-        piece_record.last_end = 0.0 if side == 0 else piece.last_end
+            half.p0[k] = piece.p0[k] if side == 0 else piece.pm[k]
+            half.p1[k] = piece.pm[k] if side == 0 else piece.p1[k]
+        half.off_0 = piece.off_0 if side == 0 else piece.off_mid
+        half.off_1 = piece.off_mid if side == 0 else piece.off_1
+        half.span = piece.span
+        half.first_end = piece.first_end if side == 0 else 0.0
+        half.last_end = 0.0 if side == 0 else piece.last_end
         fill_piece(kind, table, pool, room, x, q)
     return True
 

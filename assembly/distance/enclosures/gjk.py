@@ -12,6 +12,7 @@ is claimed of distances is proven elsewhere, from supports in that direction (`d
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
@@ -39,14 +40,17 @@ SIMPLEX = record_dtype(
 simplex_at = record_view(SIMPLEX)
 POINT = place_of(SIMPLEX, "point")
 ROOM = size_of(SIMPLEX)
+# A set: the hull of `count` points from points[at], or of a width (else below zero) the ellipsoid of two.
+ConvexSet = namedtuple("ConvexSet", "points at count width")
 _ROUNDS = 40
 # Nearer than this part of the farthest vertex counts as an overlap.
 _NEAR = 1e-14
 
 
 @kernel(inner=True)
-def support_point(x, o, count, width, n):
-    """Farthest point along n, and its number: of `count` points from x[o], or with a width of the ellipsoid."""
+def support_point(shape, n):
+    """Farthest point along n, and its number."""
+    x, o, width = shape.points, shape.at, shape.width
     if width >= 0.0:
         chi = (x[o + 3] - x[o], x[o + 4] - x[o + 1], x[o + 5] - x[o + 2])
         along = dot(n, chi)
@@ -60,7 +64,7 @@ def support_point(x, o, count, width, n):
         ), 0
     best = -math.inf
     found = 0
-    for k in range(count):
+    for k in range(shape.count):
         p = o + 3 * k
         value = n[0] * x[p] + n[1] * x[p + 1] + n[2] * x[p + 2]
         if value > best:
@@ -227,8 +231,8 @@ def inside_weights(full, g):
 
 
 @kernel(inner=True)
-def gjk(full, xa, oa, ca, wa, xb, ob, cb, wb, v, limit, part, g):
-    """Nearest points of a set at xa[oa:] and one at xb[ob:], `full` - 1 dimensions, from a first direction v.
+def gjk(full, first, second, v, limit, part, g):
+    """Nearest points of two sets a and b in `full` - 1 dimensions, from a first direction v.
 
     Stops when sets are proven farther apart than `limit`, or the distance is known to its `part`. Returns how it
     ended, the vector from b to a between the nearest points, and the vertices of the simplex left in g.
@@ -241,8 +245,8 @@ def gjk(full, xa, oa, ca, wa, xb, ob, cb, wb, v, limit, part, g):
     known = False
     farthest = 0.0
     for _ in range(_ROUNDS):
-        a, _i = support_point(xa, oa, ca, wa, (-v[0], -v[1], -v[2]))
-        b, number = support_point(xb, ob, cb, wb, v)
+        a, _i = support_point(first, (-v[0], -v[1], -v[2]))
+        b, number = support_point(second, v)
         y = sub(a, b)
         # All of a - b is at least this far along v.
         below = dot(v, y)

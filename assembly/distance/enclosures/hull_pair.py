@@ -12,6 +12,7 @@ from assembly.distance.enclosures.gjk import (
     INSIDE,
     ROOM,
     VERTEX,
+    ConvexSet,
     gjk,
     inside_weights,
     simplex_vertex_at,
@@ -55,7 +56,8 @@ def overlap_proven(full, a, count_a, b, count_b, slack, g):
         for k in range(full):
             moved, off = about_center(a, count_a, corner_around(full, k, part * farthest))
             first = (moved[0] - b[0], moved[1] - b[1], moved[2] - b[2])
-            how, _v, kept = gjk(full, moved, 0, count_a, -1.0, b, 0, count_b, -1.0, first, math.inf, 1e-15, g)
+            set_a = ConvexSet(moved, 0, count_a, -1.0)
+            how, _v, kept = gjk(full, set_a, ConvexSet(b, 0, count_b, -1.0), first, math.inf, 1e-15, g)
             if how != INSIDE:
                 break
             differences(g, kept)
@@ -80,7 +82,8 @@ def hull_distance(full, a, count_a, b, count_b, state):
     b, off_b = about_center(b, count_b, center)
     slack = off_a + off_b
     first = (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-    how, v, kept = gjk(full, a, 0, count_a, -1.0, b, 0, count_b, -1.0, first, math.inf, 1e-15, g)
+    set_a, set_b = ConvexSet(a, 0, count_a, -1.0), ConvexSet(b, 0, count_b, -1.0)
+    how, v, kept = gjk(full, set_a, set_b, first, math.inf, 1e-15, g)
     lower = 0.0
     if how == INSIDE:
         # The origin is inside a simplex of differences: proven like a point inside a simplex.

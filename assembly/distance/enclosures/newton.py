@@ -7,7 +7,7 @@ import math
 from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.distance.enclosures.enclosure import FORMULA, HULL
-from assembly.distance.enclosures.gjk import INSIDE, POINT, gjk, inside_weights, on_b, simplex_at
+from assembly.distance.enclosures.gjk import INSIDE, POINT, ConvexSet, gjk, inside_weights, on_b, simplex_at
 from assembly.geometry.expression.formula import formula_point, formula_room_at
 from assembly.geometry.interval import UNIT
 from assembly.geometry.splines.bezier_ranges import BEZIER_AT, piece_points, ranged_curve_at, value, weighted_point_at
@@ -58,7 +58,8 @@ def hull_point(full, points, count, x, g):
     simplex = simplex_at(g, 0)
     for c in range(3):
         simplex.point[c] = x[c]
-    how, _v, kept = gjk(full, g, POINT, 1, -1.0, points, 0, count, -1.0, v, math.inf, 1e-15, g)
+    hull = ConvexSet(points, 0, count, -1.0)
+    how, _v, kept = gjk(full, ConvexSet(g, POINT, 1, -1.0), hull, v, math.inf, 1e-15, g)
     if how == INSIDE:
         inside_weights(full, g)
     last = on_b(g, kept - 1)
@@ -91,39 +92,51 @@ def across(v, kept, full, g):
 
 
 @kernel(inline=True)
-def held(x, step, lo, hi):
-    return min(max(x + step, lo), hi)
+def held(x, step, bounds):
+    return min(max(x + step, bounds[0]), bounds[1])
+
+
+@kernel(inline=True)
+def is_free(x, slope, bounds):
+    """Whether a parameter may move: its bounds leave it a way, and the slope does not push it out of them."""
+    return bounds[1] > bounds[0] and not ((x <= bounds[0] and slope > 0.0) or (x >= bounds[1] and slope < 0.0))
+
+
+@kernel(inline=True)
+def step_length(slope, curvature, square):
+    """A step in one parameter; where it is not convex, as if the curve were straight."""
+    return -slope / (curvature if curvature > 1e-8 * square else square + 1e-300)
 
 
 @kernel(inner=True)
-def newton(full, ka, ta, pa, sa, ra, kb, tb, pb, sb, rb, count, s, t, s0, s1, t0, t1, g):
-    """Parameters of a local minimum in [s0, s1] x [t0, t1] from (s, t). b is a curve, or a hull of `count` points."""
-    hull = kb == HULL
+def newton(search, place, bounds_s, bounds_t):
+    """Parameters of a local minimum within bounds from a place on both shapes. b is a curve or a hull."""
+    a_shape, b_shape, g = search.a, search.b, search.g
+    hull = b_shape.kind == HULL
     best = math.inf
+    s, t = place.s, place.t
     at = (s, t)
     step = (0.0, 0.0)
     for _ in range(_ROUNDS):
-        a, a1, a2 = local_point(ka, ta, pa, sa, s, ra)
+        a, a1, a2 = local_point(a_shape.kind, a_shape.table, a_shape.pool, place.span_a, s, a_shape.room)
         b1 = (0.0, 0.0, 0.0)
         b2 = b1
         c1 = a1
         if hull:
-            b, kept, inside, _off = hull_point(full, pb, count, a, g)
+            b, kept, inside, _off = hull_point(search.full, b_shape.pool, b_shape.count, a, g)
             if inside:
                 return s, t
-            c1 = across(a1, kept, full, g)
+            c1 = across(a1, kept, search.full, g)
         else:
-            b, b1, b2 = local_point(kb, tb, pb, sb, t, rb)
+            b, b1, b2 = local_point(b_shape.kind, b_shape.table, b_shape.pool, place.span_b, t, b_shape.room)
         r = sub(a, b)
         f = dot(r, r)
         if not (f < best):
             # No descent: half the way, until it is too short to matter.
             step = (0.25 * step[0], 0.25 * step[1])
-            s = held(at[0], step[0], s0, s1)
-            t = held(at[1], step[1], t0, t1)
-            if s == at[0] and t == at[1]:
-                break
-            if f == best:
+            s = held(at[0], step[0], bounds_s)
+            t = held(at[1], step[1], bounds_t)
+            if f == best or (s == at[0] and t == at[1]):
                 break
             continue
         best = f
@@ -135,8 +148,7 @@ def newton(full, ka, ta, pa, sa, ra, kb, tb, pb, sb, rb, count, s, t, s0, s1, t0
         st = -dot(a1, b1)
         p = ss + dot(r, a2)
         q = tt - dot(r, b2)
-        free_s = s1 > s0 and not ((s <= s0 and gs > 0.0) or (s >= s1 and gs < 0.0))
-        free_t = t1 > t0 and not ((t <= t0 and gt > 0.0) or (t >= t1 and gt < 0.0))
+        free_s, free_t = is_free(s, gs, bounds_s), is_free(t, gt, bounds_t)
         if not free_s and not free_t:
             break
         if free_s and free_t:
@@ -146,15 +158,17 @@ def newton(full, ka, ta, pa, sa, ra, kb, tb, pb, sb, rb, count, s, t, s0, s1, t0
                 det = p * q - st * st
             step = (-(q * gs - st * gt) / det, -(p * gt - st * gs) / det)
         elif free_s:
-            step = (-gs / (p if p > 1e-8 * ss else ss + 1e-300), 0.0)
+            step = (step_length(gs, p, ss), 0.0)
         else:
-            step = (0.0, -gt / (q if q > 1e-8 * tt else tt + 1e-300))
+            step = (0.0, step_length(gt, q, tt))
         if not (abs(step[0]) < math.inf and abs(step[1]) < math.inf):
             break
-        s = held(s, step[0], s0, s1)
-        t = held(t, step[1], t0, t1)
+        s = held(s, step[0], bounds_s)
+        t = held(t, step[1], bounds_t)
         if s == at[0] and t == at[1]:
             break
-        if abs(s - at[0]) <= 1e-15 * (s1 - s0) and abs(t - at[1]) <= 1e-15 * (t1 - t0):
+        if abs(s - at[0]) <= 1e-15 * (bounds_s[1] - bounds_s[0]) and abs(t - at[1]) <= 1e-15 * (
+            bounds_t[1] - bounds_t[0]
+        ):
             break
     return at

@@ -7,6 +7,7 @@ second derivatives (`taylor.py`) about the points that Newton's method found, so
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
@@ -22,9 +23,11 @@ from assembly.distance.enclosures.enclosure import (
     point_values,
     separation_along,
 )
-from assembly.distance.enclosures.gjk import INSIDE, gjk, numbers_of, on_b, put_numbers
+from assembly.distance.enclosures.gjk import INSIDE, ConvexSet, gjk, numbers_of, on_b, put_numbers
 from assembly.distance.enclosures.newton import hull_point, newton
 from assembly.distance.enclosures.taylor import (
+    BoxHessian,
+    ValuesAt,
     across_feature,
     box_hessian,
     feature_rows,
@@ -48,8 +51,14 @@ SEARCH_STATE = record_dtype(
     met=1,  # 1: a meeting is proven
     count=1,  # of the pairs bounded
     slack=1,  # how far vertices of a hull may be off [length]
-    spare=1,
     lower=1,  # proven lower bound of the distance [length]
+    lowest=1,  # the same of the vertices as they are taken about the center
+    limit=1,  # pairs of at least this bound are let go
+    let_go=1,  # the least bound of those that were
+    off_a=1,  # how far points of the best known piece of a curve may be off
+    off_b=1,
+    used_a=1,  # pieces of the curves
+    used_b=1,
 )
 search_state_at = record_view(SEARCH_STATE)
 UPPER = place_of(SEARCH_STATE, "upper")
@@ -58,10 +67,8 @@ SPAN_A = place_of(SEARCH_STATE, "span_a")
 AT_T = place_of(SEARCH_STATE, "at_t")
 SPAN_B = place_of(SEARCH_STATE, "span_b")
 POINT_A = place_of(SEARCH_STATE, "point_a")
-POINT_B = place_of(SEARCH_STATE, "point_b")
 MET = place_of(SEARCH_STATE, "met")
 COUNT = place_of(SEARCH_STATE, "count")
-SLACK = place_of(SEARCH_STATE, "slack")
 STATE = size_of(SEARCH_STATE)
 LOWER = place_of(SEARCH_STATE, "lower")
 # It is the beginning of the room of a search.
@@ -73,11 +80,18 @@ SEARCH_ROOM = record_dtype(
     across=PIECE,  # a piece as seen across a feature of a hull
     rows=9,  # three, orthonormal or zero, that span what is across the feature
 )
+search_room_at = record_view(SEARCH_ROOM)
 VALUES = place_of(SEARCH_ROOM, "values")
 OTHER_VALUES = place_of(SEARCH_ROOM, "other_values")
-ACROSS = place_of(SEARCH_ROOM, "across")
-ROWS = place_of(SEARCH_ROOM, "rows")
 SCRATCH = size_of(SEARCH_ROOM)
+# A shape as a search reads it: its kind, table and pool, room for its evaluation, the first halves (-1: none yet) and
+# the records of its pieces, and the vertices of a hull, which are its pool; a curve has none.
+EnclosedShape = namedtuple("EnclosedShape", "kind table pool room halves pieces count")
+# full: the dimension and one; a, b: shapes, a a curve; bound: kind of enclosure; state: a block of SEARCH_ROOM; spare:
+# two records of pieces, the first of a point that stands still if b is a hull; g: a simplex.
+EnclosureSearch = namedtuple("EnclosureSearch", "full a b question bound heap state spare g")
+# Parameters on the smooth parts of two curves.
+PairPlace = namedtuple("PairPlace", "s span_a t span_b")
 # Corners of a triangle and of a tetrahedron around zero, turned so that nothing made by hand is parallel to them, and
 # the sizes of their copies about a point, as parts of the hull's.
 _TRIANGLE = ((0.765, 0.644, 0.0), (-0.94, 0.34, 0.0), (0.175, -0.984, 0.0))
@@ -147,12 +161,13 @@ def surrounded(full, points, count, x, off, g):
 
 
 @kernel(inner=True, exact=True)
-def meet_points(full, kb, points, count, a, off_a, b, off_b, state, g):
+def meet_points(search, a, off_a, b, off_b):
     """Distance of two points, rounded up, or of a point and a hull with its nearest point and what carries it.
 
     A point that is proven inside the hull is noted.
     """
-    best = search_state_at(state, 0)
+    full, points, count, g = search.full, search.b.pool, search.b.count, search.g
+    best = search_state_at(search.state, 0)
     kept = 0
     off_a += best.slack
     if count > 1:
@@ -172,12 +187,12 @@ def meet_points(full, kb, points, count, a, off_a, b, off_b, state, g):
 
 
 @kernel(inner=True, exact=True)
-def note(state, distance, s, span_a, t, span_b, a, b):
+def note(state, distance, place, a, b):
     """Keep points that are nearer than the best."""
     best = search_state_at(state, 0)
     if distance < best.upper:
         best.upper = distance
-        best.at_s, best.span_a, best.at_t, best.span_b = s, span_a, t, span_b
+        best.at_s, best.span_a, best.at_t, best.span_b = place.s, place.span_a, place.t, place.span_b
         for k in range(3):
             best.point_a[k] = a[k]
             best.point_b[k] = b[k]
@@ -185,23 +200,29 @@ def note(state, distance, s, span_a, t, span_b, a, b):
     return False
 
 
+@kernel(inline=True)
+def middles(state, at):
+    """The point in the middle of three pairs."""
+    return middle_of(state, at, 0), middle_of(state, at, 1), middle_of(state, at, 2)
+
+
 @kernel(inner=True, exact=True)
-def note_parameters(full, ka, ta, pa, ra, kb, tb, pb, rb, count, s, span_a, t, span_b, xb, state, g):
+def note_parameters(search, place):
     """Values at two parameters to the state, and their points if they are nearer than the best."""
-    point_values(ka, ta, pa, span_a, s, ra, state, VALUES)
-    a = (middle_of(state, VALUES, 0), middle_of(state, VALUES, 1), middle_of(state, VALUES, 2))
-    off_a = off_of(state, VALUES)
-    if kb == HULL:
-        if count == 1:
-            copy_values(xb, MID, state, OTHER_VALUES)
-        b = (pb[0], pb[1], pb[2])
-        off_b = 0.0
+    a, b, state = search.a, search.b, search.state
+    point_values(a.kind, a.table, a.pool, place.span_a, place.s, a.room, state, VALUES)
+    if b.kind == HULL:
+        if b.count == 1:
+            copy_values(b.pieces, MID, state, OTHER_VALUES)
+        point = (b.pool[0], b.pool[1], b.pool[2])
+        off = 0.0
     else:
-        point_values(kb, tb, pb, span_b, t, rb, state, OTHER_VALUES)
-        b = (middle_of(state, OTHER_VALUES, 0), middle_of(state, OTHER_VALUES, 1), middle_of(state, OTHER_VALUES, 2))
-        off_b = off_of(state, OTHER_VALUES)
-    distance, b, kept = meet_points(full, kb, pb, count if kb == HULL else 0, a, off_a, b, off_b, state, g)
-    note(state, distance, s, span_a, t, span_b, a, b)
+        point_values(b.kind, b.table, b.pool, place.span_b, place.t, b.room, state, OTHER_VALUES)
+        point = middles(state, OTHER_VALUES)
+        off = off_of(state, OTHER_VALUES)
+    on_a = middles(state, VALUES)
+    distance, on_b, kept = meet_points(search, on_a, off_of(state, VALUES), point, off)
+    note(state, distance, place, on_a, on_b)
     return kept
 
 
@@ -215,123 +236,130 @@ def domain_of(kind, pool):
 
 
 @kernel(inner=True, exact=True)
-def hull_taylor(full, xa, oa, points, count, kept, values, at, new, s, state, zero, g):
-    """Bound by second derivatives across the feature in g, from values at s, and whether that is convex."""
-    numbers = numbers_of(g)
+def hull_taylor(search, oa, kept, new, s):
+    """Bound by second derivatives across the feature in g, whether that is convex, and whether no minimum is inside.
+
+    From the middle of the piece, or from `new` values at s in the state.
+    """
+    full, xa, points, state = search.full, search.a.pieces, search.b.pool, search.state
+    numbers = numbers_of(search.g)
     feature = (int(numbers[0]), int(numbers[1]) if kept > 1 else -1, int(numbers[2]) if kept > 2 else -1)
-    rows = state[ROWS : ROWS + 9]
+    rows = search_room_at(state, 0).rows
     if not feature_rows(full, points, feature, rows):
         return 0.0, False, False
-    y = state[ACROSS : ACROSS + PIECE]
-    worst = across_feature(xa, oa, points, count, feature, rows, y)
+    y = search_room_at(state, 0).across
+    worst = across_feature(xa, oa, points, search.b.count, feature, rows, y)
     f = 3 * feature[0]
     v = (points[f], points[f + 1], points[f + 2])
     if new:
         for row in range(3):
-            turn_values(values, at, rows, row, v, y, MID)
+            turn_values(state, VALUES, rows, row, v, y, MID)
+    zero = search.spare
     hessian = box_hessian(y, 0, zero, 0)
-    lower, convex = taylor_bound(y, 0, zero, 0, hessian, y, MID, s, zero, MID, 0.0)
+    piece, still = enclosed_piece_at(y, 0), enclosed_piece_at(zero, 0)
+    lower, convex = taylor_bound(piece, still, hessian, ValuesAt(y, MID, s), ValuesAt(zero, MID, 0.0))
     lower = lower * (1.0 - 32.0 * UNIT) - worst
     # Across a vertex the distance itself is seen; across others a lower bound of it, whose slope tells nothing.
-    return max(lower, 0.0), convex, hessian[3] and worst == 0.0 and kept == 1
+    return max(lower, 0.0), convex, hessian.empty and worst == 0.0 and kept == 1
+
+
+@kernel(inline=True)
+def middle_place(piece_a, piece_b, hull):
+    """The middles of two pieces; a hull has none."""
+    s = 0.5 * (piece_a.t0 + piece_a.t1)
+    if hull:
+        return PairPlace(s, int(piece_a.span), 0.0, 0)
+    return PairPlace(s, int(piece_a.span), 0.5 * (piece_b.t0 + piece_b.t1), int(piece_b.span))
 
 
 @kernel(inner=True, exact=True)
-def bound_node(
-    full, ka, ta, pa, ra, xa, oa, kb, tb, pb, rb, xb, ob, count, bound, polish, tolerance, clearance, state, zero, g
-):
+def parting_bound(search, oa, ob, first):
+    """Lower bound of the distance of two pieces by a direction that parts them."""
+    full, a, b, bound, g = search.full, search.a, search.b, search.bound, search.g
+    piece_a, piece_b = enclosed_piece_at(a.pieces, oa), enclosed_piece_at(b.pieces, ob)
+    best = search_state_at(search.state, 0)
+    hull = b.count > 1
+    # A hull has its vertices, a piece its ends and its middle.
+    points = b.pool if hull else b.pieces
+    place = 0 if hull else ob + P0
+    count = b.count if hull else 3
+    if bound == ELLIPSOID and piece_a.wide < math.inf and (hull or piece_b.wide < math.inf):
+        set_b = ConvexSet(points, place, count, -1.0 if hull else piece_b.wide)
+        how, v, _k = gjk(full, ConvexSet(a.pieces, oa + P0, 2, piece_a.wide), set_b, first, best.upper, 1e-6, g)
+    else:
+        set_b = ConvexSet(points, place, count, -1.0)
+        how, v, _k = gjk(full, ConvexSet(a.pieces, oa + P0, 3, -1.0), set_b, first, math.inf, 1e-9, g)
+    if how == INSIDE:
+        return 0.0
+    count_b = b.count if hull else 0
+    return separation_along(a.pieces, oa, points, 0 if hull else ob, count_b, (-v[0], -v[1], -v[2]), bound)
+
+
+@kernel(inner=True, exact=True)
+def bound_node(search, oa, ob):
     """Lower bound of the distance of two pieces; better points go to the state. Infinite where no minimum is inside."""
-    piece = enclosed_piece_at(xa, oa)
-    piece_record = enclosed_piece_at(xb, ob)
-    best = search_state_at(state, 0)
+    a, b, question = search.a, search.b, search.question
+    piece_a, piece_b = enclosed_piece_at(a.pieces, oa), enclosed_piece_at(b.pieces, ob)
+    best = search_state_at(search.state, 0)
     best.count += 1.0
-    hull = count > 1
-    a = (piece.pm[0], piece.pm[1], piece.pm[2])
-    b = (piece_record.pm[0], piece_record.pm[1], piece_record.pm[2]) if not hull else (0.0, 0.0, 0.0)
-    off_b = piece_record.off_mid if not hull else 0.0
-    s = 0.5 * (piece.t0 + piece.t1)
-    t = 0.5 * (piece_record.t0 + piece_record.t1) if not hull else 0.0
-    span_a = int(piece.span)
-    span_b = int(piece_record.span) if not hull else 0
-    upper, b, kept = meet_points(full, kb, pb, count, a, piece.off_mid, b, off_b, state, g)
-    feature = numbers_of(g)
-    better = note(state, upper, s, span_a, t, span_b, a, b)
+    hull = b.count > 1
+    on_a = (piece_a.pm[0], piece_a.pm[1], piece_a.pm[2])
+    on_b = (piece_b.pm[0], piece_b.pm[1], piece_b.pm[2]) if not hull else (0.0, 0.0, 0.0)
+    place = middle_place(piece_a, piece_b, hull)
+    upper, on_b, kept = meet_points(search, on_a, piece_a.off_mid, on_b, piece_b.off_mid if not hull else 0.0)
+    feature = numbers_of(search.g)
+    better = note(search.state, upper, place, on_a, on_b)
     if best.met > 0.0:
         return 0.0, upper
     # Asked for a clearance, most searches end before a better point is worth its price.
-    if polish and better and (not clearance >= 0.0 or best.count > 8.0):
-        s0, s1 = domain_of(ka, pa)
-        t0, t1 = domain_of(kb, pb)
-        u, w = newton(full, ka, ta, pa, span_a, ra, kb, tb, pb, span_b, rb, count, s, t, s0, s1, t0, t1, g)
-        note_parameters(full, ka, ta, pa, ra, kb, tb, pb, rb, count, u, span_a, w, span_b, xb, state, g)
+    if question.polish and better and (not question.clearance >= 0.0 or best.count > 8.0):
+        s, t = newton(search, place, domain_of(a.kind, a.pool), domain_of(b.kind, b.pool))
+        note_parameters(search, PairPlace(s, place.span_a, t, place.span_b))
         if best.met > 0.0:
             return 0.0, upper
-    # A direction by which the pieces are far apart.
-    points_b = count if hull else 3
-    place_b = 0 if hull else ob + P0
-    set_b = pb if hull else xb
-    first = sub(a, b)
-    if bound == ELLIPSOID and piece.wide < math.inf and (hull or piece_record.wide < math.inf):
-        wide_b = -1.0 if hull else piece_record.wide
-        how, v, _k = gjk(full, xa, oa + P0, 2, piece.wide, set_b, place_b, points_b, wide_b, first, best.upper, 1e-6, g)
-    else:
-        how, v, _k = gjk(full, xa, oa + P0, 3, -1.0, set_b, place_b, points_b, -1.0, first, math.inf, 1e-9, g)
-    lower = 0.0
-    if how != INSIDE:
-        lower = separation_along(xa, oa, set_b, 0 if hull else ob, count if hull else 0, (-v[0], -v[1], -v[2]), bound)
-    if not polish or lower >= best.upper - 0.5 * tolerance:
+    lower = parting_bound(search, oa, ob, sub(on_a, on_b))
+    if not question.polish or lower >= best.upper - 0.5 * question.tolerance:
         return lower, upper
-    return max(
-        lower,
-        polished_bound(
-            full, ka, ta, pa, ra, xa, oa, kb, tb, pb, rb, xb, ob, count, kept, feature, tolerance, state, zero, g
-        ),
-    ), upper
+    return max(lower, polished_bound(search, oa, ob, kept, feature)), upper
 
 
 @kernel(inner=True, exact=True)
-def polished_bound(
-    full, ka, ta, pa, ra, xa, oa, kb, tb, pb, rb, xb, ob, count, kept, feature, tolerance, state, zero, g
-):
+def polished_bound(search, oa, ob, kept, feature):
     """Bound by second derivatives about the middle, and about the minimum inside if there is but one."""
-    piece = enclosed_piece_at(xa, oa)
-    piece_record = enclosed_piece_at(xb, ob)
+    xa, xb, state = search.a.pieces, search.b.pieces, search.state
+    piece_a, piece_b = enclosed_piece_at(xa, oa), enclosed_piece_at(xb, ob)
     best = search_state_at(state, 0)
-    hull = count > 1
-    s0, s1 = piece.t0, piece.t1
-    s = 0.5 * (s0 + s1)
-    span_a = int(piece.span)
-    t0, t1, span_b = 0.0, 0.0, 0
-    hessian = (0.0, 0.0, 0.0, False)
+    hull = search.b.count > 1
+    place = middle_place(piece_a, piece_b, hull)
+    t0, t1 = (0.0, 0.0) if hull else (piece_b.t0, piece_b.t1)
+    hessian = BoxHessian(0.0, 0.0, 0.0, False)
     if hull:
-        put_numbers(g, feature)
-        lower, convex, empty = hull_taylor(full, xa, oa, pb, count, kept, xa, oa + MID, False, s, state, zero, g)
+        put_numbers(search.g, feature)
+        lower, convex, empty = hull_taylor(search, oa, kept, False, place.s)
         if empty:
             return math.inf
     else:
-        t0, t1 = piece_record.t0, piece_record.t1
-        span_b = int(piece_record.span)
         hessian = box_hessian(xa, oa, xb, ob)
-        if hessian[3]:
+        if hessian.empty:
             return math.inf
-        t = 0.5 * (t0 + t1)
-        lower, convex = taylor_bound(xa, oa, xb, ob, hessian, xa, oa + MID, s, xb, ob + MID, t)
-    here = best.span_a == span_a and s0 <= best.at_s <= s1
-    here = here and (hull or (best.span_b == span_b and t0 <= best.at_t <= t1))
-    if lower >= best.upper - 0.5 * tolerance or not (convex or here):
+        values_a, values_b = ValuesAt(xa, oa + MID, place.s), ValuesAt(xb, ob + MID, place.t)
+        lower, convex = taylor_bound(piece_a, piece_b, hessian, values_a, values_b)
+    here = best.span_a == place.span_a and piece_a.t0 <= best.at_s <= piece_a.t1
+    here = here and (hull or (best.span_b == place.span_b and t0 <= best.at_t <= t1))
+    if lower >= best.upper - 0.5 * search.question.tolerance or not (convex or here):
         return lower
-    t = 0.5 * (t0 + t1)
     if here:
         s, t = best.at_s, best.at_t
     else:
-        s, t = newton(full, ka, ta, pa, span_a, ra, kb, tb, pb, span_b, rb, count, s, t, s0, s1, t0, t1, g)
-    kept = note_parameters(full, ka, ta, pa, ra, kb, tb, pb, rb, count, s, span_a, t, span_b, xb, state, g)
+        s, t = newton(search, place, (piece_a.t0, piece_a.t1), (t0, t1))
+    kept = note_parameters(search, PairPlace(s, place.span_a, t, place.span_b))
     if best.met > 0.0:
         return 0.0
     if hull:
-        if kept >= full:
+        if kept >= search.full:
             return lower
-        other, _c, _e = hull_taylor(full, xa, oa, pb, count, kept, state, VALUES, True, s, state, zero, g)
+        other, _c, _e = hull_taylor(search, oa, kept, True, s)
     else:
-        other, _c = taylor_bound(xa, oa, xb, ob, hessian, state, VALUES, s, state, OTHER_VALUES, t)
+        values_a, values_b = ValuesAt(state, VALUES, s), ValuesAt(state, OTHER_VALUES, t)
+        other, _c = taylor_bound(piece_a, piece_b, hessian, values_a, values_b)
     return max(lower, other)

@@ -17,7 +17,7 @@ from assembly._read_only import read_only
 from assembly.distance.enclosures import hull_pair
 from assembly.distance.enclosures import node as en
 from assembly.distance.enclosures import search as es
-from assembly.distance.enclosures.enclosure import AUTO, BEZIER, CAPSULE, ELLIPSOID, FORMULA, HULL, PIECE, TAYLOR
+from assembly.distance.enclosures.enclosure import AUTO, BEZIER, CAPSULE, ELLIPSOID, FORMULA, HULL, TAYLOR
 from assembly.distance.patches.formula_packing import about
 from assembly.distance.separation import Separation, SeparationStatus
 from assembly.errors import InputError, integer, number, positive, real_array
@@ -41,8 +41,6 @@ STATUSES = {
     es.BUDGET_SPENT: SeparationStatus.BUDGET_SPENT,
     es.ROUNDED: SeparationStatus.ROUNDED,
 }
-# Evaluations that the room kept between calls is for; a search that needs more begins again with its own.
-_KEPT = 1024
 
 
 class Operand(NamedTuple):
@@ -59,20 +57,9 @@ class Operand(NamedTuple):
     room: int
 
 
-class Workspace(NamedTuple):
-    """Records of pieces of both operands, their children, nodes and state."""
-
-    xa: Array
-    xb: Array
-    child: NDArray[np.int64]
-    heap: Array
-    state: Array
-
-
 # Under these names a curve keeps its center, and what it was packed to about it and about another one.
 _CENTER, _KEY = "_enclosure_center", "_enclosure_operands"
 _ORIGIN = np.zeros(3)
-_SPACES: list[Workspace] = []
 
 
 def enclosed_distance(
@@ -139,7 +126,15 @@ def enclosed_distance(
     swapped = first.kind == HULL
     if swapped:
         first, second = second, first
-    why, state = _searched(first, second, center, goal, gap, BOUNDS[bound], bool(polish), budget)
+    state = np.zeros(en.SCRATCH)
+    why = int(
+        es.search(
+            first.dimension + 1,
+            *((shape.kind, shape.table, shape.pool, shape.room) for shape in (first, second)),
+            *(center, (goal, gap, budget, bool(polish)), BOUNDS[bound], state),
+        )
+    )
+    state = state[: en.STATE].copy()
     if not state[en.UPPER] < inf:
         _note_middles(*((b, a) if swapped else (a, b)), first, second, state)
     values = state.tolist()
@@ -187,44 +182,6 @@ def _answer(
         evaluations=int(values[en.COUNT]),
     )
     return answer
-
-
-def _searched(
-    a: Operand, b: Operand, center: Array, tolerance: float, clearance: float, bound: int, polish: bool, budget: int
-) -> tuple[int, Array]:
-    """Why a search ended, and its state."""
-    roots = a.parts * b.parts
-    room_a, room_b = np.empty(a.room), np.empty(b.room)
-    for allowed in (min(_KEPT, budget), budget):
-        kept = allowed <= _KEPT and roots <= _KEPT
-        if kept:
-            space = _SPACES.pop() if _SPACES else _workspace(4 * _KEPT)
-        else:
-            space = _workspace(allowed + 2 * max(roots, a.parts + b.parts))
-        why = es.search(
-            a.dimension + 1,
-            *(a.kind, a.table, a.pool, room_a),
-            *(b.kind, b.table, b.pool, room_b),
-            *(center, tolerance, clearance, bound, polish, allowed),
-            *space,
-        )
-        state = space.state[: en.STATE].copy()
-        if kept:
-            _SPACES.append(space)
-        if why != es.BUDGET_SPENT or state[en.COUNT] < allowed or allowed == budget:
-            break
-    return int(why), state
-
-
-def _workspace(nodes: int) -> Workspace:
-    pieces = nodes + 4
-    return Workspace(
-        np.empty(PIECE * pieces),
-        np.empty(PIECE * pieces),
-        np.empty((2, pieces), dtype=np.int64),
-        np.empty(es.NODE * (nodes + 4)),
-        np.zeros(en.SCRATCH),
-    )
 
 
 def _between_hulls(a: Operand, b: Operand, tolerance: float, clearance: float) -> Separation:

@@ -20,11 +20,12 @@ import math
 
 import numpy as np
 
+from assembly._best_first import NO_PAIRS, Pairs, best_first
+from assembly._heap import PAIR, longer, waiting_pair_at
 from assembly._kernel import kernel
-from assembly._record import record_dtype, record_view, size_of
 from assembly.distance.enclosures.enclosure import (
+    BEZIER,
     HULL,
-    MID,
     PIECE,
     enclosed_piece_at,
     fill_piece,
@@ -32,85 +33,30 @@ from assembly.distance.enclosures.enclosure import (
     split_piece,
 )
 from assembly.distance.enclosures.gjk import ROOM
-from assembly.distance.enclosures.node import (
-    bound_node,
-    domain_of,
-    search_state_at,
-)
+from assembly.distance.enclosures.node import EnclosedShape, EnclosureSearch, bound_node, domain_of, search_state_at
 from assembly.distance.enclosures.taylor import crossing_proven, point_piece
+from assembly.distance.piece_search import Question
 from assembly.geometry.interval import UNIT
+from assembly.geometry.splines.bezier_ranges import ranged_curve_at
 
 # Why a search ended.
 CONVERGED, SEPARATED, NOT_SEPARATED, HIT, DISJOINT, UNDECIDED, BUDGET_SPENT, ROUNDED = range(8)
+# The arrays are too small to go on.
+CROWDED = 8
 # Bounds of nodes before what points may be off is believed.
 LOOKS = 8
-# A pair of pieces in the heap.
-PAIR_NODE = record_dtype(
-    "f8",
-    lower=1,  # bounds of its distance [length]
-    upper=1,
-    piece_a=1,  # numbers of the pieces' records
-    piece_b=1,
-)
-node_at = record_view(PAIR_NODE)
-NODE = size_of(PAIR_NODE)
-
-
-@kernel(inline=True)
-def put_node(heap, k, lower, upper, i, j):
-    """Write node k of the heap."""
-    node = node_at(heap, NODE * k)
-    node.lower, node.upper, node.piece_a, node.piece_b = lower, upper, i, j
-
-
-@kernel(inner=True)
-def push(heap, size, lower, upper, i, j):
-    """Add a node; the least (lower, upper) is at the top."""
-    k = size
-    while k > 0:
-        parent = (k - 1) // 2
-        above = node_at(heap, NODE * parent)
-        if above.lower < lower or (above.lower == lower and above.upper <= upper):
-            break
-        put_node(heap, k, above.lower, above.upper, above.piece_a, above.piece_b)
-        k = parent
-    put_node(heap, k, lower, upper, i, j)
-    return size + 1
-
-
-@kernel(inner=True)
-def drop_top(heap, size):
-    """Remove the top."""
-    size -= 1
-    last = node_at(heap, NODE * size)
-    lower, upper, i, j = last.lower, last.upper, last.piece_a, last.piece_b
-    k = 0
-    while True:
-        child = 2 * k + 1
-        if child >= size:
-            break
-        below = node_at(heap, NODE * child)
-        if child + 1 < size:
-            beside = node_at(heap, NODE * (child + 1))
-            if (beside.lower, beside.upper) < (below.lower, below.upper):
-                child += 1
-                below = beside
-        if (lower, upper) <= (below.lower, below.upper):
-            break
-        put_node(heap, k, below.lower, below.upper, below.piece_a, below.piece_b)
-        k = child
-    put_node(heap, k, lower, upper, i, j)
-    return size
+# Pieces of a curve, and pairs of them, that there is room for at first, beside the smooth parts.
+_ROOM = 64
 
 
 @kernel(inner=True, exact=True)
-def proven_hit(ka, ta, pa, ra, xa, oa, kb, tb, pb, rb, xb, ob, state):
-    """Whether two plane curves are proven to meet near the best parameters. Overwrites the records at oa and ob."""
-    piece = enclosed_piece_at(xa, oa)
-    piece_record = enclosed_piece_at(xb, ob)
-    best = search_state_at(state, 0)
-    lo_a, hi_a = domain_of(ka, pa)
-    lo_b, hi_b = domain_of(kb, pb)
+def proven_hit(search):
+    """Whether two plane curves are proven to meet near the best parameters."""
+    a, b, x = search.a, search.b, search.spare
+    piece_a, piece_b = enclosed_piece_at(x, 0), enclosed_piece_at(x, PIECE)
+    best = search_state_at(search.state, 0)
+    lo_a, hi_a = domain_of(a.kind, a.pool)
+    lo_b, hi_b = domain_of(b.kind, b.pool)
     s, t = best.at_s, best.at_t
     part = 1e-9
     for _ in range(3):
@@ -119,11 +65,11 @@ def proven_hit(ka, ta, pa, ra, xa, oa, kb, tb, pb, rb, xb, ob, state):
         part *= 100.0
         if not (lo_a <= s - h and s + h <= hi_a and lo_b <= t - k and t + k <= hi_b):
             return False
-        piece.t0, piece.t1, piece.span = s - h, s + h, best.span_a
-        piece_record.t0, piece_record.t1, piece_record.span = t - k, t + k, best.span_b
-        fill_piece(ka, ta, pa, ra, xa, oa)
-        fill_piece(kb, tb, pb, rb, xb, ob)
-        if crossing_proven(xa, oa, xb, ob, xa, oa + MID, xb, ob + MID):
+        piece_a.t0, piece_a.t1, piece_a.span = s - h, s + h, best.span_a
+        piece_b.t0, piece_b.t1, piece_b.span = t - k, t + k, best.span_b
+        fill_piece(a.kind, a.table, a.pool, a.room, x, 0)
+        fill_piece(b.kind, b.table, b.pool, b.room, x, PIECE)
+        if crossing_proven(x, 0, x, PIECE):
             return True
     return False
 
@@ -157,205 +103,160 @@ def about_center(points, count, center):
     return moved, UNIT * most
 
 
-@kernel(inner=True)
-def least_off(x, count):
-    """How far points of the best known of the first pieces may be off."""
-    least = math.inf
-    for i in range(count):
-        least = min(least, enclosed_piece_at(x, PIECE * i).off)
-    return least
-
-
-@kernel(inner=True)
-def longer(xa, oa, xb, ob):
+@kernel(inline=True)
+def halves_a(piece_a, piece_b):
     """Whether a is the piece to halve; one that cannot be bounded goes first, then the one longer in its parameter."""
-    piece = enclosed_piece_at(xa, oa)
-    piece_record = enclosed_piece_at(xb, ob)
-    a, b = piece.length, piece_record.length
+    a, b = piece_a.length, piece_b.length
     if a == math.inf and b == math.inf:
-        return piece.t1 - piece.t0 >= piece_record.t1 - piece_record.t0
+        return piece_a.t1 - piece_a.t0 >= piece_b.t1 - piece_b.t0
     return a >= b
+
+
+@kernel(inline=True)
+def pair_bound(search, i, j):
+    """Lower bound of the distance of two pieces; of equal ones the pair whose middles are nearer goes first."""
+    best = search_state_at(search.state, 0)
+    lower, upper = bound_node(search, PIECE * i, PIECE * j)
+    # Of the best known pieces: a single point may be unlucky, at a joint of the formula.
+    best.off_a = min(best.off_a, enclosed_piece_at(search.a.pieces, PIECE * i).off)
+    if search.b.kind != HULL:
+        best.off_b = min(best.off_b, enclosed_piece_at(search.b.pieces, PIECE * j).off)
+    best.limit = best.upper
+    return lower, upper
+
+
+@kernel(inline=True)
+def is_full(shape, used):
+    """Whether there is no room for two more pieces of a curve."""
+    return shape.kind != HULL and used + 2 > shape.halves.size
+
+
+@kernel(inner=True, exact=True)
+def search_ended(search, top, left):
+    """Why the search ends; -1: not yet."""
+    question, best = search.question, search_state_at(search.state, 0)
+    first = waiting_pair_at(search.heap, 0).bound
+    best.lowest = min(max(best.lowest, min(best.upper, top)), best.upper)
+    both = search.b.kind != HULL
+    if search.full == 3 and both and best.met == 0.0 and best.upper <= question.tolerance:
+        if not question.clearance > 0.0 and proven_hit(search):
+            best.met = 1.0
+    if best.met > 0.0:
+        best.lowest = 0.0
+    best.lower = max(best.lowest - best.slack, 0.0)
+    noise = 0.0
+    if best.count >= LOOKS and best.off_a + best.off_b < math.inf:
+        noise = 8.0 * (best.off_a + best.off_b + best.slack)
+    why = verdict(best.lower, best.upper, best.met > 0.0, question.tolerance, noise, question.clearance)
+    if why >= 0:
+        return why
+    if best.count >= question.budget:
+        return BUDGET_SPENT
+    if left == 0 or first >= best.upper or first > best.let_go:
+        return ROUNDED
+    crowded = is_full(search.a, best.used_a) or is_full(search.b, best.used_b) or (left + 1) * PAIR > search.heap.size
+    return CROWDED if crowded else -1
+
+
+@kernel(inline=True)
+def first_half(shape, k, used):
+    """The first half of piece k, made as piece `used` if need be; how many pieces there are then.
+
+    -1: it has none, as a hull, or as doubles end.
+    """
+    if shape.kind == HULL:
+        return -1, used
+    x, halves = shape.pieces, shape.halves
+    if halves[k] < 0 and split_piece(shape.kind, shape.table, shape.pool, shape.room, x, PIECE * k, PIECE * used):
+        halves[k], halves[used], halves[used + 1] = used, -1, -1
+        used += 2
+    return halves[k], used
+
+
+@kernel(inner=True)
+def branch(search, lower, i, j):
+    """The bound of a pair, and the halves of its longer piece with the other one; of the other if that has none."""
+    a, b = search.a, search.b
+    best = search_state_at(search.state, 0)
+    on_a = halves_a(enclosed_piece_at(a.pieces, PIECE * i), enclosed_piece_at(b.pieces, PIECE * j))
+    for _attempt in range(2):
+        if on_a:
+            half, used = first_half(a, i, int(best.used_a))
+            best.used_a = used
+            if half >= 0:
+                return lower, Pairs(half, half + 2, j, j + 1)
+        else:
+            half, used = first_half(b, j, int(best.used_b))
+            best.used_b = used
+            if half >= 0:
+                return lower, Pairs(i, i + 1, half, half + 2)
+        on_a = not on_a
+    return lower, NO_PAIRS
+
+
+advance = kernel(inner=True)(best_first(search_state_at, pair_bound, search_ended, branch))
+
+
+@kernel(inline=True, allocates=True)
+def new_shape(operand, center):
+    """A curve with its smooth parts as pieces, or a hull about the center; how many pieces, and how far it is off."""
+    kind, table, pool, room = operand
+    parts = ranged_curve_at(table, 0).pieces if kind == BEZIER else 1
+    x = np.empty((parts + _ROOM) * PIECE)
+    halves = np.full(parts + _ROOM, -1)
+    shape = EnclosedShape(kind, table, pool, np.empty(room), halves, x, 0)
+    if kind != HULL:
+        first_pieces(kind, table, pool, shape.room, x)
+        return shape, parts, 0.0
+    count = table[1]
+    vertices, off = about_center(pool, count, center)
+    if count == 1:
+        point_piece(vertices, 0, x)
+    else:
+        enclosed_piece_at(x, 0).length = -1.0
+    return EnclosedShape(kind, table, vertices, shape.room, halves, x, count), parts, off
+
+
+@kernel(inner=True, allocates=True)
+def roomier(shape, used):
+    """A shape, with four times the room where two more pieces have none."""
+    if not is_full(shape, used):
+        return shape
+    halves, pieces = longer(shape.halves, 4 * shape.halves.size), longer(shape.pieces, 4 * shape.pieces.size)
+    return EnclosedShape(shape.kind, shape.table, shape.pool, shape.room, halves, pieces, shape.count)
 
 
 @kernel(
     signatures=(
-        "(i8, i8, i8[::1], f8[::1], f8[::1], i8, i8[::1], f8[::1], f8[::1], f8[::1], f8, f8, i8, b1, i8, "
-        "f8[::1], f8[::1], i8[:, ::1], f8[::1], f8[::1])"
+        "(i8, Tuple((i8, i8[::1], f8[::1], i8)), Tuple((i8, i8[::1], f8[::1], i8)), f8[::1], "
+        "Tuple((f8, f8, i8, b1)), i8, f8[::1])"
     ),
 )
-def search(
-    full,
-    ka,
-    ta,
-    pa,
-    ra,
-    kb,
-    tb,
-    pb,
-    rb,
-    center,
-    tolerance,
-    clearance,
-    bound,
-    polish,
-    budget,
-    xa,
-    xb,
-    child,
-    heap,
-    state,
-):
+def search(full, operand_a, operand_b, center, asked, bound, state):
     """The search of the heading, for Python. `full` is the dimension and one; b may be a hull, a is a curve.
 
-    Curves are given about the center, a hull is not; the points of the answer are not, either.
-
-    Records of pieces go to xa and xb, their children to child (2, pieces), nodes to the heap; the state is described
-    above, the lower bound goes behind it. A clearance below zero asks for the distance. Returns why it ended.
+    Operands are (kind, table, pool, numbers of room). Curves are given about the center, a hull is not; the points of
+    the answer are not, either. A clearance below zero asks for the distance. Returns why it ended.
     """
+    question = Question(*asked)
+    a, used_a, _off = new_shape(operand_a, center)
+    b, used_b, slack = new_shape(operand_b, center)
+    spare, g = np.zeros(2 * PIECE), np.zeros(ROOM)
+    still = enclosed_piece_at(spare, 0)
+    still.first_end, still.last_end = 1.0, 1.0
     best = search_state_at(state, 0)
-    g = np.zeros(ROOM)
-    zero = np.zeros(PIECE)
-    piece = enclosed_piece_at(zero, 0)
-    piece.first_end = 1.0
-    piece.last_end = 1.0
-    best.upper = math.inf
-    best.met = 0.0
-    best.count = 0.0
-    best.slack = 0.0
-    room_a, room_b = child.shape[1] - 2, child.shape[1] - 2
-    used_a = first_pieces(ka, ta, pa, ra, xa)
-    count = 0
-    if kb == HULL:
-        count = tb[1]
-        used_b = 1
-        pb, best.slack = about_center(pb, count, center)
-        if count == 1:
-            point_piece(pb, 0, xb)
-        else:
-            enclosed_piece_at(xb, 0).length = -1.0
-    else:
-        used_b = first_pieces(kb, tb, pb, rb, xb)
-    child[:, : max(used_a, used_b)] = -1
-    slack = best.slack
-    noise = 0.0
-    size = 0
-    for i in range(used_a):
-        for j in range(used_b):
-            lower, upper = bound_node(
-                full,
-                ka,
-                ta,
-                pa,
-                ra,
-                xa,
-                PIECE * i,
-                kb,
-                tb,
-                pb,
-                rb,
-                xb,
-                PIECE * j,
-                count,
-                bound,
-                polish,
-                tolerance,
-                clearance,
-                state,
-                zero,
-                g,
-            )
-            if lower < best.upper:
-                size = push(heap, size, lower, upper, i, j)
-    # Of the best known pieces: a single point may be unlucky, at a joint of the formula.
-    off_a = least_off(xa, used_a)
-    off_b = least_off(xb, used_b) if kb != HULL else 0.0
-    why = -1
-    lowest = 0.0
-    stuck = math.inf
-    crowded = False
-    lower_bound = 0.0
-    top = node_at(heap, 0)
-    while True:
-        while size > 0 and top.lower >= best.upper:
-            size = 0
-        lowest = max(lowest, min(min(best.upper, stuck), top.lower if size > 0 else math.inf))
-        lowest = min(lowest, best.upper)
-        if best.met > 0.0:
-            lowest = 0.0
-        if full == 3 and kb != HULL and best.met == 0.0 and best.upper <= tolerance and not clearance > 0.0:
-            if proven_hit(ka, ta, pa, ra, xa, PIECE * room_a, kb, tb, pb, rb, xb, PIECE * room_b, state):
-                best.met = 1.0
-                lowest = 0.0
-        lower_bound = max(lowest - slack, 0.0)
-        if best.count >= LOOKS and off_a + off_b < math.inf:
-            noise = 8.0 * (off_a + off_b + slack)
-        why = verdict(lower_bound, best.upper, best.met > 0.0, tolerance, noise, clearance)
-        if why >= 0:
-            break
-        if best.count >= budget:
-            why = BUDGET_SPENT
-            break
-        if size == 0 or top.lower > stuck:
-            why = BUDGET_SPENT if crowded else ROUNDED
-            break
-        i, j = int(top.piece_a), int(top.piece_b)
-        parent = top.lower
-        size = drop_top(heap, size)
-        halve_a = longer(xa, PIECE * i, xb, PIECE * j)
-        done = False
-        for _attempt in range(2):
-            if halve_a and child[0, i] < 0 and used_a + 2 <= room_a:
-                if split_piece(ka, ta, pa, ra, xa, PIECE * i, PIECE * used_a):
-                    child[0, i] = used_a
-                    child[0, used_a : used_a + 2] = -1
-                    used_a += 2
-            if not halve_a and kb != HULL and child[1, j] < 0 and used_b + 2 <= room_b:
-                if split_piece(kb, tb, pb, rb, xb, PIECE * j, PIECE * used_b):
-                    child[1, j] = used_b
-                    child[1, used_b : used_b + 2] = -1
-                    used_b += 2
-            done = child[0, i] >= 0 if halve_a else child[1, j] >= 0
-            if done:
-                break
-            halve_a = not halve_a
-        if not done:
-            # Doubles end here, or the room: its bound is final.
-            stuck = min(stuck, parent)
-            crowded = crowded or used_a + 2 > room_a or used_b + 2 > room_b
-            continue
-        for side in range(2):
-            p = child[0, i] + side if halve_a else i
-            q = j if halve_a else child[1, j] + side
-            lower, upper = bound_node(
-                full,
-                ka,
-                ta,
-                pa,
-                ra,
-                xa,
-                PIECE * p,
-                kb,
-                tb,
-                pb,
-                rb,
-                xb,
-                PIECE * q,
-                count,
-                bound,
-                polish,
-                tolerance,
-                clearance,
-                state,
-                zero,
-                g,
-            )
-            lower = max(lower, parent)
-            off_a = min(off_a, enclosed_piece_at(xa, PIECE * p).off)
-            if kb != HULL:
-                off_b = min(off_b, enclosed_piece_at(xb, PIECE * q).off)
-            if lower < best.upper and best.met == 0.0:
-                size = push(heap, size, lower, upper, p, q)
-    best.lower = lower_bound
+    best.upper, best.lowest, best.met, best.count, best.slack = math.inf, 0.0, 0.0, 0.0, slack
+    best.let_go, best.off_a, best.off_b = math.inf, math.inf, 0.0 if b.kind == HULL else math.inf
+    best.used_a, best.used_b = used_a, used_b
+    heap = np.empty((used_a * used_b + _ROOM) * PAIR)
+    lasting = EnclosureSearch(full, a, b, question, bound, heap, state, spare, g)
+    why, left = advance(lasting, 0, Pairs(0, used_a, 0, used_b))
+    while why == CROWDED:
+        a, b = roomier(a, best.used_a), roomier(b, best.used_b)
+        if (left + 1) * PAIR > heap.size:
+            heap = longer(heap, 4 * heap.size)
+        lasting = EnclosureSearch(full, a, b, question, bound, heap, state, spare, g)
+        why, left = advance(lasting, left, NO_PAIRS)
     for k in range(3):
         best.point_a[k] += center[k]
         best.point_b[k] += center[k]

@@ -15,6 +15,7 @@ the curve. All by intervals, rounded outward.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.distance.enclosures.enclosure import (
@@ -30,6 +31,10 @@ from assembly.geometry.vec import cross, dot, sub
 
 # What second derivatives tell of a box: nothing, that F is convex, that no minimum is inside.
 OPEN, CONVEX, EMPTY = 0, 1, 2
+# Over a box: least F_ss and F_tt, largest |F_st|, and whether the slopes leave no minimum inside.
+BoxHessian = namedtuple("BoxHessian", "ss tt st empty")
+# Values (nine pairs) of C, C' and C'' at block[at:], at a parameter.
+ValuesAt = namedtuple("ValuesAt", "block at parameter")
 
 
 @kernel(inline=True)
@@ -53,9 +58,9 @@ def slope_minimum(g, h, reach):
 
 @kernel(inner=True, exact=True)
 def box_hessian(xa, oa, xb, ob):
-    """(p, q, m) of the heading over a box, and whether the slopes leave a minimum inside."""
-    piece = enclosed_piece_at(xa, oa)
-    piece_record = enclosed_piece_at(xb, ob)
+    """(p, q, m) of the heading over a box of two pieces."""
+    piece_a = enclosed_piece_at(xa, oa)
+    piece_b = enclosed_piece_at(xb, ob)
     ss = (0.0, 0.0)
     tt = (0.0, 0.0)
     st = (0.0, 0.0)
@@ -70,19 +75,18 @@ def box_hessian(xa, oa, xb, ob):
         st = isum(st, iproduct(a1, b1))
         gs = isum(gs, iproduct(r, a1))
         gt = idifference(gt, iproduct(r, b1))
-    empty = (gs[0] > 0.0 and piece.first_end == 0.0) or (gs[1] < 0.0 and piece.last_end == 0.0)
-    empty = empty or (gt[0] > 0.0 and piece_record.first_end == 0.0) or (gt[1] < 0.0 and piece_record.last_end == 0.0)
-    return ss[0], tt[0], magnitude(st), empty
+    empty = (gs[0] > 0.0 and piece_a.first_end == 0.0) or (gs[1] < 0.0 and piece_a.last_end == 0.0)
+    empty = empty or (gt[0] > 0.0 and piece_b.first_end == 0.0) or (gt[1] < 0.0 and piece_b.last_end == 0.0)
+    return BoxHessian(ss[0], tt[0], magnitude(st), empty)
 
 
 @kernel(inner=True, exact=True)
-def taylor_bound(xa, oa, xb, ob, hessian, va, pa, s, vb, pb, t):
-    """Lower bound of the distance over a box from values (nine pairs) at s and t, and whether F is convex there."""
-    piece = enclosed_piece_at(xa, oa)
-    piece_record = enclosed_piece_at(xb, ob)
-    p, q, m, _empty = hessian
-    reach_s = piece.t1 - piece.t0
-    reach_t = piece_record.t1 - piece_record.t0
+def taylor_bound(piece_a, piece_b, hessian, a, b):
+    """Lower bound of the distance over a box of two pieces from values there, and whether F is convex there."""
+    p, q, m = hessian.ss, hessian.tt, hessian.st
+    s, t = a.parameter, b.parameter
+    reach_s = piece_a.t1 - piece_a.t0
+    reach_t = piece_b.t1 - piece_b.t0
     if not (p > -math.inf and q > -math.inf and m < math.inf):
         return 0.0, False
     if m > 0.0:
@@ -98,15 +102,15 @@ def taylor_bound(xa, oa, xb, ob, hessian, va, pa, s, vb, pb, t):
     gs = (0.0, 0.0)
     gt = (0.0, 0.0)
     for k in range(3):
-        r = idifference(pair(va, pa, k), pair(vb, pb, k))
+        r = idifference(pair(a.block, a.at, k), pair(b.block, b.at, k))
         total += isquare(r)[0]
-        gs = isum(gs, iproduct(r, pair(va, pa + 6, k)))
-        gt = idifference(gt, iproduct(r, pair(vb, pb + 6, k)))
+        gs = isum(gs, iproduct(r, pair(a.block, a.at + 6, k)))
+        gt = idifference(gt, iproduct(r, pair(b.block, b.at + 6, k)))
     if not (gs[1] - gs[0] < math.inf and gt[1] - gt[0] < math.inf):
         return 0.0, False
     low = 0.5 * total * (1.0 - 4.0 * UNIT)
-    low += min(slope_minimum(gs[0], p, up(piece.t1 - s)), slope_minimum(-gs[1], p, up(s - piece.t0)))
-    low += min(slope_minimum(gt[0], q, up(piece_record.t1 - t)), slope_minimum(-gt[1], q, up(t - piece_record.t0)))
+    low += min(slope_minimum(gs[0], p, up(piece_a.t1 - s)), slope_minimum(-gs[1], p, up(s - piece_a.t0)))
+    low += min(slope_minimum(gt[0], q, up(piece_b.t1 - t)), slope_minimum(-gt[1], q, up(t - piece_b.t0)))
     low -= 4.0 * UNIT * total
     convex = (p > 0.0 or reach_s == 0.0) and (q > 0.0 or reach_t == 0.0)
     if not (low > 0.0):
@@ -179,20 +183,20 @@ def across_feature(xa, oa, points, count, feature, n, y):
     least |N (x - v)| less the largest (r / |r|).(z - v) over its vertices z: this largest, over the piece, is what is
     returned; zero or a rounding where the feature is the nearest one for all of the piece.
     """
-    piece = enclosed_piece_at(y, 0)
-    piece_record = enclosed_piece_at(xa, oa)
+    seen = enclosed_piece_at(y, 0)
+    piece = enclosed_piece_at(xa, oa)
     f = 3 * feature[0]
     v = (points[f], points[f + 1], points[f + 2])
     none = (0.0, 0.0, 0.0)
-    piece.t0, piece.t1 = piece_record.t0, piece_record.t1
-    piece.first_end, piece.last_end = piece_record.first_end, piece_record.last_end
+    seen.t0, seen.t1 = piece.t0, piece.t1
+    seen.first_end, seen.last_end = piece.first_end, piece.last_end
     near = 0.0
     for row in range(3):
         r = turned(xa, oa + BOX, n, row, v)
-        piece.box[2 * row], piece.box[2 * row + 1] = r
+        seen.box[2 * row], seen.box[2 * row + 1] = r
         near += isquare(r)[0]
-        piece.speed[2 * row], piece.speed[2 * row + 1] = turned(xa, oa + SPEED, n, row, none)
-        piece.bend[2 * row], piece.bend[2 * row + 1] = turned(xa, oa + BEND, n, row, none)
+        seen.speed[2 * row], seen.speed[2 * row + 1] = turned(xa, oa + SPEED, n, row, none)
+        seen.bend[2 * row], seen.bend[2 * row + 1] = turned(xa, oa + BEND, n, row, none)
         turn_values(xa, oa + MID, n, row, v, y, MID)
     near = math.sqrt(near) * (1.0 - 8.0 * UNIT)
     worst = 0.0
@@ -205,7 +209,7 @@ def across_feature(xa, oa, points, count, feature, n, y):
             o = 3 * row
             c = n[o] * d[0] + n[o + 1] * d[1] + n[o + 2] * d[2]
             slack = 8.0 * UNIT * size if n[o] != 0.0 or n[o + 1] != 0.0 or n[o + 2] != 0.0 else 0.0
-            inner = isum(inner, iproduct((c - slack, c + slack), (piece.box[2 * row], piece.box[2 * row + 1])))
+            inner = isum(inner, iproduct((c - slack, c + slack), (seen.box[2 * row], seen.box[2 * row + 1])))
             small += (abs(c) + slack) * (abs(c) + slack)
         # By the angle to the direction, or by the length across alone, which is a rounding for the feature's own.
         if inner[1] > 0.0:
@@ -244,16 +248,16 @@ def point_piece(points, o, x):
 
 
 @kernel(inner=True, exact=True)
-def crossing_proven(xa, oa, xb, ob, va, pa, vb, pb):
-    """Whether two plane curves meet in a box, by Krawczyk's operator about the point of the values, its middle.
+def crossing_proven(xa, oa, xb, ob):
+    """Whether two plane curves meet in a box of two pieces, by Krawczyk's operator about its middle.
 
     With r = a - b, J = [a', -b'] over the box and Y about the inverse of its middle: if -Y r + (I - Y J) X is inside
     X, the box about the point, then r has a zero there.
     """
-    piece = enclosed_piece_at(xa, oa)
-    piece_record = enclosed_piece_at(xb, ob)
-    h = 0.5 * (piece.t1 - piece.t0)
-    k = 0.5 * (piece_record.t1 - piece_record.t0)
+    piece_a = enclosed_piece_at(xa, oa)
+    piece_b = enclosed_piece_at(xb, ob)
+    h = 0.5 * (piece_a.t1 - piece_a.t0)
+    k = 0.5 * (piece_b.t1 - piece_b.t0)
     a0, a1 = pair(xa, oa + SPEED, 0), pair(xa, oa + SPEED, 1)
     b0, b1 = pair(xb, ob + SPEED, 0), pair(xb, ob + SPEED, 1)
     ax, ay = 0.5 * (a0[0] + a0[1]), 0.5 * (a1[0] + a1[1])
@@ -262,8 +266,8 @@ def crossing_proven(xa, oa, xb, ob, va, pa, vb, pb):
     if not (abs(det) > 0.0 and abs(det) < math.inf):
         return False
     y00, y01, y10, y11 = by / det, -bx / det, -ay / det, ax / det
-    r0 = idifference(pair(va, pa, 0), pair(vb, pb, 0))
-    r1 = idifference(pair(va, pa, 1), pair(vb, pb, 1))
+    r0 = idifference(pair(xa, oa + MID, 0), pair(xb, ob + MID, 0))
+    r1 = idifference(pair(xa, oa + MID, 1), pair(xb, ob + MID, 1))
     b0 = (-b0[1], -b0[0])
     b1 = (-b1[1], -b1[0])
     # Rounded inward: the box is a little smaller than it says.

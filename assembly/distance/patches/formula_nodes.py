@@ -31,11 +31,10 @@ from assembly._kernel import kernel
 from assembly._record import Store, place_of, record_dtype, record_view
 from assembly.distance.patches.nodes import (
     DEEPEST,
-    NODE_INTS,
     ROWS,
+    patch_links_of,
     patch_node_at,
-    patch_node_links_at,
-    patch_stride,
+    patch_node_of,
 )
 from assembly.distance.patches.pair import patch_work_at
 from assembly.geometry.expression.formula import (
@@ -69,13 +68,13 @@ def half_width(t0, t1):
 
 
 @kernel(inner=True)
-def set_interval(record, ints, nodes, k, t0, t1):
+def set_interval(tree, k, t0, t1):
     """Node k for [t0, t1], not described yet."""
-    links = patch_node_links_at(ints, NODE_INTS * k)
-    o = patch_node_at(nodes, patch_stride(record) * k)
-    o.away = 0.0
-    o.low_u, o.high_u = t0, t1
-    o.low_v, o.high_v = 0.0, 1.0
+    links = patch_links_of(tree, k)
+    node = patch_node_of(tree, k)
+    node.away = 0.0
+    node.low_u, node.high_u = t0, t1
+    node.low_v, node.high_v = 0.0, 1.0
     links.halves = -1
     links.patch = 0
     # Where doubles have no middle there is nothing to halve.
@@ -83,23 +82,22 @@ def set_interval(record, ints, nodes, k, t0, t1):
 
 
 @kernel(inner=True)
-def start_formula(curve, record, ints, nodes):
+def start_formula(curve, tree):
     """All of the curve as node 0."""
     pool = curve[1]
     head = formula_head_at(pool, 0)
-    set_interval(record, ints, nodes, 0, head.domain[0], head.domain[1])
+    set_interval(tree, 0, head.domain[0], head.domain[1])
 
 
 @kernel(inner=True)
-def split_formula(record, ints, nodes, k, low):
+def split_formula(tree, k, low):
     """Make the halves of node k as nodes low and low + 1, not described yet."""
-    o = patch_node_at(nodes, patch_stride(record) * k)
-    t0 = o.low_u
-    t1 = o.high_u
+    node = patch_node_of(tree, k)
+    t0, t1 = node.low_u, node.high_u
     middle = 0.5 * (t0 + t1)
-    patch_node_links_at(ints, NODE_INTS * k).halves = low
-    set_interval(record, ints, nodes, low, t0, middle)
-    set_interval(record, ints, nodes, low + 1, middle, t1)
+    patch_links_of(tree, k).halves = low
+    set_interval(tree, low, t0, middle)
+    set_interval(tree, low + 1, middle, t1)
 
 
 @kernel(inline=True)

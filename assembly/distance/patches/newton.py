@@ -9,11 +9,12 @@ formulas is compiled then.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.distance.curves.bounds import least_change
 from assembly.distance.patches.formula_nodes import formula_derivatives
-from assembly.distance.patches.nodes import ROWS, bezier_surface_at, patch_node_at
+from assembly.distance.patches.nodes import ROWS, bezier_surface_at, plus
 from assembly.distance.patches.pair import (
     BASIS,
     MARGIN,
@@ -24,12 +25,15 @@ from assembly.distance.patches.pair import (
     factorize,
     load_hessian,
     load_side,
+    node_of,
     patch_work_at,
     size_at,
     vector_dot,
 )
 from assembly.geometry.splines.bezier_pieces import UNIT
 
+# What a place of two patches proves: bounds of the distance, the upper one that of its points, and these.
+PatchPoints = namedtuple("PatchPoints", "lower upper on_a on_b")
 _STEPS = 30
 _SHORTENINGS = 12
 
@@ -59,12 +63,13 @@ def fill_basis(w, at, n, x):
 
 
 @kernel(inner=True)
-def patch_derivatives(record, nodes, o, x, y, w):
+def patch_derivatives(patch, x, y, w):
     """Point of a patch; its first and second derivatives at PATCH_J and PATCH_K."""
     work = patch_work_at(w, 0)
-    patch = bezier_surface_at(record, 0)
-    p = patch.degree_u
-    q = patch.degree_v
+    surface = bezier_surface_at(patch.record, 0)
+    nodes = patch.nodes
+    p = surface.degree_u
+    q = surface.degree_v
     bu = BASIS
     bv = BASIS + 3 * (p + 1)
     fill_basis(w, bu, p, x)
@@ -75,7 +80,7 @@ def patch_derivatives(record, nodes, o, x, y, w):
     suu = s
     suv = s
     svv = s
-    r = o + ROWS
+    r = patch.at + ROWS
     for i in range(p + 1):
         t = (0.0, 0.0, 0.0, 0.0)
         tv = t
@@ -83,18 +88,18 @@ def patch_derivatives(record, nodes, o, x, y, w):
         for l in range(q + 1):
             row = (nodes[r], nodes[r + 1], nodes[r + 2], nodes[r + 3])
             r += 4
-            t = add4(t, w[bv + l], row)
-            tv = add4(tv, w[bv + q + 1 + l], row)
-            tvv = add4(tvv, w[bv + 2 * q + 2 + l], row)
+            t = plus(t, w[bv + l], row)
+            tv = plus(tv, w[bv + q + 1 + l], row)
+            tvv = plus(tvv, w[bv + 2 * q + 2 + l], row)
         b0 = w[bu + i]
         b1 = w[bu + p + 1 + i]
         b2 = w[bu + 2 * p + 2 + i]
-        s = add4(s, b0, t)
-        su = add4(su, b1, t)
-        sv = add4(sv, b0, tv)
-        suu = add4(suu, b2, t)
-        suv = add4(suv, b1, tv)
-        svv = add4(svv, b0, tvv)
+        s = plus(s, b0, t)
+        su = plus(su, b1, t)
+        sv = plus(sv, b0, tv)
+        suu = plus(suu, b2, t)
+        suv = plus(suv, b1, tv)
+        svv = plus(svv, b0, tvv)
     d = 1.0 / s[3]
     for c in range(3):
         v = d * s[c]
@@ -108,22 +113,18 @@ def patch_derivatives(record, nodes, o, x, y, w):
     return (d * s[0], d * s[1], d * s[2])
 
 
-@kernel(inline=True)
-def add4(a, s, b):
-    return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2], a[3] + s * b[3])
-
-
 @kernel(inner=True)
-def load_points(ra, a, o, na, rb, b, p, nb, curve, shift, w):
+def load_points(a, b, curve, shift, w):
     """D, J and K at PLACE in the unit cube; the two points."""
     work = patch_work_at(w, 0)
-    u = patch_derivatives(ra, a, o, work.place[0], work.place[1] if na > 1 else 0.0, w)
+    na, nb = a.free, b.free
+    u = patch_derivatives(a, work.place[0], work.place[1] if na > 1 else 0.0, w)
     load_side(w, PATCH_J, PATCH_K, 1.0, na, 0, w)
     x = work.place[na] if nb > 0 else 0.0
     if curve is None:
-        v = patch_derivatives(rb, b, p, x, work.place[na + 1] if nb > 1 else 0.0, w)
+        v = patch_derivatives(b, x, work.place[na + 1] if nb > 1 else 0.0, w)
     else:
-        v = formula_derivatives(curve, b, p, x, w)
+        v = formula_derivatives(curve, b.nodes, b.at, x, w)
     load_side(w, PATCH_J, PATCH_K, -1.0, nb, na, w)
     for j in range(3):
         work.d[j] = (u[j] - v[j]) - shift[j]
@@ -164,17 +165,17 @@ def newton_direction(w, n):
 
 
 @kernel(inner=True)
-def nearest_in_patches(ra, a, o, na, rb, b, p, nb, curve, shift, w):
+def nearest_in_patches(a, b, curve, shift, w):
     """From PLACE to a local minimum in the unit cube."""
     work = patch_work_at(w, 0)
-    n = na + nb
+    n = a.free + b.free
     best = math.inf
     part = 1.0
     shortenings = 0
     for i in range(n):
         work.best[i] = work.place[i]
     for _ in range(_STEPS):
-        load_points(ra, a, o, na, rb, b, p, nb, curve, shift, w)
+        load_points(a, b, curve, shift, w)
         f = vector_dot(w, D, D)
         if f < best:
             slow = f > best * (1.0 - 1e-15)
@@ -203,24 +204,26 @@ def nearest_in_patches(ra, a, o, na, rb, b, p, nb, curve, shift, w):
 
 
 @kernel(inner=True, exact=True)
-def proven_in_patches(ra, a, o, na, rb, b, p, nb, curve, shift, error, rough, curved, w):
+def proven_in_patches(a, b, curve, shift, errors, curved, w):
     """Lower bound of the distance on a box, the distance at PLACE, and the points there.
 
-    The Hessian is at least MARGIN times the diagonal in Z, if it is proven curved.
+    `errors`: how far points and derivatives may be off. The Hessian is at least MARGIN times the diagonal in Z, if it
+    is proven curved.
     """
     work = patch_work_at(w, 0)
-    u, v = load_points(ra, a, o, na, rb, b, p, nb, curve, shift, w)
+    u, v = load_points(a, b, curve, shift, w)
+    error, rough = errors
     if curve is not None:
         error += work.off[0]
     far = size_at(w, D)
     size = 16.0 * UNIT * far
     change = 0.0
     if curved:
-        for i in range(na + nb):
+        for i in range(a.free + b.free):
             off = rough
             back = work.place[i]
             ahead = 1.0 - back
-            if curve is not None and i == na:
+            if curve is not None and i == a.free:
                 off += work.off[1]
                 back = work.off[2]
                 ahead = work.off[3]
@@ -229,5 +232,5 @@ def proven_in_patches(ra, a, o, na, rb, b, p, nb, curve, shift, error, rough, cu
     near = max(far - size - error, 0.0)
     square = near * near + 2.0 * change * (1.0 + 1e-12)
     lower = math.sqrt(square) * (1.0 - 8.0 * UNIT) if square > 0.0 else 0.0
-    away = patch_node_at(a, o).away + patch_node_at(b, p).away
-    return lower - away, far + size + error + away, u, v
+    away = node_of(a).away + node_of(b).away
+    return PatchPoints(lower - away, far + size + error + away, u, v)

@@ -16,6 +16,7 @@ the sum of both degrees.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
@@ -39,9 +40,6 @@ BEZIER_SURFACE = record_dtype(
 bezier_surface_at = record_view(BEZIER_SURFACE)
 PATCHES_U = place_of(BEZIER_SURFACE, "patches_u")
 PATCHES_V = place_of(BEZIER_SURFACE, "patches_v")
-RATIONAL = place_of(BEZIER_SURFACE, "rational")
-BREAKS_U = place_of(BEZIER_SURFACE, "breaks_u")
-BREAKS_V = place_of(BEZIER_SURFACE, "breaks_v")
 PATCH_RECORD = size_of(BEZIER_SURFACE)
 # A patch, its doubles. Behind them stand rows of (w x, w y, w z, w), then positions where weights differ.
 PATCH_NODE = record_dtype(
@@ -63,8 +61,6 @@ PATCH_NODE = record_dtype(
     high_v=1,
 )
 patch_node_at = record_view(PATCH_NODE)
-BOX_CENTER = place_of(PATCH_NODE, "box_center")
-BOX_HALF = place_of(PATCH_NODE, "box_half")
 A0 = place_of(PATCH_NODE, "a0")
 JU = place_of(PATCH_NODE, "ju")
 KUU = place_of(PATCH_NODE, "kuu")
@@ -72,11 +68,9 @@ E0 = place_of(PATCH_NODE, "e0")
 E1 = place_of(PATCH_NODE, "e1")
 E2 = place_of(PATCH_NODE, "e2")
 SPEED_U = place_of(PATCH_NODE, "speed_u")
-AWAY = place_of(PATCH_NODE, "away")
 LOW_U = place_of(PATCH_NODE, "low_u")
 HIGH_U = place_of(PATCH_NODE, "high_u")
 LOW_V = place_of(PATCH_NODE, "low_v")
-HIGH_V = place_of(PATCH_NODE, "high_v")
 ROWS = size_of(PATCH_NODE)
 # The same patch, its integers.
 PATCH_NODE_LINKS = record_dtype(
@@ -86,10 +80,11 @@ PATCH_NODE_LINKS = record_dtype(
     depth=1,  # halvings
 )
 patch_node_links_at = record_view(PATCH_NODE_LINKS)
-DEPTH = place_of(PATCH_NODE_LINKS, "depth")
 NODE_INTS = size_of(PATCH_NODE_LINKS)
 # Halvings after which a node is let go.
 DEEPEST = 60
+# A patch, or a piece of a curve in the place of one, that is compared: its node is at nodes[at]; free: its parameters.
+Patch = namedtuple("Patch", "record nodes at free")
 
 
 @kernel(inline=True)
@@ -106,18 +101,29 @@ def patch_positions(record, o):
     return o + ROWS + 4 * (patch.degree_u + 1) * (patch.degree_v + 1) * patch.rational
 
 
+@kernel(inline=True)
+def patch_node_of(tree, k):
+    """The doubles of node k."""
+    return patch_node_at(tree.nodes, patch_stride(tree.record) * k)
+
+
+@kernel(inline=True)
+def patch_links_of(tree, k):
+    """The integers of node k."""
+    return patch_node_links_at(tree.ints, NODE_INTS * k)
+
+
 @kernel(inner=True, exact=True)
-def fill_patch(record, pool, ints, nodes, k):
+def fill_patch(tree, k):
     """Node k for the patch k."""
-    patch = bezier_surface_at(record, 0)
-    links = patch_node_links_at(ints, NODE_INTS * k)
+    patch = bezier_surface_at(tree.record, 0)
+    links = patch_links_of(tree, k)
     count = 4 * (patch.degree_u + 1) * (patch.degree_v + 1)
-    o = patch_stride(record) * k
-    node = patch_node_at(nodes, o)
-    rows = o + ROWS
+    node = patch_node_of(tree, k)
+    rows = patch_stride(tree.record) * k + ROWS
     for j in range(count):
-        nodes[rows + j] = pool[patch.nets + count * k + j]
-    node.away = bezier_head_at(pool, 0).error
+        tree.nodes[rows + j] = tree.pool[patch.nets + count * k + j]
+    node.away = bezier_head_at(tree.pool, 0).error
     node.low_u = 0.0
     node.high_u = 1.0
     node.low_v = 0.0
@@ -128,22 +134,22 @@ def fill_patch(record, pool, ints, nodes, k):
 
 
 @kernel(inner=True, exact=True)
-def split_patch(record, pool, ints, nodes, k, low):
+def split_patch(tree, k, low):
     """Make the halves of node k, across its longer direction, as nodes low and low + 1, not described yet."""
-    patch = bezier_surface_at(record, 0)
-    links = patch_node_links_at(ints, NODE_INTS * k)
+    nodes = tree.nodes
+    patch = bezier_surface_at(tree.record, 0)
+    links = patch_links_of(tree, k)
     p = patch.degree_u
     q = patch.degree_v
-    stride = patch_stride(record)
+    stride = patch_stride(tree.record)
     o = stride * k
     node = patch_node_at(nodes, o)
     a = stride * low
     b = a + stride
     links.halves = low
     for j in range(low, low + 2):
-        patch_node_links_at(ints, NODE_INTS * j).halves = -1
-        patch_node_links_at(ints, NODE_INTS * j).patch = links.patch
-        patch_node_links_at(ints, NODE_INTS * j).depth = links.depth + 1
+        half = patch_links_of(tree, j)
+        half.halves, half.patch, half.depth = -1, links.patch, links.depth + 1
     for j in range(A0, ROWS):
         nodes[a + j] = nodes[o + j]
         nodes[b + j] = nodes[o + j]
@@ -168,7 +174,7 @@ def split_patch(record, pool, ints, nodes, k, low):
     middle = 0.5 * (nodes[o + side] + nodes[o + side + 1])
     nodes[a + side + 1] = middle
     nodes[b + side] = middle
-    away = node.away + (2.0 + 2.0 * patch.rational) * n * UNIT * bezier_head_at(pool, 0).reach
+    away = node.away + (2.0 + 2.0 * patch.rational) * n * UNIT * bezier_head_at(tree.pool, 0).reach
     patch_node_at(nodes, a).away = away
     patch_node_at(nodes, b).away = away
 
@@ -207,41 +213,51 @@ def falling(n, k):
     return value
 
 
-@kernel(inner=True, exact=True)
-def describe_patch(record, pool, nodes, o, m):
-    """Box and model of a patch from its rows; m (32) is for work."""
-    head = bezier_head_at(pool, 0)
-    node = patch_node_at(nodes, o)
+@kernel(inline=True, exact=True)
+def project_net(record, nodes, o):
+    """Write positions where weights differ. The least weight and the largest."""
     patch = bezier_surface_at(record, 0)
-    p = patch.degree_u
-    q = patch.degree_v
-    rational = patch.rational == 1
     at = patch_positions(record, o)
-    count = (p + 1) * (q + 1)
     least = math.inf
     heaviest = 0.0
-    for i in range(count):
+    for i in range((patch.degree_u + 1) * (patch.degree_v + 1)):
         s = o + ROWS + 4 * i
         w = nodes[s + 3]
         least = min(least, w)
         heaviest = max(heaviest, w)
-        if rational:
+        if patch.rational == 1:
             for j in range(3):
                 nodes[at + 4 * i + j] = nodes[s + j] / w
             nodes[at + 4 * i + 3] = w
+    return least, heaviest
+
+
+@kernel(inline=True, exact=True)
+def box_net(record, nodes, o, slack):
+    """Write the box of the positions."""
+    patch = bezier_surface_at(record, 0)
+    node = patch_node_at(nodes, o)
+    at = patch_positions(record, o)
     for j in range(3):
         low = math.inf
         high = -math.inf
-        for i in range(count):
+        for i in range((patch.degree_u + 1) * (patch.degree_v + 1)):
             low = min(low, nodes[at + 4 * i + j])
             high = max(high, nodes[at + 4 * i + j])
         node.box_center[j] = 0.5 * (low + high)
-        node.box_half[j] = 0.5 * (high - low) + 8.0 * UNIT * head.reach
-    center = (nodes[o], nodes[o + 1], nodes[o + 2])
-    r = length((nodes[o + 3], nodes[o + 4], nodes[o + 5]))
-    ratio = heaviest / least
-    grow = 1.0 + 1e-12
-    # Bounds of derivatives: m[4 k + l], those of w behind.
+        node.box_half[j] = 0.5 * (high - low) + slack
+
+
+@kernel(inline=True, exact=True)
+def derivative_bounds(record, nodes, o, least, ratio, m):
+    """Bounds of derivatives of a patch to m[4 k + l], those of w behind."""
+    patch = bezier_surface_at(record, 0)
+    node = patch_node_at(nodes, o)
+    p = patch.degree_u
+    q = patch.degree_v
+    rational = patch.rational == 1
+    center = (node.box_center[0], node.box_center[1], node.box_center[2])
+    r = length(node.box_half)
     m[0] = r
     for k in range(4):
         for l in range(4 - k):
@@ -252,7 +268,7 @@ def describe_patch(record, pool, nodes, o, m):
             m[16 + i] = 0.0
             scale = falling(p, k) * falling(q, l)
             if k <= p and l <= q:
-                x, w = largest_difference(nodes, at, p, q, k, l, center)
+                x, w = largest_difference(nodes, patch_positions(record, o), p, q, k, l, center)
                 m[i] = scale * (x / least + 64.0 * UNIT * ratio * r)
                 m[16 + i] = scale * (w / least + 64.0 * UNIT * ratio) if rational else 0.0
             if rational:
@@ -260,8 +276,17 @@ def describe_patch(record, pool, nodes, o, m):
                     for b in range(l + 1):
                         if a < k or b < l:
                             m[i] += binomial(k, a) * binomial(l, b) * m[16 + 4 * (k - a) + l - b] * m[4 * a + b]
-            m[i] *= grow
-    # The middle: value and derivatives of X and w.
+            m[i] *= 1.0 + 1e-12
+
+
+@kernel(inline=True, exact=True)
+def write_middle(record, pool, nodes, o):
+    """A0, J and K of a patch from value and derivatives of X and w in its middle."""
+    patch = bezier_surface_at(record, 0)
+    node = patch_node_at(nodes, o)
+    p = patch.degree_u
+    q = patch.degree_v
+    center = node.box_center
     v = (0.0, 0.0, 0.0, 0.0)
     du = v
     dv = v
@@ -270,9 +295,9 @@ def describe_patch(record, pool, nodes, o, m):
     vv = v
     mu = patch.middle_u
     mv = patch.middle_v
+    s = patch_positions(record, o)
     for i in range(p + 1):
         for j in range(q + 1):
-            s = at + 4 * ((q + 1) * i + j)
             w = nodes[s + 3]
             row = (w * (nodes[s] - center[0]), w * (nodes[s + 1] - center[1]), w * (nodes[s + 2] - center[2]), w)
             a0 = pool[mu + i]
@@ -287,6 +312,7 @@ def describe_patch(record, pool, nodes, o, m):
             uu = plus(uu, a2 * b0, row)
             uv = plus(uv, a1 * b1, row)
             vv = plus(vv, a0 * b2, row)
+            s += 4
     w = 1.0 / v[3]
     for j in range(3):
         c = w * v[j]
@@ -298,15 +324,26 @@ def describe_patch(record, pool, nodes, o, m):
         node.kuu[j] = w * (uu[j] - 2.0 * du[3] * cu - uu[3] * c)
         node.kuu[3 + j] = w * (uv[j] - du[3] * cv - dv[3] * cu - uv[3] * c)
         node.kuu[6 + j] = w * (vv[j] - 2.0 * dv[3] * cv - vv[3] * c)
-    n = p + q + 1.0
-    u = 8.0 * (n + 8.0) * UNIT * r * ratio
-    e0 = u + 4.0 * UNIT * head.reach
+
+
+@kernel(inner=True, exact=True)
+def describe_patch(record, pool, nodes, o, m):
+    """Box and model of a patch from its rows; m (32) is for work."""
+    node = patch_node_at(nodes, o)
+    patch = bezier_surface_at(record, 0)
+    reach = bezier_head_at(pool, 0).reach
+    least, heaviest = project_net(record, nodes, o)
+    ratio = heaviest / least
+    box_net(record, nodes, o, 8.0 * UNIT * reach)
+    derivative_bounds(record, nodes, o, least, ratio, m)
+    write_middle(record, pool, nodes, o)
+    n = patch.degree_u + patch.degree_v + 1.0
+    u = 8.0 * (n + 8.0) * UNIT * m[0] * ratio
+    e0 = u + 4.0 * UNIT * reach
     e1 = 8.0 * n * u * ratio
     e2 = 64.0 * n * n * u * ratio * ratio
-    m30 = m[12]
-    m21 = m[9]
-    m12 = m[6]
-    m03 = m[3]
+    grow = 1.0 + 1e-12
+    m30, m21, m12, m03 = m[12], m[9], m[6], m[3]
     node.e0 = (m30 + 3.0 * m21 + 3.0 * m12 + m03) / 48.0 * grow + e0 + e1 + 0.5 * e2
     node.e1 = 0.125 * max(m30 + 2.0 * m21 + m12, m21 + 2.0 * m12 + m03) * grow + e1 + e2
     node.e2 = 0.5 * max(m30 + m21, m21 + m12, m12 + m03) * grow + e2

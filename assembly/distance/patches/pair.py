@@ -56,17 +56,21 @@ D = place_of(PATCH_WORK, "d")
 J = place_of(PATCH_WORK, "j")
 K = place_of(PATCH_WORK, "k")
 H = place_of(PATCH_WORK, "h")
-G = place_of(PATCH_WORK, "g")
 Z = place_of(PATCH_WORK, "z")
 PLACE = place_of(PATCH_WORK, "place")
 STEP = place_of(PATCH_WORK, "step")
-FACTOR = place_of(PATCH_WORK, "factor")
 PATCH_J = place_of(PATCH_WORK, "patch_j")
 PATCH_K = place_of(PATCH_WORK, "patch_k")
 OFF = place_of(PATCH_WORK, "off")
 BASIS = size_of(PATCH_WORK)
 MARGIN = 0.05
 _SWEEPS = 12
+
+
+@kernel(inline=True)
+def node_of(patch):
+    """The doubles of a patch."""
+    return patch_node_at(patch.nodes, patch.at)
 
 
 @kernel(inline=True)
@@ -98,20 +102,13 @@ def load_side(source, first, second, sign, n, at, w):
                 work.k[3 * (4 * (at + i) + at + j) + c] = sign * source[second + 3 * (i + j) + c]
 
 
-@kernel(inner=True)
-def clear_bends(w):
-    """Zeros for K of parameters of different shapes."""
-    for i in range(48):
-        patch_work_at(w, 0).k[i] = 0.0
-
-
 @kernel(inner=True, exact=True)
-def load_models(a, o, na, b, p, nb, shift, w):
-    """D, J and K at the middles of two patches with na and nb parameters."""
+def load_models(a, b, shift, w):
+    """D, J and K at the middles of two patches."""
     for j in range(3):
-        patch_work_at(w, 0).d[j] = (patch_node_at(a, o).a0[j] - patch_node_at(b, p).a0[j]) - shift[j]
-    load_side(a, o + JU, o + KUU, 1.0, na, 0, w)
-    load_side(b, p + JU, p + KUU, -1.0, nb, na, w)
+        patch_work_at(w, 0).d[j] = (node_of(a).a0[j] - node_of(b).a0[j]) - shift[j]
+    load_side(a.nodes, a.at + JU, a.at + KUU, 1.0, a.free, 0, w)
+    load_side(b.nodes, b.at + JU, b.at + KUU, -1.0, b.free, a.free, w)
 
 
 @kernel(inner=True, exact=True)
@@ -152,17 +149,16 @@ def factorize(w, n, scaled, shift):
 
 
 @kernel(inner=True, exact=True)
-def patch_box_bound(a, o, b, p, shift, slack):
+def patch_box_bound(a, b, shift, slack):
     """Distance of two boxes, the second moved by the shift."""
-    node = patch_node_at(a, o)
-    node_record = patch_node_at(b, p)
+    node_a, node_b = node_of(a), node_of(b)
     total = 0.0
     for j in range(3):
-        gap = abs((node.box_center[j] - node_record.box_center[j]) - shift[j])
-        gap -= node.box_half[j] + node_record.box_half[j] + 2.0 * slack
+        gap = abs((node_a.box_center[j] - node_b.box_center[j]) - shift[j])
+        gap -= node_a.box_half[j] + node_b.box_half[j] + 2.0 * slack
         if gap > 0.0:
             total += gap * gap
-    return math.sqrt(total) * (1.0 - 8.0 * UNIT) - node.away - node_record.away
+    return math.sqrt(total) * (1.0 - 8.0 * UNIT) - node_a.away - node_b.away
 
 
 @kernel(inline=True)
@@ -176,11 +172,11 @@ def slope_at(w, n, i, raised):
 
 
 @kernel(inner=True, exact=True)
-def patch_model_bound(a, o, b, p, slack, n, w):
+def patch_model_bound(a, b, slack, w):
     """The bound of the quadratic models that `load_models` and `load_hessian` left; Z is near its place."""
     work = patch_work_at(w, 0)
-    node = patch_node_at(a, o)
-    node_record = patch_node_at(b, p)
+    node_a, node_b = node_of(a), node_of(b)
+    n = a.free + b.free
     c = vector_dot(w, D, D)
     raised = 0.0
     size = c
@@ -217,20 +213,31 @@ def patch_model_bound(a, o, b, p, slack, n, w):
         least += (slope + work.g[i]) * work.z[i] - 2.0 * slope * work.z[i] - abs(slope) - 0.25 * raised
     least -= 0.125 * cubic * (1.0 + 1e-12) + 512.0 * UNIT * size
     root = math.sqrt(least) * (1.0 - 8.0 * UNIT) if least > 0.0 else 0.0
-    away = node.away + node_record.away + node.e0 + node_record.e0 + slack
+    away = node_a.away + node_b.away + node_a.e0 + node_b.e0 + slack
     return root - away * (1.0 + 16.0 * UNIT)
 
 
+@kernel(inline=True, exact=True)
+def farthest(patch, x, y, z):
+    """The control point of a patch that is farthest along a direction: how far it is."""
+    surface = bezier_surface_at(patch.record, 0)
+    nodes = patch.nodes
+    most = -math.inf
+    i = patch_positions(patch.record, patch.at)
+    for _ in range((surface.degree_u + 1) * (surface.degree_v + 1)):
+        most = max(most, x * nodes[i] + y * nodes[i + 1] + z * nodes[i + 2])
+        i += 4
+    return most
+
+
 @kernel(inner=True, exact=True)
-def patch_hull_bound(ra, a, o, rb, b, p, shift, slack, n, w):
+def patch_hull_bound(a, b, shift, slack, w):
     """The bound of the control points in the direction between the points of the models at z, without bends."""
     work = patch_work_at(w, 0)
-    patch = bezier_surface_at(ra, 0)
-    patch_record = bezier_surface_at(rb, 0)
     n0 = work.d[0]
     n1 = work.d[1]
     n2 = work.d[2]
-    for i in range(n):
+    for i in range(a.free + b.free):
         n0 += work.z[i] * work.j[3 * i]
         n1 += work.z[i] * work.j[3 * i + 1]
         n2 += work.z[i] * work.j[3 * i + 2]
@@ -241,26 +248,18 @@ def patch_hull_bound(ra, a, o, rb, b, p, shift, slack, n, w):
     n0 *= size
     n1 *= size
     n2 *= size
-    low = math.inf
-    i = patch_positions(ra, o)
-    for _ in range((patch.degree_u + 1) * (patch.degree_v + 1)):
-        low = min(low, n0 * a[i] + n1 * a[i + 1] + n2 * a[i + 2])
-        i += 4
-    high = -math.inf
-    i = patch_positions(rb, p)
-    for _ in range((patch_record.degree_u + 1) * (patch_record.degree_v + 1)):
-        high = max(high, n0 * b[i] + n1 * b[i + 1] + n2 * b[i + 2])
-        i += 4
+    low = -farthest(a, -n0, -n1, -n2)
+    high = farthest(b, n0, n1, n2)
     gap = (low - high) - (n0 * shift[0] + n1 * shift[1] + n2 * shift[2])
-    return gap * (1.0 - 16.0 * UNIT) - 4.0 * slack - patch_node_at(a, o).away - patch_node_at(b, p).away
+    return gap * (1.0 - 16.0 * UNIT) - 4.0 * slack - node_of(a).away - node_of(b).away
 
 
 @kernel(inner=True, exact=True)
-def patch_convexity(a, o, na, b, p, n, w):
+def patch_convexity(a, b, w):
     """Whether F is proven convex on the box, its Hessian at least MARGIN diag(H) there; uses `load_hessian`'s H."""
     work = patch_work_at(w, 0)
-    node = patch_node_at(a, o)
-    node_record = patch_node_at(b, p)
+    node_a, node_b = node_of(a), node_of(b)
+    na, n = a.free, a.free + b.free
     far = size_at(w, D)
     total = 0.0
     for i in range(n):
@@ -273,16 +272,16 @@ def patch_convexity(a, o, na, b, p, n, w):
             row += size_at(w, K + 3 * (4 * i + j))
         work.step[i] = 0.5 * row
         total += row
-    e0 = node.e0 + node_record.e0 + node.away + node_record.away
+    e0 = node_a.e0 + node_b.e0 + node_a.away + node_b.away
     far += 0.125 * total + e0
     rho = 0.0
     for i in range(n):
         row = 0.0
-        e1 = node.e1 if i < na else node_record.e1
-        e2 = node.e2 if i < na else node_record.e2
+        e1 = node_a.e1 if i < na else node_b.e1
+        e2 = node_a.e2 if i < na else node_b.e2
         ji = size_at(w, J + 3 * i) + work.step[i]
         for j in range(n):
-            f1 = node.e1 if j < na else node_record.e1
+            f1 = node_a.e1 if j < na else node_b.e1
             v = 0.0
             for l in range(n):
                 turn = vector_dot(w, J + 3 * i, K + 3 * (4 * j + l)) + vector_dot(w, J + 3 * j, K + 3 * (4 * i + l))

@@ -7,13 +7,16 @@ The curve may be given by a formula: its pieces are `distance/patches/formula_no
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
+from assembly._best_first import NO_PAIRS, Pairs, best_first
+from assembly._heap import PAIR, push
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
+from assembly.distance.curves.bounds import difference
 from assembly.distance.curves.nodes import length
-from assembly.distance.curves.search import CONVERGED, bound_to_beat, ended, in_span, longer, pop, push
 from assembly.distance.patches.formula_nodes import (
     describe_formula,
     formula_parameter,
@@ -25,27 +28,41 @@ from assembly.distance.patches.newton import load_points, nearest_in_patches, pr
 from assembly.distance.patches.nodes import (
     DEEPEST,
     NODE_INTS,
+    Patch,
     bezier_surface_at,
     describe_patch,
     fill_patch,
-    patch_node_at,
-    patch_node_links_at,
+    patch_links_of,
+    patch_node_of,
     patch_stride,
     split_patch,
 )
 from assembly.distance.patches.pair import (
     BASIS,
     D,
-    clear_bends,
     free_count,
     load_hessian,
     load_models,
+    node_of,
     patch_box_bound,
     patch_convexity,
     patch_hull_bound,
     patch_model_bound,
     patch_work_at,
     size_at,
+)
+from assembly.distance.piece_search import (
+    CROWDED,
+    STATE,
+    PieceTree,
+    Question,
+    bound_to_beat,
+    crowded,
+    ended,
+    in_span,
+    is_answered,
+    roomier,
+    search_state_at,
 )
 from assembly.geometry.splines.bezier_pieces import UNIT, bezier_head_at
 
@@ -60,13 +77,17 @@ PATCH_ANSWER_RECORD = record_dtype(
 )
 patch_answer_at = record_view(PATCH_ANSWER_RECORD)
 PATCH_ANSWER = size_of(PATCH_ANSWER_RECORD)
+# a, b: trees; curve: the one given by a formula that b stands for, or None; heap: pairs of nodes; state, out: blocks of
+# PIECE_SEARCH_STATE and PATCH_ANSWER_RECORD; shift: from the center of a to that of b; slack: of a difference of two
+# points; errors: of evaluated points and derivatives; step: bounds within this of each other are one; w, m: for work.
+PatchSearch = namedtuple("PatchSearch", "a b curve heap state out question shift slack errors step w m")
 _ROOM = 512
 
 
 @kernel(inline=True)
-def patch_size(nodes, o):
+def patch_size(tree, k):
     """The longer side of a patch."""
-    node = patch_node_at(nodes, o)
+    node = patch_node_of(tree, k)
     return max(node.speed_u, node.speed_v)
 
 
@@ -87,235 +108,246 @@ def derivative_error(record, pool):
     return 8.0 * n * (4.0 * n + 16.0) * UNIT * head.reach * head.weight_ratio ** (2 * patch.rational)
 
 
-@kernel(inner=True)
-def keep_patch_points(ra, qa, ia, a, ka, rb, qb, ib, b, kb, na, nb, curve, w, u, v, upper, out):
-    """Write nearest points that are known: u and v at PLACE of two nodes."""
-    work = patch_work_at(w, 0)
-    patch_record = bezier_surface_at(ra, 0)
-    patch_0 = bezier_surface_at(rb, 0)
-    answer = patch_answer_at(out, 0)
-    o = patch_node_at(a, patch_stride(ra) * ka)
-    p = patch_stride(rb) * kb
-    node = patch_node_at(b, p)
-    patch = patch_node_links_at(ia, NODE_INTS * ka).patch
-    answer.parameters[0] = between(
-        qa, patch_record.breaks_u + patch // patch_record.patches_v, o.low_u, o.high_u, work.place[0]
-    )
-    answer.parameters[1] = between(
-        qa, patch_record.breaks_v + patch % patch_record.patches_v, o.low_v, o.high_v, work.place[1] if na > 1 else 0.0
-    )
-    patch = patch_node_links_at(ib, NODE_INTS * kb).patch
-    x = work.place[na] if nb > 0 else 0.0
-    y = work.place[na + 1] if nb > 1 else 0.0
-    if curve is None:
-        answer.parameters[2] = between(qb, patch_0.breaks_u + patch // patch_0.patches_v, node.low_u, node.high_u, x)
-        answer.parameters[3] = between(qb, patch_0.breaks_v + patch % patch_0.patches_v, node.low_v, node.high_v, y)
-    else:
-        answer.parameters[2] = formula_parameter(b, p, x)
-    answer.upper = upper
-    for j in range(3):
-        answer.points[j] = u[j] + bezier_head_at(qa, 0).center[j]
-        answer.points[3 + j] = v[j] + bezier_head_at(qb, 0).center[j]
-
-
 @kernel(inline=True)
 def between(pool, at, low, high, x):
     """The parameter of a place on a node of one direction."""
     return in_span(pool, at, low + x * (high - low))
 
 
+@kernel(inline=True)
+def parameters_at(curve, tree, k, x, y):
+    """The parameters of a shape at a place of a node."""
+    if curve is not None:
+        return formula_parameter(tree.nodes, patch_stride(tree.record) * k, x), 0.0
+    node = patch_node_of(tree, k)
+    surface = bezier_surface_at(tree.record, 0)
+    patch = patch_links_of(tree, k).patch
+    u = between(tree.pool, surface.breaks_u + patch // surface.patches_v, node.low_u, node.high_u, x)
+    return u, between(tree.pool, surface.breaks_v + patch % surface.patches_v, node.low_v, node.high_v, y)
+
+
+@kernel(inline=True)
+def freedom(curve, tree, k):
+    """How many parameters a node has; one that counts as a point has none."""
+    if curve is not None:
+        return 0 if is_dot(tree.nodes, patch_stride(tree.record) * k) else 1
+    return free_count(tree.record)
+
+
+@kernel(inline=True)
+def remainder(curve, patch):
+    """How far a piece may be from its rows: those of a formula are its model's, which is not the curve."""
+    return 0.0 if curve is None else node_of(patch).e0
+
+
+@kernel(inner=True)
+def first_half(curve, tree, k, used, short, m):
+    """The first half of node k, made as node `used` if need be; how many nodes there are then.
+
+    A piece of a formula below the radius `short` counts as a point.
+    """
+    half = patch_links_of(tree, k).halves
+    if half >= 0:
+        return half, used
+    stride = patch_stride(tree.record)
+    if curve is None:
+        split_patch(tree, k, used)
+    else:
+        split_formula(tree, k, used)
+    for j in range(used, used + 2):
+        if curve is None:
+            describe_patch(tree.record, tree.pool, tree.nodes, stride * j, m)
+        else:
+            describe_formula(curve, short, tree.nodes, stride * j, m)
+    return used, used + 2
+
+
+@kernel(inline=True)
+def compared(search, i, j):
+    """A node of each shape."""
+    a, b = search.a, search.b
+    first = Patch(a.record, a.nodes, patch_stride(a.record) * i, free_count(a.record))
+    return first, Patch(b.record, b.nodes, patch_stride(b.record) * j, freedom(search.curve, b, j))
+
+
+@kernel(inner=True)
+def keep_nearer(search, i, j, found):
+    """Keep nearest points that are known: at PLACE of two nodes."""
+    place = patch_work_at(search.w, 0).place
+    answer = patch_answer_at(search.out, 0)
+    answer.upper = found.upper
+    search_state_at(search.state, 0).limit = bound_to_beat(search.question, found.upper, search.step)
+    a, b = compared(search, i, j)
+    y = place[1] if a.free > 1 else 0.0
+    answer.parameters[0], answer.parameters[1] = parameters_at(None, search.a, i, place[0], y)
+    x = place[a.free] if b.free > 0 else 0.0
+    y = place[a.free + 1] if b.free > 1 else 0.0
+    answer.parameters[2], answer.parameters[3] = parameters_at(search.curve, search.b, j, x, y)
+    for k in range(3):
+        answer.points[k] = found.on_a[k] + bezier_head_at(search.a.pool, 0).center[k]
+        answer.points[3 + k] = found.on_b[k] + bezier_head_at(search.b.pool, 0).center[k]
+
+
+@kernel(inline=True)
+def pair_bound(search, i, j):
+    """Lower bound of the distance of two nodes."""
+    a, b = compared(search, i, j)
+    w, shift, slack = search.w, search.shift, search.slack
+    limit = search_state_at(search.state, 0).limit
+    patch_answer_at(search.out, 0).count += 1.0
+    bound = patch_box_bound(a, b, shift, slack)
+    if bound < limit:
+        load_models(a, b, shift, w)
+        load_hessian(w, a.free + b.free)
+        bound = max(bound, patch_model_bound(a, b, slack, w))
+        if bound < limit:
+            bound = max(bound, patch_hull_bound(a, b, shift, slack, w) - remainder(search.curve, b))
+    return bound, 0.0
+
+
+@kernel(inline=True)
+def search_ended(search, top, left):
+    """What the search ends with; -1: not yet."""
+    answer = patch_answer_at(search.out, 0)
+    answer.lower = max(min(top, answer.upper), 0.0)
+    status = ended(search.question, answer.upper, search.step, top, left, answer.count)
+    return CROWDED if status < 0 and crowded(search, left, NODE_INTS) else status
+
+
+@kernel(inline=True)
+def examine(search, key, i, j):
+    """Nearest points of two nodes by their models and Newton's method: their bound, and whether that is final."""
+    a, b = compared(search, i, j)
+    n = a.free + b.free
+    w, curve, shift, error = search.w, search.curve, search.shift, search.errors[0]
+    work = patch_work_at(w, 0)
+    answer = patch_answer_at(search.out, 0)
+    away = node_of(a).away + node_of(b).away
+    load_models(a, b, shift, w)
+    load_hessian(w, n)
+    key = max(key, patch_model_bound(a, b, search.slack, w))
+    for k in range(n):
+        work.place[k] = work.z[k] + 0.5
+    proven = search.question.polish and patch_convexity(a, b, w)
+    for k in range(n):
+        work.z[k] = work.h[5 * k]
+    descend = proven
+    if search.question.polish and not proven:
+        load_points(a, b, curve, shift, w)
+        descend = size_at(w, D) + error + away < answer.upper
+    if descend:
+        nearest_in_patches(a, b, curve, shift, w)
+    found = proven_in_patches(a, b, curve, shift, search.errors, proven, w)
+    if found.upper < answer.upper:
+        keep_nearer(search, i, j, found)
+    if proven:
+        # A dot's point stands for others: no patch, however small, comes nearer to the truth than that.
+        doubt = 2.0 * remainder(curve, b) if b.free == 0 else 0.0
+        key = max(key, found.lower - doubt)
+        if found.upper - found.lower <= max(search.step, 16.0 * (error + away)) + doubt:
+            return key, True
+    return key, is_answered(search.question, answer.upper, search.step, key)
+
+
+@kernel(inline=True)
+def branch(search, key, i, j):
+    """A bound of a pair, and the halves of its longer node with the other one; none where it is let go."""
+    a, b = search.a, search.b
+    state = search_state_at(search.state, 0)
+    key, final = examine(search, key, i, j)
+    if final:
+        return key, NO_PAIRS
+    long_a, long_b = patch_size(a, i), patch_size(b, j)
+    ends_a = patch_links_of(a, i).depth >= DEEPEST
+    ends_b = patch_links_of(b, j).depth >= DEEPEST
+    if max(long_a, long_b) <= search.step or (ends_a and ends_b):
+        return key, NO_PAIRS
+    short = 0.125 * search.step
+    if ends_b or (long_a >= long_b and not ends_a):
+        half, used = first_half(None, a, i, int(state.used_a), short, search.m)
+        state.used_a = used
+        return key, Pairs(half, half + 2, j, j + 1)
+    half, used = first_half(search.curve, b, j, int(state.used_b), short, search.m)
+    state.used_b = used
+    return key, Pairs(i, i + 1, half, half + 2)
+
+
+advance = kernel(inner=True)(best_first(search_state_at, pair_bound, search_ended, branch))
+
+
+@kernel(inline=True, allocates=True)
+def new_tree(curve, record, pool, short, m):
+    """A packed shape with its patches as nodes."""
+    surface = bezier_surface_at(record, 0)
+    count = surface.patches_u * surface.patches_v
+    ints, nodes = np.empty((count + _ROOM) * NODE_INTS, np.int64), np.empty((count + _ROOM) * patch_stride(record))
+    tree = PieceTree(record, pool, ints, nodes)
+    for k in range(count):
+        if curve is None:
+            fill_patch(tree, k)
+            describe_patch(record, pool, nodes, patch_stride(record) * k, m)
+        else:
+            start_formula(curve, tree)
+            describe_formula(curve, short, nodes, 0, m)
+    return tree, count
+
+
+@kernel(inner=True)
+def start_pairs(search):
+    """All pairs of patches, by their boxes: these must do where there are many. How many wait."""
+    state = search_state_at(search.state, 0)
+    # The first corners are on both shapes.
+    a, b = compared(search, 0, 0)
+    found = proven_in_patches(a, b, search.curve, search.shift, search.errors, False, search.w)
+    keep_nearer(search, 0, 0, found)
+    left = 0
+    for i in range(int(state.used_a)):
+        for j in range(int(state.used_b)):
+            a, b = compared(search, i, j)
+            bound = max(patch_box_bound(a, b, search.shift, search.slack), 0.0)
+            if bound < state.limit:
+                push(search.heap, left, bound, 0.0, i, j)
+                left += 1
+            else:
+                state.let_go = min(state.let_go, bound)
+    patch_answer_at(search.out, 0).count = state.used_a * state.used_b
+    return left
+
+
 @kernel(
     signatures=(
-        "(i8[::1], f8[::1], i8[::1], f8[::1], Tuple((i8[::1], f8[::1], f8[::1])), f8, f8, i8, b1, f8[::1])",
-        "(i8[::1], f8[::1], i8[::1], f8[::1], none, f8, f8, i8, b1, f8[::1])",
+        "(i8[::1], f8[::1], i8[::1], f8[::1], Tuple((i8[::1], f8[::1], f8[::1])), Tuple((f8, f8, i8, b1)), f8[::1])",
+        "(i8[::1], f8[::1], i8[::1], f8[::1], none, Tuple((f8, f8, i8, b1)), f8[::1])",
     ),
     allocates=True,
 )
-def patch_distance(ra, qa, rb, qb, curve, tolerance, clearance, budget, polish, out):
+def patch_distance(ra, qa, rb, qb, curve, asked, out):
     """Bounds of the distance of two packed shapes, the first no point; a clearance below zero asks for the distance.
 
     The second may stand for a curve given by a formula, which is None else.
     """
-    head = bezier_head_at(qb, 0)
-    pool_head = bezier_head_at(qa, 0)
-    patch = bezier_surface_at(ra, 0)
-    patch_record = bezier_surface_at(rb, 0)
-    answer = patch_answer_at(out, 0)
-    shift = (
-        head.center[0] - pool_head.center[0],
-        head.center[1] - pool_head.center[1],
-        head.center[2] - pool_head.center[2],
-    )
-    slack = 8.0 * UNIT * (pool_head.reach + head.reach + length(shift)) + 1e-150
+    question = Question(*asked)
+    head, other = bezier_head_at(qa, 0), bezier_head_at(qb, 0)
+    shift = difference(other.center, head.center, (0.0, 0.0, 0.0))
+    slack = 8.0 * UNIT * (head.reach + other.reach + length(shift)) + 1e-150
     error = slack + point_error(ra, qa) + point_error(rb, qb)
-    rough = max(derivative_error(ra, qa), derivative_error(rb, qb))
-    step = max(0.999 * tolerance, 8.0 * (error + pool_head.error + head.error))
-    na = free_count(ra)
-    nb = free_count(rb)
-    n = na + nb
-    sa = patch_stride(ra)
-    sb = patch_stride(rb)
-    used_a = patch.patches_u * patch.patches_v
-    used_b = patch_record.patches_u * patch_record.patches_v
-    room_a = used_a + _ROOM
-    room_b = used_b + _ROOM
-    room = used_a * used_b + _ROOM
-    a = np.empty(room_a * sa)
-    b = np.empty(room_b * sb)
-    ia = np.empty(room_a * NODE_INTS, np.int64)
-    ib = np.empty(room_b * NODE_INTS, np.int64)
-    keys = np.empty(room)
-    first = np.empty(room, np.int64)
-    second = np.empty(room, np.int64)
-    degree = max(max(patch.degree_u, patch.degree_v), max(patch_record.degree_u, patch_record.degree_v))
-    w = np.empty(BASIS + 6 * (degree + 1))
-    work = patch_work_at(w, 0)
+    errors = (error, max(derivative_error(ra, qa), derivative_error(rb, qb)))
+    step = max(0.999 * question.tolerance, 8.0 * (error + head.error + other.error))
     m = np.empty(42)
-    clear_bends(w)
-    for k in range(used_a):
-        fill_patch(ra, qa, ia, a, k)
-    if curve is None:
-        for k in range(used_b):
-            fill_patch(rb, qb, ib, b, k)
-    else:
-        start_formula(curve, rb, ib, b)
-    count = 0
-    # The first corners, which are on both shapes.
-    for i in range(4):
-        work.place[i] = 0.0
-    _low, upper, u, v = proven_in_patches(ra, a, 0, na, rb, b, 0, nb, curve, shift, error, rough, False, w)
-    keep_patch_points(ra, qa, ia, a, 0, rb, qb, ib, b, 0, na, nb, curve, w, u, v, upper, out)
-    at_start = True
-    let_go = math.inf
-    bounded = 0
-    status = CONVERGED
-    key = 0.0
-    # Nodes from new_a and new_b on are to be described; then pairs first_a..last_a with first_b..last_b bounded.
-    new_a = 0
-    new_b = 0
-    first_a = 0
-    last_a = used_a
-    first_b = 0
-    last_b = used_b
-    while True:
-        for k in range(new_a, used_a):
-            describe_patch(ra, qa, a, sa * k, m)
-        for k in range(new_b, used_b):
-            if curve is None:
-                describe_patch(rb, qb, b, sb * k, m)
-            else:
-                describe_formula(curve, 0.125 * step, b, sb * k, m)
-        new_a = used_a
-        new_b = used_b
-        limit = bound_to_beat(upper, step, clearance)
-        for ja in range(first_a, last_a):
-            for jb in range(first_b, last_b):
-                bounded += 1
-                oa = sa * ja
-                ob = sb * jb
-                if curve is not None:
-                    nb = 0 if is_dot(b, ob) else 1
-                    n = na + nb
-                bound = max(key, patch_box_bound(a, oa, b, ob, shift, slack))
-                # At the start, where there are many, boxes must do.
-                if bound < limit and not at_start:
-                    load_models(a, oa, na, b, ob, nb, shift, w)
-                    load_hessian(w, n)
-                    bound = max(bound, patch_model_bound(a, oa, b, ob, slack, n, w))
-                    if bound < limit:
-                        # The rows of a formula are its model's, which is not the curve.
-                        rest = 0.0 if curve is None else patch_node_at(b, ob).e0
-                        bound = max(bound, patch_hull_bound(ra, a, oa, rb, b, ob, shift, slack, n, w) - rest)
-                if bound < limit:
-                    push(keys, first, second, count, bound, ja, jb)
-                    count += 1
-                else:
-                    let_go = min(let_go, bound)
-        first_a = last_a
-        at_start = False
-        top = min(keys[0], let_go) if count > 0 else let_go
-        status = ended(top, upper, step, clearance, count, bounded, budget)
-        if status >= 0:
-            break
-        key = keys[0]
-        ka = first[0]
-        kb = second[0]
-        pop(keys, first, second, count)
-        count -= 1
-        oa = sa * ka
-        ob = sb * kb
-        if curve is not None:
-            nb = 0 if is_dot(b, ob) else 1
-            n = na + nb
-        away = patch_node_at(a, oa).away + patch_node_at(b, ob).away
-        load_models(a, oa, na, b, ob, nb, shift, w)
-        load_hessian(w, n)
-        key = max(key, patch_model_bound(a, oa, b, ob, slack, n, w))
-        for i in range(n):
-            work.place[i] = work.z[i] + 0.5
-        proven = polish and patch_convexity(a, oa, na, b, ob, n, w)
-        for i in range(n):
-            work.z[i] = work.h[5 * i]
-        descend = proven
-        if polish and not proven:
-            load_points(ra, a, oa, na, rb, b, ob, nb, curve, shift, w)
-            descend = size_at(w, D) + error + away < upper
-        if descend:
-            nearest_in_patches(ra, a, oa, na, rb, b, ob, nb, curve, shift, w)
-        low, far, u, v = proven_in_patches(ra, a, oa, na, rb, b, ob, nb, curve, shift, error, rough, proven, w)
-        if far < upper:
-            upper = far
-            keep_patch_points(ra, qa, ia, a, ka, rb, qb, ib, b, kb, na, nb, curve, w, u, v, upper, out)
-        if proven:
-            # A dot's point stands for others: no patch, however small, comes nearer to the truth than that.
-            doubt = 2.0 * patch_node_at(b, ob).e0 if curve is not None and nb == 0 else 0.0
-            key = max(key, low - doubt)
-            if far - low <= max(step, 16.0 * (error + away)) + doubt:
-                let_go = min(let_go, key)
-                continue
-        if key >= upper - step or (key > clearance >= 0.0):
-            let_go = min(let_go, key)
-            continue
-        # Halve the longer one.
-        long_a = patch_size(a, oa)
-        long_b = patch_size(b, ob)
-        ends_a = patch_node_links_at(ia, NODE_INTS * ka).depth >= DEEPEST
-        ends_b = patch_node_links_at(ib, NODE_INTS * kb).depth >= DEEPEST
-        if max(long_a, long_b) <= step or (ends_a and ends_b):
-            let_go = min(let_go, key)
-            continue
-        first_a = ka
-        last_a = ka + 1
-        first_b = kb
-        last_b = kb + 1
-        if ends_b or (long_a >= long_b and not ends_a):
-            if patch_node_links_at(ia, NODE_INTS * ka).halves < 0:
-                if used_a + 2 > room_a:
-                    room_a *= 4
-                    a = longer(a, room_a * sa)
-                    ia = longer(ia, room_a * NODE_INTS)
-                split_patch(ra, qa, ia, a, ka, used_a)
-                used_a += 2
-            first_a = patch_node_links_at(ia, NODE_INTS * ka).halves
-            last_a = first_a + 2
-        else:
-            if patch_node_links_at(ib, NODE_INTS * kb).halves < 0:
-                if used_b + 2 > room_b:
-                    room_b *= 4
-                    b = longer(b, room_b * sb)
-                    ib = longer(ib, room_b * NODE_INTS)
-                if curve is None:
-                    split_patch(rb, qb, ib, b, kb, used_b)
-                else:
-                    split_formula(rb, ib, b, kb, used_b)
-                used_b += 2
-            first_b = patch_node_links_at(ib, NODE_INTS * kb).halves
-            last_b = first_b + 2
-        if count + 2 > room:
-            room *= 4
-            keys = longer(keys, room)
-            first = longer(first, room)
-            second = longer(second, room)
-    answer.lower = max(min(top, upper), 0.0)
-    answer.count = bounded
+    a, used_a = new_tree(None, ra, qa, 0.125 * step, m)
+    b, used_b = new_tree(curve, rb, qb, 0.125 * step, m)
+    first, second = bezier_surface_at(ra, 0), bezier_surface_at(rb, 0)
+    degree = max(max(first.degree_u, first.degree_v), max(second.degree_u, second.degree_v))
+    # K of parameters of different shapes stays zero.
+    w = np.zeros(BASIS + 6 * (degree + 1))
+    heap, block = np.empty((used_a * used_b + _ROOM) * PAIR), np.empty(STATE)
+    state = search_state_at(block, 0)
+    state.let_go, state.used_a, state.used_b = math.inf, used_a, used_b
+    search = PatchSearch(a, b, curve, heap, block, out, question, shift, slack, errors, step, w, m)
+    left = start_pairs(search)
+    status, left = advance(search, left, NO_PAIRS)
+    while status == CROWDED:
+        a, b, heap = roomier(search, left, NODE_INTS)
+        search = PatchSearch(a, b, curve, heap, block, out, question, shift, slack, errors, step, w, m)
+        status, left = advance(search, left, NO_PAIRS)
     return status

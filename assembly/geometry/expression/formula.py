@@ -33,14 +33,7 @@ FORMULA = record_dtype(
     arc_plain=1,  # 1: the tape of the arc length is for plain doubles (`geometry/expression/rounding.py`)
 )
 formula_at = record_view(FORMULA)
-DIMENSION = place_of(FORMULA, "dimension")
-POINT_TAPE = place_of(FORMULA, "point_tape")
-RANGE_TAPE = place_of(FORMULA, "range_tape")
-ARC_TAPE = place_of(FORMULA, "arc_tape")
-HAS_RANGE = place_of(FORMULA, "has_range")
-CONTINUOUS = place_of(FORMULA, "continuous")
 ROOM = place_of(FORMULA, "room")
-ARC_PLAIN = place_of(FORMULA, "arc_plain")
 FORMULA_RECORD = size_of(FORMULA)
 # The same in the pool.
 FORMULA_HEAD = record_dtype(
@@ -72,11 +65,23 @@ FORMULA_RANGE = record_dtype(
 formula_range_at = record_view(FORMULA_RANGE)
 
 
+@kernel(inline=True, exact=True)
+def run(store, tape, room):
+    """Run a tape on the numbers in a room."""
+    run_tape(store, tape, room, room[WORK_AT:], room[RESULTS:])
+
+
+@kernel(inline=True, exact=True)
+def bound(store, tape, room):
+    """Run a tape on the intervals in a room; what it tells of kinks and jumps."""
+    return run_bounds(store, tape, room, room[WORK_AT:], room[RESULTS:])
+
+
 @kernel(inner=True)
 def formula_point(store, t, room):
     """C, C', C'' at t to the results of the room, nine doubles."""
     room[0] = t
-    run_tape(store, formula_at(store.table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
+    run(store, formula_at(store.table, 0).point_tape, room)
     results = formula_room_at(room, 0).results
     for k in range(3):
         results[k] -= formula_head_at(store.pool, 0).center[k]
@@ -119,7 +124,7 @@ def point_bounds(store, t, room):
     """Intervals of C, C', C'' at t to the results of the room, nine pairs."""
     room[0] = t
     room[1] = t
-    told = run_bounds(store, formula_at(store.table, 0).point_tape, room, room[WORK_AT:], room[RESULTS:])
+    told = bound(store, formula_at(store.table, 0).point_tape, room)
     settle(store, room, told, 3)
 
 
@@ -129,7 +134,7 @@ def range_bounds(store, lo, hi, room):
     formula = formula_at(store.table, 0)
     room[0] = lo
     room[1] = hi
-    told = run_bounds(store, formula.range_tape, room, room[WORK_AT:], room[RESULTS:])
+    told = bound(store, formula.range_tape, room)
     if formula.has_range == 0:
         forget(store.table, room, 0, 1)
     settle(store, room, told, 4)
@@ -169,13 +174,13 @@ def arc_bound(store, lo, hi, room):
     if formula.arc_plain != 0:
         room[0] = lo
         room[1] = hi
-        run_tape(store, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
+        run(store, formula.arc_tape, room)
         return results[0] if results[0] >= 0.0 else math.inf
     room[0] = lo
     room[1] = lo
     room[2] = hi
     room[3] = hi
-    run_bounds(store, formula.arc_tape, room, room[WORK_AT:], room[RESULTS:])
+    bound(store, formula.arc_tape, room)
     return results[1] if results[1] >= 0.0 else math.inf
 
 

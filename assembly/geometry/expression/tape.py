@@ -98,6 +98,82 @@ def erfinv(x):
     return y - (math.erf(y) - x) / (slope * np.exp(-y * y))
 
 
+@kernel(inline=True, exact=True)
+def rare_operation(code, x, y):
+    """The result of one of the operations from POW on."""
+    if code == POW or code == CONSTPOW:
+        return x**y
+    if code == EXP:
+        return np.exp(x)
+    if code == LOG:
+        return np.log(x)
+    if code == TAN:
+        return np.tan(x)
+    if code == ASIN:
+        return np.arcsin(x)
+    if code == ACOS:
+        return np.arccos(x)
+    if code == ATAN:
+        return math.atan(x)
+    if code == ATAN2:
+        return math.atan2(x, y)
+    if code == HYPOT:
+        return np.hypot(x, y)
+    if code == FABS:
+        return abs(x)
+    if code == SIGN:
+        return -1.0 if x < 0.0 else (1.0 if x > 0.0 else x)
+    if code == COPYSIGN:
+        return math.copysign(x, y)
+    if code == FMIN:
+        return x if x <= y or y != y else y
+    if code == FMAX:
+        return x if x >= y or y != y else y
+    if code == LT:
+        return 1.0 if x < y else 0.0
+    if code == LE:
+        return 1.0 if x <= y else 0.0
+    if code == EQ:
+        return 1.0 if x == y else 0.0
+    if code == NE:
+        return 1.0 if x != y else 0.0
+    if code == NOT:
+        return 1.0 if x == 0.0 else 0.0
+    if code == AND:
+        return 1.0 if x != 0.0 and y != 0.0 else 0.0
+    if code == OR:
+        return 1.0 if x != 0.0 or y != 0.0 else 0.0
+    if code == IF_ELSE_ZERO:
+        return 0.0 if x == 0.0 else y
+    if code == FLOOR:
+        return np.floor(x)
+    if code == CEIL:
+        return np.ceil(x)
+    if code == FMOD:
+        return np.fmod(x, y)
+    if code == REMAINDER:
+        return remainder(x, y)
+    if code == LOG1P:
+        return np.log1p(x)
+    if code == EXPM1:
+        return np.expm1(x)
+    if code == SINH:
+        return np.sinh(x)
+    if code == COSH:
+        return np.cosh(x)
+    if code == TANH:
+        return np.tanh(x)
+    if code == ASINH:
+        return np.arcsinh(x)
+    if code == ACOSH:
+        return np.arccosh(x)
+    if code == ATANH:
+        return np.arctanh(x)
+    if code == ERF:
+        return math.erf(x)
+    return erfinv(x)
+
+
 @kernel(inner=True, exact=True)
 def run_tape(store, o, x, work, y):
     """Run the tape that begins at table[o]: y of x. All of y that the tape knows is written."""
@@ -141,75 +217,5 @@ def run_tape(store, o, x, work, y):
             work[out] = np.cos(work[a])
         elif code == ASSIGN or code == LIFT:
             work[out] = work[a]
-        elif code == POW or code == CONSTPOW:
-            work[out] = work[a] ** work[b]
-        elif code == EXP:
-            work[out] = np.exp(work[a])
-        elif code == LOG:
-            work[out] = np.log(work[a])
-        elif code == TAN:
-            work[out] = np.tan(work[a])
-        elif code == ASIN:
-            work[out] = np.arcsin(work[a])
-        elif code == ACOS:
-            work[out] = np.arccos(work[a])
-        elif code == ATAN:
-            work[out] = math.atan(work[a])
-        elif code == ATAN2:
-            work[out] = math.atan2(work[a], work[b])
-        elif code == HYPOT:
-            work[out] = np.hypot(work[a], work[b])
-        elif code == FABS:
-            work[out] = abs(work[a])
-        elif code == SIGN:
-            work[out] = -1.0 if work[a] < 0.0 else (1.0 if work[a] > 0.0 else work[a])
-        elif code == COPYSIGN:
-            work[out] = math.copysign(work[a], work[b])
-        elif code == FMIN:
-            work[out] = work[a] if work[a] <= work[b] or work[b] != work[b] else work[b]
-        elif code == FMAX:
-            work[out] = work[a] if work[a] >= work[b] or work[b] != work[b] else work[b]
-        elif code == LT:
-            work[out] = 1.0 if work[a] < work[b] else 0.0
-        elif code == LE:
-            work[out] = 1.0 if work[a] <= work[b] else 0.0
-        elif code == EQ:
-            work[out] = 1.0 if work[a] == work[b] else 0.0
-        elif code == NE:
-            work[out] = 1.0 if work[a] != work[b] else 0.0
-        elif code == NOT:
-            work[out] = 1.0 if work[a] == 0.0 else 0.0
-        elif code == AND:
-            work[out] = 1.0 if work[a] != 0.0 and work[b] != 0.0 else 0.0
-        elif code == OR:
-            work[out] = 1.0 if work[a] != 0.0 or work[b] != 0.0 else 0.0
-        elif code == IF_ELSE_ZERO:
-            work[out] = 0.0 if work[a] == 0.0 else work[b]
-        elif code == FLOOR:
-            work[out] = np.floor(work[a])
-        elif code == CEIL:
-            work[out] = np.ceil(work[a])
-        elif code == FMOD:
-            work[out] = np.fmod(work[a], work[b])
-        elif code == REMAINDER:
-            work[out] = remainder(work[a], work[b])
-        elif code == LOG1P:
-            work[out] = np.log1p(work[a])
-        elif code == EXPM1:
-            work[out] = np.expm1(work[a])
-        elif code == SINH:
-            work[out] = np.sinh(work[a])
-        elif code == COSH:
-            work[out] = np.cosh(work[a])
-        elif code == TANH:
-            work[out] = np.tanh(work[a])
-        elif code == ASINH:
-            work[out] = np.arcsinh(work[a])
-        elif code == ACOSH:
-            work[out] = np.arccosh(work[a])
-        elif code == ATANH:
-            work[out] = np.arctanh(work[a])
-        elif code == ERF:
-            work[out] = math.erf(work[a])
-        elif code == ERFINV:
-            work[out] = erfinv(work[a])
+        else:
+            work[out] = rare_operation(code, work[a], work[b])

@@ -106,9 +106,15 @@ def truth(sure, possible):
     return (1.0 if sure else 0.0), (1.0 if possible else 0.0)
 
 
-@kernel(inner=True, exact=True)
-def elementary(code, a, b):
-    """Bounds of one rare operation, and what it tells of kinks and jumps."""
+@kernel(inline=True)
+def least_size(a):
+    """The least absolute value in an interval."""
+    return 0.0 if a[0] <= 0.0 <= a[1] else min(abs(a[0]), abs(a[1]))
+
+
+@kernel(inline=True, exact=True)
+def smooth_bounds(code, a, b):
+    """Bounds of an operation without kinks, by which part of them they are off, and what it tells of jumps."""
     told = SMOOTH
     lo, hi = -math.inf, math.inf
     part = LIBRARY
@@ -135,69 +141,9 @@ def elementary(code, a, b):
         lo, hi = math.atan(a[0]), math.atan(a[1])
     elif code == ATAN2:
         lo, hi, cut = iarctangent2(a, b)
-        if cut:
-            told = JUMP
+        told = JUMP if cut else SMOOTH
     elif code == HYPOT:
-        p = 0.0 if a[0] <= 0.0 <= a[1] else min(abs(a[0]), abs(a[1]))
-        q = 0.0 if b[0] <= 0.0 <= b[1] else min(abs(b[0]), abs(b[1]))
-        lo, hi = math.hypot(p, q), math.hypot(magnitude(a), magnitude(b))
-    elif code == FABS:
-        part = 0.0
-        hi = magnitude(a)
-        lo = min(abs(a[0]), abs(a[1]))
-        if a[0] < 0.0 < a[1]:
-            lo = 0.0
-        if a[0] <= 0.0 <= a[1]:
-            told = KINK
-    elif code == SIGN:
-        part = 0.0
-        lo = 1.0 if a[0] > 0.0 else (0.0 if a[0] == 0.0 else -1.0)
-        hi = -1.0 if a[1] < 0.0 else (0.0 if a[1] == 0.0 else 1.0)
-        if lo != hi or lo == 0.0:
-            told = JUMP
-    elif code == COPYSIGN:
-        part = 0.0
-        far = magnitude(a)
-        near = 0.0 if a[0] <= 0.0 <= a[1] else min(abs(a[0]), abs(a[1]))
-        if near == 0.0:
-            told = KINK
-        if b[0] > 0.0:
-            lo, hi = near, far
-        elif b[1] < 0.0:
-            lo, hi = -far, -near
-        else:
-            lo, hi = -far, far
-            told = JUMP
-    elif code == FMIN:
-        part = 0.0
-        lo, hi = min(a[0], b[0]), min(a[1], b[1])
-        if a[0] <= b[1] and b[0] <= a[1]:
-            told = KINK
-    elif code == FMAX:
-        part = 0.0
-        lo, hi = max(a[0], b[0]), max(a[1], b[1])
-        if a[0] <= b[1] and b[0] <= a[1]:
-            told = KINK
-    elif code == FLOOR or code == CEIL:
-        part = 0.0
-        # Not those of `math`, which are integers and know no infinity.
-        lo = np.floor(a[0]) if code == FLOOR else np.ceil(a[0])
-        hi = np.floor(a[1]) if code == FLOOR else np.ceil(a[1])
-        if lo != hi or a[0] == lo or a[1] == hi:
-            told = JUMP
-    elif code == FMOD or code == REMAINDER:
-        part = 0.0
-        divisor = 0.0 if b[0] <= 0.0 <= b[1] else min(abs(b[0]), abs(b[1]))
-        whole = 1.0 if code == FMOD else 0.5
-        if magnitude(a) < whole * divisor:
-            lo, hi = a
-        elif code == FMOD and b[0] == b[1] and same_quotient(a, b[0]):
-            # Doubles divide without a rounding here.
-            lo, hi = np.fmod(a[0], b[0]), np.fmod(a[1], b[0])
-        else:
-            far = min(magnitude(a), magnitude(b))
-            lo, hi = -far, far
-            told = JUMP
+        lo, hi = math.hypot(least_size(a), least_size(b)), math.hypot(magnitude(a), magnitude(b))
     elif code == LOG1P:
         if a[1] > -1.0:
             lo = math.log1p(a[0]) if a[0] > -1.0 else -math.inf
@@ -207,8 +153,7 @@ def elementary(code, a, b):
     elif code == SINH:
         lo, hi = math.sinh(a[0]), math.sinh(a[1])
     elif code == COSH:
-        lo = 0.0 if a[0] <= 0.0 <= a[1] else min(abs(a[0]), abs(a[1]))
-        lo, hi = math.cosh(lo), math.cosh(magnitude(a))
+        lo, hi = math.cosh(least_size(a)), math.cosh(magnitude(a))
     elif code == TANH:
         lo, hi = math.tanh(a[0]), math.tanh(a[1])
     elif code == ASINH:
@@ -225,38 +170,105 @@ def elementary(code, a, b):
         lo = erfinv(a[0]) if a[0] > -1.0 else -math.inf
         hi = erfinv(a[1]) if a[1] < 1.0 else math.inf
         part = _ERFINV
-    else:
-        part = 0.0
-        no_a = a[0] == 0.0 and a[1] == 0.0
-        no_b = b[0] == 0.0 and b[1] == 0.0
-        yes_a = a[0] > 0.0 or a[1] < 0.0
-        yes_b = b[0] > 0.0 or b[1] < 0.0
-        if code == LT:
-            lo, hi = truth(a[1] < b[0], a[0] < b[1])
-        elif code == LE:
-            lo, hi = truth(a[1] <= b[0], a[0] <= b[1])
-        elif code == EQ:
-            lo, hi = truth(a[0] == a[1] and b[0] == b[1] and a[0] == b[0], a[0] <= b[1] and b[0] <= a[1])
-        elif code == NE:
-            lo, hi = truth(a[0] > b[1] or b[0] > a[1], not (a[0] == a[1] and b[0] == b[1] and a[0] == b[0]))
-        elif code == NOT:
-            lo, hi = truth(no_a, not yes_a)
-        elif code == AND:
-            lo, hi = truth(yes_a and yes_b, not no_a and not no_b)
-        elif code == OR:
-            lo, hi = truth(yes_a or yes_b, not (no_a and no_b))
-        elif code == IF_ELSE_ZERO:
-            if no_a:
-                lo, hi = 0.0, 0.0
-            elif yes_a:
-                lo, hi = b
-            else:
-                lo, hi = min(b[0], 0.0), max(b[1], 0.0)
-                told = JUMP
-        if code != IF_ELSE_ZERO and lo != hi:
+    return lo, hi, part, told
+
+
+@kernel(inline=True, exact=True)
+def kinked_bounds(code, a, b):
+    """Bounds of an operation with kinks or jumps that is no comparison, and what it tells of them."""
+    told = SMOOTH
+    lo, hi = -math.inf, math.inf
+    if code == FABS:
+        lo, hi = least_size(a), magnitude(a)
+        if a[0] <= 0.0 <= a[1]:
+            told = KINK
+    elif code == SIGN:
+        lo = 1.0 if a[0] > 0.0 else (0.0 if a[0] == 0.0 else -1.0)
+        hi = -1.0 if a[1] < 0.0 else (0.0 if a[1] == 0.0 else 1.0)
+        if lo != hi or lo == 0.0:
             told = JUMP
-    if part > 0.0:
-        lo, hi = widened(lo, hi, part)
+    elif code == COPYSIGN:
+        near, far = least_size(a), magnitude(a)
+        if near == 0.0:
+            told = KINK
+        if b[0] > 0.0:
+            lo, hi = near, far
+        elif b[1] < 0.0:
+            lo, hi = -far, -near
+        else:
+            lo, hi = -far, far
+            told = JUMP
+    elif code == FMIN or code == FMAX:
+        lo = min(a[0], b[0]) if code == FMIN else max(a[0], b[0])
+        hi = min(a[1], b[1]) if code == FMIN else max(a[1], b[1])
+        if a[0] <= b[1] and b[0] <= a[1]:
+            told = KINK
+    elif code == FLOOR or code == CEIL:
+        # Not those of `math`, which are integers and know no infinity.
+        lo = np.floor(a[0]) if code == FLOOR else np.ceil(a[0])
+        hi = np.floor(a[1]) if code == FLOOR else np.ceil(a[1])
+        if lo != hi or a[0] == lo or a[1] == hi:
+            told = JUMP
+    elif code == FMOD or code == REMAINDER:
+        divisor = least_size(b)
+        whole = 1.0 if code == FMOD else 0.5
+        if magnitude(a) < whole * divisor:
+            lo, hi = a
+        elif code == FMOD and b[0] == b[1] and same_quotient(a, b[0]):
+            # Doubles divide without a rounding here.
+            lo, hi = np.fmod(a[0], b[0]), np.fmod(a[1], b[0])
+        else:
+            far = min(magnitude(a), magnitude(b))
+            lo, hi = -far, far
+            told = JUMP
+    return lo, hi, told
+
+
+@kernel(inline=True)
+def compared(code, a, b):
+    """Bounds of a comparison, or of a choice by one, and what it tells of jumps."""
+    told = SMOOTH
+    no_a = a[0] == 0.0 and a[1] == 0.0
+    no_b = b[0] == 0.0 and b[1] == 0.0
+    yes_a = a[0] > 0.0 or a[1] < 0.0
+    yes_b = b[0] > 0.0 or b[1] < 0.0
+    if code == LT:
+        lo, hi = truth(a[1] < b[0], a[0] < b[1])
+    elif code == LE:
+        lo, hi = truth(a[1] <= b[0], a[0] <= b[1])
+    elif code == EQ:
+        lo, hi = truth(a[0] == a[1] and b[0] == b[1] and a[0] == b[0], a[0] <= b[1] and b[0] <= a[1])
+    elif code == NE:
+        lo, hi = truth(a[0] > b[1] or b[0] > a[1], not (a[0] == a[1] and b[0] == b[1] and a[0] == b[0]))
+    elif code == NOT:
+        lo, hi = truth(no_a, not yes_a)
+    elif code == AND:
+        lo, hi = truth(yes_a and yes_b, not no_a and not no_b)
+    elif code == OR:
+        lo, hi = truth(yes_a or yes_b, not (no_a and no_b))
+    elif no_a:
+        lo, hi = 0.0, 0.0
+    elif yes_a:
+        lo, hi = b
+    else:
+        lo, hi = min(b[0], 0.0), max(b[1], 0.0)
+        told = JUMP
+    if code != IF_ELSE_ZERO and lo != hi:
+        told = JUMP
+    return lo, hi, told
+
+
+@kernel(inner=True, exact=True)
+def elementary(code, a, b):
+    """Bounds of one rare operation, and what it tells of kinks and jumps."""
+    if LT <= code <= IF_ELSE_ZERO:
+        lo, hi, told = compared(code, a, b)
+    elif FABS <= code <= REMAINDER:
+        lo, hi, told = kinked_bounds(code, a, b)
+    else:
+        lo, hi, part, told = smooth_bounds(code, a, b)
+        if part > 0.0:
+            lo, hi = widened(lo, hi, part)
     if not (lo <= hi):
         lo, hi = -math.inf, math.inf
     return lo, hi, told

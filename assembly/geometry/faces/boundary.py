@@ -39,13 +39,6 @@ def segment(start: Array, end: Array) -> NurbsCurve:
     return NurbsCurve(np.array([start, end]), [0.0, 0.0, length, length], 1)
 
 
-def periods(surface: NurbsSurface) -> tuple[float, float]:
-    """Periods of u and v, 0 where the surface is not closed."""
-    (a, b), (c, d) = surface.domain
-    closed_u, closed_v = surface.closed
-    return (b - a if closed_u else 0.0, d - c if closed_v else 0.0)
-
-
 def _pole_edges(surface: NurbsSurface) -> list[tuple[int, float]]:
     """Axis and value of the edges of the domain that are one point."""
     ends = [(axis, surface.domain[axis][side]) for axis in range(2) for side in range(2)]
@@ -104,7 +97,7 @@ def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[N
     """Chains of a loop (with the way from their start to their end if that is whole periods), and pole edges."""
     curves = list(loop.curves)
     slack = SLACK * np.ptp(np.array(surface.domain), axis=1)
-    period = np.array(periods(surface))
+    period = np.array(surface._periods)
     silent: list[NurbsCurve] = []
     keep = np.ones(len(curves), dtype=bool)
     for axis, value in _pole_edges(surface):
@@ -151,7 +144,7 @@ def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[N
             chain = chain + runs.pop(follows[0])
         # Joined once more: by whole periods, and exactly at the new corners.
         if np.abs(apart(chain, chain)).max() <= reach:
-            joined = Loop.unchecked(chain, 2.0 * reach / loop.size, periods(surface), "loop")
+            joined = Loop.unchecked(chain, 2.0 * reach / loop.size, surface._periods, "loop")
             chains.append((list(joined.curves), joined.turn))
         else:
             chains.append((chain, np.full(2, np.nan)))
@@ -161,11 +154,11 @@ def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[N
 def _as_loop(given: LoopLike, name: str, surface: NurbsSurface) -> Loop:
     """A loop with the surface's periods, inside the domain of its open directions."""
     if isinstance(given, Loop):
-        loop = Loop.unchecked(given.curves, given.tolerance, periods(surface), name)
+        loop = Loop.unchecked(given.curves, given.tolerance, surface._periods, name)
     else:
         if not isinstance(given, (NurbsCurve, Iterable)):
             raise TypeError(f"{name} is {given!r}; expected a Loop, a NurbsCurve or several")
-        loop = Loop.unchecked(given, TOLERANCE, periods(surface), name)
+        loop = Loop.unchecked(given, TOLERANCE, surface._periods, name)
     loop.curves = _in_domain(loop.curves, name, surface)
     return loop
 
@@ -250,7 +243,7 @@ def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence
     chains: list[tuple[list[NurbsCurve], Array]] = []
     names: list[str] = []
     silent: list[NurbsCurve] = []
-    period = periods(surface)
+    period = surface._periods
     if outer is None:
         edges, silent = _natural(surface)
         for chain in edges:

@@ -7,17 +7,13 @@ farther apart than both r together.
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import Store
-from assembly.geometry.faces.trim_pieces import (
-    PIECE_DOUBLES,
-    PIECE_INTS,
-    piece_bounds_at,
-    piece_line,
-    piece_links_at,
-)
+from assembly.geometry.faces.trim_pieces import bounds_of, links_of, piece_line, piece_of, trim_at, trim_frame_at
 
 # Around a corner that two pieces share, as a part of the size, they are not compared.
 _CORNER = 1e-5
@@ -32,199 +28,200 @@ def _between(x, low, high):
 
 
 @kernel(inner=True)
-def _to_segment(px, py, ax, ay, bx, by):
+def _to_segment(p, a, b):
     """Squared distance from a point to a segment."""
-    dx = bx - ax
-    dy = by - ay
+    dx = b[0] - a[0]
+    dy = b[1] - a[1]
     square = dx * dx + dy * dy
     t = 0.0
     if square > 0.0:
-        t = _between(((px - ax) * dx + (py - ay) * dy) / square, 0.0, 1.0)
-    ex = px - ax - t * dx
-    ey = py - ay - t * dy
+        t = _between(((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / square, 0.0, 1.0)
+    ex = p[0] - a[0] - t * dx
+    ey = p[1] - a[1] - t * dy
     return ex * ex + ey * ey
 
 
+@kernel(inline=True)
+def _left(a, u, p):
+    """How far a point is to the left of a line from a along u, times |u|."""
+    return u[0] * (p[1] - a[1]) - u[1] * (p[0] - a[0])
+
+
 @kernel(inner=True)
-def _segments(ax, ay, bx, by, cx, cy, dx, dy):
+def _segments(a, b, c, d):
     """Distance between two segments; 0 where they cross."""
-    ux = bx - ax
-    uy = by - ay
-    vx = dx - cx
-    vy = dy - cy
-    c = ux * (cy - ay) - uy * (cx - ax)
-    d = ux * (dy - ay) - uy * (dx - ax)
-    a = vx * (ay - cy) - vy * (ax - cx)
-    b = vx * (by - cy) - vy * (bx - cx)
-    if c * d < 0.0 and a * b < 0.0:
+    u = (b[0] - a[0], b[1] - a[1])
+    v = (d[0] - c[0], d[1] - c[1])
+    if _left(a, u, c) * _left(a, u, d) < 0.0 and _left(c, v, a) * _left(c, v, b) < 0.0:
         return 0.0
-    square = min(_to_segment(ax, ay, cx, cy, dx, dy), _to_segment(bx, by, cx, cy, dx, dy))
-    square = min(square, _to_segment(cx, cy, ax, ay, bx, by), _to_segment(dx, dy, ax, ay, bx, by))
-    return np.sqrt(square)
+    square = min(_to_segment(a, c, d), _to_segment(b, c, d))
+    return np.sqrt(min(square, _to_segment(c, a, b), _to_segment(d, a, b)))
+
+
+# A piece that is compared. start, end: its ends; shift: moves its curve into the cell; move: moves it by whole periods;
+# bound: on its second derivative.
+MovedPiece = namedtuple("MovedPiece", "piece start end shift move bound")
+# Corners that two pieces share: how many there are, and where, twice where there is one.
+Corners = namedtuple("Corners", "count first second")
+
+
+@kernel(inline=True)
+def _moved(store, trim, k, move):
+    """Piece k of a trim, a record, moved."""
+    bounds = bounds_of(store, trim, k)
+    return MovedPiece(
+        piece=piece_of(store, trim, k),
+        start=(bounds.start[0], bounds.start[1]),
+        end=(bounds.end[0], bounds.end[1]),
+        shift=(bounds.shift_u, bounds.shift_v),
+        move=move,
+        bound=bounds.bound_2,
+    )
 
 
 @kernel(inner=True)
-def _place(store, ints, doubles, piece, t, move_u, move_v):
+def _place(pool, moved, t):
     """The point of a piece at a parameter; its ends are as the table has them."""
-    o = piece_links_at(store.table, ints + PIECE_INTS * piece)
-    i = piece_bounds_at(store.pool, doubles + PIECE_DOUBLES * piece)
-    if t <= i.t0:
-        return i.start[0] + move_u, i.start[1] + move_v
-    if t >= i.t1:
-        return i.end[0] + move_u, i.end[1] + move_v
-    x, y, _dx, _dy = piece_line(store.pool, o.coefficients, o.degree, t - i.middle)
-    return x + i.shift_u + move_u, y + i.shift_v + move_v
+    move = moved.move
+    if t <= moved.piece.t0:
+        return moved.start[0] + move[0], moved.start[1] + move[1]
+    if t >= moved.piece.t1:
+        return moved.end[0] + move[0], moved.end[1] + move[1]
+    x, y, _dx, _dy = piece_line(pool, moved.piece, t)
+    return x + moved.shift[0] + move[0], y + moved.shift[1] + move[1]
 
 
 @kernel(inner=True)
-def _follows(store, ints, doubles, a, b, tolerance):
+def _follows(store, trim, a, b, tolerance):
     """Whether b comes after a, at once or after a stretch of next to nothing."""
     length = 0.0
-    k = piece_links_at(store.table, ints + PIECE_INTS * a).after
+    k = links_of(store, trim, a).after
     while k >= 0:
         if k == b:
             return True
-        i = piece_bounds_at(store.pool, doubles + PIECE_DOUBLES * k)
+        i = bounds_of(store, trim, k)
         length += abs(i.end[0] - i.start[0]) + abs(i.end[1] - i.start[1])
         if length > 4.0 * tolerance or k == a:
             return False
-        k = piece_links_at(store.table, ints + PIECE_INTS * k).after
+        k = links_of(store, trim, k).after
     return False
 
 
+@kernel(inline=True)
+def _is_near(p, q, move, near):
+    """Whether a point is near to another one that is moved."""
+    return abs(p[0] - q[0] - move[0]) + abs(p[1] - q[1] - move[1]) <= near
+
+
 @kernel(inner=True)
-def _meet(store, ints, doubles, a, b, move_u, move_v, tolerance, size, stack, budget):
+def _corners(store, trim, numbers, pair, tolerance):
+    """The Corners of a pair of pieces, whose numbers these are."""
+    (a, b), move, near = pair, pair[1].move, 8.0 * tolerance
+    after = _follows(store, trim, numbers[0], numbers[1], tolerance) and _is_near(a.end, b.start, move, near)
+    before = _follows(store, trim, numbers[1], numbers[0], tolerance) and _is_near(a.start, b.end, move, near)
+    return Corners(int(after) + int(before), a.end if after else a.start, a.start if before else a.end)
+
+
+@kernel(inline=True)
+def _square_from(corner, p, q):
+    """The square of the distance of a corner from the box of two points."""
+    u = _between(corner[0], min(p[0], q[0]), max(p[0], q[0])) - corner[0]
+    v = _between(corner[1], min(p[1], q[1]), max(p[1], q[1])) - corner[1]
+    return u * u + v * v
+
+
+@kernel(inline=True)
+def _farthest(corner, p, q):
+    """How far two points are from a corner at most, in u or in v."""
+    return max(abs(p[0] - corner[0]), abs(q[0] - corner[0]), abs(p[1] - corner[1]), abs(q[1] - corner[1]))
+
+
+@kernel(inline=True)
+def _gap(p, q, r, s):
+    """The distance of the boxes of two pairs of points."""
+    u = max(min(p[0], q[0]) - max(r[0], s[0]), min(r[0], s[0]) - max(p[0], q[0]), 0.0)
+    v = max(min(p[1], q[1]) - max(r[1], s[1]), min(r[1], s[1]) - max(p[1], q[1]), 0.0)
+    return np.sqrt(u * u + v * v)
+
+
+@kernel(inner=True)
+def _meet(pool, a, b, corners, tolerance, size, stack, budget):
     """Whether two pieces meet beside a common corner, where, and what is left of the budget."""
-    ia = piece_bounds_at(store.pool, doubles + PIECE_DOUBLES * a)
-    ib = piece_bounds_at(store.pool, doubles + PIECE_DOUBLES * b)
-    corners = 0
-    corner_u = 0.0
-    corner_v = 0.0
-    other_u = 0.0
-    other_v = 0.0
-    near = 8.0 * tolerance
-    if _follows(store, ints, doubles, a, b, tolerance):
-        corner_u = ia.end[0]
-        corner_v = ia.end[1]
-        if abs(corner_u - ib.start[0] - move_u) + abs(corner_v - ib.start[1] - move_v) <= near:
-            corners = 1
-    if _follows(store, ints, doubles, b, a, tolerance):
-        other_u = ia.start[0]
-        other_v = ia.start[1]
-        if abs(other_u - ib.end[0] - move_u) + abs(other_v - ib.end[1] - move_v) <= near:
-            if corners == 0:
-                corner_u = other_u
-                corner_v = other_v
-            corners += 1
-    if corners == 1:
-        other_u = corner_u
-        other_v = corner_v
-    radius = max(_CORNER * size, 2.0 * near) if corners > 0 else 0.0
-    stack[0, 0] = ia.t0
-    stack[0, 1] = ia.t1
-    stack[0, 2] = ib.t0
-    stack[0, 3] = ib.t1
+    radius = max(_CORNER * size, 16.0 * tolerance)
+    stack[0, 0], stack[0, 1] = a.piece.t0, a.piece.t1
+    stack[0, 2], stack[0, 3] = b.piece.t0, b.piece.t1
     top = 1
     while top > 0:
         top -= 1
         budget -= 1
-        a0 = stack[top, 0]
-        a1 = stack[top, 1]
-        b0 = stack[top, 2]
-        b1 = stack[top, 3]
-        px, py = _place(store, ints, doubles, a, a0, 0.0, 0.0)
-        qx, qy = _place(store, ints, doubles, a, a1, 0.0, 0.0)
-        rx, ry = _place(store, ints, doubles, b, b0, move_u, move_v)
-        sx, sy = _place(store, ints, doubles, b, b1, move_u, move_v)
-        gap_u = max(min(px, qx) - max(rx, sx), min(rx, sx) - max(px, qx), 0.0)
-        gap_v = max(min(py, qy) - max(ry, sy), min(ry, sy) - max(py, qy), 0.0)
-        apart = np.sqrt(gap_u * gap_u + gap_v * gap_v)
+        a0, a1, b0, b1 = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
+        p, q = _place(pool, a, a0), _place(pool, a, a1)
+        r, s = _place(pool, b, b0), _place(pool, b, b1)
         needed = tolerance
-        if corners > 0:
+        if corners.count > 0:
             # How far the first part is from the corner: the box of its ends holds it.
-            cu = _between(corner_u, min(px, qx), max(px, qx)) - corner_u
-            cv = _between(corner_v, min(py, qy), max(py, qy)) - corner_v
-            ou = _between(other_u, min(px, qx), max(px, qx)) - other_u
-            ov = _between(other_v, min(py, qy), max(py, qy)) - other_v
-            square = min(cu * cu + cv * cv, ou * ou + ov * ov)
+            square = min(_square_from(corners.first, p, q), _square_from(corners.second, p, q))
             needed = min(tolerance, _OPENING * square / size)
-        if apart > needed:
+        if _gap(p, q, r, s) > needed:
             continue
-        bent_a = 0.125 * ia.bound_2 * (a1 - a0) ** 2
-        bent_b = 0.125 * ib.bound_2 * (b1 - b0) ** 2
-        if _segments(px, py, qx, qy, rx, ry, sx, sy) - bent_a - bent_b > needed:
+        bent_a = 0.125 * a.bound * (a1 - a0) ** 2
+        bent_b = 0.125 * b.bound * (b1 - b0) ** 2
+        if _segments(p, q, r, s) - bent_a - bent_b > needed:
             continue
-        if corners > 0:
-            inside = True
-            for k in range(2):
-                cu = corner_u if k == 0 else other_u
-                cv = corner_v if k == 0 else other_v
-                far = max(abs(px - cu), abs(qx - cu), abs(py - cv), abs(qy - cv))
-                far = max(far, abs(rx - cu), abs(sx - cu), abs(ry - cv), abs(sy - cv))
-                inside = far <= radius
-                if inside:
-                    break
-            if inside:
+        if corners.count > 0:
+            first = max(_farthest(corners.first, p, q), _farthest(corners.first, r, s))
+            second = max(_farthest(corners.second, p, q), _farthest(corners.second, r, s))
+            if first <= radius or second <= radius:
                 continue
-        extent_a = abs(qx - px) + abs(qy - py)
-        extent_b = abs(sx - rx) + abs(sy - ry)
+        extent_a = abs(q[0] - p[0]) + abs(q[1] - p[1])
+        extent_b = abs(s[0] - r[0]) + abs(s[1] - r[1])
         if (extent_a <= 0.5 * tolerance and extent_b <= 0.5 * tolerance) or budget <= 0 or top + 2 > stack.shape[0]:
-            return True, 0.5 * (px + qx), 0.5 * (py + qy), budget
+            return True, 0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1]), budget
         for k in range(4):
             stack[top + 1, k] = stack[top, k]
         if extent_a >= extent_b:
-            m = 0.5 * (a0 + a1)
-            stack[top, 1] = m
-            stack[top + 1, 0] = m
+            stack[top, 1] = stack[top + 1, 0] = 0.5 * (a0 + a1)
         else:
-            m = 0.5 * (b0 + b1)
-            stack[top, 3] = m
-            stack[top + 1, 2] = m
+            stack[top, 3] = stack[top + 1, 2] = 0.5 * (b0 + b1)
         top += 2
     return False, 0.0, 0.0, budget
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8[::1], f8[:, ::1], i8[::1], f8, f8, f8[::1])")
-def first_crossing(table, pool, ints, doubles, pieces, moves, order, tolerance, size, where):
+@kernel(signatures="(i8[::1], f8[::1], i8, i8[::1], f8[:, ::1], i8[::1], f8, f8[::1])")
+def first_crossing(table, pool, trim, pieces, moves, order, tolerance, where):
     """The first two pieces that cross, touch or overlap: their numbers, and the point in `where`; (-1, -1): none.
 
     `pieces` are numbers of pieces, each to be moved by the row of `moves` (whole periods), and `order` is what sorts
     them by their least u.
     """
+    store = Store(table, pool)
+    record = trim_at(table, trim)
+    size = trim_frame_at(pool, record.frame).extent
     stack = np.empty((256, 4))
     budget = _BUDGET
     for j in range(order.size):
         a = pieces[order[j]]
-        i = doubles + PIECE_DOUBLES * a
+        box = bounds_of(store, record, a).box
         move_u = moves[order[j], 0]
         move_v = moves[order[j], 1]
-        right = pool[i + 1] + move_u + tolerance
+        right = box[1] + move_u + tolerance
         for k in range(j + 1, order.size):
             b = pieces[order[k]]
-            n = doubles + PIECE_DOUBLES * b
+            other = bounds_of(store, record, b).box
             shift_u = moves[order[k], 0]
             shift_v = moves[order[k], 1]
-            if pool[n] + shift_u > right:
+            if other[0] + shift_u > right:
                 break
-            if pool[n + 2] + shift_v > pool[i + 3] + move_v + tolerance:
+            if other[2] + shift_v > box[3] + move_v + tolerance:
                 continue
-            if pool[n + 3] + shift_v < pool[i + 2] + move_v - tolerance:
+            if other[3] + shift_v < box[2] + move_v - tolerance:
                 continue
             if (move_u != 0.0 or move_v != 0.0) and (shift_u != 0.0 or shift_v != 0.0):
                 continue
-            found, u, v, budget = _meet(
-                Store(table, pool),
-                ints,
-                doubles,
-                a,
-                b,
-                shift_u - move_u,
-                shift_v - move_v,
-                tolerance,
-                size,
-                stack,
-                budget,
-            )
+            first = _moved(store, record, a, (0.0, 0.0))
+            second = _moved(store, record, b, (shift_u - move_u, shift_v - move_v))
+            corners = _corners(store, record, (a, b), (first, second), tolerance)
+            found, u, v, budget = _meet(pool, first, second, corners, tolerance, size, stack, budget)
             if found:
                 where[0] = u + move_u
                 where[1] = v + move_v

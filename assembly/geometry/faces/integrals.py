@@ -12,12 +12,8 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import Store
-from assembly.geometry.faces.trim_pieces import piece_line
-from assembly.geometry.splines.evaluate import (
-    into_domain,
-    surface_at,
-    surface_point,
-)
+from assembly.geometry.faces.trim_pieces import Piece, piece_line
+from assembly.geometry.splines.evaluate import into_domain, surface_at, surface_point
 from assembly.geometry.vec import cross, dot
 
 
@@ -43,21 +39,20 @@ def _column(store, u, v, levels, nodes, weights):
     return area, volume
 
 
-@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], i8[::1], i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])")
-def along_pieces(table, pool, rows, coefficients, degrees, levels, nodes, weights, out):
+@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], i8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])")
+def along_pieces(table, pool, rows, places, levels, nodes, weights, out):
     """Integrals of u' G over parts of pieces.
 
-    A row of `rows` holds t0, t1, the middle of the span, and what moves the curve into the cell; `levels` are the
-    knots of v within the cell, with its ends.
+    A row of `rows` holds t0, t1, the middle of the span, and what moves the curve into the cell, one of
+    `places` where its coefficients are and its degree; `levels` are the knots of v within the cell, with its ends.
     """
     for k in range(rows.shape[0]):
-        t0 = rows[k, 0]
-        half = 0.5 * (rows[k, 1] - t0)
+        piece = Piece(places[k, 0], places[k, 1], rows[k, 2], rows[k, 0], rows[k, 1])
+        half = 0.5 * (piece.t1 - piece.t0)
         area = 0.0
         volume = 0.0
         for n in range(nodes.size):
-            t = t0 + half * (1.0 + nodes[n])
-            u, v, du, _dv = piece_line(pool, coefficients[k], degrees[k], t - rows[k, 2])
+            u, v, du, _dv = piece_line(pool, piece, piece.t0 + half * (1.0 + nodes[n]))
             a, b = _column(Store(table, pool), u + rows[k, 3], v + rows[k, 4], levels, nodes, weights)
             area += half * weights[n] * du * a
             volume += half * weights[n] * du * b

@@ -120,11 +120,7 @@ class Loop(ReadOnlyArrays):
         return loop
 
     def _make(
-        self,
-        curves: NurbsCurve | Iterable[NurbsCurve],
-        tolerance: float,
-        period: Sequence[float] | None,
-        name: str,
+        self, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: Sequence[float] | None, name: str
     ) -> None:
         parts = [curves] if isinstance(curves, NurbsCurve) else items(name, curves, "one NurbsCurve or several")
         if not parts:

@@ -11,8 +11,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.faces import trim_pieces as layout
 from assembly.geometry.faces.integrals import along_bottom, along_pieces
+from assembly.geometry.faces.trim_pieces import cut_of_piece, trim_at, trim_frame_at
 from assembly.geometry.faces.trim_table import TrimTable
 from assembly.geometry.splines.surface import NurbsSurface
 
@@ -40,62 +40,55 @@ def _levels(knots: Array, low: float, high: float, period: float) -> Array:
     return np.unique(np.concatenate([[low], inside, [high]]))
 
 
-def _rows(table: TrimTable, levels: tuple[Array, Array]) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
-    """Parts of pieces on which no knot of the surface is passed."""
-    record, pool = table.table, table.pool
-    count, first = int(record[layout.TRIM_ALL]), int(record[layout.TRIM_PIECE_POOL])
-    ints = record[record[layout.TRIM_PIECE_TABLE] :][: count * layout.PIECE_INTS].reshape(-1, layout.PIECE_INTS)
-    doubles = pool[first : first + count * layout.PIECE_DOUBLES].reshape(-1, layout.PIECE_DOUBLES)
+def _rows(table: TrimTable, levels: tuple[Array, Array]) -> tuple[Array, NDArray[np.int64]]:
+    """Parts of pieces on which no knot of the surface is passed, and where the coefficients and degree of each are."""
+    links, bounds = table.rows()
     rows, which = [], []
-    for k in np.flatnonzero(ints[:, layout.PIECE_SIGN_U]).tolist():
-        piece = doubles[k]
-        t0, t1 = float(piece[layout.PIECE_T0]), float(piece[layout.PIECE_T1])
+    for k in np.flatnonzero(links.sign_u).tolist():
+        piece, place = bounds[k], links[k]
+        t0, t1 = float(piece.t0), float(piece.t1)
         cuts = [t0, t1]
-        for axis in range(2):
-            low, high, shift = piece[2 * axis], piece[2 * axis + 1], piece[layout.SHIFT_U + axis]
-            start, end = float(piece[layout.START + axis] - shift), float(piece[layout.END + axis] - shift)
+        for axis, shift in enumerate((piece.shift_u, piece.shift_v)):
+            low, high = piece.box[2 * axis], piece.box[2 * axis + 1]
+            ends = float(piece.start[axis] - shift), float(piece.end[axis] - shift)
             for level in levels[axis][(levels[axis] > low) & (levels[axis] < high)]:
-                t, _, _ = layout.cut_of_piece(
-                    pool, int(ints[k, layout.PIECE_COEFFICIENTS]), int(ints[k, layout.PIECE_DEGREE]),
-                    float(piece[layout.MIDDLE]), t0, t1, axis, float(level - shift), start, end,
+                t, _, _ = cut_of_piece(
+                    table.pool, int(place.coefficients), int(place.degree), float(piece.middle),
+                    (t0, t1), axis, float(level - shift), ends,
                 )  # fmt: skip
                 cuts.append(min(max(t, t0), t1))
         cuts.sort()
         for a, b in zip(cuts[:-1], cuts[1:], strict=True):
-            rows.append([a, b, piece[layout.MIDDLE], piece[layout.SHIFT_U], piece[layout.SHIFT_V]])
+            rows.append([a, b, piece.middle, piece.shift_u, piece.shift_v])
             which.append(k)
-    chosen = ints[np.array(which, dtype=np.int64)]
-    coefficients, degrees = chosen[:, layout.PIECE_COEFFICIENTS].copy(), chosen[:, layout.PIECE_DEGREE].copy()
-    return np.array(rows).reshape(-1, 5), coefficients, degrees
+    places = np.column_stack([links.coefficients, links.degree])[which]
+    return np.array(rows).reshape(-1, 5), places.reshape(-1, 2)
 
 
 def area_and_volume(surface: NurbsSurface, table: TrimTable) -> Array:
     """Area, and integral of S.(Su x Sv) / 3, of the part of a surface that a trim leaves: (2,)."""
-    at = int(table.table[layout.TRIM_FRAME])
-    frame = table.pool[at : at + layout.FRAME]
-    low, high = frame[[layout.LOW_U, layout.LOW_V]], frame[[layout.HIGH_U, layout.HIGH_V]]
-    period = frame[[layout.PERIOD_U, layout.PERIOD_V]]
+    trim = trim_at(table.table, 0)
+    frame = trim_frame_at(table.pool, trim.frame)
+    low, high = (frame.low_u, frame.low_v), (frame.high_u, frame.high_v)
+    period = (frame.period_u, frame.period_v)
     levels = tuple(_levels(*each) for each in zip(surface.breaks(), low, high, period, strict=True))
-    rows, coefficients, degrees = _rows(table, (levels[0], levels[1]))
-    steps = int(table.table[layout.TRIM_STEPS])
-    walk = table.pool[table.table[layout.TRIM_STEP_POOL] :][: 2 * steps].reshape(-1, 2)
+    rows, places = _rows(table, (levels[0], levels[1]))
+    walk = table.pool[trim.step_pool :][: 2 * trim.steps].reshape(-1, 2)
     ends = np.unique(np.concatenate([levels[0], walk[:, 0]]))
     stretches = np.column_stack([ends[:-1], ends[1:]])
-    w = np.full(len(stretches), frame[layout.BOTTOM])
+    w = np.full(len(stretches), frame.bottom)
     for u, value in walk:
         w[stretches[:, 0] >= u] = value
     stretches, w = stretches[w != 0.0], w[w != 0.0]
     record, surface_pool = surface.packed()
-    shift = surface_pool.size
+    places[:, 0] += surface_pool.size
     pool = np.concatenate([surface_pool, table.pool])
 
     def sides(count: int, pieces: Indices, bottom: Indices) -> tuple[Array, Array]:
         out, low = np.empty((len(pieces), 2)), np.empty((len(bottom), 2))
         gauss = _gauss(count)
         if len(pieces):
-            along_pieces(
-                record, pool, rows[pieces], coefficients[pieces] + shift, degrees[pieces], levels[1], *gauss, out
-            )
+            along_pieces(record, pool, rows[pieces], places[pieces], levels[1], *gauss, out)
         if len(bottom):
             along_bottom(record, pool, stretches[bottom], levels[1], *gauss, low)
         return out, low * w[bottom, None]

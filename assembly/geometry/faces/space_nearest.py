@@ -7,24 +7,23 @@ The bounds on the derivatives of S(c(t)) follow from those of the piece c (m1, m
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.geometry.faces.trim_pieces import (
     LET_GO,
-    PIECE_DOUBLES,
-    PIECE_INTS,
+    bounds_of,
+    links_of,
+    next_in_bracket,
+    next_part,
     piece_bend,
-    piece_bounds_at,
-    piece_links_at,
+    piece_of,
     trim_at,
 )
-from assembly.geometry.splines.evaluate import (
-    into_domain,
-    surface_at,
-    surface_point,
-)
+from assembly.geometry.splines.evaluate import into_domain, surface_at, surface_point
 from assembly.geometry.vec import add, blend, dot, scale, sub
 
 _BUDGET = 100_000
@@ -40,25 +39,34 @@ def _on_surface(store, surface, u, v):
     return surface_point(store.table, store.pool, surface, x, y)
 
 
+# A piece of a boundary on its surface, a record. shift: moves the piece into the cell.
+SpacePiece = namedtuple("SpacePiece", "surface piece shift")
+
+
+@kernel(inline=True)
+def _space_piece(store, surface, trim, k):
+    """Piece k of a trim, a record, on its surface."""
+    bounds = bounds_of(store, trim, k)
+    return SpacePiece(surface, piece_of(store, trim, k), (bounds.shift_u, bounds.shift_v))
+
+
 @kernel(inner=True)
-def _on_curve(store, surface, o, i, t):
+def _on_curve(store, curve, t):
     """A point of S(c(t)) with its first two derivatives."""
-    piece = piece_bounds_at(store.pool, i)
-    links = piece_links_at(store.table, o)
-    u, v, du, dv, ddu, ddv = piece_bend(store.pool, links.coefficients, links.degree, t - piece.middle)
-    s, su, sv, suu, suv, svv = _on_surface(store, surface, u + piece.shift_u, v + piece.shift_v)
+    (u, v), (du, dv), (ddu, ddv) = piece_bend(store.pool, curve.piece, t)
+    s, su, sv, suu, suv, svv = _on_surface(store, curve.surface, u + curve.shift[0], v + curve.shift[1])
     bend = add(blend(du * du, suu, 2.0 * du * dv, suv), blend(dv * dv, svv, 1.0, blend(ddu, su, ddv, sv)))
     return s, blend(du, su, dv, sv), bend
 
 
 @kernel(inner=True)
-def _newton(store, surface, o, i, a, b, t, q):
+def _newton(store, curve, a, b, t, q):
     """The nearest point of an interval on which the distance is convex; half its square and its parameter."""
     low = a
     high = b
     f = 0.0
     for _ in range(60):
-        p, d, h = _on_curve(store, surface, o, i, t)
+        p, d, h = _on_curve(store, curve, t)
         e = sub(p, q)
         f = 0.5 * dot(e, e)
         g = dot(e, d)
@@ -72,14 +80,7 @@ def _newton(store, surface, o, i, a, b, t, q):
             low = t
             if t == b:
                 break
-        curvature = dot(d, d) + dot(e, h)
-        step = t - g / curvature if curvature > 0.0 else 0.5 * (low + high)
-        if step <= a:
-            step = a
-        elif step >= b:
-            step = b
-        elif not low < step < high:
-            step = 0.5 * (low + high)
+        step = next_in_bracket(t, g, dot(d, d) + dot(e, h), (a, b), (low, high))
         if abs(step - t) <= 2e-16 * max(abs(t), b - a):
             break
         t = step
@@ -87,11 +88,10 @@ def _newton(store, surface, o, i, a, b, t, q):
 
 
 @kernel(inner=True)
-def _search(store, surface, o, i, q, m1, m2, m3, best):
-    """As `trim.nearest_on_piece`, in space."""
-    piece = piece_bounds_at(store.pool, i)
-    t0 = piece.t0
-    t1 = piece.t1
+def _search(store, curve, bounds, q, best):
+    """As `trim_pieces.nearest_on_piece`, in space."""
+    t0, t1 = curve.piece.t0, curve.piece.t1
+    m1, m2, m3 = bounds
     found = t0 - 1.0
     level = 0
     index = 0
@@ -99,7 +99,7 @@ def _search(store, surface, o, i, q, m1, m2, m3, best):
     for _ in range(_BUDGET):
         half = 0.5 * h
         m = t0 + (index + 0.5) * h
-        p, d, dd = _on_curve(store, surface, o, i, m)
+        p, d, dd = _on_curve(store, curve, m)
         e = sub(p, q)
         f = 0.5 * dot(e, e)
         if f < best:
@@ -120,7 +120,7 @@ def _search(store, surface, o, i, q, m1, m2, m3, best):
         if low < best:
             if curvature > third * half:
                 begin = t0 + index * h
-                f, t = _newton(store, surface, o, i, begin, min(begin + h, t1), m, q)
+                f, t = _newton(store, curve, begin, min(begin + h, t1), m, q)
                 if f < best:
                     best = f
                     found = t
@@ -129,11 +129,7 @@ def _search(store, surface, o, i, q, m1, m2, m3, best):
                 index *= 2
                 h = half
                 continue
-        index += 1
-        while level > 0 and index % 2 == 0:
-            index //= 2
-            level -= 1
-            h *= 2.0
+        level, index, h = next_part(level, index, h)
         if level == 0:
             break
     return best, found
@@ -146,33 +142,30 @@ def nearest_in_space(table, pool, surface, trim, bounds, u, v, out):
     `bounds` are g1, g2, g3 of the surface.
     """
     store = Store(table, pool)
-    trim_record = trim_at(table, trim)
-    count = trim_record.pieces
+    record = trim_at(table, trim)
     for n in range(u.size):
         q, _su, _sv, _suu, _suv, _svv = _on_surface(store, surface, u[n], v[n])
         best = np.inf
         out[n, 1] = -1.0
         out[n, 2] = 0.0
-        for k in range(2 * count):
-            o = trim_record.piece_table + PIECE_INTS * (k >> 1)
-            i = trim_record.piece_pool + PIECE_DOUBLES * (k >> 1)
-            t = piece_bounds_at(pool, i).t0 if k % 2 == 0 else piece_bounds_at(pool, i).t1
-            p, _d, _h = _on_curve(store, surface, o, i, t)
+        for k in range(2 * record.pieces):
+            curve = _space_piece(store, surface, record, k >> 1)
+            t = curve.piece.t0 if k % 2 == 0 else curve.piece.t1
+            p, _d, _h = _on_curve(store, curve, t)
             e = sub(p, q)
             if 0.5 * dot(e, e) < best:
                 best = 0.5 * dot(e, e)
-                out[n, 1] = piece_links_at(table, o).curve
+                out[n, 1] = links_of(store, record, k >> 1).curve
                 out[n, 2] = t
-        for k in range(count):
-            o = trim_record.piece_table + PIECE_INTS * k
-            i = trim_record.piece_pool + PIECE_DOUBLES * k
-            c1 = piece_bounds_at(pool, i).bound_1
-            c2 = piece_bounds_at(pool, i).bound_2
+        for k in range(record.pieces):
+            curve = _space_piece(store, surface, record, k)
+            piece = bounds_of(store, record, k)
+            c1, c2, c3 = piece.bound_1, piece.bound_2, piece.bound_3
             m1 = bounds[0] * c1
             m2 = bounds[1] * c1 * c1 + bounds[0] * c2
-            m3 = bounds[2] * c1**3 + 3.0 * bounds[1] * c1 * c2 + bounds[0] * piece_bounds_at(pool, i).bound_3
-            best, t = _search(store, surface, o, i, q, m1, m2, m3, best)
-            if t >= piece_bounds_at(pool, i).t0:
-                out[n, 1] = piece_links_at(table, o).curve
+            m3 = bounds[2] * c1**3 + 3.0 * bounds[1] * c1 * c2 + bounds[0] * c3
+            best, t = _search(store, curve, (m1, m2, m3), q, best)
+            if t >= curve.piece.t0:
+                out[n, 1] = links_of(store, record, k).curve
                 out[n, 2] = t
         out[n, 0] = np.sqrt(2.0 * best)

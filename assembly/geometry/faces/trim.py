@@ -15,15 +15,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import Store
-from assembly.geometry.faces.trim_pieces import (
-    PIECE_DOUBLES,
-    PIECE_INTS,
-    piece_at,
-    piece_bounds_at,
-    piece_links_at,
-    trim_at,
-    trim_frame_at,
-)
+from assembly.geometry.faces.trim_pieces import bounds_of, links_of, piece_at, piece_of, trim_at, trim_frame_at
 
 
 @kernel(inline=True)
@@ -48,60 +40,35 @@ def _steps(pool, first, count, start, u):
 
 
 @kernel(inner=True)
-def _below(store, o, i, u, v, tolerance):
-    """What a piece adds to w at a point, and whether the point is on it."""
-    piece = piece_bounds_at(store.pool, i)
-    links = piece_links_at(store.table, o)
-    if v > store.pool[i + 3] + tolerance:
-        return links.sign_u if store.pool[i] <= u < store.pool[i + 1] else 0, False
-    if v < store.pool[i + 2] - tolerance:
-        return 0, False
-    shift_u = piece.shift_u
-    shift_v = piece.shift_v
+def _below(store, trim, k, u, v, tolerance):
+    """What piece k of a trim adds to w at a point, and whether the point is on it."""
+    bounds, links = bounds_of(store, trim, k), links_of(store, trim, k)
+    low_u, high_u, low_v, high_v = bounds.box[0], bounds.box[1], bounds.box[2], bounds.box[3]
+    within = low_u <= u < high_u
     sign_u = links.sign_u
-    sign_v = links.sign_v
-    within = store.pool[i] <= u < store.pool[i + 1]
-    major = links.major
-    x = u
+    if v > high_v + tolerance:
+        return sign_u if within else 0, False
+    if v < low_v - tolerance:
+        return 0, False
     # The ends first: beyond them the curve is not the piece's.
-    near = (u - piece.start[0]) ** 2 + (v - piece.start[1]) ** 2
-    near = min(near, (u - piece.end[0]) ** 2 + (v - piece.end[1]) ** 2)
+    near = (u - bounds.start[0]) ** 2 + (v - bounds.start[1]) ** 2
+    near = min(near, (u - bounds.end[0]) ** 2 + (v - bounds.end[1]) ** 2)
     if near <= tolerance * tolerance:
         return 0, True
-    if major == 0:
-        x = u
-        start = piece.start[0]
-        end = piece.end[0]
-        shift = shift_u
-        inside = store.pool[i] <= u <= store.pool[i + 1]
-    else:
-        x = v
-        start = piece.start[1]
-        end = piece.end[1]
-        shift = shift_v
-        inside = store.pool[i + 2] <= v <= store.pool[i + 3]
-    if not inside:
-        return sign_u if within and v > store.pool[i + 3] else 0, False
-    at, cu, cv, du, dv = piece_at(
-        store.pool,
-        links.coefficients,
-        links.degree,
-        piece.middle,
-        piece.t0,
-        piece.t1,
-        major,
-        x - shift,
-        start - shift,
-        end - shift,
-    )
-    off_u = u - shift_u - cu
-    off_v = v - shift_v - cv
+    major = links.major
+    if not (low_u <= u <= high_u if major == 0 else low_v <= v <= high_v):
+        return sign_u if within and v > high_v else 0, False
+    x, shift = (u, bounds.shift_u) if major == 0 else (v, bounds.shift_v)
+    start, end = bounds.start[major], bounds.end[major]
+    _t, point, (du, dv) = piece_at(store.pool, piece_of(store, trim, k), major, x - shift, start - shift, end - shift)
+    off_u = u - bounds.shift_u - point[0]
+    off_v = v - bounds.shift_v - point[1]
     speed = np.sqrt(du * du + dv * dv)
     if abs(du * off_v - dv * off_u) <= tolerance * speed:
         return 0, True
     if not within:
         return 0, False
-    above = off_v > 0.0 if major == 0 else (off_u < 0.0) == (sign_u * sign_v > 0)
+    above = off_v > 0.0 if major == 0 else (off_u < 0.0) == (sign_u * links.sign_v > 0)
     return sign_u if above else 0, False
 
 
@@ -119,22 +86,17 @@ def winding(store, trim, u, v):
     if frame.period_u == 0.0 and 0.0 <= x - frame.high_u <= 1e-14 * extent:
         z = frame.high_u - 1e-15 * extent
     w = _steps(store.pool, trim_record.step_pool, trim_record.steps, frame.bottom, x)
-    o = trim_record.piece_table
-    i = trim_record.piece_pool
-    for _ in range(trim_record.pieces):
-        if store.pool[i] - tolerance <= x <= store.pool[i + 1] + tolerance:
-            part, on = _below(store, o, i, x, y, tolerance)
+    for k in range(trim_record.all_pieces):
+        box = bounds_of(store, trim_record, k).box
+        if k >= trim_record.pieces:
+            sign = links_of(store, trim_record, k).sign_u
+            if box[0] <= z < box[1] and (y > box[2] or (y == box[2] and sign > 0)):
+                w += sign
+        elif box[0] - tolerance <= x <= box[1] + tolerance:
+            part, on = _below(store, trim_record, k, x, y, tolerance)
             if on:
                 return w, True
             w += part
-        o += PIECE_INTS
-        i += PIECE_DOUBLES
-    for _ in range(trim_record.pieces, trim_record.all_pieces):
-        sign = piece_links_at(store.table, o).sign_u
-        if store.pool[i] <= z < store.pool[i + 1] and (y > store.pool[i + 2] or (y == store.pool[i + 2] and sign > 0)):
-            w += sign
-        o += PIECE_INTS
-        i += PIECE_DOUBLES
     return w, False
 
 

@@ -8,20 +8,19 @@ two directions tell the side, or the winding number where they do not.
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.geometry.faces.trim import into_cell, winding
 from assembly.geometry.faces.trim_pieces import (
-    END,
-    PIECE_DOUBLES,
-    PIECE_INTS,
-    START,
+    bounds_of,
+    links_of,
     nearest_on_piece,
-    piece_bounds_at,
     piece_line,
-    piece_links_at,
+    piece_of,
     polished,
     trim_at,
     trim_frame_at,
@@ -43,16 +42,15 @@ def _gap(x, low, high):
 
 
 @kernel(inner=True)
-def _end_direction(store, o, i, at_end):
-    """Unit direction of a piece at one of its ends, from the chord where its speed vanishes there."""
-    piece = piece_bounds_at(store.pool, i)
-    links = piece_links_at(store.table, o)
+def _end_direction(store, trim, k, at_end):
+    """Unit direction of piece k at one of its ends, from the chord where its speed vanishes there."""
+    piece = piece_of(store, trim, k)
     t = piece.t1 if at_end else piece.t0
-    x, y, dx, dy = piece_line(store.pool, links.coefficients, links.degree, t - piece.middle)
+    x, y, dx, dy = piece_line(store.pool, piece, t)
     length = np.sqrt(dx * dx + dy * dy)
-    if length <= _SLOW * piece.bound_1:
+    if length <= _SLOW * bounds_of(store, trim, k).bound_1:
         near = t + 1e-4 * (piece.t0 - piece.t1) * (1.0 if at_end else -1.0)
-        a, b, dx, dy = piece_line(store.pool, links.coefficients, links.degree, near - piece.middle)
+        a, b, dx, dy = piece_line(store.pool, piece, near)
         dx = x - a if at_end else a - x
         dy = y - b if at_end else b - y
         length = np.sqrt(dx * dx + dy * dy)
@@ -60,18 +58,18 @@ def _end_direction(store, o, i, at_end):
 
 
 @kernel(inner=True)
-def _nearest_end(pool, doubles, begin, stop, x, y, best):
-    """Half the squared distance to the nearest end of pieces, the piece and the parameter, if it beats `best`."""
-    piece = begin
+def _nearest_end(store, trim, span, q, best):
+    """Half the squared distance to the nearest end of a span of pieces, piece and parameter, if it beats `best`."""
+    piece = span[0]
     t = 0.0
-    for k in range(begin, stop):
-        i = piece_bounds_at(pool, doubles + PIECE_DOUBLES * k)
-        f = 0.5 * ((x - i.start[0]) ** 2 + (y - i.start[1]) ** 2)
+    for k in range(span[0], span[1]):
+        i = bounds_of(store, trim, k)
+        f = 0.5 * ((q[0] - i.start[0]) ** 2 + (q[1] - i.start[1]) ** 2)
         if f < best:
             best = f
             piece = k
             t = i.t0
-        f = 0.5 * ((x - i.end[0]) ** 2 + (y - i.end[1]) ** 2)
+        f = 0.5 * ((q[0] - i.end[0]) ** 2 + (q[1] - i.end[1]) ** 2)
         if f < best:
             best = f
             piece = k
@@ -80,159 +78,126 @@ def _nearest_end(pool, doubles, begin, stop, x, y, best):
 
 
 @kernel(inner=True)
-def _nearest_inside(store, ints, doubles, begin, stop, x, y, best):
+def _nearest_inside(store, trim, span, q, best):
     """The same for all points of pieces, those aside whose box is too far."""
-    piece = begin
+    piece = span[0]
     t = 0.0
-    for k in range(begin, stop):
-        o = piece_links_at(store.table, ints + PIECE_INTS * k)
-        i = doubles + PIECE_DOUBLES * k
-        piece_bounds = piece_bounds_at(store.pool, i)
-        gap_u = _gap(x, store.pool[i], store.pool[i + 1])
-        gap_v = _gap(y, store.pool[i + 2], store.pool[i + 3])
+    for k in range(span[0], span[1]):
+        i = bounds_of(store, trim, k)
+        gap_u = _gap(q[0], i.box[0], i.box[1])
+        gap_v = _gap(q[1], i.box[2], i.box[3])
         if 0.5 * (gap_u * gap_u + gap_v * gap_v) < best:
-            best, at = nearest_on_piece(
-                store.pool,
-                o.coefficients,
-                o.degree,
-                piece_bounds.middle,
-                piece_bounds.t0,
-                piece_bounds.t1,
-                piece_bounds.bound_1,
-                piece_bounds.bound_2,
-                piece_bounds.bound_3,
-                x - piece_bounds.shift_u,
-                y - piece_bounds.shift_v,
-                best,
-            )
-            if at >= piece_bounds.t0:
+            bounds = (i.bound_1, i.bound_2, i.bound_3)
+            seen = (q[0] - i.shift_u, q[1] - i.shift_v)
+            best, at = nearest_on_piece(store.pool, piece_of(store, trim, k), bounds, seen, best)
+            if at >= i.t0:
                 piece = k
                 t = at
     return best, piece, t
 
 
+# Where a boundary is nearest to a point. distance: signed, positive on the side of the material; curve: which boundary
+# curve, or -1; t: its parameter; u, v: the foot; normal_u, normal_v: unit normal there to the material.
+TrimFoot = namedtuple("TrimFoot", "distance curve t u v normal_u normal_v")
+
+
 @kernel(inner=True)
 def trim_nearest(store, trim, first, count, u, v):
-    """Signed distance to boundary curves, index and parameter of the foot, the foot, and its normal to material.
-
-    The distance is positive on the material side of the curves `first` to `first + count - 1`.
-    """
-    trim_record = trim_at(store.table, trim)
-    frame = trim_frame_at(store.pool, trim_record.frame)
+    """The TrimFoot of a point on the boundary curves `first` to `first + count - 1`."""
+    record = trim_at(store.table, trim)
+    frame = trim_frame_at(store.pool, record.frame)
     period_u = frame.period_u
     period_v = frame.period_v
     qx = into_cell(u, frame.low_u, frame.high_u, period_u)
     qy = into_cell(v, frame.low_v, frame.high_v, period_v)
-    begin = store.table[trim_record.curve_pieces + first]
-    stop = store.table[trim_record.curve_pieces + first + count]
-    ints = trim_record.piece_table
-    doubles = trim_record.piece_pool
+    span = (store.table[record.curve_pieces + first], store.table[record.curve_pieces + first + count])
     copies_u = 1 if period_u != 0.0 else 0
     copies_v = 1 if period_v != 0.0 else 0
-    if begin == stop:
-        return np.inf, -1, 0.0, u, v, 0.0, 0.0
+    if span[0] == span[1]:
+        return TrimFoot(np.inf, -1, 0.0, u, v, 0.0, 0.0)
     best = np.inf
-    piece = begin
-    t = piece_bounds_at(store.pool, doubles + PIECE_DOUBLES * begin).t0
-    move_u = 0.0
-    move_v = 0.0
+    piece = span[0]
+    t = bounds_of(store, record, piece).t0
+    q = (qx, qy)
     # Ends of pieces first: near ones spare the search of most others. Then the pieces; copies one period away last.
     for search in range(2):
         for copy_u in range(1 + 2 * copies_u):
-            move_a = (copy_u + 1) // 2 * (period_u if copy_u % 2 else -period_u)
-            x = qx - move_a
+            x = qx - (copy_u + 1) // 2 * (period_u if copy_u % 2 else -period_u)
             cell_u = _gap(x, frame.low_u, frame.high_u) if copy_u else 0.0
             for copy_v in range(1 + 2 * copies_v):
-                move_b = (copy_v + 1) // 2 * (period_v if copy_v % 2 else -period_v)
-                y = qy - move_b
+                y = qy - (copy_v + 1) // 2 * (period_v if copy_v % 2 else -period_v)
                 cell_v = _gap(y, frame.low_v, frame.high_v) if copy_v else 0.0
                 if 0.5 * (cell_u * cell_u + cell_v * cell_v) >= best:
                     continue
                 if search == 0:
-                    f, k, at = _nearest_end(store.pool, doubles, begin, stop, x, y, best)
+                    f, k, at = _nearest_end(store, record, span, (x, y), best)
                 else:
-                    f, k, at = _nearest_inside(store, ints, doubles, begin, stop, x, y, best)
+                    f, k, at = _nearest_inside(store, record, span, (x, y), best)
                 if f < best:
                     best = f
                     piece = k
                     t = at
-                    move_u = move_a
-                    move_v = move_b
-    o = piece_links_at(store.table, ints + PIECE_INTS * piece)
-    i = piece_bounds_at(store.pool, doubles + PIECE_DOUBLES * piece)
-    t = polished(
-        store.pool,
-        o.coefficients,
-        o.degree,
-        i.middle,
-        i.t0,
-        i.t1,
-        t,
-        qx - move_u - i.shift_u,
-        qy - move_v - i.shift_v,
-    )
-    return _foot(store, trim, begin, stop, piece, t, u, v, qx - move_u, qy - move_v)
+                    q = (x, y)
+    bounds = bounds_of(store, record, piece)
+    t = polished(store.pool, piece_of(store, record, piece), t, (q[0] - bounds.shift_u, q[1] - bounds.shift_v))
+    return _foot(store, trim, span, piece, t, (u, v), q)
 
 
 @kernel(inner=True)
-def _foot(store, trim, begin, stop, piece, t, u, v, qx, qy):
-    """What `trim_nearest` returns, from the piece and the parameter of the foot; (qx, qy) is (u, v) in the cell."""
-    trim_record = trim_at(store.table, trim)
-    o = trim_record.piece_table + PIECE_INTS * piece
-    links = piece_links_at(store.table, o)
-    i = trim_record.piece_pool + PIECE_DOUBLES * piece
-    piece_bounds = piece_bounds_at(store.pool, i)
-    size = trim_frame_at(store.pool, trim_record.frame).extent
-    x, y, dx, dy = piece_line(store.pool, links.coefficients, links.degree, t - piece_bounds.middle)
-    ox = qx - x - piece_bounds.shift_u
-    oy = qy - y - piece_bounds.shift_v
-    distance = np.sqrt(ox * ox + oy * oy)
-    at_start = t <= piece_bounds.t0
-    at_end = t >= piece_bounds.t1
+def _foot_on_piece(store, record, k, t, q):
+    """Where on piece k a foot is that was found at t: its parameter, the way from there, the direction, the end.
+
+    The end is -1 at the start, 1 at the end, 0 in between.
+    """
+    bounds = bounds_of(store, record, k)
+    size = trim_frame_at(store.pool, record.frame).extent
+    x, y, dx, dy = piece_line(store.pool, piece_of(store, record, k), t)
+    ox = q[0] - x - bounds.shift_u
+    oy = q[1] - y - bounds.shift_v
+    end = 1 if t >= bounds.t1 else (-1 if t <= bounds.t0 else 0)
     beyond = dx * ox + dy * oy
     speed = np.sqrt(dx * dx + dy * dy)
-    unsure = speed <= _SLOW * piece_bounds.bound_1
-    far = max(_BEYOND * size, 4e-15 * (abs(qx) + abs(qy)))
-    if not (at_start or at_end) and (unsure or abs(beyond) > far * speed):
+    unsure = speed <= _SLOW * bounds.bound_1
+    far = max(_BEYOND * size, 4e-15 * (abs(q[0]) + abs(q[1])))
+    if end == 0 and (unsure or abs(beyond) > far * speed):
         # The way to the foot is not across the curve: is it an end, that rounding or a vanishing speed has left?
-        first = t - piece_bounds.t0 < piece_bounds.t1 - t if unsure else beyond < 0.0
-        end = START if first else END
-        ax = store.pool[i + end] - piece_bounds.shift_u - x
-        ay = store.pool[i + end + 1] - piece_bounds.shift_v - y
+        first = t - bounds.t0 < bounds.t1 - t if unsure else beyond < 0.0
+        ax = (bounds.start[0] if first else bounds.end[0]) - bounds.shift_u - x
+        ay = (bounds.start[1] if first else bounds.end[1]) - bounds.shift_v - y
         if ax * ax + ay * ay <= (_AT_END * size) ** 2:
-            at_start = first
-            at_end = not first
-            t = piece_bounds.t0 if at_start else piece_bounds.t1
+            end = -1 if first else 1
+            t = bounds.t0 if first else bounds.t1
             ox -= ax
             oy -= ay
-            distance = np.sqrt(ox * ox + oy * oy)
-    other = -1
-    if at_start or at_end:
-        dx, dy = _end_direction(store, o, i, at_end)
-        other = links.after if at_end else links.before
-    else:
-        length = np.sqrt(dx * dx + dy * dy)
-        if length > 0.0:
-            dx /= length
-            dy /= length
+    if end != 0:
+        dx, dy = _end_direction(store, record, k, end > 0)
+    elif speed > 0.0:
+        dx /= speed
+        dy /= speed
+    return t, (ox, oy), (dx, dy), end
+
+
+@kernel(inner=True)
+def _foot(store, trim, span, piece, t, point, q):
+    """The TrimFoot of a point, from the piece and the parameter of the foot; q is the point in the cell."""
+    record = trim_at(store.table, trim)
+    links = links_of(store, record, piece)
+    t, (ox, oy), (dx, dy), end = _foot_on_piece(store, record, piece, t, q)
+    distance = np.sqrt(ox * ox + oy * oy)
+    other = -1 if end == 0 else (links.after if end > 0 else links.before)
     sign = 1.0 if dx * oy - dy * ox >= 0.0 else -1.0
-    smooth = not (at_start or at_end)
-    if begin <= other < stop:
-        ax, ay = _end_direction(
-            store,
-            trim_record.piece_table + PIECE_INTS * other,
-            trim_record.piece_pool + PIECE_DOUBLES * other,
-            not at_end,
-        )
+    smooth = end == 0
+    if span[0] <= other < span[1]:
+        ax, ay = _end_direction(store, record, other, end < 0)
         # Positive for a corner that is convex: only points outside have it nearest.
-        turn = dx * ay - dy * ax if at_end else ax * dy - ay * dx
+        turn = dx * ay - dy * ax if end > 0 else ax * dy - ay * dx
         same_way = dx * ax + dy * ay > 0.0
         if same_way and abs(turn) <= _SMOOTH:
             smooth = True
         elif same_way or abs(turn) > 1e-9:
             sign = -1.0 if turn > 0.0 else 1.0
         else:
-            w, _on = winding(store, trim, u, v)
+            w, _on = winding(store, trim, point[0], point[1])
             sign = 1.0 if w == 1.0 else -1.0
         dx += ax
         dy += ay
@@ -240,25 +205,20 @@ def _foot(store, trim, begin, stop, piece, t, u, v, qx, qy):
         if length > 1e-9:
             dx /= length
             dy /= length
-    curve = links.curve
+    u, v = point[0] - ox, point[1] - oy
     if smooth:
         # Across the curve, not along the tiny and noisy way to the foot.
-        return dx * oy - dy * ox, curve, t, u - ox, v - oy, -dy, dx
-    if distance > 1e-13 * size:
-        s = sign * distance
-        return s, curve, t, u - ox, v - oy, ox / s, oy / s
-    return sign * distance, curve, t, u - ox, v - oy, -dy, dx
+        return TrimFoot(dx * oy - dy * ox, links.curve, t, u, v, -dy, dx)
+    s = sign * distance
+    if distance > 1e-13 * trim_frame_at(store.pool, record.frame).extent:
+        return TrimFoot(s, links.curve, t, u, v, ox / s, oy / s)
+    return TrimFoot(s, links.curve, t, u, v, -dy, dx)
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, f8[::1], f8[::1], f8[:, ::1])")
 def nearest_points(table, pool, trim, first, count, u, v, out):
     """`trim_nearest` at flat points, a row of seven each."""
     for k in range(u.size):
-        s, curve, t, cu, cv, nu, nv = trim_nearest(Store(table, pool), trim, first, count, u[k], v[k])
-        out[k, 0] = s
-        out[k, 1] = curve
-        out[k, 2] = t
-        out[k, 3] = cu
-        out[k, 4] = cv
-        out[k, 5] = nu
-        out[k, 6] = nv
+        foot = trim_nearest(Store(table, pool), trim, first, count, u[k], v[k])
+        out[k, 0], out[k, 1], out[k, 2] = foot.distance, foot.curve, foot.t
+        out[k, 3], out[k, 4], out[k, 5], out[k, 6] = foot.u, foot.v, foot.normal_u, foot.normal_v

@@ -10,11 +10,13 @@ and |C(t) - C(m) - C'(m) (t - m)| <= max |C''| h^2 / 2; an interval with F'' > L
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 import numpy as np
 
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import record_dtype, record_view, size_of
 
 # A trim in the table: the boundary of a face in its parameters.
 TRIM = record_dtype(
@@ -31,16 +33,6 @@ TRIM = record_dtype(
     step_pool=1,  # where in the pool the steps begin
 )
 trim_at = record_view(TRIM)
-TRIM_CURVES = place_of(TRIM, "curves")
-TRIM_FIRST = place_of(TRIM, "first")
-TRIM_ALL = place_of(TRIM, "all_pieces")
-TRIM_PIECES = place_of(TRIM, "pieces")
-TRIM_PIECE_TABLE = place_of(TRIM, "piece_table")
-TRIM_PIECE_POOL = place_of(TRIM, "piece_pool")
-TRIM_CURVE_PIECES = place_of(TRIM, "curve_pieces")
-TRIM_FRAME = place_of(TRIM, "frame")
-TRIM_STEPS = place_of(TRIM, "steps")
-TRIM_STEP_POOL = place_of(TRIM, "step_pool")
 TRIM_RECORD = size_of(TRIM)
 # The frame of a trim in the pool; everything is in parameters.
 TRIM_FRAME_RECORD = record_dtype(
@@ -56,14 +48,6 @@ TRIM_FRAME_RECORD = record_dtype(
     extent=1,  # size of the cell or domain
 )
 trim_frame_at = record_view(TRIM_FRAME_RECORD)
-LOW_U = place_of(TRIM_FRAME_RECORD, "low_u")
-LOW_V = place_of(TRIM_FRAME_RECORD, "low_v")
-HIGH_U = place_of(TRIM_FRAME_RECORD, "high_u")
-HIGH_V = place_of(TRIM_FRAME_RECORD, "high_v")
-PERIOD_U = place_of(TRIM_FRAME_RECORD, "period_u")
-PERIOD_V = place_of(TRIM_FRAME_RECORD, "period_v")
-BOTTOM = place_of(TRIM_FRAME_RECORD, "bottom")
-SIZE = place_of(TRIM_FRAME_RECORD, "extent")
 FRAME = size_of(TRIM_FRAME_RECORD)
 # A piece of a boundary curve, its integers.
 PIECE_LINKS = record_dtype(
@@ -78,12 +62,6 @@ PIECE_LINKS = record_dtype(
     major=1,  # the coordinate that changes faster (0: u, 1: v)
 )
 piece_links_at = record_view(PIECE_LINKS)
-PIECE_CURVE = place_of(PIECE_LINKS, "curve")
-PIECE_COEFFICIENTS = place_of(PIECE_LINKS, "coefficients")
-PIECE_DEGREE = place_of(PIECE_LINKS, "degree")
-PIECE_SIGN_U = place_of(PIECE_LINKS, "sign_u")
-PIECE_SIGN_V = place_of(PIECE_LINKS, "sign_v")
-PIECE_MAJOR = place_of(PIECE_LINKS, "major")
 PIECE_INTS = size_of(PIECE_LINKS)
 # The same piece, its doubles.
 PIECE_BOUNDS = record_dtype(
@@ -101,15 +79,6 @@ PIECE_BOUNDS = record_dtype(
     end=2,  # (u, v) at t1
 )
 piece_bounds_at = record_view(PIECE_BOUNDS)
-PIECE_T0 = place_of(PIECE_BOUNDS, "t0")
-PIECE_T1 = place_of(PIECE_BOUNDS, "t1")
-SHIFT_U = place_of(PIECE_BOUNDS, "shift_u")
-SHIFT_V = place_of(PIECE_BOUNDS, "shift_v")
-MIDDLE = place_of(PIECE_BOUNDS, "middle")
-BOUND_1 = place_of(PIECE_BOUNDS, "bound_1")
-BOUND_3 = place_of(PIECE_BOUNDS, "bound_3")
-START = place_of(PIECE_BOUNDS, "start")
-END = place_of(PIECE_BOUNDS, "end")
 PIECE_DOUBLES = size_of(PIECE_BOUNDS)
 # Where the distance hardly changes, as from the center of a circle, this part of its square is let go.
 LET_GO = 1e-10
@@ -118,14 +87,39 @@ _ROUNDING = 4e-15
 _BUDGET = 100_000
 
 
+# A piece, or a part of one. at: where in the pool its coefficients are; middle: of its span; t0, t1: its interval.
+Piece = namedtuple("Piece", "at degree middle t0 t1")
+
+
 @kernel(inline=True)
-def piece_line(pool, o, degree, s):
+def piece_of(store, trim, k):
+    """Piece k of a trim, a record."""
+    links = piece_links_at(store.table, trim.piece_table + PIECE_INTS * k)
+    bounds = piece_bounds_at(store.pool, trim.piece_pool + PIECE_DOUBLES * k)
+    return Piece(links.coefficients, links.degree, bounds.middle, bounds.t0, bounds.t1)
+
+
+@kernel(inline=True)
+def links_of(store, trim, k):
+    """The integers of piece k of a trim, a record."""
+    return piece_links_at(store.table, trim.piece_table + PIECE_INTS * k)
+
+
+@kernel(inline=True)
+def bounds_of(store, trim, k):
+    """The doubles of piece k of a trim, a record."""
+    return piece_bounds_at(store.pool, trim.piece_pool + PIECE_DOUBLES * k)
+
+
+@kernel(inline=True)
+def piece_line(pool, piece, t):
     """u, v, u', v' of a rational piece."""
-    p = load_lanes(pool, o + 4 * degree)
+    s = t - piece.middle
+    p = load_lanes(pool, piece.at + 4 * piece.degree)
     d = 0.0 * p
-    for k in range(degree - 1, -1, -1):
+    for k in range(piece.degree - 1, -1, -1):
         d = p + s * d
-        p = load_lanes(pool, o + 4 * k) + s * p
+        p = load_lanes(pool, piece.at + 4 * k) + s * p
     i = 1.0 / lane(p, 3)
     a = i * p
     b = i * (d - lane(d, 3) * a)
@@ -133,30 +127,31 @@ def piece_line(pool, o, degree, s):
 
 
 @kernel(inline=True)
-def piece_bend(pool, o, degree, s):
-    """u, v, u', v', u'', v'' of a rational piece."""
-    p = load_lanes(pool, o + 4 * degree)
+def piece_bend(pool, piece, t):
+    """(u, v), (u', v'), (u'', v'') of a rational piece."""
+    s = t - piece.middle
+    p = load_lanes(pool, piece.at + 4 * piece.degree)
     d = 0.0 * p
     h = 0.0 * p
-    for k in range(degree - 1, -1, -1):
+    for k in range(piece.degree - 1, -1, -1):
         h = d + s * h
         d = p + s * d
-        p = load_lanes(pool, o + 4 * k) + s * p
+        p = load_lanes(pool, piece.at + 4 * k) + s * p
     i = 1.0 / lane(p, 3)
     a = i * p
     b = i * (d - lane(d, 3) * a)
     c = i * (2.0 * h - (2.0 * lane(d, 3)) * b - (2.0 * lane(h, 3)) * a)
-    return lane(a, 0), lane(a, 1), lane(b, 0), lane(b, 1), lane(c, 0), lane(c, 1)
+    return (lane(a, 0), lane(a, 1)), (lane(b, 0), lane(b, 1)), (lane(c, 0), lane(c, 1))
 
 
 @kernel(inner=True)
-def piece_at(pool, o, degree, middle, t0, t1, axis, target, start, end):
+def piece_at(pool, piece, axis, target, start, end):
     """The parameter at which a piece that runs one way has a coordinate, and its point and direction there."""
     rising = end > start
-    low = t0
-    high = t1
-    t = t0 + (t1 - t0) * (target - start) / (end - start)
-    x, y, dx, dy = piece_line(pool, o, degree, t - middle)
+    low = piece.t0
+    high = piece.t1
+    t = low + (high - low) * (target - start) / (end - start)
+    x, y, dx, dy = piece_line(pool, piece, t)
     for _ in range(80):
         value = x - target if axis == 0 else y - target
         slope = dx if axis == 0 else dy
@@ -172,20 +167,20 @@ def piece_at(pool, o, degree, middle, t0, t1, axis, target, start, end):
         if abs(step - t) <= 3e-16 * abs(step):
             break
         t = step
-        x, y, dx, dy = piece_line(pool, o, degree, t - middle)
-    return t, x, y, dx, dy
+        x, y, dx, dy = piece_line(pool, piece, t)
+    return t, (x, y), (dx, dy)
 
 
 @kernel(inner=True)
-def _newton(pool, o, degree, middle, a, b, t, qx, qy):
-    """The nearest point of an interval on which the distance is convex; half its square and its parameter."""
+def _newton(pool, piece, a, b, t, q):
+    """The nearest point of [a, b], over which the distance is convex; half its square and its parameter."""
     low = a
     high = b
     f = 0.0
     for _ in range(60):
-        x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, t - middle)
-        ex = x - qx
-        ey = y - qy
+        (x, y), (dx, dy), (ddx, ddy) = piece_bend(pool, piece, t)
+        ex = x - q[0]
+        ey = y - q[1]
         f = 0.5 * (ex * ex + ey * ey)
         g = ex * dx + ey * dy
         if g == 0.0:
@@ -199,25 +194,44 @@ def _newton(pool, o, degree, middle, a, b, t, qx, qy):
             if t == b:
                 break
         curvature = dx * dx + dy * dy + ex * ddx + ey * ddy
-        step = t - g / curvature if curvature > 0.0 else 0.5 * (low + high)
-        if step <= a:
-            step = a
-        elif step >= b:
-            step = b
-        elif not low < step < high:
-            step = 0.5 * (low + high)
+        step = next_in_bracket(t, g, curvature, (a, b), (low, high))
         if abs(step - t) <= 2e-16 * max(abs(t), b - a):
             break
         t = step
     return f, t
 
 
-@kernel(inner=True)
-def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best):
-    """Half the squared distance and the parameter of the nearest point of a piece, where it beats `best`.
+@kernel(inline=True)
+def next_in_bracket(t, slope, curvature, interval, bracket):
+    """Newton's next parameter, at an end of its interval or else inside of the bracket of the minimum."""
+    low, high = bracket
+    step = t - slope / curvature if curvature > 0.0 else 0.5 * (low + high)
+    if step <= interval[0]:
+        return interval[0]
+    if step >= interval[1]:
+        return interval[1]
+    return step if low < step < high else 0.5 * (low + high)
 
-    The second value is `t0 - 1` where it does not.
+
+@kernel(inline=True)
+def next_part(level, index, h):
+    """The part behind one that needs no more halving, of the parts that halvings make: its level, index and width."""
+    index += 1
+    while level > 0 and index % 2 == 0:
+        index //= 2
+        level -= 1
+        h *= 2.0
+    return level, index, h
+
+
+@kernel(inner=True)
+def nearest_on_piece(pool, piece, bounds, q, best):
+    """Half the squared distance to q and the parameter of the nearest point of a piece, where it beats `best`.
+
+    The `bounds` are those on |C'|, |C''| and |C'''|. The second value is `t0 - 1` where it does not.
     """
+    t0, t1 = piece.t0, piece.t1
+    m1, m2, m3 = bounds
     found = t0 - 1.0
     level = 0
     index = 0
@@ -225,9 +239,9 @@ def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best):
     for _ in range(_BUDGET):
         half = 0.5 * h
         m = t0 + (index + 0.5) * h
-        x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, m - middle)
-        ex = x - qx
-        ey = y - qy
+        (x, y), (dx, dy), (ddx, ddy) = piece_bend(pool, piece, m)
+        ex = x - q[0]
+        ey = y - q[1]
         f = 0.5 * (ex * ex + ey * ey)
         if f < best:
             best = f
@@ -251,8 +265,8 @@ def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best):
                 low = max(low, 0.5 * apart * apart)
         if low < best:
             if curvature > third * half:
-                at_low = t0 + index * h
-                f, t = _newton(pool, o, degree, middle, at_low, min(at_low + h, t1), m, qx, qy)
+                begin = t0 + index * h
+                f, t = _newton(pool, piece, begin, min(begin + h, t1), m, q)
                 if f < best:
                     best = f
                     found = t
@@ -261,36 +275,32 @@ def nearest_on_piece(pool, o, degree, middle, t0, t1, m1, m2, m3, qx, qy, best):
                 index *= 2
                 h = half
                 continue
-        index += 1
-        while level > 0 and index % 2 == 0:
-            index //= 2
-            level -= 1
-            h *= 2.0
+        level, index, h = next_part(level, index, h)
         if level == 0:
             break
     return best, found
 
 
 @kernel(inner=True)
-def polished(pool, o, degree, middle, t0, t1, t, qx, qy):
+def polished(pool, piece, t, q):
     """A parameter near that of a nearest point, brought to it by Newton's method as long as that goes downhill."""
-    x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, t - middle)
+    (x, y), (dx, dy), (ddx, ddy) = piece_bend(pool, piece, t)
     for _ in range(8):
-        ex = x - qx
-        ey = y - qy
+        ex = x - q[0]
+        ey = y - q[1]
         speed = dx * dx + dy * dy
         curvature = speed + ex * ddx + ey * ddy
         if not curvature > 1e-3 * speed:
             break
-        step = min(max(t - (ex * dx + ey * dy) / curvature, t0), t1)
+        step = min(max(t - (ex * dx + ey * dy) / curvature, piece.t0), piece.t1)
         if step == t:
             break
-        x, y, dx, dy, ddx, ddy = piece_bend(pool, o, degree, step - middle)
-        ax = x - qx
-        ay = y - qy
+        (x, y), (dx, dy), (ddx, ddy) = piece_bend(pool, piece, step)
+        ax = x - q[0]
+        ay = y - q[1]
         if ax * ax + ay * ay > (ex * ex + ey * ey) * (1.0 + 4e-16):
             break
-        near = abs(step - t) <= 4e-16 * max(abs(t), t1 - t0)
+        near = abs(step - t) <= 4e-16 * max(abs(t), piece.t1 - piece.t0)
         t = step
         if near:
             break
@@ -301,11 +311,13 @@ def polished(pool, o, degree, middle, t0, t1, t, qx, qy):
 def ends_of_pieces(pool, coefficients, degrees, middles, t, out):
     """Points of pieces at parameters."""
     for k in range(t.size):
-        out[k, 0], out[k, 1], _du, _dv = piece_line(pool, coefficients[k], degrees[k], t[k] - middles[k])
+        piece = Piece(coefficients[k], degrees[k], middles[k], t[k], t[k])
+        out[k, 0], out[k, 1], _du, _dv = piece_line(pool, piece, t[k])
 
 
-@kernel(signatures="(f8[::1], i8, i8, f8, f8, f8, i8, f8, f8, f8)")
-def cut_of_piece(pool, coefficients, degree, middle, t0, t1, axis, target, start, end):
-    """The parameter at which a piece has a coordinate, and its point there."""
-    t, x, y, _dx, _dy = piece_at(pool, coefficients, degree, middle, t0, t1, axis, target, start, end)
-    return t, x, y
+@kernel(signatures="(f8[::1], i8, i8, f8, UniTuple(f8, 2), i8, f8, UniTuple(f8, 2))")
+def cut_of_piece(pool, coefficients, degree, middle, interval, axis, target, ends):
+    """The parameter at which a piece has a coordinate, of which it has `ends`, and its point there."""
+    piece = Piece(coefficients, degree, middle, interval[0], interval[1])
+    t, point, _direction = piece_at(pool, piece, axis, target, ends[0], ends[1])
+    return t, point[0], point[1]

@@ -5,24 +5,30 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.faces import trim_pieces as layout
+from assembly._record import rows_of
 from assembly.geometry.faces.crossing import first_crossing
 from assembly.geometry.faces.monotone import ROW, cut_curves
 from assembly.geometry.faces.trim import windings
-from assembly.geometry.faces.trim_pieces import PIECE_DOUBLES, PIECE_INTS, TRIM_RECORD
+from assembly.geometry.faces.trim_pieces import (
+    FRAME,
+    PIECE_BOUNDS,
+    PIECE_DOUBLES,
+    PIECE_INTS,
+    PIECE_LINKS,
+    TRIM_RECORD,
+    cut_of_piece,
+    ends_of_pieces,
+    trim_at,
+    trim_frame_at,
+)
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_packing import packed_curves
-from assembly.geometry.splines.evaluate import (
-    CURVE_BREAKS,
-    CURVE_COEFFICIENTS,
-    CURVE_DEGREE,
-    CURVE_RECORD,
-    CURVE_SPANS,
-)
+from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_COEFFICIENTS, CURVE_DEGREE, CURVE_RECORD, CURVE_SPANS
 
 __all__ = ["TrimTable", "build"]
 
@@ -33,9 +39,6 @@ ON_BOUNDARY = 1e-12
 # Some roundings of a coordinate, as a part of it.
 NOISE = 1e-14
 _BINOMIALS = np.array([[comb(n, k) for k in range(32)] for n in range(32)], dtype=float)
-# Fields that point into the table and into the pool.
-_TABLE_FIELDS = [layout.TRIM_FIRST, layout.TRIM_PIECE_TABLE, layout.TRIM_CURVE_PIECES]
-_POOL_FIELDS = [layout.TRIM_PIECE_POOL, layout.TRIM_FRAME, layout.TRIM_STEP_POOL]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,41 +68,50 @@ class TrimTable:
         if table_at == 0 and pool_at == 0:
             return self.table, self.pool
         table = self.table.copy()
-        table[_TABLE_FIELDS] += table_at
-        table[_POOL_FIELDS] += pool_at
+        record = trim_at(table, 0)
+        _pieces(table, self.pool, self.pieces)[0].coefficients += pool_at
         records = table[TRIM_RECORD : TRIM_RECORD + CURVE_RECORD * self.curves].reshape(-1, CURVE_RECORD)
         records[:, [CURVE_BREAKS, CURVE_COEFFICIENTS]] += pool_at
-        first = int(self.table[layout.TRIM_PIECE_TABLE])
-        table[first : first + PIECE_INTS * self.pieces].reshape(-1, PIECE_INTS)[:, layout.PIECE_COEFFICIENTS] += pool_at
+        for field in ("first", "piece_table", "curve_pieces"):
+            record[field] += table_at
+        for field in ("piece_pool", "frame", "step_pool"):
+            record[field] += pool_at
         return table, self.pool
+
+    def rows(self) -> tuple[Any, Any]:
+        """Integers and doubles of all pieces, a record each."""
+        return _pieces(self.table, self.pool, self.pieces)
 
     def crossing(self, tolerance: float) -> tuple[int, int, Array] | None:
         """Two boundary curves that cross, or come nearer than this part of the size, and where; None if none do."""
-        record = self.table
-        count, first = int(record[layout.TRIM_PIECES]), int(record[layout.TRIM_PIECE_POOL])
-        frame = self.pool[record[layout.TRIM_FRAME] : record[layout.TRIM_FRAME] + layout.FRAME]
-        size = float(frame[layout.SIZE])
-        boxes = self.pool[first : first + PIECE_DOUBLES * count].reshape(-1, PIECE_DOUBLES)[:, :4]
+        record = trim_at(self.table, 0)
+        frame = trim_frame_at(self.pool, record.frame)
+        links, bounds = self.rows()
+        boxes = bounds.box[: record.pieces]
         low = boxes[:, [0, 2]]
-        nearest = max(tolerance * size, NOISE * float(np.abs(boxes).max(initial=0.0)))
-        pieces, moves = np.arange(count), np.zeros((count, 2))
-        for axis in range(2):
-            period = frame[layout.PERIOD_U + axis]
+        nearest = max(tolerance * frame.extent, NOISE * float(np.abs(boxes).max(initial=0.0)))
+        pieces, moves = np.arange(record.pieces), np.zeros((record.pieces, 2))
+        cell = (frame.low_u, frame.period_u), (frame.low_v, frame.period_v)
+        for axis, (begin, period) in enumerate(cell):
             if period:
                 # What touches the lower border of the cell meets what touches the upper one.
-                touches = low[pieces, axis] <= frame[layout.LOW_U + axis] + nearest
+                touches = low[pieces, axis] <= begin + nearest
                 pieces = np.concatenate([pieces, pieces[touches]])
                 copies = moves[touches]
                 copies[:, axis] += period
                 moves = np.concatenate([moves, copies])
         order = np.argsort(low[pieces, 0] + moves[:, 0])
         where = np.empty(2)
-        places = int(record[layout.TRIM_PIECE_TABLE]), first
-        a, b = first_crossing(self.table, self.pool, *places, pieces, moves, order, nearest, size, where)
-        if a < 0:
-            return None
-        ints = self.table[places[0] : places[0] + PIECE_INTS * count].reshape(-1, PIECE_INTS)
-        return int(ints[a, layout.PIECE_CURVE]), int(ints[b, layout.PIECE_CURVE]), where
+        a, b = first_crossing(self.table, self.pool, 0, pieces, moves, order, nearest, where)
+        return None if a < 0 else (int(links.curve[a]), int(links.curve[b]), where)
+
+
+def _pieces(table: Ints, pool: Array, count: int) -> tuple[Any, Any]:
+    """Integers and doubles of the pieces of a trim at the start of a table, a record each."""
+    record = trim_at(table, 0)
+    ints = table[record.piece_table :][: PIECE_INTS * count].reshape(-1, PIECE_INTS)
+    doubles = pool[record.piece_pool :][: PIECE_DOUBLES * count].reshape(-1, PIECE_DOUBLES)
+    return rows_of(PIECE_LINKS, ints), rows_of(PIECE_BOUNDS, doubles)
 
 
 def _largest_gap(low: Array, high: Array, period: float) -> float:
@@ -145,7 +157,7 @@ class _Pieces:
         self.ends = np.empty((len(rows), 2, 2))
         for side in range(2):
             out = np.empty((len(rows), 2))
-            layout.ends_of_pieces(self.pool, self.coefficients, self.degree, self.middle, self.t[:, side].copy(), out)
+            ends_of_pieces(self.pool, self.coefficients, self.degree, self.middle, self.t[:, side].copy(), out)
             self.ends[:, side] = out
         self._neighbors(chains, closing)
 
@@ -184,9 +196,9 @@ class _Pieces:
         crossed = np.arange(np.floor((lowest - low) / period) + 1.0, np.ceil((highest - low) / period)) * period + low
         times, points = [t0], [a]
         for level in crossed[::sign]:
-            t, x, y = layout.cut_of_piece(
+            t, x, y = cut_of_piece(
                 self.pool, int(self.coefficients[piece]), int(self.degree[piece]), float(self.middle[piece]),
-                float(t0), float(t1), axis, float(level), float(a[axis]), float(b[axis]),
+                (float(t0), float(t1)), axis, float(level), (float(a[axis]), float(b[axis])),
             )  # fmt: skip
             # Cuts along u come first: nothing has been moved along the axis itself.
             point = np.array([x, y]) + self.shift[piece]
@@ -298,39 +310,31 @@ def _table(
     low, high = pieces.ends.min(axis=1), pieces.ends.max(axis=1)
     extent = pieces.ends[:, 1] - pieces.ends[:, 0]
     first = np.searchsorted(pieces.curve, np.arange(count + 1))
-    ints = np.column_stack(
-        [
-            pieces.curve,
-            pieces.coefficients,
-            pieces.degree,
-            pieces.before,
-            pieces.after,
-            np.sign(extent).astype(np.int64),
-            np.abs(extent[:, 1]) > np.abs(extent[:, 0]),
-        ]
-    ).astype(np.int64)
-    doubles = np.column_stack(
-        [low[:, 0], high[:, 0], low[:, 1], high[:, 1], pieces.t, pieces.shift, pieces.middle, pieces.bounds,
-         pieces.ends.reshape(-1, 4)]
-    )  # fmt: skip
-    assert ints.shape[1] == PIECE_INTS and doubles.shape[1] == PIECE_DOUBLES
-    record = np.zeros(TRIM_RECORD, dtype=np.int64)
     records = pieces.records[:count]
-    piece_table = TRIM_RECORD + records.size
-    piece_pool = pieces.pool.size
-    frame_at = piece_pool + doubles.size
-    frame = np.array([*cell[0], *cell[1], *periods, ON_BOUNDARY * size, 0.0, size])
-    record[[layout.TRIM_CURVES, layout.TRIM_FIRST, layout.TRIM_ALL, layout.TRIM_PIECES]] = (
-        count,
-        TRIM_RECORD,
-        total,
-        first[-1],
+    table = np.concatenate(
+        [np.zeros(TRIM_RECORD, dtype=np.int64), records.ravel(), np.zeros(PIECE_INTS * total, dtype=np.int64), first]
     )
-    record[[layout.TRIM_PIECE_TABLE, layout.TRIM_PIECE_POOL]] = piece_table, piece_pool
-    record[[layout.TRIM_CURVE_PIECES, layout.TRIM_FRAME]] = piece_table + ints.size, frame_at
-    record[[layout.TRIM_STEPS, layout.TRIM_STEP_POOL]] = len(walk), frame_at + frame.size
-    table = np.concatenate([record, records.ravel(), ints.ravel(), first])
-    pool = np.concatenate([pieces.pool, doubles.ravel(), frame, walk.ravel()])
+    pool = np.concatenate([pieces.pool, np.zeros(PIECE_DOUBLES * total + FRAME), walk.ravel()])
+    record = trim_at(table, 0)
+    record.curves, record.first, record.all_pieces, record.pieces = count, TRIM_RECORD, total, first[-1]
+    record.piece_table, record.piece_pool = TRIM_RECORD + records.size, pieces.pool.size
+    record.curve_pieces = record.piece_table + PIECE_INTS * total
+    record.frame = pieces.pool.size + PIECE_DOUBLES * total
+    record.steps, record.step_pool = len(walk), record.frame + FRAME
+    links, bounds = _pieces(table, pool, total)
+    links.curve, links.coefficients, links.degree = pieces.curve, pieces.coefficients, pieces.degree
+    links.before, links.after = pieces.before, pieces.after
+    links.sign_u, links.sign_v = np.sign(extent).T
+    links.major = np.abs(extent[:, 1]) > np.abs(extent[:, 0])
+    bounds.box = np.stack([low, high], 2).reshape(-1, 4)
+    (bounds.t0, bounds.t1), (bounds.shift_u, bounds.shift_v) = pieces.t.T, pieces.shift.T
+    bounds.middle = pieces.middle
+    bounds.bound_1, bounds.bound_2, bounds.bound_3 = pieces.bounds.T
+    bounds.start, bounds.end = pieces.ends[:, 0], pieces.ends[:, 1]
+    frame = trim_frame_at(pool, record.frame)
+    (frame.low_u, frame.low_v), (frame.high_u, frame.high_v) = cell
+    frame.period_u, frame.period_v = periods
+    frame.on, frame.extent = ON_BOUNDARY * size, size
     left, right = np.empty(len(chains)), np.empty(len(chains))
     if chains:
         # The longest piece of every chain, and points beside its middle.
@@ -340,9 +344,7 @@ def _table(
         longest = np.array([b + int(np.argmax(lengths[b:s])) for b, s in zip(begins, stops, strict=True)])
         t = pieces.t[longest].mean(axis=1)
         point = np.empty((len(chains), 2))
-        layout.ends_of_pieces(
-            pool, pieces.coefficients[longest], pieces.degree[longest], pieces.middle[longest], t, point
-        )
+        ends_of_pieces(pool, pieces.coefficients[longest], pieces.degree[longest], pieces.middle[longest], t, point)
         point += pieces.shift[longest]
         across = np.column_stack([-extent[longest, 1], extent[longest, 0]])
         beside = max(1e-10 * size, NOISE * float(np.abs(pieces.ends).max()))
@@ -351,12 +353,11 @@ def _table(
             windings(table, pool, 0, probe[:, 0].copy(), probe[:, 1].copy(), out)
         # w is to be 1 where there is material.
         bottom = 1.0 - left[0]
-        pool[frame_at + layout.BOTTOM] += bottom
-        pool[frame_at + frame.size + 1 :: 2] += bottom
+        pool[record.step_pool + 1 :: 2] += bottom
         left, right = left + bottom, right + bottom
     else:
-        pool[frame_at + layout.BOTTOM] = 1.0
-    bottom = float(pool[frame_at + layout.BOTTOM])
+        bottom = 1.0
+    frame.bottom = bottom = float(bottom)
     across_u = float(pool[-1]) if len(walk) else bottom
     # Once around, every u is passed by as many rings, net, as the whole way in u has periods.
     rings = float(np.round(extent[:, 0].sum() / periods[0])) if periods[0] else 0.0

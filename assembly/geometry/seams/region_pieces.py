@@ -11,7 +11,7 @@ from assembly.errors import AssemblyError
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["EDGE", "POLE", "SEAM", "Piece", "Uncut", "closed_at_poles", "periods", "segment", "shifted"]
+__all__ = ["EDGE", "POLE", "SEAM", "Piece", "Uncut", "closed_at_poles", "segment", "shifted"]
 
 Array = NDArray[np.float64]
 EDGE, SEAM, POLE = "edge", "seam", "pole"
@@ -48,11 +48,6 @@ def shifted(piece: Piece, by: Array) -> None:
     piece.curve = NurbsCurve(old.control_points + by, old.knots, old.degree, old.weights, name=old.name)
 
 
-def periods(surface: NurbsSurface) -> list[float]:
-    """Of u and v; 0 where the surface is not closed."""
-    return [high - low if closed else 0.0 for (low, high), closed in zip(surface.domain, surface.closed, strict=True)]
-
-
 def _along_pole(point: Array, surface: NurbsSurface) -> tuple[int, int, float] | None:
     """The pole that a boundary ends at: its side (0, 1, 2, 3: low u, high u, low v, high v), the direction along it
     (0: u, 1: v), and the sign of that direction with the material to the left.
@@ -71,7 +66,7 @@ def closed_at_poles(chains: list[list[NurbsCurve]], surface: NurbsSurface) -> li
     A boundary that ends at a pole goes on along it, with the material to the left, to the next one that begins there.
     """
     sides = [high - low for low, high in surface.domain]
-    around = periods(surface)
+    around = surface._periods
     size = max(sides)
     done: list[list[Piece]] = []
     broken: list[list[Piece]] = []

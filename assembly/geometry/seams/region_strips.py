@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.seams.region_pieces import Piece, Uncut, periods, shifted
+from assembly.geometry.seams.region_pieces import Piece, Uncut, shifted
 from assembly.geometry.splines import bezier
 from assembly.geometry.splines.surface import NurbsSurface
 
@@ -20,16 +20,6 @@ Array = NDArray[np.float64]
 _SLACK = 1.0 / 32.0
 # Parts of a span within which a strip ends at the span's end.
 _NEAR = 1e-6
-
-
-def _divided(piece: Array, x: float) -> tuple[Array, Array]:
-    """Bezier points of the two parts of a piece (degree + 1, ...), by de Casteljau's algorithm."""
-    left, right = [piece[0]], [piece[-1]]
-    while len(piece) > 1:
-        piece = (1.0 - x) * piece[:-1] + x * piece[1:]
-        left.append(piece[0])
-        right.append(piece[-1])
-    return np.array(left), np.array(right[::-1])
 
 
 def strip(surface: NurbsSurface, axis: int, low: float, high: float) -> NurbsSurface:
@@ -51,9 +41,9 @@ def strip(surface: NurbsSurface, axis: int, low: float, high: float) -> NurbsSur
                 continue
             first, last = (low if low > a + near else a), (high if high < b - near else b)
             if last < b:
-                piece = _divided(piece, (last - a) / (b - a))[0]
+                piece = bezier.divided(piece, (last - a) / (b - a))[0]
             if first > a:
-                piece = _divided(piece, (first - a) / (last - a))[1]
+                piece = bezier.divided(piece, (first - a) / (last - a))[1]
             ends = [*ends, last] if ends else [first, last]
             pieces.append(piece)
     points = np.moveaxis(bezier.joined(np.array(pieces)), 0, axis)
@@ -62,7 +52,7 @@ def strip(surface: NurbsSurface, axis: int, low: float, high: float) -> NurbsSur
     return NurbsSurface(points[..., :3] / points[..., 3:], both, degrees, points[..., 3])
 
 
-def _continuous(row: list[Piece], around: list[float]) -> Array:
+def _continuous(row: list[Piece], around: tuple[float, float]) -> Array:
     """Move pieces by whole periods to where the ones before them end; the way from the start to the end."""
     for before, piece in zip(row, row[1:], strict=False):
         gap = before.ends[1] - piece.ends[0]
@@ -93,7 +83,7 @@ def winds(corners: Array, point: Array) -> bool:
 def opened(chains: list[list[Piece]], surface: NurbsSurface, axis: int) -> NurbsSurface:
     """The surface opened in a direction in which the region does not go round it, and the chains moved onto it."""
     low, high = surface.domain[axis]
-    around = periods(surface)
+    around = surface._periods
     period = around[axis]
     turns = [_continuous(row, around) for row in chains]
     corners = [corners_of(row) for row in chains]

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,6 +97,17 @@ def spine_of(face: Face) -> Spine | None:
     return None
 
 
+class _Piece(NamedTuple):
+    """The piece of a spine over a span of u: its start, what it is there, its length and the wire's radius."""
+
+    start: Array
+    tangent: Array
+    normal: Array
+    curvature: float
+    length: float
+    radius: float
+
+
 class _Candidate:
     """A surface whose u may run along a wire."""
 
@@ -146,8 +158,8 @@ class _Candidate:
         center = a + np.cross((p @ p) * q - (q @ q) * p, normal) / (2.0 * square)
         return center, float(np.linalg.norm(a - center))
 
-    def _piece(self, k: int) -> tuple[Array, Array, Array, float, float, float] | None:
-        """Start, tangent, normal, curvature, length and radius of the piece over a span of u."""
+    def _piece(self, k: int) -> _Piece | None:
+        """The piece over a span of u, if it is a line or an arc."""
         low, high = self.at_u[k], self.at_u[k + 1]
         (a, radius), (b, _), (c, _) = (self._center(u) for u in (low, 0.5 * (low + high), high))
         chord = c - a
@@ -161,7 +173,7 @@ class _Candidate:
             across = self.surface.evaluate(low, self.at_v[0]) - a
             across = across - across @ tangent * tangent
             wide = float(np.linalg.norm(across))
-            return (a, tangent, across / wide, 0.0, length, radius) if wide > 0.0 else None
+            return _Piece(a, tangent, across / wide, 0.0, length, radius) if wide > 0.0 else None
         # An arc: its middle is above that of the chord.
         bend = 8.0 * rise / (length * length + 4.0 * rise * rise)
         half = 2.0 * np.arctan2(2.0 * rise, length)
@@ -170,7 +182,7 @@ class _Candidate:
         ahead, up = chord / length, -off / rise
         tangent = np.cos(half) * ahead - np.sin(half) * up
         normal = np.sin(half) * ahead + np.cos(half) * up
-        return a, tangent, normal, bend, 2.0 * half / bend, radius
+        return _Piece(a, tangent, normal, bend, 2.0 * half / bend, radius)
 
     def _fits(self, spine: Spine, piece: int, span: int) -> bool:
         """Whether the surface over a span of u is the wire around a piece."""

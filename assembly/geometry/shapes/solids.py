@@ -220,14 +220,7 @@ def plate(x: float, y: float, z: float, holes: Iterable[ArrayLike] = ()) -> tupl
 
 
 def plate_with_slot(
-    x: float,
-    y: float,
-    z: float,
-    length: float,
-    width: float,
-    *,
-    center: ArrayLike = (0.0, 0.0),
-    angle: float = 0.0,
+    x: float, y: float, z: float, length: float, width: float, *, center: ArrayLike = (0.0, 0.0), angle: float = 0.0
 ) -> tuple[Face, ...]:
     """A box about the origin with a slot through it along z; the slot has round ends.
 

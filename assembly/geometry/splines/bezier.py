@@ -188,6 +188,16 @@ def joined(bezier: Array) -> Array:
     return np.concatenate([inner, bezier[-1, -1:]])
 
 
+def divided(points: Array, x: float) -> tuple[Array, Array]:
+    """De Casteljau's algorithm: Bezier points of both parts of a piece (degree + 1, ...), cut at x in [0, 1]."""
+    left, right = np.empty_like(points), np.empty_like(points)
+    last = len(points) - 1
+    for k in range(last + 1):
+        left[k], right[last - k] = points[0], points[-1]
+        points = (1.0 - x) * points[:-1] + x * points[1:]
+    return left, right
+
+
 @lru_cache(maxsize=64)
 def power_matrix(degree: int) -> Array:
     """Matrix of integers from Bezier points to powers about the middle of a span.

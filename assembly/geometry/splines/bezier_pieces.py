@@ -27,10 +27,6 @@ BEZIER_CURVE = record_dtype(
     square_binomials=1,  # where in the pool binomials of twice the degree begin
 )
 bezier_curve_at = record_view(BEZIER_CURVE)
-DEGREE = place_of(BEZIER_CURVE, "degree")
-RATIONAL = place_of(BEZIER_CURVE, "rational")
-BREAKS = place_of(BEZIER_CURVE, "breaks")
-PIECES = place_of(BEZIER_CURVE, "pieces")
 RECORD = size_of(BEZIER_CURVE)
 # The head of its pool.
 BEZIER_HEAD = record_dtype(

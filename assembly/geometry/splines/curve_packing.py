@@ -35,7 +35,7 @@ def packed_curves(curves: Sequence[NurbsCurve]) -> tuple[Array, Array, Ints]:
     bezier, pool = np.empty(3 * int(room.sum())), np.empty(int((4 * room + count - degree + 1).sum()))
     records = np.empty((len(curves), CURVE_RECORD), dtype=np.int64)
     filled, used, finite = bezier_tables(
-        points, weights, knots, shape, _power_matrices(), COINCIDENT, bezier, pool, records
+        (points, weights, knots), shape, _power_matrices(), COINCIDENT, bezier, pool, records
     )
     if not finite:
         raise InputError("knots span a domain too short for doubles at this degree; expected a scale nearer to one")

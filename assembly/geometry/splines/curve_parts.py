@@ -22,16 +22,6 @@ def sampled(breaks: Array, count: int) -> Array:
     return np.unique(np.concatenate([np.linspace(a, b, count) for a, b in zip(breaks[:-1], breaks[1:], strict=True)]))
 
 
-def _cut(points: Array, x: float) -> tuple[Array, Array]:
-    """De Casteljau's algorithm: Bezier points of both parts of a piece (degree + 1, d), cut at x in [0, 1]."""
-    left, right = np.empty_like(points), np.empty_like(points)
-    last = len(points) - 1
-    for k in range(last + 1):
-        left[k], right[last - k] = points[0], points[-1]
-        points = (1.0 - x) * points[:-1] + x * points[1:]
-    return left, right
-
-
 def between(curve: NurbsCurve, low: float, high: float) -> NurbsCurve:
     """The part of a curve over [low, high] of its domain, in the same parameter.
 
@@ -48,11 +38,11 @@ def between(curve: NurbsCurve, low: float, high: float) -> NurbsCurve:
     pieces = curve.bezier_pieces()[first:last].copy()
     breaks = at[first : last + 1].copy()
     if high < breaks[-1]:
-        pieces[-1] = _cut(pieces[-1], (high - breaks[-2]) / (breaks[-1] - breaks[-2]))[0]
+        pieces[-1] = bezier.divided(pieces[-1], (high - breaks[-2]) / (breaks[-1] - breaks[-2]))[0]
         breaks[-1] = high
     if low > breaks[0]:
         # The first piece may be the last one too, and has a new end then.
-        pieces[0] = _cut(pieces[0], (low - breaks[0]) / (breaks[1] - breaks[0]))[1]
+        pieces[0] = bezier.divided(pieces[0], (low - breaks[0]) / (breaks[1] - breaks[0]))[1]
         breaks[0] = low
     points = bezier.joined(pieces)
     knots = bezier.full_knots(breaks, curve.degree)

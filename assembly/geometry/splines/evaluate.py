@@ -12,6 +12,8 @@ Records of surfaces and curves stand in the table of integers; what they point t
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes, store_xyz
 from assembly._record import Store, place_of, record_dtype, record_view, size_of
@@ -35,8 +37,6 @@ SURFACE = record_dtype(
 )
 surface_at = record_view(SURFACE)
 SURFACE_RECORD = size_of(SURFACE)
-DEGREE_U = place_of(SURFACE, "degree_u")
-DEGREE_V = place_of(SURFACE, "degree_v")
 SPANS_U = place_of(SURFACE, "spans_u")
 SPANS_V = place_of(SURFACE, "spans_v")
 BREAKS_U = place_of(SURFACE, "breaks_u")
@@ -47,7 +47,6 @@ CLOSED_V = place_of(SURFACE, "closed_v")
 SIGN = place_of(SURFACE, "sign")
 CELLS = place_of(SURFACE, "cells")
 CELL_COUNT = place_of(SURFACE, "cell_count")
-POLES = place_of(SURFACE, "poles")
 # A curve in the table.
 CURVE = record_dtype(
     "i8",
@@ -102,14 +101,18 @@ def _row3(pool, o, t):
     return a + t * (b + t * (c + t * d)), b + t * (2.0 * c + t * (3.0 * d)), 2.0 * c + (6.0 * t) * d
 
 
+# A value at parameters (u, v) and its derivatives: lanes, or points (x, y, z).
+SurfaceJet = namedtuple("SurfaceJet", "point u v uu uv vv")
+
+
 @kernel(inline=True)
 def _bicubic(pool, o, s, t):
-    """Homogeneous value and derivatives (A, Au, Av, Auu, Auv, Avv) of a bicubic piece."""
+    """The homogeneous SurfaceJet of a bicubic piece."""
     a, av, avv = _row3(pool, o, t)
     b, bv, bvv = _row3(pool, o + 16, t)
     c, cv, cvv = _row3(pool, o + 32, t)
     d, dv, dvv = _row3(pool, o + 48, t)
-    return (
+    return SurfaceJet(
         a + s * (b + s * (c + s * d)),
         b + s * (2.0 * c + s * (3.0 * d)),
         av + s * (bv + s * (cv + s * dv)),
@@ -134,7 +137,7 @@ def _row(pool, o, degree, t):
 
 @kernel(inline=True)
 def _any_degree(pool, o, degree_u, degree_v, s, t):
-    """Homogeneous value and derivatives for any degree, Horner in u over Horner in v."""
+    """The same for any degree, Horner in u over Horner in v."""
     stride = 4 * (degree_v + 1)
     p, pv, pvv = _row(pool, o + stride * degree_u, degree_v, t)
     d = 0.0 * p
@@ -148,31 +151,31 @@ def _any_degree(pool, o, degree_u, degree_v, s, t):
         p = a + s * p
         pv = av + s * pv
         pvv = avv + s * pvv
-    return p, d, pv, 2.0 * h, dv, 2.0 * pvv
+    return SurfaceJet(p, d, pv, 2.0 * h, dv, 2.0 * pvv)
 
 
 @kernel(inline=True)
-def _quotient(a, au, av, auu, auv, avv):
-    """Divide by the weight: rational derivatives from homogeneous ones."""
-    i = 1.0 / lane(a, 3)
-    wu = lane(au, 3)
-    wv = lane(av, 3)
-    p = i * a
-    pu = i * (au - wu * p)
-    pv = i * (av - wv * p)
-    return (
+def _quotient(a):
+    """Divide a homogeneous SurfaceJet by the weight."""
+    i = 1.0 / lane(a.point, 3)
+    wu = lane(a.u, 3)
+    wv = lane(a.v, 3)
+    p = i * a.point
+    pu = i * (a.u - wu * p)
+    pv = i * (a.v - wv * p)
+    return SurfaceJet(
         p,
         pu,
         pv,
-        i * (auu - (2.0 * wu) * pu - lane(auu, 3) * p),
-        i * (auv - wu * pv - wv * pu - lane(auv, 3) * p),
-        i * (avv - (2.0 * wv) * pv - lane(avv, 3) * p),
+        i * (a.uu - (2.0 * wu) * pu - lane(a.uu, 3) * p),
+        i * (a.uv - wu * pv - wv * pu - lane(a.uv, 3) * p),
+        i * (a.vv - (2.0 * wv) * pv - lane(a.vv, 3) * p),
     )
 
 
 @kernel(inline=True)
 def surface_lanes(store, r, u, v):
-    """S, Su, Sv, Suu, Suv, Svv of the surface whose record starts at r, as four-lane values."""
+    """The SurfaceJet of the surface whose record starts at r, as four-lane values."""
     patch = surface_at(store.table, r)
     iu = find_span(store.pool, patch.breaks_u, patch.spans_u, u)
     iv = find_span(store.pool, patch.breaks_v, patch.spans_v, v)
@@ -184,10 +187,8 @@ def surface_lanes(store, r, u, v):
     q = patch.degree_v
     o = patch.coefficients + 4 * (p + 1) * (q + 1) * (iu * patch.spans_v + iv)
     if p == 3 and q == 3:
-        a, au, av, auu, auv, avv = _bicubic(store.pool, o, s, t)
-    else:
-        a, au, av, auu, auv, avv = _any_degree(store.pool, o, p, q, s, t)
-    return _quotient(a, au, av, auu, auv, avv)
+        return _quotient(_bicubic(store.pool, o, s, t))
+    return _quotient(_any_degree(store.pool, o, p, q, s, t))
 
 
 @kernel(inline=True)
@@ -197,9 +198,9 @@ def xyz(a):
 
 @kernel(signatures="(i8[::1], f8[::1], i8, f8, f8)")
 def surface_point(table, pool, r, u, v):
-    """S, Su, Sv, Suu, Suv, Svv as 3-tuples."""
-    a, au, av, auu, auv, avv = surface_lanes(Store(table, pool), r, u, v)
-    return xyz(a), xyz(au), xyz(av), xyz(auu), xyz(auv), xyz(avv)
+    """The SurfaceJet of the surface whose record starts at r, as points."""
+    a = surface_lanes(Store(table, pool), r, u, v)
+    return SurfaceJet(xyz(a.point), xyz(a.u), xyz(a.v), xyz(a.uu), xyz(a.uv), xyz(a.vv))
 
 
 @kernel(inline=True)
@@ -237,16 +238,16 @@ def evaluate_surface(table, pool, u, v, order, out):
         y, fits = into_domain(pool, patch.breaks_v, patch.spans_v, patch.closed_v, v[i])
         if not fits:
             return 2 * i + 1
-        a, au, av, auu, auv, avv = surface_lanes(Store(table, pool), 0, x, y)
+        a = surface_lanes(Store(table, pool), 0, x, y)
         o = 3 * i
-        store_xyz(a, out, o)
+        store_xyz(a.point, out, o)
         if order >= 1:
-            store_xyz(au, out, o + block)
-            store_xyz(av, out, o + 2 * block)
+            store_xyz(a.u, out, o + block)
+            store_xyz(a.v, out, o + 2 * block)
         if order >= 2:
-            store_xyz(auu, out, o + 3 * block)
-            store_xyz(auv, out, o + 4 * block)
-            store_xyz(avv, out, o + 5 * block)
+            store_xyz(a.uu, out, o + 3 * block)
+            store_xyz(a.uv, out, o + 4 * block)
+            store_xyz(a.vv, out, o + 5 * block)
     return -1
 
 

@@ -18,24 +18,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.errors import InputError, integer, number
 from assembly.geometry.expression.formula import (
-    ARC_PLAIN,
-    ARC_TAPE,
-    CONTINUOUS,
-    DIMENSION,
     FORMULA_POOL,
     FORMULA_RECORD,
-    HAS_RANGE,
-    POINT_TAPE,
-    RANGE_TAPE,
-    ROOM,
     WORK_AT,
     arc_bounds,
+    formula_at,
     formula_points,
     formula_ranges,
 )
 from assembly.geometry.expression.instructions import compact, instructions, packed
 from assembly.geometry.expression.rounding import apart, upper_expression
-from assembly.geometry.expression.tape import CONSTANTS, WORK
+from assembly.geometry.expression.tape import tape_at
 from assembly.geometry.splines.curve import COINCIDENT, checked_name, parameters
 
 if TYPE_CHECKING:
@@ -118,7 +111,7 @@ class FormulaCurve:
         self._table, self._pool = _packed_record(
             column, parameter, self.domain, slope, _arc_expression(arc_length, self.domain), self.error
         )
-        self._room = np.zeros(int(self._table[ROOM]))
+        self._room = np.zeros(int(formula_at(self._table, 0).room))
         self._has_arc = arc_length is not None
         at = np.linspace(*self.domain, _LOOKS)
         out = np.empty((_LOOKS, 9))
@@ -363,22 +356,22 @@ def _packed_record(
         programs.append(compact("arc", arc[0], arc[1] if plain is None else plain))
     table = [np.zeros(FORMULA_RECORD, dtype=np.int64)]
     pool = [np.array([*domain, error, 0.0, 0.0, 0.0])]
-    head = table[0]
-    head[DIMENSION], head[HAS_RANGE] = column.size1(), slope is None
-    head[CONTINUOUS] = not _JUMPS & {name for name, _out, _in in instructions(compact("curve", parameter, column))}
+    head = formula_at(table[0], 0)
+    head.dimension, head.has_range = column.size1(), slope is None
+    head.continuous = not _JUMPS & {name for name, _out, _in in instructions(compact("curve", parameter, column))}
     used, constants, work = FORMULA_RECORD, FORMULA_POOL, 0
-    for place, program in zip((POINT_TAPE, RANGE_TAPE, ARC_TAPE), programs, strict=False):
+    for name, program in zip(("point_tape", "range_tape", "arc_tape"), programs, strict=False):
         tape = packed(program)
-        if place == ARC_TAPE and plain is not None:
-            head[ARC_PLAIN] = 1
+        if name == "arc_tape" and plain is not None:
+            head.arc_plain = 1
             tape = apart(tape)
-        head[place] = used
+        head[name] = used
         row = tape.table.copy()
-        row[CONSTANTS] = constants
-        work = max(work, int(row[WORK]))
+        tape_at(row, 0).constants = constants
+        work = max(work, int(tape_at(row, 0).work))
         table.append(row)
         pool.append(tape.constants)
         used += row.size
         constants += tape.constants.size
-    head[ROOM] = WORK_AT + 2 * work
+    head.room = WORK_AT + 2 * work
     return np.concatenate(table), np.concatenate(pool)

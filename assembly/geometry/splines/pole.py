@@ -16,10 +16,7 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly.geometry.splines.evaluate import (
-    surface_at,
-    surface_point,
-)
+from assembly.geometry.splines.evaluate import surface_at, surface_point
 from assembly.geometry.vec import add, blend, cross, dot, scale, sub
 
 # The polar chart is left for the pole's own within this part of the domain: its error is the third power.

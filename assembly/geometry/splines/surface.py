@@ -119,6 +119,12 @@ class NurbsSurface(ReadOnlyArrays):
         v = self._same_edge(pieces[:, 0, :, 0], pieces[:, -1, :, -1])
         return u, v
 
+    @cached_property
+    def _periods(self) -> tuple[float, float]:
+        """Periods of u and v, 0 where the surface is not closed."""
+        (a, b), (c, d) = self.domain
+        return (b - a if self.closed[0] else 0.0, d - c if self.closed[1] else 0.0)
+
     def _same_edge(self, first: Array, last: Array) -> bool:
         """Whether two edges (spans, degree + 1, 4), homogeneous, are one curve and not one point."""
         # Two rational pieces of degree q that agree at 2 q + 1 points are equal.

@@ -23,6 +23,7 @@ from assembly.proximity.brep.records import (
     FACE_RECORD,
     VERTEX,
     VERTEX_RECORD,
+    Feature,
     edge_at,
     face_at,
     shell_at,
@@ -40,7 +41,7 @@ def feature_kind(table, shell, code):
 
 @kernel(inline=True)
 def feature_at(table, shell, code):
-    """What `solve_features` takes: the surface record of a face, the record of an edge or a vertex."""
+    """The surface record of a face, the record of an edge or a vertex."""
     solid = shell_at(table, shell)
     faces = solid.faces
     edges = solid.edges
@@ -49,6 +50,12 @@ def feature_at(table, shell, code):
     if code < faces + edges:
         return solid.edge_table + EDGE_RECORD * (code - faces)
     return solid.vertex_table + VERTEX_RECORD * (code - faces - edges)
+
+
+@kernel(inline=True)
+def feature_of(store, shell, code):
+    """The `Feature` of a number."""
+    return Feature(feature_kind(store.table, shell, code), feature_at(store.table, shell, code))
 
 
 # A point of an edge on one of its faces. u, v: in the domain; point: of the surface; tangent: of the edge, by the

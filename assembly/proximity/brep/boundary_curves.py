@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.geometry.faces.face import Face
-from assembly.geometry.faces.trim_pieces import TRIM_FIRST
+from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import CORNER, between, crease_knots
 from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, COEFFICIENTS, CURVE_RECORD, SPANS_U, SPANS_V
@@ -131,7 +131,7 @@ class Survey:
             self.spans.append(int(record[SPANS_U] + record[SPANS_V]))
             add(record, pool)
             table, pool = face.packed_trim(at[0], at[1])
-            self.curves.append(int(table[TRIM_FIRST]))
+            self.curves.append(int(trim_at(table, 0).first))
             add(table, pool)
         self.table, self.pool = np.concatenate(tables), np.concatenate(pools)
 
@@ -222,13 +222,8 @@ class Batch:
         samples = np.concatenate([boundary.samples for boundary in self.rims])
         out = np.empty((which.size, 2))
         nearest_on_boundaries(
-            self.survey.table,
-            self.survey.pool,
-            self.surfaces,
-            self.curves,
-            closed,
-            begins,
-            samples,
+            (self.survey.table, self.survey.pool),
+            (self.surfaces, self.curves, closed, begins, samples),
             np.ascontiguousarray(which),
             np.ascontiguousarray(points),
             np.ascontiguousarray(guess),

@@ -53,17 +53,21 @@ def _nearest_sample(samples, first, stop, p):
 
 @kernel(
     signatures=(
-        "(i8[::1], f8[::1], i8[::1], i8[::1], b1[::1], i8[::1], f8[:, ::1], i8[::1], f8[:, ::1], f8[::1], f8, "
-        "f8[:, ::1])"
+        "(Tuple((i8[::1], f8[::1])), Tuple((i8[::1], i8[::1], b1[::1], i8[::1], f8[:, ::1])), i8[::1], f8[:, ::1], "
+        "f8[::1], f8, f8[:, ::1])"
     ),
 )
-def nearest_on_boundaries(table, pool, surfaces, curves, closed, begins, samples, which, points, guess, close, out):
-    """Nearest points of curves `which` to points near them: rows of the parameter and the distance.
+def nearest_on_boundaries(store, boundaries, which, points, guess, close, out):
+    """Nearest points of boundary curves `which` to points near them: rows of the parameter and the distance.
+
+    `boundaries` are the surfaces and the curves, whether these are closed, where their samples (t, x, y, z) begin, and
+    the samples.
 
     Gauss and Newton's iteration, which converges quadratically for points on the curve: from the guess if it is right
     to `close`, else from the nearest of the curve's samples. Distances are measured a step before the parameter.
     """
-    store = Store(table, pool)
+    table, pool = store
+    surfaces, curves, closed, begins, samples = boundaries
     for i in range(which.size):
         k = which[i]
         p = (points[i, 0], points[i, 1], points[i, 2])
@@ -72,7 +76,7 @@ def nearest_on_boundaries(table, pool, surfaces, curves, closed, begins, samples
         low = samples[first, 0]
         high = samples[stop - 1, 0]
         t = guess[i]
-        c, rate, _normal = _jet(store, surfaces[k], curves[k], t)
+        c, rate, _normal = _jet(Store(table, pool), surfaces[k], curves[k], t)
         gap = sub(p, c)
         best = t
         least = math.sqrt(dot(gap, gap))
@@ -80,7 +84,7 @@ def nearest_on_boundaries(table, pool, surfaces, curves, closed, begins, samples
             t = samples[_nearest_sample(samples, first, stop, p), 0]
             least = math.inf
             for _ in range(_NEWTON_STEPS):
-                c, rate, _normal = _jet(store, surfaces[k], curves[k], t)
+                c, rate, _normal = _jet(Store(table, pool), surfaces[k], curves[k], t)
                 gap = sub(p, c)
                 distance = math.sqrt(dot(gap, gap))
                 speed = max(dot(rate, rate), 1e-300)

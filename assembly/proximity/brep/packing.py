@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from assembly._record import rows_of
 from assembly.errors import positive
 from assembly.geometry.faces.face import Face
-from assembly.geometry.faces.trim_pieces import TRIM_FIRST
+from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.evaluate import CELL_SIZE, CELLS, COEFFICIENTS, CURVE_RECORD, OFFSETS
 from assembly.proximity.brep import records as shell
 from assembly.proximity.brep.edge_cells import edge_cells, outside_cells
@@ -94,7 +94,7 @@ def _face(writer: Writer, face: Face, flags: Array, edges: Sequence[int | None],
     packed.trim = curves = -1
     if face.boundary:
         table, pool = face.packed_trim(writer.table_at, writer.pool_at)
-        curves = int(table[TRIM_FIRST])
+        curves = int(trim_at(table, 0).first)
         packed.trim, _ = writer.add(table, pool)
     packed.edges, _ = writer.add([-1 if edge is None else edge for edge in edges])
     _, packed.cell_flags = writer.add(pool=flags)

@@ -11,10 +11,15 @@ t_b = m0 + m1 t, to first order. An edge that is closed smoothly has no vertices
 
 from __future__ import annotations
 
-from assembly._record import place_of, record_dtype, record_view, size_of
+from collections import namedtuple
+
+from assembly._record import record_dtype, record_view, size_of
 
 # Kinds of features; and a point of an edge, or of a face, that stays where it is on it.
 FACE, EDGE, VERTEX, EDGE_POINT, FACE_POINT = 0, 1, 2, 3, 4
+# A feature, or a point of one, by its kind and by where the record of its surface, its edge or its vertex is in the
+# table.
+Feature = namedtuple("Feature", "kind record")
 # A header: numbers of features, and where their records begin in the table.
 SHELL_DTYPE = record_dtype(
     "i8",
@@ -26,9 +31,6 @@ SHELL_DTYPE = record_dtype(
     vertex_table=1,
 )
 shell_at = record_view(SHELL_DTYPE)
-FACES = place_of(SHELL_DTYPE, "faces")
-EDGES = place_of(SHELL_DTYPE, "edges")
-EDGE_TABLE = place_of(SHELL_DTYPE, "edge_table")
 SHELL = size_of(SHELL_DTYPE)
 # A face.
 FACE_DTYPE = record_dtype(
@@ -39,10 +41,6 @@ FACE_DTYPE = record_dtype(
     cell_flags=1,  # in the pool a flag for every cell of the surface; 0: all of it is outside the trim
 )
 face_at = record_view(FACE_DTYPE)
-FACE_SURFACE = place_of(FACE_DTYPE, "surface")
-FACE_TRIM = place_of(FACE_DTYPE, "trim")
-FACE_EDGES = place_of(FACE_DTYPE, "edges")
-FACE_CELL_FLAGS = place_of(FACE_DTYPE, "cell_flags")
 FACE_RECORD = size_of(FACE_DTYPE)
 # An edge, S_a(c_a(t)).
 EDGE_DTYPE = record_dtype(
@@ -60,17 +58,6 @@ EDGE_DTYPE = record_dtype(
     cell_count=1,
 )
 edge_at = record_view(EDGE_DTYPE)
-EDGE_SURFACE = place_of(EDGE_DTYPE, "surface")
-EDGE_CURVE = place_of(EDGE_DTYPE, "curve")
-EDGE_FACE_A = place_of(EDGE_DTYPE, "face_a")
-EDGE_FACE_B = place_of(EDGE_DTYPE, "face_b")
-EDGE_SURFACE_B = place_of(EDGE_DTYPE, "surface_b")
-EDGE_CURVE_B = place_of(EDGE_DTYPE, "curve_b")
-EDGE_MAP = place_of(EDGE_DTYPE, "map")
-EDGE_START = place_of(EDGE_DTYPE, "start")
-EDGE_END = place_of(EDGE_DTYPE, "end")
-EDGE_CELLS = place_of(EDGE_DTYPE, "cells")
-EDGE_CELL_COUNT = place_of(EDGE_DTYPE, "cell_count")
 EDGE_RECORD = size_of(EDGE_DTYPE)
 # Doubles a cell of an edge: t from and to, center of its sphere, radius.
 EDGE_CELL_SIZE = 6
@@ -84,9 +71,4 @@ VERTEX_DTYPE = record_dtype(
     face_list=1,  # where these are in the table
 )
 vertex_at = record_view(VERTEX_DTYPE)
-VERTEX_POINT = place_of(VERTEX_DTYPE, "point")
-VERTEX_EDGES = place_of(VERTEX_DTYPE, "edges")
-VERTEX_EDGE_LIST = place_of(VERTEX_DTYPE, "edge_list")
-VERTEX_FACES = place_of(VERTEX_DTYPE, "faces")
-VERTEX_FACE_LIST = place_of(VERTEX_DTYPE, "face_list")
 VERTEX_RECORD = size_of(VERTEX_DTYPE)

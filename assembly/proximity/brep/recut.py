@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from assembly.geometry.faces.boundary import periods, segment
+from assembly.geometry.faces.boundary import segment
 from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.loop import TOLERANCE, Loop
 from assembly.geometry.splines.curve import NurbsCurve
@@ -51,7 +51,7 @@ def with_cuts(face: Face, parts: Sequence[Sequence[NurbsCurve]]) -> Face:
         (a, b), (c, d) = face.surface.domain
         corners = np.array([[a, c], [b, c], [b, d], [a, d]])
         edges = [segment(corners[k], corners[(k + 1) % 4]) for k in range(4)]
-        outer = Loop.unchecked(edges, TOLERANCE, periods(face.surface), "outer")
+        outer = Loop.unchecked(edges, TOLERANCE, face.surface._periods, "outer")
     boundary = face.boundary
     return Face(
         face.surface,

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Writer"]
+from assembly.proximity.brep.records import EDGE_RECORD, edge_at
+
+__all__ = ["Writer", "edge_over"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -44,3 +46,12 @@ class Writer:
     def arrays(self) -> tuple[Table, Array]:
         """All that was added."""
         return np.concatenate(self._table), np.concatenate(self._pool)
+
+
+def edge_over(surface: int, curve: int, endless: bool) -> Table:
+    """An edge by itself: a curve on a surface, or in space with surface -1."""
+    edge = np.full(EDGE_RECORD, -1, dtype=np.int64)
+    record = edge_at(edge, 0)
+    record.surface, record.curve = surface, curve
+    record.start = record.end = -1 if endless else 0
+    return edge

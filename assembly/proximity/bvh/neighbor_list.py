@@ -13,13 +13,14 @@ and a table is one's own.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.vec import add, dot, matvec, sub
-from assembly.proximity.bvh.tree import node_at, pairs_about, still_within, three_of, tree_at
+from assembly.proximity.bvh.tree import pairs_about, still_within, three_of, tree_node
 
 # A list in the table. Lengths are multiples of GRAIN; pairs of elements (k, 2) follow.
 NEIGHBOR_LIST = record_dtype(
@@ -32,8 +33,6 @@ NEIGHBOR_LIST = record_dtype(
     reach=1,  # query margin
 )
 neighbor_list_at = record_view(NEIGHBOR_LIST)
-OWNER = place_of(NEIGHBOR_LIST, "owner")
-COUNT = place_of(NEIGHBOR_LIST, "count")
 ENTRIES = size_of(NEIGHBOR_LIST)
 # An entry: elements of the two bodies that may be near.
 NEIGHBORS = record_dtype("i8", f=1, g=1)
@@ -46,17 +45,20 @@ LIST_INTS = ENTRIES + ENTRY * ROOM
 GRAIN, FAR = 2.0**-48, 1000.0
 
 
-@kernel(inner=True)
-def moved_since(store, at, p, moving):
-    """How far the body that moves is at most from where it was when the list at `at` was made; infinite for another's.
+# Which list it is, and who asks for it. at: where it is in the table; owner: the number of a pair of bodies; moving:
+# the one whose motion is measured (`manager/motion_bounds.Mover`).
+ListKey = namedtuple("ListKey", "at owner moving")
 
-    `moving` is the body whose motion is measured (`manager/motion_bounds.Mover`).
-    """
-    neighbors = neighbor_list_at(store.table, at)
-    if neighbors.owner != p:
+
+@kernel(inner=True)
+def moved_since(store, key):
+    """How far the body that moves is at most from where it was when its list was made; infinite for another's."""
+    neighbors = neighbor_list_at(store.table, key.at)
+    moving = key.moving
+    if neighbors.owner != key.owner:
         return math.inf
-    root = tree_at(store.table, moving.tree).node_pool
-    middle = add(matvec(moving.turn, three_of(node_at(store.pool, root).center)), moving.shift)
+    root = tree_node(store, moving.tree, 0)
+    middle = add(matvec(moving.turn, three_of(root.center)), moving.shift)
     e = moving.quaternion
     square = 0.0
     other = 0.0
@@ -65,7 +67,7 @@ def moved_since(store, at, p, moving):
         square += (e[k] - was) * (e[k] - was)
         other += (e[k] + was) * (e[k] + was)
     way = sub(middle, (GRAIN * neighbors.place[0], GRAIN * neighbors.place[1], GRAIN * neighbors.place[2]))
-    return math.sqrt(dot(way, way)) + 2.0 * node_at(store.pool, root).radius * math.sqrt(min(square, other))
+    return math.sqrt(dot(way, way)) + 2.0 * root.radius * math.sqrt(min(square, other))
 
 
 @kernel(inner=True)
@@ -82,18 +84,19 @@ def reaches(table, at, moved, reach):
 @kernel(inner=True)
 def can_be_listed(store, moving, reach):
     """Whether lengths of a list are in its range."""
-    root = tree_at(store.table, moving.tree).node_pool
-    middle = add(matvec(moving.turn, three_of(node_at(store.pool, root).center)), moving.shift)
-    return dot(middle, middle) < FAR * FAR and reach < FAR and node_at(store.pool, root).radius < FAR
+    root = tree_node(store, moving.tree, 0)
+    middle = add(matvec(moving.turn, three_of(root.center)), moving.shift)
+    return dot(middle, middle) < FAR * FAR and reach < FAR and root.radius < FAR
 
 
 @kernel(inner=True)
-def write_list(store, at, p, moving, reach, ring, found, count):
+def write_list(store, key, reach, ring, found, count):
     """Keep `count` pairs (k, 2), made for motions up to `ring`; none where there is no room. Whether there was."""
-    neighbors = neighbor_list_at(store.table, at)
-    root = node_at(store.pool, tree_at(store.table, moving.tree).node_pool)
+    moving = key.moving
+    neighbors = neighbor_list_at(store.table, key.at)
+    root = tree_node(store, moving.tree, 0)
     middle = add(matvec(moving.turn, three_of(root.center)), moving.shift)
-    neighbors.owner = p
+    neighbors.owner = key.owner
     for k in range(4):
         neighbors.turn[k] = np.int64(moving.quaternion[k] / GRAIN)
     for k in range(3):
@@ -106,27 +109,25 @@ def write_list(store, at, p, moving, reach, ring, found, count):
         return False
     neighbors.count = count
     for k in range(count):
-        entry = neighbors_at(store.table, at + ENTRIES + ENTRY * k)
+        entry = neighbors_at(store.table, key.at + ENTRIES + ENTRY * k)
         entry.f = found[k, 0]
         entry.g = found[k, 1]
     return True
 
 
 @kernel(inner=True)
-def listed_pairs(store, at, p, trees, pose, moving, reach, ring, stack, candidates):
-    """What `pairs_within` finds, from the list at `at`, which is made anew where it does not reach.
+def listed_pairs(store, key, trees, pose, reach, ring, stack, candidates):
+    """What `pairs_within` finds, from the list of a `ListKey`, which is made anew where it does not reach.
 
-    The pose is that of g seen from f; `moving` is a Mover (`manager/motion_bounds.py`), and
-    a new list is for motions of it up to `ring`. -1 where there is no room for a list.
+    The pose is that of g seen from f; a new list is for motions up to `ring`. -1 where there is no room for a list.
     """
-    fits = reaches(store.table, at, moved_since(store, at, p, moving), reach)
-    if fits < 0 or (fits == 0 and not can_be_listed(store, moving, ring + reach)):
+    fits = reaches(store.table, key.at, moved_since(store, key), reach)
+    if fits < 0 or (fits == 0 and not can_be_listed(store, key.moving, ring + reach)):
         return -1
     if fits == 0:
-        tilt = ring / node_at(store.pool, tree_at(store.table, moving.tree).node_pool).radius
-        count = pairs_about(store, trees[0], trees[1], pose, reach, ring, tilt, stack, candidates)
-        if not write_list(store, at, p, moving, reach, ring, candidates, count):
+        tilt = ring / tree_node(store, key.moving.tree, 0).radius
+        count = pairs_about(store, trees, pose, reach, ring, tilt, stack, candidates)
+        if not write_list(store, key, reach, ring, candidates, count):
             return -1
-    return still_within(
-        store, trees[0], trees[1], pose, reach, at + ENTRIES, neighbor_list_at(store.table, at).count, candidates
-    )
+    count = neighbor_list_at(store.table, key.at).count
+    return still_within(store, trees, pose, reach, key.at + ENTRIES, count, candidates)

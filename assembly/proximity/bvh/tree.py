@@ -16,13 +16,14 @@ and the shift are those of g relative to f.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._record import Store, place_of, record_dtype, record_view, size_of
-from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, scale, sub
-from assembly.kinematics.motion import RelativePose
+from assembly._record import Store, record_dtype, record_view, size_of
+from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
+from assembly.kinematics.motion import RelativePose, inverse_pose
 
 # The header of a tree in the table.
 TREE_DTYPE = record_dtype(
@@ -34,10 +35,6 @@ TREE_DTYPE = record_dtype(
     element_pool=1,  # where these begin in the pool
 )
 tree_at = record_view(TREE_DTYPE)
-NODES = place_of(TREE_DTYPE, "nodes")
-NODE_TABLE = place_of(TREE_DTYPE, "node_table")
-NODE_POOL = place_of(TREE_DTYPE, "node_pool")
-ELEMENT_POOL = place_of(TREE_DTYPE, "element_pool")
 TREE = size_of(TREE_DTYPE)
 # A node in the table.
 NODE_LINKS = record_dtype(
@@ -58,10 +55,6 @@ NODE_BOUNDS = record_dtype(
     radius=1,  # of the ball
 )
 node_at = record_view(NODE_BOUNDS)
-CENTER = place_of(NODE_BOUNDS, "center")
-COS = place_of(NODE_BOUNDS, "cosine")
-SIN = place_of(NODE_BOUNDS, "sine")
-RADIUS = place_of(NODE_BOUNDS, "radius")
 NODE = size_of(NODE_BOUNDS)
 # An element in the pool: a patch of a face, a part of an edge, or a vertex.
 ELEMENT_DTYPE = record_dtype(
@@ -72,7 +65,6 @@ ELEMENT_DTYPE = record_dtype(
     node=1,  # its node
 )
 element_at = record_view(ELEMENT_DTYPE)
-ELEMENT_FEATURE = place_of(ELEMENT_DTYPE, "feature")
 ELEMENT = size_of(ELEMENT_DTYPE)
 # Rounding of unit vectors and of coordinates, relative: what is in doubt is kept.
 ROUNDING = 1e-13
@@ -111,11 +103,6 @@ def magnitudes(m):
 
 
 @kernel(inline=True)
-def transposed(m):
-    return (m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
-
-
-@kernel(inline=True)
 def off_axis(d, dd, axis, c, s, r):
     """Whether the point d is farther than r from the double cone along an axis, c and s of its half angle."""
     p = dot(d, axis)
@@ -145,80 +132,100 @@ def beside_cone(d, axis, c, s, ho, hp, rotation, slack):
     return True
 
 
-@kernel(inline=True)
-def seen_from(pool, p, rotation, bulk, shift):
-    """The node at p as another tree sees it: center, half widths of a box around its own, axis."""
-    center = add(matvec(rotation, three_of(node_at(pool, p).center)), shift)
-    return center, matvec(bulk, three_of(node_at(pool, p).half)), matvec(rotation, three_of(node_at(pool, p).axis))
+# How one tree sees another one. rotation, shift: the pose of the other; bulk: the magnitudes of the rotation.
+View = namedtuple("View", "rotation shift bulk")
+# What is asked of a pair of nodes. reach: the most |gap|; slack: how far points may be off [length]; tilt: how far unit
+# vectors may.
+Margin = namedtuple("Margin", "reach slack tilt")
 
 
 @kernel(inline=True)
-def admits(pool, o, p, seen, rotation, bulk, reach, slack, tilt):
-    """Whether the nodes at o of one tree and at p of the other, seen from the one, may hold a pair.
+def view_of(pose):
+    """The `View` of a pose."""
+    return View(pose.rotation, pose.shift, magnitudes(pose.rotation))
 
-    `rotation` is that of the other tree, `bulk` its magnitudes; `slack` is how far points may be off, and `tilt` unit
-    vectors. What excludes most pairs for little comes first.
+
+@kernel(inline=True)
+def seen_from(view, node):
+    """A node as another tree sees it: center, half widths of a box around its own, axis."""
+    center = add(matvec(view.rotation, three_of(node.center)), view.shift)
+    return center, matvec(view.bulk, three_of(node.half)), matvec(view.rotation, three_of(node.axis))
+
+
+@kernel(inline=True)
+def admits(node, other, seen, view, margin):
+    """Whether a node of one tree and one of another, as the one sees it, may hold a pair.
+
+    What excludes most pairs for little comes first.
     """
-    node = node_at(pool, o)
-    node_bounds = node_at(pool, p)
+    reach, slack, tilt = margin
     center, around, axis_p = seen
-    axis_o = three_of(node_at(pool, o).axis)
+    axis_o = three_of(node.axis)
     co = node.cosine
     so = node.sine
-    cp = node_bounds.cosine
-    sp = node_bounds.sine
+    cp = other.cosine
+    sp = other.sine
     if so * cp + co * sp > ROUNDING and -dot(axis_o, axis_p) < co * cp - so * sp - tilt:
         return False
-    d = sub(center, three_of(node_at(pool, o).center))
+    d = sub(center, three_of(node.center))
     dd = dot(d, d)
-    r = node.radius + node_bounds.radius + slack
+    r = node.radius + other.radius + slack
     if dd > (r + reach) * (r + reach):
         return False
     square = reach * reach
-    ho = three_of(node_at(pool, o).half)
+    ho = three_of(node.half)
     if excess(d, ho, around) > square:
         return False
     r += tilt * (r + reach)
     if off_axis(d, dd, axis_o, co, so, r) or off_axis(d, dd, axis_p, cp, sp, r):
         return False
-    return excess(matvec_t(rotation, d), matvec_t(bulk, ho), three_of(node_at(pool, p).half)) <= square
+    return excess(matvec_t(view.rotation, d), matvec_t(view.bulk, ho), three_of(other.half)) <= square
 
 
 @kernel(inner=True)
-def facing(pool, o, p, pose, slack):
-    """Whether leaves at o of f and at p of g, admitted, still may hold a pair when their boxes are looked at closer."""
-    node = node_at(pool, o)
-    node_bounds = node_at(pool, p)
-    d = sub(
-        add(matvec(pose.rotation, three_of(node_at(pool, p).center)), pose.shift), three_of(node_at(pool, o).center)
-    )
-    ho = three_of(node_at(pool, o).half)
-    hp = three_of(node_at(pool, p).half)
-    if beside_cone(d, three_of(node_at(pool, o).axis), node.cosine, node.sine, ho, hp, pose.rotation, slack):
+def facing(node, other, pose, slack):
+    """Whether leaves of f and of g, admitted, still may hold a pair when their boxes are looked at closer."""
+    d = sub(add(matvec(pose.rotation, three_of(other.center)), pose.shift), three_of(node.center))
+    ho = three_of(node.half)
+    hp = three_of(other.half)
+    if beside_cone(d, three_of(node.axis), node.cosine, node.sine, ho, hp, pose.rotation, slack):
         return False
-    axis = matvec(pose.rotation, three_of(node_at(pool, p).axis))
-    return not beside_cone(d, axis, node_bounds.cosine, node_bounds.sine, ho, hp, pose.rotation, slack)
+    axis = matvec(pose.rotation, three_of(other.axis))
+    return not beside_cone(d, axis, other.cosine, other.sine, ho, hp, pose.rotation, slack)
+
+
+@kernel(inline=True)
+def tree_node(store, tree, k):
+    """The NODE_BOUNDS of node k."""
+    return node_at(store.pool, tree_at(store.table, tree).node_pool + NODE * k)
+
+
+@kernel(inline=True)
+def child_of(store, tree, k):
+    """The first child of node k, or -1 - element."""
+    return node_links_at(store.table, tree_at(store.table, tree).node_table + NODE_INTS * k).child
 
 
 @kernel(inline=True)
 def node_of(store, tree, e):
-    """Where the node of element e is in the pool."""
-    tree_record = tree_at(store.table, tree)
-    return tree_record.node_pool + NODE * np.int64(element_at(store.pool, tree_record.element_pool + ELEMENT * e).node)
+    """The NODE_BOUNDS of the node of element e."""
+    element = element_at(store.pool, tree_at(store.table, tree).element_pool + ELEMENT * e)
+    return tree_node(store, tree, np.int64(element.node))
 
 
 @kernel(inline=True)
-def rounding(pool, root_f, root_g, shift):
+def rounding(store, trees, shift):
     """By how much coordinates may be off."""
-    size = node_at(pool, root_f).radius + node_at(pool, root_g).radius
-    c = three_of(node_at(pool, root_f).center)
-    e = three_of(node_at(pool, root_g).center)
+    f, g = tree_node(store, trees[0], 0), tree_node(store, trees[1], 0)
+    size = f.radius + g.radius
+    c = three_of(f.center)
+    e = three_of(g.center)
     size += math.sqrt(dot(c, c)) + math.sqrt(dot(e, e)) + math.sqrt(dot(shift, shift))
     return ROUNDING * size
 
 
 @kernel(inner=True)
-def pairs_about(store, tree_f, tree_g, pose, reach, ring, tilt, stack, out):
+def pairs_about(store, trees, pose, reach, ring, tilt, stack, out):
     """Elements (k, 2) that may hold an extremal pair with |gap| <= reach at this pose, or at one near it; their number.
 
     Near are poses at which no point of either body is farther than `ring` from where it is now, seen from the other,
@@ -227,25 +234,17 @@ def pairs_about(store, tree_f, tree_g, pose, reach, ring, tilt, stack, out):
 
     -1 where the stack (n, 2) is too short; more than `out` holds where `out` is: then what it holds are the first.
     """
-    tree = tree_at(store.table, tree_f)
-    tree_record = tree_at(store.table, tree_g)
-    node_f = tree.node_pool
-    node_g = tree_record.node_pool
-    ints_f = tree.node_table
-    ints_g = tree_record.node_table
-    slack = ring + rounding(store.pool, node_f, node_g, pose.shift)
-    reach += slack
-    tilt += ROUNDING
-    bulk = magnitudes(pose.rotation)
-    back = transposed(pose.rotation)
-    back_bulk = transposed(bulk)
-    back_shift = neg(matvec(back, pose.shift))
+    tree_f, tree_g = trees
+    slack = ring + rounding(store, trees, pose.shift)
+    margin = Margin(reach + slack, slack, tilt + ROUNDING)
+    view = view_of(pose)
+    back = view_of(inverse_pose(pose))
     room = stack.shape[0]
     count = 0
     if room < 1:
         return -1
-    seen = seen_from(store.pool, node_g, pose.rotation, bulk, pose.shift)
-    if not admits(store.pool, node_f, node_g, seen, pose.rotation, bulk, reach, slack, tilt):
+    g = tree_node(store, tree_g, 0)
+    if not admits(tree_node(store, tree_f, 0), g, seen_from(view, g), view, margin):
         return 0
     stack[0, 0] = 0
     stack[0, 1] = 0
@@ -254,12 +253,12 @@ def pairs_about(store, tree_f, tree_g, pose, reach, ring, tilt, stack, out):
         used -= 1
         i = stack[used, 0]
         j = stack[used, 1]
-        o = node_f + NODE * i
-        p = node_g + NODE * j
-        child_f = node_links_at(store.table, ints_f + NODE_INTS * i).child
-        child_g = node_links_at(store.table, ints_g + NODE_INTS * j).child
+        f = tree_node(store, tree_f, i)
+        g = tree_node(store, tree_g, j)
+        child_f = child_of(store, tree_f, i)
+        child_g = child_of(store, tree_g, j)
         if child_f < 0 and child_g < 0:
-            if facing(store.pool, o, p, pose, slack + tilt * reach):
+            if facing(f, g, pose, slack + margin.tilt * margin.reach):
                 if count < out.shape[0]:
                     out[count, 0] = -1 - child_f
                     out[count, 1] = -1 - child_g
@@ -267,50 +266,45 @@ def pairs_about(store, tree_f, tree_g, pose, reach, ring, tilt, stack, out):
             continue
         if used + 2 > room:
             return -1
-        if child_g < 0 or (child_f >= 0 and node_at(store.pool, o).radius >= node_at(store.pool, p).radius):
-            seen = seen_from(store.pool, p, pose.rotation, bulk, pose.shift)
-            for k in range(2):
-                if admits(store.pool, node_f + NODE * (child_f + k), p, seen, pose.rotation, bulk, reach, slack, tilt):
-                    stack[used, 0] = child_f + k
+        if child_g < 0 or (child_f >= 0 and f.radius >= g.radius):
+            seen = seen_from(view, g)
+            for k in range(child_f, child_f + 2):
+                if admits(tree_node(store, tree_f, k), g, seen, view, margin):
+                    stack[used, 0] = k
                     stack[used, 1] = j
                     used += 1
         else:
-            seen = seen_from(store.pool, o, back, back_bulk, back_shift)
-            for k in range(2):
-                if admits(store.pool, node_g + NODE * (child_g + k), o, seen, back, back_bulk, reach, slack, tilt):
+            seen = seen_from(back, f)
+            for k in range(child_g, child_g + 2):
+                if admits(tree_node(store, tree_g, k), f, seen, back, margin):
                     stack[used, 0] = i
-                    stack[used, 1] = child_g + k
+                    stack[used, 1] = k
                     used += 1
     return count
 
 
 @kernel(inner=True)
-def pairs_within(store, tree_f, tree_g, pose, reach, stack, out):
+def pairs_within(store, trees, pose, reach, stack, out):
     """Elements (k, 2) of two trees that may hold an extremal pair with |gap| <= reach; see `pairs_about`."""
-    return pairs_about(store, tree_f, tree_g, pose, reach, 0.0, 0.0, stack, out)
+    return pairs_about(store, trees, pose, reach, 0.0, 0.0, stack, out)
 
 
 @kernel(inner=True)
-def still_within(store, tree_f, tree_g, pose, reach, listed, count, out):
+def still_within(store, trees, pose, reach, listed, count, out):
     """Which of the elements in a list, count of them from its place `listed` in the table, `pairs_within` would find.
 
     As long as `out` holds them; their number.
     """
-    slack = rounding(
-        store.pool, tree_at(store.table, tree_f).node_pool, tree_at(store.table, tree_g).node_pool, pose.shift
-    )
-    reach += slack
-    bulk = magnitudes(pose.rotation)
+    slack = rounding(store, trees, pose.shift)
+    margin = Margin(reach + slack, slack, ROUNDING)
+    view = view_of(pose)
     found = 0
     for k in range(count):
         e = store.table[listed + 2 * k]
         d = store.table[listed + 2 * k + 1]
-        o = node_of(store, tree_f, e)
-        p = node_of(store, tree_g, d)
-        seen = seen_from(store.pool, p, pose.rotation, bulk, pose.shift)
-        if admits(store.pool, o, p, seen, pose.rotation, bulk, reach, slack, ROUNDING) and facing(
-            store.pool, o, p, pose, slack
-        ):
+        f = node_of(store, trees[0], e)
+        g = node_of(store, trees[1], d)
+        if admits(f, g, seen_from(view, g), view, margin) and facing(f, g, pose, slack):
             if found < out.shape[0]:
                 out[found, 0] = e
                 out[found, 1] = d
@@ -318,31 +312,26 @@ def still_within(store, tree_f, tree_g, pose, reach, listed, count, out):
     return found
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, UniTuple(f8, 9), UniTuple(f8, 3), f8, i8[:, ::1], i8[:, ::1])")
-def facing_pairs(table, pool, tree_f, tree_g, rotation, shift, reach, stack, out):
+@kernel(signatures="(i8[::1], f8[::1], UniTuple(i8, 2), UniTuple(f8, 9), UniTuple(f8, 3), f8, i8[:, ::1], i8[:, ::1])")
+def facing_pairs(table, pool, trees, rotation, shift, reach, stack, out):
     """`pairs_within` for Python."""
-    return pairs_within(Store(table, pool), tree_f, tree_g, RelativePose(rotation, shift), reach, stack, out)
+    return pairs_within(Store(table, pool), trees, RelativePose(rotation, shift), reach, stack, out)
 
 
 @kernel(inline=True)
-def box_distance(pool, o, p, seen, rotation, bulk):
-    """The square of a lower bound of the distance of the boxes at o and at p; see `admits`."""
-    ho = three_of(node_at(pool, o).half)
-    d = sub(seen[0], three_of(node_at(pool, o).center))
+def box_distance(node, other, seen, view):
+    """The square of a lower bound of the distance of the boxes of two nodes; see `admits`."""
+    ho = three_of(node.half)
+    d = sub(seen[0], three_of(node.center))
     along = excess(d, ho, seen[1])
-    return max(along, excess(matvec_t(rotation, d), matvec_t(bulk, ho), three_of(node_at(pool, p).half)))
+    return max(along, excess(matvec_t(view.rotation, d), matvec_t(view.bulk, ho), three_of(other.half)))
 
 
 @kernel(inner=True)
-def overlapping(store, tree_f, tree_g, pose, stack, out):
+def overlapping(store, trees, pose, stack, out):
     """Elements (k, 2) of two trees whose boxes meet; how many `out` holds of them."""
-    tree = tree_at(store.table, tree_f)
-    tree_record = tree_at(store.table, tree_g)
-    node_f = tree.node_pool
-    node_g = tree_record.node_pool
-    ints_f = tree.node_table
-    ints_g = tree_record.node_table
-    bulk = magnitudes(pose.rotation)
+    tree_f, tree_g = trees
+    view = view_of(pose)
     count = 0
     stack[0, 0] = 0
     stack[0, 1] = 0
@@ -351,23 +340,18 @@ def overlapping(store, tree_f, tree_g, pose, stack, out):
         used -= 1
         i = stack[used, 0]
         j = stack[used, 1]
-        o = node_f + NODE * i
-        p = node_g + NODE * j
-        if (
-            box_distance(
-                store.pool, o, p, seen_from(store.pool, p, pose.rotation, bulk, pose.shift), pose.rotation, bulk
-            )
-            > 0.0
-        ):
+        f = tree_node(store, tree_f, i)
+        g = tree_node(store, tree_g, j)
+        if box_distance(f, g, seen_from(view, g), view) > 0.0:
             continue
-        child_f = node_links_at(store.table, ints_f + NODE_INTS * i).child
-        child_g = node_links_at(store.table, ints_g + NODE_INTS * j).child
+        child_f = child_of(store, tree_f, i)
+        child_g = child_of(store, tree_g, j)
         if child_f < 0 and child_g < 0:
             out[count, 0] = -1 - child_f
             out[count, 1] = -1 - child_g
             count += 1
         elif used + 2 <= stack.shape[0]:
-            down_f = child_g < 0 or (child_f >= 0 and node_at(store.pool, o).radius >= node_at(store.pool, p).radius)
+            down_f = child_g < 0 or (child_f >= 0 and f.radius >= g.radius)
             for k in range(2):
                 stack[used, 0] = child_f + k if down_f else i
                 stack[used, 1] = j if down_f else child_g + k
@@ -376,22 +360,15 @@ def overlapping(store, tree_f, tree_g, pose, stack, out):
 
 
 @kernel(inner=True)
-def least_distance(store, tree_f, tree_g, pose, upper, stack):
+def least_distance(store, trees, pose, upper, stack):
     """A lower bound of the distance of two trees' elements, at most `upper`: that of their boxes.
 
     A stack (n, 2) that is too short makes what is found lower, not wrong.
     """
-    tree = tree_at(store.table, tree_f)
-    tree_record = tree_at(store.table, tree_g)
-    node_f = tree.node_pool
-    node_g = tree_record.node_pool
-    ints_f = tree.node_table
-    ints_g = tree_record.node_table
-    slack = rounding(store.pool, node_f, node_g, pose.shift)
-    bulk = magnitudes(pose.rotation)
-    back = transposed(pose.rotation)
-    back_bulk = transposed(bulk)
-    back_shift = neg(matvec(back, pose.shift))
+    tree_f, tree_g = trees
+    slack = rounding(store, trees, pose.shift)
+    view = view_of(pose)
+    back = view_of(inverse_pose(pose))
     room = stack.shape[0]
     best = (upper + slack) * (upper + slack)
     if room < 1:
@@ -403,26 +380,26 @@ def least_distance(store, tree_f, tree_g, pose, upper, stack):
         used -= 1
         i = stack[used, 0]
         j = stack[used, 1]
-        o = node_f + NODE * i
-        p = node_g + NODE * j
-        seen = seen_from(store.pool, p, pose.rotation, bulk, pose.shift)
-        bound = box_distance(store.pool, o, p, seen, pose.rotation, bulk)
+        f = tree_node(store, tree_f, i)
+        g = tree_node(store, tree_g, j)
+        seen = seen_from(view, g)
+        bound = box_distance(f, g, seen, view)
         # What was found since the pair was put here may exclude it.
         if bound >= best:
             continue
-        child_f = node_links_at(store.table, ints_f + NODE_INTS * i).child
-        child_g = node_links_at(store.table, ints_g + NODE_INTS * j).child
+        child_f = child_of(store, tree_f, i)
+        child_g = child_of(store, tree_g, j)
         if (child_f < 0 and child_g < 0) or used + 2 > room:
             best = bound
             continue
-        descend_f = child_g < 0 or (child_f >= 0 and node_at(store.pool, o).radius >= node_at(store.pool, p).radius)
+        descend_f = child_g < 0 or (child_f >= 0 and f.radius >= g.radius)
         if descend_f:
-            one = box_distance(store.pool, node_f + NODE * child_f, p, seen, pose.rotation, bulk)
-            other = box_distance(store.pool, node_f + NODE * (child_f + 1), p, seen, pose.rotation, bulk)
+            one = box_distance(tree_node(store, tree_f, child_f), g, seen, view)
+            other = box_distance(tree_node(store, tree_f, child_f + 1), g, seen, view)
         else:
-            seen = seen_from(store.pool, o, back, back_bulk, back_shift)
-            one = box_distance(store.pool, node_g + NODE * child_g, o, seen, back, back_bulk)
-            other = box_distance(store.pool, node_g + NODE * (child_g + 1), o, seen, back, back_bulk)
+            seen = seen_from(back, f)
+            one = box_distance(tree_node(store, tree_g, child_g), f, seen, back)
+            other = box_distance(tree_node(store, tree_g, child_g + 1), f, seen, back)
         # The nearer one comes last, and is looked at first.
         near = 0 if one <= other else 1
         for k in range(2):
@@ -434,7 +411,7 @@ def least_distance(store, tree_f, tree_g, pose, upper, stack):
     return max(math.sqrt(best) - slack, 0.0)
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, UniTuple(f8, 9), UniTuple(f8, 3), f8, i8[:, ::1])")
-def tree_distance(table, pool, tree_f, tree_g, rotation, shift, upper, stack):
+@kernel(signatures="(i8[::1], f8[::1], UniTuple(i8, 2), UniTuple(f8, 9), UniTuple(f8, 3), f8, i8[:, ::1])")
+def tree_distance(table, pool, trees, rotation, shift, upper, stack):
     """`least_distance` for Python."""
-    return least_distance(Store(table, pool), tree_f, tree_g, RelativePose(rotation, shift), upper, stack)
+    return least_distance(Store(table, pool), trees, RelativePose(rotation, shift), upper, stack)

@@ -250,5 +250,5 @@ def final_parameters(
     out = np.empty((len(begin), 3))
     number = _METHODS[method]
     tolerance = 1e-10 * patch.size
-    attraction(table, pool, place, begin, number, form_number(form), _LIMITS[number], tolerance, out)
+    attraction((table, pool), place, begin, number, form_number(form), _LIMITS[number], tolerance, out)
     return out[:, :2], out[:, 2] <= tolerance

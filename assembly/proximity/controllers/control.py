@@ -20,7 +20,17 @@ from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CELLS, COEFFI
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace, Point
 from assembly.kinematics.pose import check_quaternion
-from assembly.proximity.controllers.laws import DISTANCE, ERROR, GAIN, MODE_F, MODE_G, ROW, ControlLaw, run_control
+from assembly.proximity.controllers.laws import (
+    DISTANCE,
+    ERROR,
+    GAIN,
+    MODE_F,
+    MODE_G,
+    ROW,
+    ControlEnd,
+    ControlLaw,
+    run_control,
+)
 
 __all__ = ["ControlRun", "ControlStatus", "Controller"]
 
@@ -167,10 +177,10 @@ class Controller:
         else:
             place = target.coordinates if isinstance(target, Point) else vector("target", target)
             self._point = tuple(place.tolist())
-        self._form = form_number(form)
         if gain is not None and rate is not None:
             raise InputError(f"gain is {gain} and rate is {rate}; expected one of them")
         self._law = ControlLaw(
+            form=form_number(form),
             gain=0.0 if gain is None else positive("gain", gain),
             rate=0.0 if rate is None else positive("rate", rate),
             nearest=number("nearest", nearest),
@@ -246,20 +256,15 @@ class Controller:
     def _advance(self, poses: Array, steps: int, dt: float, kept: int) -> ControlRun:
         """Steps along poses; of the states the last one, or all of them in `kept` rows."""
         out = np.zeros((kept, ROW))
+        end = ControlEnd(steps, self._tolerance, _MEET * self._size)
         status, done = run_control(
-            self._table,
-            self._pool,
-            0,
-            self._second,
-            self._point,
+            (self._table, self._pool),
+            (self._second, self._point),
             poses,
             self._x,
             positive("dt", dt),
-            steps,
-            self._form,
             tuple(self._law),
-            self._tolerance,
-            _MEET * self._size,
+            tuple(end),
             out,
         )
         out = out[: done + 1]

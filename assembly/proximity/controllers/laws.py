@@ -24,10 +24,12 @@ from assembly.geometry.splines.evaluate import (
     surface_at,
     surface_point,
 )
-from assembly.geometry.vec import add, dot, matvec, matvec_t, sub
-from assembly.kinematics.motion import RelativePose, relative_pose, rotation
+from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
+from assembly.kinematics.motion import IDENTITY, RelativePose, relative_pose, rotation
 from assembly.proximity.extrema.feedback import descent_step, end_of
 
+# The record of the surface that is controlled.
+F = 0
 # Forms of the projections.
 UNIT, COVARIANT, CONTRAVARIANT = 0, 1, 2
 # Statuses of a run.
@@ -49,14 +51,24 @@ ERROR = place_of(STEP_ROW, "error")
 MODE_F = place_of(STEP_ROW, "mode_f")
 MODE_G = place_of(STEP_ROW, "mode_g")
 GAIN = place_of(STEP_ROW, "gain")
-# How a controller moves, as four numbers.
+# How a controller moves.
 ControlLaw = namedtuple(
     "ControlLaw",
     [
+        "form",  # of the projections: UNIT, COVARIANT or CONTRAVARIANT
         "gain",  # 0: as large as the step allows
         "rate",  # exponential rate of the distance [1 / time]; 0: none
         "nearest",  # the distance that the rate leads to [length]
         "feed_forward",  # 1: the motion's part of the closest point's rate is added
+    ],
+)
+# When a run ends.
+ControlEnd = namedtuple(
+    "ControlEnd",
+    [
+        "steps",  # at most
+        "tolerance",  # where nothing moves any more, at an error of at most so much [length]
+        "meet",  # at a distance of at most so much the points meet [length]
     ],
 )
 # Where the target stands, seen from f, and how it moves.
@@ -171,10 +183,10 @@ def keep(h, held_u, held_v):
 
 
 @kernel(inner=True)
-def control_rates(store, f, g, placed, x, form, law, dt):
+def control_rates(store, g, placed, x, law, dt):
     """The `ControlStep` of a `ControlLaw` at x, of a `Target`. With g < 0 that is the point `placed.shift`."""
-    turn, shift = placed.turn, placed.shift
-    s = surface_point(store.table, store.pool, f, x[0], x[1])
+    turn, shift, form = placed.turn, placed.shift, law.form
+    s = surface_point(store.table, store.pool, F, x[0], x[1])
     t = s
     target = shift
     if g >= 0:
@@ -185,7 +197,7 @@ def control_rates(store, f, g, placed, x, form, law, dt):
     distance = math.sqrt(square)
     psi = (dot(d, s[1]), dot(d, s[2]))
     b = law_weights(form, s[1], s[2])
-    end_u, end_v = ends(store, f, x[0], x[1])
+    end_u, end_v = ends(store, F, x[0], x[1])
     ru, rv, held_u, held_v = saturate(end_u, end_v, psi, b, s[1], s[2], form)
     h = second_form(s, d)
     power = -(psi[0] * ru + psi[1] * rv)
@@ -240,9 +252,9 @@ def control_rates(store, f, g, placed, x, form, law, dt):
 
 
 @kernel(inline=True)
-def moved(store, f, g, x, rates, dt):
+def moved(store, g, x, rates, dt):
     """Parameters after an Euler step, wrapped and clamped."""
-    uf, vf, _end = into_domain(store, f, x[0] + dt * rates[0], x[1] + dt * rates[1])
+    uf, vf, _end = into_domain(store, F, x[0] + dt * rates[0], x[1] + dt * rates[1])
     ug, vg = x[2], x[3]
     if g >= 0:
         ug, vg, _end = into_domain(store, g, x[2] + dt * rates[2], x[3] + dt * rates[3])
@@ -250,33 +262,48 @@ def moved(store, f, g, x, rates, dt):
 
 
 @kernel(inner=True)
-def lowering(store, f, g, pose, x, rates, dt, distance):
+def lowering(store, g, pose, x, step, dt):
     """Parameters after a step that does not lead farther apart: a whole one, or the largest of its halves."""
     y = x
     for _ in range(HALVINGS):
-        y = moved(store, f, g, x, rates, dt)
+        y = moved(store, g, x, step.rates, dt)
         target = pose.shift
         if g >= 0:
             target = add(matvec(pose.rotation, surface_point(store.table, store.pool, g, y[2], y[3])[0]), pose.shift)
-        p = surface_point(store.table, store.pool, f, y[0], y[1])[0]
+        p = surface_point(store.table, store.pool, F, y[0], y[1])[0]
         d = sub(p, target)
         # At rest distances differ by the rounding of the points.
         rounding = 1e-14 * (math.sqrt(dot(p, p)) + math.sqrt(dot(target, target)))
-        if dot(d, d) <= distance * (distance + rounding):
+        if dot(d, d) <= step.distance * (step.distance + rounding):
             return y
         dt *= 0.5
     return y
 
 
 @kernel(inline=True)
-def relative(table, poses, k, g, point):
-    """The pose of the target seen from f at the poses of step k; of a point, its place."""
+def target_pose(poses, k, g, point):
+    """The pose of the target seen from f at the poses of step k; of a point, its place is the shift."""
     k = min(k, poses.shape[0] - 1)
-    turn_f = rotation(poses[k], 0)
-    pose = relative_pose(poses[k], 0, turn_f, 1, rotation(poses[k], 1))
+    pose = relative_pose(poses[k], 0, rotation(poses[k], 0), 1, rotation(poses[k], 1))
     if g < 0:
-        return RelativePose(rotation=pose.rotation, shift=add(matvec(pose.rotation, point), pose.shift))
+        return RelativePose(pose.rotation, add(matvec(pose.rotation, point), pose.shift))
     return pose
+
+
+@kernel(inline=True)
+def posed_target(store, g, pose, after, x, dt):
+    """The `Target` at a pose, moving to another one in a time dt."""
+    i = 1.0 / dt
+    drift_g = (0.0, 0.0, 0.0)
+    was, comes = pose.shift, after.shift
+    if g >= 0:
+        here = surface_point(store.table, store.pool, F, x[0], x[1])[0]
+        there = surface_point(store.table, store.pool, g, x[2], x[3])[0]
+        before = matvec_t(pose.rotation, sub(here, pose.shift))
+        drift_g = scale(i, sub(matvec_t(after.rotation, sub(here, after.shift)), before))
+        was = add(matvec(pose.rotation, there), pose.shift)
+        comes = add(matvec(after.rotation, there), after.shift)
+    return Target(pose.rotation, pose.shift, scale(i, sub(comes, was)), drift_g)
 
 
 @kernel(inline=True)
@@ -293,44 +320,33 @@ def write_row(out, row, x, step):
 
 @kernel(
     signatures=(
-        "(i8[::1], f8[::1], i8, i8, UniTuple(f8, 3), f8[:, :, ::1], UniTuple(f8, 4), f8, i8, i8, UniTuple(f8, 4), f8, "
-        "f8, f8[:, ::1])"
+        "(Tuple((i8[::1], f8[::1])), Tuple((i8, UniTuple(f8, 3))), f8[:, :, ::1], UniTuple(f8, 4), f8, "
+        "Tuple((i8, f8, f8, f8, f8)), Tuple((i8, f8, f8)), f8[:, ::1])"
     ),
 )
-def run_control(table, pool, f, g, point, poses, x, dt, steps, form, law, tolerance, meet, out):
-    """`steps` Euler steps of the controller from x, along poses (n, 2, 7), the last of which stays: status and steps.
+def run_control(store, target, poses, x, dt, law, end, out):
+    """Euler steps of the controller from x, along poses (n, 2, 7), the last of which stays: status and steps.
 
-    `law` are the numbers of a `ControlLaw`. Row k of `out` is the state after k steps; one with a single row gets the
-    last state. Where nothing moves any more the run ends with an error of at most `tolerance`. The points meet at a
-    distance of `meet`.
+    `target` is the record of its surface, or -1, and the point that it is then; `law` and `end` are the numbers of a
+    `ControlLaw` and a `ControlEnd`. Row k of `out` is the state after k steps; one with a single row gets the last
+    state.
     """
-    store = Store(table, pool)
-    law = ControlLaw(law[0], law[1], law[2], law[3])
-    turn, shift = relative(table, poses, 0, g, point)
+    table, pool = store
+    scene = Store(table, pool)
+    g, point = target
+    law = ControlLaw(law[0], law[1], law[2], law[3], law[4])
+    steps, tolerance, meet = end
+    pose = target_pose(poses, 0, g, point)
     last = out.shape[0] - 1
     zero = (0.0, 0.0, 0.0)
     for k in range(steps + 1):
-        drift_f = zero
-        drift_g = zero
         still = k >= poses.shape[0] - 1
-        next_turn, next_shift = turn, shift
+        after = pose
+        placed = Target(pose.rotation, pose.shift, zero, zero)
         if not still:
-            next_turn, next_shift = relative(table, poses, k + 1, g, point)
-            i = 1.0 / dt
-            there = zero
-            if g >= 0:
-                there = surface_point(table, pool, g, x[2], x[3])[0]
-                here = surface_point(table, pool, f, x[0], x[1])[0]
-                before = matvec_t(turn, sub(here, shift))
-                after = matvec_t(next_turn, sub(here, next_shift))
-                drift_g = (i * (after[0] - before[0]), i * (after[1] - before[1]), i * (after[2] - before[2]))
-            before = shift
-            after = next_shift
-            if g >= 0:
-                before = add(matvec(turn, there), shift)
-                after = add(matvec(next_turn, there), next_shift)
-            drift_f = (i * (after[0] - before[0]), i * (after[1] - before[1]), i * (after[2] - before[2]))
-        step = control_rates(store, f, g, Target(turn, shift, drift_f, drift_g), x, form, law, dt)
+            after = target_pose(poses, k + 1, g, point)
+            placed = posed_target(scene, g, pose, after, x, dt)
+        step = control_rates(scene, g, placed, x, law, dt)
         if not step.distance < 1e300:
             return IRREGULAR, max(k - 1, 0)
         write_row(out, min(k, last), x, step)
@@ -342,10 +358,10 @@ def run_control(table, pool, f, g, point, poses, x, dt, steps, form, law, tolera
         if k == steps:
             break
         if still and law.gain == 0.0:
-            x = lowering(store, f, g, RelativePose(turn, shift), x, step.rates, dt, step.distance)
+            x = lowering(scene, g, pose, x, step, dt)
         else:
-            x = moved(store, f, g, x, step.rates, dt)
-        turn, shift = next_turn, next_shift
+            x = moved(scene, g, x, step.rates, dt)
+        pose = after
     return ON_ITS_WAY, steps
 
 
@@ -371,42 +387,44 @@ def newton_change(s, d, form):
     return du, dv
 
 
-@kernel(signatures="(i8[::1], f8[::1], UniTuple(f8, 3), f8[:, ::1], i8, i8, i8, f8, f8[:, ::1])")
-def attraction(table, pool, point, starts, method, form, limit, tolerance, out):
+@kernel(
+    signatures="(Tuple((i8[::1], f8[::1])), UniTuple(f8, 3), f8[:, ::1], i8, i8, i8, f8, f8[:, ::1])",
+)
+def attraction(store, point, starts, method, form, limit, tolerance, out):
     """Where a witness point ends from every start (n, 2): out (n, 3) of parameters and error; how many ended.
 
     Newton's method without saturation fails where it leaves the patch; with it, components that lead out are set to
     zero and the rest is clamped. The switching controller takes the gain that its eigenvalues allow.
     """
-    store = Store(table, pool)
-    law = ControlLaw(0.0, 0.0, 0.0, 0.0)
-    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    table, pool = store
+    scene = Store(table, pool)
+    law = ControlLaw(form, 0.0, 0.0, 0.0, 0.0)
     zero = (0.0, 0.0, 0.0)
-    placed = Target(same, point, zero, zero)
+    placed = Target(IDENTITY.rotation, point, zero, zero)
     ended = 0
     for i in range(starts.shape[0]):
         x = (starts[i, 0], starts[i, 1], 0.0, 0.0)
         error = math.inf
         for _ in range(limit):
             if method == SWITCHING:
-                step = control_rates(store, 0, -1, placed, x, form, law, 1.0)
+                step = control_rates(scene, -1, placed, x, law, 1.0)
                 error = step.error
-                y = lowering(store, 0, -1, RelativePose(same, point), x, step.rates, 1.0, step.distance)
+                y = lowering(scene, -1, RelativePose(IDENTITY.rotation, point), x, step, 1.0)
                 clamped = False
             else:
-                s = surface_point(table, pool, 0, x[0], x[1])
+                s = surface_point(table, pool, F, x[0], x[1])
                 d = sub(s[0], point)
                 du, dv = newton_change(s, d, form)
                 held_u = False
                 held_v = False
                 if method == NEWTON_SATURATED:
-                    end_u, end_v = ends(store, 0, x[0], x[1])
+                    end_u, end_v = ends(scene, F, x[0], x[1])
                     held_u = end_u * du > 0.0
                     held_v = end_v * dv > 0.0
                     du = 0.0 if held_u else du
                     dv = 0.0 if held_v else dv
                 error = math.sqrt(free_error((dot(d, s[1]), dot(d, s[2])), s[1], s[2], held_u, held_v))
-                u, v, clamped = into_domain(store, 0, x[0] + du, x[1] + dv)
+                u, v, clamped = into_domain(scene, F, x[0] + du, x[1] + dv)
                 y = (u, v, 0.0, 0.0)
             if error <= tolerance:
                 ended += 1

@@ -6,59 +6,45 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.domain import into_domain
-from assembly.geometry.splines.evaluate import (
-    spline_curve_at,
-    surface_point,
-)
+from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
-from assembly.kinematics.motion import RelativePose
-from assembly.proximity.brep.records import EDGE, FACE, edge_at, face_at
-from assembly.proximity.extrema.feature_jets import edge_jet, vertex_point
+from assembly.kinematics.motion import IDENTITY
+from assembly.proximity.brep.records import EDGE, FACE
+from assembly.proximity.extrema.feature_jets import edge_advance, edge_jet, vertex_point
 
 
 @kernel(inner=True)
-def tangents(store, kind, record, pose, u, v):
+def tangents(store, feature, pose, u, v):
     """Point and tangents of a feature, moved by a pose."""
     zero = (0.0, 0.0, 0.0)
-    if kind == FACE:
-        p, su, sv, _uu, _uv, _vv = surface_point(store.table, store.pool, face_at(store.table, record).surface, u, v)
-    elif kind == EDGE:
-        p, su, _tt = edge_jet(store, record, u)
+    if feature.kind == FACE:
+        p, su, sv, _uu, _uv, _vv = surface_point(store.table, store.pool, feature.record, u, v)
+    elif feature.kind == EDGE:
+        p, su, _tt = edge_jet(store, feature.record, u)
         sv = zero
     else:
-        p = vertex_point(store, record)
+        p = vertex_point(store, feature.record)
         su = zero
         sv = zero
     return add(matvec(pose.rotation, p), pose.shift), matvec(pose.rotation, su), matvec(pose.rotation, sv)
 
 
 @kernel(inner=True)
-def within(store, kind, record, u, v):
+def within(store, feature, u, v):
     """Coordinates wrapped, or held at the ends of the domain."""
-    edge = edge_at(store.table, record)
-    if kind == FACE:
-        u, v, _clamped = into_domain(store, face_at(store.table, record).surface, u, v)
+    if feature.kind == FACE:
+        u, v, _clamped = into_domain(store, feature.record, u, v)
         return u, v
-    if kind == EDGE:
-        c = spline_curve_at(store.table, edge.curve)
-        o = c.breaks
-        low = store.pool[o]
-        high = store.pool[o + c.spans]
-        if edge.start < 0 and not low <= u <= high:
-            u -= (high - low) * math.floor((u - low) / (high - low))
-        return min(max(u, low), high), v
-    return u, v
+    return (edge_advance(store, feature.record, u, 0.0) if feature.kind == EDGE else u), v
 
 
 @kernel(inner=True)
-def crossing_point(store, kind_f, f, kind_g, g, pose, x, size):
+def crossing_point(store, f, g, pose, x, size):
     """Coordinates where d = 0 near x, by least steps, and whether they were found."""
-    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    origin = (0.0, 0.0, 0.0)
     previous = math.inf
     for _ in range(12):
-        p, pu, pv = tangents(store, kind_f, f, RelativePose(same, origin), x[0], x[1])
-        q, qu, qv = tangents(store, kind_g, g, pose, x[2], x[3])
+        p, pu, pv = tangents(store, f, IDENTITY, x[0], x[1])
+        q, qu, qv = tangents(store, g, pose, x[2], x[3])
         d = sub(q, p)
         off = math.sqrt(dot(d, d))
         if off <= 1e-13 * size:
@@ -89,7 +75,7 @@ def crossing_point(store, kind_f, f, kind_g, g, pose, x, size):
             return x, False
         y = blend(d[0] / det, cross(row1, row2), d[1] / det, cross(row2, row0))
         y = add(y, scale(d[2] / det, cross(row0, row1)))
-        uf, vf = within(store, kind_f, f, x[0] + su * dot(a, y), x[1] + sv * dot(b, y))
-        ug, vg = within(store, kind_g, g, x[2] - tu * dot(c, y), x[3] - tv * dot(e, y))
+        uf, vf = within(store, f, x[0] + su * dot(a, y), x[1] + sv * dot(b, y))
+        ug, vg = within(store, g, x[2] - tu * dot(c, y), x[3] - tv * dot(e, y))
         x = (uf, vf, ug, vg)
     return x, False

@@ -23,7 +23,8 @@ from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_COEFFICIENTS, OFFSETS, SURFACE_RECORD
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.pose import pose_row
-from assembly.proximity.brep.records import EDGE, EDGE_CURVE, EDGE_END, EDGE_RECORD, EDGE_START, EDGE_SURFACE, FACE
+from assembly.proximity.brep.records import EDGE, EDGE_RECORD, FACE
+from assembly.proximity.brep.writer import edge_over
 from assembly.proximity.extrema.feature_query import PAIR, feature_derivatives, feature_pair_at, find_features
 from assembly.proximity.extrema.pairs import EXTREMAL, PairStatus, Side, as_face
 
@@ -117,10 +118,7 @@ def _packed(key: _Key) -> _Packed:
     record, numbers = curve.packed()
     record = record.copy()
     record[[CURVE_BREAKS, CURVE_COEFFICIENTS]] += room
-    edge = np.full(EDGE_RECORD, -1, dtype=np.int64)
-    edge[EDGE_SURFACE] = -1 if carrier is None else SURFACE_RECORD
-    edge[EDGE_CURVE] = sum(part.size for part in table)
-    edge[EDGE_START] = edge[EDGE_END] = -1 if endless else 0
+    edge = edge_over(-1 if carrier is None else SURFACE_RECORD, sum(part.size for part in table), endless)
     size = max(surface.size, curve.size if carrier is None else carrier.size)
     return _Packed(np.concatenate([*table, record, edge]), np.concatenate([*pool, numbers]), size, endless)
 
@@ -130,7 +128,7 @@ class _Query:
     """Checked arguments as the kernels take them."""
 
     packed: _Packed
-    features: tuple[int, int, int, int]
+    features: tuple[tuple[int, int], tuple[int, int]]
     q: Array
     x: tuple[float, float, float, float]
 
@@ -165,7 +163,7 @@ def _query(
                 raise InputError(f"{name}[{k}] is {x[k]:g}; expected a parameter in [{low:g}, {high:g}]")
             x[k] = low + (x[k] - low) % (high - low)
     edge = packed.table.size - EDGE_RECORD
-    return _Query(packed, (FACE, 0, EDGE, edge), q, (x[0], x[1], x[2], 0.0))
+    return _Query(packed, ((FACE, 0), (EDGE, edge)), q, (x[0], x[1], x[2], 0.0))
 
 
 def extremal_curve_pair(
@@ -205,9 +203,8 @@ def extremal_curve_pair(
     query = _query(surface, q_s, curve, q_c, "start", start, embedded_in)
     packed, out = query.packed, np.empty(PAIR)
     nothing = (0.0, 0.0, 0.0)
-    status = find_features(
-        packed.table, packed.pool, *query.features, query.q, query.x, nothing, packed.size, np.inf, out
-    )
+    store = packed.table, packed.pool
+    status = find_features(store, query.features, query.q, query.x, nothing, packed.size, np.inf, out)
     pair = feature_pair_at(out, 0)
     points = np.array([pair.point_f, pair.point_g])
     return CurvePair(pair.parameters[:3], points, pair.normal, float(pair.gap), _STATUSES[status])
@@ -225,8 +222,9 @@ def _derivatives(
     packed = query.packed
     first, hessian = np.full((5, 14), np.nan), np.full((12, 12), np.nan)
     nothing = (0.0, 0.0, 0.0)
+    store = packed.table, packed.pool
     error, _isolated = feature_derivatives(
-        packed.table, packed.pool, *query.features, query.q, query.x, nothing, packed.size, first, hessian
+        store, query.features, query.q, query.x, nothing, packed.size, first, hessian
     )
     at = list(query.x[:3])
     if error == np.inf:

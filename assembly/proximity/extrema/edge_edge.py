@@ -12,9 +12,16 @@ from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import cross, dot, neg, scale, sub
-from assembly.kinematics.motion import RelativePose
+from assembly.kinematics.motion import IDENTITY
 from assembly.proximity.brep.records import EDGE, VERTEX
-from assembly.proximity.extrema.face_face import BEND, CONVERGED, LEFT_PATCH, NOT_CONVERGED, SINGULAR, STAGNANT
+from assembly.proximity.extrema.face_face import (
+    CONVERGED,
+    LEFT_PATCH,
+    NOT_CONVERGED,
+    SINGULAR,
+    STAGNANT,
+    bent_at_most,
+)
 from assembly.proximity.extrema.feature_jets import (
     BEYOND,
     FINE,
@@ -45,21 +52,36 @@ CurveSide = namedtuple(
         "point",
         "tangent",  # of length one; zero of a vertex
         "bent",  # curvature vector C_tt / |C_t|^2
+        "bend",  # curvature
         "speed",  # |C_t|; one of a vertex
-        "is_point",  # whether it counts as a vertex here
+    ],
+)
+# A step of Newton's method for two curves, and the equations it is from.
+CurveStep = namedtuple(
+    "CurveStep",
+    [
+        "h",  # matrix (11, 12, 21, 22) of the equations
+        "scope",  # bound of its entries
+        "residual",  # (d.t_f, d.t_g) [length]
+        "lengths",  # how far the points go along their curves
+        "fine",  # whether the matrix is regular
+        "point_f",  # whether f counts as a point: a vertex, or an edge that is held at an end
+        "point_g",
     ],
 )
 
 
 @kernel(inline=True)
-def unit_tangent(ct, ctt):
-    """Unit tangent, curvature vector C_tt / |C_t|^2, its bend and |C_t|; zeros and one for a vertex."""
+def curve_side(store, feature, pose, t):
+    """The `CurveSide` of an edge at t, or of a vertex."""
+    p, ct, ctt = other_jet(store, feature, pose, t, 0.0)
     square = dot(ct, ct)
     if not square > 1e-290:
-        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 1.0
+        return CurveSide(p, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 1.0)
     speed = math.sqrt(square)
     side = cross(ct, ctt)
-    return scale(1.0 / speed, ct), scale(1.0 / square, ctt), math.sqrt(dot(side, side)) / (square * speed), speed
+    bend = math.sqrt(dot(side, side)) / (square * speed)
+    return CurveSide(p, scale(1.0 / speed, ct), scale(1.0 / square, ctt), bend, speed)
 
 
 @kernel(inner=True)
@@ -85,9 +107,9 @@ def normal_between(d, t1, t2, curves, n, size, isolated):
 
 
 @kernel(inner=True)
-def straight_side(tx, ty, n, side, unit):
+def straight_side(tx, ty, n, side, is_point, unit):
     """(X, Y) of an edge or a point, and its parameter's rate."""
-    if side.is_point:
+    if is_point:
         return vertex_side(unit), (0.0, 0.0, 0.0, 0.0)
     c0 = dot(tx, side.tangent)
     c1 = dot(ty, side.tangent)
@@ -100,17 +122,18 @@ def straight_side(tx, ty, n, side, unit):
 
 
 @kernel(inner=True)
-def straight_frame(curve_f, curve_g, residual, normal, size, regular, isolated, fold):
-    """The `FeatureFrame` of a pair without faces, from the `CurveSide` of either."""
+def straight_frame(curve_f, curve_g, step, normal, size, regular):
+    """The `FeatureFrame` of a pair without faces, from the `CurveSide` of either and the `CurveStep` there."""
+    _i, isolated = inverse(step.h, step.scope, RANK)
     t1, t2 = curve_f.tangent, curve_g.tangent
     d = sub(curve_g.point, curve_f.point)
-    n, sure = normal_between(d, t1, t2, not (curve_f.is_point or curve_g.is_point), normal, size, isolated)
+    n, sure = normal_between(d, t1, t2, not (step.point_f or step.point_g), normal, size, isolated)
     tx = across(n, t1 if dot(t1, t1) > 0.5 else t2)
     ty = cross(n, tx)
     beta = dot(n, d)
     unit = max(max(abs(dot(n, curve_f.bent)), abs(dot(n, curve_g.bent))), 1.0 / size)
-    f, rate_f = straight_side(tx, ty, n, curve_f, unit)
-    g, rate_g = straight_side(tx, ty, n, curve_g, unit)
+    f, rate_f = straight_side(tx, ty, n, curve_f, step.point_f, unit)
+    g, rate_g = straight_side(tx, ty, n, curve_g, step.point_g, unit)
     # Where points coincide their direction is the one given, or any.
     isolated = isolated and (sure or dot(normal, normal) > 0.25)
     return FeatureFrame(
@@ -125,107 +148,99 @@ def straight_frame(curve_f, curve_g, residual, normal, size, regular, isolated, 
         rates_f=rate_f,
         rates_g=rate_g,
         response=pair_response(f, g, beta, unit),
-        residual=(residual[0], residual[1], 0.0, 0.0),
+        residual=(step.residual[0], step.residual[1], 0.0, 0.0),
         regular=regular,
         isolated=isolated,
         proper=True,
-        fold=fold,
+        fold=fold_of(step.h, step.scope),
     )
 
 
 @kernel(inner=True)
-def solve_off_face(store, kind_f, f, kind_g, g, pose, x, normal, size, turn, limit):
+def curve_step(store, f, g, x, curve_f, curve_g, limits):
+    """The `CurveStep` from x = (t_f, t_g), with those edges held beyond whose ends it would lead."""
+    least = BEYOND * limits.size
+    moves = limits.steps > 0
+    d = sub(curve_g.point, curve_f.point)
+    t1, t2 = curve_f.tangent, curve_g.tangent
+    scope = 1.0 + math.sqrt(dot(d, d)) * (curve_f.bend + curve_g.bend)
+    r1 = dot(d, t1)
+    r2 = dot(d, t2)
+    # At the end of an edge, and the distance would be less beyond it.
+    point_f = f.kind == VERTEX or (moves and abs(r1) > least and edge_held(store, f.record, x[0], r1))
+    point_g = g.kind == VERTEX or (moves and abs(r2) > least and edge_held(store, g.record, x[1], -r2))
+    while True:
+        r1 = 0.0 if point_f else r1
+        r2 = 0.0 if point_g else r2
+        cosine = 0.0 if point_f or point_g else dot(t1, t2)
+        h = (
+            1.0 if point_f else 1.0 - dot(d, curve_f.bent),
+            -cosine,
+            -cosine,
+            1.0 if point_g else 1.0 + dot(d, curve_g.bent),
+        )
+        i, fine = inverse(h, scope, FINE)
+        s1 = i[0] * r1 - i[1] * r2
+        s2 = i[2] * r1 - i[3] * r2
+        # Or a step leads beyond it.
+        out_f = moves and not point_f and abs(s1) > least and edge_held(store, f.record, x[0], s1)
+        out_g = moves and not point_g and abs(s2) > least and edge_held(store, g.record, x[1], s2)
+        if not (out_f or out_g):
+            return CurveStep(h, scope, (r1, r2), (s1, s2), fine, point_f, point_g)
+        point_f = point_f or out_f
+        point_g = point_g or out_g
+
+
+@kernel(inner=True)
+def solve_off_face(store, f, g, pose, x, normal, limits):
     """Newton from x = (t_f, t_g) for edges and vertices. Returns status, (t_f, t_g) and the frame."""
-    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    origin = (0.0, 0.0, 0.0)
-    if limit > 0:
+    size = limits.size
+    at_f = f.kind == VERTEX
+    at_g = g.kind == VERTEX
+    if limits.steps > 0:
         # A start carried along a step may be beyond an end, where a curve goes on and its edge does not.
         x = (
-            edge_advance(store, f, x[0], 0.0) if kind_f == EDGE else x[0],
-            edge_advance(store, g, x[1], 0.0) if kind_g == EDGE else x[1],
+            edge_advance(store, f.record, x[0], 0.0) if f.kind == EDGE else x[0],
+            edge_advance(store, g.record, x[1], 0.0) if g.kind == EDGE else x[1],
         )
-    tolerance = 4e-14 * size
     previous = 1e300
     status = NOT_CONVERGED
     iteration = 0
     while True:
-        p, ct, ctt = other_jet(store, kind_f, f, RelativePose(same, origin), x[0], 0.0)
-        q, cs, css = other_jet(store, kind_g, g, pose, x[1], 0.0)
-        d = sub(q, p)
-        t1, bent1, bend1, speed1 = unit_tangent(ct, ctt)
-        t2, bent2, bend2, speed2 = unit_tangent(cs, css)
-        regular = (kind_f == VERTEX or dot(t1, t1) > 0.5) and (kind_g == VERTEX or dot(t2, t2) > 0.5)
-        point_f = kind_f == VERTEX
-        point_g = kind_g == VERTEX
-        scope = 1.0
-        h = (1.0, 0.0, 0.0, 1.0)
-        r1 = 0.0
-        r2 = 0.0
+        curve_f = curve_side(store, f, IDENTITY, x[0])
+        curve_g = curve_side(store, g, pose, x[1])
+        t1, t2 = curve_f.tangent, curve_g.tangent
+        regular = (at_f or dot(t1, t1) > 0.5) and (at_g or dot(t2, t2) > 0.5)
         if not regular:
+            step = CurveStep((1.0, 0.0, 0.0, 1.0), 1.0, (0.0, 0.0), (0.0, 0.0), False, at_f, at_g)
             break
-        scope = 1.0 + math.sqrt(dot(d, d)) * (bend1 + bend2)
-        r1 = dot(d, t1)
-        r2 = dot(d, t2)
-        if limit > 0:
-            # At the end of an edge, and the distance would be less beyond it.
-            point_f = point_f or (abs(r1) > BEYOND * size and edge_held(store, f, x[0], r1))
-            point_g = point_g or (abs(r2) > BEYOND * size and edge_held(store, g, x[1], -r2))
-        while True:
-            r1 = 0.0 if point_f else r1
-            r2 = 0.0 if point_g else r2
-            cosine = 0.0 if point_f or point_g else dot(t1, t2)
-            h = (
-                1.0 if point_f else 1.0 - dot(d, bent1),
-                -cosine,
-                -cosine,
-                1.0 if point_g else 1.0 + dot(d, bent2),
-            )
-            i, fine = inverse(h, scope, FINE)
-            s1 = i[0] * r1 - i[1] * r2
-            s2 = i[2] * r1 - i[3] * r2
-            # Or a step leads beyond it.
-            out_f = limit > 0 and not point_f and abs(s1) > BEYOND * size and edge_held(store, f, x[0], s1)
-            out_g = limit > 0 and not point_g and abs(s2) > BEYOND * size and edge_held(store, g, x[1], s2)
-            if not (out_f or out_g):
-                break
-            point_f = point_f or out_f
-            point_g = point_g or out_g
-        step = max(abs(s1), abs(s2))
-        reach_f = abs(s1) * max(bend1, 2.0 / size)
-        reach_g = abs(s2) * max(bend2, 2.0 / size)
-        bend = max(reach_f, reach_g)
-        off = max(abs(r1), abs(r2))
-        small = off <= (ROUNDING if fine else SLACK) * size
-        if small or (step <= tolerance and bend < 1e-9) or (bend < STAGNANT and step > 0.25 * previous):
-            _i, isolated = inverse(h, scope, RANK)
-            if point_f != (kind_f == VERTEX) or point_g != (kind_g == VERTEX):
+        step = curve_step(store, f, g, x, curve_f, curve_g, limits)
+        s1, s2 = step.lengths
+        length = max(abs(s1), abs(s2))
+        bend_f = abs(s1) * max(curve_f.bend, 2.0 / size)
+        bend_g = abs(s2) * max(curve_g.bend, 2.0 / size)
+        bend = max(bend_f, bend_g)
+        off = max(abs(step.residual[0]), abs(step.residual[1]))
+        small = off <= (ROUNDING if step.fine else SLACK) * size
+        if small or (length <= 4e-14 * size and bend < 1e-9) or (bend < STAGNANT and length > 0.25 * previous):
+            if step.point_f != at_f or step.point_g != at_g:
                 status = LEFT_PATCH
-            elif isolated:
+            elif inverse(step.h, step.scope, RANK)[1]:
                 status = CONVERGED
             else:
                 status = SINGULAR if off < 1e-9 * size else NOT_CONVERGED
             break
-        if iteration >= limit or not step < 1e300 or bend > turn:
+        if iteration >= limits.steps or not length < 1e300 or bend > limits.turn:
             break
-        previous = step
-        factor_f = 1.0 if reach_f <= BEND else BEND / reach_f
-        factor_g = 1.0 if reach_g <= BEND else BEND / reach_g
+        previous = length
+        factor_f = bent_at_most(bend_f)
+        factor_g = bent_at_most(bend_g)
         x = (
-            x[0] if point_f else edge_advance(store, f, x[0], factor_f * s1 / speed1),
-            x[1] if point_g else edge_advance(store, g, x[1], factor_g * s2 / speed2),
+            x[0] if step.point_f else edge_advance(store, f.record, x[0], factor_f * s1 / curve_f.speed),
+            x[1] if step.point_g else edge_advance(store, g.record, x[1], factor_g * s2 / curve_g.speed),
         )
         iteration += 1
-    _i, isolated = inverse(h, scope, RANK)
-    frame = straight_frame(
-        CurveSide(p, t1, bent1, speed1, point_f),
-        CurveSide(q, t2, bent2, speed2, point_g),
-        (r1, r2),
-        normal,
-        size,
-        regular,
-        isolated,
-        fold_of(h, scope),
-    )
+    frame = straight_frame(curve_f, curve_g, step, normal, size, regular)
     if status == CONVERGED and not frame.isolated:
         status = SINGULAR
     return status, x, frame

@@ -18,15 +18,15 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, blend, cross, dot, matvec, neg, sub
+from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.proximity.brep.records import EDGE
 from assembly.proximity.extrema.face_face import (
-    BEND,
     CONVERGED,
     LEFT_PATCH,
     NOT_CONVERGED,
     SINGULAR,
     advance,
+    bent_at_most,
     own_frame,
     stagnates,
 )
@@ -77,226 +77,302 @@ FaceEdgePair = namedtuple(
 )
 
 
+# A point beside a face, and its projection along the normal there.
+PointOverFace = namedtuple(
+    "PointOverFace",
+    [
+        "face",  # a `SurfaceFrame`
+        "point",
+        "gap",  # beta
+        "residual",  # of the point along the tangents (two numbers)
+        "offset",  # I + beta A (11, 12, 22)
+        "bound",  # of the face's curvatures, at least one over the size
+    ],
+)
+# An edge at a point of it, seen from a face.
+EdgeOverFace = namedtuple(
+    "EdgeOverFace",
+    [
+        "along",  # as those of `FaceEdgePair`
+        "bend",
+        "speed",
+        "tilt",  # -n.C_t / |P C_t|
+        "slope",  # n.C_t
+        "curved",  # its own curvature
+        "steep",  # whether it goes along the normal
+    ],
+)
+# Of a point.
+NO_EDGE = EdgeOverFace((1.0, 0.0), 0.0, 1.0, 0.0, 0.0, 0.0, False)
+# A step of Newton's method for a face and an edge or a point, and the equations it is from.
+FaceEdgeStep = namedtuple(
+    "FaceEdgeStep",
+    [
+        "h",  # matrix (11, 12, 21, 22) of the equations
+        "unit",  # as that of `FaceEdgePair`
+        "move",  # of the point of the face, along its tangents
+        "length",  # how far the other point goes
+        "dt",  # and by how much its parameter changes
+        "fine",  # whether the matrix is regular
+        "slides",  # whether the edge is inclined to what is straight along it
+        "is_point",  # whether the other feature counts as a point
+    ],
+)
+
+
+@kernel(inline=True)
+def scope_of(step, gap):
+    """A bound of the entries of the equations' matrix."""
+    return step.unit * (1.0 + abs(gap) * step.unit)
+
+
+@kernel(inline=True)
+def point_over(face, point, size):
+    """The `PointOverFace` of a point and a `SurfaceFrame`."""
+    a = face.shape
+    d = sub(point, face.point)
+    beta = dot(face.normal, d)
+    residual = (dot(face.tangent_x, d), dot(face.tangent_y, d))
+    offset = (1.0 + beta * a[0], beta * a[1], 1.0 + beta * a[2])
+    return PointOverFace(face, point, beta, residual, offset, max(curvature_bound(a), 1.0 / size))
+
+
+@kernel(inline=True)
+def edge_over(face, ct, ctt):
+    """The `EdgeOverFace` of an edge with these derivatives."""
+    q0 = dot(face.tangent_x, ct)
+    q1 = dot(face.tangent_y, ct)
+    flat = q0 * q0 + q1 * q1
+    square = dot(ct, ct)
+    slope = dot(face.normal, ct)
+    if flat <= STEEP * square:
+        return EdgeOverFace((1.0, 0.0), 0.0, 1.0, 0.0, slope, 0.0, True)
+    speed = math.sqrt(flat)
+    side = cross(ct, ctt)
+    curved = math.sqrt(dot(side, side)) / (square * math.sqrt(square))
+    bend = -dot(face.normal, ctt) / flat
+    return EdgeOverFace((q0 / speed, q1 / speed), bend, speed, -slope / speed, slope, curved, False)
+
+
+@kernel(inline=True)
+def point_step(over, slides, is_point):
+    """The `FaceEdgeStep` of a point over a face."""
+    r, k, unit = over.residual, over.offset, over.bound
+    h = (unit * k[0], unit * k[1], unit * k[1], unit * k[2])
+    i, fine = inverse(h, unit * (1.0 + abs(over.gap) * unit), FINE)
+    move = (unit * (i[0] * r[0] + i[1] * r[1]), unit * (i[2] * r[0] + i[3] * r[1]))
+    return FaceEdgeStep(h, unit, move, 0.0, 0.0, fine, slides, is_point)
+
+
+@kernel(inline=True)
+def edge_step(store, other, over, edge, limits):
+    """The `FaceEdgeStep` of an edge over a face, as if it had no ends."""
+    a, r, k = over.face.shape, over.residual, over.offset
+    (c0, c1), bend = edge.along, edge.bend
+    unit = max(over.bound, abs(bend))
+    # The first row times the tangent, the second across it.
+    w0 = c0 * k[0] + c1 * k[1]
+    w1 = c0 * k[1] + c1 * k[2]
+    h = (
+        bend * w0 - c0 * a[0] - c1 * a[1],
+        bend * w1 - c0 * a[1] - c1 * a[2],
+        unit * (c0 * k[1] - c1 * k[0]),
+        unit * (c0 * k[2] - c1 * k[1]),
+    )
+    i, fine = inverse(h, unit * (1.0 + abs(over.gap) * unit), FINE)
+    s0 = bend * (c0 * r[0] + c1 * r[1]) - edge.tilt
+    s1 = unit * (c0 * r[1] - c1 * r[0])
+    ax = i[0] * s0 + i[1] * s1
+    ay = i[2] * s0 + i[3] * s1
+    bx = k[0] * ax + k[1] * ay - r[0]
+    by = k[1] * ax + k[2] * ay - r[1]
+    length = abs(bx) + abs(by)
+    dt = (c0 * bx + c1 * by) / edge.speed
+    slides = limits.steps > 0 and (edge.steep or (not fine and abs(edge.tilt) >= LEVEL))
+    if slides:
+        # The gap falls along all of this: on to where the edge bends or ends.
+        length = limits.size
+        dt = edge_stride(store, other.record)
+        dt = -dt if edge.slope > 0.0 else dt
+    return FaceEdgeStep(h, unit, (ax, ay), length, dt, fine, slides, False)
+
+
 @kernel(inner=True)
-def solve_on_face(store, face, kind, other, pose, x, size, turn, limit):
+def step_on_face(store, other, t, over, edge, limits):
+    """The `FaceEdgeStep` of a face and another feature at t; an edge is held at its end."""
+    moves = limits.steps > 0
+    if other.kind != EDGE:
+        return point_step(over, False, True)
+    # At the end of the edge, and the gap would be less beyond it.
+    leads_out = moves and (edge.steep or abs(edge.tilt) > BEYOND)
+    if leads_out and edge_held(store, other.record, t, -edge.slope):
+        return point_step(over, False, True)
+    step = edge_step(store, other, over, edge, limits)
+    # Held too where the step leads beyond the end: the slope may be that of a face not solved yet.
+    leads_out = moves and abs(step.dt) * edge.speed > BEYOND * limits.size
+    if leads_out and edge_held(store, other.record, t, step.dt):
+        return point_step(over, step.slides, True)
+    return step
+
+
+@kernel(inline=True)
+def face_edge_pair(status, x, over, edge, step, regular):
+    """The `FaceEdgePair` that Newton's method ends with."""
+    k = over.offset
+    scope = scope_of(step, over.gap)
+    _i, isolated = inverse(step.h, scope, RANK)
+    fold = fold_of(step.h, scope)
+    is_point = step.is_point
+    tilt = 0.0 if is_point else edge.tilt
+    is_regular = regular and not (edge.steep and not is_point)
+    # Past a center of curvature the foot is no nearest point of the face; nor is the edge's where it bends away.
+    nearest = is_point or (fold < LEVEL and k[0] + k[2] > 0.0 and k[0] * k[2] > k[1] * k[1])
+    # Positive, as of two faces, where the pair is closest or deepest.
+    fold = fold if is_point else -fold
+    return FaceEdgePair(
+        status=status,
+        parameters=x,
+        face=over.face,
+        point=over.point,
+        gap=over.gap,
+        along=edge.along,
+        bend=edge.bend,
+        speed=edge.speed,
+        unit=step.unit,
+        residual=(over.residual[0], over.residual[1], tilt),
+        regular=is_regular,
+        is_point=is_point,
+        isolated=isolated,
+        proper=nearest,
+        fold=fold,
+    )
+
+
+@kernel(inner=True)
+def solve_on_face(store, face, other, pose, x, limits):
     """Newton from x = (u, v, t, s) for a face and an edge, a vertex or a point, in the axes of the face.
 
-    A point of an edge stays at t, one of a face at (t, s). With limit 0 everything is evaluated at x. Returns a
-    `FaceEdgePair`.
+    A point of an edge stays at t, one of a face at (t, s). Returns a `FaceEdgePair`.
     """
-    if limit > 0 and kind == EDGE:
+    size = limits.size
+    is_edge = other.kind == EDGE
+    if limits.steps > 0 and is_edge:
         # A start carried along a step may be beyond an end, where the curve goes on and the edge does not.
-        x = (x[0], x[1], edge_advance(store, other, x[2], 0.0), x[3])
-    tolerance = 4e-14 * size
+        x = (x[0], x[1], edge_advance(store, other.record, x[2], 0.0), x[3])
     previous = 1e300
     status = NOT_CONVERGED
     iteration = 0
     while True:
         own = own_frame(store, face, x[0], x[1])
-        p, n, tx, ty = own.point, own.normal, own.tangent_x, own.tangent_y
-        e, a, regular = own.rates, own.shape, own.regular
-        q, ct, ctt = other_jet(store, kind, other, pose, x[2], x[3])
-        d = sub(q, p)
-        beta = dot(n, d)
-        r0 = dot(tx, d)
-        r1 = dot(ty, d)
-        k11 = 1.0 + beta * a[0]
-        k12 = beta * a[1]
-        k22 = 1.0 + beta * a[2]
-        bound = max(curvature_bound(a), 1.0 / size)
-        point = kind != EDGE
-        steep = False
-        c0 = 1.0
-        c1 = 0.0
-        k = 0.0
-        speed = 1.0
-        tilt = 0.0
-        bent = 0.0
-        dt = 0.0
-        unit = bound
-        h = (unit * k11, unit * k12, unit * k12, unit * k22)
-        if not point:
-            q0 = dot(tx, ct)
-            q1 = dot(ty, ct)
-            flat = q0 * q0 + q1 * q1
-            square = dot(ct, ct)
-            slope = dot(n, ct)
-            steep = flat <= STEEP * square
-            regular = regular and square > 1e-290
-            if not steep:
-                speed = math.sqrt(flat)
-                c0 = q0 / speed
-                c1 = q1 / speed
-                k = -dot(n, ctt) / flat
-                tilt = -slope / speed
-                side = cross(ct, ctt)
-                bent = math.sqrt(dot(side, side)) / (square * math.sqrt(square))
+        q, ct, ctt = other_jet(store, other, pose, x[2], x[3])
+        over = point_over(own, q, size)
+        edge = edge_over(own, ct, ctt) if is_edge else NO_EDGE
+        regular = own.regular and (not is_edge or dot(ct, ct) > 1e-290)
         if not regular:
             # An apex, a crease or a cusp: there is no tangent to go on.
+            step = point_step(over, False, not is_edge)
             break
-        slide = False
-        if not point and limit > 0 and (steep or abs(tilt) > BEYOND):
-            # At the end of the edge, and the gap would be less beyond it.
-            point = edge_held(store, other, x[2], -slope)
-        if not point:
-            unit = max(bound, abs(k))
-            # The first row times the tangent, the second across it.
-            w0 = c0 * k11 + c1 * k12
-            w1 = c0 * k12 + c1 * k22
-            h = (
-                k * w0 - c0 * a[0] - c1 * a[1],
-                k * w1 - c0 * a[1] - c1 * a[2],
-                unit * (c0 * k12 - c1 * k11),
-                unit * (c0 * k22 - c1 * k12),
-            )
-            i, fine = inverse(h, unit * (1.0 + abs(beta) * unit), FINE)
-            s0 = k * (c0 * r0 + c1 * r1) - tilt
-            s1 = unit * (c0 * r1 - c1 * r0)
-            ax = i[0] * s0 + i[1] * s1
-            ay = i[2] * s0 + i[3] * s1
-            bx = k11 * ax + k12 * ay - r0
-            by = k12 * ax + k22 * ay - r1
-            dt = (c0 * bx + c1 * by) / speed
-            slide = limit > 0 and (steep or (not fine and abs(tilt) >= LEVEL))
-            if slide:
-                # The gap falls along all of this: on to where the edge bends or ends.
-                dt = edge_stride(store, other)
-                dt = -dt if slope > 0.0 else dt
-            # Held too where the step leads beyond the end: the slope may be that of a face not solved yet.
-            point = limit > 0 and abs(dt) * speed > BEYOND * size and edge_held(store, other, x[2], dt)
-        if point:
-            unit = bound
-            tilt = 0.0
-            dt = 0.0
-            h = (unit * k11, unit * k12, unit * k12, unit * k22)
-            i, fine = inverse(h, unit * (1.0 + abs(beta) * unit), FINE)
-            ax = unit * (i[0] * r0 + i[1] * r1)
-            ay = unit * (i[2] * r0 + i[3] * r1)
-            step_g = 0.0
-        elif slide:
-            step_g = size
-        else:
-            step_g = abs(bx) + abs(by)
-        step_f = abs(ax) + abs(ay)
-        step = max(step_f, step_g)
-        bend_f = step_f * max(curvature_bound(a), 2.0 / size)
-        bend_g = 0.0 if point or slide else step_g * max(bent, 2.0 / size)
+        step = step_on_face(store, other, x[2], over, edge, limits)
+        tilt = 0.0 if step.is_point else edge.tilt
+        ax, ay = step.move
+        length_f = abs(ax) + abs(ay)
+        length = max(length_f, step.length)
+        bend_f = length_f * max(curvature_bound(own.shape), 2.0 / size)
+        bend_g = 0.0 if step.is_point or step.slides else step.length * max(edge.curved, 2.0 / size)
         bend = max(bend_f, bend_g)
-        off = max(abs(r0), abs(r1))
-        level = ROUNDING if fine else SLACK
+        off = max(abs(over.residual[0]), abs(over.residual[1]))
+        level = ROUNDING if step.fine else SLACK
         small = off <= level * size and abs(tilt) <= level
-        settled = (step <= tolerance and bend < 1e-9) or stagnates(step, bend, previous, status, p, q, size)
-        if not slide and (small or settled):
-            _i, isolated = inverse(h, unit * (1.0 + abs(beta) * unit), RANK)
-            done = abs(tilt) < LEVEL and off < LEVEL * size
-            if point and kind == EDGE:
+        settled = (length <= 4e-14 * size and bend < 1e-9) or stagnates(
+            length, bend, previous, status, own.point, q, size
+        )
+        if not step.slides and (small or settled):
+            if step.is_point and is_edge:
                 status = LEFT_PATCH
-            elif isolated:
+            elif inverse(step.h, scope_of(step, over.gap), RANK)[1]:
                 status = CONVERGED
             else:
-                status = SINGULAR if done else NOT_CONVERGED
+                status = SINGULAR if abs(tilt) < LEVEL and off < LEVEL * size else NOT_CONVERGED
             break
-        if iteration >= limit or not step < 1e300 or bend > turn:
+        if iteration >= limits.steps or not length < 1e300 or bend > limits.turn:
             break
-        previous = step
-        factor_f = 1.0 if bend_f <= BEND else BEND / bend_f
-        factor_g = 1.0 if bend_g <= BEND else BEND / bend_g
-        du = factor_f * (e[0] * ax + e[1] * ay)
-        dv = factor_f * e[2] * ay
-        u, v, clamped = advance(store, face, x[0], x[1], du, dv, blend(factor_f * ax, tx, factor_f * ay, ty))
-        t = x[2] if point else edge_advance(store, other, x[2], factor_g * dt)
+        previous = length
+        factor = bent_at_most(bend_f)
+        e = own.rates
+        du = factor * (e[0] * ax + e[1] * ay)
+        dv = factor * e[2] * ay
+        way = blend(factor * ax, own.tangent_x, factor * ay, own.tangent_y)
+        u, v, clamped = advance(store, face, x[0], x[1], du, dv, way)
+        t = x[2] if step.is_point else edge_advance(store, other.record, x[2], bent_at_most(bend_g) * step.dt)
         status = NOT_CONVERGED
         if clamped:
             status = LEFT_PATCH
             # Held at the end of the patch and nothing else moves: the pair has left.
-            if abs(u - x[0]) + abs(v - x[1]) + abs(t - x[2]) <= 1e-12 * (abs(du) + abs(dv) + abs(dt)):
+            if abs(u - x[0]) + abs(v - x[1]) + abs(t - x[2]) <= 1e-12 * (abs(du) + abs(dv) + abs(step.dt)):
                 break
         x = (u, v, t, x[3])
         iteration += 1
-    scope = unit * (1.0 + abs(beta) * unit)
-    _i, isolated = inverse(h, scope, RANK)
-    fold = fold_of(h, scope)
-    # Past a center of curvature the foot is no nearest point of the face; nor is the edge's where it bends away.
-    nearest = point or (fold < LEVEL and k11 + k22 > 0.0 and k11 * k22 > k12 * k12)
-    return FaceEdgePair(
-        status=status,
-        parameters=x,
-        face=own,
-        point=q,
-        gap=beta,
-        along=(c0, c1),
-        bend=k,
-        speed=speed,
-        unit=unit,
-        residual=(r0, r1, tilt),
-        regular=regular and not (steep and not point),
-        is_point=point,
-        isolated=isolated,
-        proper=nearest,
-        # Positive, as of two faces, where the pair is closest or deepest.
-        fold=fold if point else -fold,
+    return face_edge_pair(status, x, over, edge, step, regular)
+
+
+@kernel(inline=True)
+def sided_frame(found, side):
+    """The `FeatureFrame` of a pair in the axes of the face, which is f; `side` -1: with n and y turned back."""
+    face, speed, unit = found.face, found.speed, found.unit
+    e, a, r = face.rates, face.shape, found.residual
+    c = (found.along[0], side * found.along[1])
+    other = vertex_side(unit)
+    rate = (0.0, 0.0, 0.0, 0.0)
+    if not found.is_point:
+        other = edge_side(c[0], c[1], side * found.bend, unit)
+        rate = (c[0] / speed, c[1] / speed, 0.0, 0.0)
+    own = face_side((side * a[0], a[1], side * a[2]))
+    response = pair_response(own, other, found.gap, unit) if side > 0.0 else pair_response(other, own, found.gap, unit)
+    return FeatureFrame(
+        normal=scale(side, face.normal),
+        tangent_x=face.tangent_x,
+        tangent_y=scale(side, face.tangent_y),
+        point_f=face.point,
+        point_g=found.point,
+        gap=found.gap,
+        side_f=own,
+        side_g=other,
+        rates_f=(e[0], side * e[1], 0.0, side * e[2]),
+        rates_g=rate,
+        response=response,
+        residual=(r[0], side * r[1], r[2], 0.0),
+        regular=found.regular,
+        isolated=found.isolated,
+        proper=found.proper,
+        fold=found.fold,
     )
 
 
 @kernel(inner=True)
 def face_frame(found):
     """The `FeatureFrame` of a pair whose face is f, from what `solve_on_face` returns."""
-    face, c, speed, unit = found.face, found.along, found.speed, found.unit
-    e, residual = face.rates, found.residual
-    f = face_side(face.shape)
-    if found.is_point:
-        g = vertex_side(unit)
-        rate = (0.0, 0.0, 0.0, 0.0)
-    else:
-        g = edge_side(c[0], c[1], found.bend, unit)
-        rate = (c[0] / speed, c[1] / speed, 0.0, 0.0)
-    return FeatureFrame(
-        normal=face.normal,
-        tangent_x=face.tangent_x,
-        tangent_y=face.tangent_y,
-        point_f=face.point,
-        point_g=found.point,
-        gap=found.gap,
-        side_f=f,
-        side_g=g,
-        rates_f=(e[0], e[1], 0.0, e[2]),
-        rates_g=rate,
-        response=pair_response(f, g, found.gap, unit),
-        residual=(residual[0], residual[1], residual[2], 0.0),
-        regular=found.regular,
-        isolated=found.isolated,
-        proper=found.proper,
-        fold=found.fold,
-    )
+    return sided_frame(found, 1.0)
 
 
 @kernel(inner=True)
 def turned_frame(pose, found):
     """The frame of a pair whose face is g, in the axes of f: n, y and with them the curvatures change their signs."""
-    face, c, speed, unit = found.face, found.along, found.speed, found.unit
-    e, a, residual = face.rates, face.shape, found.residual
-    g = face_side((-a[0], a[1], -a[2]))
-    if found.is_point:
-        f = vertex_side(unit)
-        rate = (0.0, 0.0, 0.0, 0.0)
-    else:
-        f = edge_side(c[0], -c[1], -found.bend, unit)
-        rate = (c[0] / speed, -c[1] / speed, 0.0, 0.0)
+    frame = sided_frame(found, -1.0)
     return FeatureFrame(
-        normal=neg(matvec(pose.rotation, face.normal)),
-        tangent_x=matvec(pose.rotation, face.tangent_x),
-        tangent_y=neg(matvec(pose.rotation, face.tangent_y)),
-        point_f=add(matvec(pose.rotation, found.point), pose.shift),
-        point_g=add(matvec(pose.rotation, face.point), pose.shift),
-        gap=found.gap,
-        side_f=f,
-        side_g=g,
-        rates_f=rate,
-        rates_g=(e[0], -e[1], 0.0, -e[2]),
-        response=pair_response(f, g, found.gap, unit),
-        residual=(residual[0], -residual[1], residual[2], 0.0),
-        regular=found.regular,
-        isolated=found.isolated,
-        proper=found.proper,
-        fold=found.fold,
+        normal=matvec(pose.rotation, frame.normal),
+        tangent_x=matvec(pose.rotation, frame.tangent_x),
+        tangent_y=matvec(pose.rotation, frame.tangent_y),
+        point_f=add(matvec(pose.rotation, frame.point_g), pose.shift),
+        point_g=add(matvec(pose.rotation, frame.point_f), pose.shift),
+        gap=frame.gap,
+        side_f=frame.side_g,
+        side_g=frame.side_f,
+        rates_f=frame.rates_g,
+        rates_g=frame.rates_f,
+        response=frame.response,
+        residual=frame.residual,
+        regular=frame.regular,
+        isolated=frame.isolated,
+        proper=frame.proper,
+        fold=frame.fold,
     )

@@ -339,8 +339,8 @@ def carried_along(frame, ax, ay, bx, by):
 
 
 @kernel(inner=True)
-def solve_pair(store, f, g, pose, x, size, turn, close, downhill):
-    """Newton from x to the extremal pair: a `PairSolution`.
+def solve_pair(store, surfaces, pose, x, size, turn, close, downhill):
+    """Newton from x to the extremal pair of two surfaces: a `PairSolution`.
 
     `size` is the length against which steps are measured. A step that would turn a normal by more than `BEND` is
     shortened, so that the iteration follows the surface; one that would turn it by more than `turn` says that x was not
@@ -348,7 +348,7 @@ def solve_pair(store, f, g, pose, x, size, turn, close, downhill):
     what is left is of the order of close^2, and of close^3 in the gap. With `downhill` a start along a level valley is
     led to its least, as a search asks; without, a pair that is followed stays where it is in a continuum.
     """
-    tolerance = 4e-14 * size
+    f, g = surfaces
     flat = 1e-9 / size
     previous = 1e300
     status = NOT_CONVERGED
@@ -378,7 +378,7 @@ def solve_pair(store, f, g, pose, x, size, turn, close, downhill):
         bend = max(bend_f, bend_g)
         small = bend < close and isolated
         # Small against the scene and against the bodies' own curvature; or as small as rounding lets it become.
-        if (step <= tolerance and bend < 1e-9) or stagnates(
+        if (step <= 4e-14 * size and bend < 1e-9) or stagnates(
             step, bend, previous, status, frame.point_f, frame.point_g, size
         ):
             # In a singular system a vanishing step is a solution only if the residual vanishes too.

@@ -53,6 +53,15 @@ SLACK = 1e-13
 # A slope (or a length over the size) at the end of an edge that leads beyond it by less is rounding.
 BEYOND = 1e-12
 
+# How Newton's method goes on a pair of features.
+NewtonLimits = namedtuple(
+    "NewtonLimits",
+    [
+        "size",  # the length against which steps are measured
+        "turn",  # a step that would turn a normal or a tangent by more says that there is no pair near [rad]
+        "steps",  # at most; with none the pair is evaluated where it is
+    ],
+)
 # What a feature asks of a contact normal: the two matrices X and Y above, entry by entry.
 FeatureSide = namedtuple("FeatureSide", ["x11", "x12", "x21", "x22", "y11", "y12", "y21", "y22"])
 # Everything about a pair of any two features at some parameters, extremal or not, in the axes of body f.
@@ -238,18 +247,15 @@ def across(a, b):
 
 
 @kernel(inner=True)
-def other_jet(store, kind, other, pose, t, s):
+def other_jet(store, other, pose, t, s):
     """Point, C_t, C_tt of an edge at t, or of a point (whose derivatives vanish), of a face at (t, s), moved."""
     zero = (0.0, 0.0, 0.0)
-    if kind == VERTEX:
-        return add(matvec(pose.rotation, vertex_point(store, other)), pose.shift), zero, zero
-    if kind == FACE_POINT:
-        return (
-            add(matvec(pose.rotation, surface_point(store.table, store.pool, other, t, s)[0]), pose.shift),
-            zero,
-            zero,
-        )
-    p, ct, ctt = edge_jet(store, other, t)
-    if kind == EDGE_POINT:
+    if other.kind == VERTEX:
+        return add(matvec(pose.rotation, vertex_point(store, other.record)), pose.shift), zero, zero
+    if other.kind == FACE_POINT:
+        p = surface_point(store.table, store.pool, other.record, t, s)[0]
+        return add(matvec(pose.rotation, p), pose.shift), zero, zero
+    p, ct, ctt = edge_jet(store, other.record, t)
+    if other.kind == EDGE_POINT:
         return add(matvec(pose.rotation, p), pose.shift), zero, zero
     return add(matvec(pose.rotation, p), pose.shift), matvec(pose.rotation, ct), matvec(pose.rotation, ctt)

@@ -14,23 +14,19 @@ What would leave a patch is set to zero component by component before the step a
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly._record import Store
-from assembly.geometry.splines.evaluate import (
-    surface_at,
-    surface_point,
-)
+from assembly.geometry.splines.evaluate import surface_at, surface_point
 from assembly.geometry.vec import add, blend, dot, matvec, matvec_t, sub
-from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extrema.face_face import (
-    BEND,
     CONVERGED,
     LEFT_PATCH,
     NOT_CONVERGED,
     SINGULAR,
     PairSolution,
     advance,
+    bent_at_most,
     own_frame,
     pair_frame,
     solve_pair,
@@ -72,17 +68,24 @@ def end_of(pool, breaks, spans, closed, pole_low, pole_high, u):
     return 0
 
 
-@kernel(inline=True)
-def free_directions(store, r, u, v, e, gx, gy, slack):
-    """Two directions (tx, ty) in which a point may descend, zero where an end of the patch takes one away; how many.
+# Directions in the tangent frame in which a point may descend, and how many there are: the others are zero.
+FreeDirections = namedtuple("FreeDirections", "first second count")
 
-    e is E^-1 of `own_frame`, (gx, gy) the gradient over tangent lengths, `slack` what of it is rounding. Along an end
+
+@kernel(inline=True)
+def free_directions(store, r, u, v, e, gradient, slack):
+    """The `FreeDirections` of a point: an end of the patch may take one away or both.
+
+    e is E^-1 of `own_frame`, the gradient one over tangent lengths, `slack` what of it is rounding. Along an end
     the direction is that of the end: S_v at an end of u.
     """
     patch = surface_at(store.table, r)
+    gx, gy = gradient
+    none = (0.0, 0.0)
+    both = FreeDirections((1.0, 0.0), (0.0, 1.0), 2)
     if e[0] == 0.0:
         # At a pole.
-        return 1.0, 0.0, 0.0, 1.0, 2
+        return both
     poles = patch.poles
     end_u = end_of(store.pool, patch.breaks_u, patch.spans_u, patch.closed_u, poles & 1, poles & 2, u)
     end_v = end_of(store.pool, patch.breaks_v, patch.spans_v, patch.closed_v, poles & 4, poles & 8, v)
@@ -95,12 +98,12 @@ def free_directions(store, r, u, v, e, gx, gy, slack):
     held_u = end_u * gx < -slack
     held_v = end_v * (vx * gx + vy * gy) < -slack * length
     if held_u and held_v:
-        return 0.0, 0.0, 0.0, 0.0, 0
+        return FreeDirections(none, none, 0)
     if held_v:
-        return 1.0, 0.0, 0.0, 0.0, 1
+        return FreeDirections((1.0, 0.0), none, 1)
     if held_u:
-        return vx / length, vy / length, 0.0, 0.0, 1
-    return 1.0, 0.0, 0.0, 1.0, 2
+        return FreeDirections((vx / length, vy / length), none, 1)
+    return both
 
 
 @kernel(inner=True)
@@ -114,12 +117,15 @@ def end_curvature(store, r, u, v, along_v, d):
 
 
 @kernel(inline=True)
-def reduced(h11, h12, h22, t):
-    """T^T H T for the directions t, with one on the diagonal in the place of a direction that is taken away."""
-    a = t[0] * (h11 * t[0] + h12 * t[1]) + t[1] * (h12 * t[0] + h22 * t[1])
-    b = t[0] * (h11 * t[2] + h12 * t[3]) + t[1] * (h12 * t[2] + h22 * t[3])
-    c = t[2] * (h11 * t[2] + h12 * t[3]) + t[3] * (h12 * t[2] + h22 * t[3])
-    return (a if t[4] > 0 else 1.0), b, (c if t[4] > 1 else 1.0)
+def reduced(k, shape, t):
+    """T^T (I + k A) T for the directions t, with one on the diagonal in the place of one that is taken away."""
+    h11, h12, h22 = 1.0 + k * shape[0], k * shape[1], 1.0 + k * shape[2]
+    x, y = t.first
+    z, w = t.second
+    a = x * (h11 * x + h12 * y) + y * (h12 * x + h22 * y)
+    b = x * (h11 * z + h12 * w) + y * (h12 * z + h22 * w)
+    c = z * (h11 * z + h12 * w) + w * (h12 * z + h22 * w)
+    return (a if t.count > 0 else 1.0), b, (c if t.count > 1 else 1.0)
 
 
 @kernel(inline=True)
@@ -155,26 +161,90 @@ def descent_step(p, c, q, gf, gg, mu):
     return (a1, a2), (b1, b2), True
 
 
+# Two points of surfaces. f, g: the `SurfaceFrame` of either, in its own axes; d: the vector from f to g in the axes of
+# f; d_g: in those of g; square: |d|^2.
+WitnessPoints = namedtuple("WitnessPoints", "f g d d_g square")
+
+
 @kernel(inline=True)
-def both_frames(store, f, g, pose, x):
-    """`own_frame` of either surface, each in its own axes, and the vector d from f to g in both."""
-    own_f = own_frame(store, f, x[0], x[1])
-    own_g = own_frame(store, g, x[2], x[3])
+def witness_points(store, surfaces, pose, x):
+    """The `WitnessPoints` at parameters x."""
+    own_f = own_frame(store, surfaces[0], x[0], x[1])
+    own_g = own_frame(store, surfaces[1], x[2], x[3])
     d = sub(add(matvec(pose.rotation, own_g.point), pose.shift), own_f.point)
-    return own_f, own_g, d, matvec_t(pose.rotation, d)
+    return WitnessPoints(own_f, own_g, d, matvec_t(pose.rotation, d), dot(d, d))
+
+
+# |d|^2 / 2 to second order about two points, over the directions in which they may go.
+DescentModel = namedtuple(
+    "DescentModel",
+    [
+        "ways_f",  # `FreeDirections`
+        "ways_g",
+        "h_f",  # second derivative (11, 12, 22) over those of f
+        "coupling",  # over one of f and one of g (11, 12, 21, 22)
+        "h_g",
+        "slope_f",  # gradient over those of f [length]
+        "slope_g",
+        "bend_f",  # by how much a step turns the normal of f, over its length
+        "bend_g",
+    ],
+)
+
+
+@kernel(inline=True)
+def descent_model(store, surfaces, pose, x, at, size):
+    """The `DescentModel` at parameters x with these `WitnessPoints`."""
+    f, g = surfaces
+    xf, yf, xg, yg = at.f.tangent_x, at.f.tangent_y, at.g.tangent_x, at.g.tangent_y
+    gf = (-dot(xf, at.d), -dot(yf, at.d))
+    gg = (dot(xg, at.d_g), dot(yg, at.d_g))
+    tf = free_directions(store, f, x[0], x[1], at.f.rates, gf, ROUNDING * size)
+    tg = free_directions(store, g, x[2], x[3], at.g.rates, gg, ROUNDING * size)
+    h_f = reduced(dot(at.f.normal, at.d), at.f.shape, tf)
+    h_g = reduced(-dot(at.g.normal, at.d_g), at.g.shape, tg)
+    if tf.count == 1:
+        h_f = (1.0 - end_curvature(store, f, x[0], x[1], tf.first[1] != 0.0, at.d), 0.0, 1.0)
+    if tg.count == 1:
+        h_g = (1.0 + end_curvature(store, g, x[2], x[3], tg.first[1] != 0.0, at.d_g), 0.0, 1.0)
+    f1 = matvec_t(pose.rotation, blend(tf.first[0], xf, tf.first[1], yf))
+    f2 = matvec_t(pose.rotation, blend(tf.second[0], xf, tf.second[1], yf))
+    g1 = blend(tg.first[0], xg, tg.first[1], yg)
+    g2 = blend(tg.second[0], xg, tg.second[1], yg)
+    return DescentModel(
+        ways_f=tf,
+        ways_g=tg,
+        h_f=h_f,
+        coupling=(-dot(f1, g1), -dot(f1, g2), -dot(f2, g1), -dot(f2, g2)),
+        h_g=h_g,
+        slope_f=(tf.first[0] * gf[0] + tf.first[1] * gf[1], tf.second[0] * gf[0] + tf.second[1] * gf[1]),
+        slope_g=(tg.first[0] * gg[0] + tg.first[1] * gg[1], tg.second[0] * gg[0] + tg.second[1] * gg[1]),
+        bend_f=max(curvature_bound(at.f.shape), 2.0 / size),
+        bend_g=max(curvature_bound(at.g.shape), 2.0 / size),
+    )
+
+
+@kernel(inline=True)
+def step_along(store, r, u, v, own, ways, step, factor):
+    """Parameters of a surface after part of a step along its free directions; whether an end held them."""
+    ax = factor * (ways.first[0] * step[0] + ways.second[0] * step[1])
+    ay = factor * (ways.first[1] * step[0] + ways.second[1] * step[1])
+    e = own.rates
+    return advance(store, r, u, v, e[0] * ax + e[1] * ay, e[2] * ay, blend(ax, own.tangent_x, ay, own.tangent_y))
 
 
 @kernel(inner=True)
-def finish(store, f, g, pose, x, size, reach):
+def finish(store, surfaces, pose, x, size, reach):
     """Newton's method from x: whether it came to the extremum that the descent leads to, and the `PairSolution`.
 
     That is one no farther apart than x, off by no more than `reach` on either surface; with reach = 0, where the
     surfaces meet, one where they touch or, solids, are deepest in each other.
     """
+    f, g = surfaces
     start = pair_frame(store, f, g, pose, x)
     most = TURN_APART if reach > 0.0 else TURN_MET
     cosine = SAME_APART if reach > 0.0 else SAME_MET
-    found = solve_pair(store, f, g, pose, x, size, most, 0.0, False)
+    found = solve_pair(store, surfaces, pose, x, size, most, 0.0, False)
     y, frame = found.parameters, found.frame
     same = (found.status == CONVERGED or found.status == SINGULAR) and dot(start.normal, frame.normal) > cosine
     if same:
@@ -201,7 +271,7 @@ def with_steps(found, count):
 
 
 @kernel(inner=True)
-def descend_pair(store, f, g, pose, x, size, limit):
+def descend_pair(store, surfaces, pose, x, size, limit):
     """From any parameters x down to the nearest pair that the descent leads to, in at most `limit` steps.
 
     Returns a `PairSolution`, as `solve_pair` does. The points never move apart.
@@ -215,71 +285,45 @@ def descend_pair(store, f, g, pose, x, size, limit):
     mu = LEAST
     near = NEAR
     count = 0
-    own_f, own_g, d, dg = both_frames(store, f, g, pose, x)
-    square = dot(d, d)
-    while own_f.regular and own_g.regular:
-        if square <= MEET * MEET * size * size:
+    f, g = surfaces
+    at = witness_points(store, surfaces, pose, x)
+    while at.f.regular and at.g.regular:
+        if at.square <= MEET * MEET * size * size:
             status = CROSSED
             break
-        nf, xf, yf, ef, a = own_f.normal, own_f.tangent_x, own_f.tangent_y, own_f.rates, own_f.shape
-        ng, xg, yg, eg, b = own_g.normal, own_g.tangent_x, own_g.tangent_y, own_g.rates, own_g.shape
-        gf = (-dot(xf, d), -dot(yf, d))
-        gg = (dot(xg, dg), dot(yg, dg))
-        tf = free_directions(store, f, x[0], x[1], ef, gf[0], gf[1], ROUNDING * size)
-        tg = free_directions(store, g, x[2], x[3], eg, gg[0], gg[1], ROUNDING * size)
-        held = tf[4] < 2 or tg[4] < 2
-        # The second derivative of |d|^2 / 2 over those directions.
-        k = dot(nf, d)
-        p = reduced(1.0 + k * a[0], k * a[1], 1.0 + k * a[2], tf)
-        k = -dot(ng, dg)
-        q = reduced(1.0 + k * b[0], k * b[1], 1.0 + k * b[2], tg)
-        if tf[4] == 1:
-            p = (1.0 - end_curvature(store, f, x[0], x[1], tf[1] != 0.0, d), 0.0, 1.0)
-        if tg[4] == 1:
-            q = (1.0 + end_curvature(store, g, x[2], x[3], tg[1] != 0.0, dg), 0.0, 1.0)
-        f1 = matvec_t(pose.rotation, blend(tf[0], xf, tf[1], yf))
-        f2 = matvec_t(pose.rotation, blend(tf[2], xf, tf[3], yf))
-        g1 = blend(tg[0], xg, tg[1], yg)
-        g2 = blend(tg[2], xg, tg[3], yg)
-        c = (-dot(f1, g1), -dot(f1, g2), -dot(f2, g1), -dot(f2, g2))
-        rf = (tf[0] * gf[0] + tf[1] * gf[1], tf[2] * gf[0] + tf[3] * gf[1])
-        rg = (tg[0] * gg[0] + tg[1] * gg[1], tg[2] * gg[0] + tg[3] * gg[1])
-        bend_f = max(curvature_bound(a), 2.0 / size)
-        bend_g = max(curvature_bound(b), 2.0 / size)
-        first = max(DAMPING, DAMPING * math.sqrt(square) * max(bend_f, bend_g))
+        model = descent_model(store, surfaces, pose, x, at, size)
+        held = model.ways_f.count < 2 or model.ways_g.count < 2
+        rf, rg = model.slope_f, model.slope_g
+        first = max(DAMPING, DAMPING * math.sqrt(at.square) * max(model.bend_f, model.bend_g))
         lower = False
         while mu < STUCK * (1.0 + first):
-            sf, sg, definite = descent_step(p, c, q, rf, rg, mu)
+            sf, sg, definite = descent_step(model.h_f, model.coupling, model.h_g, rf, rg, mu)
             if not definite:
                 mu = max(4.0 * mu, 1e-4 * first)
                 continue
-            step = max(abs(sf[0]) + abs(sf[1]), abs(sg[0]) + abs(sg[1]))
-            bend = max((abs(sf[0]) + abs(sf[1])) * bend_f, (abs(sg[0]) + abs(sg[1])) * bend_g)
+            step_f, step_g = abs(sf[0]) + abs(sf[1]), abs(sg[0]) + abs(sg[1])
+            step = max(step_f, step_g)
+            bend = max(step_f * model.bend_f, step_g * model.bend_g)
             if not held and bend < near and mu <= 1e-3 * first:
                 # `solve_pair` takes the rest; should it go elsewhere, the descent goes on to a nearer start.
-                same, found = finish(store, f, g, pose, x, size, 8.0 * step + 1e-9 * size)
+                same, found = finish(store, surfaces, pose, x, size, 8.0 * step + 1e-9 * size)
                 if same:
                     return with_steps(found, count)
                 near *= 0.1
             if step <= MEET * size or count >= limit:
                 break
-            factor = 1.0 if bend <= BEND else BEND / bend
-            ax = factor * (tf[0] * sf[0] + tf[2] * sf[1])
-            ay = factor * (tf[1] * sf[0] + tf[3] * sf[1])
-            bx = factor * (tg[0] * sg[0] + tg[2] * sg[1])
-            by = factor * (tg[1] * sg[0] + tg[3] * sg[1])
-            uf, vf, end_f = advance(store, f, x[0], x[1], ef[0] * ax + ef[1] * ay, ef[2] * ay, blend(ax, xf, ay, yf))
-            ug, vg, end_g = advance(store, g, x[2], x[3], eg[0] * bx + eg[1] * by, eg[2] * by, blend(bx, xg, by, yg))
+            factor = bent_at_most(bend)
+            uf, vf, end_f = step_along(store, f, x[0], x[1], at.f, model.ways_f, sf, factor)
+            ug, vg, end_g = step_along(store, g, x[2], x[3], at.g, model.ways_g, sg, factor)
             y = (uf, vf, ug, vg)
-            next_f, next_g, d_next, dg_next = both_frames(store, f, g, pose, y)
-            now = dot(d_next, d_next)
+            there = witness_points(store, surfaces, pose, y)
             count += 1
             # What the slope alone would give over this step.
             slope = factor * (rf[0] * sf[0] + rf[1] * sf[1] + rg[0] * sg[0] + rg[1] * sg[1])
-            if now < square + 2e-4 * slope or (now < square and (held or end_f or end_g)):
+            if there.square < at.square + 2e-4 * slope or (there.square < at.square and (held or end_f or end_g)):
                 lower = True
                 # Half of the slope is what Newton's method gives near a minimum.
-                mu = 0.1 * mu if now < square + 0.5 * slope else mu
+                mu = 0.1 * mu if there.square < at.square + 0.5 * slope else mu
                 mu = mu if mu > 1e-4 * first else LEAST
                 break
             mu = max(4.0 * mu, first)
@@ -289,32 +333,12 @@ def descend_pair(store, f, g, pose, x, size, limit):
                 status = LEFT_PATCH
             break
         x = y
-        own_f, own_g, d, dg = next_f, next_g, d_next, dg_next
-        square = now
-    if status == NOT_CONVERGED and square <= TOUCH * TOUCH * size * size:
+        at = there
+    if status == NOT_CONVERGED and at.square <= TOUCH * TOUCH * size * size:
         status = CROSSED
     if status == CROSSED:
-        same, found = finish(store, f, g, pose, x, size, 0.0)
+        same, found = finish(store, surfaces, pose, x, size, 0.0)
         if same:
             return with_steps(found, count)
     frame = pair_frame(store, f, g, pose, x)
     return PairSolution(status, x, count, frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9 / size))
-
-
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], UniTuple(f8, 4), f8, i8, f8[::1])")
-def find_descent(table, pool, f, g, q, x, size, limit, out):
-    """The descent for Python.
-
-    out: parameters (4), point of f (3), point of g (3), normal (3), gap; all in world axes. Returns the status.
-    """
-    turn_f = rotation(q, 0)
-    pose = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    found = descend_pair(Store(table, pool), f, g, pose, x, size, limit)
-    frame = found.frame
-    origin = position(q, 0)
-    out[0], out[1], out[2], out[3] = found.parameters
-    out[4], out[5], out[6] = add(matvec(turn_f, frame.point_f), origin)
-    out[7], out[8], out[9] = add(matvec(turn_f, frame.point_g), origin)
-    out[10], out[11], out[12] = matvec(turn_f, frame.normal)
-    out[13] = frame.gap
-    return found.status

@@ -31,14 +31,13 @@ from assembly.geometry.splines.evaluate import (
     surface_point,
 )
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
-from assembly.kinematics.motion import RelativePose, position, relative_pose, rotation
+from assembly.kinematics.motion import IDENTITY, relative_pose, rotation
 from assembly.proximity.extrema.face_face import (
     CONVERGED,
     LEFT_PATCH,
     NOT_CONVERGED,
     SINGULAR,
     own_frame,
-    pair_frame,
     solve_pair,
 )
 
@@ -227,8 +226,7 @@ def global_start(store, f, g, pose, size):
     nf = patch.cell_count
     a = np.empty((nf, 6))
     b = np.empty((other.cell_count, 6))
-    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    extent = cell_samples(store, f, RelativePose(same, (0.0, 0.0, 0.0)), a)
+    extent = cell_samples(store, f, IDENTITY, a)
     extent = min(extent, cell_samples(store, g, pose, b))
     nearest = np.empty(nf, np.int64)
     score = np.empty(nf)
@@ -248,7 +246,7 @@ def global_start(store, f, g, pose, size):
         start = start_in(cell_f, cell_g)
         if attempt == 0:
             best = RankedPair(3.0, math.inf, np.int64(NOT_CONVERGED), start)
-        found = solve_pair(store, f, g, pose, start, size, math.inf, 0.0, False)
+        found = solve_pair(store, (f, g), pose, start, size, math.inf, 0.0, False)
         limit = score[i]
         near = is_near(found, limit)
         coarse = cell_f.radius + cell_g.radius > COARSE * extent
@@ -267,7 +265,7 @@ def global_start(store, f, g, pose, size):
                 break
             # The minimum is no farther than the points found.
             upper = min(upper, limit)
-            found = solve_pair(store, f, g, pose, start, size, math.inf, 0.0, False)
+            found = solve_pair(store, (f, g), pose, start, size, math.inf, 0.0, False)
         if is_near(found, limit):
             best = take(store, g, pose.rotation, found, best)
         i = next_candidate(store, f, a, nearest, score, i)
@@ -284,7 +282,7 @@ def global_start(store, f, g, pose, size):
             cell_f = cell_at(store.pool, patch.cells + CELL_SIZE * i)
             cell_g = cell_at(store.pool, other.cells + CELL_SIZE * nearest[i])
             start = start_in(cell_f, cell_g)
-            found = solve_pair(store, f, g, pose, start, size, math.inf, 0.0, False)
+            found = solve_pair(store, (f, g), pose, start, size, math.inf, 0.0, False)
             if found.status != NOT_CONVERGED:
                 best = take(store, g, pose.rotation, found, best)
             i = next_candidate(store, f, a, nearest, score, i)
@@ -294,34 +292,11 @@ def global_start(store, f, g, pose, size):
     return best.status, best.parameters, best.gap
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], f8[:, ::1], i8)")
-def start_surfaces(table, pool, f, g, i, j, q, tracked, r):
-    """A global start for surfaces f and g of bodies i and j of a scene, into tracked[r]. A status."""
+@kernel(signatures="(i8[::1], f8[::1], UniTuple(i8, 2), UniTuple(i8, 2), f8[:, ::1], f8[:, ::1], i8)")
+def start_surfaces(table, pool, surfaces, bodies, q, tracked, r):
+    """A global start for surfaces of two bodies of a scene, into tracked[r]. A status."""
+    i, j = bodies
     pose = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
-    status, x, _gap = global_start(Store(table, pool), f, g, pose, 1.0)
+    status, x, _gap = global_start(Store(table, pool), surfaces[0], surfaces[1], pose, 1.0)
     tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3] = x
-    return status
-
-
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], UniTuple(f8, 4), f8, f8[::1])")
-def find_pair(table, pool, f, g, q, x, size, out):
-    """One pair for Python: from x, or a global start where x is NaN.
-
-    out: parameters (4), point of f (3), point of g (3), normal (3), gap; all in world axes. Returns the status.
-    """
-    store = Store(table, pool)
-    turn_f = rotation(q, 0)
-    pose = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    if math.isnan(x[0]):
-        status, x, _gap = global_start(store, f, g, pose, size)
-        frame = pair_frame(store, f, g, pose, x)
-    else:
-        found = solve_pair(store, f, g, pose, x, size, math.inf, 0.0, False)
-        status, x, frame = found.status, found.parameters, found.frame
-    origin = position(q, 0)
-    out[0], out[1], out[2], out[3] = x
-    out[4], out[5], out[6] = add(matvec(turn_f, frame.point_f), origin)
-    out[7], out[8], out[9] = add(matvec(turn_f, frame.point_g), origin)
-    out[10], out[11], out[12] = matvec(turn_f, frame.normal)
-    out[13] = frame.gap
     return status

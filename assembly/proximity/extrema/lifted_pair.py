@@ -39,20 +39,32 @@ Variations = namedtuple(
     ],
 )
 VECTORS = len(Variations._fields)
-# The vectors themselves, in world axes; points from their bodies' origins.
-PairVectors = namedtuple("PairVectors", ["d", "n", "length", "point_f", "f_u", "f_v", "point_g", "g_u", "g_v"])
+# The vectors themselves, in world axes, of the points the `VectorJet`: of those, from their bodies' origins.
+PairVectors = namedtuple("PairVectors", "d n length f g")
+# A vector that the coordinates of a surface move, with its derivatives in them, in world axes.
+VectorJet = namedtuple("VectorJet", "value u v uu uv vv")
+# A pair whose coordinates are unknowns. surfaces: their records; bodies: their rows in a configuration; x: the
+# coordinates; lengths: the s_i.
+LiftedPair = namedtuple("LiftedPair", "surfaces bodies x lengths")
 
 
 @kernel(inline=True)
-def place(turn, p, u, v, uu, uv, vv):
-    return (
-        matvec(turn, p),
-        matvec(turn, u),
-        matvec(turn, v),
-        matvec(turn, uu),
-        matvec(turn, uv),
-        matvec(turn, vv),
+def point_jet(store, surface, turn, u, v):
+    """The `VectorJet` of a point of a surface, from the origin of its body, which `turn` turns."""
+    p, su, sv, suu, suv, svv = surface_point(store.table, store.pool, surface, u, v)
+    return VectorJet(
+        matvec(turn, p), matvec(turn, su), matvec(turn, sv), matvec(turn, suu), matvec(turn, suv), matvec(turn, svv)
     )
+
+
+@kernel(inline=True)
+def tangent_jets(store, surface, turn, point, u, v):
+    """The `VectorJet` of either tangent at the point whose own one is given."""
+    uuu, uuv, uvv, vvv = third_derivatives(store.table, store.pool, surface, u, v)
+    uuv = matvec(turn, uuv)
+    uvv = matvec(turn, uvv)
+    along_u = VectorJet(point.u, point.uu, point.uv, matvec(turn, uuu), uuv, uvv)
+    return along_u, VectorJet(point.v, point.uv, point.vv, uuv, uvv, matvec(turn, vvv))
 
 
 @kernel(inline=True)
@@ -87,12 +99,16 @@ def coordinate_lengths(table, pool, f, g, x, lengths, k):
     return 0
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], f8[:, ::1], i8, f8)")
-def is_extremal(table, pool, f, g, i, j, q, tracked, r, tolerance):
+@kernel(
+    signatures=("(Tuple((i8[::1], f8[::1])), UniTuple(i8, 2), UniTuple(i8, 2), f8[:, ::1], f8[:, ::1], i8, f8)"),
+)
+def is_extremal(store, surfaces, bodies, q, tracked, r, tolerance):
     """Whether the coordinates in tracked[r] are those of an extremal pair, by the frame of tracked pairs."""
+    table, pool = store
+    i, j = bodies
     pose = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
     x = (tracked[r, 0], tracked[r, 1], tracked[r, 2], tracked[r, 3])
-    frame = pair_frame(Store(table, pool), f, g, pose, x)
+    frame = pair_frame(Store(table, pool), surfaces[0], surfaces[1], pose, x)
     residual = frame.residual
     tilt = max(abs(residual[2]), abs(residual[3]))
     holds = frame.regular and tilt <= 1e-9 and max(abs(residual[0]), abs(residual[1])) <= tolerance
@@ -116,17 +132,14 @@ def has_stayed(table, pool, f, g, tracked, was, r, most):
 
 
 @kernel(inner=True)
-def variations(store, f, g, i, j, q, x, s, rates):
+def variations(store, pair, q, rates):
     """Fill the `Variations`; returns the `PairVectors`."""
-    patch = surface_at(store.table, f)
-    turn_f = rotation(q, i)
-    turn_g = rotation(q, j)
-    a, b, c, d_, e, h = surface_point(store.table, store.pool, f, x[0], x[1])
-    pf, fu, fv, fuu, fuv, fvv = place(turn_f, a, b, c, d_, e, h)
-    a, b, c, d_, e, h = surface_point(store.table, store.pool, g, x[2], x[3])
-    pg, gu, gv, guu, guv, gvv = place(turn_g, a, b, c, d_, e, h)
-    d = add(sub(position(q, j), position(q, i)), sub(pg, pf))
-    normal = scale(float(patch.sign), cross(fu, fv))
+    (i, j), x, s = pair.bodies, pair.x, pair.lengths
+    f = point_jet(store, pair.surfaces[0], rotation(q, i), x[0], x[1])
+    g = point_jet(store, pair.surfaces[1], rotation(q, j), x[2], x[3])
+    d = add(sub(position(q, j), position(q, i)), sub(g.value, f.value))
+    sign = float(surface_at(store.table, pair.surfaces[0]).sign)
+    normal = scale(sign, cross(f.u, f.v))
     length = math.sqrt(dot(normal, normal))
     n = scale(1.0 / length, normal)
     for k in range(3):
@@ -141,39 +154,38 @@ def variations(store, f, g, i, j, q, x, s, rates):
     for k in range(3):
         rates.d[k, k] = -1.0
         rates.d[k, 6 + k] = 1.0
-    put_turn(rates.d, 3, scale(-1.0, pf))
-    put_turn(rates.d, 9, pg)
-    put_column(rates.d, 12, scale(-1.0 / s[0], fu))
-    put_column(rates.d, 13, scale(-1.0 / s[1], fv))
-    put_column(rates.d, 14, scale(1.0 / s[2], gu))
-    put_column(rates.d, 15, scale(1.0 / s[3], gv))
-    put_turn(rates.f_u, 3, fu)
-    put_column(rates.f_u, 12, scale(1.0 / s[0], fuu))
-    put_column(rates.f_u, 13, scale(1.0 / s[1], fuv))
-    put_turn(rates.f_v, 3, fv)
-    put_column(rates.f_v, 12, scale(1.0 / s[0], fuv))
-    put_column(rates.f_v, 13, scale(1.0 / s[1], fvv))
-    put_turn(rates.g_u, 9, gu)
-    put_column(rates.g_u, 14, scale(1.0 / s[2], guu))
-    put_column(rates.g_u, 15, scale(1.0 / s[3], guv))
-    put_turn(rates.g_v, 9, gv)
-    put_column(rates.g_v, 14, scale(1.0 / s[2], guv))
-    put_column(rates.g_v, 15, scale(1.0 / s[3], gvv))
-    sign = float(patch.sign)
+    put_turn(rates.d, 3, scale(-1.0, f.value))
+    put_turn(rates.d, 9, g.value)
+    put_column(rates.d, 12, scale(-1.0 / s[0], f.u))
+    put_column(rates.d, 13, scale(-1.0 / s[1], f.v))
+    put_column(rates.d, 14, scale(1.0 / s[2], g.u))
+    put_column(rates.d, 15, scale(1.0 / s[3], g.v))
+    put_turn(rates.f_u, 3, f.u)
+    put_column(rates.f_u, 12, scale(1.0 / s[0], f.uu))
+    put_column(rates.f_u, 13, scale(1.0 / s[1], f.uv))
+    put_turn(rates.f_v, 3, f.v)
+    put_column(rates.f_v, 12, scale(1.0 / s[0], f.uv))
+    put_column(rates.f_v, 13, scale(1.0 / s[1], f.vv))
+    put_turn(rates.g_u, 9, g.u)
+    put_column(rates.g_u, 14, scale(1.0 / s[2], g.uu))
+    put_column(rates.g_u, 15, scale(1.0 / s[3], g.uv))
+    put_turn(rates.g_v, 9, g.v)
+    put_column(rates.g_v, 14, scale(1.0 / s[2], g.uv))
+    put_column(rates.g_v, 15, scale(1.0 / s[3], g.vv))
     for k in range(VARIABLES):
-        change = scale(sign, add(cross(column(rates.f_u, k), fv), cross(fu, column(rates.f_v, k))))
+        change = scale(sign, add(cross(column(rates.f_u, k), f.v), cross(f.u, column(rates.f_v, k))))
         put_column(rates.normal, k, change)
         put_column(rates.unit, k, scale(1.0 / length, sub(change, scale(dot(n, change), n))))
-    return PairVectors(d, n, length, pf, fu, fv, pg, gu, gv)
+    return PairVectors(d, n, length, f, g)
 
 
 @kernel(inner=True)
-def free_rows(store, f, g, i, j, q, x, s, work, residual, jacobian, r, e):
+def free_rows(store, pair, q, work, residual, jacobian, r, e):
     """The gap into row r, the rows of tangency into rows e to e + 3, with their gradients."""
     rates = Variations(work[0], work[1], work[2], work[3], work[4], work[5], work[6])
-    vectors = variations(store, f, g, i, j, q, x, s, rates)
-    d, n = vectors.d, vectors.n
-    fu, fv, gu, gv = vectors.f_u, vectors.f_v, vectors.g_u, vectors.g_v
+    vectors = variations(store, pair, q, rates)
+    d, n, s = vectors.d, vectors.n, pair.lengths
+    fu, fv, gu, gv = vectors.f.u, vectors.f.v, vectors.g.u, vectors.g.v
     beta = dot(n, d)
     residual[r] = beta
     residual[e] = dot(d, fu) / s[0]
@@ -191,36 +203,38 @@ def free_rows(store, f, g, i, j, q, x, s, work, residual, jacobian, r, e):
 
 
 @kernel(inner=True)
-def add_second(y, a, a1, a2, a11, a12, a22, w, u, s1, s2, out):
-    """out += y . (second variation of a), a vector of a body whose rotation stands at w and coordinates at u."""
+def add_second(y, jet, side, lengths, out):
+    """out += y . (second variation of a vector) of body f (side 0) or g (side 1), from its `VectorJet`."""
+    w = 3 + 6 * side
+    u = 12 + 2 * side
+    s1, s2 = lengths[2 * side], lengths[2 * side + 1]
+    a = jet.value
     ya = dot(y, a)
     for k in range(3):
         for l in range(3):
             out[w + k, w + l] += 0.5 * (y[k] * a[l] + a[k] * y[l])
         out[w + k, w + k] -= ya
-    c1 = cross(a1, y)
-    c2 = cross(a2, y)
+    c1 = cross(jet.u, y)
+    c2 = cross(jet.v, y)
     for k in range(3):
         out[w + k, u] += c1[k] / s1
         out[u, w + k] += c1[k] / s1
         out[w + k, u + 1] += c2[k] / s2
         out[u + 1, w + k] += c2[k] / s2
-    out[u, u] += dot(y, a11) / (s1 * s1)
-    out[u, u + 1] += dot(y, a12) / (s1 * s2)
-    out[u + 1, u] += dot(y, a12) / (s1 * s2)
-    out[u + 1, u + 1] += dot(y, a22) / (s2 * s2)
+    out[u, u] += dot(y, jet.uu) / (s1 * s1)
+    out[u, u + 1] += dot(y, jet.uv) / (s1 * s2)
+    out[u + 1, u] += dot(y, jet.uv) / (s1 * s2)
+    out[u + 1, u + 1] += dot(y, jet.vv) / (s2 * s2)
 
 
 @kernel(inner=True)
-def free_hessian(store, f, g, i, j, q, x, s, y, work, out):
+def free_hessian(store, pair, q, y, work, out):
     """Second derivative (16, 16) of y . rows, overwriting out."""
     rates = Variations(work[0], work[1], work[2], work[3], work[4], work[5], work[6])
-    vectors = variations(store, f, g, i, j, q, x, s, rates)
-    d, n, length = vectors.d, vectors.n, vectors.length
-    fu, fv, gu, gv = vectors.f_u, vectors.f_v, vectors.g_u, vectors.g_v
-    sign = float(surface_at(store.table, f).sign)
-    turn_f = rotation(q, i)
-    turn_g = rotation(q, j)
+    vectors = variations(store, pair, q, rates)
+    d, n, length, s = vectors.d, vectors.n, vectors.length, pair.lengths
+    fu, fv, gu, gv = vectors.f.u, vectors.f.v, vectors.g.u, vectors.g.v
+    sign = float(surface_at(store.table, pair.surfaces[0]).sign)
     beta = dot(n, d)
     l1 = y[1] / s[0]
     l2 = y[2] / s[1]
@@ -256,30 +270,13 @@ def free_hessian(store, f, g, i, j, q, x, s, y, work, out):
                 - turned * dot(n, column(rates.normal, l))
             )
     # Second variations of the vectors themselves, each with its coefficient.
-    a = surface_point(store.table, store.pool, f, x[0], x[1])
-    b = surface_point(store.table, store.pool, g, x[2], x[3])
-    fuu = matvec(turn_f, a[3])
-    fuv = matvec(turn_f, a[4])
-    fvv = matvec(turn_f, a[5])
-    guu = matvec(turn_g, b[3])
-    guv = matvec(turn_g, b[4])
-    gvv = matvec(turn_g, b[5])
-    a30, a21, a12, a03 = third_derivatives(store.table, store.pool, f, x[0], x[1])
-    b30, b21, b12, b03 = third_derivatives(store.table, store.pool, g, x[2], x[3])
-    fuuu = matvec(turn_f, a30)
-    fuuv = matvec(turn_f, a21)
-    fuvv = matvec(turn_f, a12)
-    fvvv = matvec(turn_f, a03)
-    guuu = matvec(turn_g, b30)
-    guuv = matvec(turn_g, b21)
-    guvv = matvec(turn_g, b12)
-    gvvv = matvec(turn_g, b03)
+    x = pair.x
+    jet_fu, jet_fv = tangent_jets(store, pair.surfaces[0], rotation(q, pair.bodies[0]), vectors.f, x[0], x[1])
+    jet_gu, jet_gv = tangent_jets(store, pair.surfaces[1], rotation(q, pair.bodies[1]), vectors.g, x[2], x[3])
     of_d = add(scale(y[0], n), blend(l1, fu, l2, fv))
-    add_second(scale(-1.0, of_d), vectors.point_f, fu, fv, fuu, fuv, fvv, 3, 12, s[0], s[1], out)
-    add_second(of_d, vectors.point_g, gu, gv, guu, guv, gvv, 9, 14, s[2], s[3], out)
-    of_fu = add(scale(l1, d), cross(fv, across))
-    of_fv = add(scale(l2, d), cross(across, fu))
-    add_second(of_fu, fu, fuu, fuv, fuuu, fuuv, fuvv, 3, 12, s[0], s[1], out)
-    add_second(of_fv, fv, fuv, fvv, fuuv, fuvv, fvvv, 3, 12, s[0], s[1], out)
-    add_second(scale(l3, n), gu, guu, guv, guuu, guuv, guvv, 9, 14, s[2], s[3], out)
-    add_second(scale(l4, n), gv, guv, gvv, guuv, guvv, gvvv, 9, 14, s[2], s[3], out)
+    add_second(scale(-1.0, of_d), vectors.f, 0, s, out)
+    add_second(of_d, vectors.g, 1, s, out)
+    add_second(add(scale(l1, d), cross(fv, across)), jet_fu, 0, s, out)
+    add_second(add(scale(l2, d), cross(across, fu)), jet_fv, 0, s, out)
+    add_second(scale(l3, n), jet_gu, 1, s, out)
+    add_second(scale(l4, n), jet_gv, 1, s, out)

@@ -20,9 +20,15 @@ from assembly.geometry.splines.evaluate import OFFSETS, SURFACE_RECORD
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace
 from assembly.kinematics.pose import pose_row
-from assembly.proximity.extrema.feedback import CROSSED, find_descent
-from assembly.proximity.extrema.global_start import find_pair
-from assembly.proximity.extrema.rates import pair_derivatives
+from assembly.proximity.brep.records import FACE
+from assembly.proximity.extrema.feature_query import (
+    PLACED,
+    feature_derivatives,
+    find_descent,
+    find_pair,
+    placed_pair_at,
+)
+from assembly.proximity.extrema.feedback import CROSSED
 
 __all__ = ["ContactPair", "PairStatus", "contact_jacobian", "descend", "extremal_pair", "gap_gradient", "gap_hessian"]
 
@@ -43,6 +49,8 @@ class PairStatus(Enum):
 
 
 _STATUSES = tuple(PairStatus)
+# Where the records of the two surfaces are in the table of a query.
+_SURFACES = 0, SURFACE_RECORD
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +163,9 @@ def extremal_pair(
         x: tuple[float, ...] = (np.nan, np.nan, np.nan, np.nan)
     else:
         x = inside("start", vector("start", start, 4), (f.surface, g.surface))
-    out = np.empty(14)
-    status = find_pair(table, pool, 0, SURFACE_RECORD, q, x, size, out)
-    return ContactPair(out[:4], out[4:10].reshape(2, 3), out[10:13], float(out[13]), _STATUSES[status])
+    out = np.empty(PLACED)
+    status = find_pair(table, pool, _SURFACES, q, x, size, out)
+    return _contact_pair(out, _STATUSES[status])
 
 
 def descend(
@@ -195,10 +203,14 @@ def descend(
     q = _configuration(q_f, q_g)
     table, pool, size = _packed(_key(f), _key(g))
     x = inside("start", vector("start", start, 4), (f.surface, g.surface))
-    out = np.empty(14)
-    status = find_descent(table, pool, 0, SURFACE_RECORD, q, x, size, steps, out)
-    named = PairStatus.NOT_CONVERGED if status == CROSSED else _STATUSES[status]
-    return ContactPair(out[:4], out[4:10].reshape(2, 3), out[10:13], float(out[13]), named)
+    out = np.empty(PLACED)
+    status = find_descent(table, pool, _SURFACES, q, x, size, steps, out)
+    return _contact_pair(out, PairStatus.NOT_CONVERGED if status == CROSSED else _STATUSES[status])
+
+
+def _contact_pair(out: Array, status: PairStatus) -> ContactPair:
+    pair = placed_pair_at(out, 0)
+    return ContactPair(pair.parameters, np.array([pair.point_f, pair.point_g]), pair.normal, float(pair.gap), status)
 
 
 def _derivatives(
@@ -209,7 +221,8 @@ def _derivatives(
     table, pool, size = _packed(_key(f), _key(g))
     x = inside("parameters", real_array("parameters", parameters, (4,)), (f.surface, g.surface))
     first, hessian = np.full((5, 14), np.nan), np.full((12, 12), np.nan)
-    error, _isolated = pair_derivatives(table, pool, 0, SURFACE_RECORD, q, x, size, first, hessian)
+    features = tuple((FACE, surface) for surface in _SURFACES)
+    error, _isolated = feature_derivatives((table, pool), features, q, x, (0.0, 0.0, 0.0), size, first, hessian)
     if np.isfinite(first[4]).all() and not error <= EXTREMAL:
         raise InputError(
             f"parameters are {list(x)}, off an extremal pair by {error:.1e}; expected those of extremal_pair"

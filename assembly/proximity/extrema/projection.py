@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.splines.domain import into_domain, is_within
@@ -12,14 +13,16 @@ from assembly.proximity.extrema.singular import BESIDE
 
 # Steps down the slope of a gap.
 SLIDES = 24
+# The projection of a point on a surface. parameters: (u, v); distance: signed, positive outside; normal: outward unit
+# normal; settled: whether the steps came to it, a minimum of the distance.
+Projection = namedtuple("Projection", "parameters distance normal settled")
 
 
 @kernel(inner=True)
 def projection_of(store, g, y, s, t):
-    """The foot on surface g of a point y, by Newton's method from (s, t): parameters, signed distance, normal.
+    """The `Projection` on surface g of a point y, by four steps of Newton's method from (s, t).
 
-    Positive outside. A step is never longer than what brings the tangent plane's foot. And whether four of them did:
-    they may not be there yet, or where the distance has no minimum.
+    A step is never longer than what brings the tangent plane's foot.
     """
     distance = 0.0
     n = (0.0, 0.0, 0.0)
@@ -52,7 +55,7 @@ def projection_of(store, g, y, s, t):
         if first * first / a + second * second / c < 1e-16:
             settled = bent
             break
-    return s, t, distance, n, settled
+    return Projection((s, t), distance, n, settled)
 
 
 @kernel(inner=True)
@@ -65,8 +68,8 @@ def slide_down(store, f, g, pose, start, stride, half):
     """
     u, v, s, t = start
     p, su, sv, _uu, _uv, _vv = surface_point(store.table, store.pool, f, u, v)
-    s, t, gap, n, _settled = projection_of(store, g, matvec_t(pose.rotation, sub(p, pose.shift)), s, t)
-    slope = matvec(pose.rotation, n)
+    on_g = projection_of(store, g, matvec_t(pose.rotation, sub(p, pose.shift)), s, t)
+    slope = matvec(pose.rotation, on_g.normal)
     normal = cross(su, sv)
     across = scale(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
     slope = sub(slope, scale(dot(slope, across), across))
@@ -86,18 +89,19 @@ def slide_down(store, f, g, pose, start, stride, half):
             store, f, u + (c * first - b * second) / det, v + (a * second - b * first) / det
         )
         q, ru, rv, _uu, _uv, _vv = surface_point(store.table, store.pool, f, u_new, v_new)
-        s_new, t_new, gap_new, n, _settled = projection_of(store, g, matvec_t(pose.rotation, sub(q, pose.shift)), s, t)
-        if gap_new > gap:
+        s, t = on_g.parameters
+        there_g = projection_of(store, g, matvec_t(pose.rotation, sub(q, pose.shift)), s, t)
+        if there_g.distance > on_g.distance:
             length *= 0.25
             continue
         normal = cross(ru, rv)
         across = scale(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
-        there = matvec(pose.rotation, n)
+        there = matvec(pose.rotation, there_g.normal)
         there = sub(there, scale(dot(there, across), across))
         moved = sub(q, p)
         bent = dot(moved, sub(there, slope))
         length = min(dot(moved, moved) / bent, 4.0 * length) if bent > 0.0 else 2.0 * length
-        u, v, s, t, gap, p, su, sv, slope = u_new, v_new, s_new, t_new, gap_new, q, ru, rv, there
+        u, v, on_g, p, su, sv, slope = u_new, v_new, there_g, q, ru, rv, there
         if not is_within(store, f, u, v, start[0], start[1], BESIDE * half[0], BESIDE * half[1]):
-            return (u, v, s, t), False
-    return (u, v, s, t), True
+            return (u, v, *on_g.parameters), False
+    return (u, v, *on_g.parameters), True

@@ -15,16 +15,10 @@ only these rates:
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
 from assembly._kernel import kernel
-from assembly._record import Store, place_of, record_dtype, record_view, size_of
-from assembly.geometry.vec import cross, dot, matvec, scale, sub
-from assembly.kinematics.motion import quaternion_columns, relative_pose, rotation
-from assembly.proximity.extrema.face_face import pair_frame
-from assembly.proximity.extrema.pair_matrix import pair_matrix
+from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly.geometry.vec import cross, dot, matvec, neg, scale, sub
+from assembly.kinematics.motion import quaternion_columns
 
 # What the derivatives of one gap need, in world axes.
 GAP_DERIVATIVES = record_dtype(
@@ -59,13 +53,37 @@ def put(array, row, o, a):
     array[row, o + 2] = a[2]
 
 
+@kernel(inline=True)
+def store_velocities(x, y, arm_f, arm_g, records, row):
+    """z over the twists: x.v, y.v, and (x, y).(omega x n) = (y.omega, -x.omega)."""
+    put(records, row, ZED, neg(x))
+    put(records, row, ZED + 3, cross(x, arm_f))
+    put(records, row, ZED + 6, x)
+    put(records, row, ZED + 9, cross(arm_g, x))
+    put(records, row, ZED + 12, neg(y))
+    put(records, row, ZED + 15, cross(y, arm_f))
+    put(records, row, ZED + 18, y)
+    put(records, row, ZED + 21, cross(arm_g, y))
+    zero = (0.0, 0.0, 0.0)
+    put(records, row, ZED + 24, zero)
+    put(records, row, ZED + 27, neg(y))
+    put(records, row, ZED + 30, zero)
+    put(records, row, ZED + 33, y)
+    put(records, row, ZED + 36, zero)
+    put(records, row, ZED + 39, x)
+    put(records, row, ZED + 42, zero)
+    put(records, row, ZED + 45, neg(x))
+
+
 @kernel(inner=True)
-def store_record(turn, shift, frame, matrix, records, row):
-    """Fill a record from a pair's frame in the axes of body f, whose rotation is `turn`; g's origin is at `shift`."""
+def feature_record(turn, shift, frame, offset, records, row):
+    """Fill a record from the frame of two features in the axes of body f, whose rotation is `turn`; g is at `shift`.
+
+    The offset is X + beta Y of f (`feature_jets.offset_side`).
+    """
     derivatives = derivatives_at(records, row)
-    e, t = frame.rates_f, frame.rates_g
-    a, c = frame.shape_f, frame.shape_g
-    k, i = matrix.k, matrix.inverse
+    f, g, i = frame.side_f, frame.side_g, frame.response
+    of_f, of_g = frame.rates_f, frame.rates_g
     x = matvec(turn, frame.tangent_x)
     y = matvec(turn, frame.tangent_y)
     arm_f = matvec(turn, frame.point_g)
@@ -74,48 +92,34 @@ def store_record(turn, shift, frame, matrix, records, row):
     put(records, row, NORMAL, matvec(turn, frame.normal))
     put(records, row, ARM_F, arm_f)
     put(records, row, ARM_G, arm_g)
-    # z over the twists: x.v, y.v, and (x, y).(omega x n) = (y.omega, -x.omega).
-    put(records, row, ZED, scale(-1.0, x))
-    put(records, row, ZED + 3, cross(x, arm_f))
-    put(records, row, ZED + 6, x)
-    put(records, row, ZED + 9, cross(arm_g, x))
-    put(records, row, ZED + 12, scale(-1.0, y))
-    put(records, row, ZED + 15, cross(y, arm_f))
-    put(records, row, ZED + 18, y)
-    put(records, row, ZED + 21, cross(arm_g, y))
-    for j in range(3):
-        derivatives.zed[2, j] = 0.0
-        derivatives.zed[2, 3 + j] = -y[j]
-        derivatives.zed[2, 6 + j] = 0.0
-        derivatives.zed[2, 9 + j] = y[j]
-        derivatives.zed[3, j] = 0.0
-        derivatives.zed[3, 3 + j] = x[j]
-        derivatives.zed[3, 6 + j] = 0.0
-        derivatives.zed[3, 9 + j] = -x[j]
-    # The map from z to a is [H^-1 C, -H^-1].
+    store_velocities(x, y, arm_f, arm_g, records, row)
+    # s = S z, S = H^-1 [Y_g^T, -X_g^T].
     m = (
-        i[0] * c[0] + i[1] * c[1],
-        i[0] * c[1] + i[1] * c[2],
-        -i[0],
-        -i[1],
-        i[2] * c[0] + i[3] * c[1],
-        i[2] * c[1] + i[3] * c[2],
-        -i[2],
-        -i[3],
+        i[0] * g.y11 + i[1] * g.y12,
+        i[0] * g.y21 + i[1] * g.y22,
+        -i[0] * g.x11 - i[1] * g.x12,
+        -i[0] * g.x21 - i[1] * g.x22,
+        i[2] * g.y11 + i[3] * g.y12,
+        i[2] * g.y21 + i[3] * g.y22,
+        -i[2] * g.x11 - i[3] * g.x12,
+        -i[2] * g.x21 - i[3] * g.x22,
     )
-    w = (a[0], a[1], -k[0], -k[1], a[1], a[2], -k[1], -k[2])
+    v11, v12, v21, v22 = offset
+    w = (f.y11, f.y21, -v11, -v21, f.y12, f.y22, -v12, -v22)
     for j in range(4):
-        ax = m[j]
-        ay = m[4 + j]
-        bx = k[0] * ax + k[1] * ay - (1.0 if j == 0 else 0.0)
-        by = k[1] * ax + k[2] * ay - (1.0 if j == 1 else 0.0)
-        derivatives.rates[0, j] = e[0] * ax + e[1] * ay
-        derivatives.rates[1, j] = e[2] * ay
-        derivatives.rates[2, j] = t[0] * bx + t[1] * by
-        derivatives.rates[3, j] = t[2] * bx + t[3] * by
+        s0 = m[j]
+        s1 = m[4 + j]
+        ax = f.x11 * s0 + f.x12 * s1
+        ay = f.x21 * s0 + f.x22 * s1
+        bx = v11 * s0 + v12 * s1 - (1.0 if j == 0 else 0.0)
+        by = v21 * s0 + v22 * s1 - (1.0 if j == 1 else 0.0)
+        derivatives.rates[0, j] = of_f[0] * ax + of_f[1] * ay
+        derivatives.rates[1, j] = of_f[2] * ax + of_f[3] * ay
+        derivatives.rates[2, j] = of_g[0] * bx + of_g[1] * by
+        derivatives.rates[3, j] = of_g[2] * bx + of_g[3] * by
         for l in range(4):
-            # a.(A z_12 - (I + beta A) z_34), made symmetric; z_12.z_34 adds a half off the diagonal.
-            value = 0.5 * (ax * w[l] + ay * w[4 + l] + m[l] * w[j] + m[4 + l] * w[4 + j])
+            # s.(Y_f^T z1 - (X_f + beta Y_f)^T z2), made symmetric; z1.z2 adds a half off the diagonal.
+            value = 0.5 * (s0 * w[l] + s1 * w[4 + l] + m[l] * w[j] + m[4 + l] * w[4 + j])
             derivatives.form[j, l] = value + (0.5 if l == j + 2 or j == l + 2 else 0.0)
 
 
@@ -153,12 +157,12 @@ def add_cross(n, factor, out, o, p):
 
 
 @kernel(inner=True)
-def add_gap_terms(records, row, jacobian, r, factor, weight, out, f, g):
+def add_gap_terms(records, jacobian, r, factor, weight, out, f, g):
     """Upper triangle of out += factor (Hessian of the gap) + weight (gradient gradient^T), twists at f.. and g...
 
     A negative f or g is a body that does not move: its block is left out.
     """
-    derivatives = derivatives_at(records, row)
+    derivatives = derivatives_at(records, r)
     for i in range(12):
         if (f if i < 6 else g) < 0:
             continue
@@ -191,9 +195,9 @@ def add_gap_terms(records, row, jacobian, r, factor, weight, out, f, g):
                 out[g + j - 6, f + i] += value
     if factor == 0.0:
         return
-    n = load(records, row, NORMAL)
-    arm_f = load(records, row, ARM_F)
-    arm_g = load(records, row, ARM_G)
+    n = load(records, r, NORMAL)
+    arm_f = load(records, r, ARM_F)
+    arm_g = load(records, r, ARM_G)
     if f >= 0:
         add_spin(n, arm_f, factor, out, f + 3)
         add_cross(n, -factor, out, f + 3, f)
@@ -219,44 +223,3 @@ def into_quaternions(row, q, out, r):
         out[r, 7 * b + 3], out[r, 7 * b + 4], out[r, 7 * b + 5], out[r, 7 * b + 6] = quaternion_columns(
             w, q[b, 3], q[b, 4], q[b, 5], q[b, 6]
         )
-
-
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], UniTuple(f8, 4), f8, f8[:, ::1], f8[:, ::1])")
-def pair_derivatives(table, pool, f, g, q, x, size, first, hessian):
-    """The public derivatives of one pair: d(parameters)/dq and d(gap)/dq in `first` (5, 14), the Hessian (12, 12).
-
-    Returns the pair's residual (lengths over `size`, and the tilt) and whether everything is regular.
-    """
-    turn = rotation(q, 0)
-    pose = relative_pose(q, 0, turn, 1, rotation(q, 1))
-    frame = pair_frame(Store(table, pool), f, g, pose, x)
-    r = frame.residual
-    error = max(abs(r[0]), abs(r[1])) / size + max(abs(r[2]), abs(r[3]))
-    if not frame.regular:
-        return error, False
-    matrix = pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9 / size)
-    records = np.empty((1, RECORD))
-    derivatives = derivatives_at(records, 0)
-    gradient = np.empty((1, 12))
-    row = np.empty(12)
-    store_record(turn, pose.shift, frame, matrix, records, 0)
-    gradient_row(records, 0, gradient, 0)
-    for j in range(12):
-        row[j] = gradient[0, j]
-    into_quaternions(row, q, first, 4)
-    for i in range(4):
-        for j in range(12):
-            # At a pole the polar coordinates have no rates.
-            at_pole = frame.rates_f[0] == 0.0 if i < 2 else frame.rates_g[0] == 0.0 and frame.rates_g[1] == 0.0
-            row[j] = math.nan if at_pole else 0.0
-            for l in range(4):
-                row[j] += derivatives.rates[i, l] * derivatives.zed[l, j]
-        into_quaternions(row, q, first, i)
-    for i in range(12):
-        for j in range(12):
-            hessian[i, j] = 0.0
-    add_gap_terms(records, 0, gradient, 0, 1.0, 0.0, hessian, 0, 6)
-    for i in range(12):
-        for j in range(i):
-            hessian[i, j] = hessian[j, i]
-    return error, matrix.isolated

@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CLOSED_U, CLOSED_V, SPANS_U, SPANS_V, find_span
+from assembly.geometry.splines.evaluate import find_span, surface_at
 from assembly.proximity.extrema.face_face import pair_frame
+from assembly.proximity.extrema.feature_jets import fold_of
 from assembly.proximity.extrema.pair_matrix import pair_matrix
 
 # A root this far from a fold is the only one in its patches and those beside them, which turn by half a radian at most.
@@ -18,17 +19,12 @@ ALONE, BESIDE = 0.05, 3.0
 
 
 @kernel(inline=True)
-def fold_of(h):
-    """How far a pair with this H is from a fold."""
-    norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-    return (h[0] * h[3] - h[1] * h[2]) / norm2 if norm2 > 1e-18 else 0.0
-
-
-@kernel(inline=True)
-def across(store, r, breaks, spans, closed, x, most):
+def across(store, r, direction, x, most):
     """A parameter just beyond the knot line nearest to x, or x itself where none is within `most`."""
-    o = store.table[r + breaks]
-    count = store.table[r + spans]
+    patch = surface_at(store.table, r)
+    o = patch.breaks_u if direction == 0 else patch.breaks_v
+    count = patch.spans_u if direction == 0 else patch.spans_v
+    closed = patch.closed_u == 1 if direction == 0 else patch.closed_v == 1
     k = find_span(store.pool, o, count, x)
     lo = store.pool[o + k]
     hi = store.pool[o + k + 1]
@@ -40,10 +36,10 @@ def across(store, r, breaks, spans, closed, x, most):
     if end == lo:
         if k > 0:
             return lo - 1e-9 * (lo - store.pool[o + k - 1])
-        return last - 1e-9 * (last - store.pool[o + count - 1]) if store.table[r + closed] == 1 else x
+        return last - 1e-9 * (last - store.pool[o + count - 1]) if closed else x
     if k + 1 < count:
         return hi + 1e-9 * (store.pool[o + k + 2] - hi)
-    return first + 1e-9 * (store.pool[o + 1] - first) if store.table[r + closed] == 1 else x
+    return first + 1e-9 * (store.pool[o + 1] - first) if closed else x
 
 
 @kernel(inner=True)
@@ -54,10 +50,10 @@ def fold_beyond(store, posed, x, half):
     """
     f, g = posed.surfaces[0], posed.surfaces[1]
     y = (
-        across(store, f, BREAKS_U, SPANS_U, CLOSED_U, x[0], BESIDE * half[0]),
-        across(store, f, BREAKS_V, SPANS_V, CLOSED_V, x[1], BESIDE * half[1]),
-        across(store, g, BREAKS_U, SPANS_U, CLOSED_U, x[2], BESIDE * half[2]),
-        across(store, g, BREAKS_V, SPANS_V, CLOSED_V, x[3], BESIDE * half[3]),
+        across(store, f, 0, x[0], BESIDE * half[0]),
+        across(store, f, 1, x[1], BESIDE * half[1]),
+        across(store, g, 0, x[2], BESIDE * half[2]),
+        across(store, g, 1, x[3], BESIDE * half[3]),
     )
     least = math.inf
     for i in range(4):
@@ -72,5 +68,5 @@ def fold_beyond(store, posed, x, half):
                 continue
             frame = pair_frame(store, f, g, posed.pose, (u, v, s, t))
             if frame.regular:
-                least = min(least, fold_of(pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9).h))
+                least = min(least, fold_of(pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9).h, 1.0))
     return least

@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 from collections import namedtuple
 
+import numpy as np
+
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
+from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.splines.evaluate import (
     CELL_SIZE,
     spline_curve_at,
@@ -30,17 +32,9 @@ from assembly.proximity.brep.records import (
     shell_at,
     vertex_at,
 )
+from assembly.proximity.bvh.tree import three_of
 from assembly.proximity.features.edge_model import edge_model
-from assembly.proximity.features.quadratic_model import (
-    CENTER,
-    LINEAR_U,
-    LINEAR_V,
-    face_model,
-    get,
-    model_at,
-    put,
-    vertex_model,
-)
+from assembly.proximity.features.quadratic_model import NODE, Box, face_model, model_at, put, vertex_model
 
 # The integers of a node.
 CELL_NODE = record_dtype(
@@ -55,10 +49,6 @@ CELL_NODE = record_dtype(
     has_model=1,  # 1: its quadratic model is made
 )
 cell_node_at = record_view(CELL_NODE)
-LEVEL = place_of(CELL_NODE, "level")
-KIND = place_of(CELL_NODE, "kind")
-RECORD = place_of(CELL_NODE, "record")
-HAS_MODEL = place_of(CELL_NODE, "has_model")
 INFO = size_of(CELL_NODE)
 # Levels.
 WHOLE, PART, GROUP, CELL = 0, 1, 2, 3
@@ -74,6 +64,9 @@ SPANS = 4
 PARTS = 8192
 
 
+# A tree. shell: its record; pose: where it stands; nodes: a QUADRATIC_MODEL a row; info: a CELL_NODE a row; used: how
+# many nodes there are, one number; work: room for coefficients.
+BallTree = namedtuple("BallTree", "shell pose nodes info used work")
 # The cells of a feature. kind: FACE, EDGE or VERTEX; record: where its record is in the table; count: how many cells;
 # pool: where they begin in the pool; stride: numbers of a cell; ball: where its ball is among them.
 FeatureCells = namedtuple("FeatureCells", "kind record count pool stride ball")
@@ -110,8 +103,21 @@ def room(store, shell):
 
 
 @kernel(inline=True)
-def new_node(info, i, level, kind, feature, record):
-    cell = cell_node_at(info, i)
+def cell_in(tree, i):
+    """The CELL_NODE of node i."""
+    return cell_node_at(tree.info, i)
+
+
+@kernel(inline=True)
+def model_in(tree, i):
+    """The QUADRATIC_MODEL of node i."""
+    return model_at(tree.nodes, i)
+
+
+@kernel(inline=True)
+def new_node(tree, i, level, kind, feature, record):
+    """Node i, without children."""
+    cell = cell_in(tree, i)
     cell.level = level
     cell.kind = kind
     cell.feature = feature
@@ -120,6 +126,35 @@ def new_node(info, i, level, kind, feature, record):
     cell.children = 0
     cell.side = UNKNOWN
     cell.has_model = 0
+    return cell
+
+
+@kernel(inline=True)
+def set_box(model, u, v, half_u, half_v):
+    model.u0 = u
+    model.v0 = v
+    model.half_u = half_u
+    model.half_v = half_v
+
+
+@kernel(inner=True)
+def add_cell(tree, i, side, box):
+    """A new node: a cell of the feature of node i, over a box, within the ball of that one."""
+    cell, parent = cell_in(tree, i), model_in(tree, i)
+    new_node(tree, tree.used[0], CELL, cell.kind, cell.feature, cell.record).side = side
+    model = model_in(tree, tree.used[0])
+    set_box(model, box.u, box.v, box.half_u, box.half_v)
+    put(model.center, three_of(parent.center))
+    model.radius = parent.radius
+    cell.children += 1
+    tree.used[0] += 1
+
+
+@kernel(inline=True)
+def set_ball(model, center, reach):
+    """A ball that rounding is within."""
+    put(model.center, center)
+    model.radius = reach + 4e-16 * (reach + abs(center[0]) + abs(center[1]) + abs(center[2]))
 
 
 @kernel(inner=True)
@@ -128,17 +163,16 @@ def ball_around(nodes, i, first, last):
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
     for k in range(first, last):
-        c = get(nodes, k, CENTER)
+        c = three_of(model_at(nodes, k).center)
         r = model_at(nodes, k).radius
         lo = (min(lo[0], c[0] - r), min(lo[1], c[1] - r), min(lo[2], c[2] - r))
         hi = (max(hi[0], c[0] + r), max(hi[1], c[1] + r), max(hi[2], c[2] + r))
     center = scale(0.5, add(lo, hi))
     reach = 0.0
     for k in range(first, last):
-        d = sub(get(nodes, k, CENTER), center)
+        d = sub(model_at(nodes, k).center, center)
         reach = max(reach, math.sqrt(dot(d, d)) + model_at(nodes, k).radius)
-    put(nodes, i, CENTER, center)
-    model_at(nodes, i).radius = reach + 4e-16 * (reach + abs(center[0]) + abs(center[1]) + abs(center[2]))
+    set_ball(model_at(nodes, i), center, reach)
 
 
 @kernel(inner=True)
@@ -150,94 +184,101 @@ def used_cell(store, record, kind, c):
     return store.pool[face.cell_flags + c] != 0.0
 
 
-@kernel(inner=True)
-def plant(store, shell, pose, nodes, info):
-    """The nodes of the shell and of its features. Returns the number of nodes."""
-    cell = cell_node_at(info, 0)
+@kernel(inner=True, allocates=True)
+def plant(store, shell, pose):
+    """A `BallTree` of the nodes of a shell and of its features."""
+    most = room(store, shell)
+    tree = BallTree(
+        shell=shell,
+        pose=pose,
+        nodes=np.empty((most, NODE)),
+        info=np.empty((most, INFO), np.int64),
+        used=np.empty(1, np.int64),
+        work=np.empty((4, 16, 16)),
+    )
     solid = shell_at(store.table, shell)
     features = solid.faces + solid.edges + solid.vertices
-    new_node(info, 0, WHOLE, -1, -1, shell)
-    cell.child = 1
-    cell.children = features
+    root = new_node(tree, 0, WHOLE, -1, -1, shell)
+    root.child = 1
+    root.children = features
     for k in range(features):
-        own = feature_cells(store.table, shell, k)
-        kind, record, cells, at, size, ball = own.kind, own.record, own.count, own.pool, own.stride, own.ball
-        i = 1 + k
-        model = model_at(nodes, i)
-        new_node(info, i, PART, kind, k, record)
-        if kind == VERTEX:
-            cell_node_at(info, i).level = CELL
-            point = add(matvec(pose.rotation, (store.pool[at], store.pool[at + 1], store.pool[at + 2])), pose.shift)
-            put(nodes, i, CENTER, point)
-            model.radius = 0.0
-            continue
-        lo = (math.inf, math.inf, math.inf)
-        hi = (-math.inf, -math.inf, -math.inf)
-        low_u = math.inf
-        low_v = math.inf
-        high_u = -math.inf
-        high_v = -math.inf
-        for c in range(cells):
-            if used_cell(store, record, kind, c):
-                o = at + size * c
-                if kind == FACE:
-                    low_u = min(low_u, store.pool[o] - store.pool[o + 9])
-                    high_u = max(high_u, store.pool[o] + store.pool[o + 9])
-                    low_v = min(low_v, store.pool[o + 1] - store.pool[o + 10])
-                    high_v = max(high_v, store.pool[o + 1] + store.pool[o + 10])
-                else:
-                    low_u = min(low_u, store.pool[o])
-                    high_u = max(high_u, store.pool[o + 1])
-                    low_v = 0.0
-                    high_v = 0.0
-                o += ball
-                r = store.pool[o + 3]
-                lo = (
-                    min(lo[0], store.pool[o] - r),
-                    min(lo[1], store.pool[o + 1] - r),
-                    min(lo[2], store.pool[o + 2] - r),
-                )
-                hi = (
-                    max(hi[0], store.pool[o] + r),
-                    max(hi[1], store.pool[o + 1] + r),
-                    max(hi[2], store.pool[o + 2] + r),
-                )
-        model.u0 = 0.5 * (low_u + high_u)
-        model.v0 = 0.5 * (low_v + high_v)
-        model.half_u = 0.5 * (high_u - low_u)
-        model.half_v = 0.5 * (high_v - low_v)
-        x, y, z = scale(0.5, add(lo, hi))
-        reach = 0.0
-        for c in range(cells):
-            if used_cell(store, record, kind, c):
-                o = at + size * c + ball
-                d = (store.pool[o] - x) ** 2 + (store.pool[o + 1] - y) ** 2 + (store.pool[o + 2] - z) ** 2
-                reach = max(reach, math.sqrt(d) + store.pool[o + 3])
-        center = add(matvec(pose.rotation, (x, y, z)), pose.shift)
-        put(nodes, i, CENTER, center)
-        model.radius = reach + 4e-16 * (reach + abs(center[0]) + abs(center[1]) + abs(center[2]))
-    ball_around(nodes, 0, 1, 1 + features)
-    return 1 + features
+        plant_feature(store, tree, k)
+    ball_around(tree.nodes, 0, 1, 1 + features)
+    tree.used[0] = 1 + features
+    return tree
 
 
 @kernel(inner=True)
-def open_spans(store, nodes, info, i, count):
-    """Pieces of one span each as cells of a feature that has few spans. Returns the number of nodes."""
-    cell = cell_node_at(info, i)
-    model = model_at(nodes, i)
-    kind = cell.kind
-    record = cell.record
-    face = face_at(store.table, record)
-    cell.child = count
+def plant_feature(store, tree, k):
+    """The node of feature k, with the ball around its cells, and of a face or an edge the box of their parameters."""
+    pose = tree.pose
+    kind, record, cells, at, size, ball = feature_cells(store.table, tree.shell, k)
+    model = model_in(tree, 1 + k)
+    new_node(tree, 1 + k, CELL if kind == VERTEX else PART, kind, k, record)
+    if kind == VERTEX:
+        point = (store.pool[at], store.pool[at + 1], store.pool[at + 2])
+        put(model.center, add(matvec(pose.rotation, point), pose.shift))
+        model.radius = 0.0
+        return
+    lo = (math.inf, math.inf, math.inf)
+    hi = (-math.inf, -math.inf, -math.inf)
+    low_u = math.inf
+    low_v = math.inf
+    high_u = -math.inf
+    high_v = -math.inf
+    for c in range(cells):
+        if used_cell(store, record, kind, c):
+            o = at + size * c
+            if kind == FACE:
+                low_u = min(low_u, store.pool[o] - store.pool[o + 9])
+                high_u = max(high_u, store.pool[o] + store.pool[o + 9])
+                low_v = min(low_v, store.pool[o + 1] - store.pool[o + 10])
+                high_v = max(high_v, store.pool[o + 1] + store.pool[o + 10])
+            else:
+                low_u = min(low_u, store.pool[o])
+                high_u = max(high_u, store.pool[o + 1])
+                low_v = 0.0
+                high_v = 0.0
+            o += ball
+            r = store.pool[o + 3]
+            lo = (
+                min(lo[0], store.pool[o] - r),
+                min(lo[1], store.pool[o + 1] - r),
+                min(lo[2], store.pool[o + 2] - r),
+            )
+            hi = (
+                max(hi[0], store.pool[o] + r),
+                max(hi[1], store.pool[o + 1] + r),
+                max(hi[2], store.pool[o + 2] + r),
+            )
+    set_box(model, 0.5 * (low_u + high_u), 0.5 * (low_v + high_v), 0.5 * (high_u - low_u), 0.5 * (high_v - low_v))
+    x, y, z = scale(0.5, add(lo, hi))
+    reach = 0.0
+    for c in range(cells):
+        if used_cell(store, record, kind, c):
+            o = at + size * c + ball
+            d = (store.pool[o] - x) ** 2 + (store.pool[o + 1] - y) ** 2 + (store.pool[o + 2] - z) ** 2
+            reach = max(reach, math.sqrt(d) + store.pool[o + 3])
+    set_ball(model, add(matvec(pose.rotation, (x, y, z)), pose.shift), reach)
+
+
+@kernel(inner=True)
+def open_spans(store, tree, i):
+    """Pieces of one span each as cells of a feature that has few spans."""
+    cell, model = cell_in(tree, i), model_in(tree, i)
+    is_edge = cell.kind == EDGE
+    face = face_at(store.table, cell.record)
+    cell.child = tree.used[0]
     low_u = model.u0 - model.half_u
     high_u = model.u0 + model.half_u
     low_v = model.v0 - model.half_v
     high_v = model.v0 + model.half_v
-    curve = spline_curve_at(store.table, edge_at(store.table, record).curve if kind == EDGE else -1)
-    r = surface_at(store.table, face.surface if kind == FACE else -1)
-    breaks_u = curve.breaks if kind == EDGE else r.breaks_u
-    spans_u = curve.spans if kind == EDGE else r.spans_u
-    spans_v = 1 if kind == EDGE else r.spans_v
+    curve = spline_curve_at(store.table, edge_at(store.table, cell.record).curve if is_edge else -1)
+    r = surface_at(store.table, -1 if is_edge else face.surface)
+    breaks_u = curve.breaks if is_edge else r.breaks_u
+    spans_u = curve.spans if is_edge else r.spans_u
+    spans_v = 1 if is_edge else r.spans_v
+    side = UNKNOWN if not is_edge and face.trim >= 0 else INSIDE
     for iu in range(spans_u):
         u0 = max(store.pool[breaks_u + iu], low_u)
         u1 = min(store.pool[breaks_u + iu + 1], high_u)
@@ -246,23 +287,13 @@ def open_spans(store, nodes, info, i, count):
         for iv in range(spans_v):
             v0 = 0.0
             v1 = 0.0
-            if kind == FACE:
+            if not is_edge:
                 at = r.breaks_v + iv
                 v0 = max(store.pool[at], low_v)
                 v1 = min(store.pool[at + 1], high_v)
                 if not v0 < v1:
                     continue
-            new_node(info, count, CELL, kind, cell.feature, record)
-            cell_node_at(info, count).side = UNKNOWN if kind == FACE and face.trim >= 0 else INSIDE
-            model_at(nodes, count).u0 = 0.5 * (u0 + u1)
-            model_at(nodes, count).v0 = 0.5 * (v0 + v1)
-            model_at(nodes, count).half_u = 0.5 * (u1 - u0)
-            model_at(nodes, count).half_v = 0.5 * (v1 - v0)
-            put(nodes, count, CENTER, get(nodes, i, CENTER))
-            model_at(nodes, count).radius = model.radius
-            count += 1
-    cell.children = count - cell.child
-    return count
+            add_cell(tree, i, side, Box(0.5 * (u0 + u1), 0.5 * (v0 + v1), 0.5 * (u1 - u0), 0.5 * (v1 - v0)))
 
 
 @kernel(inner=True)
@@ -275,115 +306,96 @@ def span_count(table, kind, record):
 
 
 @kernel(inner=True)
-def open_feature(store, shell, pose, nodes, info, i, count):
-    """Groups and cells of a feature. Returns the number of nodes."""
-    cell = cell_node_at(info, i)
-    own = feature_cells(store.table, shell, cell.feature)
-    kind, record, cells, at, size, ball = own.kind, own.record, own.count, own.pool, own.stride, own.ball
+def open_feature(store, tree, i):
+    """Groups and cells of a feature."""
+    pose, cell = tree.pose, cell_in(tree, i)
+    kind, record, cells, at, size, ball = feature_cells(store.table, tree.shell, cell.feature)
     used = 0
     for c in range(cells):
         if used_cell(store, record, kind, c):
             used += 1
     groups = (used + TOGETHER - 1) // TOGETHER
-    first = count + groups
+    cell.child = tree.used[0]
+    cell.children = groups
+    first = cell.child + groups
     j = first
     for c in range(cells):
         if not used_cell(store, record, kind, c):
             continue
         o = at + size * c
-        new_node(info, j, CELL, kind, cell.feature, record)
-        put(
-            nodes,
-            j,
-            CENTER,
-            add(
-                matvec(pose.rotation, (store.pool[o + ball], store.pool[o + ball + 1], store.pool[o + ball + 2])),
-                pose.shift,
-            ),
-        )
-        model_at(nodes, j).radius = store.pool[o + ball + 3]
+        p = o + ball
+        part, model = new_node(tree, j, CELL, kind, cell.feature, record), model_in(tree, j)
+        center = (store.pool[p], store.pool[p + 1], store.pool[p + 2])
+        put(model.center, add(matvec(pose.rotation, center), pose.shift))
+        model.radius = store.pool[p + 3]
         if kind == FACE:
-            model_at(nodes, j).u0 = store.pool[o]
-            model_at(nodes, j).v0 = store.pool[o + 1]
-            model_at(nodes, j).half_u = store.pool[o + 9]
-            model_at(nodes, j).half_v = store.pool[o + 10]
-            if face_at(store.table, record).trim < 0:
-                cell_node_at(info, j).side = INSIDE
+            set_box(model, store.pool[o], store.pool[o + 1], store.pool[o + 9], store.pool[o + 10])
         else:
-            model_at(nodes, j).u0 = 0.5 * (store.pool[o] + store.pool[o + 1])
-            model_at(nodes, j).v0 = 0.0
-            model_at(nodes, j).half_u = 0.5 * (store.pool[o + 1] - store.pool[o])
-            model_at(nodes, j).half_v = 0.0
-            cell_node_at(info, j).side = INSIDE
+            middle, half = 0.5 * (store.pool[o] + store.pool[o + 1]), 0.5 * (store.pool[o + 1] - store.pool[o])
+            set_box(model, middle, 0.0, half, 0.0)
+        part.side = UNKNOWN if kind == FACE and face_at(store.table, record).trim >= 0 else INSIDE
         j += 1
     for k in range(groups):
-        g = count + k
-        cell_node = cell_node_at(info, g)
-        new_node(info, g, GROUP, kind, cell.feature, record)
-        cell_node.child = first + TOGETHER * k
-        cell_node.children = min(TOGETHER, used - TOGETHER * k)
-        ball_around(nodes, g, cell_node.child, cell_node.child + cell_node.children)
-    cell.child = count
-    cell.children = groups
-    return first + used
+        group = new_node(tree, cell.child + k, GROUP, kind, cell.feature, record)
+        group.child = first + TOGETHER * k
+        group.children = min(TOGETHER, used - TOGETHER * k)
+        ball_around(tree.nodes, cell.child + k, group.child, group.child + group.children)
+    tree.used[0] = first + used
+
+
+@kernel(inline=True)
+def is_full(tree):
+    """Whether there is no room for the parts of another cell."""
+    return tree.used[0] + 160 > tree.nodes.shape[0]
 
 
 @kernel(inner=True)
-def give_model(store, pose, nodes, info, i, work):
+def give_model(store, tree, i):
     """See to it that a cell has its model."""
-    cell = cell_node_at(info, i)
+    cell, model = cell_in(tree, i), model_in(tree, i)
     if cell.has_model == 1:
         return
     cell.has_model = 1
     record = cell.record
     if cell.kind == FACE:
-        face_model(store, face_at(store.table, record).surface, pose, nodes, i, work)
+        face_model(store, face_at(store.table, record).surface, tree.pose, model, tree.work)
     elif cell.kind == EDGE:
-        edge_model(store, record, pose, nodes, i, work)
+        edge_model(store, record, tree.pose, model, tree.work)
     else:
-        vertex_model(store.pool, vertex_at(store.table, record).point, pose, nodes, i)
+        vertex_model(store.pool, vertex_at(store.table, record).point, tree.pose, model)
 
 
 @kernel(inner=True)
-def split_cell(nodes, info, i, count):
-    """Two or four parts of a cell that has its model. Returns the number of nodes."""
-    cell = cell_node_at(info, i)
-    model = model_at(nodes, i)
-    p = get(nodes, i, LINEAR_U)
-    q = get(nodes, i, LINEAR_V)
-    uu = dot(p, p)
-    vv = dot(q, q)
+def split_cell(tree, i):
+    """Two or four parts of a cell that has its model."""
+    cell, model = cell_in(tree, i), model_in(tree, i)
+    uu = dot(model.linear_u, model.linear_u)
+    vv = dot(model.linear_v, model.linear_v)
     is_edge = cell.kind == EDGE
     in_u = is_edge or SLENDER * SLENDER * uu >= vv
     in_v = not is_edge and SLENDER * SLENDER * vv >= uu
-    cell.child = count
+    cell.child = tree.used[0]
     parts_u = 2 if in_u else 1
     parts_v = 2 if in_v else 1
     half_u = model.half_u / parts_u
     half_v = model.half_v / parts_v
+    side = UNKNOWN if cell.side == MIXED_SIDE else cell.side
     for a in range(parts_u):
         for b in range(parts_v):
-            new_node(info, count, CELL, cell.kind, cell.feature, cell.record)
-            cell_node_at(info, count).side = UNKNOWN if cell.side == MIXED_SIDE else cell.side
-            model_at(nodes, count).u0 = model.u0 + (2 * a + 1 - parts_u) * half_u
-            model_at(nodes, count).v0 = model.v0 + (2 * b + 1 - parts_v) * half_v
-            model_at(nodes, count).half_u = half_u
-            model_at(nodes, count).half_v = half_v
-            put(nodes, count, CENTER, get(nodes, i, CENTER))
-            model_at(nodes, count).radius = model.radius
-            count += 1
-    cell.children = parts_u * parts_v
-    return count
+            u = model.u0 + (2 * a + 1 - parts_u) * half_u
+            v = model.v0 + (2 * b + 1 - parts_v) * half_v
+            add_cell(tree, i, side, Box(u, v, half_u, half_v))
 
 
 @kernel(inner=True)
-def grow(store, shell, pose, nodes, info, i, count):
-    """See to it that a node has children, cells yet without their models. Returns the number of nodes."""
-    cell = cell_node_at(info, i)
-    if cell.child >= 0 or cell.kind == VERTEX:
-        return count
-    if cell.level == PART:
-        if span_count(store.table, cell.kind, cell.record) <= SPANS:
-            return open_spans(store, nodes, info, i, count)
-        return open_feature(store, shell, pose, nodes, info, i, count)
-    return split_cell(nodes, info, i, count)
+def grow(store, tree, i):
+    """See to it that a node has children, cells yet without their models. Returns its CELL_NODE."""
+    cell = cell_in(tree, i)
+    if cell.child < 0 and cell.kind != VERTEX:
+        if cell.level != PART:
+            split_cell(tree, i)
+        elif span_count(store.table, cell.kind, cell.record) <= SPANS:
+            open_spans(store, tree, i)
+        else:
+            open_feature(store, tree, i)
+    return cell

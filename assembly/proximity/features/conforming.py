@@ -19,21 +19,16 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.vec import add, dot, matvec, scale, sub
-from assembly.kinematics.motion import RelativePose
+from assembly.kinematics.motion import IDENTITY, RelativePose
 from assembly.proximity.brep.apexes import unit
-from assembly.proximity.brep.borders import feature_at, feature_kind, on_surface, other_parameter
-from assembly.proximity.brep.records import (
-    EDGE,
-    EDGE_RECORD,
-    edge_at,
-    shell_at,
-)
+from assembly.proximity.brep.borders import feature_at, feature_kind, feature_of, on_surface, other_parameter
+from assembly.proximity.brep.records import EDGE, edge_at, shell_at
 from assembly.proximity.extrema.crossing import tangents
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
 from assembly.proximity.extrema.feature_pair import solve_features
 from assembly.proximity.features.ball_tree import feature_cells, used_cell
 from assembly.proximity.features.global_search import CROSSING, FoundPair, search
-from assembly.proximity.features.separating_normals import WAYS, add_ways
+from assembly.proximity.features.separating_normals import WAYS, FeaturePoint, add_ways, points_of, way_at
 
 # Points of shells that are deeper in each other than this part of the size tell a crossing from conforming faces.
 NEARLY = 1e-6
@@ -87,61 +82,52 @@ def grown(pose, about, factor):
 
 
 @kernel(inner=True)
-def leans(store, shell, code, u, v, turn, n, size, ways):
-    """How much the normals of a shell's faces at a point of a feature lean along n, all together."""
+def leans(store, shell, at, turn, n, size, ways):
+    """How much the normals of a shell's faces at a `FeaturePoint` lean along n, all together."""
     s = 0.0
-    for k in range(add_ways(store, shell, code, u, v, turn, 1.0, size, ways, 0)):
-        s += dot(n, (ways[k, 0], ways[k, 1], ways[k, 2]))
+    for k in range(add_ways(store, shell, at, turn, 1.0, size, ways, 0)):
+        s += dot(n, way_at(ways, k))
     return s
 
 
 @kernel(inner=True)
-def face_beside(store, shell, code, u, v, turn, n):
-    """The face that leans most along n at a point of an edge, and the point on it; what is no edge stays as it is."""
-    solid = shell_at(store.table, shell)
-    if feature_kind(store.table, shell, code) != EDGE:
-        return code, u, v
-    edge = solid.edge_table + EDGE_RECORD * (code - solid.faces)
+def face_beside(store, shell, at, turn, n):
+    """The point of an edge on the face that leans most along n; a `FeaturePoint` of what is no edge stays as it is."""
+    if feature_kind(store.table, shell, at.code) != EDGE:
+        return at
+    edge = feature_at(store.table, shell, at.code)
     edge_record = edge_at(store.table, edge)
     surface = edge_record.surface
-    face = edge_record.face_a
-    on_edge = on_surface(store, surface, edge_record.curve, u)
-    a, b, p, m = on_edge.u, on_edge.v, on_edge.point, on_edge.normal
+    one = on_surface(store, surface, edge_record.curve, at.u)
     if edge_record.face_b >= 0:
-        other = edge_record.surface_b
-        s = other_parameter(store, edge, u, p)
-        on_edge = on_surface(store, other, edge_record.curve_b, s)
-        c, d, k = on_edge.u, on_edge.v, on_edge.normal
-        lean = float(surface_at(store.table, surface).sign) * dot(unit(matvec(turn, m)), n)
-        if float(surface_at(store.table, other).sign) * dot(unit(matvec(turn, k)), n) > lean:
-            return edge_record.face_b, c, d
-    return face, a, b
+        surface_b = edge_record.surface_b
+        s = other_parameter(store, edge, at.u, one.point)
+        other = on_surface(store, surface_b, edge_record.curve_b, s)
+        lean = float(surface_at(store.table, surface).sign) * dot(unit(matvec(turn, one.normal)), n)
+        if float(surface_at(store.table, surface_b).sign) * dot(unit(matvec(turn, other.normal)), n) > lean:
+            return FeaturePoint(edge_record.face_b, other.u, other.v)
+    return FeaturePoint(edge_record.face_a, one.u, one.v)
 
 
 @kernel(inner=True)
 def pair_from(store, shells, pose, codes, x, n, size):
-    """The pair of two features of shells from x, and whether it is one at which they touch with a normal near n."""
-    f, g = codes
-    kind_f = feature_kind(store.table, shells[0], f)
-    kind_g = feature_kind(store.table, shells[1], g)
-    a = feature_at(store.table, shells[0], f)
-    b = feature_at(store.table, shells[1], g)
-    status, y, frame = solve_features(store, kind_f, a, kind_g, b, pose, x, n, size, math.inf)
-    found = (
-        (status == CONVERGED or status == SINGULAR) and abs(frame.gap) <= NEARLY * size and dot(frame.normal, n) > 0.5
-    )
-    return found, y, frame.normal, frame.gap
+    """The `FoundPair` of two features from x: one at which shells touch with a normal near n, or none."""
+    f = feature_of(store, shells[0], codes[0])
+    g = feature_of(store, shells[1], codes[1])
+    status, y, frame = solve_features(store, f, g, pose, x, n, size, math.inf)
+    touches = abs(frame.gap) <= NEARLY * size and dot(frame.normal, n) > 0.5
+    return FoundPair((status == CONVERGED or status == SINGULAR) and touches, codes, y, frame.normal, frame.gap)
 
 
 @kernel(inner=True, allocates=True)
-def conforming_pair(store, shell_f, shell_g, pose, size):
+def conforming_pair(store, shells, pose, size):
     """The pair at which two shells that have points in common touch along conforming faces.
 
     Made smaller, a shell within the other one's material is free as well: there normals do not oppose each other.
     It is not deeper than `NEARLY` of the size.
     """
-    none = (0.0, 0.0, 0.0)
-    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    shell_f, shell_g = shells
+    same = IDENTITY.rotation
     ways = np.empty((WAYS, 3))
     for side in range(2):
         center, reach = middle_of(store, shell_g if side == 0 else shell_f)
@@ -150,32 +136,28 @@ def conforming_pair(store, shell_f, shell_g, pose, size):
         about = add(matvec(pose.rotation, center), pose.shift) if side == 0 else center
         part = NEARLY * size / reach
         larger = grown(pose, about, 1.0 - part if side == 0 else 1.0 / (1.0 - part))
-        nearest = search(store, shell_f, shell_g, larger, size, ROUGH)
-        f, g, x = nearest.f, nearest.g, nearest.x
-        if nearest.status == CROSSING or f < 0:
+        nearest = search(store, shells, larger, size, ROUGH)
+        x = nearest.x
+        if nearest.status == CROSSING or nearest.codes[0] < 0:
             continue
-        kind_f = feature_kind(store.table, shell_f, f)
-        kind_g = feature_kind(store.table, shell_g, g)
-        p = tangents(
-            store, kind_f, feature_cells(store.table, shell_f, f).record, RelativePose(same, none), x[0], x[1]
-        )[0]
-        q = tangents(store, kind_g, feature_cells(store.table, shell_g, g).record, larger, x[2], x[3])[0]
+        f, g = points_of(nearest.codes, x)
+        p = tangents(store, feature_of(store, shell_f, f.code), IDENTITY, f.u, f.v)[0]
+        q = tangents(store, feature_of(store, shell_g, g.code), larger, g.u, g.v)[0]
         d = sub(q, p)
         length = math.sqrt(dot(d, d))
         if not length > 0.0:
             continue
         n = scale(1.0 / length, d)
-        if not leans(store, shell_f, f, x[0], x[1], same, n, size, ways) > 0.0:
+        if not leans(store, shell_f, f, same, n, size, ways) > 0.0:
             continue
-        if not leans(store, shell_g, g, x[2], x[3], pose.rotation, n, size, ways) < 0.0:
+        if not leans(store, shell_g, g, pose.rotation, n, size, ways) < 0.0:
             continue
-        shells = (shell_f, shell_g)
-        found, y, m, gap = pair_from(store, shells, pose, (f, g), x, n, size)
-        if not found:
+        found = pair_from(store, shells, pose, nearest.codes, x, n, size)
+        if not found.found:
             # Edges that lie on each other have no normal: the faces beside them do.
-            f, u, v = face_beside(store, shell_f, f, x[0], x[1], same, n)
-            g, s, w = face_beside(store, shell_g, g, x[2], x[3], pose.rotation, scale(-1.0, n))
-            found, y, m, gap = pair_from(store, shells, pose, (f, g), (u, v, s, w), n, size)
-        if found:
-            return FoundPair(True, f, g, y, m, gap)
-    return FoundPair(False, -1, -1, (0.0, 0.0, 0.0, 0.0), none, 0.0)
+            f = face_beside(store, shell_f, f, same, n)
+            g = face_beside(store, shell_g, g, pose.rotation, scale(-1.0, n))
+            found = pair_from(store, shells, pose, (f.code, g.code), (f.u, f.v, g.u, g.v), n, size)
+        if found.found:
+            return found
+    return FoundPair(False, (-1, -1), (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)

@@ -20,63 +20,38 @@ from assembly.geometry.splines.evaluate import (
 from assembly.geometry.vec import add, blend, dot, scale
 from assembly.proximity.brep.records import edge_at
 from assembly.proximity.features.quadratic_model import (
-    LEAST_WEIGHT,
     ROUNDING,
-    model_at,
+    Box,
+    Quadratic,
+    expand,
     place_model,
+    quadratic_over,
     remainder,
+    term_off,
 )
 
 
 @kernel(inner=True)
-def curve_remainder(store, curve, t0, h, c0, c1, c2, work):
+def curve_remainder(store, curve, box, quadratic, work):
     """Bounds of |x|, |y|, |z| of what the quadratic leaves of a curve over one part of a span."""
     arc = spline_curve_at(store.table, curve)
-    span = find_span(store.pool, arc.breaks, arc.spans, t0)
+    span = find_span(store.pool, arc.breaks, arc.spans, box.u)
     at = arc.breaks + span
-    s = t0 - 0.5 * (store.pool[at] + store.pool[at + 1])
     n = arc.degree
     o = arc.coefficients + 4 * (n + 1) * span
     for i in range(n + 1):
         w = store.pool[o + 4 * i + 3]
         for c in range(3):
-            work[c, 0, i] = store.pool[o + 4 * i + c] - w * c0[c]
-        work[3, 0, i] = w
-    for c in range(4):
-        for first in range(n):
-            for i in range(n - 1, first - 1, -1):
-                work[c, 0, i] += s * work[c, 0, i + 1]
-    factor = 1.0
-    for i in range(n + 1):
-        for c in range(4):
-            work[c, 0, i] *= factor
-        factor *= h
-    least = 2.0 * work[3, 0, 0]
-    for i in range(n + 1):
-        least -= abs(work[3, 0, i])
-    if not least > LEAST_WEIGHT * work[3, 0, 0]:
+            work[c, i, 0] = store.pool[o + 4 * i + c] - w * quadratic.point[c]
+        work[3, i, 0] = w
+    least = expand(work, (n, 0), Box(box.u - 0.5 * (store.pool[at] + store.pool[at + 1]), 0.0, box.half_u, 0.0))
+    if not least > 0.0:
         return (math.inf, math.inf, math.inf)
     ex = 0.0
     ey = 0.0
     ez = 0.0
     for i in range(n + 3):
-        x = 0.0
-        y = 0.0
-        z = 0.0
-        if i <= n:
-            x = work[0, 0, i]
-            y = work[1, 0, i]
-            z = work[2, 0, i]
-        if 1 <= i <= n + 1:
-            w = work[3, 0, i - 1]
-            x -= w * c1[0]
-            y -= w * c1[1]
-            z -= w * c1[2]
-        if i >= 2:
-            w = work[3, 0, i - 2]
-            x -= w * c2[0]
-            y -= w * c2[1]
-            z -= w * c2[2]
+        x, y, z = term_off(work, (n, 0), quadratic, i, 0)
         ex += abs(x)
         ey += abs(y)
         ez += abs(z)
@@ -90,9 +65,10 @@ def meets(pool, breaks, k, move, u, a):
 
 
 @kernel(inner=True)
-def wide_remainder(store, r, u0, v0, a, b, s0, p, q, l, m, k, work):
+def wide_remainder(store, r, box, quadratic, work):
     """`remainder` over a box that may lie over several spans, and over seams."""
     patch = surface_at(store.table, r)
+    u0, v0, a, b = box
     bu = patch.breaks_u
     bv = patch.breaks_v
     nu = patch.spans_u
@@ -114,10 +90,8 @@ def wide_remainder(store, r, u0, v0, a, b, s0, p, q, l, m, k, work):
                 move_v = turn_v * period_v
                 for iv in range(nv):
                     if meets(store.pool, bv, iv, move_v, v0, b):
-                        u = u0 - move_u
-                        v = v0 - move_v
-                        e = remainder(store, r, iu, iv, u, v, a, b, s0, p, q, l, m, k, none, work).rest
-                        most = max(most, e)
+                        there = Box(u0 - move_u, v0 - move_v, a, b)
+                        most = max(most, remainder(store, r, (iu, iv), there, quadratic, none, work).rest)
     return most
 
 
@@ -127,23 +101,22 @@ def length(a):
 
 
 @kernel(inner=True)
-def edge_model(store, edge, pose, nodes, i, work):
-    """Fill in a node of an edge, whose interval stands in it already, moved by a pose."""
-    model = model_at(nodes, i)
+def edge_model(store, edge, pose, model, work):
+    """Fill in the model of an edge, whose interval stands in it already, moved by a pose."""
     edge_record = edge_at(store.table, edge)
-    t0 = model.u0
     h = model.half_u
     curve = edge_record.curve
     zero = (0.0, 0.0, 0.0)
-    c0, d, w = curve_point(store.table, store.pool, curve, t0)
+    c0, d, w = curve_point(store.table, store.pool, curve, model.u0)
     c1 = scale(h, d)
     c2 = scale(0.5 * h * h, w)
-    left = curve_remainder(store, curve, t0, h, c0, c1, c2, work)
+    own = Quadratic(c0, c1, zero, c2, zero, zero)
+    left = curve_remainder(store, curve, Box(model.u0, 0.0, h, 0.0), own, work)
     r = edge_record.surface
     far = abs(pose.shift[0]) + abs(pose.shift[1]) + abs(pose.shift[2])
     if r < 0:
         e = length(left) + ROUNDING * (far + abs(c0[0]) + abs(c0[1]) + abs(c0[2]))
-        place_model(pose, c0, c1, zero, c2, zero, zero, e, nodes, i)
+        place_model(pose, own, e, model)
         return
     u0, v0, _clamped = into_domain(store, r, c0[0], c0[1])
     s0, su, sv, suu, suv, svv = surface_point(store.table, store.pool, r, u0, v0)
@@ -157,15 +130,11 @@ def edge_model(store, edge, pose, nodes, i, work):
     b = abs(c1[1]) + more_v
     e = math.inf
     if a < math.inf and b < math.inf:
-        p = scale(a, su)
-        q = scale(b, sv)
-        l = scale(0.5 * a * a, suu)
-        m = scale(a * b, suv)
-        k = scale(0.5 * b * b, svv)
-        e = wide_remainder(store, r, u0, v0, a, b, s0, p, q, l, m, k, work)
+        box = Box(u0, v0, a, b)
+        e = wide_remainder(store, r, box, quadratic_over(box, s0, su, sv, suu, suv, svv), work)
         e += left[0] * length(su) + left[1] * length(sv)
         e += 0.5 * length(suu) * more_u * (2.0 * abs(c1[0]) + more_u)
         e += 0.5 * length(svv) * more_v * (2.0 * abs(c1[1]) + more_v)
         e += length(suv) * (abs(c1[0]) * more_v + abs(c1[1]) * more_u + more_u * more_v)
         e += ROUNDING * (far + abs(s0[0]) + abs(s0[1]) + abs(s0[2]))
-    place_model(pose, s0, linear, zero, square, zero, zero, e, nodes, i)
+    place_model(pose, Quadratic(s0, linear, zero, square, zero, zero), e, model)

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -169,21 +169,29 @@ def _extent(faces: Faces) -> float:
     return float(np.linalg.norm(high - low))
 
 
-@lru_cache(maxsize=64)
-def _packed(a: Faces, b: Faces) -> tuple[Table, Array, int, int, float]:
+class _Packed(NamedTuple):
     """Two shells as one table and one pool, where they begin, and the larger size."""
+
+    table: Table
+    pool: Array
+    shells: tuple[int, int]
+    size: float
+
+
+@lru_cache(maxsize=64)
+def _packed(a: Faces, b: Faces) -> _Packed:
     table_a, pool_a, shell_a = pack_shell(solid_of(a), 1.0)
     table_b, pool_b, shell_b = pack_shell(solid_of(b), 1.0, table_a.size, pool_a.size)
     size = max(_extent(a), _extent(b))
-    return np.concatenate([table_a, table_b]), np.concatenate([pool_a, pool_b]), shell_a, shell_b, size
+    return _Packed(np.concatenate([table_a, table_b]), np.concatenate([pool_a, pool_b]), (shell_a, shell_b), size)
 
 
-def _search(packed: tuple[Table, Array, int, int, float], q: Array, codes: Table, out: Array) -> FeatureStatus:
+def _search(packed: _Packed, q: Array, codes: Table, out: Array) -> FeatureStatus:
     """The pair at poses (2, 7) into codes (2,) and out (PAIR,)."""
-    table, pool, shell_a, shell_b, size = packed
-    status: FeatureStatus = _STATUSES[find_nearest(table, pool, shell_a, shell_b, q, size, codes, out)]
+    table, pool, shells, size = packed
+    status: FeatureStatus = _STATUSES[find_nearest(table, pool, shells, q, size, codes, out)]
     if status is FeatureStatus.CROSSING:
-        status = _STATUSES[find_deepest(table, pool, shell_a, shell_b, q, size, codes, out)]
+        status = _STATUSES[find_deepest(table, pool, shells, q, size, codes, out)]
     return status
 
 
@@ -245,7 +253,7 @@ def closest_features(
     pair = _closest(faces, q)
     if pair.status not in (FeatureStatus.PENETRATING, FeatureStatus.CROSSING):
         return pair
-    reach = touching * _packed(*faces)[4]
+    reach = touching * _packed(*faces).size
     if pair.status is FeatureStatus.PENETRATING and pair.gap >= -reach:
         return replace(pair, status=FeatureStatus.APART)
     return _parted(faces, q, reach) or pair
@@ -320,8 +328,8 @@ class FeatureTracker(OwnState):
         self._q[1] = _pose("q_b", self._shapes[1], q_b)
         status = None
         if self.searches:
-            table, pool, shell_a, shell_b, size = self._packed
-            if follow_nearest(table, pool, shell_a, shell_b, self._q, size, self._codes, self._out) == TRACKED:
+            table, pool, shells, size = self._packed
+            if follow_nearest(table, pool, shells, self._q, size, self._codes, self._out) == TRACKED:
                 status = FeatureStatus.TRACKED
         if status is None:
             status = _search(self._packed, self._q, self._codes, self._out)

@@ -22,30 +22,25 @@ from collections import namedtuple
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.vec import dot, sub
-from assembly.kinematics.motion import RelativePose
-from assembly.proximity.brep.records import FACE, VERTEX, face_at
+from assembly.kinematics.motion import IDENTITY
+from assembly.proximity.brep.records import FACE, VERTEX, Feature, face_at
+from assembly.proximity.bvh.tree import three_of
 from assembly.proximity.extrema.crossing import crossing_point
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR, solve_pair
 from assembly.proximity.extrema.feature_pair import solve_features
 from assembly.proximity.features.ball_tree import (
     CELL,
-    INFO,
     OUTSIDE,
-    cell_node_at,
+    cell_in,
     give_model,
     grow,
+    is_full,
+    model_in,
     plant,
-    room,
 )
-from assembly.proximity.features.quadratic_model import (
-    CENTER,
-    NODE,
-    POINT,
-    get,
-    model_at,
-    pair_bound,
-)
+from assembly.proximity.features.quadratic_model import ball_bound, pair_bound
 from assembly.proximity.features.region_tests import (
     FAR,
     KNOWN,
@@ -106,273 +101,267 @@ def drop_first(keys, slots, count):
     slots[i] = slot
 
 
+# Pairs of nodes that wait to be looked at, a slot each. keys, slots: their least distances and their slots, a heap;
+# pairs: the two nodes, and what is known (NEW, BOUNDED or GUESS); normals: near that of the pair, or zero where it is
+# not known; free: slots that were left; counts: how many pairs wait, slots were in use, slots are free.
+PairQueue = namedtuple("PairQueue", "keys slots pairs normals free counts")
+QUEUE_COUNTS = record_dtype("i8", waiting=1, used=1, free=1)
+counts_at = record_view(QUEUE_COUNTS)
+COUNTS = size_of(QUEUE_COUNTS)
+# A pair whose bound is that of balls, or that of models; one that is only tried as a start.
+NEW, BOUNDED, GUESS = 0, 1, 2
+
+
+@kernel(inner=True, allocates=True)
+def new_queue():
+    """An empty `PairQueue`."""
+    return PairQueue(
+        keys=np.empty(WAITING),
+        slots=np.empty(WAITING, np.int64),
+        pairs=np.empty((WAITING, 3), np.int64),
+        normals=np.empty((WAITING, 3)),
+        free=np.empty(WAITING, np.int64),
+        counts=np.zeros(COUNTS, np.int64),
+    )
+
+
+@kernel(inner=True)
+def add_pair(queue, key, i, j, known, n):
+    """Let a pair wait; it is left out where there is no room."""
+    counts = counts_at(queue.counts, 0)
+    if counts.free > 0:
+        counts.free -= 1
+        slot = queue.free[counts.free]
+    elif counts.used < WAITING:
+        slot = counts.used
+        counts.used += 1
+    else:
+        return
+    queue.pairs[slot, 0], queue.pairs[slot, 1], queue.pairs[slot, 2] = i, j, known
+    queue.normals[slot, 0], queue.normals[slot, 1], queue.normals[slot, 2] = n
+    push(queue.keys, queue.slots, counts.waiting, key, slot)
+    counts.waiting += 1
+
+
+@kernel(inner=True)
+def take_first(queue):
+    """The slot of the pair with the least distance, which does not wait any more: it is there until one is added."""
+    counts = counts_at(queue.counts, 0)
+    slot = queue.slots[0]
+    drop_first(queue.keys, queue.slots, counts.waiting)
+    counts.waiting -= 1
+    queue.free[counts.free] = slot
+    counts.free += 1
+    return slot
+
+
 # Where Newton's method leads. curvature: the least of g relative to f; stretch: 1 over the least of f's metric K.
 NearExtremum = namedtuple("NearExtremum", "status x gap curvature stretch")
 
 
+@kernel(inline=True)
+def feature_in(table, tree, i):
+    """The `Feature` of a node."""
+    cell = cell_in(tree, i)
+    return Feature(cell.kind, face_at(table, cell.record).surface if cell.kind == FACE else cell.record)
+
+
 @kernel(inner=True)
-def extremum_near(store, kind_f, f, kind_g, g, pose, x, n, size):
+def extremum_near(store, f, g, pose, x, n, size):
     """Newton's method from x; its status says whether it led to an extremum."""
-    face = face_at(store.table, f)
-    face_record = face_at(store.table, g)
-    if kind_f == FACE and kind_g == FACE:
-        found = solve_pair(store, face.surface, face_record.surface, pose, x, size, 1.5, 0.0, False)
+    if f.kind == FACE and g.kind == FACE:
+        found = solve_pair(store, (f.record, g.record), pose, x, size, 1.5, 0.0, False)
         gap = found.frame.gap
         least, stretch = relative_curvature(found.matrix.k, found.matrix.h, gap)
         return NearExtremum(found.status, found.parameters, gap, least, stretch)
-    af = face.surface if kind_f == FACE else f
-    ag = face_record.surface if kind_g == FACE else g
-    status, y, frame = solve_features(store, kind_f, af, kind_g, ag, pose, x, n, size, 1.5)
+    status, y, frame = solve_features(store, f, g, pose, x, n, size, 1.5)
     return NearExtremum(status, y, frame.gap, 0.0, 1.0)
 
 
 @kernel(inner=True)
-def larger_first(a, ai, i, b, bi, j):
+def larger_first(trees, i, j):
     """Whether to go down on the side of f: what is not a cell first, then what is larger."""
-    model = model_at(a, i)
-    model_record = model_at(b, j)
-    cell = cell_node_at(ai, i)
-    cell_node = cell_node_at(bi, j)
-    if cell.level == CELL and cell_node.level != CELL:
-        return False
-    if cell_node.level == CELL and cell.level != CELL:
-        return True
-    if cell.kind == VERTEX or cell_node.kind == VERTEX:
-        return cell_node.kind == VERTEX
-    if cell.level == CELL:
+    cell_f, cell_g = cell_in(trees[0], i), cell_in(trees[1], j)
+    f, g = model_in(trees[0], i), model_in(trees[1], j)
+    if (cell_f.level == CELL) != (cell_g.level == CELL):
+        return cell_g.level == CELL
+    if cell_f.kind == VERTEX or cell_g.kind == VERTEX:
+        return cell_g.kind == VERTEX
+    if cell_f.level == CELL:
         # What keeps the bound from the distance, or else the extent.
-        return model.rest + 0.02 * model.radius >= model_record.rest + 0.02 * model_record.radius
-    return model.radius >= model_record.radius
+        return f.rest + 0.02 * f.radius >= g.rest + 0.02 * g.radius
+    return f.radius >= g.radius
+
+
+@kernel(inline=True)
+def are_cells(trees, i, j):
+    """Whether both nodes are cells."""
+    return cell_in(trees[0], i).level == CELL and cell_in(trees[1], j).level == CELL
+
+
+# What a search for the nearest points of two shells finds. status: APART, CROSSING (at the point) or UNPROVEN; codes:
+# numbers of the features; x: their coordinates, (u, v) of f, then of g; gap: n.(g - f), n the outward normal of a face
+# of f, else of g, else from f to g; lower: no points are nearer than this; effort: pairs looked at.
+ShellSearch = namedtuple("ShellSearch", "status codes x gap lower effort")
+# A pair of features, or none. normal: near that of the pair, or zero where it is not known.
+FoundPair = namedtuple("FoundPair", "found codes x normal gap")
+
+
+@kernel(inline=True)
+def pair_at(trees, i, j, x, gap):
+    """The `FoundPair` at x of the features of two nodes."""
+    codes = (cell_in(trees[0], i).feature, cell_in(trees[1], j).feature)
+    return FoundPair(True, codes, x, (0.0, 0.0, 0.0), gap)
+
+
+@kernel(inline=True)
+def middles(trees, i, j):
+    """The coordinates in the middles of two cells."""
+    f, g = model_in(trees[0], i), model_in(trees[1], j)
+    return (f.u0, f.v0, g.u0, g.v0)
 
 
 @kernel(inner=True)
-def ball_bound(a, i, b, j):
-    d = sub(get(b, j, CENTER), get(a, i, CENTER))
-    return math.sqrt(dot(d, d)) - model_at(a, i).radius - model_at(b, j).radius
+def are_feasible(store, trees, i, j, x):
+    """Whether coordinates on the features of two nodes are points of the shells."""
+    f, g = cell_in(trees[0], i), cell_in(trees[1], j)
+    if not is_feasible(store, f.kind, f.record, x[0], x[1]):
+        return False
+    return is_feasible(store, g.kind, g.record, x[2], x[3])
 
 
-# What a search for the nearest points of two shells finds. status: APART, CROSSING (at the point) or UNPROVEN; f, g:
-# numbers of the features; x: their coordinates, (u, v) of f, then of g; gap: n.(g - f), n the outward normal of a face
-# of f, else of g, else from f to g; lower: no points are nearer than this; effort: pairs looked at.
-ShellSearch = namedtuple("ShellSearch", "status f g x gap lower effort")
-# A pair of features, or none. normal: near that of the pair, or zero where it is not known.
-FoundPair = namedtuple("FoundPair", "found f g x normal gap")
+@kernel(inner=True)
+def nearest_cells(store, trees):
+    """Two cells, by going down where balls are nearest."""
+    i = 0
+    j = 0
+    while True:
+        if are_cells(trees, i, j):
+            return i, j
+        down_f = larger_first(trees, i, j)
+        tree = trees[0] if down_f else trees[1]
+        cell = grow(store, tree, i if down_f else j)
+        center = three_of(model_in(trees[1], j).center) if down_f else three_of(model_in(trees[0], i).center)
+        nearest = math.inf
+        for k in range(cell.child, cell.child + cell.children):
+            d = sub(model_in(tree, k).center, center)
+            if dot(d, d) < nearest:
+                nearest = dot(d, d)
+                i = k if down_f else i
+                j = j if down_f else k
+
+
+@kernel(inner=True)
+def split_pair(store, trees, i, j, n, best, most, queue):
+    """Let the pairs of the parts of one node and the other one wait, but for those `most` or more apart."""
+    cells = are_cells(trees, i, j)
+    down_f = larger_first(trees, i, j)
+    tree = trees[0] if down_f else trees[1]
+    cell = grow(store, tree, i if down_f else j)
+    for k in range(cell.child, cell.child + cell.children):
+        p, q = (k, j) if down_f else (i, k)
+        a, b = model_in(trees[0], p), model_in(trees[1], q)
+        if cells:
+            give_model(store, tree, k)
+            key, m = pair_bound(a, b, n, abs(best.gap))
+        else:
+            key, m = ball_bound(a, b), n
+        if key < most:
+            add_pair(queue, key, p, q, BOUNDED if cells else NEW, m)
+
+
+@kernel(inner=True)
+def note_extremum(extremum, trees, i, j, near):
+    """Write an extremum of the features of two nodes."""
+    for l in range(4):
+        extremum.parameters[l] = near.x[l]
+    extremum.curvature = near.curvature
+    extremum.stretch = near.stretch
+    extremum.feature_f = cell_in(trees[0], i).feature
+    extremum.feature_g = cell_in(trees[1], j).feature
+
+
+@kernel(inline=True)
+def within(best, size, rough):
+    """The distance from which on a pair may be left out."""
+    return (1.0 - rough) * abs(best.gap) - 1e-13 * size
 
 
 @kernel(inner=True, allocates=True)
-def search(store, shell_f, shell_g, pose, size, rough):
+def search(store, shells, pose, size, rough):
     """The nearest points of two shells, g seen from f, or any that are farther by a part of that, `rough`, at most."""
-    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    origin = (0.0, 0.0, 0.0)
-    most_f = room(store, shell_f)
-    most_g = room(store, shell_g)
-    a = np.empty((most_f, NODE))
-    ai = np.empty((most_f, INFO), np.int64)
-    b = np.empty((most_g, NODE))
-    bi = np.empty((most_g, INFO), np.int64)
-    work = np.empty((4, 16, 16))
-    count_f = plant(store, shell_f, RelativePose(same, origin), a, ai)
-    count_g = plant(store, shell_g, pose, b, bi)
-    keys = np.empty(WAITING)
-    slots = np.empty(WAITING, np.int64)
-    pairs = np.empty((WAITING, 3), np.int64)
-    normals = np.empty((WAITING, 3))
-    free = np.empty(WAITING, np.int64)
-    released = 0
-    used = 0
-    waiting = 0
+    trees = (plant(store, shells[0], IDENTITY), plant(store, shells[1], pose))
+    queue = new_queue()
+    counts = counts_at(queue.counts, 0)
     extrema = np.empty((EXTREMA, KNOWN))
-    owners = np.empty((EXTREMA, 2), np.int64)
     known = 0
-    tolerance = 1e-13 * size
     # The least bound of a pair that was too small to be cut.
     uncut = math.inf
     status = APART
-    upper = math.inf
-    best = (-1, -1)
-    at = (0.0, 0.0, 0.0, 0.0)
-    gap = upper
-    lower = upper
+    nowhere = (0.0, 0.0, 0.0)
+    best = FoundPair(False, (-1, -1), (0.0, 0.0, 0.0, 0.0), nowhere, math.inf)
+    lower = math.inf
     effort = 0
-    # A first guess, by going down where balls are nearest.
-    i = 0
-    j = 0
-    while cell_node_at(ai, i).level != CELL or cell_node_at(bi, j).level != CELL:
-        if larger_first(a, ai, i, b, bi, j):
-            count_f = grow(store, shell_f, RelativePose(same, origin), a, ai, i, count_f)
-            nearest = math.inf
-            first = cell_node_at(ai, i).child
-            for k in range(first, first + cell_node_at(ai, i).children):
-                d = sub(get(b, j, CENTER), get(a, k, CENTER))
-                if dot(d, d) < nearest:
-                    nearest = dot(d, d)
-                    i = k
-        else:
-            count_g = grow(store, shell_g, pose, b, bi, j, count_g)
-            nearest = math.inf
-            first = cell_node_at(bi, j).child
-            for k in range(first, first + cell_node_at(bi, j).children):
-                d = sub(get(b, k, CENTER), get(a, i, CENTER))
-                if dot(d, d) < nearest:
-                    nearest = dot(d, d)
-                    j = k
-    first_f = i
-    model = model_at(a, first_f)
-    first_g = j
-    model_record = model_at(b, first_g)
-    pairs[0, 0] = i
-    pairs[0, 1] = j
-    pairs[0, 2] = 2
-    pairs[1, 0] = 0
-    pairs[1, 1] = 0
-    pairs[1, 2] = 0
-    for k in range(2):
-        normals[k, 0], normals[k, 1], normals[k, 2] = origin
-    used = 2
-    push(keys, slots, 0, -math.inf, 0)
-    push(keys, slots, 1, ball_bound(a, 0, b, 0), 1)
-    waiting = 2
-    while waiting > 0:
-        key = keys[0]
-        slot = slots[0]
-        if key >= (1.0 - rough) * upper - tolerance:
+    first_f, first_g = nearest_cells(store, trees)
+    add_pair(queue, -math.inf, first_f, first_g, GUESS, nowhere)
+    add_pair(queue, ball_bound(model_in(trees[0], 0), model_in(trees[1], 0)), 0, 0, NEW, nowhere)
+    while counts.waiting > 0:
+        key = queue.keys[0]
+        if key >= within(best, size, rough):
             break
-        drop_first(keys, slots, waiting)
-        waiting -= 1
-        i = pairs[slot, 0]
-        j = pairs[slot, 1]
-        ready = pairs[slot, 2]
-        n = (normals[slot, 0], normals[slot, 1], normals[slot, 2])
-        free[released] = slot
-        released += 1
+        slot = take_first(queue)
+        i, j, ready = queue.pairs[slot, 0], queue.pairs[slot, 1], queue.pairs[slot, 2]
+        n = (queue.normals[slot, 0], queue.normals[slot, 1], queue.normals[slot, 2])
         effort += 1
         lower = max(key, 0.0)
-        if count_f + 160 > most_f or count_g + 160 > most_g or waiting + 160 > WAITING:
+        if is_full(trees[0]) or is_full(trees[1]) or counts.waiting + 160 > WAITING:
             status = UNPROVEN
             break
-        are_cells = cell_node_at(ai, i).level == CELL and cell_node_at(bi, j).level == CELL
-        if are_cells:
-            give_model(store, RelativePose(same, origin), a, ai, i, work)
-            give_model(store, pose, b, bi, j, work)
-            kind_f = cell_node_at(ai, i).kind
-            kind_g = cell_node_at(bi, j).kind
-            f = cell_node_at(ai, i).record
-            g = cell_node_at(bi, j).record
-            if ready == 0:
-                key, n = pair_bound(a, i, b, j, n, upper)
-                if key >= (1.0 - rough) * upper - tolerance:
+        f, g = model_in(trees[0], i), model_in(trees[1], j)
+        if are_cells(trees, i, j):
+            give_model(store, trees[0], i)
+            give_model(store, trees[1], j)
+            if ready == NEW:
+                key, n = pair_bound(f, g, n, abs(best.gap))
+                if key >= within(best, size, rough):
                     continue
-                if waiting > 0 and key > keys[0]:
-                    released -= 1
-                    slot = free[released]
-                    pairs[slot, 0] = i
-                    pairs[slot, 1] = j
-                    pairs[slot, 2] = 1
-                    normals[slot, 0], normals[slot, 1], normals[slot, 2] = n
-                    push(keys, slots, waiting, key, slot)
-                    waiting += 1
+                if counts.waiting > 0 and key > queue.keys[0]:
+                    add_pair(queue, key, i, j, BOUNDED, n)
                     continue
-            d = sub(get(b, j, POINT), get(a, i, POINT))
-            apart = math.sqrt(dot(d, d))
-            start = (model_at(a, i).u0, model_at(a, i).v0, model_at(b, j).u0, model_at(b, j).v0)
-            if (
-                apart < upper
-                and is_feasible(store, kind_f, f, start[0], start[1])
-                and is_feasible(store, kind_g, g, start[2], start[3])
-            ):
-                upper = apart
-                best = (cell_node_at(ai, i).feature, cell_node_at(bi, j).feature)
-                at = start
-                gap = apart
-            if ready != 2 and excluded(a, i, kind_f, b, j, kind_g, key > 0.0):
+            d = sub(g.point, f.point)
+            start = middles(trees, i, j)
+            if math.sqrt(dot(d, d)) < abs(best.gap) and are_feasible(store, trees, i, j, start):
+                best = pair_at(trees, i, j, start, math.sqrt(dot(d, d)))
+            if ready != GUESS and excluded(trees, i, j, key > 0.0):
                 continue
-            settled, beside = is_known(store, a, ai, i, b, bi, j, extrema, owners, known)
+            settled, beside = is_known(store, trees, i, j, extrema[:known])
             if settled:
                 continue
+            one, other = feature_in(store.table, trees[0], i), feature_in(store.table, trees[1], j)
             # Beside an extremum Newton's method would find that one again.
-            if ready == 2 or (max(model_at(a, i).bend, model_at(b, j).bend) < SMOOTH and beside > FAR):
-                near = extremum_near(store, kind_f, f, kind_g, g, pose, start, n, size)
+            if ready == GUESS or (max(f.bend, g.bend) < SMOOTH and beside > FAR):
+                near = extremum_near(store, one, other, pose, start, n, size)
                 if near.status == CONVERGED or near.status == SINGULAR:
-                    x, beta = near.x, near.gap
-                    if (
-                        abs(beta) < upper
-                        and is_feasible(store, kind_f, f, x[0], x[1])
-                        and is_feasible(store, kind_g, g, x[2], x[3])
-                    ):
-                        upper = abs(beta)
-                        best = (cell_node_at(ai, i).feature, cell_node_at(bi, j).feature)
-                        at = x
-                        gap = beta
+                    if abs(near.gap) < abs(best.gap) and are_feasible(store, trees, i, j, near.x):
+                        best = pair_at(trees, i, j, near.x, near.gap)
                     if known < EXTREMA:
-                        extremum = known_extremum_at(extrema, known)
-                        for l in range(4):
-                            extremum.parameters[l] = x[l]
-                        extremum.curvature = near.curvature
-                        extremum.stretch = near.stretch
-                        owners[known, 0] = cell_node_at(ai, i).feature
-                        owners[known, 1] = cell_node_at(bi, j).feature
+                        note_extremum(known_extremum_at(extrema, known), trees, i, j, near)
                         known += 1
-                        if is_known(store, a, ai, i, b, bi, j, extrema[known - 1 :], owners[known - 1 :], 1)[0]:
+                        if is_known(store, trees, i, j, extrema[known - 1 : known])[0]:
                             continue
-            if key <= 0.0 and model_at(a, i).bend + model_at(b, j).bend < SMOOTH:
-                x, crosses = crossing_point(store, kind_f, f, kind_g, g, pose, start, size)
-                if crosses and is_feasible(store, kind_f, f, x[0], x[1]) and is_feasible(store, kind_g, g, x[2], x[3]):
-                    status = CROSSING
-                    best = (cell_node_at(ai, i).feature, cell_node_at(bi, j).feature)
-                    at = x
-                    gap = 0.0
-                    lower = 0.0
-                    upper = 0.0
-                    break
-            if ready == 2:
+            if key <= 0.0 and f.bend + g.bend < SMOOTH:
+                x, crosses = crossing_point(store, one, other, pose, start, size)
+                if crosses and are_feasible(store, trees, i, j, x):
+                    return ShellSearch(CROSSING, pair_at(trees, i, j, x, 0.0).codes, x, 0.0, 0.0, effort)
+            if ready == GUESS or side_of(store, trees[0], i) == OUTSIDE or side_of(store, trees[1], j) == OUTSIDE:
                 continue
-            if side_of(store, a, ai, i) == OUTSIDE or side_of(store, b, bi, j) == OUTSIDE:
-                continue
-            if max(model_at(a, i).radius, model_at(b, j).radius) < TINY * size:
+            if max(f.radius, g.radius) < TINY * size:
                 uncut = min(uncut, key)
                 continue
-        if larger_first(a, ai, i, b, bi, j):
-            count_f = grow(store, shell_f, RelativePose(same, origin), a, ai, i, count_f)
-            first = cell_node_at(ai, i).child
-            last = first + cell_node_at(ai, i).children
-            down_f = True
-        else:
-            count_g = grow(store, shell_g, pose, b, bi, j, count_g)
-            first = cell_node_at(bi, j).child
-            last = first + cell_node_at(bi, j).children
-            down_f = False
-        for k in range(first, last):
-            p = k if down_f else i
-            q = j if down_f else k
-            if are_cells:
-                if down_f:
-                    give_model(store, RelativePose(same, origin), a, ai, p, work)
-                else:
-                    give_model(store, pose, b, bi, q, work)
-                key, m = pair_bound(a, p, b, q, n, upper)
-            else:
-                key = ball_bound(a, p, b, q)
-                m = n
-            if key >= (1.0 - rough) * upper - tolerance:
-                continue
-            if released > 0:
-                released -= 1
-                slot = free[released]
-            elif used < WAITING:
-                slot = used
-                used += 1
-            else:
-                continue
-            pairs[slot, 0] = p
-            pairs[slot, 1] = q
-            pairs[slot, 2] = 1 if are_cells else 0
-            normals[slot, 0], normals[slot, 1], normals[slot, 2] = m
-            push(keys, slots, waiting, key, slot)
-            waiting += 1
+        split_pair(store, trees, i, j, n, best, within(best, size, rough), queue)
     if status == APART:
-        lower = (1.0 - rough) * upper - tolerance
-    elif best[0] < 0 and upper == math.inf:
+        lower = within(best, size, rough)
+    elif not best.found:
         # Out of room before any point inside the trims: where the search began.
-        best = (cell_node_at(ai, first_f).feature, cell_node_at(bi, first_g).feature)
-        at = (model.u0, model.v0, model_record.u0, model_record.v0)
-    return ShellSearch(status, best[0], best[1], at, gap, max(min(lower, uncut), 0.0), effort)
+        best = pair_at(trees, first_f, first_g, middles(trees, first_f, first_g), math.inf)
+    return ShellSearch(status, best.codes, best.x, best.gap, max(min(lower, uncut), 0.0), effort)

@@ -10,7 +10,7 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.vec import dot, matvec_t, neg
 from assembly.proximity.brep.apexes import unit
-from assembly.proximity.brep.borders import feature_at, feature_kind, on_surface
+from assembly.proximity.brep.borders import feature_of, on_surface
 from assembly.proximity.brep.records import (
     EDGE,
     EDGE_POINT,
@@ -18,6 +18,7 @@ from assembly.proximity.brep.records import (
     FACE_POINT,
     FACE_RECORD,
     VERTEX,
+    Feature,
     edge_at,
     shell_at,
 )
@@ -33,54 +34,56 @@ NOTHING, FEATURES, POINT, HELD_F, HELD_G = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @kernel(inner=True)
-def lean_of(store, shell, kind, code, t, s, n):
+def lean_of(store, shell, feature, code, t, s, n):
     """By how much a normal leans over what is beside an edge, a vertex or a point, at most; 0 for a face."""
+    kind = feature.kind
     if kind == FACE_POINT:
-        cosine = dot(n, own_frame(store, feature_at(store.table, shell, code), t, s).normal)
+        cosine = dot(n, own_frame(store, feature.record, t, s).normal)
         return math.sqrt(max(1.0 - cosine * cosine, 0.0)) if cosine > 0.0 else 1.0
     if kind == EDGE or kind == EDGE_POINT:
         lean = from_edge(store, shell, code, t, n)[0]
         if kind == EDGE:
             return lean
-        edge = edge_at(store.table, feature_at(store.table, shell, code))
+        edge = edge_at(store.table, feature.record)
         along = on_surface(store, edge.surface, edge.curve, t).tangent
         return max(lean, abs(dot(n, unit(along))))
     return from_vertex(store, shell, code, n)[2] if kind == VERTEX else 0.0
 
 
 @kernel(inline=True)
-def held_kind(table, shell, code, held, own):
-    """The kind of a feature; EDGE_POINT or FACE_POINT where a point of it is held, of a face if `held` is `own`."""
-    kind = feature_kind(table, shell, code)
+def held_feature(store, shell, code, held, own):
+    """A `Feature`; an EDGE_POINT or FACE_POINT where a point of it is held, of a face if `held` is `own`."""
+    kind, record = feature_of(store, shell, code)
     if kind == EDGE and held == POINT:
-        return EDGE_POINT
-    return FACE_POINT if kind == FACE and held == own else kind
+        kind = EDGE_POINT
+    elif kind == FACE and held == own:
+        kind = FACE_POINT
+    return Feature(kind, record)
 
 
 @kernel(inner=True)
-def hold_features(store, shell_f, shell_g, pose, code_f, code_g, x, n, size, turn, held):
+def hold_features(store, shells, pose, codes, x, n, turn, held):
     """Newton's method on two features that stay what they are: status, x, frame. Arguments as in `track_features`.
 
     Where `held` is POINT, HELD_F or HELD_G, a point of one stays where it is on it, too. LEFT_PATCH where a point
     on a face is past its boundary, one of an edge past its end, or the normal leans by more than TILT.
     """
-    kind_f = held_kind(store.table, shell_f, code_f, held, HELD_F)
-    kind_g = held_kind(store.table, shell_g, code_g, held, HELD_G)
-    if kind_f == EDGE and kind_g == EDGE and dot(n, n) < 0.25:
-        n = between_edges(store, shell_f, shell_g, pose.rotation, code_f, code_g, x[0], x[2])
-    f = feature_at(store.table, shell_f, code_f)
-    g = feature_at(store.table, shell_g, code_g)
-    status, x, frame = solve_features(store, kind_f, f, kind_g, g, pose, x, n, size, turn)
+    (shell_f, shell_g), (code_f, code_g) = shells, codes
+    f = held_feature(store, shell_f, code_f, held, HELD_F)
+    g = held_feature(store, shell_g, code_g, held, HELD_G)
+    if f.kind == EDGE and g.kind == EDGE and dot(n, n) < 0.25:
+        n = between_edges(store, shells, pose.rotation, codes, x)
+    status, x, frame = solve_features(store, f, g, pose, x, n, 1.0, turn)
     inside = True
-    if kind_f == FACE:
+    if f.kind == FACE:
         inside = is_feasible(store, FACE, shell_at(store.table, shell_f).face_table + FACE_RECORD * code_f, x[0], x[1])
-    elif kind_g == FACE:
+    elif g.kind == FACE:
         inside = is_feasible(store, FACE, shell_at(store.table, shell_g).face_table + FACE_RECORD * code_g, x[2], x[3])
     if status == CONVERGED and not inside:
         status = LEFT_PATCH
     if status == CONVERGED or status == SINGULAR:
         n = frame.normal
-        lean = lean_of(store, shell_f, kind_f, code_f, x[0], x[1], n)
-        lean = max(lean, lean_of(store, shell_g, kind_g, code_g, x[2], x[3], neg(matvec_t(pose.rotation, n))))
+        lean = lean_of(store, shell_f, f, code_f, x[0], x[1], n)
+        lean = max(lean, lean_of(store, shell_g, g, code_g, x[2], x[3], neg(matvec_t(pose.rotation, n))))
         status = status if lean <= TILT else LEFT_PATCH
     return status, x, frame

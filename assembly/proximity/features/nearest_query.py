@@ -8,15 +8,15 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import Store, place_of, record_dtype, record_view, size_of
-from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
-from assembly.kinematics.motion import RelativePose, position, relative_pose, rotation
-from assembly.proximity.brep.borders import feature_at, feature_kind
+from assembly.geometry.vec import dot, matvec_t, scale, sub
+from assembly.kinematics.motion import IDENTITY, rotation
+from assembly.proximity.brep.borders import feature_of
 from assembly.proximity.extrema.crossing import tangents
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
 from assembly.proximity.extrema.feature_pair import solve_features
-from assembly.proximity.features.ball_tree import feature_cells
+from assembly.proximity.extrema.feature_query import pose_of_second, write_pair
 from assembly.proximity.features.conforming import NEARLY, conforming_pair
-from assembly.proximity.features.global_search import APART, CROSSING, UNPROVEN, search
+from assembly.proximity.features.global_search import APART, CROSSING, UNPROVEN, FoundPair, search
 from assembly.proximity.features.penetration import PENETRATING, TOUCHING, deepest
 from assembly.proximity.features.separating_normals import WAYS, overlap_at
 from assembly.proximity.features.switching import track_features
@@ -56,116 +56,87 @@ def answer_parameters(out):
 
 
 @kernel(inner=True)
-def write_pair(q, turn_f, x, pf, pg, n, gap, out):
-    """A pair in the axes of body f into `out`, in world axes."""
-    answer = answer_at(out, 0)
-    origin = position(q, 0)
-    a = add(matvec(turn_f, pf), origin)
-    b = add(matvec(turn_f, pg), origin)
-    normal = matvec(turn_f, n)
-    for k in range(4):
-        answer.parameters[k] = x[k]
-    for k in range(3):
-        answer.point_f[k] = a[k]
-        answer.point_g[k] = b[k]
-        answer.normal[k] = normal[k]
-    answer.gap = gap
-
-
-@kernel(inner=True)
-def write_features(store, shell_f, shell_g, q, turn_f, pose, f, g, x, n, gap, size, codes, out):
-    """The pair of features f and g at x into codes (2,) and out (PAIR,); n a normal near its own, or zero."""
-    kind_f = feature_kind(store.table, shell_f, f)
-    kind_g = feature_kind(store.table, shell_g, g)
-    a = feature_at(store.table, shell_f, f)
-    b = feature_at(store.table, shell_g, g)
-    status, y, frame = solve_features(store, kind_f, a, kind_g, b, pose, x, n, size, math.inf)
-    codes[0] = f
-    codes[1] = g
-    if (status == CONVERGED or status == SINGULAR) and abs(abs(frame.gap) - abs(gap)) <= 1e-12 * size:
-        write_pair(q, turn_f, y, frame.point_f, frame.point_g, frame.normal, frame.gap, out)
+def write_features(store, shells, q, pair, size, codes, out):
+    """A `FoundPair`, whose normal may be zero, into codes (2,) and out (PAIR,)."""
+    x = pair.x
+    pose = pose_of_second(q)
+    f = feature_of(store, shells[0], pair.codes[0])
+    g = feature_of(store, shells[1], pair.codes[1])
+    status, y, frame = solve_features(store, f, g, pose, x, pair.normal, size, math.inf)
+    codes[0], codes[1] = pair.codes
+    if (status == CONVERGED or status == SINGULAR) and abs(abs(frame.gap) - abs(pair.gap)) <= 1e-12 * size:
+        write_pair(q, y, frame.point_f, frame.point_g, frame.normal, frame.gap, out)
         return
     # A crossing, or an apex where Newton's method has no tangent to go on: the points themselves.
-    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    none = (0.0, 0.0, 0.0)
-    pf = tangents(store, kind_f, feature_cells(store.table, shell_f, f).record, RelativePose(same, none), x[0], x[1])[0]
-    pg = tangents(store, kind_g, feature_cells(store.table, shell_g, g).record, pose, x[2], x[3])[0]
+    pf = tangents(store, f, IDENTITY, x[0], x[1])[0]
+    pg = tangents(store, g, pose, x[2], x[3])[0]
     d = sub(pg, pf)
     length = math.sqrt(dot(d, d))
-    write_pair(q, turn_f, x, pf, pg, scale(1.0 / length, d) if length > 1e-9 * size else frame.normal, length, out)
+    write_pair(q, x, pf, pg, scale(1.0 / length, d) if length > 1e-9 * size else frame.normal, length, out)
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
-def find_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
+@kernel(signatures="(i8[::1], f8[::1], UniTuple(i8, 2), f8[:, ::1], f8, i8[::1], f8[::1])")
+def find_nearest(table, pool, shells, q, size, codes, out):
     """The nearest pair at the poses q (2, 7); its features into codes (2,), the pair into out. Returns the status."""
     store = Store(table, pool)
     answer = answer_at(out, 0)
-    turn_f = rotation(q, 0)
-    pose = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    nearest = search(store, shell_f, shell_g, pose, size, 0.0)
-    status, f, g = nearest.status, nearest.f, nearest.g
-    x, gap = nearest.x, nearest.gap
+    pose = pose_of_second(q)
+    nearest = search(store, shells, pose, size, 0.0)
+    status = nearest.status
     none = (0.0, 0.0, 0.0)
+    found = FoundPair(True, nearest.codes, nearest.x, none, nearest.gap)
     if status == UNPROVEN:
         # The search was over before it came to the nearest one; beside what it found there may be nearer ones.
-        beside = track_features(store, shell_f, shell_g, pose, f, g, x, none, size, math.inf)
+        beside = track_features(store, shells, pose, nearest.codes, nearest.x, none, size, math.inf)
         off = beside.frame.gap
-        if (beside.status == CONVERGED or beside.status == SINGULAR) and nearest.lower <= abs(off) < abs(gap):
-            f, g, x, gap = beside.f, beside.g, beside.x, off
-        if abs(gap) - nearest.lower <= PROVEN * size:
+        if (beside.status == CONVERGED or beside.status == SINGULAR) and nearest.lower <= abs(off) < abs(found.gap):
+            found = FoundPair(True, beside.codes, beside.x, none, off)
+        if abs(found.gap) - nearest.lower <= PROVEN * size:
             status = APART
-    if status == APART and abs(gap) <= TOUCHING * size:
+    if status == APART and abs(found.gap) <= TOUCHING * size:
         # Solids whose faces are flush have points in common before a search comes to where they cross.
-        if overlap_at(store, shell_f, shell_g, pose.rotation, f, g, x, size, np.empty((WAYS, 3))):
+        if overlap_at(store, shells, pose.rotation, found.codes, found.x, size, np.empty((WAYS, 3))):
             status = CROSSING
-    write_features(store, shell_f, shell_g, q, turn_f, pose, f, g, x, none, gap, size, codes, out)
+    write_features(store, shells, q, found, size, codes, out)
     answer.lower = nearest.lower
     answer.effort = nearest.effort
     return status
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
-def find_deepest(table, pool, shell_f, shell_g, q, size, codes, out):
+@kernel(signatures="(i8[::1], f8[::1], UniTuple(i8, 2), f8[:, ::1], f8, i8[::1], f8[::1])")
+def find_deepest(table, pool, shells, q, size, codes, out):
     """The pair of two shells that cross at the features and coordinates in codes and out. Returns the status.
 
     APART where they turn out to touch, and rounding said that they cross. Where what leads out is long it is seen
     whether only conforming faces have points in common.
     """
     store = Store(table, pool)
-    turn_f = rotation(q, 0)
-    pose = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    x = answer_parameters(out)
-    pair = deepest(store, shell_f, shell_g, pose, codes[0], codes[1], x, size)
+    pose = pose_of_second(q)
+    pair = deepest(store, shells, pose, (codes[0], codes[1]), answer_parameters(out), size)
     if not pair.found or pair.gap < -NEARLY * size:
-        touching = conforming_pair(store, shell_f, shell_g, pose, size)
+        touching = conforming_pair(store, shells, pose, size)
         if touching.found:
             pair = touching
     if not pair.found:
         return CROSSING
-    write_features(
-        store, shell_f, shell_g, q, turn_f, pose, pair.f, pair.g, pair.x, pair.normal, pair.gap, size,
-        codes, out,
-    )  # fmt: skip
+    write_features(store, shells, q, pair, size, codes, out)
     return PENETRATING if pair.gap < 0.0 else APART
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8, i8[::1], f8[::1])")
-def follow_nearest(table, pool, shell_f, shell_g, q, size, codes, out):
+@kernel(signatures="(i8[::1], f8[::1], UniTuple(i8, 2), f8[:, ::1], f8, i8[::1], f8[::1])")
+def follow_nearest(table, pool, shells, q, size, codes, out):
     """The pair in codes and out carried to the poses q. Returns TRACKED, or LOST and leaves the pair."""
     answer = answer_at(out, 0)
-    turn_f = rotation(q, 0)
-    pose = relative_pose(q, 0, turn_f, 1, rotation(q, 1))
-    n = matvec_t(turn_f, (answer.normal[0], answer.normal[1], answer.normal[2]))
+    n = matvec_t(rotation(q, 0), (answer.normal[0], answer.normal[1], answer.normal[2]))
     x = answer_parameters(out)
-    found = track_features(Store(table, pool), shell_f, shell_g, pose, codes[0], codes[1], x, n, size, 1.0)
+    found = track_features(Store(table, pool), shells, pose_of_second(q), (codes[0], codes[1]), x, n, size, 1.0)
     status, frame = found.status, found.frame
     # An edge may have become the farthest one of its neighborhood, surfaces may cross beside their points. In a
     # continuum, of flush faces say, nothing tells.
     if not (status == SINGULAR or (status == CONVERGED and frame.proper)):
         return LOST
-    codes[0] = found.f
-    codes[1] = found.g
-    write_pair(q, turn_f, found.x, frame.point_f, frame.point_g, frame.normal, frame.gap, out)
+    codes[0], codes[1] = found.codes
+    write_pair(q, found.x, frame.point_f, frame.point_g, frame.normal, frame.gap, out)
     answer.lower = math.nan
     answer.switches += found.switches
     return TRACKED

@@ -15,13 +15,21 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, blend, dot, scale
-from assembly.kinematics.motion import RelativePose
+from assembly.kinematics.motion import IDENTITY, RelativePose
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import face_at, shell_at
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
 from assembly.proximity.extrema.global_start import global_start
 from assembly.proximity.features.global_search import CROSSING, FoundPair, search
-from assembly.proximity.features.separating_normals import WAYS, add_end_ways, add_way, add_ways
+from assembly.proximity.features.separating_normals import (
+    WAYS,
+    add_end_ways,
+    add_way,
+    add_ways,
+    points_of,
+    sum_of,
+    way_at,
+)
 from assembly.proximity.features.switching import track_features
 
 # A pair of shells that cross was found.
@@ -48,36 +56,48 @@ def has_one_face(table, shell):
 
 
 @kernel(inner=True)
-def walk_back(store, shell_f, shell_g, pose, away, f, g, x, size):
+def walk_back(store, shells, pose, away, codes, x, size):
     """The pair of g moved by `away`, followed until g is back."""
-    none = (0.0, 0.0, 0.0)
     done = 0.0
     step = 1.0 / STEPS
-    n = none
+    n = (0.0, 0.0, 0.0)
     gap = 0.0
     halved = 0
     while done < 1.0:
         part = min(done + step, 1.0)
         place = blend(1.0, pose.shift, 1.0 - part, away)
-        there = track_features(store, shell_f, shell_g, RelativePose(pose.rotation, place), f, g, x, n, size, 1.0)
+        there = track_features(store, shells, RelativePose(pose.rotation, place), codes, x, n, size, 1.0)
         if there.status != CONVERGED and there.status != SINGULAR:
             if halved == HALVINGS:
-                return FoundPair(False, f, g, x, n, gap)
+                return FoundPair(False, codes, x, n, gap)
             halved += 1
             step *= 0.5
             continue
-        f = there.f
-        g = there.g
+        codes = there.codes
         x = there.x
         n = there.frame.normal
         gap = there.frame.gap
         done = part
-    return FoundPair(True, f, g, x, n, gap)
+    return FoundPair(True, codes, x, n, gap)
+
+
+@kernel(inner=True)
+def ways_out(store, shells, pose, codes, x, size, ways):
+    """Ways in which two shells that cross at x of two features may come apart; how many there are."""
+    f, g = points_of(codes, x)
+    count = add_ways(store, shells[0], f, IDENTITY.rotation, 1.0, size, ways, 0)
+    count = add_ways(store, shells[1], g, pose.rotation, -1.0, size, ways, count)
+    # Out of a corner it leads between the walls.
+    count = add_way(sum_of(ways, count), ways, count)
+    # Flush bodies meet all along edges, also where another face leads out sooner.
+    count = add_end_ways(store, shells[0], f, IDENTITY.rotation, 1.0, size, ways, count)
+    return add_end_ways(store, shells[1], g, pose.rotation, -1.0, size, ways, count)
 
 
 @kernel(inner=True, allocates=True)
-def deepest(store, shell_f, shell_g, pose, f, g, x, size):
-    """The pair of two shells that cross at x of features f and g."""
+def deepest(store, shells, pose, codes, x, size):
+    """The pair of two shells that cross at x of two features."""
+    shell_f, shell_g = shells
     none = (0.0, 0.0, 0.0)
     if has_one_face(store.table, shell_f) and has_one_face(store.table, shell_g):
         a = feature_at(store.table, shell_f, 0)
@@ -85,20 +105,10 @@ def deepest(store, shell_f, shell_g, pose, f, g, x, size):
         status, y, gap = global_start(store, a, b, pose, size)
         # The far side of a thin body may be nearer than where it is in the other one.
         if (status == CONVERGED or status == SINGULAR) and gap <= TOUCHING * size:
-            return FoundPair(True, 0, 0, y, none, gap)
-    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+            return FoundPair(True, (0, 0), y, none, gap)
     ways = np.empty((WAYS, 3))
-    count = add_ways(store, shell_f, f, x[0], x[1], same, 1.0, size, ways, 0)
-    count = add_ways(store, shell_g, g, x[2], x[3], pose.rotation, -1.0, size, ways, count)
-    # Out of a corner it leads between the walls.
-    total = none
-    for k in range(count):
-        total = add(total, (ways[k, 0], ways[k, 1], ways[k, 2]))
-    count = add_way(total, ways, count)
-    # Flush bodies meet all along edges, also where another face leads out sooner.
-    count = add_end_ways(store, shell_f, f, x[0], x[1], same, 1.0, size, ways, count)
-    count = add_end_ways(store, shell_g, g, x[2], x[3], pose.rotation, -1.0, size, ways, count)
-    best = FoundPair(False, f, g, x, none, -math.inf)
+    count = ways_out(store, shells, pose, codes, x, size, ways)
+    best = FoundPair(False, codes, x, none, -math.inf)
     other = best
     for attempt in range(2):
         if attempt == 1:
@@ -110,12 +120,12 @@ def deepest(store, shell_f, shell_g, pose, f, g, x, size):
         # The shortest way out, of all of them.
         for _ in range(DOUBLINGS):
             for k in range(count):
-                away = scale(reach, (ways[k, 0], ways[k, 1], ways[k, 2]))
+                away = scale(reach, way_at(ways, k))
                 place = add(pose.shift, away)
-                out = search(store, shell_f, shell_g, RelativePose(pose.rotation, place), size, ROUGH)
+                out = search(store, shells, RelativePose(pose.rotation, place), size, ROUGH)
                 if out.status == CROSSING or not out.lower > 0.0:
                     continue
-                back = walk_back(store, shell_f, shell_g, pose, away, out.f, out.g, out.x, size)
+                back = walk_back(store, shells, pose, away, out.codes, out.x, size)
                 gap = back.gap
                 if not back.found or not TOUCHING * size >= gap > best.gap:
                     continue
@@ -128,10 +138,8 @@ def deepest(store, shell_f, shell_g, pose, f, g, x, size):
                     # They touch here. If that is all, the least move parts them. Where they touch along a line or
                     # all over a face a search so near may not come to its proof: that none is found has to do.
                     place = add(pose.shift, scale(PARTED / reach * size, away))
-                    if (
-                        search(store, shell_f, shell_g, RelativePose(pose.rotation, place), size, ROUGH).status
-                        == CROSSING
-                    ):
+                    parted = search(store, shells, RelativePose(pose.rotation, place), size, ROUGH)
+                    if parted.status == CROSSING:
                         continue
                 best = back
             if best.found:

@@ -19,13 +19,10 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
-from assembly.geometry.splines.evaluate import (
-    find_span,
-    surface_at,
-    surface_point,
-)
-from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
+from assembly._record import record_dtype, record_view, size_of
+from assembly.geometry.splines.evaluate import find_span, surface_at, surface_point
+from assembly.geometry.vec import add, cross, dot, matvec, neg, scale, sub
+from assembly.proximity.bvh.tree import three_of
 
 # A node: box, model and sphere. Lengths are over the size of the scene.
 QUADRATIC_MODEL = record_dtype(
@@ -50,21 +47,6 @@ QUADRATIC_MODEL = record_dtype(
     change=1,  # how much curvatures change over it
 )
 model_at = record_view(QUADRATIC_MODEL)
-U0 = place_of(QUADRATIC_MODEL, "u0")
-V0 = place_of(QUADRATIC_MODEL, "v0")
-HALF_U = place_of(QUADRATIC_MODEL, "half_u")
-HALF_V = place_of(QUADRATIC_MODEL, "half_v")
-POINT = place_of(QUADRATIC_MODEL, "point")
-LINEAR_U = place_of(QUADRATIC_MODEL, "linear_u")
-LINEAR_V = place_of(QUADRATIC_MODEL, "linear_v")
-SQUARE_U = place_of(QUADRATIC_MODEL, "square_u")
-MIXED = place_of(QUADRATIC_MODEL, "mixed")
-SQUARE_V = place_of(QUADRATIC_MODEL, "square_v")
-REST = place_of(QUADRATIC_MODEL, "rest")
-CENTER = place_of(QUADRATIC_MODEL, "center")
-RADIUS = place_of(QUADRATIC_MODEL, "radius")
-NORMAL = place_of(QUADRATIC_MODEL, "normal")
-REST_N = place_of(QUADRATIC_MODEL, "rest_n")
 NODE = size_of(QUADRATIC_MODEL)
 # Where weights vary by more than this over a box it has no model: e is infinite and its sphere is what bounds it.
 LEAST_WEIGHT = 0.1
@@ -72,16 +54,16 @@ LEAST_WEIGHT = 0.1
 ROUNDING = 1e-15
 
 
-@kernel(inline=True)
-def put(a, i, k, v):
-    a[i, k] = v[0]
-    a[i, k + 1] = v[1]
-    a[i, k + 2] = v[2]
+# The quadratic S0 + p s + q t + l s^2 + m s t + k t^2.
+Quadratic = namedtuple("Quadratic", "point linear_u linear_v square_u mixed square_v")
+# A box of parameters: its middle, half its widths.
+Box = namedtuple("Box", "u v half_u half_v")
 
 
 @kernel(inline=True)
-def get(a, i, k):
-    return (a[i, k], a[i, k + 1], a[i, k + 2])
+def put(field, v):
+    """Write three numbers of a record's field."""
+    field[0], field[1], field[2] = v
 
 
 @kernel(inner=True)
@@ -100,19 +82,12 @@ Remainder = namedtuple("Remainder", "rest rest_n sss sst stt ttt beyond")
 
 
 @kernel(inner=True)
-def remainder(store, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, work):
-    """How far a piece of the surface may be off the quadratic over a box; `work` holds 4 by 16 by 16 numbers.
-
-    The piece may be one beside the middle of the box: then terms of low order remain too.
-    """
+def load_piece(store, r, span, origin, work):
+    """The coefficients of a piece of a surface, coordinates from an origin, and weights, into work; the degrees."""
     patch = surface_at(store.table, r)
-    ou = patch.breaks_u + iu
-    ov = patch.breaks_v + iv
-    s = u0 - 0.5 * (store.pool[ou] + store.pool[ou + 1])
-    t = v0 - 0.5 * (store.pool[ov] + store.pool[ov + 1])
     nu = patch.degree_u
     nv = patch.degree_v
-    o = patch.coefficients + 4 * (nu + 1) * (nv + 1) * (iu * patch.spans_v + iv)
+    o = patch.coefficients + 4 * (nu + 1) * (nv + 1) * (span[0] * patch.spans_v + span[1])
     # Missing powers of low degrees cost nothing.
     top = nv
     while nu > 0 and vanish(store.pool, o + 4 * nu * (top + 1), 4, top + 1):
@@ -123,33 +98,92 @@ def remainder(store, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, work):
         for j in range(nv + 1):
             at = o + 4 * (i * (top + 1) + j)
             w = store.pool[at + 3]
-            work[0, i, j] = store.pool[at] - w * origin[0]
-            work[1, i, j] = store.pool[at + 1] - w * origin[1]
-            work[2, i, j] = store.pool[at + 2] - w * origin[2]
+            for c in range(3):
+                work[c, i, j] = store.pool[at + c] - w * origin[c]
             work[3, i, j] = w
-    # Powers about the middle of the box, by Horner's rule repeated, then scaled by its half widths.
+    return nu, nv
+
+
+@kernel(inner=True)
+def expand(work, degrees, box):
+    """Make powers of the piece in work those about the middle of a box, over its half widths.
+
+    Returns its least weight over the box; 0 where weights vary by more than `LEAST_WEIGHT` allows.
+    """
+    nu, nv = degrees
+    # By Horner's rule repeated.
     for c in range(4):
         for first in range(nu):
             for i in range(nu - 1, first - 1, -1):
                 for j in range(nv + 1):
-                    work[c, i, j] += s * work[c, i + 1, j]
+                    work[c, i, j] += box.u * work[c, i + 1, j]
         for first in range(nv):
             for j in range(nv - 1, first - 1, -1):
                 for i in range(nu + 1):
-                    work[c, i, j] += t * work[c, i, j + 1]
+                    work[c, i, j] += box.v * work[c, i, j + 1]
     factor = 1.0
     for i in range(nu + 1):
         f = factor
         for j in range(nv + 1):
             for c in range(4):
                 work[c, i, j] *= f
-            f *= b
-        factor *= a
+            f *= box.half_v
+        factor *= box.half_u
     least = 2.0 * work[3, 0, 0]
     for i in range(nu + 1):
         for j in range(nv + 1):
             least -= abs(work[3, i, j])
-    if not least > LEAST_WEIGHT * work[3, 0, 0]:
+    return least if least > LEAST_WEIGHT * work[3, 0, 0] else 0.0
+
+
+@kernel(inline=True)
+def less(x, w, a):
+    return (x[0] - w * a[0], x[1] - w * a[1], x[2] - w * a[2])
+
+
+@kernel(inner=True)
+def term_off(work, degrees, quadratic, i, j):
+    """The coefficient of s^i t^j in A - w P, A and w in work."""
+    nu, nv = degrees
+    x = (0.0, 0.0, 0.0)
+    if i <= nu and j <= nv:
+        x = (work[0, i, j], work[1, i, j], work[2, i, j])
+    if j <= nv and 1 <= i <= nu + 1:
+        x = less(x, work[3, i - 1, j], quadratic.linear_u)
+    if i <= nu and 1 <= j <= nv + 1:
+        x = less(x, work[3, i, j - 1], quadratic.linear_v)
+    if j <= nv and i >= 2:
+        x = less(x, work[3, i - 2, j], quadratic.square_u)
+    if 1 <= i <= nu + 1 and 1 <= j <= nv + 1:
+        x = less(x, work[3, i - 1, j - 1], quadratic.mixed)
+    if i <= nu and j >= 2:
+        x = less(x, work[3, i, j - 2], quadratic.square_v)
+    return x
+
+
+@kernel(inline=True)
+def quadratic_over(box, s0, su, sv, suu, suv, svv):
+    """The `Quadratic` of a surface over a box, from its derivatives in the middle."""
+    a, b = box.half_u, box.half_v
+    return Quadratic(
+        s0, scale(a, su), scale(b, sv), scale(0.5 * a * a, suu), scale(a * b, suv), scale(0.5 * b * b, svv)
+    )
+
+
+@kernel(inner=True)
+def remainder(store, r, span, box, quadratic, n, work):
+    """How far a piece of the surface may be off the quadratic over a box; `work` holds 4 by 16 by 16 numbers.
+
+    The piece may be one beside the middle of the box: then terms of low order remain too.
+    """
+    patch = surface_at(store.table, r)
+    ou = patch.breaks_u + span[0]
+    ov = patch.breaks_v + span[1]
+    s = box.u - 0.5 * (store.pool[ou] + store.pool[ou + 1])
+    t = box.v - 0.5 * (store.pool[ov] + store.pool[ov + 1])
+    degrees = load_piece(store, r, span, quadratic.point, work)
+    least = expand(work, degrees, Box(s, t, box.half_u, box.half_v))
+    if not least > 0.0:
         return Remainder(math.inf, math.inf, 0.0, 0.0, 0.0, 0.0, math.inf)
     ex = 0.0
     ey = 0.0
@@ -160,40 +194,9 @@ def remainder(store, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, work):
     c21 = 0.0
     c12 = 0.0
     c03 = 0.0
-    for i in range(nu + 3):
-        for j in range(nv + 3):
-            x = 0.0
-            y = 0.0
-            z = 0.0
-            if i <= nu and j <= nv:
-                x = work[0, i, j]
-                y = work[1, i, j]
-                z = work[2, i, j]
-            if j <= nv and 1 <= i <= nu + 1:
-                w = work[3, i - 1, j]
-                x -= w * p[0]
-                y -= w * p[1]
-                z -= w * p[2]
-            if i <= nu and 1 <= j <= nv + 1:
-                w = work[3, i, j - 1]
-                x -= w * q[0]
-                y -= w * q[1]
-                z -= w * q[2]
-            if j <= nv and i >= 2:
-                w = work[3, i - 2, j]
-                x -= w * l[0]
-                y -= w * l[1]
-                z -= w * l[2]
-            if 1 <= i <= nu + 1 and 1 <= j <= nv + 1:
-                w = work[3, i - 1, j - 1]
-                x -= w * m[0]
-                y -= w * m[1]
-                z -= w * m[2]
-            if i <= nu and j >= 2:
-                w = work[3, i, j - 2]
-                x -= w * k[0]
-                y -= w * k[1]
-                z -= w * k[2]
+    for i in range(degrees[0] + 3):
+        for j in range(degrees[1] + 3):
+            x, y, z = term_off(work, degrees, quadratic, i, j)
             ex += abs(x)
             ey += abs(y)
             ez += abs(z)
@@ -215,44 +218,40 @@ def remainder(store, r, iu, iv, u0, v0, a, b, origin, p, q, l, m, k, n, work):
 
 
 @kernel(inner=True)
-def face_model(store, r, pose, nodes, i, work):
-    """Fill in a node of a surface, whose box stands in it already, moved by a pose."""
-    model = model_at(nodes, i)
+def face_model(store, r, pose, model, work):
+    """Fill in the model of a surface, whose box stands in it already, moved by a pose."""
     patch = surface_at(store.table, r)
-    u0 = model.u0
-    v0 = model.v0
-    a = model.half_u
-    b = model.half_v
-    s0, su, sv, suu, suv, svv = surface_point(store.table, store.pool, r, u0, v0)
-    p = scale(a, su)
-    q = scale(b, sv)
-    l = scale(0.5 * a * a, suu)
-    m = scale(a * b, suv)
-    k = scale(0.5 * b * b, svv)
-    iu = find_span(store.pool, patch.breaks_u, patch.spans_u, u0)
-    iv = find_span(store.pool, patch.breaks_v, patch.spans_v, v0)
+    box = Box(model.u0, model.v0, model.half_u, model.half_v)
+    s0, su, sv, suu, suv, svv = surface_point(store.table, store.pool, r, box.u, box.v)
+    quadratic = quadratic_over(box, s0, su, sv, suu, suv, svv)
+    p, q = quadratic.linear_u, quadratic.linear_v
+    span = (
+        find_span(store.pool, patch.breaks_u, patch.spans_u, box.u),
+        find_span(store.pool, patch.breaks_v, patch.spans_v, box.v),
+    )
     n = cross(p, q)
     nn = dot(n, n)
     n = scale(1.0 / math.sqrt(nn), n) if nn > 1e-20 * dot(p, p) * dot(q, q) and nn > 0.0 else (0.0, 0.0, 0.0)
-    left = remainder(store, r, iu, iv, u0, v0, a, b, s0, p, q, l, m, k, n, work)
+    left = remainder(store, r, span, box, quadratic, n, work)
     noise = ROUNDING * (
         abs(s0[0]) + abs(s0[1]) + abs(s0[2]) + abs(pose.shift[0]) + abs(pose.shift[1]) + abs(pose.shift[2])
     )
-    place_model(pose, s0, p, q, l, m, k, left.rest + noise, nodes, i)
+    place_model(pose, quadratic, left.rest + noise, model)
     if nn > 0.0 and model.bend < math.inf:
         model.rest_n = left.rest_n + noise
-        change = curvature_change(p, q, l, m, k, n, left)
+        change = curvature_change(quadratic, n, left)
         across = nn / max(dot(p, p), dot(q, q))
         model.change = (change + 12.0 * left.beyond) / across
 
 
 @kernel(inner=True)
-def curvature_change(p, q, l, m, k, n, left):
+def curvature_change(quadratic, n, left):
     """How much the second fundamental form changes over a box, in its half widths, whatever the parameters do.
 
     The covariant derivative h_ij;k = n.S_ijk - G^l_ij h_kl - G^l_ki h_lj - G^l_kj h_il, with G the tangential parts of
     the second derivatives in the basis S_u, S_v.
     """
+    _s0, p, q, l, m, k = quadratic
     uu = dot(p, p)
     uv = dot(p, q)
     vv = dot(q, q)
@@ -281,17 +280,18 @@ def curvature_change(p, q, l, m, k, n, left):
 
 
 @kernel(inner=True)
-def place_model(pose, s0, p, q, l, m, k, e, nodes, i):
+def place_model(pose, quadratic, e, model):
     """Write a model, moved by a pose, with what follows from it."""
-    model = model_at(nodes, i)
-    put(nodes, i, POINT, add(matvec(pose.rotation, s0), pose.shift))
-    p = matvec(pose.rotation, p)
-    q = matvec(pose.rotation, q)
-    put(nodes, i, LINEAR_U, p)
-    put(nodes, i, LINEAR_V, q)
-    put(nodes, i, SQUARE_U, matvec(pose.rotation, l))
-    put(nodes, i, MIXED, matvec(pose.rotation, m))
-    put(nodes, i, SQUARE_V, matvec(pose.rotation, k))
+    point = add(matvec(pose.rotation, quadratic.point), pose.shift)
+    p = matvec(pose.rotation, quadratic.linear_u)
+    q = matvec(pose.rotation, quadratic.linear_v)
+    l, m, k = quadratic.square_u, quadratic.mixed, quadratic.square_v
+    put(model.point, point)
+    put(model.linear_u, p)
+    put(model.linear_v, q)
+    put(model.square_u, matvec(pose.rotation, l))
+    put(model.mixed, matvec(pose.rotation, m))
+    put(model.square_v, matvec(pose.rotation, k))
     model.rest = e
     model.rest_n = e
     uu = dot(p, p)
@@ -301,20 +301,20 @@ def place_model(pose, s0, p, q, l, m, k, e, nodes, i):
     model.curved = curved + e
     # The parallelogram of the linear part reaches as far as its longer diagonal; or as the ball known.
     radius = math.sqrt(max(uu + vv + 2.0 * abs(uv), 0.0)) + curved + e
-    d = sub(get(nodes, i, CENTER), get(nodes, i, POINT))
+    d = sub(three_of(model.center), point)
     model.radius = min(radius, model.radius + math.sqrt(dot(d, d)))
-    put(nodes, i, CENTER, get(nodes, i, POINT))
+    put(model.center, point)
     normal = cross(p, q)
     nn = dot(normal, normal)
     if nn > 1e-20 * uu * vv and nn > 0.0:
         nn = math.sqrt(nn)
-        put(nodes, i, NORMAL, scale(1.0 / nn, normal))
+        put(model.normal, scale(1.0 / nn, normal))
         # The height of the parallelogram over its longer side: the shortest way across the box.
         across = nn / math.sqrt(max(uu, vv))
         model.bend = (2.0 * curved + 3.0 * e) / across
         model.change = 6.0 * e / (across * across)
     else:
-        put(nodes, i, NORMAL, (0.0, 0.0, 0.0))
+        put(model.normal, (0.0, 0.0, 0.0))
         length = math.sqrt(max(uu, vv))
         is_curve = min(uu, vv) == 0.0 and length > 0.0
         model.bend = (2.0 * curved + 3.0 * e) / length if is_curve else math.inf
@@ -331,82 +331,74 @@ def crest(l, k):
 
 
 @kernel(inline=True)
-def support(nodes, i, x, y, z):
-    """The most of n.(S - S0) over a node; n = (x, y, z) is a unit vector."""
-    model = model_at(nodes, i)
-    lu = x * model.linear_u[0] + y * model.linear_u[1] + z * model.linear_u[2]
-    lv = x * model.linear_v[0] + y * model.linear_v[1] + z * model.linear_v[2]
-    ku = x * model.square_u[0] + y * model.square_u[1] + z * model.square_u[2]
-    kv = x * model.square_v[0] + y * model.square_v[1] + z * model.square_v[2]
-    m = x * model.mixed[0] + y * model.mixed[1] + z * model.mixed[2]
-    c = x * model.normal[0] + y * model.normal[1] + z * model.normal[2]
+def support(model, n):
+    """The most of n.(S - S0) over a node; n is a unit vector."""
+    lu = dot(n, model.linear_u)
+    lv = dot(n, model.linear_v)
+    ku = dot(n, model.square_u)
+    kv = dot(n, model.square_v)
+    m = dot(n, model.mixed)
+    c = dot(n, model.normal)
     rest = abs(c) * model.rest_n + math.sqrt(max(1.0 - c * c, 0.0)) * model.rest
     return crest(lu, ku) + crest(lv, kv) + abs(m) + rest
 
 
 @kernel(inner=True)
-def bound_along(a, i, b, j, n):
-    """A lower bound of the distance of two nodes from the unit direction n."""
-    model = model_at(b, j)
-    model_record = model_at(a, i)
-    x, y, z = n
-    apart = (
-        x * (model.point[0] - model_record.point[0])
-        + y * (model.point[1] - model_record.point[1])
-        + z * (model.point[2] - model_record.point[2])
-    )
-    return apart - support(a, i, x, y, z) - support(b, j, -x, -y, -z)
+def bound_along(f, g, n):
+    """A lower bound of the distance of what two models are of, from the unit direction n."""
+    apart = dot(n, sub(g.point, f.point))
+    return apart - support(f, n) - support(g, neg(n))
+
+
+@kernel(inline=True)
+def between_centers(f, g):
+    """From the middle of one model's sphere to that of another one's."""
+    return sub(three_of(g.center), three_of(f.center))
+
+
+@kernel(inline=True)
+def ball_bound(f, g):
+    """A lower bound of the distance of what two models are of, from their spheres."""
+    d = between_centers(f, g)
+    return math.sqrt(dot(d, d)) - f.radius - g.radius
 
 
 @kernel(inner=True)
-def pair_bound(a, i, b, j, n, enough):
-    """The best bound found for two nodes and its direction, beginning with n (zero: none); done at `enough`."""
-    model = model_at(a, i)
-    model_record = model_at(b, j)
-    d = sub(get(b, j, CENTER), get(a, i, CENTER))
-    length = math.sqrt(dot(d, d))
-    best = length - model.radius - model_record.radius
-    if best >= enough or not model.rest + model_record.rest < math.inf:
+def pair_bound(f, g, n, enough):
+    """The best bound found for two models and its direction, beginning with n (zero: none); done at `enough`."""
+    best = ball_bound(f, g)
+    if best >= enough or not f.rest + g.rest < math.inf:
         return best, n
-    if dot(n, n) > 0.5:
-        value = bound_along(a, i, b, j, n)
+    d = between_centers(f, g)
+    length = math.sqrt(dot(d, d))
+    known = n
+    for way in range(4):
+        if way == 0:
+            m = known
+        elif way == 1:
+            m = scale(1.0 / length, d) if length > 0.0 else (0.0, 0.0, 0.0)
+        else:
+            m = three_of(f.normal if way == 2 else g.normal)
+            m = neg(m) if dot(m, d) < 0.0 else m
+        if not dot(m, m) > 0.5:
+            continue
+        value = bound_along(f, g, m)
         if value > best:
             best = value
+            n = m
             if best >= enough:
-                return best, n
-    if length > 0.0:
-        c = scale(1.0 / length, d)
-        value = bound_along(a, i, b, j, c)
-        if value > best:
-            best = value
-            n = c
-            if best >= enough:
-                return best, n
-    for side in range(2):
-        m = get(a, i, NORMAL) if side == 0 else get(b, j, NORMAL)
-        if dot(m, m) > 0.5:
-            if dot(m, d) < 0.0:
-                m = scale(-1.0, m)
-            value = bound_along(a, i, b, j, m)
-            if value > best:
-                best = value
-                n = m
-                if best >= enough:
-                    return best, n
+                break
     return best, n
 
 
 @kernel(inner=True)
-def vertex_model(pool, at, pose, nodes, i):
-    """Fill in a node of a vertex."""
-    model = model_at(nodes, i)
+def vertex_model(pool, at, pose, model):
+    """Fill in the model of a vertex."""
     zero = (0.0, 0.0, 0.0)
-    point = (pool[at], pool[at + 1], pool[at + 2])
-    for k in range(4):
-        nodes[i, k] = 0.0
-    put(nodes, i, CENTER, (0.0, 0.0, 0.0))
+    model.u0 = model.v0 = model.half_u = model.half_v = 0.0
+    put(model.center, zero)
     model.radius = math.inf
-    place_model(pose, point, zero, zero, zero, zero, zero, 0.0, nodes, i)
+    place_model(pose, Quadratic((pool[at], pool[at + 1], pool[at + 2]), zero, zero, zero, zero, zero), 0.0, model)
     model.radius = 0.0
     model.bend = 0.0
     model.change = 0.0

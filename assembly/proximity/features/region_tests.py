@@ -14,36 +14,10 @@ from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.faces.trim import trim_side
 from assembly.geometry.faces.trim_nearest import trim_nearest
 from assembly.geometry.faces.trim_pieces import trim_at
-from assembly.geometry.splines.evaluate import (
-    spline_curve_at,
-    surface_at,
-)
+from assembly.geometry.splines.evaluate import spline_curve_at, surface_at
 from assembly.geometry.vec import cross, dot, sub
-from assembly.proximity.brep.records import (
-    EDGE,
-    FACE,
-    VERTEX,
-    edge_at,
-    face_at,
-)
-from assembly.proximity.features.ball_tree import (
-    INSIDE,
-    MIXED_SIDE,
-    OUTSIDE,
-    UNKNOWN,
-    cell_node_at,
-)
-from assembly.proximity.features.quadratic_model import (
-    LINEAR_U,
-    LINEAR_V,
-    MIXED,
-    NORMAL,
-    POINT,
-    SQUARE_U,
-    SQUARE_V,
-    get,
-    model_at,
-)
+from assembly.proximity.brep.records import EDGE, FACE, VERTEX, edge_at, face_at
+from assembly.proximity.features.ball_tree import INSIDE, MIXED_SIDE, OUTSIDE, UNKNOWN, cell_in, model_in
 
 # Boxes whose normals turn by less hold at most one extremum.
 TRUSTED = 0.05
@@ -62,10 +36,9 @@ def is_feasible(store, kind, record, u, v):
 
 
 @kernel(inner=True)
-def side_of(store, nodes, info, i):
+def side_of(store, tree, i):
     """Where a cell is from the trim of its face."""
-    cell = cell_node_at(info, i)
-    model = model_at(nodes, i)
+    cell, model = cell_in(tree, i), model_in(tree, i)
     if cell.kind != FACE or cell.side != UNKNOWN:
         return cell.side
     trim = face_at(store.table, cell.record).trim
@@ -77,58 +50,52 @@ def side_of(store, nodes, info, i):
 
 
 @kernel(inner=True)
-def grows(a, i, p, q, first, second, b, j, d, length):
-    """Whether d.S_u, p = S_u over half a box and q = S_v so, cannot vanish over a node a[i] and another b[j].
+def grows(f, g, p, q, first, second, d):
+    """Whether d.S_u, p = S_u over half a box and q = S_v so, cannot vanish over what two models are of.
 
     `first` and `second` are half the derivatives of p along both directions.
     """
-    model = model_at(a, i)
-    model_record = model_at(b, j)
     pp = dot(p, p)
     if pp == 0.0:
         return False
     long = math.sqrt(pp)
-    moves = pp + abs(dot(p, q)) + abs(dot(p, get(b, j, LINEAR_U))) + abs(dot(p, get(b, j, LINEAR_V)))
-    turn = 2.0 * math.sqrt(dot(first, first)) + math.sqrt(dot(second, second)) + 6.0 * model.rest
-    return (
-        abs(dot(d, p))
-        > moves + long * (model.curved + model_record.curved) + (length + model.radius + model_record.radius) * turn
-    )
+    moves = pp + abs(dot(p, q)) + abs(dot(p, g.linear_u)) + abs(dot(p, g.linear_v))
+    turn = 2.0 * math.sqrt(dot(first, first)) + math.sqrt(dot(second, second)) + 6.0 * f.rest
+    reach = math.sqrt(dot(d, d)) + f.radius + g.radius
+    return abs(dot(d, p)) > moves + long * (f.curved + g.curved) + reach * turn
 
 
 @kernel(inner=True)
-def monotone(a, i, kind, b, j, d, length):
-    """Whether d.S_u or d.S_v cannot vanish over a node of one feature, and any point of one of another."""
+def monotone(f, kind, g, d):
+    """Whether d.S_u or d.S_v cannot vanish over the model of one feature, and any point of one of another."""
     if kind == VERTEX:
         return False
-    p = get(a, i, LINEAR_U)
-    q = get(a, i, LINEAR_V)
-    m = get(a, i, MIXED)
-    if grows(a, i, p, q, get(a, i, SQUARE_U), m, b, j, d, length):
+    if grows(f, g, f.linear_u, f.linear_v, f.square_u, f.mixed, d):
         return True
-    return kind == FACE and grows(a, i, q, p, get(a, i, SQUARE_V), m, b, j, d, length)
+    return kind == FACE and grows(f, g, f.linear_v, f.linear_u, f.square_v, f.mixed, d)
 
 
 @kernel(inner=True)
-def excluded(a, i, kind_f, b, j, kind_g, are_apart):
+def excluded(trees, i, j, are_apart):
     """Whether no extremum of two features, and no crossing, is in a pair of their cells."""
-    d = sub(get(b, j, POINT), get(a, i, POINT))
-    length = math.sqrt(dot(d, d))
-    if monotone(a, i, kind_f, b, j, d, length) or monotone(b, j, kind_g, a, i, d, length):
+    f, g = model_in(trees[0], i), model_in(trees[1], j)
+    kind_f, kind_g = cell_in(trees[0], i).kind, cell_in(trees[1], j).kind
+    d = sub(g.point, f.point)
+    if monotone(f, kind_f, g, d) or monotone(g, kind_g, f, d):
         return True
-    bend = model_at(a, i).bend + model_at(b, j).bend
+    bend = f.bend + g.bend
     # Where features cross, their normals need not be parallel.
     if not (are_apart and bend < 1.5):
         return False
     if kind_f == FACE and kind_g == FACE:
-        s = cross(get(a, i, NORMAL), get(b, j, NORMAL))
+        s = cross(f.normal, g.normal)
         return dot(s, s) > math.sin(bend) ** 2
     if kind_f == FACE and kind_g == EDGE:
-        t = get(b, j, LINEAR_U)
-        return abs(dot(t, get(a, i, NORMAL))) > math.sin(bend) * math.sqrt(dot(t, t))
+        t = g.linear_u
+        return abs(dot(t, f.normal)) > math.sin(bend) * math.sqrt(dot(t, t))
     if kind_f == EDGE and kind_g == FACE:
-        t = get(a, i, LINEAR_U)
-        return abs(dot(t, get(b, j, NORMAL))) > math.sin(bend) * math.sqrt(dot(t, t))
+        t = f.linear_u
+        return abs(dot(t, g.normal)) > math.sin(bend) * math.sqrt(dot(t, t))
     return False
 
 
@@ -178,48 +145,44 @@ def periods(store, kind, record):
 
 
 @kernel(inner=True)
-def from_middles(store, a, ai, i, b, bi, j, x):
-    """The most half widths that coordinates x are from the middles of two cells."""
-    model = model_at(a, i)
-    model_record = model_at(b, j)
-    cell = cell_node_at(ai, i)
-    cell_node = cell_node_at(bi, j)
-    pu, pv = periods(store, cell.kind, cell.record)
-    s = off_middle(x[0], model.u0, model.half_u, pu)
-    s = max(s, off_middle(x[1], model.v0, model.half_v, pv))
-    pu, pv = periods(store, cell_node.kind, cell_node.record)
-    s = max(s, off_middle(x[2], model_record.u0, model_record.half_u, pu))
-    return max(s, off_middle(x[3], model_record.v0, model_record.half_v, pv))
+def from_middle(store, tree, i, u, v):
+    """The most half widths that coordinates are from the middle of a cell."""
+    cell, model = cell_in(tree, i), model_in(tree, i)
+    period_u, period_v = periods(store, cell.kind, cell.record)
+    return max(off_middle(u, model.u0, model.half_u, period_u), off_middle(v, model.v0, model.half_v, period_v))
 
 
-# An extremum of two faces that is known.
+# An extremum of two features that is known.
 KNOWN_EXTREMUM = record_dtype(
     "f8",
     parameters=4,  # (u, v) of f, then of g
-    curvature=1,  # least relative curvature
+    curvature=1,  # least relative curvature, of two faces
     stretch=1,  # 1 / the least eigenvalue of K of f
+    feature_f=1,  # their numbers
+    feature_g=1,
 )
 known_extremum_at = record_view(KNOWN_EXTREMUM)
 KNOWN = size_of(KNOWN_EXTREMUM)
 
 
 @kernel(inner=True)
-def is_known(store, a, ai, i, b, bi, j, extrema, owners, count):
-    """Whether the only extremum that two cells may hold is one that is known; half widths from the nearest one."""
-    model = model_at(a, i)
-    model_record = model_at(b, j)
-    bend = max(model.bend, model_record.bend)
+def is_known(store, trees, i, j, extrema):
+    """Whether the only extremum that two cells may hold is a known one; half widths from the nearest one."""
+    f, g = model_in(trees[0], i), model_in(trees[1], j)
+    feature_f, feature_g = cell_in(trees[0], i).feature, cell_in(trees[1], j).feature
+    bend = max(f.bend, g.bend)
     nearest = math.inf
-    for k in range(count):
-        if owners[k, 0] != cell_node_at(ai, i).feature or owners[k, 1] != cell_node_at(bi, j).feature:
-            continue
+    for k in range(extrema.shape[0]):
         extremum = known_extremum_at(extrema, k)
-        s = from_middles(store, a, ai, i, b, bi, j, extremum.parameters)
+        if extremum.feature_f != feature_f or extremum.feature_g != feature_g:
+            continue
+        x = extremum.parameters
+        s = max(from_middle(store, trees[0], i, x[0], x[1]), from_middle(store, trees[1], j, x[2], x[3]))
         nearest = min(nearest, s)
         if s <= BESIDE and bend <= TRUSTED:
             return True, s
         if s <= FAR:
-            change = model.change * extremum.stretch * extremum.stretch + model_record.change
+            change = f.change * extremum.stretch * extremum.stretch + g.change
             if extremum.curvature > 1.5 * max(s, 1.0) * change:
                 return True, s
     return False, nearest

@@ -7,10 +7,12 @@ solids overlap there.
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
-from assembly.kinematics.motion import RelativePose
+from assembly.kinematics.motion import IDENTITY, RelativePose
 from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import edge_end, feature_kind, nearest_edge, on_surface, other_parameter
 from assembly.proximity.brep.records import (
@@ -19,6 +21,7 @@ from assembly.proximity.brep.records import (
     FACE,
     FACE_RECORD,
     VERTEX_RECORD,
+    Feature,
     edge_at,
     face_at,
     shell_at,
@@ -35,6 +38,31 @@ BORDER = 1e-9
 INTO = 0.05
 
 
+# A point of a feature, by the feature's number and its coordinates.
+FeaturePoint = namedtuple("FeaturePoint", "code u v")
+
+
+@kernel(inline=True)
+def points_of(codes, x):
+    """The `FeaturePoint` of either feature of a pair."""
+    return FeaturePoint(codes[0], x[0], x[1]), FeaturePoint(codes[1], x[2], x[3])
+
+
+@kernel(inline=True)
+def way_at(ways, k):
+    """Way k."""
+    return (ways[k, 0], ways[k, 1], ways[k, 2])
+
+
+@kernel(inline=True)
+def sum_of(ways, count):
+    """The sum of so many ways."""
+    total = (0.0, 0.0, 0.0)
+    for k in range(count):
+        total = add(total, way_at(ways, k))
+    return total
+
+
 @kernel(inner=True)
 def add_way(n, ways, count):
     """Add a direction, if it is one and not among the ways yet; how many there are then."""
@@ -42,7 +70,7 @@ def add_way(n, ways, count):
     if count == ways.shape[0] or not dot(n, n) > 0.5:
         return count
     for k in range(count):
-        if dot(n, (ways[k, 0], ways[k, 1], ways[k, 2])) > ALIKE:
+        if dot(n, way_at(ways, k)) > ALIKE:
             return count
     ways[count, 0], ways[count, 1], ways[count, 2] = n
     return count + 1
@@ -68,39 +96,40 @@ def add_edge_ways(store, edge, t, turn, side, ways, count):
 
 
 @kernel(inner=True)
-def add_ways(store, shell, code, u, v, turn, side, size, ways, count):
-    """The normals of the faces at a point (u, v) of a feature; turned, times `side`. How many ways there are then."""
+def add_ways(store, shell, at, turn, side, size, ways, count):
+    """The normals of the faces at a `FeaturePoint`; turned, times `side`. How many ways there are then."""
+    code, u, v = at
     solid = shell_at(store.table, shell)
     kind = feature_kind(store.table, shell, code)
     faces, edges = solid.faces, solid.edges
     if kind == FACE:
-        record = solid.face_table + FACE_RECORD * code
-        face = face_at(store.table, record)
-        p, su, sv = tangents(store, FACE, record, RelativePose(turn, (0.0, 0.0, 0.0)), u, v)
+        face = face_at(store.table, solid.face_table + FACE_RECORD * code)
+        p, su, sv = tangents(store, Feature(FACE, face.surface), RelativePose(turn, (0.0, 0.0, 0.0)), u, v)
         sign = float(surface_at(store.table, face.surface).sign)
         count = add_way(scale(side * sign, cross(su, sv)), ways, count)
         if face.trim >= 0:
-            code, at = nearest_edge(store, shell, code, u, v)
+            code, found = nearest_edge(store, shell, code, u, v)
             edge = solid.edge_table + EDGE_RECORD * (code - faces)
-            d = sub(matvec(turn, edge_jet(store, edge, at[0])[0]), p)
+            d = sub(matvec(turn, edge_jet(store, edge, found[0])[0]), p)
             if dot(d, d) <= BORDER * BORDER * size * size:
-                count = add_edge_ways(store, edge, at[0], turn, side, ways, count)
+                count = add_edge_ways(store, edge, found[0], turn, side, ways, count)
         return count
     if kind == EDGE:
         edge = solid.edge_table + EDGE_RECORD * (code - faces)
         return add_edge_ways(store, edge, u, turn, side, ways, count)
     vertex = vertex_at(store.table, solid.vertex_table + VERTEX_RECORD * (code - faces - edges))
     for k in range(vertex.edges):
-        at = vertex.edge_list + 2 * k
-        edge = solid.edge_table + EDGE_RECORD * store.table[at]
-        t = edge_end(store, edge, store.table[at + 1])
+        entry = vertex.edge_list + 2 * k
+        edge = solid.edge_table + EDGE_RECORD * store.table[entry]
+        t = edge_end(store, edge, store.table[entry + 1])
         count = add_edge_ways(store, edge, t, turn, side, ways, count)
     return count
 
 
 @kernel(inner=True)
-def add_end_ways(store, shell, code, u, v, turn, side, size, ways, count):
-    """The normals of the faces at both ends of an edge, or of the edge of a face that is nearest to (u, v)."""
+def add_end_ways(store, shell, at, turn, side, size, ways, count):
+    """The normals of the faces at both ends of an edge, or of the edge of a face that is nearest to a point of it."""
+    code, u, v = at
     solid = shell_at(store.table, shell)
     kind = feature_kind(store.table, shell, code)
     faces, edges = solid.faces, solid.edges
@@ -111,7 +140,8 @@ def add_end_ways(store, shell, code, u, v, turn, side, size, ways, count):
         edge = edge_at(store.table, solid.edge_table + EDGE_RECORD * (code - faces))
         for end in (edge.start, edge.end):
             if end >= 0:
-                count = add_ways(store, shell, faces + edges + end, 0.0, 0.0, turn, side, size, ways, count)
+                vertex = FeaturePoint(faces + edges + end, 0.0, 0.0)
+                count = add_ways(store, shell, vertex, turn, side, size, ways, count)
     return count
 
 
@@ -126,28 +156,25 @@ def is_open(table, shell):
 
 
 @kernel(inner=True)
-def overlap_at(store, shell_f, shell_g, turn, f, g, x, size, ways):
+def overlap_at(store, shells, turn, codes, x, size, ways):
     """Whether solids that meet at x of features f and g have insides in common there, as where faces are flush.
 
     One direction is tried, against the sum of all normals. False is not certain, nor of what overlaps elsewhere.
     """
-    if is_open(store.table, shell_f) or is_open(store.table, shell_g):
+    if is_open(store.table, shells[0]) or is_open(store.table, shells[1]):
         return False
-    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    if add_ways(store, shell_g, g, x[2], x[3], turn, 1.0, size, ways, 0) == 0:
+    f, g = points_of(codes, x)
+    if add_ways(store, shells[1], g, turn, 1.0, size, ways, 0) == 0:
         # A tip has no normal.
         return False
-    count = add_ways(store, shell_f, f, x[0], x[1], same, 1.0, size, ways, 0)
+    count = add_ways(store, shells[0], f, IDENTITY.rotation, 1.0, size, ways, 0)
     if count == 0:
         return False
-    count = add_ways(store, shell_g, g, x[2], x[3], turn, 1.0, size, ways, count)
+    count = add_ways(store, shells[1], g, turn, 1.0, size, ways, count)
     if count == ways.shape[0]:
         return False
-    total = (0.0, 0.0, 0.0)
+    total = unit(sum_of(ways, count))
     for k in range(count):
-        total = add(total, (ways[k, 0], ways[k, 1], ways[k, 2]))
-    total = unit(total)
-    for k in range(count):
-        if not dot(total, (ways[k, 0], ways[k, 1], ways[k, 2])) > INTO:
+        if not dot(total, way_at(ways, k)) > INTO:
             return False
     return True

@@ -11,6 +11,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, blend, dot, matvec
+from assembly.kinematics.motion import IDENTITY
 from assembly.proximity.brep.borders import feature_at, nearest_edge
 from assembly.proximity.brep.records import (
     EDGE_RECORD,
@@ -42,25 +43,25 @@ def border_ahead(store, shell, code, at, move, pose, way):
         return code, at, math.inf
     code, found = nearest_edge(store, shell, code, at[0] + move[0], at[1] + move[1])
     edge = solid.edge_table + EDGE_RECORD * (code - solid.faces)
-    p = add(matvec(pose[0], edge_jet(store, edge, found[0])[0]), pose[1])
+    p = add(matvec(pose.rotation, edge_jet(store, edge, found[0])[0]), pose.shift)
     return code, found, dot(way, p)
 
 
 @kernel(inner=True)
-def slide_off(store, shell_f, shell_g, pose, code_f, code_g, x, size):
+def slide_off(store, shells, pose, codes, x, size):
     """Two faces that are straight along each other and lean: on to the border that ends the way down.
 
     Returns whether there is such a way, the two features then, and the coordinates.
     """
-    f = feature_at(store.table, shell_f, code_f)
-    g = feature_at(store.table, shell_g, code_g)
+    f = feature_at(store.table, shells[0], codes[0])
+    g = feature_at(store.table, shells[1], codes[1])
     frame = pair_frame(store, f, g, pose, x)
     tx, ty, e, t = frame.tangent_x, frame.tangent_y, frame.rates_f, frame.rates_g
     straight = STRAIGHT / size
     matrix = pair_matrix(frame.shape_f, frame.shape_g, frame.gap, straight)
     h = matrix.h
     if matrix.isolated or not frame.regular:
-        return False, code_f, code_g, x
+        return False, codes, x
     m = matvec(pose.rotation, own_frame(store, g, x[2], x[3]).normal)
     lean = 1.0 / dot(m, frame.normal)
     wx = lean * dot(m, tx)
@@ -72,17 +73,15 @@ def slide_off(store, shell_f, shell_g, pose, code_f, code_g, x, size):
         wy = along * w[1]
     slope = math.sqrt(wx * wx + wy * wy)
     if not slope > LEVEL:
-        return False, code_f, code_g, x
+        return False, codes, x
     way = blend(wx / slope, tx, wy / slope, ty)
     wx *= FAR * size / slope
     wy *= FAR * size / slope
     # Parameters of a flat face go with lengths, and those along a valley do.
     on_f = (e[0] * wx + e[1] * wy, e[2] * wy)
     on_g = (t[0] * wx + t[1] * wy, t[2] * wx + t[3] * wy)
-    same = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    here = (same, (0.0, 0.0, 0.0))
-    edge_f, at_f, way_f = border_ahead(store, shell_f, code_f, (x[0], x[1]), on_f, here, way)
-    edge_g, at_g, way_g = border_ahead(store, shell_g, code_g, (x[2], x[3]), on_g, (pose.rotation, pose.shift), way)
+    edge_f, at_f, way_f = border_ahead(store, shells[0], codes[0], (x[0], x[1]), on_f, IDENTITY, way)
+    edge_g, at_g, way_g = border_ahead(store, shells[1], codes[1], (x[2], x[3]), on_g, pose, way)
     if way_f <= way_g:
-        return way_f < math.inf, edge_f, code_g, (at_f[0], at_f[1], x[2], x[3])
-    return True, code_f, edge_g, (x[0], x[1], at_g[0], at_g[1])
+        return way_f < math.inf, (edge_f, codes[1]), (at_f[0], at_f[1], x[2], x[3])
+    return True, (codes[0], edge_g), (x[0], x[1], at_g[0], at_g[1])

@@ -15,8 +15,9 @@ from assembly._record import Store, place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import matvec_t
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
-from assembly.proximity.extrema.feature_pair import conforms, feature_record
-from assembly.proximity.extrema.rates import RECORD
+from assembly.proximity.extrema.feature_jets import offset_side
+from assembly.proximity.extrema.feature_pair import conforms
+from assembly.proximity.extrema.rates import RECORD, feature_record
 from assembly.proximity.features.global_search import CROSSING
 from assembly.proximity.features.holding import hold_features
 from assembly.proximity.features.nearest_query import PAIR, answer_at
@@ -66,58 +67,78 @@ def pair_parameters(record):
 
 
 @kernel(inline=True)
-def write_tracked(x, feature_f, feature_g, n, tracked, r):
+def write_tracked(x, codes, n, tracked, r):
     """Parameters, features and normal of a pair."""
     pair = tracked_at(tracked, r)
     for k in range(4):
         pair.parameters[k] = x[k]
-    pair.feature_f = float(feature_f)
-    pair.feature_g = float(feature_g)
+    pair.feature_f = float(codes[0])
+    pair.feature_g = float(codes[1])
     for i in range(3):
         pair.normal[i] = n[i]
 
 
 @kernel(inner=True)
-def track_row(store, shell_f, shell_g, pose, start, r, patience):
+def write_record(turn, shift, frame, offset, records, r):
+    """The record of a contact, but for its slack; as `feature_record`."""
+    feature_record(turn, shift, frame, offset, records, r)
+    contact = contact_record_at(records, r)
+    contact.proper = CONFORMING if conforms(frame, offset) else (1.0 if frame.proper else 0.0)
+    contact.fold = frame.fold
+
+
+@kernel(inner=True)
+def track_row(store, shells, pose, start, r, patience):
     """`track_features` from the tracked values start[r], or `hold_features`."""
     pair = tracked_at(start, r)
-    code_f = np.int64(pair.feature_f)
-    code_g = np.int64(pair.feature_g)
+    codes = (np.int64(pair.feature_f), np.int64(pair.feature_g))
     x = pair_parameters(pair)
     n = (pair.normal[0], pair.normal[1], pair.normal[2])
     if pair.stays > 0.0:
-        status, x, frame = hold_features(store, shell_f, shell_g, pose, code_f, code_g, x, n, 1.0, patience, pair.stays)
-        return FeatureTrack(status, code_f, code_g, x, frame, 0)
-    return track_features(store, shell_f, shell_g, pose, code_f, code_g, x, n, 1.0, patience)
+        status, x, frame = hold_features(store, shells, pose, codes, x, n, patience, pair.stays)
+        return FeatureTrack(status, codes, x, frame, 0)
+    return track_features(store, shells, pose, codes, x, n, 1.0, patience)
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], f8[:, ::1], f8, f8[:, ::1], f8[:, ::1], i8)")
-def track_solids(table, pool, shell_f, shell_g, i, j, q, start, patience, records, tracked, r):
-    """Newton and switching from the tracked values start[r]; fills record r and tracked[r]. Returns the status.
+@kernel(
+    signatures=(
+        "(Tuple((i8[::1], f8[::1])), UniTuple(i8, 2), UniTuple(i8, 2), f8[:, ::1], f8, UniTuple(f8[:, ::1], 3), i8)"
+    ),
+)
+def track_solids(store, shells, bodies, q, patience, rows, r):
+    """Newton and switching from tracked values; fills record and tracked values. Returns the status.
 
-    Bodies i and j stand as q says; no step turns a normal by more than `patience`.
+    Both bodies stand as q says; no step turns a normal by more than `patience`. `rows` are the tracked values to start
+    from, the records and the tracked values, of all of which row r is the pair's.
     """
-    contact = contact_record_at(records, r)
+    table, pool = store
+    start, records, tracked = rows
+    i, j = bodies
     turn = rotation(q, i)
     pose = relative_pose(q, i, turn, j, rotation(q, j))
-    found = track_row(Store(table, pool), shell_f, shell_g, pose, start, r, patience)
+    found = track_row(Store(table, pool), shells, pose, start, r, patience)
     status, frame = found.status, found.frame
     if status == CONVERGED or status == SINGULAR:
-        feature_record(turn, pose.shift, frame, records, r)
-        contact.proper = CONFORMING if conforms(frame) else (1.0 if frame.proper else 0.0)
-        contact.fold = frame.fold
-        write_tracked(found.x, found.f, found.g, frame.normal, tracked, r)
+        write_record(turn, pose.shift, frame, offset_side(frame.side_f, frame.gap), records, r)
+        write_tracked(found.x, found.codes, frame.normal, tracked, r)
         tracked_at(tracked, r).stays = tracked_at(start, r).stays
     return status
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, i8, f8[:, ::1], i8, i8, f8[:, ::1], i8)")
-def search_solids(table, pool, shell_f, shell_g, i, j, q, nearest_at, deepest_at, tracked, r):
+@kernel(
+    signatures=(
+        "(Tuple((i8[::1], f8[::1])), UniTuple(i8, 2), UniTuple(i8, 2), f8[:, ::1], UniTuple(i8, 2), f8[:, ::1], i8)"
+    ),
+)
+def search_solids(store, shells, bodies, q, searches, tracked, r):
     """The closest features wherever they are, into tracked[r]. Returns 1, or 0 where there are none.
 
-    `nearest_at` and `deepest_at` are the addresses of `nearest_query.find_nearest` and `find_deepest`, the latter 0
-    where it is not wanted: then solids that cross have no pair.
+    `searches` are the addresses of `nearest_query.find_nearest` and `find_deepest`, the latter 0 where it is not
+    wanted: then solids that cross have no pair.
     """
+    table, pool = store
+    nearest_at, deepest_at = searches
+    i, j = bodies
     poses = np.empty((2, 7))
     for k in range(7):
         poses[0, k] = q[i, k]
@@ -125,17 +146,17 @@ def search_solids(table, pool, shell_f, shell_g, i, j, q, nearest_at, deepest_at
     codes = np.zeros(2, np.int64)
     out = np.zeros(PAIR)
     answer = answer_at(out, 0)
-    status = call_address(nearest_at, (table, pool, shell_f, shell_g, poses, 1.0, codes, out))
+    status = call_address(nearest_at, (table, pool, shells, poses, 1.0, codes, out))
     if codes[0] < 0:
         return 0
     n = (0.0, 0.0, 0.0)
     if status == CROSSING:
         if deepest_at == 0:
             return 0
-        status = call_address(deepest_at, (table, pool, shell_f, shell_g, poses, 1.0, codes, out))
+        status = call_address(deepest_at, (table, pool, shells, poses, 1.0, codes, out))
         # Solids that only touch have no depth: their crossing point is where the pair is.
         if status != CROSSING:
             n = matvec_t(rotation(q, i), (answer.normal[0], answer.normal[1], answer.normal[2]))
-    write_tracked((out[0], out[1], out[2], out[3]), codes[0], codes[1], n, tracked, r)
+    write_tracked((out[0], out[1], out[2], out[3]), codes, n, tracked, r)
     tracked_at(tracked, r).stays = 0.0
     return 1

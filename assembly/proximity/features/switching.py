@@ -25,6 +25,7 @@ from assembly.proximity.brep.borders import (
     edge_end,
     feature_at,
     feature_kind,
+    feature_of,
     nearest_edge,
     on_surface,
     other_parameter,
@@ -85,18 +86,17 @@ def from_edge(store, shell, code, t, n):
 
 
 @kernel(inner=True)
-def between_edges(store, shell_f, shell_g, rotation, code_f, code_g, t_f, t_g):
+def between_edges(store, shells, rotation, codes, x):
     """The normal of two edges that leans least over their faces: it tells the outside where edges touch."""
-    solid = shell_at(store.table, shell_f)
-    shell_record = shell_at(store.table, shell_g)
-    edge_f = edge_at(store.table, solid.edge_table + EDGE_RECORD * (code_f - solid.faces))
-    edge_g = edge_at(store.table, shell_record.edge_table + EDGE_RECORD * (code_g - shell_record.faces))
-    along_f = on_surface(store, edge_f.surface, edge_f.curve, t_f).tangent
-    along_g = on_surface(store, edge_g.surface, edge_g.curve, t_g).tangent
+    (shell_f, shell_g), (code_f, code_g) = shells, codes
+    edge_f = edge_at(store.table, feature_at(store.table, shell_f, code_f))
+    edge_g = edge_at(store.table, feature_at(store.table, shell_g, code_g))
+    along_f = on_surface(store, edge_f.surface, edge_f.curve, x[0]).tangent
+    along_g = on_surface(store, edge_g.surface, edge_g.curve, x[2]).tangent
     n = unit(cross(along_f, matvec(rotation, along_g)))
     m = matvec_t(rotation, n)
-    there = max(from_edge(store, shell_f, code_f, t_f, n)[0], from_edge(store, shell_g, code_g, t_g, neg(m))[0])
-    back = max(from_edge(store, shell_f, code_f, t_f, neg(n))[0], from_edge(store, shell_g, code_g, t_g, m)[0])
+    there = max(from_edge(store, shell_f, code_f, x[0], n)[0], from_edge(store, shell_g, code_g, x[2], neg(m))[0])
+    back = max(from_edge(store, shell_f, code_f, x[0], neg(n))[0], from_edge(store, shell_g, code_g, x[2], m)[0])
     return n if there <= back else neg(n)
 
 
@@ -162,59 +162,47 @@ def checked(store, shell, code, a, b, held, n):
     return other, found, other != code
 
 
-# A pair of features that was tracked. f, g: the features, numbers; x: their coordinates; switches: how often it went on
-# to another feature.
-FeatureTrack = namedtuple("FeatureTrack", "status f g x frame switches")
+# A pair of features that was tracked. codes: their numbers; x: their coordinates; frame: its `FeatureFrame`; switches:
+# how often it went on to another feature.
+FeatureTrack = namedtuple("FeatureTrack", "status codes x frame switches")
 
 
 @kernel(inner=True)
-def track_features(store, shell_f, shell_g, pose, code_f, code_g, x, n, size, turn):
+def track_features(store, shells, pose, codes, x, n, size, turn):
     """Newton's method on a pair of features, and switching until no other feature beside them is closer.
 
     Poses, `size` and `turn` as in `solve_pair`: g relative to f, everything in the axes of f. `n` is a normal near the
     pair's, from f towards g, zero where unknown. Where features switch, `turn` bounds the way from feature to feature
     no more; the normal at the end must not be across the one at the start, which would be the far side's.
 
-    Returns
-    -------
-    status, the two features, x (4), the frame of `solve_features`, how often it switched. CONVERGED or SINGULAR where
-    the pair is the closest one of its neighborhood, and neither solid is inside the other there.
+    Returns a `FeatureTrack`: CONVERGED or SINGULAR where the pair is the closest one of its neighborhood, and neither
+    solid is inside the other there.
     """
+    shell_f, shell_g = shells
     switches = 0
     before = n
     while True:
-        kind_f = feature_kind(store.table, shell_f, code_f)
-        kind_g = feature_kind(store.table, shell_g, code_g)
-        if kind_f == EDGE and kind_g == EDGE and dot(n, n) < 0.25:
-            n = between_edges(store, shell_f, shell_g, pose.rotation, code_f, code_g, x[0], x[2])
+        code_f, code_g = codes
+        f = feature_of(store, shell_f, code_f)
+        g = feature_of(store, shell_g, code_g)
+        are_faces = f.kind == FACE and g.kind == FACE
+        if f.kind == EDGE and g.kind == EDGE and dot(n, n) < 0.25:
+            n = between_edges(store, shells, pose.rotation, codes, x)
         begun = x
-        status, x, frame = solve_features(
-            store,
-            kind_f,
-            feature_at(store.table, shell_f, code_f),
-            kind_g,
-            feature_at(store.table, shell_g, code_g),
-            pose,
-            x,
-            n,
-            size,
-            turn if switches == 0 else math.inf,
-        )
+        status, x, frame = solve_features(store, f, g, pose, x, n, size, turn if switches == 0 else math.inf)
         if switches >= ROUNDS:
             status = NOT_CONVERGED
             break
-        if status == NOT_CONVERGED and kind_f == FACE and kind_g == FACE:
-            slides, code_f, code_g, x = slide_off(store, shell_f, shell_g, pose, code_f, code_g, begun, size)
-            if slides:
-                switches += 1
-                continue
         if status == NOT_CONVERGED:
-            tip_f = apex_near(store, shell_f, code_f, x[0], x[1])
-            tip_g = apex_near(store, shell_g, code_g, x[2], x[3]) if tip_f == code_f else code_g
-            if tip_f == code_f and tip_g == code_g:
-                break
-            code_f = tip_f
-            code_g = tip_g
+            slides = False
+            if are_faces:
+                slides, codes, x = slide_off(store, shells, pose, codes, begun, size)
+            if not slides:
+                code_f = apex_near(store, shell_f, codes[0], x[0], x[1])
+                code_g = apex_near(store, shell_g, codes[1], x[2], x[3]) if code_f == codes[0] else codes[1]
+                if code_f == codes[0] and code_g == codes[1]:
+                    break
+                codes = (code_f, code_g)
             switches += 1
             continue
         n = frame.normal
@@ -225,13 +213,14 @@ def track_features(store, shell_f, shell_g, pose, code_f, code_g, x, n, size, tu
             code_g, at_g, switched = checked(store, shell_g, code_g, x[2], x[3], held, neg(matvec_t(pose.rotation, n)))
         if not switched:
             break
+        codes = (code_f, code_g)
         x = (at_f[0], at_f[1], at_g[0], at_g[1])
         switches += 1
     if turn < math.inf and dot(before, before) > 0.25 and dot(before, n) < ACROSS:
         status = NOT_CONVERGED
-    if kind_f == FACE and kind_g == FACE and status != NOT_CONVERGED:
+    if are_faces and status != NOT_CONVERGED:
         # Of solids that touch, outward normals oppose each other; else one is inside the other.
-        normal = own_frame(store, feature_at(store.table, shell_g, code_g), x[2], x[3]).normal
+        normal = own_frame(store, g.record, x[2], x[3]).normal
         if dot(normal, matvec_t(pose.rotation, n)) > 0.0:
             status = NOT_CONVERGED
-    return FeatureTrack(status, code_f, code_g, x, frame, switches)
+    return FeatureTrack(status, codes, x, frame, switches)

@@ -15,21 +15,12 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.geometry.splines.evaluate import surface_point
-from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
+from assembly.geometry.vec import add, dot, scale, sub
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import EDGE, VERTEX
-from assembly.proximity.bvh.tree import (
-    ELEMENT,
-    NODE,
-    NODE_INTS,
-    element_at,
-    node_at,
-    node_links_at,
-    three_of,
-    tree_at,
-)
+from assembly.proximity.bvh.tree import three_of
 from assembly.proximity.extrema.feature_jets import edge_jet, vertex_point
-from assembly.proximity.features.solid_contact import tracked_at
+from assembly.proximity.features.solid_contact import pair_parameters, tracked_at
 from assembly.proximity.manager.extrema import (
     BESIDE_CONTACT,
     ELSEWHERE,
@@ -40,15 +31,9 @@ from assembly.proximity.manager.extrema import (
     extremum_at,
     given_at,
 )
-from assembly.proximity.manager.overlap import DEPTH, projection_at, surface_of, with_children
+from assembly.proximity.manager.overlap import DEPTH, next_near, patch_at, projection_at, seen_by_other, surface_of
 from assembly.proximity.manager.posed_pair import posed_pair
-from assembly.proximity.manager.state import (
-    PAIR_RECORD,
-    lengths_at,
-    manager_at,
-    pair_at,
-    pair_lengths_at,
-)
+from assembly.proximity.manager.records import ContactManager, lengths_of, pair_lengths_of, pair_of
 
 # A way from one pair to another one has so many strides, were it straight; so many it may have at most.
 STRIDES, LONGEST = 32, 96
@@ -70,6 +55,13 @@ def point_of(store, surface, shell, code, u, v):
     return edge_jet(store, feature, u)[0] if kind == EDGE else surface_point(store.table, store.pool, feature, u, v)[0]
 
 
+@kernel(inline=True)
+def apart(a, b):
+    """The distance of two points."""
+    d = sub(a, b)
+    return math.sqrt(dot(d, d))
+
+
 @kernel(inner=True)
 def point_on_edge(store, edge, low, high, y):
     """The point of a part of an edge that Newton's method takes for the nearest one to y."""
@@ -89,69 +81,52 @@ def point_on_edge(store, edge, low, high, y):
 
 
 @kernel(inner=True)
-def nearest_point(store, tree, surface, shell, y, reach, stack):
-    """The nearest point of a body to y, in its axes, and whether one is within reach."""
-    tree_record = tree_at(store.table, tree)
+def nearest_point(posed, side, y, distance, stack):
+    """The nearest point of one body to y, in its axes, and whether one is within a distance."""
+    store, shell = posed.store, posed.shells[side]
     stack[0] = 0
     used = 1
-    least = reach
+    least = distance
     best = y
     some = False
     while used > 0:
-        used -= 1
-        i = stack[used]
-        o = node_at(store.pool, tree_record.node_pool + NODE * i)
-        square = 0.0
-        for k in range(3):
-            off = max(abs(y[k] - o.center[k]) - o.half[k], 0.0)
-            square += off * off
-        if square > least * least:
-            continue
-        child = node_links_at(store.table, tree_record.node_table + NODE_INTS * i).child
-        if child >= 0:
-            used = with_children(stack, used, child)
-            continue
-        e = -1 - child
-        at = tree_record.element_pool + ELEMENT * e
-        code = np.int64(element_at(store.pool, at).feature)
-        if surface_of(store.table, shell, surface, code) >= 0:
-            distance, n, found = projection_at(store, tree, surface, shell, e, y)
-            p = sub(y, scale(distance, n))
+        e, used = next_near(store, posed.trees[side], y, least, stack, used)
+        if e < 0:
+            break
+        element = patch_at(posed, side, e)
+        code = np.int64(element.feature)
+        if surface_of(posed, side, code) >= 0:
+            off, n, found = projection_at(posed, side, e, y)
+            p = sub(y, scale(off, n))
             if not found:
                 continue
         elif feature_kind(store.table, shell, code) == EDGE:
-            element = element_at(store.pool, at)
             middle, half = element.middle[0], element.half[0]
             p = point_on_edge(store, feature_at(store.table, shell, code), middle - half, middle + half, y)
         else:
             p = vertex_point(store, feature_at(store.table, shell, code))
-        d = sub(p, y)
-        distance = math.sqrt(dot(d, d))
-        if distance <= least:
-            least, best, some = distance, p, True
+        away = apart(p, y)
+        if away <= least:
+            least, best, some = away, p, True
     return best, some
 
 
 @kernel(inner=True)
-def between_bodies(store, posed, c, reach, stack):
+def between_bodies(posed, c, distance, stack):
     """The middle of the nearest points of both bodies to c, how far these are apart, and whether both are in reach."""
-    turn, shift = posed.pose.rotation, posed.pose.shift
-    p, found_f = nearest_point(store, posed.trees[0], posed.surfaces[0], posed.shells[0], c, reach, stack)
-    at_g = matvec_t(turn, sub(c, shift))
-    q, found_g = nearest_point(store, posed.trees[1], posed.surfaces[1], posed.shells[1], at_g, reach, stack)
-    q = add(matvec(turn, q), shift)
-    d = sub(q, p)
-    return scale(0.5, add(p, q)), math.sqrt(dot(d, d)), found_f and found_g
+    p, found_f = nearest_point(posed, 0, c, distance, stack)
+    q, found_g = nearest_point(posed, 1, seen_by_other(posed, 0, c), distance, stack)
+    q = seen_by_other(posed, 1, q)
+    return scale(0.5, add(p, q)), apart(q, p), found_f and found_g
 
 
 @kernel(inner=True)
-def leads_to(store, posed, begin, end, level, stack):
+def leads_to(posed, begin, end, level, stack):
     """Whether a way between the bodies leads from one point to another one, along which they are nearer than a level.
 
     It goes straight for the end, and after every stride back to where both bodies are equally far.
     """
-    d = sub(end, begin)
-    left = math.sqrt(dot(d, d))
+    left = apart(end, begin)
     stride = left / STRIDES
     c = begin
     for _ in range(LONGEST):
@@ -160,75 +135,53 @@ def leads_to(store, posed, begin, end, level, stack):
         c = add(c, scale(stride / left, sub(end, c)))
         near = False
         for _centering in range(CENTERINGS):
-            c, gap, found = between_bodies(store, posed, c, stride + level, stack)
+            c, gap, found = between_bodies(posed, c, stride + level, stack)
             if not found:
                 return False
             near = gap < level
             if near:
                 break
-        d = sub(end, c)
-        before, left = left, math.sqrt(dot(d, d))
+        before, left = left, apart(end, c)
         if not near or left > before - GAINED * stride:
             return False
     return False
 
 
 @kernel(inner=True)
-def contact_points(store, posed, given, tracked):
+def contact_points(posed, given, tracked):
     """The pair of points of a given contact, in the axes of body f of its pair of bodies."""
-    given_record = given_at(store.table, given)
-    pair = tracked_at(tracked, given_record.row)
-    a = point_of(
-        store, given_record.surface[0], given_record.shell[0], np.int64(pair.feature_f),
-        pair.parameters[0], pair.parameters[1],
-    )  # fmt: skip
-    b = point_of(
-        store, given_record.surface[1], given_record.shell[1],
-        np.int64(pair.feature_g), pair.parameters[2], pair.parameters[3],
-    )  # fmt: skip
-    if given_record.swapped == 1:
+    pair = tracked_at(tracked, given.row)
+    x, codes = pair_parameters(pair), (np.int64(pair.feature_f), np.int64(pair.feature_g))
+    a = point_of(posed.store, given.surface[0], given.shell[0], codes[0], x[0], x[1])
+    b = point_of(posed.store, given.surface[1], given.shell[1], codes[1], x[2], x[3])
+    if given.swapped == 1:
         a, b = b, a
-    return a, add(matvec(posed.pose.rotation, b), posed.pose.shift)
-
-
-@kernel(inline=True)
-def extremum_points(extrema, k):
-    """The pair of points of a root."""
-    extremum = extremum_at(extrema, k)
-    return three_of(extremum.point_f), three_of(extremum.point_g)
-
-
-@kernel(inline=True)
-def apart(a, b):
-    """The distance of two points."""
-    d = sub(a, b)
-    return math.sqrt(dot(d, d))
+    return a, seen_by_other(posed, 1, b)
 
 
 @kernel(inner=True, allocates=True)
-def spread(store, posed, extrema, count, begin, limits, stack):
-    """Mark the roots in the place of a contact whose points have their middle at `begin`.
+def spread(posed, extrema, begin, limits, stack):
+    """Mark the extrema in the place of a contact whose points have their middle at `begin`.
 
-    From root to root, the nearest first: each is tried from the nearest point that is known to be in the place. The
-    `limits` are the level below which gaps are, and the gap below which no root is taken.
+    From extremum to extremum, the nearest first: each is tried from the nearest point that is known to be in the place.
+    The `limits` are the gap below which no extremum is taken, and the level below which gaps are.
     """
-    level, lowest = limits
+    lowest, level = limits
+    count = extrema.shape[0]
     middles = np.empty((count, 3))
-    # From how near a root was tried last, and from where it is to be tried next.
+    # From how near an extremum was tried last, and from where it is to be tried next.
     tried = np.full(count, math.inf)
     nearest = np.full(count, math.inf)
     source = np.empty((count, 3))
     eligible = np.zeros(count, np.bool_)
     for k in range(count):
-        p, q = extremum_points(extrema, k)
-        c = scale(0.5, add(p, q))
+        extremum = extremum_at(extrema, k)
+        c = scale(0.5, add(three_of(extremum.point_f), three_of(extremum.point_g)))
         middles[k, 0], middles[k, 1], middles[k, 2] = c
         source[k, 0], source[k, 1], source[k, 2] = begin
         nearest[k] = apart(c, begin)
-        may = extremum_at(extrema, k).origin == NEW or extremum_at(extrema, k).origin >= LISTED
-        eligible[k] = (
-            may and extremum_at(extrema, k).place == ELSEWHERE and lowest <= extremum_at(extrema, k).gap < level
-        )
+        may = extremum.origin == NEW or extremum.origin >= LISTED
+        eligible[k] = may and extremum.place == ELSEWHERE and lowest <= extremum.gap < level
     while True:
         best = -1
         for k in range(count):
@@ -237,45 +190,47 @@ def spread(store, posed, extrema, count, begin, limits, stack):
         if best < 0:
             return
         tried[best] = nearest[best]
-        start = (source[best, 0], source[best, 1], source[best, 2])
-        end = (middles[best, 0], middles[best, 1], middles[best, 2])
-        if not leads_to(store, posed, start, end, level, stack):
+        end = three_of(middles[best])
+        if not leads_to(posed, three_of(source[best]), end, level, stack):
             continue
         extremum_at(extrema, best).place = BESIDE_CONTACT
         eligible[best] = False
         for k in range(count):
-            away = apart((middles[k, 0], middles[k, 1], middles[k, 2]), end)
+            away = apart(three_of(middles[k]), end)
             if away < nearest[k]:
                 nearest[k] = away
                 source[k, 0], source[k, 1], source[k, 2] = end
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8[:, ::1], i8)")
-def mark_places(table, pool, watch, p, q, tracked, extrema, count):
-    """Mark the roots of pair p that are a given contact's pair, or in its place; how many contacts have one."""
-    store = Store(table, pool)
-    manager = manager_at(table, watch)
-    pair = pair_at(table, manager.pair_table + PAIR_RECORD * p)
-    posed = posed_pair(manager, pair, q)
-    least = pair_lengths_at(pool, pair.minimum).least
-    merge_radius = lengths_at(pool, manager.lengths).neglect
-    stack = np.empty(DEPTH, np.int64)
+@kernel(inner=True)
+def mark(manager, p, q, tracked, extrema, stack):
+    """Mark the extrema of pair p that are a given contact's pair, or in its place; how many contacts have one."""
+    table = manager.store.table
+    pair = pair_of(manager, p)
+    posed = posed_pair(manager, p, q)
+    least = pair_lengths_of(manager, p).least
+    merge_radius = lengths_of(manager).neglect
     known = 0
     for c in range(pair.given_count):
-        given = pair.given + GIVEN_RECORD * c
-        given_record = given_at(table, given)
-        r = given_record.row
-        if math.isnan(tracked_at(tracked, r).parameters[0]):
+        given = given_at(table, pair.given + GIVEN_RECORD * c)
+        contact = tracked_at(tracked, given.row)
+        if math.isnan(contact.parameters[0]):
             continue
         known += 1
-        a, b = contact_points(store, posed, given, tracked)
-        for k in range(count):
-            p_f, p_g = extremum_points(extrema, k)
-            if max(apart(p_f, a), apart(p_g, b)) <= merge_radius:
-                extremum_at(extrema, k).place = OF_CONTACT
-        gap = apart(a, b) if tracked_at(tracked, r).gap > 0.0 else 0.0
+        a, b = contact_points(posed, given, tracked)
+        for k in range(extrema.shape[0]):
+            extremum = extremum_at(extrema, k)
+            if max(apart(three_of(extremum.point_f), a), apart(three_of(extremum.point_g), b)) <= merge_radius:
+                extremum.place = OF_CONTACT
+        gap = apart(a, b) if contact.gap > 0.0 else 0.0
         # A contact that may stay open, and is by more than the least gap, excuses nothing that is nearer.
-        lowest = least if given_record.opens == 1 and gap >= least else -math.inf
-        limits = (gap + least, lowest)
-        spread(store, posed, extrema, count, scale(0.5, add(a, b)), limits, stack)
+        lowest = least if given.opens == 1 and gap >= least else -math.inf
+        spread(posed, extrema, scale(0.5, add(a, b)), (lowest, gap + least), stack)
     return known
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], i8, f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def mark_places(table, pool, at, memory, p, q, tracked, extrema):
+    """`mark`, of the contact manager at a place of the table. An update calls this by its address."""
+    manager = ContactManager(Store(table, pool), at, memory)
+    return mark(manager, p, q, tracked, extrema, np.empty(DEPTH, np.int64))

@@ -19,13 +19,7 @@ from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import EDGE, FACE, FACE_RECORD, face_at, shell_at
-from assembly.proximity.bvh.tree import (
-    ELEMENT,
-    element_at,
-    node_at,
-    node_of,
-    tree_at,
-)
+from assembly.proximity.bvh.tree import ELEMENT, element_at, node_of, tree_at
 from assembly.proximity.extrema.feature_jets import edge_jet, edge_limits
 
 # A part of an edge is looked at with so much of its neighbors, in half widths: what goes through where two meet counts.
@@ -104,7 +98,7 @@ def patch_vertex_contacts(store, surface, patch):
 @kernel(inner=True)
 def goes_through(store, tree, shell, e, a, b, margin):
     """Whether what is within a margin of a chord goes through the face of a body at a flat patch; body axes."""
-    node = node_at(store.pool, node_of(store, tree, e))
+    node = node_of(store, tree, e)
     if node.cosine <= 0.0 or node.sine > FLAT:
         return False
     patch = element_at(store.pool, tree_at(store.table, tree).element_pool + ELEMENT * e)
@@ -134,8 +128,9 @@ def goes_through(store, tree, shell, e, a, b, margin):
 
 
 @kernel(inner=True)
-def pierces(store, posed, pair, margin, offsets):
+def pierces(posed, pair, margin):
     """Whether of two elements, of f and of g, one is a part of an edge that goes through the other, a patch."""
+    store = posed.store
     for side in range(2):
         tree, shell = posed.trees[side], posed.shells[side]
         other, other_shell = posed.trees[1 - side], posed.shells[1 - side]
@@ -153,6 +148,6 @@ def pierces(store, posed, pair, margin, offsets):
         else:
             a = add(matvec(posed.pose.rotation, a), posed.pose.shift)
             b = add(matvec(posed.pose.rotation, b), posed.pose.shift)
-        if goes_through(store, other, other_shell, pair[1 - side], a, b, margin + 2.0 * bent + offsets[1 - side]):
+        if goes_through(store, other, other_shell, pair[1 - side], a, b, margin + 2.0 * bent + posed.offsets[1 - side]):
             return True
     return False

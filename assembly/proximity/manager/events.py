@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import rows_of
-from assembly.proximity.manager import state as watch_memory
+from assembly.proximity.manager import records as watch_memory
 
 __all__ = ["Event", "EventKind", "EventReason", "PairState", "events_of", "fresh_memory", "listed_places"]
 
 Array = NDArray[np.float64]
-Table = NDArray[np.int64]
 
 
 class EventKind(Enum):

@@ -1,39 +1,34 @@
-"""Extremal pairs of two bodies, the roots of a look (`proximity/manager/update.py`): from pairs of patches by Newton's
-method.
+"""Extremal pairs of two bodies, the extrema of an update (`proximity/manager/update.py`): from pairs of patches by
+Newton's method.
 
-A root counts where outward normals oppose each other and the distance has a local minimum, by which solids touch; a
-saddle of the distance is known, but not listed. Two roots are one where their points are near in space and along the
-surfaces as well: the surface point halfway between their parameters is near them, too (paper 001, section 5).
+An extremum counts where outward normals oppose each other and the distance has a local minimum, by which solids touch;
+a saddle of the distance is known, but not listed. Two extrema are one where their points are near in space and along
+the surfaces as well: the surface point halfway between their parameters is near them, too (paper 001, section 5).
 """
 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
 from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly._record import place_of, record_dtype, record_view, size_of
-from assembly.geometry.splines.evaluate import (
-    surface_at,
-    surface_point,
-)
+from assembly._record import record_dtype, record_view, size_of
+from assembly.geometry.splines.evaluate import surface_at, surface_point
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
-from assembly.kinematics.motion import RelativePose, rotation
+from assembly.kinematics.motion import rotation
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import shell_at
 from assembly.proximity.bvh.tree import three_of
 from assembly.proximity.extrema.face_face import CONVERGED, NOT_CONVERGED, SINGULAR, pair_frame, solve_pair
+from assembly.proximity.extrema.feature_pair import two_face_frame
 from assembly.proximity.extrema.feedback import descend_pair
 from assembly.proximity.extrema.global_start import opposed
 from assembly.proximity.extrema.rates import derivatives_at
-from assembly.proximity.extrema.singular import ALONE, fold_of
-from assembly.proximity.features.solid_contact import (
-    contact_record_at,
-    pair_parameters,
-    tracked_at,
-)
+from assembly.proximity.extrema.singular import ALONE
+from assembly.proximity.features.solid_contact import contact_record_at, pair_parameters, tracked_at
 
 # An extremum of the distance of two bodies. Points and the normal are in the axes of f.
 EXTREMUM = record_dtype(
@@ -52,16 +47,10 @@ EXTREMUM = record_dtype(
     place=1,  # ELSEWHERE, or where it is to given contacts (`contact_place.py`)
 )
 extremum_at = record_view(EXTREMUM)
-CODE_F = place_of(EXTREMUM, "code_f")
-CODE_G = place_of(EXTREMUM, "code_g")
-EXTREMUM_NORMAL = place_of(EXTREMUM, "normal")
-GAP = place_of(EXTREMUM, "gap")
-ORIGIN = place_of(EXTREMUM, "origin")
-POINT_F = place_of(EXTREMUM, "point_f")
-EXTREMUM_FOLD = place_of(EXTREMUM, "fold")
-EXTREMUM_BEYOND = place_of(EXTREMUM, "beyond")
-VERTEX_CONTACT = place_of(EXTREMUM, "corner")
 ROOT = size_of(EXTREMUM)
+# A list of extrema. rows: the EXTREMUM records, of which the row behind the last is that of a start that is tried;
+# count: how many there are, (1,); derivatives, tracked: one record of each, for a pair of features that is tried.
+Extrema = namedtuple("Extrema", "rows count derivatives tracked")
 # Where it is from: of no use, new, from LISTED on the place it has, down from GIVEN_CONTACT which given contact it is.
 USELESS, NEW, LISTED, GIVEN_CONTACT = -2.0, -1.0, 0, -3.0
 # A given contact of two bodies in the table.
@@ -75,9 +64,9 @@ GIVEN_DTYPE = record_dtype(
 )
 given_at = record_view(GIVEN_DTYPE)
 GIVEN_RECORD = size_of(GIVEN_DTYPE)
-# Of a root: in no contact's place, in one beside the contact's own pair, that pair.
+# Of an extremum: in no contact's place, in one beside the contact's own pair, that pair.
 ELSEWHERE, BESIDE_CONTACT, OF_CONTACT = 0.0, 1.0, 2.0
-# What became of a start: nothing there, a root that is known, a saddle, a minimum.
+# What became of a start: nothing there, an extremum that is known, a saddle, a minimum.
 NOTHING, ALIKE, SADDLE, MINIMUM_FOUND = 0, 1, 2, 3
 # Roots of no use are the same within this radius, in parts of the scene's size.
 SAME = 1e-6
@@ -109,11 +98,18 @@ def square_to(a, b):
     return dot(d, d)
 
 
+@kernel(inline=True)
+def is_full(extrema):
+    """Whether a list has no room for another extremum."""
+    return extrema.count[0] == extrema.rows.shape[0]
+
+
 @kernel(inner=True)
-def are_one(store, posed, extrema, i, k, merge_radius):
-    """Whether roots i and k are the same contact."""
+def are_one(posed, rows, i, k, merge_radius):
+    """Whether extrema i and k are the same contact."""
+    store = posed.store
     square = merge_radius * merge_radius
-    one, other = extremum_at(extrema, i), extremum_at(extrema, k)
+    one, other = extremum_at(rows, i), extremum_at(rows, k)
     codes, other_codes = (one.code_f, one.code_g), (other.code_f, other.code_g)
     points = (three_of(one.point_f), three_of(one.point_g))
     other_points = (three_of(other.point_f), three_of(other.point_g))
@@ -138,35 +134,46 @@ def are_one(store, posed, extrema, i, k, merge_radius):
 
 
 @kernel(inner=True)
-def surfaces_extremum(store, posed, start, extrema, k):
-    """Newton on two surfaces from `start`, the controller where it fails; fills root k.
+def is_known_one(posed, extrema, merge_radius):
+    """Whether the extremum that is tried is one of the list.
 
-    Returns NOTHING, SADDLE or MINIMUM_FOUND.
+    One of far sides, or a saddle, hides no contact beside it.
     """
-    turn, shift = posed.pose.rotation, posed.pose.shift
-    f, g = posed.surfaces[0], posed.surfaces[1]
-    found = solve_pair(store, f, g, RelativePose(turn, shift), start, 1.0, math.inf, 0.0, True)
-    if found.status == NOT_CONVERGED:
-        # The controller leads down from anywhere, to a minimum of the distance.
-        found = descend_pair(store, f, g, RelativePose(turn, shift), start, 1.0, DESCENTS)
-    if found.status != CONVERGED and found.status != SINGULAR:
-        return NOTHING
-    x, frame = found.parameters, found.frame
-    if not opposed(frame, turn, store, g, x):
-        return NOTHING
-    h = found.matrix.h
-    det = h[0] * h[3] - h[1] * h[2]
-    norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-    write(extrema, k, x, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, fold_of(h))
-    return MINIMUM_FOUND if det > -1e-9 * norm2 and h[0] + h[3] <= 0.0 else SADDLE
+    for k in range(extrema.count[0]):
+        radius = min(merge_radius, SAME) if extremum_at(extrema.rows, k).origin == USELESS else merge_radius
+        if are_one(posed, extrema.rows, extrema.count[0], k, radius):
+            return True
+    return False
 
 
 @kernel(inner=True)
-def solids_extremum(store, posed, codes, start, n, extrema, k, work, vertex_contact):
-    """Switching and Newton on the features of two solids, or Newton alone for a corner; fills root k."""
+def surfaces_extremum(posed, start, extremum):
+    """Newton on two surfaces from `start`, the controller where it fails; fills an extremum.
+
+    Returns NOTHING, SADDLE or MINIMUM_FOUND.
+    """
+    store, pose = posed.store, posed.pose
+    found = solve_pair(store, posed.surfaces, pose, start, 1.0, math.inf, 0.0, True)
+    if found.status == NOT_CONVERGED:
+        # The controller leads down from anywhere, to a minimum of the distance.
+        found = descend_pair(store, posed.surfaces, pose, start, 1.0, DESCENTS)
+    if found.status != CONVERGED and found.status != SINGULAR:
+        return NOTHING
+    x, frame = found.parameters, found.frame
+    if not opposed(frame, pose.rotation, store, posed.surfaces[1], x):
+        return NOTHING
+    pair = two_face_frame(frame, found.matrix)
+    write_frame(extremum, x, frame, pair.fold)
+    return MINIMUM_FOUND if pair.proper else SADDLE
+
+
+@kernel(inner=True)
+def solids_extremum(posed, codes, start, n, extrema, vertex_contact):
+    """Switching and Newton on features of two solids, Newton alone for a corner; fills the extremum behind the list."""
+    store = posed.store
     i, j = posed.bodies
     q = posed.poses
-    records, tracked = work
+    records, tracked = extrema.derivatives, extrema.tracked
     pair = tracked_at(tracked, 0)
     derivatives = derivatives_at(records, 0)
     contact = contact_record_at(records, 0)
@@ -179,94 +186,103 @@ def solids_extremum(store, posed, codes, start, n, extrema, k, work, vertex_cont
         pair.normal[l] = n[l]
     status = call_address(
         posed.track_solids,
-        (store.table, store.pool, posed.shells[0], posed.shells[1], i, j, q, tracked, math.inf, records, tracked, 0),
+        (store, posed.shells, posed.bodies, q, math.inf, (tracked, records, tracked), 0),
     )
     if status != CONVERGED and (status != SINGULAR or vertex_contact > 0.0):
         # An edge along another one, or along a face, is no corner: its ends are.
         return NOTHING
-    turn = rotation(q, i)
     m = three_of(pair.normal)
-    pg = matvec_t(turn, three_of(derivatives.arm_f))
+    pg = matvec_t(rotation(q, i), three_of(derivatives.arm_f))
     gap = derivatives.gap
-    x = pair_parameters(pair)
-    write(extrema, k, x, pair.feature_f, pair.feature_g, m, gap, sub(pg, scale(gap, m)), pg, contact.fold)
-    extremum_at(extrema, k).corner = vertex_contact
+    extremum = extremum_at(extrema.rows, extrema.count[0])
+    points = (sub(pg, scale(gap, m)), pg)
+    write(extremum, pair_parameters(pair), (pair.feature_f, pair.feature_g), m, gap, points, contact.fold)
+    extremum.corner = vertex_contact
     return MINIMUM_FOUND if contact.proper == 1.0 else SADDLE
 
 
 @kernel(inline=True)
-def write(extrema, k, x, code_f, code_g, n, gap, pf, pg, fold):
-    extremum = extremum_at(extrema, k)
+def write(extremum, x, codes, n, gap, points, fold):
+    """Fill an extremum, of no use yet: its parameters, features, normal, gap, the points of f and g, and fold."""
     for l in range(4):
         extremum.parameters[l] = x[l]
-    extremum.code_f = float(code_f)
-    extremum.code_g = float(code_g)
+    extremum.code_f = float(codes[0])
+    extremum.code_g = float(codes[1])
     extremum.normal[0], extremum.normal[1], extremum.normal[2] = n
     extremum.gap = gap
     extremum.origin = USELESS
-    extremum.point_f[0], extremum.point_f[1], extremum.point_f[2] = pf
-    extremum.point_g[0], extremum.point_g[1], extremum.point_g[2] = pg
+    extremum.point_f[0], extremum.point_f[1], extremum.point_f[2] = points[0]
+    extremum.point_g[0], extremum.point_g[1], extremum.point_g[2] = points[1]
     extremum.fold = fold
     extremum.beyond = math.nan
     extremum.corner = 0.0
     extremum.place = ELSEWHERE
 
 
-@kernel(inner=True)
-def add_extremum(store, posed, codes, start, n, merge_radius, extrema, count, work, vertex_contact):
-    """Look for a root from a start and add it, as USELESS, if it is none of the known ones; a corner where it holds on
-    to something.
+@kernel(inline=True)
+def write_frame(extremum, x, frame, fold):
+    """Fill an extremum of two surfaces by its frame."""
+    write(extremum, x, (0, 0), frame.normal, frame.gap, (frame.point_f, frame.point_g), fold)
 
-    Returns how many roots there are, and NOTHING, ALIKE, SADDLE or MINIMUM_FOUND.
+
+@kernel(inner=True)
+def add_extremum(posed, codes, start, n, merge_radius, extrema, vertex_contact):
+    """Look for an extremum from a start and add it, as USELESS, if it is none of the known ones; a corner where it
+    holds on to something.
+
+    Returns NOTHING, ALIKE, SADDLE or MINIMUM_FOUND.
     """
     if posed.surfaces[0] >= 0:
-        found = surfaces_extremum(store, posed, start, extrema, count)
+        found = surfaces_extremum(posed, start, extremum_at(extrema.rows, extrema.count[0]))
     else:
-        found = solids_extremum(store, posed, codes, start, n, extrema, count, work, vertex_contact)
+        found = solids_extremum(posed, codes, start, n, extrema, vertex_contact)
     if found == NOTHING:
-        return count, found
-    for k in range(count):
-        # One of far sides, or a saddle, hides no contact beside it.
-        radius = min(merge_radius, SAME) if extremum_at(extrema, k).origin == USELESS else merge_radius
-        if are_one(store, posed, extrema, count, k, radius):
-            return count, ALIKE
-    return count + 1, found
+        return found
+    if is_known_one(posed, extrema, merge_radius):
+        return ALIKE
+    extrema.count[0] += 1
+    return found
 
 
 @kernel(inner=True)
-def add_given(store, posed, tracked, listed, many, merge_radius, extrema, work):
-    """Add the roots at which given contacts of the two bodies are now. Returns how many.
+def add_surface_extremum(posed, start, merge_radius, extrema):
+    """The same of two surfaces."""
+    return add_extremum(posed, (0, 0), start, (0.0, 0.0, 0.0), merge_radius, extrema, 0.0)
 
-    A contact whose coordinates are unknowns of a solve may be on its way to another root than Newton's method goes to
-    from there: it does not stand for that one.
+
+@kernel(inner=True)
+def add_given(posed, tracked, listed, many, merge_radius, extrema):
+    """Add the extrema at which given contacts of the two bodies are now.
+
+    A contact whose coordinates are unknowns of a solve may be on its way to another extremum than Newton's method goes
+    to from there: it does not stand for that one.
     """
-    count = 0
+    store = posed.store
     for c in range(many):
         given = given_at(store.table, listed + GIVEN_RECORD * c)
         x = pair_parameters(tracked_at(tracked, given.row))
-        if math.isnan(x[0]) or count == extrema.shape[0]:
+        if math.isnan(x[0]) or is_full(extrema):
             continue
         if given.swapped == 1:
             x = (x[2], x[3], x[0], x[1])
-        before = count
-        count, found = add_extremum(store, posed, (0, 0), x, (0.0, 0.0, 0.0), 0.0, extrema, count, work, 0.0)
-        if posed.surfaces[0] >= 0 and (found == NOTHING or (count > before and count < extrema.shape[0])):
+        before = extrema.count[0]
+        found = add_surface_extremum(posed, x, 0.0, extrema)
+        count = extrema.count[0]
+        if posed.surfaces[0] >= 0 and (found == NOTHING or (count > before and not is_full(extrema))):
             frame = pair_frame(store, posed.surfaces[0], posed.surfaces[1], posed.pose, x)
             if frame.regular:
-                write(extrema, count, x, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, 0.0)
+                write_frame(extremum_at(extrema.rows, count), x, frame, 0.0)
             if found != NOTHING:
-                same = frame.regular and are_one(store, posed, extrema, before, count, merge_radius)
-                count = count if same else before
+                same = frame.regular and are_one(posed, extrema.rows, before, count, merge_radius)
+                extrema.count[0] = count if same else before
             elif frame.regular and opposed(frame, posed.pose.rotation, store, posed.surfaces[1], x):
                 # At a fold Newton's method may find nothing: there the contact still is.
-                count += 1
-        if count > before:
-            extremum_at(extrema, before).origin = GIVEN_CONTACT - c
-    return count
+                extrema.count[0] += 1
+        if extrema.count[0] > before:
+            extremum_at(extrema.rows, before).origin = GIVEN_CONTACT - c
 
 
 @kernel(inline=True)
-def is_alone(extrema, k):
-    """Whether root k is far from a fold, beyond knot lines too as far as it is known."""
-    extremum = extremum_at(extrema, k)
+def is_alone(extremum):
+    """Whether an extremum is far from a fold, beyond knot lines too as far as it is known."""
     return extremum.fold > ALONE and not extremum.beyond <= ALONE

@@ -11,26 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
-from assembly.proximity.bvh.tree import (
-    NODE,
-    NODE_INTS,
-    node_at,
-    node_links_at,
-    three_of,
-    tree_at,
-)
+from assembly.geometry.vec import add, dot, matvec, scale
+from assembly.proximity.bvh.tree import three_of
 from assembly.proximity.manager.extrema import LISTED, NEW, USELESS, extremum_at
-from assembly.proximity.manager.overlap import DEPTH, projection_at, with_children
-from assembly.proximity.manager.state import (
-    HANDED_OFF,
-    LOST,
-    PLACE_MEMORY,
-    memory_places,
-    note,
-    place_at,
-    release,
-)
+from assembly.proximity.manager.overlap import DEPTH, next_near, projection_at, seen_by_other
+from assembly.proximity.manager.records import HANDED_OFF, LOST
+from assembly.proximity.manager.slots import give_up
 
 # Faces are flush at a pair where they are nearer to its middle than this part of how deep it is,
 SHORT = 1e-3
@@ -41,49 +27,33 @@ ROUNDING, FACES_ABOUT = 1e-9, 16
 
 
 @kernel(inner=True)
-def faces_about(store, tree, shell, y, reach, stack, normals):
-    """Write the normals of a body's faces that are within reach of a point; how many there are. In its axes."""
-    tree_record = tree_at(store.table, tree)
+def faces_about(posed, side, y, distance, stack, normals):
+    """Write the normals of one body's faces that are within a distance of a point; how many there are. In its axes."""
     stack[0] = 0
     used = 1
     count = 0
     while used > 0 and count < normals.shape[0]:
-        used -= 1
-        i = stack[used]
-        o = node_at(store.pool, tree_record.node_pool + NODE * i)
-        square = 0.0
-        for k in range(3):
-            off = max(abs(y[k] - o.center[k]) - o.half[k], 0.0)
-            square += off * off
-        if square > reach * reach:
-            continue
-        child = node_links_at(store.table, tree_record.node_table + NODE_INTS * i).child
-        if child >= 0:
-            used = with_children(stack, used, child)
-            continue
-        distance, n, some = projection_at(store, tree, -1, shell, -1 - child, y)
-        if some and abs(distance) <= reach:
+        e, used = next_near(posed.store, posed.trees[side], y, distance, stack, used)
+        if e < 0:
+            break
+        off, n, some = projection_at(posed, side, e, y)
+        if some and abs(off) <= distance:
             normals[count, 0], normals[count, 1], normals[count, 2] = n
             count += 1
     return count
 
 
 @kernel(inner=True)
-def is_between_flush_faces(store, posed, extrema, k, stack, normals):
-    """Whether the middle of root k, with a negative gap, is between two faces that all but touch there."""
-    extremum = extremum_at(extrema, k)
-    turn, shift = posed.pose.rotation, posed.pose.shift
-    a, b = three_of(extremum.point_f), three_of(extremum.point_g)
-    c = scale(0.5, add(a, b))
-    reach = -SHORT * extremum.gap
-    many = faces_about(store, posed.trees[0], posed.shells[0], c, reach, stack, normals[0])
+def is_between_flush_faces(posed, extremum, stack, normals):
+    """Whether the middle of an extremum, with a negative gap, is between two faces that all but touch there."""
+    c = scale(0.5, add(three_of(extremum.point_f), three_of(extremum.point_g)))
+    distance = -SHORT * extremum.gap
+    many = faces_about(posed, 0, c, distance, stack, normals[0])
     if many == 0:
         return False
-    others = faces_about(
-        store, posed.trees[1], posed.shells[1], matvec_t(turn, sub(c, shift)), reach, stack, normals[1]
-    )
+    others = faces_about(posed, 1, seen_by_other(posed, 0, c), distance, stack, normals[1])
     for i in range(others):
-        n = matvec(turn, (normals[1, i, 0], normals[1, i, 1], normals[1, i, 2]))
+        n = matvec(posed.pose.rotation, (normals[1, i, 0], normals[1, i, 1], normals[1, i, 2]))
         for l in range(many):
             if dot(n, (normals[0, l, 0], normals[0, l, 1], normals[0, l, 2])) < OPPOSED - 1.0:
                 return True
@@ -91,30 +61,27 @@ def is_between_flush_faces(store, posed, extrema, k, stack, normals):
 
 
 @kernel(inner=True, allocates=True)
-def drop_flush(store, watch, memory, p, posed, extrema, count, tracked):
-    """Make those roots of pair p useless that run between flush faces; listed ones give up their places."""
+def drop_flush(manager, p, posed, extrema, tracked):
+    """Make extrema of pair p useless that run between flush faces; listed ones give up their slots."""
     stack = np.empty(DEPTH, np.int64)
     normals = np.empty((2, FACES_ABOUT, 3))
-    places = memory_places(store.table, watch)[1]
-    for k in range(count):
-        extremum = extremum_at(extrema, k)
-        origin = np.int64(extremum.origin)
-        if not extremum.gap < -ROUNDING or not (extremum.origin == NEW or origin >= LISTED):
+    for k in range(extrema.count[0]):
+        extremum = extremum_at(extrema.rows, k)
+        is_listed = np.int64(extremum.origin) >= LISTED
+        if not extremum.gap < -ROUNDING or not (extremum.origin == NEW or is_listed):
             continue
-        if not is_between_flush_faces(store, posed, extrema, k, stack, normals):
+        if not is_between_flush_faces(posed, extremum, stack, normals):
             continue
-        if origin >= LISTED:
-            number = place_at(memory, places + PLACE_MEMORY * (origin - LISTED)).number
-            note(store.table, watch, memory, HANDED_OFF, LOST, p, number, extremum.gap)
-            release(store.table, watch, memory, origin - LISTED, tracked)
+        if is_listed:
+            give_up(manager, p, extremum, HANDED_OFF, LOST, tracked)
         extremum.origin = USELESS
 
 
 @kernel(inner=True)
-def any_deep(extrema, count):
-    """Whether any root is deeper than rounding."""
-    for k in range(count):
-        extremum = extremum_at(extrema, k)
+def any_deep(extrema):
+    """Whether any extremum is deeper than rounding."""
+    for k in range(extrema.count[0]):
+        extremum = extremum_at(extrema.rows, k)
         if extremum.gap < -ROUNDING and extremum.origin != USELESS:
             return True
     return False

@@ -102,10 +102,10 @@ def into_near_singular(store, f, g, pose, x, half):
     on_f = False
     for _ in range(STEPS):
         step = across_near_singular(store, f, g, pose, x)
-        found, there, bend, on_f, along = step.found, step.there, step.bend, step.on_f, step.along
-        if not found or not is_beside(store, (f, g), there, start, half, 1.0):
+        on_f, along = step.on_f, step.along
+        if not step.found or not is_beside(store, (f, g), step.there, start, half, 1.0):
             return False, x, on_f, along
-        x = there
-        if bend <= ARRIVED:
+        x = step.there
+        if step.bend <= ARRIVED:
             return True, x, on_f, along
     return False, x, on_f, along

@@ -16,113 +16,110 @@ from assembly.proximity.brep.records import FACE, FACE_RECORD, shell_at
 from assembly.proximity.features.holding import HELD_F, HELD_G
 from assembly.proximity.features.region_tests import is_feasible
 from assembly.proximity.features.solid_contact import pair_parameters
-from assembly.proximity.manager.extrema import (
-    NEW,
-    ROOT,
-    USELESS,
-    extremum_at,
-)
+from assembly.proximity.manager.extrema import NEW, ROOT, USELESS, extremum_at
 from assembly.proximity.manager.near_singular import across_near_singular, into_near_singular
 
 # Cosine of the angle by which a valley turns from one of its points that are held to the next.
 APART = 0.5
 # Points nearer than this, in parts of the scene's size, are along each other whichever way.
 NEAR = 1e-3
-# A root this near to a fold, det H over |H|^2, is one of a continuum as far as Newton's method can tell.
+# An extremum this near to a fold, det H over |H|^2, is one of a continuum as far as Newton's method can tell.
 CONTINUUM = 1e-6
 
 
 @kernel(inner=True)
-def is_of_faces(table, posed, code_f, code_g):
+def is_of_faces(posed, codes):
     """Whether both features are faces."""
-    return feature_kind(table, posed.shells[0], code_f) == FACE and feature_kind(table, posed.shells[1], code_g) == FACE
+    table, shells = posed.store.table, posed.shells
+    return feature_kind(table, shells[0], codes[0]) == FACE and feature_kind(table, shells[1], codes[1]) == FACE
+
+
+@kernel(inline=True)
+def features_of(posed, codes):
+    """The records of a feature of f and of one of g."""
+    table, shells = posed.store.table, posed.shells
+    return feature_at(table, shells[0], codes[0]), feature_at(table, shells[1], codes[1])
 
 
 @kernel(inner=True)
-def is_loose(extrema, k):
-    """Whether a root is any one of a continuum, where it is by chance."""
-    extremum = extremum_at(extrema, k)
+def is_loose(extremum):
+    """Whether an extremum is any one of a continuum, where it is by chance."""
     return extremum.corner == 0.0 and abs(extremum.fold) <= CONTINUUM
 
 
 @kernel(inner=True)
-def is_next_in_near_singular(store, posed, codes, surfaces, x, along, extrema, count):
+def is_next_in_near_singular(posed, codes, surfaces, x, along, extrema, count):
     """Whether the point at x of a valley between two faces is to be held; `along` is the valley's direction there.
 
     So it is where the valley has turned far from all of the points that are known between these faces, or where these
     lie beside it rather than along it, in another valley.
     """
+    store = posed.store
     p = surface_point(store.table, store.pool, surfaces[0], x[0], x[1])[0]
     for k in range(count):
-        extremum = extremum_at(extrema, k)
+        extremum = extremum_at(extrema.rows, k)
         alike = extremum.code_f == codes[0] and extremum.code_g == codes[1]
-        if alike and extremum.origin != USELESS and not is_loose(extrema, k):
+        if alike and extremum.origin != USELESS and not is_loose(extremum):
             y = pair_parameters(extremum)
             step = across_near_singular(store, surfaces[0], surfaces[1], posed.pose, y)
-            found, other = step.found, step.along
             way = sub(p, surface_point(store.table, store.pool, surfaces[0], y[0], y[1])[0])
             square = dot(way, way)
             part = dot(way, along)
-            if found and dot(along, other) > APART and 2.0 * part * part >= square - NEAR * NEAR:
+            if step.found and dot(along, step.along) > APART and 2.0 * part * part >= square - NEAR * NEAR:
                 return False
     return True
 
 
 @kernel(inner=True)
-def is_left_out(store, posed, extrema, k):
-    """Whether root k, behind all that stay, is of a continuum and next to what is held; if not, it is held."""
-    extremum = extremum_at(extrema, k)
+def is_left_out(posed, extrema, k):
+    """Whether extremum k, behind all that stay, is of a continuum and next to what is held; if not, it is held."""
+    extremum = extremum_at(extrema.rows, k)
     codes = (np.int64(extremum.code_f), np.int64(extremum.code_g))
-    if (
-        extremum.origin == USELESS
-        or not is_loose(extrema, k)
-        or not is_of_faces(store.table, posed, codes[0], codes[1])
-    ):
+    if extremum.origin == USELESS or not is_loose(extremum) or not is_of_faces(posed, codes):
         return False
-    surfaces = (feature_at(store.table, posed.shells[0], codes[0]), feature_at(store.table, posed.shells[1], codes[1]))
+    surfaces = features_of(posed, codes)
     x = pair_parameters(extremum)
-    step = across_near_singular(store, surfaces[0], surfaces[1], posed.pose, x)
-    found, on_f, along = step.found, step.on_f, step.along
-    if not found:
+    step = across_near_singular(posed.store, surfaces[0], surfaces[1], posed.pose, x)
+    if not step.found:
         return False
-    if extremum.origin == NEW and not is_next_in_near_singular(store, posed, codes, surfaces, x, along, extrema, k):
+    if extremum.origin == NEW and not is_next_in_near_singular(posed, codes, surfaces, x, step.along, extrema, k):
         return True
-    extremum.corner = HELD_F if on_f else HELD_G
+    extremum.corner = HELD_F if step.on_f else HELD_G
     return False
 
 
 @kernel(inner=True)
-def hold_continua(store, posed, extrema, count):
-    """Of a continuum of roots along a valley between two faces, hold those that are listed and few of the new ones.
+def hold_continua(posed, extrema):
+    """Of a continuum of extrema along a valley between two faces, hold those that are listed and few of the new ones.
 
     What Newton's method finds there are as many as it has starts, and may fill the room; one that is not next to what
-    is held is left out. Returns how many roots there are then.
+    is held is left out.
     """
+    rows = extrema.rows
     stay = 0
-    for k in range(count):
+    for k in range(extrema.count[0]):
         for l in range(ROOT):
-            extrema[stay, l] = extrema[k, l]
+            rows[stay, l] = rows[k, l]
         stay += 1
-        if is_left_out(store, posed, extrema, stay - 1):
+        if is_left_out(posed, extrema, stay - 1):
             stay -= 1
-    return stay
+    extrema.count[0] = stay
 
 
 @kernel(inner=True)
-def is_on_face(store, posed, codes, side, x):
+def is_on_face(posed, codes, side, x):
     """Whether the point at x of the face of one side is one of the body, within its boundary."""
-    face = shell_at(store.table, posed.shells[side]).face_table + FACE_RECORD * codes[side]
-    return is_feasible(store, FACE, face, x[2 * side], x[2 * side + 1])
+    face = shell_at(posed.store.table, posed.shells[side]).face_table + FACE_RECORD * codes[side]
+    return is_feasible(posed.store, FACE, face, x[2 * side], x[2 * side + 1])
 
 
 @kernel(inner=True)
-def sunk(store, posed, codes, held, x):
+def sunk(posed, codes, held, x):
     """Where the bottom of the valley is, between two faces, across which x is; x where there is none in the faces.
 
     `held` says of which face it holds a point, HELD_F or HELD_G.
     """
-    f = feature_at(store.table, posed.shells[0], codes[0])
-    g = feature_at(store.table, posed.shells[1], codes[1])
+    f, g = features_of(posed, codes)
     wide = (math.inf, math.inf, math.inf, math.inf)
-    found, there, _on_f, _along = into_near_singular(store, f, g, posed.pose, x, wide)
-    return there if found and is_on_face(store, posed, codes, 0 if held == HELD_F else 1, there) else x
+    found, there, _on_f, _along = into_near_singular(posed.store, f, g, posed.pose, x, wide)
+    return there if found and is_on_face(posed, codes, 0 if held == HELD_F else 1, there) else x

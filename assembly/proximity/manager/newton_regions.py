@@ -1,4 +1,4 @@
-"""Whether a pair of patches has a root that is known, or one to which Newton's method stays near where it starts.
+"""Whether a pair of patches has an extremum that is known, or one to which Newton's method stays near where it starts.
 
 The patches of two bodies that face each other are tiles of where they may touch. What is in a tile is found from its
 middle in a few steps; a sequence that leaves it, and those beside it, is on its way to what other tiles have.
@@ -13,13 +13,13 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.splines.domain import is_within
-from assembly.proximity.bvh.tree import ELEMENT, element_at, tree_at
 from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_frame, pair_step
 from assembly.proximity.extrema.pair_matrix import across_first, pair_matrix
 from assembly.proximity.extrema.singular import ALONE, BESIDE, fold_beyond
 from assembly.proximity.features.holding import POINT
 from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.extrema import extremum_at, is_alone
+from assembly.proximity.manager.overlap import patch_at
 
 # Steps; and below so many radians, that a step turns a normal, it is as good as there.
 STEPS, CLOSE = 6, 0.02
@@ -40,10 +40,9 @@ PASSED = size_of(NEWTON_WAY)
 
 
 @kernel(inline=True)
-def half_widths(store, trees, pair):
-    """Half the widths, in parameters, of the patches of a pair of elements."""
-    f = element_at(store.pool, tree_at(store.table, trees[0]).element_pool + ELEMENT * pair[0])
-    g = element_at(store.pool, tree_at(store.table, trees[1]).element_pool + ELEMENT * pair[1])
+def half_widths(posed, e, d):
+    """Half the widths, in parameters, of the patches e of f and d of g."""
+    f, g = patch_at(posed, 0, e), patch_at(posed, 1, d)
     return (f.half[0], f.half[1], g.half[0], g.half[1])
 
 
@@ -57,44 +56,45 @@ def is_beside(store, surfaces, x, y, half, part):
 
 
 @kernel(inner=True)
-def is_known(store, posed, e, d, extrema, count):
-    """The features of elements e and d, the parameters of their middles, whether a known root is all there is.
+def is_known(posed, e, d, extrema):
+    """The features of elements e and d, the parameters of their middles, whether a known extremum is all there is.
 
-    And whether one is there that is near a fold, on this side of a knot line or beyond: a second root may be beside it.
+    And whether one is there that is near a fold, on this side of a knot line or beyond: a second extremum may be beside
+    it.
     """
-    f = element_at(store.pool, tree_at(store.table, posed.trees[0]).element_pool + ELEMENT * e)
-    g = element_at(store.pool, tree_at(store.table, posed.trees[1]).element_pool + ELEMENT * d)
+    f, g = patch_at(posed, 0, e), patch_at(posed, 1, d)
     codes = (np.int64(f.feature), np.int64(g.feature))
     start = (f.middle[0], f.middle[1], g.middle[0], g.middle[1])
-    half = half_widths(store, posed.trees, (e, d))
+    half = half_widths(posed, e, d)
     folds = False
-    for k in range(count):
-        extremum = extremum_at(extrema, k)
+    for k in range(extrema.count[0]):
+        extremum = extremum_at(extrema.rows, k)
         if extremum.code_f != codes[0] or extremum.code_g != codes[1]:
             continue
         if not extremum.fold > ALONE or extremum.corner >= POINT:
-            # A point that stays where it is is no root: where the edge, or the face, is nearest may be beside it.
+            # A point that stays where it is is no extremum: where the edge, or the face, is nearest may be beside it.
             continue
         x = pair_parameters(extremum)
-        if not is_beside(store, posed.surfaces, x, start, half, BESIDE):
+        if not is_beside(posed.store, posed.surfaces, x, start, half, BESIDE):
             continue
         if posed.surfaces[0] >= 0 and math.isnan(extremum.beyond):
             # Beyond a knot line curvatures may be others.
-            extremum.beyond = fold_beyond(store, posed, x, half)
-        if is_alone(extrema, k):
+            extremum.beyond = fold_beyond(posed.store, posed, x, half)
+        if is_alone(extremum):
             return codes, start, True, False
         folds = True
     return codes, start, False, folds
 
 
 @kernel(inner=True)
-def stays(store, surfaces, pose, start, half, passed, count):
+def stays(posed, start, half, passed, count):
     """Whether Newton's method from `start` stays beside it, within BESIDE times half widths in (u, v) and (s, t).
 
     Returns STAYED or LEFT, or which of the `count` sequences in `passed` (n, PASSED) it goes along with; where it came
     to; and how many sequences there are now.
     """
-    f, g = surfaces[0], surfaces[1]
+    store, surfaces, pose = posed.store, posed.surfaces, posed.pose
+    f, g = surfaces
     x = start
     for step in range(STEPS):
         frame = pair_frame(store, f, g, pose, x)

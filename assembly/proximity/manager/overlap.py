@@ -1,4 +1,4 @@
-"""Whether two bodies are in each other, whatever extrema there are, and which roots are of far sides: by facets.
+"""Whether two bodies are in each other, whatever extrema there are, and which extrema are of far sides: by facets.
 
 A patch whose middle is inside the other body says so by its foot there, where nothing is between the two; a part of an
 edge that goes through a face does (`proximity/manager/edge_piercing.py`). A segment is inside a body or outside by how
@@ -27,12 +27,12 @@ from assembly.proximity.bvh.tree import (
     node_at,
     node_links_at,
     overlapping,
+    three_of,
     tree_at,
 )
 from assembly.proximity.extrema.projection import projection_of
 from assembly.proximity.extrema.singular import BESIDE
 from assembly.proximity.manager.edge_piercing import cut_at, patch_vertex_contacts, pierces
-from assembly.proximity.manager.extrema import extremum_at
 
 # Room for the descent of a segment.
 DEPTH = 256
@@ -67,20 +67,24 @@ def meets_box(pool, o, a, d):
 
 
 @kernel(inner=True)
-def surface_of(table, shell, surface, code):
-    """The surface record of an element's feature, or -1 where it is no face."""
+def surface_of(posed, side, code):
+    """The surface record of a feature of one body, or -1 where it is no face."""
+    surface, shell = posed.surfaces[side], posed.shells[side]
     if surface >= 0:
         return surface
+    table = posed.store.table
     return feature_at(table, shell, code) if code < shell_at(table, shell).faces else -1
 
 
 @kernel(inner=True)
-def in_trim(store, shell, code, u, v):
+def in_trim(posed, side, code, u, v):
     """Whether parameters are within the boundary of a face or on it; of a surface without one they always are."""
+    shell = posed.shells[side]
     if shell < 0:
         return True
-    trim = face_at(store.table, shell_at(store.table, shell).face_table + FACE_RECORD * code).trim
-    return trim < 0 or trim_side(store, trim, u, v) >= 0
+    table = posed.store.table
+    trim = face_at(table, shell_at(table, shell).face_table + FACE_RECORD * code).trim
+    return trim < 0 or trim_side(posed.store, trim, u, v) >= 0
 
 
 @kernel(inline=True)
@@ -93,13 +97,38 @@ def with_children(stack, used, child):
     return used + 2
 
 
+@kernel(inner=True)
+def next_near(store, tree, y, distance, stack, used):
+    """The next element of a tree whose box is within a distance of a point, in its axes, and how many nodes wait then.
+
+    It is -1 where there is none any more. The walk begins with the root, node 0, alone on the stack.
+    """
+    record = tree_at(store.table, tree)
+    while used > 0:
+        used -= 1
+        i = stack[used]
+        o = node_at(store.pool, record.node_pool + NODE * i)
+        square = 0.0
+        for k in range(3):
+            off = max(abs(y[k] - o.center[k]) - o.half[k], 0.0)
+            square += off * off
+        if square > distance * distance:
+            continue
+        child = node_links_at(store.table, record.node_table + NODE_INTS * i).child
+        if child < 0:
+            return -1 - child, used
+        used = with_children(stack, used, child)
+    return np.int64(-1), used
+
+
 @kernel(inner=True, allocates=True)
-def facets_cut(store, tree, surface, shell, a, d, end, beside):
-    """How many facets of a body's faces cut the segment from a to a + d, but for that part at its ends; body axes.
+def facets_cut(posed, side, a, d, end, beside):
+    """How many facets of one body's faces cut the segment from a to a + d, but for that part at its ends; body axes.
 
     Or are beside it, by that part of their sides. And whether the first of them leads out of the body.
     """
-    tree_record = tree_at(store.table, tree)
+    store = posed.store
+    tree = tree_at(store.table, posed.trees[side])
     stack = np.empty(DEPTH, np.int64)
     stack[0] = 0
     used = 1
@@ -109,146 +138,151 @@ def facets_cut(store, tree, surface, shell, a, d, end, beside):
     while used > 0:
         used -= 1
         i = stack[used]
-        if not meets_box(store.pool, tree_record.node_pool + NODE * i, a, d):
+        if not meets_box(store.pool, tree.node_pool + NODE * i, a, d):
             continue
-        at = node_links_at(store.table, tree_record.node_table + NODE_INTS * i)
+        at = node_links_at(store.table, tree.node_table + NODE_INTS * i)
         child = at.child
         if child >= 0:
             used = with_children(stack, used, child)
             continue
         code = at.feature
-        r = surface_of(store.table, shell, surface, code)
+        r = surface_of(posed, side, code)
         if r < 0:
             continue
-        e = tree_record.element_pool + ELEMENT * (-1 - child)
+        e = tree.element_pool + ELEMENT * (-1 - child)
         (u, v, wide, high), (p, q, s, t) = patch_vertex_contacts(store, r, element_at(store.pool, e))
         for k in range(2):
             cut = cut_at(a, d, p, q if k == 0 else s, s if k == 0 else t, end, beside)
-            hit, way, x, y, along = cut.hit, cut.part, cut.q, cut.r, cut.turns
+            x, y = cut.q, cut.r
             here = (u + (x + y if k == 0 else x) * wide, v + (y if k == 0 else x + y) * high)
-            if hit and in_trim(store, shell, code, here[0], here[1]):
+            if cut.hit and in_trim(posed, side, code, here[0], here[1]):
                 count += 1
-                if way < first:
-                    first = way
-                    leaves = along == (surface_at(store.table, r).sign > 0)
+                if cut.part < first:
+                    first = cut.part
+                    leaves = cut.turns == (surface_at(store.table, r).sign > 0)
     return count, leaves
 
 
+@kernel(inline=True)
+def patch_at(posed, side, e):
+    """Element e of one body."""
+    return element_at(posed.store.pool, tree_at(posed.store.table, posed.trees[side]).element_pool + ELEMENT * e)
+
+
 @kernel(inner=True)
-def projection_at(store, tree, surface, shell, e, y):
-    """The signed distance of a point from its foot at a body's element e, the normal there, and whether there is one.
+def projection_at(posed, side, e, y):
+    """The signed distance of a point from its foot at one body's element e, the normal there, and whether there is one.
 
     A foot that Newton's method did not reach is none: off the foot of a point outside, the tangent plane of a bulge has
     it inside. One farther off than BESIDE may be on the far side.
     """
-    patch = element_at(store.pool, tree_at(store.table, tree).element_pool + ELEMENT * e)
+    store = posed.store
+    patch = patch_at(posed, side, e)
     code = np.int64(patch.feature)
-    f = surface_of(store.table, shell, surface, code)
+    f = surface_of(posed, side, code)
     if f < 0:
         return 0.0, y, False
     u, v = patch.middle[0], patch.middle[1]
-    s, t, distance, n, settled = projection_of(store, f, y, u, v)
+    foot = projection_of(store, f, y, u, v)
     for _ in range(PROJECTIONS):
-        if settled:
+        if foot.settled:
             break
-        s, t, distance, n, settled = projection_of(store, f, y, s, t)
+        foot = projection_of(store, f, y, foot.parameters[0], foot.parameters[1])
+    s, t = foot.parameters
     beside = is_within(store, f, s, t, u, v, BESIDE * patch.half[0], BESIDE * patch.half[1])
-    return distance, n, settled and beside and in_trim(store, shell, code, s, t)
+    return foot.distance, foot.normal, foot.settled and beside and in_trim(posed, side, code, s, t)
 
 
 @kernel(inner=True, allocates=True)
-def nearest_projection(store, tree, surface, shell, y, reach):
-    """The signed distance of a point from its nearest foot on a body; minus the reach if none is nearer than that."""
-    tree_record = tree_at(store.table, tree)
+def nearest_projection(posed, side, y, most):
+    """The signed distance of a point from its nearest foot on one body; minus `most` if none is nearer than that."""
     stack = np.empty(DEPTH, np.int64)
     stack[0] = 0
     used = 1
-    nearest = -reach
+    nearest = -most
     while used > 0:
-        used -= 1
-        i = stack[used]
-        o = node_at(store.pool, tree_record.node_pool + NODE * i)
-        square = 0.0
-        for k in range(3):
-            off = max(abs(y[k] - o.center[k]) - o.half[k], 0.0)
-            square += off * off
-        if square > nearest * nearest:
-            continue
-        child = node_links_at(store.table, tree_record.node_table + NODE_INTS * i).child
-        if child >= 0:
-            used = with_children(stack, used, child)
-            continue
-        distance, _n, some = projection_at(store, tree, surface, shell, -1 - child, y)
+        e, used = next_near(posed.store, posed.trees[side], y, nearest, stack, used)
+        if e < 0:
+            break
+        distance, _n, some = projection_at(posed, side, e, y)
         if some and abs(distance) < abs(nearest):
             nearest = distance
     return nearest
 
 
 @kernel(inner=True)
-def is_inside_at(store, tree, surface, shell, e, y, margin, offset):
-    """Whether a point is farther than a margin inside a body, by its foot at element e.
+def is_inside_at(posed, side, e, y, margin):
+    """Whether a point is farther than a margin inside one body, by its foot at element e.
 
     Of a thin wall the foot may be on the far side. Then one on the near side is nearer, or, where that is past an edge,
-    a facet is between; these are up to an `offset` beside their surfaces.
+    a facet is between; these are up to an offset beside their surfaces.
     """
-    distance, n, some = projection_at(store, tree, surface, shell, e, y)
+    offset = posed.offsets[side]
+    distance, n, some = projection_at(posed, side, e, y)
     if not (some and distance < -margin):
         return False
-    if nearest_projection(store, tree, surface, shell, y, -distance) >= -margin:
+    if nearest_projection(posed, side, y, -distance) >= -margin:
         return False
     if -distance <= 2.0 * offset:
         return True
-    return facets_cut(store, tree, surface, shell, y, scale(-distance, n), offset / -distance, 0.0)[0] == 0
+    return facets_cut(posed, side, y, scale(-distance, n), offset / -distance, 0.0)[0] == 0
 
 
-@kernel(inner=True)
-def is_deep(store, posed, e, d, margin, offsets):
-    """Whether the middle of a patch of f is farther than a margin inside g at a patch, or the other way round."""
+@kernel(inline=True)
+def seen_by_other(posed, side, a):
+    """A point of one body in the axes of the other one."""
     turn, shift = posed.pose.rotation, posed.pose.shift
-    tree_f, tree_g = posed.trees
-    f, g = posed.surfaces
-    shell_f, shell_g = posed.shells
-    a, some = middle(store, tree_f, f, shell_f, e)
-    a = matvec_t(turn, sub(a, shift))
-    if some and is_inside_at(store, tree_g, g, shell_g, d, a, margin, offsets[1]):
-        return True
-    b, some = middle(store, tree_g, g, shell_g, d)
-    b = add(matvec(turn, b), shift)
-    return some and is_inside_at(store, tree_f, f, shell_f, e, b, margin, offsets[0])
+    return matvec_t(turn, sub(a, shift)) if side == 0 else add(matvec(turn, a), shift)
 
 
 @kernel(inner=True)
-def middle(store, tree, surface, shell, e):
+def is_deep(posed, e, d, margin):
+    """Whether the middle of a patch of f is farther than a margin inside g at a patch, or the other way round."""
+    a, some = middle(posed, 0, e)
+    if some and is_inside_at(posed, 1, d, seen_by_other(posed, 0, a), margin):
+        return True
+    b, some = middle(posed, 1, d)
+    return some and is_inside_at(posed, 0, e, seen_by_other(posed, 1, b), margin)
+
+
+@kernel(inner=True)
+def middle(posed, side, e):
     """The middle of a patch, in the axes of its body, and whether it is one of a face and within its boundary."""
-    patch = element_at(store.pool, tree_at(store.table, tree).element_pool + ELEMENT * e)
+    store = posed.store
+    patch = patch_at(posed, side, e)
     code = np.int64(patch.feature)
-    f = surface_of(store.table, shell, surface, code)
-    if f < 0 or not in_trim(store, shell, code, patch.middle[0], patch.middle[1]):
+    f = surface_of(posed, side, code)
+    if f < 0 or not in_trim(posed, side, code, patch.middle[0], patch.middle[1]):
         return (0.0, 0.0, 0.0), False
     return surface_point(store.table, store.pool, f, patch.middle[0], patch.middle[1])[0], True
 
 
+@kernel(inline=True)
+def is_patch(posed, side, e):
+    """Whether an element of one body is of a face."""
+    shell = posed.shells[side]
+    return shell < 0 or patch_at(posed, side, e).feature < shell_at(posed.store.table, shell).faces
+
+
 @kernel(inner=True)
-def below_part(store, tree, surface, shell, k, below):
+def below_part(posed, side, k, below):
     """A point `below` the middle of a patch in the k-th of three parts of a body's patches, and whether there is one.
 
     The parts are of different faces, if there are some: a point of a face that touches may be taken for inside.
     """
-    tree_record = tree_at(store.table, tree)
-    solid = shell_at(store.table, shell)
-    first = tree_record.element_pool
-    elements = tree_record.elements
+    store = posed.store
+    elements = tree_at(store.table, posed.trees[side]).elements
     patches = 0
     for e in range(elements):
-        patches += int(shell < 0 or element_at(store.pool, first + ELEMENT * e).feature < solid.faces)
+        patches += int(is_patch(posed, side, e))
     passed = 0
     for e in range(elements):
-        if shell < 0 or element_at(store.pool, first + ELEMENT * e).feature < solid.faces:
+        if is_patch(posed, side, e):
             if passed >= patches * k // 3:
-                a, some = middle(store, tree, surface, shell, e)
+                a, some = middle(posed, side, e)
                 if some:
-                    patch = element_at(store.pool, first + ELEMENT * e)
-                    f = surface_of(store.table, shell, surface, np.int64(patch.feature))
+                    patch = patch_at(posed, side, e)
+                    f = surface_of(posed, side, np.int64(patch.feature))
                     _p, su, sv, _uu, _uv, _vv = surface_point(
                         store.table, store.pool, f, patch.middle[0], patch.middle[1]
                     )
@@ -258,18 +292,17 @@ def below_part(store, tree, surface, shell, k, below):
 
 
 @kernel(inner=True)
-def is_wholly_inside(store, posed, side, below):
+def is_wholly_inside(posed, side, below):
     """Whether f (side 0) is wholly inside g, or g in f: by rays, each another way, from three points `below` it."""
-    turn, shift = posed.pose.rotation, posed.pose.shift
+    store = posed.store
     tree, other = posed.trees[side], posed.trees[1 - side]
-    surface, shell = posed.surfaces[side], posed.shells[side]
     # Some direction that no face is likely to lie along, and far enough.
     far = 10.0 * (
         node_at(store.pool, tree_at(store.table, tree).node_pool).radius
         + node_at(store.pool, tree_at(store.table, other).node_pool).radius
     )
     for k in range(3):
-        a, some = below_part(store, tree, surface, shell, k, below)
+        a, some = below_part(posed, side, k, below)
         if not some:
             return False
         ray = (0.6012 * far, 0.3517 * far, 0.7174 * far)
@@ -277,8 +310,7 @@ def is_wholly_inside(store, posed, side, below):
             ray = scale(-1.0, ray)
         elif k == 2:
             ray = (0.5218 * far, -0.8125 * far, -0.2601 * far)
-        a = matvec_t(turn, sub(a, shift)) if side == 0 else add(matvec(turn, a), shift)
-        cut, leaves = facets_cut(store, other, posed.surfaces[1 - side], posed.shells[1 - side], a, ray, 0.0, 0.0)
+        cut, leaves = facets_cut(posed, 1 - side, seen_by_other(posed, side, a), ray, 0.0, 0.0)
         # In a bore that is open at its ends a ray goes into the material.
         if cut % 2 == 0 or not leaves:
             return False
@@ -286,43 +318,31 @@ def is_wholly_inside(store, posed, side, below):
 
 
 @kernel(inner=True)
-def crosses(store, posed, stack, candidates, margin, offsets):
-    """Whether two bodies are in each other by more than a margin, or wholly, whatever extrema there are.
-
-    Facets of f and of g are up to `offsets` beside their surfaces.
-    """
-    count = overlapping(store, posed.trees[0], posed.trees[1], posed.pose, stack, candidates)
+def crosses(posed, stack, candidates, margin):
+    """Whether two bodies are in each other by more than a margin, or wholly, whatever extrema there are."""
+    count = overlapping(posed.store, posed.trees, posed.pose, stack, candidates)
     for c in range(count):
-        if is_deep(store, posed, candidates[c, 0], candidates[c, 1], margin, offsets):
+        if is_deep(posed, candidates[c, 0], candidates[c, 1], margin):
             return True
-        if posed.surfaces[0] < 0 and pierces(store, posed, (candidates[c, 0], candidates[c, 1]), margin, offsets):
+        if posed.surfaces[0] < 0 and pierces(posed, (candidates[c, 0], candidates[c, 1]), margin):
             return True
-    return is_wholly_inside(store, posed, 0, BELOW + 2.0 * offsets[1]) or is_wholly_inside(
-        store, posed, 1, BELOW + 2.0 * offsets[0]
+    return is_wholly_inside(posed, 0, BELOW + 2.0 * posed.offsets[1]) or is_wholly_inside(
+        posed, 1, BELOW + 2.0 * posed.offsets[0]
     )
 
 
 @kernel(inner=True)
-def is_outside(store, posed, extrema, k, offsets):
-    """Whether root k, of a negative gap, is one of far sides: then a surface is between its points.
+def is_outside(posed, extremum):
+    """Whether an extremum with a negative gap is one of far sides: then a surface is between its points.
 
-    Facets of f and of g are up to `offsets` beside their surfaces; gaps of no more are taken for true.
+    Gaps of no more than facets are beside their surfaces are taken for true.
     """
-    extremum = extremum_at(extrema, k)
     depth = -extremum.gap
-    turn, shift = posed.pose.rotation, posed.pose.shift
-    a = (extremum.point_f[0], extremum.point_f[1], extremum.point_f[2])
-    b = (extremum.point_g[0], extremum.point_g[1], extremum.point_g[2])
-    end = offsets[0] / depth
-    if (
-        end < 0.5
-        and facets_cut(store, posed.trees[0], posed.surfaces[0], posed.shells[0], a, sub(b, a), end, BETWEEN)[0] > 0
-    ):
-        return True
-    a = matvec_t(turn, sub(a, shift))
-    b = matvec_t(turn, sub(b, shift))
-    end = offsets[1] / depth
-    return (
-        end < 0.5
-        and facets_cut(store, posed.trees[1], posed.surfaces[1], posed.shells[1], a, sub(b, a), end, BETWEEN)[0] > 0
-    )
+    a, b = three_of(extremum.point_f), three_of(extremum.point_g)
+    for side in range(2):
+        end = posed.offsets[side] / depth
+        if side == 1:
+            a, b = seen_by_other(posed, 0, a), seen_by_other(posed, 0, b)
+        if end < 0.5 and facets_cut(posed, side, a, sub(b, a), end, BETWEEN)[0] > 0:
+            return True
+    return False

@@ -10,26 +10,31 @@ from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.kinematics.motion import relative_pose, rotation
+from assembly.proximity.manager.records import pair_lengths_of, pair_of, record_of
 
-# pose: of g seen from f, shift in lengths over the scene's size.
+# store: table and pool of the scene. pose: of g seen from f, shift in lengths over the scene's size.
 # surfaces: records of the two surfaces, -1 both where the bodies are B-rep bodies.
 # shells: records of the two B-rep bodies, -1 both where the bodies are surfaces.
 # trees: records of the trees of patches. centerlines: records of those of two round wires, -1 both of other bodies.
+# offsets: how far facets of the two are beside their surfaces at most.
 # bodies: their rows in poses, (n, 7). track_solids: address of `features/solid_contact.track_solids`.
-PosedPair = namedtuple("PosedPair", "pose surfaces shells trees centerlines bodies poses track_solids")
+PosedPair = namedtuple("PosedPair", "store pose surfaces shells trees centerlines offsets bodies poses track_solids")
 
 
 @kernel(inline=True)
-def posed_pair(manager, pair, q):
-    """The bodies of a pair of the contact manager, records of both, at the poses q."""
+def posed_pair(manager, p, q):
+    """The bodies of pair p of a contact manager at the poses q: for kernels that make no arrays."""
+    pair, lengths = pair_of(manager, p), pair_lengths_of(manager, p)
     i, j = pair.body_f, pair.body_g
     return PosedPair(
+        store=manager.store,
         pose=relative_pose(q, i, rotation(q, i), j, rotation(q, j)),
         surfaces=(pair.surface_f, pair.surface_g),
         shells=(pair.shell_f, pair.shell_g),
         trees=(pair.tree_f, pair.tree_g),
         centerlines=(pair.spine_f, pair.spine_g),
+        offsets=(lengths.offset[0], lengths.offset[1]),
         bodies=(i, j),
         poses=q,
-        track_solids=manager.track_solids,
+        track_solids=record_of(manager).track_solids,
     )

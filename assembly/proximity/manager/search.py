@@ -1,16 +1,16 @@
-"""The search of a look for contacts that are not known: minima of the distance from the middles of patches.
+"""The search of an update for contacts that are not known: minima of the distance from the middles of patches.
 
 Most pairs of patches that face each other have none of their own: one that is known is all there is, or Newton's method
-goes where it went from others. Where none is found a motion may bring one forth. Near a fold, where two roots merge,
+goes where it went from others. Where none is found a motion may bring one forth. Near a fold, where two extrema merge,
 starts are led down the slope of the gap as well.
 """
 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, dot, matvec, scale, sub
 from assembly.proximity.extrema.projection import slide_down
 from assembly.proximity.manager.candidates import around, element_ball
 from assembly.proximity.manager.extrema import (
@@ -22,120 +22,106 @@ from assembly.proximity.manager.extrema import (
     add_extremum,
     extremum_at,
     is_alone,
+    is_full,
 )
-from assembly.proximity.manager.motion_bounds import MotionBall, PairSearch
+from assembly.proximity.manager.motion_bounds import PairSearch, ball_about
 from assembly.proximity.manager.newton_regions import LEFT, half_widths, is_known, newton_way_at, stays
 from assembly.proximity.manager.overlap import is_outside
 
-# Starts that a look leads down the slope of the gap, because Newton's method found no minimum from there.
+# Starts that an update leads down the slope of the gap, because Newton's method found no minimum from there.
 SLIDES_A_LOOK = 6
 
 
-@kernel(inner=True)
-def search_candidate(store, posed, e, d, merge_radius, extrema, count, work, passed, state):
-    """Look for a root of the patches e of f and d of g that is not known.
+# How far a search has come. folding: whether an extremum is near a fold; visited: how many ways of Newton's method are
+# remembered; slides: how many starts went down a slope.
+Progress = namedtuple("Progress", "folding visited slides")
+# Limits of a search. curved_bound: the curvature-limited motion bound; enough: how near is near enough to look into;
+# span: of gaps of new minima; merge_radius: extrema nearer to each other are one.
+Limits = namedtuple("Limits", "curved_bound enough span merge_radius")
 
-    Returns how many roots there are; which one is a new minimum, or -1; whether a motion may bring one forth; and the
-    state: whether a root is near a fold, how many ways there are in `passed`, how many starts went down a slope.
+
+@kernel(inner=True)
+def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
+    """Look for an extremum of the patches e of f and d of g that is not known.
+
+    Returns which one is a new minimum, or -1; whether a motion may bring one forth; and the Progress.
     """
-    folding, visited, slides = state
-    codes, start, inside, folds = is_known(store, posed, e, d, extrema, count)
+    folding, visited, slides = progress
+    codes, start, inside, folds = is_known(posed, e, d, extrema)
     folding = folding or folds
     if inside:
-        return count, -1, False, (folding, visited, slides)
+        return -1, False, Progress(folding, visited, slides)
     smooth = posed.surfaces[0] >= 0
-    before = count
+    before = extrema.count[0]
     stayed, near, half, mine = True, start, (0.0, 0.0, 0.0, 0.0), visited
     if smooth:
-        half = half_widths(store, posed.trees, (e, d))
-        way, near, visited = stays(store, posed.surfaces, posed.pose, start, half, passed, visited)
+        half = half_widths(posed, e, d)
+        way, near, visited = stays(posed, start, half, passed, visited)
         stayed = way != LEFT
         if way >= 0:
-            return count, -1, folding or newton_way_at(passed, way).barren == 1.0, (folding, visited, slides)
+            return -1, folding or newton_way_at(passed, way).barren == 1.0, Progress(folding, visited, slides)
     result = NOTHING
     if stayed or not folding:
-        # Where nothing folds, it tells whether it goes to a root that is known.
-        count, result = add_extremum(
-            store, posed, codes, near, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, 0.0
-        )
-    if count > before:
-        folding = folding or not is_alone(extrema, before)
-    minimum = result == MINIMUM_FOUND or (result == ALIKE and extremum_at(extrema, count).fold > 0.0)
+        # Where nothing folds, it tells whether it goes to an extremum that is known.
+        result = add_extremum(posed, codes, near, (0.0, 0.0, 0.0), merge_radius, extrema, 0.0)
+    if extrema.count[0] > before:
+        folding = folding or not is_alone(extremum_at(extrema.rows, before))
+    minimum = result == MINIMUM_FOUND or (result == ALIKE and extremum_at(extrema.rows, extrema.count[0]).fold > 0.0)
     if folding and smooth and stayed and not minimum and slides < SLIDES_A_LOOK:
         # Near a fold Newton's method may go to the saddle, past the minimum beside it.
-        if count > before:
+        if extrema.count[0] > before:
             before += 1
         slides += 1
-        stride = element_ball(store, posed.trees[0], e)[1]
-        start, stayed = slide_down(store, posed.surfaces[0], posed.surfaces[1], posed.pose, start, stride, half)
-        if stayed and count < extrema.shape[0]:
-            count, result = add_extremum(
-                store, posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, 0.0
-            )
+        stride = element_ball(posed.store, posed.trees[0], e)[1]
+        start, stayed = slide_down(posed.store, posed.surfaces[0], posed.surfaces[1], posed.pose, start, stride, half)
+        if stayed and not is_full(extrema):
+            result = add_extremum(posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, 0.0)
+    progress = Progress(folding, visited, slides)
     if result == ALIKE and not folding:
-        # On the slopes around a root that is known.
-        return count, -1, False, (folding, visited, slides)
-    if count == before or result != MINIMUM_FOUND:
-        # Patches that face each other and hold no root of their own.
+        # On the slopes around an extremum that is known.
+        return -1, False, progress
+    if extrema.count[0] == before or result != MINIMUM_FOUND:
+        # Patches that face each other and hold no extremum of their own.
         if visited > mine:
             newton_way_at(passed, mine).barren = 1.0
-        return count, -1, True, (folding, visited, slides)
-    return count, before, False, (folding, visited, slides)
+        return -1, True, progress
+    return before, False, progress
 
 
 @kernel(inner=True)
-def search_patches(
-    store, posed, moving, limits, span, offsets, merge_radius, facing, found, extrema, count, work, passed
-):
-    """Look into `found` pairs of patches for minima that are not known: new ones where their gaps are in a span.
-
-    The `limits` are the flank and how near is near enough to look into. Returns a PairSearch.
-    """
-    flank, enough = limits
-    candidates, distances = facing
-    free = math.inf
+def search_patches(posed, moving, limits, facing, extrema, passed):
+    """Look into pairs of patches, `facing`, for minima that are not known, within Limits. Returns a PairSearch."""
+    curved_bound, enough, span = limits.curved_bound, limits.enough, limits.span
+    rest = math.inf
     fertile = math.inf
     folding = False
-    for k in range(count):
-        folding = folding or not is_alone(extrema, k)
-    state = (folding, 0, 0)
+    for k in range(extrema.count[0]):
+        folding = folding or not is_alone(extremum_at(extrema.rows, k))
+    progress = Progress(folding, 0, 0)
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
-    for c in range(found):
-        if count == extrema.shape[0]:
+    for c in range(facing.found):
+        if is_full(extrema):
             break
-        bound = distances[c]
-        if bound > flank and bound > enough:
-            # Whatever root is there is not near enough for a place, and bounds what the bodies may go;
-            free = min(free, bound)
+        bound = facing.distances[c]
+        if bound > curved_bound and bound > enough:
+            # Whatever extremum is there is not near enough for a slot, and bounds what the bodies may go;
+            rest = min(rest, bound)
             continue
+        e, d = facing.pairs[c, 0], facing.pairs[c, 1]
         if bound > enough:
             # in a crowd, what the ball around it may go.
             new, bears = -1, True
         else:
-            count, new, bears, state = search_candidate(
-                store,
-                posed,
-                candidates[c, 0],
-                candidates[c, 1],
-                merge_radius,
-                extrema,
-                count,
-                work,
-                passed,
-                state,
-            )
-            bound = max(bound, flank)
+            new, bears, progress = search_candidate(posed, e, d, limits.merge_radius, extrema, passed, progress)
+            bound = max(bound, curved_bound)
         if bears:
             fertile = min(fertile, bound)
-            lo, hi = around(store, moving.tree, candidates[c, moving.side], lo, hi)
+            lo, hi = around(posed.store, moving.tree, d if moving.side == 1 else e, lo, hi)
         if new >= 0:
-            gap = extremum_at(extrema, new).gap
+            extremum = extremum_at(extrema.rows, new)
             # The far sides of two bodies oppose each other, too.
-            alien = gap > span[1] or gap < span[0]
-            alien = alien or (gap < 0.0 and is_outside(store, posed, extrema, new, offsets))
-            extremum_at(extrema, new).origin = USELESS if alien else NEW
-    d = sub(hi, lo)
-    center = scale(0.5, add(lo, hi))
-    place = add(matvec(moving.turn, center), moving.shift)
-    return PairSearch(count, free, fertile, MotionBall(center, place, 0.5 * math.sqrt(dot(d, d))), math.inf)
+            alien = extremum.gap > span[1] or extremum.gap < span[0]
+            alien = alien or (extremum.gap < 0.0 and is_outside(posed, extremum))
+            extremum.origin = USELESS if alien else NEW
+    return PairSearch(rest, fertile, ball_about(moving, lo, hi, 0.0), math.inf)

@@ -17,25 +17,20 @@ from assembly.geometry.vec import cross, dot
 from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import EDGE, FACE
-from assembly.proximity.bvh.tree import ELEMENT, element_at, pairs_about, three_of, tree_at
+from assembly.proximity.bvh.tree import pairs_about, three_of
 from assembly.proximity.extrema.feature_jets import edge_jet
 from assembly.proximity.features.holding import FEATURES, HELD_F, HELD_G, POINT, TILT
 from assembly.proximity.features.solid_contact import pair_parameters
-from assembly.proximity.manager.extrema import (
-    NEW,
-    NOTHING,
-    add_extremum,
-    extremum_at,
-    solids_extremum,
-)
+from assembly.proximity.manager.extrema import NEW, NOTHING, add_extremum, extremum_at, is_full, solids_extremum
 from assembly.proximity.manager.near_singular import into_near_singular
 from assembly.proximity.manager.near_singular_points import (
+    features_of,
     hold_continua,
     is_next_in_near_singular,
     is_of_faces,
     is_on_face,
 )
-from assembly.proximity.manager.overlap import is_outside
+from assembly.proximity.manager.overlap import is_outside, patch_at
 
 # Rounding of gaps.
 SLACK = 1e-9
@@ -45,46 +40,49 @@ NEXT, STRAIGHT = 0.75, 0.02
 
 
 @kernel(inner=True)
-def is_vertex_contact(table, posed, code_f, code_g):
+def kinds_of(posed, codes):
+    """What two features are: faces, edges or vertices."""
+    table, shells = posed.store.table, posed.shells
+    return feature_kind(table, shells[0], codes[0]), feature_kind(table, shells[1], codes[1])
+
+
+@kernel(inner=True)
+def is_vertex_contact(posed, codes):
     """Whether two features are a face and no face, or two edges."""
-    f = feature_kind(table, posed.shells[0], code_f)
-    g = feature_kind(table, posed.shells[1], code_g)
+    f, g = kinds_of(posed, codes)
     return (f == EDGE and g == EDGE) or ((f == FACE) != (g == FACE))
 
 
 @kernel(inner=True)
-def hold_extrema(store, posed, extrema, count, work):
-    """Make corners of those roots that are at one: rows that jump from corner to corner hold none of them."""
-    if count == extrema.shape[0]:
+def hold_extrema(posed, extrema):
+    """Make corners of those extrema that are at one: rows that jump from corner to corner hold none of them."""
+    if is_full(extrema):
         return
-    for k in range(count):
-        extremum = extremum_at(extrema, k)
+    for k in range(extrema.count[0]):
+        extremum = extremum_at(extrema.rows, k)
         codes = (np.int64(extremum.code_f), np.int64(extremum.code_g))
-        if (
-            extremum.corner > 0.0
-            or extremum.gap < -SLACK
-            or not is_vertex_contact(store.table, posed, codes[0], codes[1])
-        ):
+        if extremum.corner > 0.0 or extremum.gap < -SLACK or not is_vertex_contact(posed, codes):
             continue
         x, n = pair_parameters(extremum), three_of(extremum.normal)
-        found = solids_extremum(store, posed, codes, x, n, extrema, count, work, FEATURES)
+        found = solids_extremum(posed, codes, x, n, extrema, FEATURES)
         extremum.corner = 0.0 if found == NOTHING else FEATURES
 
 
 @kernel(inner=True)
-def is_next(store, posed, codes, side, start, width, extrema, count):
+def is_next(posed, codes, side, start, width, extrema):
     """Whether the middle of a part of an edge, at `start`, is to be held over the face that the other feature is.
 
     So it is where the edge is bent, and has turned far from all of its points that are known over that face.
     """
+    store = posed.store
     edge = feature_at(store.table, posed.shells[side], codes[side])
     _p, along, bent = edge_jet(store, edge, start[2 * side])
     side_of = cross(along, bent)
     if width * width * dot(side_of, side_of) < STRAIGHT * STRAIGHT * dot(along, along) * dot(along, along):
         return False
     along = unit(along)
-    for k in range(count):
-        extremum = extremum_at(extrema, k)
+    for k in range(extrema.count[0]):
+        extremum = extremum_at(extrema.rows, k)
         if extremum.code_f == codes[0] and extremum.code_g == codes[1]:
             _p, other, _bent = edge_jet(store, edge, extremum.parameters[2 * side])
             if dot(along, unit(other)) > NEXT:
@@ -93,79 +91,61 @@ def is_next(store, posed, codes, side, start, width, extrema, count):
 
 
 @kernel(inner=True)
-def add_vertex_contact(store, posed, codes, start, span, offsets, merge_radius, extrema, count, work, holds):
-    """Add the corner that holds on to two features, or to a point of an edge; how many roots there are then."""
-    before = count
-    extremum = extremum_at(extrema, before)
-    count, _result = add_extremum(
-        store, posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, holds
-    )
-    if count == before:
-        return count
+def add_vertex_contact(posed, codes, start, span, merge_radius, extrema, holds):
+    """Add the corner that holds on to two features, or to a point of an edge."""
+    before = extrema.count[0]
+    extremum = extremum_at(extrema.rows, before)
+    add_extremum(posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, holds)
+    if extrema.count[0] == before:
+        return
     gap = extremum.gap
-    of_edges = (
-        feature_kind(store.table, posed.shells[0], codes[0])
-        == feature_kind(store.table, posed.shells[1], codes[1])
-        == EDGE
-    )
-    stays = (-SLACK if of_edges else span[0]) <= gap <= span[1]
-    if not stays or (gap < -SLACK and is_outside(store, posed, extrema, before, offsets)):
-        return before
-    extremum.origin = NEW
-    return count
+    f, g = kinds_of(posed, codes)
+    stays = (-SLACK if f == g == EDGE else span[0]) <= gap <= span[1]
+    if not stays or (gap < -SLACK and is_outside(posed, extremum)):
+        extrema.count[0] = before
+    else:
+        extremum.origin = NEW
 
 
 @kernel(inner=True)
-def add_near_singular(store, posed, codes, start, half, span, offsets, merge_radius, extrema, count, work):
-    """Hold a point of a valley that crosses a pair of patches of two faces; how many roots there are then."""
-    surfaces = (feature_at(store.table, posed.shells[0], codes[0]), feature_at(store.table, posed.shells[1], codes[1]))
-    found, x, on_f, along = into_near_singular(store, surfaces[0], surfaces[1], posed.pose, start, half)
-    if not found or not is_next_in_near_singular(store, posed, codes, surfaces, x, along, extrema, count):
-        return count
-    if not is_on_face(store, posed, codes, 0 if on_f else 1, x):
-        return count
-    held = HELD_F if on_f else HELD_G
-    return add_vertex_contact(store, posed, codes, x, span, offsets, merge_radius, extrema, count, work, held)
+def add_near_singular(posed, codes, start, half, span, merge_radius, extrema):
+    """Hold a point of a valley that crosses a pair of patches of two faces."""
+    surfaces = features_of(posed, codes)
+    found, x, on_f, along = into_near_singular(posed.store, surfaces[0], surfaces[1], posed.pose, start, half)
+    if not found or not is_next_in_near_singular(posed, codes, surfaces, x, along, extrema, extrema.count[0]):
+        return
+    if is_on_face(posed, codes, 0 if on_f else 1, x):
+        add_vertex_contact(posed, codes, x, span, merge_radius, extrema, HELD_F if on_f else HELD_G)
 
 
 @kernel(inner=True)
-def add_vertex_contacts(store, posed, span, offsets, merge_radius, stack, candidates, extrema, count, work):
-    """Add corners with gaps in a span; how many roots there are then.
+def add_vertex_contacts(posed, span, merge_radius, stack, candidates, extrema):
+    """Add corners with gaps in a span.
 
     A point just below a face is inside, where none is between; deeper ones may be behind a sheet, and edges that have
-    crossed already beside the other body: roots tell of them. Where all that are near have been looked into, roots
+    crossed already beside the other body: extrema tell of them. Where all that are near have been looked into, extrema
     that are at a corner become one.
     """
+    hold_continua(posed, extrema)
     tree_f, tree_g = posed.trees
-    count = hold_continua(store, posed, extrema, count)
-    found = pairs_about(store, tree_f, tree_g, posed.pose, span[1], 0.0, TILT, stack, candidates)
+    found = pairs_about(posed.store, posed.trees, posed.pose, span[1], 0.0, TILT, stack, candidates)
     for c in range(min(found, candidates.shape[0])):
-        if count == extrema.shape[0]:
+        if is_full(extrema):
             break
-        o = tree_at(store.table, tree_f).element_pool + ELEMENT * candidates[c, 0]
-        p = tree_at(store.table, tree_g).element_pool + ELEMENT * candidates[c, 1]
-        f, g = element_at(store.pool, o), element_at(store.pool, p)
+        f, g = patch_at(posed, 0, candidates[c, 0]), patch_at(posed, 1, candidates[c, 1])
         codes = (np.int64(f.feature), np.int64(g.feature))
         start = (f.middle[0], f.middle[1], g.middle[0], g.middle[1])
-        if is_of_faces(store.table, posed, codes[0], codes[1]):
+        if is_of_faces(posed, codes):
             half = (f.half[0], f.half[1], g.half[0], g.half[1])
-            count = add_near_singular(
-                store, posed, codes, start, half, span, offsets, merge_radius, extrema, count, work
-            )
-        if not is_vertex_contact(store.table, posed, codes[0], codes[1]):
+            add_near_singular(posed, codes, start, half, span, merge_radius, extrema)
+        if not is_vertex_contact(posed, codes):
             continue
-        count = add_vertex_contact(
-            store, posed, codes, start, span, offsets, merge_radius, extrema, count, work, FEATURES
-        )
-        side = 0 if feature_kind(store.table, posed.shells[0], codes[0]) == EDGE else 1
-        other = feature_kind(store.table, posed.shells[1 - side], codes[1 - side])
-        is_rim = other == FACE and feature_kind(store.table, posed.shells[side], codes[side]) == EDGE
+        add_vertex_contact(posed, codes, start, span, merge_radius, extrema, FEATURES)
+        kinds = kinds_of(posed, codes)
+        side = 0 if kinds[0] == EDGE else 1
         width = f.half[0] if side == 0 else g.half[0]
-        if is_rim and count < extrema.shape[0]:
-            if is_next(store, posed, codes, side, start, width, extrema, count):
-                count = add_vertex_contact(
-                    store, posed, codes, start, span, offsets, merge_radius, extrema, count, work, POINT
-                )
+        if kinds[side] == EDGE and kinds[1 - side] == FACE and not is_full(extrema):
+            if is_next(posed, codes, side, start, width, extrema):
+                add_vertex_contact(posed, codes, start, span, merge_radius, extrema, POINT)
     if 0 <= found <= candidates.shape[0]:
-        hold_extrema(store, posed, extrema, count, work)
-    return count
+        hold_extrema(posed, extrema)

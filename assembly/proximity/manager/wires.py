@@ -1,7 +1,7 @@
 """Spines of round wires as kernels read them: points, and which parameters of the surface stand for a point.
 
-A spine (`geometry/shapes/centerline.py`) is a record in the table. Its pieces, lines and arcs, are cut into parts that
-hardly turn, run through by lengths from their middles; over the parts is a tree of balls, whose root is node 0 and
+A centerline (`geometry/shapes/centerline.py`) is a record in the table. Its pieces, lines and arcs, are cut into parts
+that hardly turn, run through by lengths from their middles; over the parts is a tree of balls, whose root is node 0 and
 where the two children of a node follow each other.
 """
 
@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._record import Store, place_of, record_dtype, record_view, size_of
+from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.splines.evaluate import find_span, surface_at
 from assembly.geometry.vec import add, blend, cross, dot, scale, sub
 from assembly.proximity.bvh.tree import three_of
@@ -31,8 +31,6 @@ CENTERLINE = record_dtype(
     numbers=1,  # where its WIRE is in the pool
 )
 centerline_at = record_view(CENTERLINE)
-PARTS = place_of(CENTERLINE, "parts")
-PART_POOL = place_of(CENTERLINE, "part_pool")
 SPINE = size_of(CENTERLINE)
 # Numbers of a wire.
 WIRE = record_dtype(
@@ -67,8 +65,6 @@ CENTERLINE_PART = record_dtype(
     beyond=(2, 3),  # the curvature vectors beyond these joints
 )
 centerline_part_at = record_view(CENTERLINE_PART)
-PART_BEND = place_of(CENTERLINE_PART, "bend")
-HALF = place_of(CENTERLINE_PART, "half")
 PART = size_of(CENTERLINE_PART)
 # A node in the pool: a ball around its parts.
 CENTERLINE_NODE = record_dtype("f8", center=3, radius=1)
@@ -128,7 +124,8 @@ def both_radii(store, centerlines):
 
 @kernel(inner=True)
 def wire_parameters(store, centerline, surface, part, s, way):
-    """Parameters (u, v) of the wire's surface in a unit direction from a point of its spine, s from a part's middle.
+    """Parameters (u, v) of the wire's surface in a unit direction from a point of its centerline, s from a part's
+    middle.
 
     At a free end the direction may lead on: there is a half ball.
     """
@@ -172,7 +169,7 @@ def wire_parameters(store, centerline, surface, part, s, way):
 
 @kernel(inner=True)
 def centerline_place(store, centerline, surface, u, v):
-    """The part of a wire's spine, and how far from its middle, where parameters of the surface are."""
+    """The part of a wire's centerline, and how far from its middle, where parameters of the surface are."""
     line = centerline_at(store.table, centerline)
     along = line.along
     wire = surface_at(store.table, surface)
@@ -197,25 +194,3 @@ def centerline_place(store, centerline, surface, u, v):
         # Ends of a piece, and half balls: exactly.
         return part, x * o.half
     return part, reach * length - o.place
-
-
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8, f8[::1])")
-def point_of(table, pool, centerline, part, s, out):
-    """`spine_point` for Python: point, tangent and curvature into out (9,)."""
-    p, t, c = centerline_point(pool, centerline_at(table, centerline).part_pool + PART * part, s)
-    for i in range(3):
-        out[i] = p[i]
-        out[3 + i] = t[i]
-        out[6 + i] = c[i]
-
-
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, i8, f8, f8, f8, f8)")
-def parameters_of(table, pool, centerline, surface, part, s, x, y, z):
-    """`wire_parameters` for Python."""
-    return wire_parameters(Store(table, pool), centerline, surface, part, s, (x, y, z))
-
-
-@kernel(signatures="(i8[::1], f8[::1], i8, i8, f8, f8)")
-def place_of(table, pool, centerline, surface, u, v):
-    """`spine_place` for Python."""
-    return centerline_place(Store(table, pool), centerline, surface, u, v)

@@ -16,13 +16,7 @@ from numpy.typing import NDArray
 
 from assembly._record import rows_of as records_in
 from assembly.constraints.packing.scene import Packed
-from assembly.constraints.program.records import (
-    SLOTS,
-    TAPE_FIELDS,
-    TAPE_RECORD,
-    TAPE_TABLE,
-    TAPES,
-)
+from assembly.constraints.program.records import SLOTS, TAPE_FIELDS, TAPE_RECORD, TAPE_TABLE, TAPES
 from assembly.errors import InputError
 from assembly.solve.attempts.fit import Run
 from assembly.solve.dense.jacobian import moving_columns, rows_of

@@ -23,6 +23,7 @@ from assembly.constraints.program.records import IMPLICIT, SLOTS
 from assembly.errors import InputError
 from assembly.solve.dense.jacobian import Rows, moving_columns, rows_of
 from assembly.solve.dense.rank import centered
+from assembly.solve.loop.parameters import NEIGHBORHOOD
 from assembly.solve.loop.settings import (
     COUNT,
     FEASIBILITY,
@@ -30,7 +31,6 @@ from assembly.solve.loop.settings import (
     GATHER,
     INFEASIBLE,
     ITERATIONS,
-    NEIGHBORHOOD,
     OBJECTIVE,
     PENALTY,
     PENALTY_FLOOR,

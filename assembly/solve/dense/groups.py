@@ -72,8 +72,7 @@ def groups_of(
     for label in dict.fromkeys(group[k] for k, body in enumerate(bodies) if not body.fixed):
         members = tuple(k for k, body in enumerate(bodies) if not body.fixed and group[k] == label)
         own = np.array(
-            [r for r in np.flatnonzero(counted).tolist() if owner_groups[int(rows.owners[r])] == label],
-            dtype=np.int64,
+            [r for r in np.flatnonzero(counted).tolist() if owner_groups[int(rows.owners[r])] == label], dtype=np.int64
         )
         jacobian = rows.jacobian[np.ix_(own, moving_columns(members))]
         interruption.check("rank")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.solve.interruption import CTRL_C, Interruption
-from assembly.solve.loop.settings import NEIGHBORHOOD
+from assembly.solve.loop.parameters import NEIGHBORHOOD
 
 __all__ = ["HELD", "SMALLEST", "Balanced", "centered", "orthonormal", "tolerance_at"]
 

@@ -14,19 +14,21 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import Store
+from assembly.constraints.program.contact import copy_tracked
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.objective_terms import objective
 from assembly.constraints.program.records import (
     EXTRA_COLUMN,
-    FREE_COLUMN,
     JOINT_ROW,
     ROW,
     TAPE_RECORD,
     Iterate,
     LiftedPairs,
+    Program,
     TapeRoom,
     body_coordinate_at,
     header_at,
+    jacobian_row_at,
     joint_row_at,
     row_at,
     tape_at,
@@ -36,13 +38,13 @@ from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
 from assembly.solve.loop.contacts import free_folds, start_contacts
 from assembly.solve.loop.line_search import goal
-from assembly.solve.loop.report import scaled_poses
+from assembly.solve.loop.parameters import FREE_BELOW
+from assembly.solve.loop.report import read_tracked, scaled_poses, write_tracked
 from assembly.solve.loop.residuals import arrange, shape_of, size_of_shape
-from assembly.solve.loop.settings import FREE_BELOW
 
 # A point of the loop at a state: the contact that is lost, or -1, and all rows are evaluated; how many contacts are at
-# folds; the iterate, and what contacts and tapes work in.
-PointFound = namedtuple("PointFound", "lost count iterate lifted tapes")
+# folds; the iterate, and a program whose rows and unknowns have no places yet.
+PointFound = namedtuple("PointFound", "lost count iterate program")
 
 
 @kernel(inner=True)
@@ -51,6 +53,14 @@ def spread_block(packed, r, column, body, out):
     if body >= 0:
         for k in range(6):
             out[r, 6 * body + k] += packed[r, column + k]
+
+
+@kernel(inner=True)
+def spread_lifted(packed, r, at, out):
+    """The entries of row r for a lifted pair's coordinates, to columns at.."""
+    row = jacobian_row_at(packed, r)
+    for j in range(4):
+        out[r, at + j] = row.lifted[j]
 
 
 @kernel(inner=True)
@@ -77,14 +87,12 @@ def spread_rows(table, free, count, packed, out):
             for i in range(4):
                 spread_block(packed, e + i, 0, row_at(table, row).body_f, out)
                 spread_block(packed, e + i, 6, row_at(table, row).body_g, out)
-                out[k, at + i] = packed[k, FREE_COLUMN + i]
-                for j in range(4):
-                    out[e + i, at + j] = packed[e + i, FREE_COLUMN + j]
+                spread_lifted(packed, e + i, at, out)
+            spread_lifted(packed, k, at, out)
     for r in range(header.contacts, header.contacts + header.trims):
         k = trim_row_at(table, header.row_table + ROW * r).contact
         if free[k] >= 0:
-            for j in range(4):
-                out[r, 6 * header.bodies + 4 * free[k] + j] = packed[r, FREE_COLUMN + j]
+            spread_lifted(packed, r, 6 * header.bodies + 4 * free[k], out)
     for t in range(header.tapes):
         tape = tape_at(table, header.tape_table + TAPE_RECORD * t)
         for v in range(tape.values):
@@ -116,7 +124,7 @@ def point_at(store, state, free):
     tracks = header.tracked
     start = np.empty((tracks, TRACK))
     point = new_point(store.table)
-    q, tracked, records, residual = point.q, point.tracked, point.records, point.residual
+    tracked = point.tracked
     o = header.tape_room
     room = TapeRoom(np.empty(store.table[o]), np.empty(store.table[o + 1]), np.empty(store.table[o + 2]))
     loose = LiftedPairs(
@@ -127,27 +135,31 @@ def point_at(store, state, free):
         np.empty((tracks, TRACK)),
         np.empty(0),
     )
-    scaled_poses(store, state, q)
-    for k in range(tracks):
-        for i in range(TRACK):
-            tracked[k, i] = state[7 * header.bodies + TRACK * k + i]
+    program = Program(store, None, loose, room, None)
+    scaled_poses(store, state, point.q)
+    read_tracked(store.table, state, tracked)
     for k in range(pairs):
         free[k] = -1
     count = 0
-    lost = start_contacts(store, q, tracked, free, loose.lengths)
+    lost = start_contacts(store, point.q, tracked, free, loose.lengths)
     if lost < 0:
         # Every contact counts here, also one that pushes nothing.
-        active = np.ones(residual.size)
-        count = free_folds(store, records, tracked, active, free, loose.lengths, -1.0, -1, False)
+        active = np.ones(point.residual.size)
+        count = free_folds(store, loose, point, active, -1.0, -1, False)
         before = -1
         while count != before:
             for k in range(tracks):
-                for i in range(TRACK):
-                    start[k, i] = tracked[k, i]
-            lost = evaluate(store, start, math.inf, loose, room, point)
+                copy_tracked(tracked, k, start)
+            lost = evaluate(program, start, math.inf, point)
             before = count
-            count = free_folds(store, records, tracked, active, free, loose.lengths, FREE_BELOW, lost, False)
-    return PointFound(lost, count, point, loose, room)
+            count = free_folds(store, loose, point, active, FREE_BELOW, lost, False)
+    return PointFound(lost, count, point, program)
+
+
+@kernel(inline=True, allocates=True)
+def arranged(found, structure, tips):
+    """The program of a point that is found, with places of rows and unknowns."""
+    return Program(found.program.store, structure, found.program.lifted, found.program.tapes, tips)
 
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], f8[:, ::1])")
@@ -162,14 +174,11 @@ def rows_at(table, pool, state, free, residual, jacobian):
     header = header_at(table, 0)
     found = point_at(Store(table, pool), state, free)
     lost, count, point = found.lost, found.count, found.iterate
-    tracked, values, packed = point.tracked, point.residual, point.jacobian
-    for k in range(header.tracked):
-        for i in range(TRACK):
-            state[7 * header.bodies + TRACK * k + i] = tracked[k, i]
+    write_tracked(table, point.tracked, state)
     for r in range(header.rows + 4 * count):
-        residual[r] = values[r]
+        residual[r] = point.residual[r]
     if lost < 0:
-        spread_rows(table, free, count, packed, jacobian)
+        spread_rows(table, free, count, point.jacobian, jacobian)
     return lost
 
 
@@ -191,17 +200,18 @@ def gradient_at(table, pool, state, free, gradient, tips):
 def slopes_at(store, free, found, tips, gradient, integers, doubles):
     """The same at a point that `point_at` found, with what it works in."""
     header = header_at(store.table, 0)
-    lost, count, point, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
+    lost, count, point = found.lost, found.count, found.iterate
     rows = header.rows + 4 * count
     n = 6 * header.moving + 4 * count
     shape = shape_of(store.table, rows, n, store.table[:0], integers, doubles)
     arrange(store.table, free, shape, rows, n)
+    program = arranged(found, shape, tips)
     slopes = np.empty(n)
     curves = np.empty((n, n))
     if lost < 0:
-        value = goal(store, shape, rows, loose, room, tips, point, 1, slopes, curves)
+        value = goal(program, rows, point, 1, slopes, curves)
     else:
-        value = objective(store, point.q, 1, room, shape.sparsity, slopes, curves)
+        value = objective(store, point.q, 1, program.tapes, shape.sparsity, slopes, curves)
     for b in range(header.bodies):
         s = store.table[header.slots + b]
         for k in range(6):

@@ -28,7 +28,7 @@ from assembly.constraints.packing.scene import Packed
 from assembly.errors import InputError
 from assembly.kinematics.pose import retract
 from assembly.solve.dense.jacobian import Rows, moving_columns, rows_of
-from assembly.solve.loop.settings import ROUNDING
+from assembly.solve.loop.parameters import ROUNDING
 from assembly.solve.scene import Scene
 
 __all__ = ["pose_error"]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from assembly.kinematics.body import BodyFace
 from assembly.kinematics.pose import rotate
 from assembly.proximity.extrema.pairs import ContactPair, PairStatus, extremal_pair
 
-__all__ = ["FEASIBILITY", "STATIONARITY", "Audit", "Sides", "audit", "is_extremal", "twist_gradients"]
+__all__ = ["FEASIBILITY", "STATIONARITY", "Audit", "Claim", "Sides", "audit", "is_extremal", "twist_gradients"]
 
 Array = NDArray[np.float64]
 # What counts as held and as balanced: violations over the scene's size, and the Lagrangian's gradient over one plus
@@ -112,18 +113,40 @@ class Audit(ReadOnlyArrays):
     crossing: bool
 
 
+class Claim(NamedTuple):
+    """A pose that a solver says to be a solution, and what it says of it; lengths over the scene's size.
+
+    Attributes
+    ----------
+    q : (n, 7)
+        In the user's unit of length.
+    parameters : (k, 4)
+        Near the pairs.
+    forces : (m,)
+        Multipliers of the rows.
+    gradient : (n, 6)
+        Of the objective, in twists.
+    balance : (n, 6)
+        The same with the forces of the rows after those of the contacts.
+    aside : array
+        The Lagrangian's gradient in what else is variable.
+    """
+
+    q: Array
+    parameters: Array
+    forces: Array
+    gradient: Array
+    balance: Array
+    aside: Array
+
+
 def audit(
     contacts: Sequence[Sides],
     others: Callable[[Array], Array],
     one_sided: NDArray[np.bool_],
-    q: Array,
-    parameters: Array,
-    forces: Array,
-    gradient: Array,
-    balance: Array,
-    aside: Array,
     moving: Sequence[int],
     scale: float,
+    claim: Claim,
 ) -> Audit:
     """Look at a pose afresh, whatever a solver said of it.
 
@@ -133,32 +156,22 @@ def audit(
     others : callable
         (n, 7) -> residuals of the rows after those of the contacts, lengths over `scale`.
     one_sided : (m,)
-    q : (n, 7)
-    parameters : (k, 4)
-        Near the pairs.
-    forces : (m,)
-        Multipliers of the rows, lengths over `scale`.
-    gradient : (n, 6)
-        Of the objective, in twists, lengths over `scale`.
-    balance : (n, 6)
-        The same with the forces of the rows after those of the contacts.
-    aside : array
-        The Lagrangian's gradient in what else is variable.
     moving : sequence of int
         Rows of q that are free.
     scale : float
         The scene's size.
+    claim : Claim
     """
-    balance = balance.copy()
+    q, forces, balance = claim.q, claim.forces, claim.balance.copy()
     pairs = []
-    for contact, at, force in zip(contacts, parameters, forces[: len(contacts)], strict=True):
+    for contact, at, force in zip(contacts, claim.parameters, forces[: len(contacts)], strict=True):
         pairs.append(contact.find_again(q, at))
         balance[contact.bodies] += force * contact.wrench(q, pairs[-1], scale)
     residuals = np.concatenate([[pair.gap / scale for pair in pairs], others(q)])
     violation = float(np.where(one_sided, np.maximum(-residuals, 0.0), np.abs(residuals)).max(initial=0.0))
     # A row without force is complementary wherever it stands, at an infinite residual, too.
     slack = np.maximum(forces, np.abs(forces * np.where(forces == 0.0, 0.0, residuals)))[one_sided]
-    parts = np.concatenate([np.abs(balance[moving]).ravel(), np.abs(aside), slack])
+    parts = np.concatenate([np.abs(balance[moving]).ravel(), np.abs(claim.aside), slack])
     # A user's expression may have no value, and so no gradient.
     stationarity = float(np.nan_to_num(parts.max(initial=0.0), nan=np.inf, posinf=np.inf))
     return Audit(
@@ -168,6 +181,6 @@ def audit(
         stationarity=stationarity,
         held=violation <= FEASIBILITY and all(map(is_extremal, pairs)),
         # Without a gradient nothing is balanced.
-        balanced=stationarity <= STATIONARITY * (1.0 + float(np.abs(gradient).max())) < np.inf,
+        balanced=stationarity <= STATIONARITY * (1.0 + float(np.abs(claim.gradient).max())) < np.inf,
         crossing=any(contact.cross(q, pair) for contact, pair in zip(contacts, pairs, strict=True)),
     )

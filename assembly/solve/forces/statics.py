@@ -214,10 +214,7 @@ def geometric_jacobian(at: Solution | Assembly, inputs: Sequence[Joint | Freedom
 
 
 def joint_torques(
-    at: Solution | Assembly,
-    inputs: Sequence[Joint | Freedom],
-    tip: Point | Frame | Body,
-    wrench: Wrench | ArrayLike,
+    at: Solution | Assembly, inputs: Sequence[Joint | Freedom], tip: Point | Frame | Body, wrench: Wrench | ArrayLike
 ) -> Array:
     """J^T W: torques and forces of the joints of an open chain that do the work of a wrench at its tip, (k,).
 

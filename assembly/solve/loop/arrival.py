@@ -7,21 +7,9 @@ from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.solve.linear_algebra.factorize import greatest_on_diagonal
 from assembly.solve.loop.inertia import DOWNWARD
 from assembly.solve.loop.multipliers import strongest
+from assembly.solve.loop.parameters import GAIN, MOST_ROUNDING, NEAR_SADDLE, OFF_SADDLE, ROUNDING, STEPS_OF_ROUNDING
 from assembly.solve.loop.residuals import turned
-from assembly.solve.loop.settings import (
-    MOST_ROUNDING,
-    ROUNDING,
-    TESTED,
-    results_at,
-    settings_at,
-)
-
-# A saddle is left from where the dual residual and the violation are no more.
-NEAR_SADDLE, OFF_SADDLE = 1e-3, 1e-6
-# What a step must gain of violations that rounding of far coordinates may explain.
-GAIN = 0.5
-# A step of so many roundings of a coordinate at most is no move.
-STEPS_OF_ROUNDING = 8.0
+from assembly.solve.loop.settings import TESTED, results_at, settings_at
 
 
 @kernel(inner=True)
@@ -43,14 +31,14 @@ def rounding_at(store, settings, current):
 
 
 @kernel(inner=True)
-def is_rounding(program, current, lagrangian, n, rows, y, moved, dual):
+def is_rounding(program, current, rows, system, moved, dual):
     """Whether a step moved poses by no more than doubles tell apart, and rounding explains the slope that is left.
 
     Poses' rounding by the objective's curvature, and that of forces.
     """
     store, shape = program.store, program.structure
-    reach = max(1.0, reach_of(store, current.q))
-    most = ROUNDING * (reach * greatest_on_diagonal(lagrangian, n, shape.sparsity) + strongest(y, rows))
+    reach, n = max(1.0, reach_of(store, current.q)), system.gradient.size
+    most = ROUNDING * (reach * greatest_on_diagonal(system.hessian, n, shape.sparsity) + strongest(rows.y, rows.count))
     return moved <= STEPS_OF_ROUNDING * ROUNDING * reach and dual <= most
 
 

@@ -7,41 +7,34 @@ import math
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import is_clearance_row
+from assembly.constraints.program.contact import is_clearance_row, is_of_solids
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.objective_terms import recenter
-from assembly.constraints.program.records import (
-    header_at,
-    pool_header_at,
-)
+from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.proximity.features.solid_contact import TRACK, contact_record_at, tracked_at
-from assembly.proximity.manager.state import memory_header_at
+from assembly.proximity.manager.records import memory_header_at
 from assembly.proximity.manager.update import AS_NEEDED, SPARING
+from assembly.solve.loop.arrival import reach_of, rounding_at
 from assembly.solve.loop.clearances import forget_clearance_rows, place_clearance_rows, update_around
-from assembly.solve.loop.contacts import free_folds, is_of_surfaces, start_contacts
+from assembly.solve.loop.contacts import free_folds, start_contacts
+from assembly.solve.loop.deadline import begin_tick
 from assembly.solve.loop.initial_guess import assemble, scattered
+from assembly.solve.loop.parameters import EXTRA_TIME, FAR, FREE_BELOW, PATIENCE
+from assembly.solve.loop.report import read_tracked
 from assembly.solve.loop.residuals import arrange
-from assembly.solve.loop.settings import (
-    ASSEMBLES,
-    CONTACT_LOST,
-    GATHERED,
-    RUNNING,
-    results_at,
-    settings_at,
-)
+from assembly.solve.loop.restoration import begin_way, restoration_at
+from assembly.solve.loop.settings import ASSEMBLES, CONTACT_LOST, GATHERED, RUNNING, results_at, settings_at
 from assembly.solve.loop.warm_start import warm_start
-from assembly.solve.loop.workspace import results_of, unknowns
+from assembly.solve.loop.workspace import resized, results_of, unknowns
 
 
 @kernel(inline=True)
-def read_state(store, state, current, trial, y, better_y):
+def read_state(store, state, current, trial, rows):
     """Poses, tracked values and multipliers of a state, scaled."""
     units = pool_header_at(store.pool, 0)
     header = header_at(store.table, 0)
     size = units.scale
-    tracks = header.tracked
-    o_tracked = 7 * header.bodies
-    o_y = o_tracked + TRACK * tracks
+    o_y = 7 * header.bodies + TRACK * header.tracked
     for b in range(header.bodies):
         for k in range(7):
             value = state[7 * b + k]
@@ -50,16 +43,14 @@ def read_state(store, state, current, trial, y, better_y):
             current.q[b, k] = value
             trial.q[b, k] = value
     recenter(store, current.q)
-    for k in range(tracks):
-        for i in range(TRACK):
-            current.tracked[k, i] = state[o_tracked + TRACK * k + i]
+    read_tracked(store.table, state, current.tracked)
     for k in range(header.contacts):
         # Before anything is evaluated no pair is near a fold.
         contact_record_at(current.records, k).fold = 1.0
     for r in range(header.rows):
         current.residual[r] = math.inf
-        y[r] = state[o_y + r]
-        better_y[r] = y[r]
+        rows.y[r] = state[o_y + r]
+        rows.better_y[r] = rows.y[r]
 
 
 @kernel(inner=True)
@@ -87,7 +78,7 @@ def overlap_allowed(settings):
 
 
 @kernel(inline=True)
-def find_contacts(program, settings, state, current, by_row, n):
+def find_contacts(program, settings, state, current, rows, n):
     """Find the contacts of the start and evaluate its rows, unless the last tick left them in its state.
 
     Bodies of a contact or a clearance that are in each other by no more than touching there may stay so.
@@ -95,74 +86,60 @@ def find_contacts(program, settings, state, current, by_row, n):
     evaluated yet where a contact has no pair to begin with, or is at a fold.
     """
     limits = settings_at(settings, 0)
-    store, shape, lifted, workspace = (
-        program.store,
-        program.structure,
-        program.lifted,
-        program.tapes,
-    )
+    store, lifted = program.store, program.lifted
     header = header_at(store.table, 0)
     free, lengths, memory = lifted.free, lifted.lengths, lifted.memory
     memory_header = memory_header_at(memory, 0)
-    y, better_y, active = by_row.y, by_row.better_y, by_row.active
     recalled, tick = int(limits.recall), limits.tick == 1.0
     watched = header.watch >= 0
     came = False
     if watched:
-        place_clearance_rows(store.table, memory, current, y, better_y, free, True)
+        place_clearance_rows(store.table, lifted, current, rows, True)
     lost = start_contacts(store, current.q, current.tracked, free, lengths)
     if watched and lost < 0:
         memory_header.overlap = limits.touching
         came = update_around(store, memory, current, SPARING if tick else AS_NEEDED)
         memory_header.overlap = 0.0
-        place_clearance_rows(store.table, memory, current, y, better_y, free, False)
-    count = free_folds(
-        store, current.records, current.tracked, active, free, lengths, -1.0, -1, limits.free_trims == 1.0
-    )
+        place_clearance_rows(store.table, lifted, current, rows, False)
+    count = free_folds(store, lifted, current, rows.active, -1.0, -1, limits.free_trims == 1.0)
     if lost >= 0 or count > 0:
         return lost, False
     if watched:
-        arrange(store.table, free, shape, header.rows, n)
+        arrange(store.table, free, program.structure, header.rows, n)
     if recalled == 0 or came or not warm_start(store.table, state, recalled, current):
-        lost = evaluate(store, current.tracked, math.inf, lifted, workspace, current)
+        lost = evaluate(program, current.tracked, math.inf, current)
         if lost < 0:
             let_touch(store.table, current, overlap_allowed(settings))
     return lost, True
 
 
 @kernel(inner=True)
-def put_together(program, current, by_row):
+def put_together(program, current, rows):
     """Gather scattered bodies, and begin again from there; returns the contact that has no pair, or -1."""
-    store, shape, lifted, workspace = (
-        program.store,
-        program.structure,
-        program.lifted,
-        program.tapes,
-    )
+    store, lifted = program.store, program.lifted
     header = header_at(store.table, 0)
     free, lengths, memory = lifted.free, lifted.lengths, lifted.memory
-    y, better_y = by_row.y, by_row.better_y
     watched = header.watch >= 0
-    assemble(store, shape.bases, header.slots, current)
+    assemble(store, program.structure.bases, header.slots, current)
     for k in range(header.contacts):
         current.tracked[k, 0] = math.nan
     if watched:
         forget_clearance_rows(store.table, memory)
-        place_clearance_rows(store.table, memory, current, y, better_y, free, False)
+        place_clearance_rows(store.table, lifted, current, rows, False)
     start_contacts(store, current.q, current.tracked, free, lengths)
     if watched:
         update_around(store, memory, current, AS_NEEDED)
-        place_clearance_rows(store.table, memory, current, y, better_y, free, False)
+        place_clearance_rows(store.table, lifted, current, rows, False)
     if header.implicit == 1:
         recenter(store, current.q)
     for r in range(header.rows):
-        y[r] = 0.0
-        better_y[r] = 0.0
-    return evaluate(store, current.tracked, math.inf, lifted, workspace, current)
+        rows.y[r] = 0.0
+        rows.better_y[r] = 0.0
+    return evaluate(program, current.tracked, math.inf, current)
 
 
 @kernel(inline=True, allocates=True)
-def set_out(program, settings, state, current, by_row, n):
+def set_out(program, settings, state, current, rows, n):
     """Find contacts, evaluate rows, gather what is scattered where the settings ask for it.
 
     Returns CONTACT_LOST, GATHERED or RUNNING, the contact that is lost or -1, and whether that one is at a fold, to be
@@ -176,13 +153,13 @@ def set_out(program, settings, state, current, by_row, n):
     result.held = 0.0
     result.curved = 0.0
     tick = limits.tick == 1.0
-    lost, evaluated = find_contacts(program, settings, state, current, by_row, n)
+    lost, evaluated = find_contacts(program, settings, state, current, rows, n)
     # A tick begins where the last one ended: there a pair that Newton's method loses is at a fold.
-    folded = lost >= 0 and evaluated and tick and is_of_surfaces(store.table, lost)
+    folded = lost >= 0 and evaluated and tick and not is_of_solids(store.table, lost)
     status = CONTACT_LOST if lost >= 0 and not folded else RUNNING
     result.scatter = 1.0 if status == RUNNING and scattered(store.table, current.residual, shape.one_sided) else 0.0
     if limits.gather > 0.0 and result.scatter == 1.0:
-        lost = put_together(program, current, by_row)
+        lost = put_together(program, current, rows)
         folded = False
         status = GATHERED if limits.gather == ASSEMBLES else RUNNING
         status = CONTACT_LOST if lost >= 0 else status
@@ -192,25 +169,51 @@ def set_out(program, settings, state, current, by_row, n):
 
 
 @kernel(inner=True, allocates=True)
-def rearrange(program, count, before, current, y, better_y, active):
-    """Rows and unknowns for other contacts or `count` free pairs, where there were `before` rows.
+def rearrange(program, count, rows, current):
+    """Rows and unknowns for other contacts or `count` free pairs.
 
-    Returns how many rows and unknowns there are, room for these, and which contact is lost at this point, or -1.
+    Returns the rows, the system of a step, and which contact is lost at this point, or -1.
     """
-    store, shape, lifted, workspace = (
-        program.store,
-        program.structure,
-        program.lifted,
-        program.tapes,
-    )
+    store, shape = program.store, program.structure
     header = header_at(store.table, 0)
-    for r in range(before, y.size):
+    for r in range(rows.count, rows.y.size):
         # New rows of tangency say nothing yet: least squares leave them out.
-        y[r] = 0.0
-        better_y[r] = 0.0
-        active[r] = 0.0
-    rows = header.rows + 4 * count
+        rows.y[r] = 0.0
+        rows.better_y[r] = 0.0
+        rows.active[r] = 0.0
+    rows = resized(rows, header.rows + 4 * count)
     n = 6 * header.moving + 4 * count
-    arrange(store.table, lifted.free, shape, rows, n)
+    arrange(store.table, program.lifted.free, shape, rows.count, n)
     system = unknowns(n, shape.sparsity)
-    return rows, n, system, evaluate(store, current.tracked, math.inf, lifted, workspace, current)
+    return rows, system, evaluate(program, current.tracked, math.inf, current)
+
+
+@kernel(inline=True)
+def begin_loop(task, current):
+    """The record of the loop before its first step."""
+    store, limits, loop = task.program.store, task.limits, task.loop
+    loop.begin, loop.done, loop.looks = begin_tick(store.table, task.settings, task.results, task.program.lifted.memory)
+    loop.feasible = rounding_at(store, task.settings, current)
+    loop.farthest = FAR * (1.0 + reach_of(store, current.q)) if limits.strays == 1.0 else math.inf
+    loop.limit = int(limits.iterations) - loop.done
+    loop.longest_tick = EXTRA_TIME * int(limits.iterations) - loop.done
+    loop.status = loop.ended = RUNNING
+    loop.violation = loop.value = loop.dual = math.inf
+    loop.last_violation = loop.last_dual = math.inf
+    loop.mu, loop.floor = limits.penalty, limits.penalty_floor
+    # The first step of a tick needs about what that of the last one did; half of it is tried first.
+    loop.shift = 2.0 * task.result.first_shift if task.tick else 0.0
+    loop.used_shift, loop.radius, loop.leash, loop.cut_length = 0.0, limits.radius, math.inf, math.inf
+    loop.longest, loop.slope, loop.cut, loop.alpha = 0.0, 0.0, 1.0, 0.0
+    loop.below = FREE_BELOW
+    loop.check_violation = loop.entered = loop.restored = math.inf
+    loop.rows = header_at(store.table, 0).rows
+    loop.over = loop.iteration = loop.asked = loop.late = loop.changed = 0
+    loop.lifted = loop.lifts = loop.folded = loop.first = loop.kept = loop.is_fresh = loop.cuts = loop.stood = 0
+    loop.measured = loop.may_go = 1
+    loop.restoring = loop.restorations = loop.kicks = loop.holds = loop.sunk = loop.begun = 0
+    loop.lingers = loop.settled_by = 0
+    loop.lost = loop.back_at = loop.asked_at = loop.looked_at = -1
+    loop.check_at = PATIENCE
+    restoration_at(task.way, 0).softness = 1e-2
+    begin_way(task.way)

@@ -8,16 +8,11 @@ import numpy as np
 
 from assembly._address import call_address
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import is_of_solids
-from assembly.constraints.program.records import (
-    ROW,
-    contact_row_at,
-    header_at,
-    row_at,
-)
-from assembly.proximity.features.solid_contact import TRACK, contact_record_at
+from assembly.constraints.program.contact import contact_of, copy_tracked, is_of_solids
+from assembly.constraints.program.records import header_at
+from assembly.proximity.features.solid_contact import contact_record_at
 from assembly.proximity.manager.motion_bounds import STILL
-from assembly.proximity.manager.state import (
+from assembly.proximity.manager.records import (
     IN_PLACE,
     PAIR_MEMORY,
     PAIR_RECORD,
@@ -43,11 +38,10 @@ def clear_clearance_rows(table):
     """No row has a contact: so a packed scene is left, whose solutions have contacts of their own."""
     header = header_at(table, 0)
     for k in range(header.first_guard, header.first_guard + header.guards):
-        row = header.row_table + ROW * k
-        fields = row_at(table, row)
-        fields.body_f = -1
-        fields.body_g = -1
-        contact_row_at(table, row).guard_number = 0
+        contact = contact_of(table, k)
+        contact.body_f = -1
+        contact.body_g = -1
+        contact.guard_number = 0
 
 
 @kernel(inner=True)
@@ -63,41 +57,40 @@ def forget_clearance_rows(table, memory):
 
 
 @kernel(inner=True)
-def place_clearance_rows(table, memory, current, y, better_y, free, begins):
+def place_clearance_rows(table, lifted, current, rows, begins):
     """Make every row the contact that its place has; multipliers of one that is new are zero.
 
     Where a solve begins, rows know no contacts yet, and multipliers are those of the places.
     """
     header = header_at(table, 0)
     watch = header.watch
+    memory, free = lifted.memory, lifted.free
     places = memory_places(table, watch)[1]
     for k in range(header.guards):
         slot = place_at(memory, places + PLACE_MEMORY * k)
         r = header.first_guard + k
         contact_record = contact_record_at(current.records, r)
-        row = header.row_table + ROW * r
-        contact = contact_row_at(table, row)
-        fields = row_at(table, row)
+        contact = contact_of(table, r)
         p = np.int64(slot.pair)
         number = np.int64(slot.number) if p >= 0 else 0
         if number == contact.guard_number:
             continue
         contact.guard_number = number
         if not begins:
-            y[r] = 0.0
-            better_y[r] = 0.0
+            rows.y[r] = 0.0
+            rows.better_y[r] = 0.0
         free[r] = -1
         # Nothing is known of it yet.
         contact_record.fold = 1.0
         contact_record.slack = 0.0
         current.residual[r] = 1.0
         if p < 0:
-            fields.body_f = -1
-            fields.body_g = -1
+            contact.body_f = -1
+            contact.body_g = -1
             continue
         pair_record = pair_at(table, manager_at(table, watch).pair_table + PAIR_RECORD * p)
-        fields.body_f = pair_record.body_f
-        fields.body_g = pair_record.body_g
+        contact.body_f = pair_record.body_f
+        contact.body_g = pair_record.body_g
         in_place = slot.given == 1.0
         contact.minimum = pair_record.minimum + (IN_PLACE if in_place else 0)
         contact.surface_f = pair_record.surface_f
@@ -133,7 +126,7 @@ def update_around(store, memory, point, how):
 
 
 @kernel(inner=True)
-def update_again(store, memory, point, how, free, scratch):
+def update_again(store, lifted, point, how):
     """The watch's look at a point that is evaluated; whether rows changed.
 
     A look puts contacts on their extrema. Those whose coordinates are unknowns are on their way there: their rows have
@@ -141,27 +134,25 @@ def update_again(store, memory, point, how, free, scratch):
     contacts are from each other may be on its way to a saddle, and goes there.
     """
     header = header_at(store.table, 0)
-    tracked = point.tracked
+    memory, free, scratch, tracked = lifted.memory, lifted.free, lifted.guess, point.tracked
     first = header.first_guard
     for r in range(first, first + header.guards):
         if free[r] >= 0:
-            for i in range(TRACK):
-                scratch[r, i] = tracked[r, i]
+            copy_tracked(tracked, r, scratch)
     changed = update_around(store, memory, point, how)
     places = memory_places(store.table, header.watch)[1]
     merge_radius = lengths_at(store.pool, manager_at(store.table, header.watch).lengths).neglect
     for r in range(first, first + header.guards):
         place = places + PLACE_MEMORY * (r - first)
         number = np.int64(place_at(memory, place).number) if place_at(memory, place).pair >= 0.0 else 0
-        if free[r] >= 0 and number == contact_row_at(store.table, header.row_table + ROW * r).guard_number:
-            row = contact_row_at(store.table, header.row_table + ROW * r)
-            f, g = row.surface_f, row.surface_g
+        contact = contact_of(store.table, r)
+        if free[r] >= 0 and number == contact.guard_number:
+            f, g = contact.surface_f, contact.surface_g
             if (
                 call_address(header.stayed_address, (store.table, store.pool, f, g, tracked, scratch, r, merge_radius))
                 == 1
             ):
-                for i in range(TRACK):
-                    tracked[r, i] = scratch[r, i]
+                copy_tracked(scratch, r, tracked)
             else:
                 changed = True
     return changed
@@ -172,7 +163,7 @@ def numbers_of(table, out):
     """The numbers of the contacts that rows have now."""
     header = header_at(table, 0)
     for k in range(header.guards):
-        out[k] = contact_row_at(table, header.row_table + ROW * (header.first_guard + k)).guard_number
+        out[k] = contact_of(table, header.first_guard + k).guard_number
 
 
 @kernel(inner=True)
@@ -183,7 +174,7 @@ def go_back(table, memory, numbers):
     pairs, places, _events = memory_places(table, watch)
     same = True
     for k in range(header.guards):
-        number = contact_row_at(table, header.row_table + ROW * (header.first_guard + k)).guard_number
+        number = contact_of(table, header.first_guard + k).guard_number
         if number != numbers[k]:
             same = False
             place_at(memory, places + PLACE_MEMORY * k).pair = -1.0
@@ -227,8 +218,8 @@ def allowed_share(store, memory, current, trial, step, share):
             o.part = end
         if end > max(begin, 1.0):
             allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
-        flank = store.pool[pair_at(store.table, manager.pair_table + PAIR_RECORD * p).minimum + 1]
-        most = min(flank, lengths_at(store.pool, manager.lengths).last_reach)
+        flank = pair_at(store.table, manager.pair_table + PAIR_RECORD * p).minimum + 1
+        most = min(store.pool[flank], lengths_at(store.pool, manager.lengths).last_reach)
         if begin <= STILL and o.reach >= min(o.cut_short, most):
             # It was looked at right here, as far as another look would.
             o.part = begin

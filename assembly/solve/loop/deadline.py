@@ -12,17 +12,9 @@ import math
 from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.program.records import header_at
-from assembly.proximity.manager.state import (
-    manager_at,
-    memory_header_at,
-)
+from assembly.proximity.manager.records import manager_at, memory_header_at
+from assembly.solve.loop.parameters import HALF, LOOKS_ALONE
 from assembly.solve.loop.settings import results_at, settings_at
-
-# No look begins, and no step from a pose that holds, where so much of a budget is spent: either may take as long as the
-# rest of it.
-HALF = 0.5
-# A tick may end with a look until there were so many of every pair; then a step has to come first.
-LOOKS_ALONE = 4
 
 
 @kernel(inline=True)

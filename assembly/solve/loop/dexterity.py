@@ -25,21 +25,9 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.constraints.program.evaluate import evaluate
-from assembly.constraints.program.objective_terms import (
-    DEXTERITY,
-    TERM,
-    load,
-    term_at,
-)
+from assembly.constraints.program.objective_terms import DEXTERITY, TERM, load, term_at
 from assembly.constraints.program.primitives import add_coordinate_hessian, coordinate
-from assembly.constraints.program.records import (
-    BODY_COORDINATE,
-    ROW,
-    Iterate,
-    body_coordinate_at,
-    header_at,
-    row_at,
-)
+from assembly.constraints.program.records import BODY_COORDINATE, ROW, Iterate, body_coordinate_at, header_at, row_at
 from assembly.constraints.program.row_terms import add_row_terms
 from assembly.geometry.vec import add, cross, matvec, scale
 from assembly.kinematics.motion import rotation
@@ -78,6 +66,9 @@ DETERMINED, DEPENDENT, OPEN = 0, 1, 2
 TipMap = namedtuple("TipMap", "outcome jacobian used inputs adjoint")
 InputRates = namedtuple("InputRates", "v z changes")
 Adjoint = namedtuple("Adjoint", "p y loads")
+# The end effector of a term: its task, the arm from its body's origin, where that body's twist stands among the
+# unknowns (negative: fixed), factors of velocities and angular velocities.
+EndEffector = namedtuple("EndEffector", "task arm place linear angular")
 # What rows may change by unit rates of the inputs, and how much of the tip's motion may be left open.
 UNDETERMINED = 1e-6
 # Rows that change by less than this are as good as kept.
@@ -110,53 +101,64 @@ def task_rows(task):
 
 
 @kernel(inner=True)
-def tip_velocity(pool, o, task, p, v, s, out, column):
-    """Column of out: the tip's velocity for rates v; s is the place of its body's twist, p its arm."""
-    weights = dexterity_weights_at(pool, o)
-    for i in range(task_rows(task)):
+def end_effector(store, term, q):
+    """The end effector of a term at poses."""
+    weights = dexterity_weights_at(store.pool, term.parameters)
+    arm = matvec(rotation(q, term.body), load(store.pool, term.parameters + ARM))
+    task = dexterity_at(store.table, term.tape).task
+    return EndEffector(task, arm, slot(store.table, term.body), weights.linear, weights.angular)
+
+
+@kernel(inner=True)
+def tip_velocity(tip, v, out, column):
+    """Column of out: the tip's velocity for rates v."""
+    s = tip.place
+    for i in range(task_rows(tip.task)):
         out[i, column] = 0.0
     if s < 0:
         return
     w = (v[s + 3], v[s + 4], v[s + 5])
-    swept = cross(w, p)
-    if task != ROTATION:
+    swept = cross(w, tip.arm)
+    if tip.task != ROTATION:
         for i in range(3):
-            out[i, column] = weights.linear * (v[s + i] + swept[i])
-    if task != POSITION:
-        first = 0 if task == ROTATION else 3
+            out[i, column] = tip.linear * (v[s + i] + swept[i])
+    if tip.task != POSITION:
+        first = 0 if tip.task == ROTATION else 3
         for i in range(3):
-            out[first + i, column] = weights.angular * w[i]
+            out[first + i, column] = tip.angular * w[i]
 
 
 @kernel(inner=True)
-def add_tip_force(pool, o, task, p, w, column, s, out):
+def add_tip_force(tip, w, column, out):
     """out += T^T w, with w a column over the task."""
-    weights = dexterity_weights_at(pool, o)
+    s = tip.place
     if s < 0:
         return
-    if task != ROTATION:
-        f = (weights.linear * w[0, column], weights.linear * w[1, column], weights.linear * w[2, column])
-        turn = cross(p, f)
+    if tip.task != ROTATION:
+        f = (tip.linear * w[0, column], tip.linear * w[1, column], tip.linear * w[2, column])
+        turn = cross(tip.arm, f)
         for i in range(3):
             out[s + i] += f[i]
             out[s + 3 + i] += turn[i]
-    if task != POSITION:
-        first = 0 if task == ROTATION else 3
+    if tip.task != POSITION:
+        first = 0 if tip.task == ROTATION else 3
         for i in range(3):
-            out[s + 3 + i] += weights.angular * w[first + i, column]
+            out[s + 3 + i] += tip.angular * w[first + i, column]
 
 
 @kernel(inner=True)
-def add_tip_bend(pool, o, task, p, w, column, v, s, gradient):
+def add_tip_bend(tip, w, column, v, gradient):
     """gradient += w . (dT v), less half of what turns do not commute by."""
-    weights = dexterity_weights_at(pool, o)
+    s, p = tip.place, tip.arm
+    if s < 0:
+        return
     f = (0.0, 0.0, 0.0)
     moment = (0.0, 0.0, 0.0)
-    if task != ROTATION:
-        f = scale(weights.linear, (w[0, column], w[1, column], w[2, column]))
-    if task != POSITION:
-        first = 0 if task == ROTATION else 3
-        moment = scale(weights.angular, (w[first, column], w[first + 1, column], w[first + 2, column]))
+    if tip.task != ROTATION:
+        f = scale(tip.linear, (w[0, column], w[1, column], w[2, column]))
+    if tip.task != POSITION:
+        first = 0 if tip.task == ROTATION else 3
+        moment = scale(tip.angular, (w[first, column], w[first + 1, column], w[first + 2, column]))
     spin = (v[s + 3], v[s + 4], v[s + 5])
     bent = cross(p, cross(f, spin))
     turn = cross(add(moment, cross(p, f)), spin)
@@ -205,28 +207,22 @@ def tip_map(store, term, bases, rows, n, point, order):
     What the tip needs, and so whether its motion is open, is found from order 1 on.
     """
     term_record = term_at(store.table, term)
-    q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
+    residual = point.residual
     record = term_record.tape
-    dexterity_record = dexterity_at(store.table, record)
-    o = term_record.parameters
-    factors = o + FACTORS
-    body = term_record.body
-    k = dexterity_record.inputs
-    task = dexterity_record.task
-    m = task_rows(task)
-    s = slot(store.table, body)
-    arm = matvec(rotation(q, body), load(store.pool, o + ARM))
+    factors = term_record.parameters + FACTORS
+    effector = end_effector(store, term_record, point.q)
+    k, m = dexterity_at(store.table, record).inputs, task_rows(effector.task)
     used = used_rows(store.table, rows)
     b = np.zeros((k, n))
     for i in range(k):
-        input_row(store.table, record + INPUT_LIST + INPUT * i, records, tracked, b, i)
+        input_row(store.table, record + INPUT_LIST + INPUT * i, point.records, point.tracked, b, i)
     tip = np.zeros((m, k))
     v = np.zeros((k, n))
     z = np.zeros((k, k))
     p = np.zeros((m, n))
     y = np.zeros((m, k))
     changes = np.zeros((k, used.size))
-    exists, system = rate_system(bases, jacobian, used, b)
+    exists, system = rate_system(bases, point.jacobian, used, b)
     outcome = DETERMINED if exists else DEPENDENT
     if exists:
         # Where rows do not hold, redundant ones contradict each other and idle motions move the tip a little: singular
@@ -239,9 +235,9 @@ def tip_map(store, term, bases, rows, n, point, order):
         missed = 0.0
         for i in range(k):
             h[i] = 1.0
-            missed = max(missed, settle(system, bases, jacobian, used, b, g, h, v[i], z[i]))
+            missed = max(missed, settle(system, g, h, v[i], z[i]))
             h[i] = 0.0
-            tip_velocity(store.pool, o, task, arm, v[i], s, tip, i)
+            tip_velocity(effector, v[i], tip, i)
             for r in range(m):
                 tip[r, i] *= store.pool[factors + i]
         unit = np.zeros((m, 1))
@@ -249,39 +245,38 @@ def tip_map(store, term, bases, rows, n, point, order):
             for i in range(n):
                 g[i] = 0.0
             unit[r, 0] = 1.0
-            add_tip_force(store.pool, o, task, arm, unit, 0, s, g)
+            add_tip_force(effector, unit, 0, g)
             unit[r, 0] = 0.0
-            left = settle(system, bases, jacobian, used, b, g, h, p[r], y[r])
+            left = settle(system, g, h, p[r], y[r])
             if not left <= leeway * largest(g):
                 outcome = OPEN
-        changes = row_rates(bases, jacobian, used, v)
+        changes = row_rates(bases, point.jacobian, used, v)
         if not max(missed, largest(changes)) <= leeway:
             outcome = DEPENDENT
-    return TipMap(outcome, tip, used, InputRates(v, z, changes), Adjoint(p, y, row_rates(bases, jacobian, used, p)))
+    loads = row_rates(bases, point.jacobian, used, p)
+    return TipMap(outcome, tip, used, InputRates(v, z, changes), Adjoint(p, y, loads))
 
 
-@kernel(inner=True)
-def bend(store, record, shape, lifted, workspace, point, forces, weights, inputs, rates, hessian, gradient):
-    """gradient -= H v, H the second derivative of forces . rows + inputs . (values of the inputs).
-
-    `weights` are no weights of rows: zeros.
-    """
+@kernel(inner=True, allocates=True)
+def bend(program, record, point, forces, inputs, rates, hessian, gradient):
+    """gradient -= H v, H the second derivative of forces . rows + inputs . (values of the inputs)."""
+    table = program.store.table
     n = rates.size
     for r in range(n):
         for c in range(r, n):
             hessian[r, c] = 0.0
-    add_row_terms(store, lifted, workspace, shape, point, forces, weights, hessian)
+    add_row_terms(program, point, forces, np.zeros(forces.size), hessian)
     for j in range(inputs.size):
-        asked = body_coordinate_at(store.table, record + INPUT_LIST + INPUT * j)
+        asked = body_coordinate_at(table, record + INPUT_LIST + INPUT * j)
         add_coordinate_hessian(
             asked.kind,
             asked.component,
             point.records,
-            header_at(store.table, 0).contacts + asked.joint,
+            header_at(table, 0).contacts + asked.joint,
             inputs[j],
             hessian,
-            slot(store.table, asked.body_f),
-            slot(store.table, asked.body_g),
+            slot(table, asked.body_f),
+            slot(table, asked.body_g),
         )
     for r in range(n):
         for c in range(r, n):
@@ -291,38 +286,30 @@ def bend(store, record, shape, lifted, workspace, point, forces, weights, inputs
 
 
 @kernel(inner=True, allocates=True)
-def dexterity(store, term, shape, rows, lifted, workspace, point, order, gradient):
+def dexterity(program, term, count, point, order, gradient):
     """Value of the term at a point whose rows are evaluated; from order 1 on its gradient is added."""
+    store, n = program.store, gradient.size
     term_record = term_at(store.table, term)
-    bases = shape.bases
-    n = gradient.size
-    record = term_record.tape
-    dexterity_record = dexterity_at(store.table, record)
-    o = term_record.parameters
-    factors = o + FACTORS
-    task = dexterity_record.task
-    weight = dexterity_weights_at(store.pool, o).weight
-    tip = tip_map(store, term, bases, rows, n, point, order)
+    record, o = term_record.tape, term_record.parameters
+    factors, weight = o + FACTORS, dexterity_weights_at(store.pool, o).weight
+    tip = tip_map(store, term, program.structure.bases, count, n, point, order)
     jacobian, used = tip.jacobian, tip.used
     v, z, changes = tip.inputs
     p, y, loads = tip.adjoint
     if tip.outcome != DETERMINED:
         return math.inf
     slopes = np.empty(jacobian.shape)
-    value = measure_jacobian(dexterity_record.measure, store.pool, o + DIRECTION, jacobian, slopes)
+    value = measure_jacobian(dexterity_at(store.table, record).measure, store.pool, o + DIRECTION, jacobian, slopes)
     if not math.isfinite(value):
         return math.inf
     if order == 0:
         return weight * value
-    body = term_record.body
-    s = slot(store.table, body)
-    arm = matvec(rotation(point.q, body), load(store.pool, o + ARM))
+    effector = end_effector(store, term_record, point.q)
     m, k = jacobian.shape
     # Room for one combination at a time: p, y, A p as forces on all rows.
     pull = np.empty(n)
     turn = np.empty(k)
-    forces = np.zeros(rows)
-    none = np.zeros(rows)
+    forces = np.zeros(count)
     hessian = np.empty((n, n))
     for i in range(k):
         for c in range(n):
@@ -340,19 +327,19 @@ def dexterity(store, term, shape, rows, lifted, workspace, point, order, gradien
                 turn[j] += w * y[r, j]
             for l in range(used.size):
                 forces[used[l]] += w * loads[r, l]
-        bend(store, record, shape, lifted, workspace, point, forces, none, turn, v[i], hessian, gradient)
+        bend(program, record, point, forces, turn, v[i], hessian, gradient)
         if largest(changes[i]) > KEPT:
             for l in range(used.size):
                 forces[used[l]] = changes[i, l]
-            bend(store, record, shape, lifted, workspace, point, forces, none, z[i], pull, hessian, gradient)
-        if s >= 0:
-            add_tip_bend(store.pool, o, task, arm, slopes, i, v[i], s, gradient)
+            bend(program, record, point, forces, z[i], pull, hessian, gradient)
+        add_tip_bend(effector, slopes, i, v[i], gradient)
     return weight * value
 
 
 @kernel(inner=True, allocates=True)
-def add_dexterities(store, shape, rows, lifted, workspace, current, order, gradient, hessian):
+def add_dexterities(program, count, current, order, gradient, hessian):
     """Values of all terms of this kind; from order 1 on gradients, and Hessians by differences of these."""
+    store = program.store
     header = header_at(store.table, 0)
     value = 0.0
     n = gradient.size
@@ -361,7 +348,7 @@ def add_dexterities(store, shape, rows, lifted, workspace, current, order, gradi
         if term_at(store.table, term).kind != DEXTERITY:
             continue
         slope = np.zeros(n)
-        value += dexterity(store, term, shape, rows, lifted, workspace, current, order, slope)
+        value += dexterity(program, term, count, current, order, slope)
         if order == 0 or not math.isfinite(value):
             continue
         for i in range(n):
@@ -380,11 +367,11 @@ def add_dexterities(store, shape, rows, lifted, workspace, current, order, gradi
                 other[i] = 0.0
             step[j] = STEP
             move(store.table, current.q, step, 1.0, beside.q)
-            predict_pairs(store, shape.bases, lifted, current, beside, step, 1.0)
+            predict_pairs(store, program.structure.bases, program.lifted, current, beside, step, 1.0)
             step[j] = 0.0
-            if evaluate(store, lifted.guess, math.inf, lifted, workspace, beside) >= 0:
+            if evaluate(program, program.lifted.guess, math.inf, beside) >= 0:
                 continue
-            if math.isfinite(dexterity(store, term, shape, rows, lifted, workspace, beside, 1, other)):
+            if math.isfinite(dexterity(program, term, count, beside, 1, other)):
                 for i in range(n):
                     bend = 0.5 * (other[i] - slope[i]) / STEP
                     hessian[min(i, j), max(i, j)] += 2.0 * bend if i == j else bend

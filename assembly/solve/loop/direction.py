@@ -9,90 +9,67 @@ from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.records import header_at
 from assembly.constraints.program.row_terms import add_row_terms
 from assembly.solve.linear_algebra.factorize import factorize_shifted
-from assembly.solve.loop.line_search import damped_step
+from assembly.solve.loop.line_search import Trust, damped_step
 from assembly.solve.loop.multipliers import curve_rows, leave_out, predict_active_set, weigh_rows
+from assembly.solve.loop.parameters import CLOSE, FORESEEN, KICK, LEAST_SHIFT, SADDLE, SHIFT, TINIEST_SHIFT
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import add_transposed, move, times
 
-# The least shift of the Hessian; of violations alone, so much of the largest one, down to rounding. That is where rows
-# gain nothing although they are off by less than CLOSE.
-LEAST_SHIFT, SHIFT, TINIEST_SHIFT = 1e-8, 1e-2, 1e-13
-CLOSE = 1e-6
-# A step is computed so many times more for one-sided rows that it would break. Where they change places for ever, it
-# is the one without them: half of an exchange may lead uphill.
-FORESEEN = 12
-# Where so many steps in a row that hold are cut by half and more, the next ones are damped until one is not: most of
-# these may go where nothing holds, as a ring turns about its own axis.
-OFTEN = 25
-# Where violations are stationary, this much curvature downward makes a saddle of it; a small move leads off it, in a
-# direction that nothing but a scene made for it has as a symmetry.
-SADDLE, KICK = 1e-5, 1e-3
+
+@kernel(inline=True)
+def first_shift(program, restoring, shift, violation, dual):
+    """The shift that is tried first, after one of `shift`: no larger than what inertia needs so near to a solution.
+
+    That falls with the distance to it. Where rows alone count and depend on each other there, the squares of their
+    slopes do, too; contacts of a clearance come and go instead.
+    """
+    least, off = LEAST_SHIFT, dual
+    if restoring and violation < CLOSE and header_at(program.store.table, 0).watch < 0:
+        least, off = max(min(SHIFT * violation, least), TINIEST_SHIFT), violation
+    return max(min(0.25 * shift, off), least)
 
 
 @kernel(inline=True)
-def find_direction(
-    program, current, rows, y, mu, shift, radius, cuts, dual, violation, restoring, is_fresh, weights, system
-):
-    """The step of the augmented Lagrangian at a point, into the system's lines; by the last factor unless `is_fresh`.
+def find_direction(program, current, rows, system, trust, restoring, is_fresh):
+    """The step of the augmented Lagrangian at a point, into the system; by the last factor unless `is_fresh`.
 
-    `weights` gets which rows count, what they push with, and which do because the step would break them. Returns the
+    The rows get which of them count, what they push with, and which do because the step would break them. Returns the
     shift of the matrix and that of the factor the step is by, negative where there is none; the step's largest
     component and turn.
     """
-    store, shape, lifted, workspace = (
-        program.store,
-        program.structure,
-        program.lifted,
-        program.tapes,
-    )
-    header = header_at(store.table, 0)
-    active, forces, foreseen = weights
-    gradient, lines, lagrangian, matrix = system.gradient, system.directions, system.hessian, system.factor
-    bases, one_sided, order = shape.bases, shape.one_sided, shape.sparsity
-    descent, step, straight = lines.descent, lines.step, lines.straight
+    shape, order = program.structure, program.structure.sparsity
+    gradient, lagrangian, matrix = system.gradient, system.hessian, system.factor
+    descent = system.directions.descent
     n = descent.size
-    residual, jacobian = current.residual, current.jacobian
-    weigh_rows(rows, one_sided, residual, y, mu, forces, active)
+    shift = trust.shift
+    weigh_rows(rows, shape.one_sided, current.residual)
     for i in range(n):
         descent[i] = -gradient[i]
-    add_transposed(bases, jacobian, rows, forces, descent)
-    for r in range(rows):
-        foreseen[r] = 0.0
+    add_transposed(shape.bases, current.jacobian, rows.count, rows.forces, descent)
+    for r in range(rows.count):
+        rows.foreseen[r] = 0.0
     if is_fresh:
-        curve_rows(rows, residual, y, active, restoring, forces)
-        add_row_terms(store, lifted, workspace, shape, current, forces, active, lagrangian)
-        # What the inertia needs falls with the distance to the solution. Where rows alone count and depend on each
-        # other there, the squares of their slopes do, too; contacts of a clearance come and go instead.
-        least, off = LEAST_SHIFT, dual
-        if restoring and violation < CLOSE and header.watch < 0:
-            least, off = max(min(SHIFT * violation, least), TINIEST_SHIFT), violation
-        shift = factorize_shifted(lagrangian, n, order, max(min(0.25 * shift, off), least), matrix)
+        curve_rows(rows, current.residual, restoring)
+        add_row_terms(program, current, rows.forces, rows.active, lagrangian)
+        shift = factorize_shifted(lagrangian, n, order, shift, matrix)
         if shift < 0.0:
             return shift, shift, 0.0, 0.0
-    damps = header.contacts == 0 or cuts >= OFTEN
-    used, longest, turn = damped_step(
-        store.table, lagrangian, n, order, shift, radius, damps, matrix, descent, step, straight
-    )
+    used, longest, turn = damped_step(program, system, Trust(shift, trust.radius, trust.damps))
     for attempt in range(FORESEEN + 1):
         if used < 0.0 or restoring:
             break
-        changed = predict_active_set(
-            store.table, shape, rows, residual, jacobian, y, mu, step, is_fresh, active, foreseen, descent, lagrangian
-        )
-        if changed == 0:
+        if predict_active_set(program, current, rows, system, is_fresh) == 0:
             break
         if attempt == FORESEEN:
-            leave_out(shape, rows, residual, jacobian, y, mu, is_fresh, active, foreseen, descent, lagrangian)
+            leave_out(shape, current, rows, system, is_fresh)
         if not is_fresh:
             is_fresh = True
-            curve_rows(rows, residual, y, active, restoring, forces)
-            add_row_terms(store, lifted, workspace, shape, current, forces, active, lagrangian)
+            curve_rows(rows, current.residual, restoring)
+            add_row_terms(program, current, rows.forces, rows.active, lagrangian)
         shift = factorize_shifted(lagrangian, n, order, max(shift, LEAST_SHIFT), matrix)
         used = shift
         if shift >= 0.0:
-            used, longest, turn = damped_step(
-                store.table, lagrangian, n, order, shift, radius, damps, matrix, descent, step, straight
-            )
+            used, longest, turn = damped_step(program, system, Trust(shift, trust.radius, trust.damps))
     return shift, used, longest, turn
 
 
@@ -104,9 +81,9 @@ def short_share(radius, longest, turn):
 
 
 @kernel(inline=True)
-def cut_step(shape, current, rows, y, mu, cut, foreseen, lines):
+def cut_step(shape, current, rows, system, cut):
     """Shorten the step to a share. Returns the merit's slope along it, and the largest component of the descent."""
-    descent, step, straight = lines.descent, lines.step, lines.straight
+    descent, step, straight = system.directions.descent, system.directions.step, system.directions.straight
     slope = 0.0
     steepest = 0.0
     for i in range(descent.size):
@@ -114,22 +91,23 @@ def cut_step(shape, current, rows, y, mu, cut, foreseen, lines):
         straight[i] = step[i]
         slope -= descent[i] * step[i]
         steepest = max(steepest, abs(descent[i]))
-    for r in range(rows):
-        if foreseen[r] == 1.0:
+    for r in range(rows.count):
+        if rows.foreseen[r] == 1.0:
             # What the row adds to the descent is not in the merit before it binds.
-            slope -= (y[r] + current.residual[r] / mu) * times(shape.bases, current.jacobian, r, step)
+            slope -= (rows.y[r] + current.residual[r] / rows.mu) * times(shape.bases, current.jacobian, r, step)
     return slope, steepest
 
 
 @kernel(inline=True)
-def propose(shape, current, rows, y, mu, active, straight, alpha, better_y):
+def propose(shape, current, rows, straight, alpha):
     """The multipliers of first order after a share alpha of the straight step."""
-    bases, one_sided = shape.bases, shape.one_sided
-    for r in range(rows):
+    y, better_y = rows.y, rows.better_y
+    for r in range(rows.count):
         better_y[r] = 0.0
-        if active[r] > 0.0:
-            better_y[r] = y[r] + alpha * (times(bases, current.jacobian, r, straight) + current.residual[r]) / mu
-            if one_sided[r] == 1:
+        if rows.active[r] > 0.0:
+            change = alpha * (times(shape.bases, current.jacobian, r, straight) + current.residual[r])
+            better_y[r] = y[r] + change / rows.mu
+            if shape.one_sided[r] == 1:
                 better_y[r] = min(better_y[r], 0.0)
 
 
@@ -139,18 +117,12 @@ def leave_saddle(program, current, trial, number, system):
 
     Of axes that are parallel and are to stand at right angles, say. `number` is how many moves there have been.
     """
-    store, shape, lifted, workspace = (
-        program.store,
-        program.structure,
-        program.lifted,
-        program.tapes,
-    )
-    step, lagrangian, matrix = system.directions.step, system.hessian, system.factor
+    store, step = program.store, system.directions.step
     n = step.size
-    if not factorize_shifted(lagrangian, n, shape.sparsity, LEAST_SHIFT, matrix) > SADDLE:
+    if not factorize_shifted(system.hessian, n, program.structure.sparsity, LEAST_SHIFT, system.factor) > SADDLE:
         return False
     for i in range(n):
         step[i] = KICK * math.sin(number + 1 + i) if i < 6 * header_at(store.table, 0).moving else 0.0
     move(store.table, current.q, step, 1.0, trial.q)
-    predict_pairs(store, shape.bases, lifted, current, trial, step, 1.0)
-    return evaluate(store, lifted.guess, math.inf, lifted, workspace, trial) < 0
+    predict_pairs(store, program.structure.bases, program.lifted, current, trial, step, 1.0)
+    return evaluate(program, program.lifted.guess, math.inf, trial) < 0

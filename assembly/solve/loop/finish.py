@@ -31,61 +31,56 @@ from assembly.solve.loop.warm_start import leave
 from assembly.solve.loop.workspace import results_of
 
 # How the loop ended: status, and objective, violation, dual residual of its last iterate; the violation that counts as
-# none, how many rows there are, whether there is a last feasible iterate.
-End = namedtuple("End", "status value violation dual feasible rows holds")
+# none, whether there is a last feasible iterate.
+End = namedtuple("End", "status value violation dual feasible holds")
 
 
 @kernel(inner=True)
-def tells_crossing(store, lifted, workspace, current, y, better_y):
+def tells_crossing(program, current, rows):
     """Look at everything where a solve failed; whether bodies are in each other, with or without a row that says so."""
-    memory, free = lifted.memory, lifted.free
-    update_around(store, memory, current, EVERYTHING)
-    place_clearance_rows(store.table, memory, current, y, better_y, free, False)
-    lost = evaluate(store, current.tracked, math.inf, lifted, workspace, current)
+    table, lifted = program.store.table, program.lifted
+    update_around(program.store, lifted.memory, current, EVERYTHING)
+    place_clearance_rows(table, lifted, current, rows, False)
+    lost = evaluate(program, current.tracked, math.inf, current)
     return (
         lost >= 0
-        or not is_clear(store.table, current.residual)
-        or any_crossed(store.table, header_at(store.table, 0).watch, memory)
+        or not is_clear(table, current.residual)
+        or any_crossed(table, header_at(table, 0).watch, lifted.memory)
     )
 
 
 @kernel(inner=True)
-def return_to(store, held, numbers, lifted, rows, current, y, better_y, tick):
+def return_to(program, held, rows, current, tick):
     """Back to the last pose that held; what is near there is looked for again."""
-    memory, free = lifted.memory, lifted.free
-    bring_back(held, rows, current, y)
+    store, lifted = program.store, program.lifted
+    bring_back(held, rows, current)
     if header_at(store.table, 0).watch >= 0:
-        go_back(store.table, memory, numbers)
+        go_back(store.table, lifted.memory, held.numbers)
         if not tick:
-            update_around(store, memory, current, EVERYTHING)
-        place_clearance_rows(store.table, memory, current, y, better_y, free, False)
+            update_around(store, lifted.memory, current, EVERYTHING)
+        place_clearance_rows(store.table, lifted, current, rows, False)
 
 
 @kernel(inline=True, allocates=True)
-def finish(program, settings, state, tips, current, trial, by_row, at_end, held, numbers, system, gram):
+def finish(program, settings, state, iterates, rows, system, at_end):
     """Write the end into the state; returns status, objective, violation and dual residual of the pose returned."""
     limits = settings_at(settings, 0)
-    store, shape, lifted, workspace = (
-        program.store,
-        program.structure,
-        program.lifted,
-        program.tapes,
-    )
+    store, lifted = program.store, program.lifted
+    current, trial, held = iterates
     header = header_at(store.table, 0)
-    gradient, lines, lagrangian = system.gradient, system.directions, system.hessian
-    y, better_y, active, forces = by_row.y, by_row.better_y, by_row.active, by_row.forces
+    gradient, lagrangian = system.gradient, system.hessian
     status, value, violation, dual = at_end.status, at_end.value, at_end.violation, at_end.dual
-    feasible, rows, holds = at_end.feasible, at_end.rows, at_end.holds
+    feasible, holds = at_end.feasible, at_end.holds
     results = results_of(store.table, state)
     result = results_at(results, 0)
     tick = limits.tick == 1.0
     watched = header.watch >= 0
     tells = watched and not tick and status != SOLVED and status != CONTACT_LOST
-    crosses = tells and tells_crossing(store, lifted, workspace, current, y, better_y)
+    crosses = tells and tells_crossing(program, current, rows)
     fails = status == STALLED or status == ITERATION_LIMIT or status == INFEASIBLE
     is_wish = limits.any_pose == 1.0 and (fails or status == SOLVED) and not crosses
     if holds and ((tick and not violation <= feasible and result.carried == 0.0) or crosses):
-        return_to(store, held, numbers, lifted, rows, current, y, better_y, tick)
+        return_to(program, held, rows, current, tick)
         result.held = 1.0
     gathered = header.implicit == 1 and limits.gather > 0.0 and result.scatter == 1.0
     if gathered:
@@ -96,28 +91,30 @@ def finish(program, settings, state, tips, current, trial, by_row, at_end, held,
     if status != CONTACT_LOST and not (tick and result.held == 0.0):
         # A tick that went well ends at a pose that was just evaluated.
         bound = 1.25 * feasible
-        good, violation = judge(store, state, lifted, workspace, shape, rows, current, trial, bound, tick)
+        good, violation = judge(program, state, rows.count, current, trial, bound, tick)
         is_cut_short = status == OUT_OF_TIME and not tick
         if (is_wish or is_cut_short) and holds and not good and not watched:
-            return_to(store, held, numbers, lifted, rows, current, y, better_y, tick)
+            return_to(program, held, rows, current, tick)
             result.held = 1.0
             write_pose(store, current.q, state)
-            good, violation = judge(store, state, lifted, workspace, shape, rows, current, trial, bound, tick)
+            good, violation = judge(program, state, rows.count, current, trial, bound, tick)
         if is_wish and good and (fails or result.held == 1.0):
             status = SOLVED
-            value = goal(store, shape, rows, lifted, workspace, tips, trial, 1, gradient, lagrangian)
-            dual = multipliers_at(shape, rows, trial, active, gradient, lines.descent, gram, y)
+            value = goal(program, rows.count, trial, 1, gradient, lagrangian)
+            dual = multipliers_at(program.structure, trial, rows, system)
         elif gathered or is_cut_short:
-            value = goal(store, shape, rows, lifted, workspace, tips, trial, 0, gradient, lagrangian)
+            value = goal(program, rows.count, trial, 0, gradient, lagrangian)
         if status == SOLVED and not good:
             status = UNSURE if is_near_saddle(store.table, settings, results, violation, dual) else STALLED
-    result.improper = write_rows(store.table, current, y, lifted, tick, pool_header_at(store.pool, 0).scale, state)
+    result.improper = write_rows(store.table, current, rows.y, lifted, tick, pool_header_at(store.pool, 0).scale, state)
     if limits.second_order > 0.0 and result.held + result.carried == 0.0 and status != CONTACT_LOST:
-        status = test_end(program, settings, results, status, tips, current, rows, y, active, forces, system)
+        status = test_end(program, settings, results, status, current, rows, system)
     if limits.recall > 0.0:
         # With clearances what a tick ends with depends on rounding where wires wedge: there, rows are evaluated afresh.
         good = status == SOLVED if watched else status != CONTACT_LOST
-        leave(store.table, state, int(limits.recall), current, good and result.held == 0.0 and rows == header.rows)
+        leave(
+            store.table, state, int(limits.recall), current, good and result.held == 0.0 and rows.count == header.rows
+        )
     if watched:
         clear_clearance_rows(store.table)
     return status, value, violation, dual

@@ -11,87 +11,69 @@ from assembly._kernel import kernel
 from assembly.constraints.program.records import header_at
 from assembly.constraints.program.row_terms import add_row_terms
 from assembly.solve.linear_algebra.factorize import factorize_shifted
-from assembly.solve.loop.direction import LEAST_SHIFT
 from assembly.solve.loop.line_search import goal
-from assembly.solve.loop.multipliers import NEAR, WEAK, strongest
-from assembly.solve.loop.settings import (
-    SOLVED,
-    UNSURE,
-    results_at,
-    settings_at,
-)
+from assembly.solve.loop.multipliers import strongest
+from assembly.solve.loop.parameters import CLEAR_SHIFT, IDLE, LEAST_SHIFT, NEAR, NEAR_END, SMALL_SHIFT, WEAK
+from assembly.solve.loop.settings import SOLVED, UNSURE, results_at, settings_at
+from assembly.solve.loop.workspace import penalized
 
-# A factorization tells of the end with a shift up to this, at a point where the dual residual was no more than that.
-SMALL_SHIFT, NEAR_END = 1e-7, 1e-3
-# One that needed more than this near an end tells of negative curvature, any other one of nothing.
-CLEAR_SHIFT, DOWNWARD, UNKNOWN = 1e-3, -2.0, -1.0
-# A one-sided row with a multiplier below this does not push. Nor do multipliers bend anything that are all below it.
-IDLE = 1e-7
+# What a factorization told: of negative curvature near an end, or nothing.
+DOWNWARD, UNKNOWN = -2.0, -1.0
 
 
 @kernel(inner=True)
-def pushing_sum(rows, one_sided, weights, least):
+def pushing_sum(count, one_sided, weights, least):
     """A sum that tells which one-sided rows have a weight above the least: of the squares of their places."""
     total = 0.0
-    for r in range(rows):
+    for r in range(count):
         if one_sided[r] == 1 and weights[r] > least:
             total += (r + 1.0) * (r + 1.0)
     return total
 
 
 @kernel(inner=True)
-def note_factor(settings, results, iteration, shift, dual, restoring, is_fresh, rows, one_sided, active, y):
-    """Keep what the factorization of a step told: its shift, for the first step of a tick, and whether it is convex.
+def note_factor(results, rows, one_sided, shift, dual, restoring):
+    """Keep what the new factorization of a step of a solve told: whether it is convex.
 
     One that is leaves one and a sum that tells which one-sided rows it had; one that tells of negative curvature is
     DOWNWARD: near an end a step tries a shift no larger than the dual residual first.
     """
     result = results_at(results, 0)
-    if iteration == 0:
-        result.first_shift = shift
-    if not is_fresh or settings_at(settings, 0).tick == 1.0:
-        return
-    force = strongest(y, rows)
+    force = strongest(rows.y, rows.count)
     # Weak multipliers are left out of the matrix (`multipliers.curve_rows`).
     bends = force >= WEAK or force <= IDLE
     if shift <= SMALL_SHIFT and dual <= NEAR_END and bends and not restoring:
-        result.curved = 1.0 + pushing_sum(rows, one_sided, active, 0.0)
+        result.curved = 1.0 + pushing_sum(rows.count, one_sided, rows.active, 0.0)
     else:
         result.curved = DOWNWARD if shift >= CLEAR_SHIFT > dual and not restoring else UNKNOWN
 
 
 @kernel(inner=True)
-def told_convex(results, rows, one_sided, residual, y, scratch):
+def told_convex(results, rows, one_sided, residual):
     """Whether the last factorization had the rows that push at the end, and none that only touches."""
     result = results_at(results, 0)
     if not result.curved > 0.0:
         return False
-    for r in range(rows):
-        scratch[r] = -y[r]
-        if one_sided[r] == 1 and abs(residual[r]) <= NEAR and y[r] >= -IDLE:
+    for r in range(rows.count):
+        rows.forces[r] = -rows.y[r]
+        if one_sided[r] == 1 and abs(residual[r]) <= NEAR and rows.y[r] >= -IDLE:
             return False
-    return result.curved == 1.0 + pushing_sum(rows, one_sided, scratch, IDLE)
+    return result.curved == 1.0 + pushing_sum(rows.count, one_sided, rows.forces, IDLE)
 
 
 @kernel(inner=True)
-def is_convex(program, tips, current, rows, y, active, system, mu, shift):
+def is_convex(program, current, rows, system, shift):
     """Whether the matrix of the rows that push, shifted by so much, has a factor at this point."""
-    store, shape, lifted, workspace = (
-        program.store,
-        program.structure,
-        program.lifted,
-        program.tapes,
-    )
-    gradient, lagrangian, matrix = system.gradient, system.hessian, system.factor
-    goal(store, shape, rows, lifted, workspace, tips, current, 1, gradient, lagrangian)
-    for r in range(rows):
-        active[r] = 0.0 if shape.one_sided[r] == 1 and y[r] >= -IDLE else 1.0 / mu
-    add_row_terms(store, lifted, workspace, shape, current, y, active, lagrangian)
-    return factorize_shifted(lagrangian, gradient.size, shape.sparsity, shift, matrix) == shift
+    shape, lagrangian = program.structure, system.hessian
+    goal(program, rows.count, current, 1, system.gradient, lagrangian)
+    for r in range(rows.count):
+        rows.active[r] = 0.0 if shape.one_sided[r] == 1 and rows.y[r] >= -IDLE else 1.0 / rows.mu
+    add_row_terms(program, current, rows.y, rows.active, lagrangian)
+    return factorize_shifted(lagrangian, system.gradient.size, shape.sparsity, shift, system.factor) == shift
 
 
 @kernel(inline=True)
-def test_end(program, settings, results, status, tips, current, rows, y, active, forces, system):
+def test_end(program, settings, results, status, current, rows, system):
     """The status of a solve that is SOLVED: UNSURE where no factorization tells that no curvature is negative.
 
     Of a tick that is asked for it the result says whether its end is a minimum. A first solve that ends where it began
@@ -107,9 +89,9 @@ def test_end(program, settings, results, status, tips, current, rows, y, active,
     if not tick:
         if result.curved == DOWNWARD or (result.curved == 0.0 and limits.penalty > mu):
             return UNSURE
-        if told_convex(results, rows, shape.one_sided, current.residual, y, forces):
+        if told_convex(results, rows, shape.one_sided, current.residual):
             return status
     shift = 0.0 if tick else LEAST_SHIFT
-    convex = is_convex(program, tips, current, rows, y, active, system, mu, shift)
+    convex = is_convex(program, current, penalized(rows, mu), system, shift)
     result.curved = 1.0 if convex else -1.0
     return status if tick or convex else UNSURE

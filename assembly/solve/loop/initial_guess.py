@@ -41,8 +41,12 @@ ENOUGH = 1e-26
 DAMPING, STUCK = 1e-4, 1e6
 # A place where rows are smaller by less than this is no better one.
 LOWER = 0.9
-# What the fit of one body works in: J^T J, the same with damping, how far its rows reach, a row, J^T c, the step.
-FitRoom = namedtuple("FitRoom", "matrix damped last row slope step")
+# What the fit of one body works in: J^T J, the same with damping, how far its rows reach, a row, J^T c, the step; its
+# poses at the start, at best, and before a step.
+FitRoom = namedtuple("FitRoom", "matrix damped last row slope step poses")
+START, BEST, BEFORE = 0, 1, 2
+# A body to be placed: its number, where its twist stands, where its `count` rows are listed in the table.
+Placed = namedtuple("Placed", "body slot first count")
 
 
 @kernel(inner=True)
@@ -73,11 +77,11 @@ def is_of(table, row, joint):
 
 
 @kernel(inner=True)
-def body_rows(store, first, count, joint, point):
-    """Evaluate rows listed in the table, of a joint or of all (-1); half the sum of squares of what does not hold."""
-    q, tracked, records, residual, jacobian = point.q, point.tracked, point.records, point.residual, point.jacobian
+def body_rows(store, placed, joint, point):
+    """Evaluate a body's rows, of a joint or of all (-1); half the sum of squares of what does not hold."""
+    q, records, residual = point.q, point.records, point.residual
     cost = 0.0
-    for l in range(first, first + count):
+    for l in range(placed.first, placed.first + placed.count):
         r = store.table[l]
         row = header_at(store.table, 0).row_table + ROW * r
         joint_there = joint_row_at(store.table, row)
@@ -87,16 +91,16 @@ def body_rows(store, first, count, joint, point):
         place_joint(store, joint_there.joint, q, records)
         if second >= 0:
             place_joint(store, coordinate_at(store.table, second).joint, q, records)
-        joint_row(store, r, tracked, tracked, records, residual, jacobian)
+        joint_row(store, r, point.tracked, point)
         if row_at(store.table, row).one_sided == 0 or residual[r] < 0.0:
             cost += 0.5 * residual[r] * residual[r]
     return cost
 
 
 @kernel(inner=True)
-def follow_drives(store, first, count, tracked):
-    """Driven angles of rows listed in the table are looked for near their values again."""
-    for l in range(first, first + count):
+def follow_drives(store, placed, tracked):
+    """Driven angles of a body's rows are looked for near their values again."""
+    for l in range(placed.first, placed.first + placed.count):
         row = header_at(store.table, 0).row_table + ROW * store.table[l]
         joint = joint_row_at(store.table, row)
         if row_at(store.table, row).one_sided == 0 and joint.second < 0 and joint.angle >= 0:
@@ -117,9 +121,9 @@ def body_row(bases, jacobian, r, s, out):
 
 
 @kernel(inner=True)
-def is_half_around(table, residual, first, count):
-    """Whether an angle of rows listed in the table is far from where it is driven to."""
-    for l in range(first, first + count):
+def is_half_around(table, residual, placed):
+    """Whether an angle of a body's rows is far from where it is driven to."""
+    for l in range(placed.first, placed.first + placed.count):
         row = header_at(table, 0).row_table + ROW * table[l]
         joint = joint_row_at(table, row)
         driven = row_at(table, row).one_sided == 0 and joint.second < 0 and joint.angle >= 0
@@ -129,20 +133,20 @@ def is_half_around(table, residual, first, count):
 
 
 @kernel(inner=True)
-def normal_equations(table, bases, first, count, joint, s, point, workspace):
-    """J^T J and J^T c of rows that do not hold, in the twist that stands at s."""
+def normal_equations(table, bases, placed, joint, point, workspace):
+    """J^T J and J^T c of a body's rows that do not hold, in its twist."""
     residual, jacobian = point.residual, point.jacobian
     matrix, row, slope = workspace.matrix, workspace.row, workspace.slope
     for i in range(6):
         slope[i] = 0.0
         for j in range(i, 6):
             matrix[i, j] = 0.0
-    for l in range(first, first + count):
+    for l in range(placed.first, placed.first + placed.count):
         r = table[l]
         at = header_at(table, 0).row_table + ROW * r
         if not is_of(table, at, joint) or (row_at(table, at).one_sided == 1 and residual[r] >= 0.0):
             continue
-        body_row(bases, jacobian, r, s, row)
+        body_row(bases, jacobian, r, placed.slot, row)
         for i in range(6):
             slope[i] += row[i] * residual[r]
             for j in range(i, 6):
@@ -150,26 +154,20 @@ def normal_equations(table, bases, first, count, joint, s, point, workspace):
 
 
 @kernel(inner=True)
-def fit_body(store, bases, body, first, count, joint, s, point, workspace):
-    """Move a body until rows listed in the table, of a joint or of all (-1), are as small as they get.
+def fit_body(store, bases, placed, joint, point, workspace):
+    """Move a body until its rows, of a joint or of all (-1), are as small as they get.
 
     Returns half the sum of squares of those that do not hold.
     """
-    q = point.q
-    matrix, damped, last, slope, step = (
-        workspace.matrix,
-        workspace.damped,
-        workspace.last,
-        workspace.slope,
-        workspace.step,
-    )
+    q, body = point.q, placed.body
+    matrix, damped, last, _row, slope, step, poses = workspace
     damping = DAMPING
-    cost = body_rows(store, first, count, joint, point)
+    cost = body_rows(store, placed, joint, point)
     for _step in range(STEPS):
         if cost <= ENOUGH or damping > STUCK:
             break
-        normal_equations(store.table, bases, first, count, joint, s, point, workspace)
-        before = pose_of(q, body)
+        normal_equations(store.table, bases, placed, joint, point, workspace)
+        copy_pose(q, body, poses, BEFORE)
         while damping <= STUCK:
             for i in range(6):
                 step[i] = -slope[i]
@@ -183,25 +181,21 @@ def fit_body(store, bases, body, first, count, joint, s, point, workspace):
                 for i in range(6):
                     step[i] *= cut
                 retract(q, body, (step[0], step[1], step[2]), (step[3], step[4], step[5]), q)
-                there = body_rows(store, first, count, joint, point)
+                there = body_rows(store, placed, joint, point)
                 if there < cost:
                     cost = there
                     damping = max(0.1 * damping, 1e-12)
                     break
-            put_pose(q, body, before)
+            copy_pose(poses, BEFORE, q, body)
             damping *= 10.0
-    return body_rows(store, first, count, joint, point)
+    return body_rows(store, placed, joint, point)
 
 
 @kernel(inline=True)
-def pose_of(q, body):
-    return (q[body, 0], q[body, 1], q[body, 2], q[body, 3], q[body, 4], q[body, 5], q[body, 6])
-
-
-@kernel(inline=True)
-def put_pose(q, body, pose):
-    for k in range(7):
-        q[body, k] = pose[k]
+def copy_pose(poses, k, out, l):
+    """Pose k of some to pose l of others."""
+    for i in range(7):
+        out[l, i] = poses[k, i]
 
 
 @kernel(inner=True, allocates=True)
@@ -209,35 +203,34 @@ def assemble(store, bases, slots, point):
     """Move the bodies of the point one by one."""
     header = header_at(store.table, 0)
     q, tracked, residual = point.q, point.tracked, point.residual
-    workspace = FitRoom(np.empty((6, 6)), np.empty((6, 6)), np.full(6, 5), np.empty(6), np.empty(6), np.empty(6))
+    matrices, vectors, poses = np.empty((2, 6, 6)), np.empty((3, 6)), np.empty((3, 7))
+    workspace = FitRoom(matrices[0], matrices[1], np.full(6, 5), vectors[0], vectors[1], vectors[2], poses)
     o = header.gather_table + 1
     for _entry in range(store.table[header.gather_table]):
         body = store.table[o]
-        count = store.table[o + 1]
-        first = o + 2
-        o = first + count
-        s = 6 * store.table[slots + body]
-        start = pose_of(q, body)
-        cost = fit_body(store, bases, body, first, count, -1, s, point, workspace)
-        if cost <= ENOUGH or not is_half_around(store.table, residual, first, count):
+        placed = Placed(body, 6 * store.table[slots + body], o + 2, store.table[o + 1])
+        o = placed.first + placed.count
+        copy_pose(q, body, poses, START)
+        cost = fit_body(store, bases, placed, -1, point, workspace)
+        if cost <= ENOUGH or not is_half_around(store.table, residual, placed):
             continue
-        best = pose_of(q, body)
+        copy_pose(q, body, poses, BEST)
         tried = -1
-        for l in range(first, first + count):
+        for l in range(placed.first, o):
             joint = joint_row_at(store.table, header.row_table + ROW * store.table[l]).joint
             if cost <= ENOUGH:
                 break
             if joint == tried:
                 continue
             tried = joint
-            put_pose(q, body, start)
-            follow_drives(store, first, count, tracked)
-            fit_body(store, bases, body, first, count, joint, s, point, workspace)
-            follow_drives(store, first, count, tracked)
-            there = fit_body(store, bases, body, first, count, -1, s, point, workspace)
+            copy_pose(poses, START, q, body)
+            follow_drives(store, placed, tracked)
+            fit_body(store, bases, placed, joint, point, workspace)
+            follow_drives(store, placed, tracked)
+            there = fit_body(store, bases, placed, -1, point, workspace)
             if there < LOWER * cost:
                 cost = there
-                best = pose_of(q, body)
-        put_pose(q, body, best)
-        follow_drives(store, first, count, tracked)
-        body_rows(store, first, count, -1, point)
+                copy_pose(q, body, poses, BEST)
+        copy_pose(poses, BEST, q, body)
+        follow_drives(store, placed, tracked)
+        body_rows(store, placed, -1, point)

@@ -1,10 +1,12 @@
 """The step and the line search on the augmented Lagrangian.
 
-A step that the rows' curvature spoils is bent back onto the rows, with the factorization at hand, before it is
-shortened.
+A step that the rows' curvature spoils is bent, with the factorization at hand, before it is shortened: to where the
+rows hold, and if that is too far, to where the step's linear model leaves them (the second-order correction).
 """
 
 from __future__ import annotations
+
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import MAY_GO, hold_all, is_clearance_row, may_go
@@ -16,26 +18,29 @@ from assembly.proximity.features.solid_contact import tracked_at
 from assembly.solve.linear_algebra.factorize import factorize_shifted, forward_step, solve_step
 from assembly.solve.loop.clearances import ends_unseen, is_too_far
 from assembly.solve.loop.dexterity import add_dexterities
+from assembly.solve.loop.parameters import BENT, HALVED, LETS_GO, SHORTENINGS, SHORTEST, TO_ROWS, TURN
 from assembly.solve.loop.predict import predict_pairs
-from assembly.solve.loop.residuals import add_transposed, merit, move
+from assembly.solve.loop.residuals import add_transposed, merit, move, times
 
-# A step shorter than this decides nothing.
-SHORTEST = 1e-6
-# A body turns by this much at most in a step, and this often a step is shortened by a larger shift.
-TURN = 1.0
-SHORTENINGS = 4
-# A clearance's contact that no longer step, nor one halved so far, finds again is given up.
-LETS_GO, HALVED = 1e-5, 0.0625
+# How a step is kept short: the shift of the Hessian, the length it may have, whether the shift grows for that.
+Trust = namedtuple("Trust", "shift radius damps")
+# What is known along a step: the merit's slope, the step's largest component; whether a contact that ends where solids
+# are in each other may be given up, and whether bodies may go all the way for certain.
+Line = namedtuple("Line", "slope longest lets_go is_free")
 
 
 @kernel(inner=True)
-def damped_step(table, lagrangian, n, order, shift, radius, damps, matrix, descent, step, scratch):
-    """The step of the factor in `matrix`, its shift raised until the step is not much longer than the radius.
+def damped_step(program, system, trust):
+    """The step of the system's factor, its shift raised until the step is not much longer than the radius.
 
     Nor may a body turn by much more than a radian. Scaled down instead, a step would lose what its stiff directions
     gain, those that bring the rows to hold. That is for who `damps`; with contacts rows change fast along the step.
     Returns the shift, and the step's largest component and turn.
     """
+    order, matrix = program.structure.sparsity, system.factor
+    descent, step, scratch = system.directions.descent, system.directions.step, system.directions.straight
+    n, turning = step.size, 6 * header_at(program.store.table, 0).moving
+    shift = trust.shift
     for attempt in range(SHORTENINGS + 1):
         for i in range(n):
             step[i] = descent[i]
@@ -44,10 +49,10 @@ def damped_step(table, lagrangian, n, order, shift, radius, damps, matrix, desce
         turn = 0.0
         for i in range(n):
             longest = max(longest, abs(step[i]))
-            if i % 6 >= 3 and i < 6 * header_at(table, 0).moving:
+            if i % 6 >= 3 and i < turning:
                 turn = max(turn, abs(step[i]))
-        excess = max(turn / TURN, longest / radius)
-        if excess <= 1.5 or attempt == SHORTENINGS or not damps:
+        excess = max(turn / TURN, longest / trust.radius)
+        if excess <= 1.5 or attempt == SHORTENINGS or not trust.damps:
             break
         # Newton's method on 1 / |step|, whose slope is |U^-T step|^2.
         for i in range(n):
@@ -58,110 +63,112 @@ def damped_step(table, lagrangian, n, order, shift, radius, damps, matrix, desce
         for i in range(n):
             square += step[i] * step[i]
             slope += scratch[i] * scratch[i]
-        shift = factorize_shifted(lagrangian, n, order, shift + square / slope * (excess - 1.0), matrix)
+        shift = factorize_shifted(system.hessian, n, order, shift + square / slope * (excess - 1.0), matrix)
         if shift < 0.0:
             break
     return shift, longest, turn
 
 
-@kernel(inner=True)
-def goal(store, shape, rows, lifted, workspace, tips, point, order, gradient, hessian):
-    """The objective at a point whose rows are evaluated; from order 1 on its gradient and the Hessian's upper half.
+@kernel(inline=True)
+def dexterities_at(tips, program, count, point, order, gradient, hessian):
+    """Their terms of the objective. Where `tips` is None there are none: what they need is not even compiled."""
+    return 0.0 if tips is None else add_dexterities(program, count, point, order, gradient, hessian)
 
-    `tips` is None where no term is a dexterity: then what these need is not even compiled.
-    """
-    value = objective(store, point.q, order, workspace, shape.sparsity, gradient, hessian)
-    if tips is not None:
-        value += add_dexterities(store, shape, rows, lifted, workspace, point, order, gradient, hessian)
-    return value
+
+@kernel(inner=True)
+def goal(program, count, point, order, gradient, hessian):
+    """The objective where `count` rows are evaluated; from order 1 on its gradient and the Hessian's upper half."""
+    shape = program.structure
+    value = objective(program.store, point.q, order, program.tapes, shape.sparsity, gradient, hessian)
+    return value + dexterities_at(program.tips, program, count, point, order, gradient, hessian)
 
 
 @kernel(inline=True)
-def search(program, tips, current, trial, rows, y, base, value, restoring, leave, mu, slope, longest, weights, system):
+def rounding_of(rows, residual, gradient, size):
+    """The rounding of a merit of this size: its own, and that of poses of order one, by slopes and forces of rows."""
+    noise = 1e-14 * (size + 1e-300)
+    for i in range(gradient.size):
+        noise += 4e-16 * abs(gradient[i])
+    for r in range(rows.count):
+        noise += 4e-16 * (abs(rows.y[r]) + abs(residual[r]) / rows.mu)
+    return noise
+
+
+@kernel(inline=True)
+def bend_step(shape, current, trial, rows, system, alpha, promised):
+    """Bend a step, of which a share alpha leads to the trial point, by the factor at hand.
+
+    To where rows hold, or if `promised` to what the linear model of the straight step leaves of them.
+    """
+    descent, step = system.directions.descent, system.directions.step
+    residual, active, forces = current.residual, rows.active, rows.forces
+    for i in range(step.size):
+        descent[i] = 0.0
+    for r in range(rows.count):
+        left = (1.0 - alpha) * residual[r]
+        if promised:
+            left = residual[r] + alpha * times(shape.bases, current.jacobian, r, system.directions.straight)
+        forces[r] = -(trial.residual[r] - left) * active[r]
+    add_transposed(shape.bases, current.jacobian, rows.count, forces, descent)
+    solve_step(system.factor, step.size, shape.sparsity, descent)
+    for i in range(step.size):
+        step[i] += descent[i] / alpha
+
+
+@kernel(inline=True)
+def search(program, current, trial, rows, system, line, value, restoring):
     """Try alpha times the step, alpha from 1 down, until the augmented Lagrangian falls enough.
 
     The trial point is left in `trial`. Returns whether one was accepted, alpha, and the contact lost by the last trial
-    or -1. `base` is the objective's part of the merit here, `longest` the largest component of the step. The `leave`
-    says whether a contact that ends where solids are in each other may be given up, and whether bodies may go all the
-    way for certain.
+    or -1. `value` is the objective here, which counts unless rows alone do (`restoring`).
     """
-    store, shape, lifted, workspace = (
-        program.store,
-        program.structure,
-        program.lifted,
-        program.tapes,
-    )
+    store, shape, lifted = program.store, program.structure, program.lifted
     header = header_at(store.table, 0)
-    active, forces, _foreseen = weights
-    lets_go, may_go_all = leave
-    gradient, descent, step, straight, lagrangian, matrix = (
-        system.gradient,
-        system.directions.descent,
-        system.directions.step,
-        system.directions.straight,
-        system.hessian,
-        system.factor,
-    )
-    bases, one_sided, order = shape.bases, shape.one_sided, shape.sparsity
-    n = descent.size
+    step, straight, longest = system.directions.step, system.directions.straight, line.longest
     residual = current.residual
-    current_merit = merit(residual, one_sided, rows, y, mu) + base
+    current_merit = merit(residual, shape.one_sided, rows) + (0.0 if restoring else value)
     # Of the violations alone no objective rounds anything off.
-    noise = 1e-14 * (abs(current_merit) + (0.0 if restoring else abs(value)) + 1e-300)
-    # Rounding of the poses, of order one, is felt through the objective's slope and the rows' forces.
-    for i in range(n):
-        noise += 4e-16 * abs(gradient[i])
-    for r in range(rows):
-        noise += 4e-16 * (abs(y[r]) + abs(residual[r]) / mu)
+    size = abs(current_merit) + (0.0 if restoring else abs(value))
+    noise = rounding_of(rows, residual, system.gradient, size)
     alpha = 1.0
     bends = 0
     lost = -1
     while alpha * longest > 1e-9 * SHORTEST or alpha == 1.0:
         move(store.table, current.q, step, alpha, trial.q)
-        predict_pairs(store, bases, lifted, current, trial, step, alpha)
-        known = may_go_all and alpha == 1.0 and bends == 0
+        predict_pairs(store, shape.bases, lifted, current, trial, step, alpha)
+        known = line.is_free and alpha == 1.0 and bends % 3 == 0
         if header.watch >= 0 and not known and is_too_far(store, lifted.memory, trial):
             # Bent, it would go farther than is known to be free.
-            bends = 2
+            bends = BENT
             alpha *= 0.5
             continue
-        lost = evaluate(store, lifted.guess, BEND, lifted, workspace, trial)
-        if header.watch >= 0 and not lets_go and lost < 0 and ends_unseen(store, lifted.memory, current, trial):
+        lost = evaluate(program, lifted.guess, BEND, trial)
+        if header.watch >= 0 and not line.lets_go and lost < 0 and ends_unseen(store, lifted.memory, current, trial):
             # A tick has no last look, which would tell of what it led through.
-            bends = 2
+            bends = BENT
             alpha *= 0.5
             continue
         if lost < 0:
-            there = merit(trial.residual, one_sided, rows, y, mu)
+            there = merit(trial.residual, shape.one_sided, rows)
             if not restoring:
-                there += goal(store, shape, rows, lifted, workspace, tips, trial, 0, gradient, lagrangian)
-            if there <= current_merit + 1e-4 * alpha * slope + noise:
+                there += goal(program, rows.count, trial, 0, system.gradient, system.hessian)
+            if there <= current_merit + 1e-4 * alpha * line.slope + noise:
                 return True, alpha, lost
-            if bends < 2:
-                bends += 1
-                for i in range(n):
-                    descent[i] = 0.0
-                for r in range(rows):
-                    forces[r] = -(trial.residual[r] - (1.0 - alpha) * residual[r]) * active[r]
-                add_transposed(bases, current.jacobian, rows, forces, descent)
-                solve_step(matrix, n, order, descent)
-                for i in range(n):
-                    step[i] += descent[i] / alpha
-                continue
-            if bends == 2:
-                bends = 3
-                for i in range(n):
+            bends = min(bends + 1, BENT + 1)
+            if bends % 3 == 0:
+                for i in range(step.size):
                     step[i] = straight[i]
+            else:
+                bend_step(shape, current, trial, rows, system, alpha, bends > TO_ROWS)
+            if bends <= BENT:
+                continue
         # A bent step may be longer than it was.
-        short = lets_go and bends % 3 == 0 and alpha <= HALVED and alpha * longest < LETS_GO
-        if (
-            lost >= 0
-            and short
-            and may_go(store.table, lost, residual)
-            and tracked_at(current.tracked, lost).stays >= 0.0
-        ):
-            tracked_at(current.tracked, lost).stays = MAY_GO - tracked_at(current.tracked, lost).stays
-            continue
+        short = line.lets_go and bends % 3 == 0 and alpha <= HALVED and alpha * longest < LETS_GO
+        if lost >= 0 and short and may_go(store.table, lost, residual):
+            pair = tracked_at(current.tracked, lost)
+            if pair.stays >= 0.0:
+                pair.stays = MAY_GO - pair.stays
+                continue
         alpha *= 0.5
         # A pair near a fold is freed; a clearance's is given up where its gap does not close.
         if lost >= 0 and alpha * longest < 0.01 and not is_clearance_row(store.table, lost):

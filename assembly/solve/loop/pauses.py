@@ -5,12 +5,9 @@ from __future__ import annotations
 from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.program.records import header_at, pool_header_at
-from assembly.proximity.manager.state import GOES_ON, SLICE, manager_at
+from assembly.proximity.manager.records import GOES_ON, SLICE, manager_at
+from assembly.solve.loop.parameters import MANY_PAIRS, SHORT
 from assembly.solve.loop.settings import results_at, settings_at
-
-# Steps of which a short solve has no more: it never looks at the clock, but in a large scene, where a step takes long.
-# A scene with more pairs of bodies to look at is large.
-SHORT, MANY_PAIRS = 4, 256
 
 
 @kernel(inline=True)

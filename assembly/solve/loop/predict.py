@@ -5,21 +5,11 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import copy_tracked, is_clearance_row, predict_pair, surface_of
-from assembly.constraints.program.records import (
-    FREE_COLUMN,
-    ROW,
-    contact_row_at,
-    header_at,
-    row_at,
-)
+from assembly.constraints.program.contact import contact_of, copy_tracked, is_clearance_row, predict_pair, surface_of
+from assembly.constraints.program.records import FREE_COLUMN, header_at
 from assembly.geometry.splines.domain import into_domain
 from assembly.proximity.extrema.rates import derivatives_at
-from assembly.proximity.features.solid_contact import (
-    CONTACT_RECORD,
-    contact_record_at,
-    tracked_at,
-)
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, contact_record_at, tracked_at
 from assembly.solve.loop.residuals import times
 
 
@@ -42,7 +32,7 @@ def stays_open(store, bases, k, current, trial, d, alpha):
     left = contact_record_at(current.records, k).slack
     if not left > 0.0 or bases[k, 2] >= 0:
         return False
-    minimum = contact_row_at(store.table, header_at(store.table, 0).row_table + ROW * k).minimum
+    minimum = contact_of(store.table, k).minimum
     left -= longest_way(d, bases[k, 0], alpha, store.pool[minimum + 4])
     left -= longest_way(d, bases[k, 1], alpha, store.pool[minimum + 5])
     if not left > 0.0:
@@ -60,7 +50,7 @@ def predict_pairs(store, bases, lifted, current, trial, d, alpha):
     """Contact coordinates along alpha d: by the contact velocity, or, for a free pair, by its own unknowns.
 
     Gaps follow to first order, angles start from where they are: a step turns no body by more than a radian. The guess
-    goes into `loose`. Rows of clearances that stay open for certain are marked there as IDLE, and their derivatives go
+    goes into `lifted`. Rows of clearances that stay open for certain are marked there as IDLE, and their derivatives go
     on to the trial point as they are.
     """
     header = header_at(store.table, 0)
@@ -70,8 +60,8 @@ def predict_pairs(store, bases, lifted, current, trial, d, alpha):
     for k in range(header.tracked):
         copy_tracked(tracked, k, out)
     for k in range(header.contacts):
-        row = header.row_table + ROW * k
-        if row_at(store.table, row).body_f < 0:
+        contact = contact_of(store.table, k)
+        if contact.body_f < 0:
             continue
         f = bases[k, 0]
         g = bases[k, 1]
@@ -80,7 +70,7 @@ def predict_pairs(store, bases, lifted, current, trial, d, alpha):
         if u >= 0:
             for i in range(4):
                 out[k, i] += alpha * d[u + i] / lengths[k, i]
-            keep_inside(store, row, k, out)
+            keep_inside(store, k, out)
         else:
             for j in range(4):
                 s = 0.0
@@ -92,20 +82,19 @@ def predict_pairs(store, bases, lifted, current, trial, d, alpha):
                 s *= alpha
                 for i in range(4):
                     out[k, i] += derivatives_at(records, k).rates[i, j] * s
-            predict_pair(store, row, k, tracked, out)
+            predict_pair(store, k, tracked, out)
         if is_clearance_row(store.table, k) and stays_open(store, bases, k, current, trial, d, alpha):
             tracked_at(out, k).idle = 1.0
             tracked_at(out, k).gap = max(
-                tracked_at(out, k).gap,
-                store.pool[contact_row_at(store.table, row).minimum] + contact_record_at(trial.records, k).slack,
+                tracked_at(out, k).gap, store.pool[contact.minimum] + contact_record_at(trial.records, k).slack
             )
 
 
 @kernel(inner=True)
-def keep_inside(store, row, k, out):
+def keep_inside(store, k, out):
     """Coordinates that are unknowns may run over the end of a patch."""
     for side in range(2):
         i = 2 * side
         out[k, i], out[k, i + 1], _clamped = into_domain(
-            store, surface_of(store.table, row, side), out[k, i], out[k, i + 1]
+            store, surface_of(contact_of(store.table, k), side), out[k, i], out[k, i + 1]
         )

@@ -23,16 +23,18 @@ from collections import namedtuple
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.constraints.program.row_terms import width
 from assembly.solve.linear_algebra.factorize import factorize, substitute
-from assembly.solve.loop.residuals import add_row, clear_row, times, width
+from assembly.solve.loop.residuals import add_row, clear_row, times
 
 # Rows are of order one: singular values below the root of this count as zero.
 REST = 1e-10
 PASSES = 8
 # A pass that changes rates by no more than this part of them is the last one: errors shrink by the same factor each.
 ENOUGH = 1e-8
-# Factors of M and G with how far their rows reach, and rows M^-1 B^T.
-RateFactors = namedtuple("RateFactors", "matrix last solved gram ends")
+# Rows A (those in the list `used`) and B, and what solves them: the factors of M and G with how far their rows reach,
+# and rows M^-1 B^T.
+RateSystem = namedtuple("RateSystem", "bases jacobian used inputs matrix last solved gram ends")
 
 
 @kernel(inner=True)
@@ -61,7 +63,7 @@ def add_square(x, low, high, matrix, last):
 
 @kernel(inner=True, allocates=True)
 def rate_system(bases, jacobian, used, b):
-    """Factors of M and G, for the rows of A in the list `used` and B (k, n).
+    """The system of the rows of A in the list `used` and B (k, n).
 
     Returns whether they exist: not where an input has no rates at all.
     """
@@ -100,16 +102,16 @@ def rate_system(bases, jacobian, used, b):
             for l in range(n):
                 gram[i, j] += b[i, l] * s[j, l]
     exists = factorize(gram, k, ends) and exists
-    return exists, RateFactors(matrix, last, s, gram, ends)
+    return exists, RateSystem(bases, jacobian, used, b, matrix, last, s, gram, ends)
 
 
 @kernel(inner=True, allocates=True)
-def settle(system, bases, jacobian, used, b, g, h, v, z):
+def settle(system, g, h, v, z):
     """Solve for v (n,) and z (k,). Returns the largest part of g and h that is left.
 
     What no pass takes off g pushes motions that nothing determines; their part of v is left out.
     """
-    matrix, last, s, gram, ends = system.matrix, system.last, system.solved, system.gram, system.ends
+    bases, jacobian, used, b, matrix, last, s, gram, ends = system
     k, n = b.shape
     rest = g.copy()
     missing = h.copy()

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 
+from assembly._carve import carve
 from assembly._kernel import kernel
-from assembly.constraints.program.contact import TOUCHING
+from assembly.constraints.program.contact import TOUCHING, copy_tracked
 from assembly.constraints.program.evaluate import evaluate
-from assembly.constraints.program.records import (
-    ROW,
-    header_at,
-    pool_header_at,
-    row_at,
-)
+from assembly.constraints.program.records import ROW, header_at, pool_header_at, row_at
 from assembly.proximity.extrema.face_face import BEND
 from assembly.proximity.features.solid_contact import TRACK, contact_record_at
 from assembly.solve.loop.contacts import free_pairs_hold
@@ -53,6 +49,24 @@ def write_pose(store, q, state):
                 state[7 * b + k] = q[b, k]
 
 
+@kernel(inner=True, allocates=True)
+def read_tracked(table, state, tracked):
+    """Tracked values of a state, which stand behind its poses, into those of a point."""
+    header = header_at(table, 0)
+    kept = carve(state, 7 * header.bodies, (header.tracked, TRACK))
+    for k in range(header.tracked):
+        copy_tracked(kept, k, tracked)
+
+
+@kernel(inner=True, allocates=True)
+def write_tracked(table, tracked, state):
+    """Tracked values of a point into a state."""
+    header = header_at(table, 0)
+    kept = carve(state, 7 * header.bodies, (header.tracked, TRACK))
+    for k in range(header.tracked):
+        copy_tracked(tracked, k, kept)
+
+
 @kernel(inner=True)
 def is_clear(table, residual):
     """Whether no contact, given or of a clearance, is one of bodies in each other."""
@@ -63,50 +77,47 @@ def is_clear(table, residual):
 
 
 @kernel(inner=True)
-def keep(current, y, rows, held):
+def keep(current, rows, held):
     """Copy poses, tracked values and multipliers of a point."""
     for b in range(held.q.shape[0]):
         for k in range(7):
             held.q[b, k] = current.q[b, k]
     for r in range(held.tracked.shape[0]):
-        for k in range(TRACK):
-            held.tracked[r, k] = current.tracked[r, k]
-    for r in range(rows):
-        held.y[r] = y[r]
+        copy_tracked(current.tracked, r, held.tracked)
+    for r in range(rows.count):
+        held.y[r] = rows.y[r]
 
 
 @kernel(inner=True)
-def bring_back(held, rows, current, y):
+def bring_back(held, rows, current):
     """The point that `keep` copied."""
     for b in range(held.q.shape[0]):
         for k in range(7):
             current.q[b, k] = held.q[b, k]
     for r in range(held.tracked.shape[0]):
-        for k in range(TRACK):
-            current.tracked[r, k] = held.tracked[r, k]
-    for r in range(rows):
-        y[r] = held.y[r]
+        copy_tracked(held.tracked, r, current.tracked)
+    for r in range(rows.count):
+        rows.y[r] = held.y[r]
 
 
 @kernel(inner=True)
-def judge(store, state, lifted, workspace, shape, rows, current, trial, bound, lax):
+def judge(program, state, count, current, trial, bound, lax):
     """The pose as it is returned, rounded to the user's coordinates, evaluated afresh into `trial`.
 
-    Residuals and pairs found are copied to `here`. Returns whether every row holds within the bound, and the largest
-    violation, tangency counted by gaps if `lax`.
+    Residuals of its `count` rows and pairs found are copied to `current`. Returns whether every row holds within the
+    bound, and the largest violation, tangency counted by gaps if `lax`.
     """
-    q = trial.q
-    scaled_poses(store, state, q)
-    lost = evaluate(store, current.tracked, BEND, lifted, workspace, trial)
+    store, lifted = program.store, program.lifted
+    scaled_poses(store, state, trial.q)
+    lost = evaluate(program, current.tracked, BEND, trial)
     if lost >= 0:
         return False, math.inf
-    for r in range(rows):
+    for r in range(count):
         current.residual[r] = trial.residual[r]
     for k in range(header_at(store.table, 0).contacts):
-        for i in range(TRACK):
-            current.tracked[k, i] = trial.tracked[k, i]
-    violation = off_rows(store.table, lifted, shape.one_sided, trial, lax)
-    holds = free_pairs_hold(store, q, current.tracked, lifted.free, 1e-9)
+        copy_tracked(trial.tracked, k, current.tracked)
+    violation = off_rows(store.table, lifted, program.structure.one_sided, trial, lax)
+    holds = free_pairs_hold(store, trial.q, current.tracked, lifted.free, 1e-9)
     return holds and violation <= bound, violation
 
 
@@ -117,11 +128,8 @@ def write_rows(table, current, y, lifted, lax, size, state):
     tracked, records, residual, jacobian = current.tracked, current.records, current.residual, current.jacobian
     free = lifted.free
     m = header.rows
-    o = 7 * header.bodies
-    for k in range(header.tracked):
-        for i in range(TRACK):
-            state[o + TRACK * k + i] = tracked[k, i]
-    o += TRACK * header.tracked
+    write_tracked(table, tracked, state)
+    o = 7 * header.bodies + TRACK * header.tracked
     crossing = 0.0
     for r in range(m):
         state[o + r] = y[r]

@@ -14,19 +14,19 @@ from assembly.constraints.program.envelope import close_envelope, place_folds
 from assembly.constraints.program.hessian_blocks import choose_storage
 from assembly.constraints.program.objective_terms import TAPE_TERM, TERM, term_at
 from assembly.constraints.program.records import (
-    EXTRA_COLUMN,
-    FREE_COLUMN,
     JOINT_ROW,
     ROW,
     TAPE_RECORD,
     Sparsity,
     body_coordinate_at,
     header_at,
+    jacobian_row_at,
     joint_row_at,
     row_at,
     tape_at,
     trim_row_at,
 )
+from assembly.constraints.program.row_terms import column_of, width
 from assembly.kinematics.motion import retract
 
 # Where rows and unknowns stand. `bases`: see the heading; `one_sided`: 1 for rows residual >= 0; where the Hessian has
@@ -65,7 +65,8 @@ def place_rows(table, free, bases, one_sided):
                 for j in range(bases.shape[1]):
                     bases[e, j] = bases[r, j]
     for r in range(header.contacts, header.contacts + header.trims):
-        bases[r, 2] = bases[trim_row_at(table, header.row_table + ROW * r).contact, 2]
+        k = trim_row_at(table, header.row_table + ROW * r).contact
+        bases[r, 2] = bases[k, 2]
     for t in range(header.tapes):
         tape = tape_at(table, header.tape_table + TAPE_RECORD * t)
         for v in range(tape.values):
@@ -78,11 +79,6 @@ def record_of_blocks(table):
     """The part of the table that has it; empty where the scene has none."""
     header = header_at(table, 0)
     return table[header.block_record : header.block_record + header.block_length]
-
-
-@kernel(inline=True)
-def width(block):
-    return 4 if block == 2 else 6
 
 
 @kernel(inner=True)
@@ -212,47 +208,49 @@ def shape_of(table, most, n, blocks, integers, doubles):
 @kernel(inner=True)
 def times(bases, jacobian, r, d):
     """Row r of J d."""
+    row = jacobian_row_at(jacobian, r)
     s = 0.0
     f = bases[r, 0]
     if f >= 0:
         for k in range(6):
-            s += jacobian[r, k] * d[f + k]
+            s += row.twist_f[k] * d[f + k]
     g = bases[r, 1]
     if g >= 0:
         for k in range(6):
-            s += jacobian[r, 6 + k] * d[g + k]
+            s += row.twist_g[k] * d[g + k]
     u = bases[r, 2]
     if u >= 0:
         for k in range(4):
-            s += jacobian[r, FREE_COLUMN + k] * d[u + k]
+            s += row.lifted[k] * d[u + k]
     for b in range(3, bases.shape[1]):
-        at = bases[r, b]
+        at, column = bases[r, b], column_of(b)
         if at >= 0:
             for k in range(6):
-                s += jacobian[r, EXTRA_COLUMN + 6 * (b - 3) + k] * d[at + k]
+                s += jacobian[r, column + k] * d[at + k]
     return s
 
 
 @kernel(inner=True)
 def add_row(bases, jacobian, r, factor, out):
     """out += factor times row r of J."""
+    row = jacobian_row_at(jacobian, r)
     f = bases[r, 0]
     if f >= 0:
         for k in range(6):
-            out[f + k] += factor * jacobian[r, k]
+            out[f + k] += factor * row.twist_f[k]
     g = bases[r, 1]
     if g >= 0:
         for k in range(6):
-            out[g + k] += factor * jacobian[r, 6 + k]
+            out[g + k] += factor * row.twist_g[k]
     u = bases[r, 2]
     if u >= 0:
         for k in range(4):
-            out[u + k] += factor * jacobian[r, FREE_COLUMN + k]
+            out[u + k] += factor * row.lifted[k]
     for b in range(3, bases.shape[1]):
-        at = bases[r, b]
+        at, column = bases[r, b], column_of(b)
         if at >= 0:
             for k in range(6):
-                out[at + k] += factor * jacobian[r, EXTRA_COLUMN + 6 * (b - 3) + k]
+                out[at + k] += factor * jacobian[r, column + k]
 
 
 @kernel(inner=True)
@@ -277,10 +275,11 @@ def violation_of(residual, one_sided, rows):
 
 
 @kernel(inner=True)
-def merit(residual, one_sided, rows, y, mu):
+def merit(residual, one_sided, rows):
     """What the rows add to the augmented Lagrangian; a one-sided row counts only while y + c / mu is negative."""
     value = 0.0
-    for r in range(rows):
+    y, mu = rows.y, rows.mu
+    for r in range(rows.count):
         c = residual[r]
         if one_sided[r] == 1 and y[r] + c / mu >= 0.0:
             value -= 0.5 * mu * y[r] * y[r]

@@ -11,22 +11,18 @@ ones behind. A solve that begins there has neither.
 
 from __future__ import annotations
 
+import math
+
 from assembly._kernel import kernel
-from assembly.constraints.program.records import (
-    ROW,
-    contact_row_at,
-    header_at,
-)
+from assembly.constraints.program.contact import contact_of
+from assembly.constraints.program.records import header_at
 from assembly.proximity.manager.update import AS_NEEDED, any_crossed
 from assembly.solve.loop.clearances import forget_clearance_rows, place_clearance_rows, update_around
+from assembly.solve.loop.finish import return_to
+from assembly.solve.loop.parameters import BEGINNINGS, DEEP, FREE_BELOW, LEFT, PATIENCE, SHORTER, SHORTEST
 from assembly.solve.loop.report import bring_back
-
-# Deeper than this part of how far bodies may go in one step, which is half the least radius of theirs.
-DEEP = 1.0
-# How much shorter steps are after one that led too deep; as often as another pose is clear they may be twice as long.
-SHORTER, LONGER = 0.25, 2.0
-# So often at most a solve that gets no further begins again, while so many of its steps are left.
-BEGINNINGS, LEFT = 3, 20
+from assembly.solve.loop.settings import RUNNING, STALLED
+from assembly.solve.loop.workspace import rows_in
 
 
 @kernel(inner=True)
@@ -38,7 +34,7 @@ def has_sunk(store, memory, residual):
     header = header_at(store.table, 0)
     for k in range(header.guards):
         r = header.first_guard + k
-        row = contact_row_at(store.table, header.row_table + ROW * r)
+        row = contact_of(store.table, r)
         if row.guard_number > 0 and row.shell_f < 0:
             # How far bodies may go in one step is behind the least gap, which the residual is less.
             at = row.minimum
@@ -48,14 +44,56 @@ def has_sunk(store, memory, residual):
 
 
 @kernel(inner=True)
-def begin_again(store, held, lifted, current, y, better_y):
+def begin_again(store, held, lifted, current, rows):
     """Back to the pose that is held. Its contacts are found anew; no row has pushed yet."""
     header = header_at(store.table, 0)
-    memory, free = lifted.memory, lifted.free
-    bring_back(held, header.rows, current, y)
-    forget_clearance_rows(store.table, memory)
-    update_around(store, memory, current, AS_NEEDED)
-    place_clearance_rows(store.table, memory, current, y, better_y, free, False)
+    bring_back(held, rows, current)
+    forget_clearance_rows(store.table, lifted.memory)
+    update_around(store, lifted.memory, current, AS_NEEDED)
+    place_clearance_rows(store.table, lifted, current, rows, False)
     for r in range(header.rows):
-        y[r] = 0.0
-        better_y[r] = 0.0
+        rows.y[r] = 0.0
+        rows.better_y[r] = 0.0
+
+
+@kernel(inline=True)
+def retreats(task):
+    """Whether bodies have sunk into each other, and there is a pose to go back to."""
+    loop = task.loop
+    return loop.sunk and loop.holds and loop.ended == RUNNING and loop.iteration < loop.limit
+
+
+@kernel(inline=True)
+def retreat(task, held, current, rows):
+    """Back to the last feasible iterate, and on from there with shorter steps."""
+    loop = task.loop
+    loop.leash = SHORTER * min(loop.leash, loop.alpha * loop.longest)
+    if loop.leash < SHORTEST:
+        loop.status = STALLED
+        return
+    return_to(task.program, held, rows, current, task.tick)
+    # Rows of tangency have other pairs now.
+    loop.rows = header_at(task.program.store.table, 0).rows
+    loop.measured, loop.changed = 0, 1
+    loop.iteration += 1
+    loop.back_at = loop.iteration
+
+
+@kernel(inline=True)
+def goes_on(task, held, current, rows):
+    """Whether there is another step. A solve that gets no further begins again where it last held."""
+    loop, limits = task.loop, task.limits
+    may_begin = task.watched and not task.tick and loop.holds and loop.begun < BEGINNINGS
+    if loop.status == STALLED and not loop.over and may_begin and loop.iteration + LEFT <= loop.limit:
+        loop.rows, loop.mu = header_at(task.program.store.table, 0).rows, limits.penalty
+        begin_again(task.program.store, held, task.program.lifted, current, rows_in(loop, rows))
+        loop.measured, loop.changed = 0, 1
+        loop.begun += 1
+        loop.iteration += 1
+        loop.status = loop.ended = RUNNING
+        loop.radius, loop.leash, loop.shift, loop.last_dual = limits.radius, math.inf, 0.0, math.inf
+        loop.restoring = loop.restorations = loop.cuts = 0
+        loop.cut_length = loop.check_violation = math.inf
+        loop.check_at = loop.iteration + PATIENCE
+        loop.lost, loop.below = -1, FREE_BELOW
+    return loop.status == RUNNING

@@ -86,11 +86,3 @@ HELD = place_of(RESULTS_RECORD, "held")
 CURVED = place_of(RESULTS_RECORD, "curved")
 CARRIED = place_of(RESULTS_RECORD, "carried")
 HISTORY = 7  # figures an iteration: objective, feasibility, stationarity, mu, regularization, step length, radius
-# Rounding of poses far from the origin, in parts of that.
-ROUNDING = 4e-16
-# How far bodies may be expected to move to mend what rows are off, lengths over the size and radians.
-NEIGHBORHOOD = 0.02
-# More than this is no rounding that a solution may have.
-MOST_ROUNDING = 1e-6
-# A pair this near to a fold (det H over |H|^2) gets its coordinates as unknowns.
-FREE_BELOW = 0.02

@@ -6,22 +6,21 @@ import math
 
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import TOUCHING
+from assembly.solve.loop.parameters import (
+    DRAGGED,
+    HARDEST,
+    LITTLE,
+    MOST_TILTED,
+    MUCH,
+    NEIGHBORHOOD,
+    ROUNDED,
+    SETTLED,
+    SLOW,
+    STILL,
+    STUCK,
+)
 from assembly.solve.loop.restoration import restoration_at
-from assembly.solve.loop.settings import NEIGHBORHOOD, settings_at
-
-# So many whole steps in a row that leave this part of the largest violation tell that rows contradict each other; one
-# may be by an old factor.
-STUCK, STILL = 2.0, 0.99
-# Rows that are off by this at most may repeat each other, tilted by so much. Rounding, in parts of what counts as held.
-LITTLE, MOST_TILTED, ROUNDED = 1e-2, 1e-3, 0.01
-# What is off by so many times what counts as held is not so by rounding.
-MUCH = 2.0
-# So many steps in a row, however long, that leave as much begin to restore, in steps no longer than a neighborhood; so
-# many of these tell that what rows are off is mended far away, if at all.
-DRAGGED, SETTLED = 4.0, 2.0
-# Where so many whole steps in a row do not halve the violation, the floor of the penalty gives way, down to here:
-# rounding, times its inverse, must stay small against the objective's curvature.
-SLOW, HARDEST = 3.0, 1e-10
+from assembly.solve.loop.settings import settings_at
 
 
 @kernel(inline=True)

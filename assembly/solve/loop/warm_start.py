@@ -7,14 +7,8 @@ from __future__ import annotations
 
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
-from assembly.constraints.program.contact import idle_row
-from assembly.constraints.program.records import (
-    FREE_COLUMN,
-    ROW,
-    contact_row_at,
-    header_at,
-    row_at,
-)
+from assembly.constraints.program.contact import contact_of, idle_row
+from assembly.constraints.program.records import FREE_COLUMN, header_at
 from assembly.proximity.features.solid_contact import CONTACT_RECORD
 
 # What is left of a contact.
@@ -53,12 +47,10 @@ def warm_start(table, state, at, point):
             return False
     o = at + 1 + 7 * header.bodies
     for r in range(header.contacts):
-        if recalled_at(state, o + RECALLED * r).number != float(
-            contact_row_at(table, header.row_table + ROW * r).guard_number
-        ):
+        if recalled_at(state, o + RECALLED * r).number != float(contact_of(table, r).guard_number):
             return False
     for r in range(header.contacts):
-        if row_at(table, header.row_table + ROW * r).body_f < 0:
+        if contact_of(table, r).body_f < 0:
             idle_row(r, 1.0, point)
             continue
         left = recalled_at(state, o + RECALLED * r)
@@ -83,9 +75,9 @@ def leave(table, state, at, point, good):
     o = at + 1 + 7 * header.bodies
     for r in range(header.contacts):
         left = recalled_at(state, o + RECALLED * r)
-        row = header.row_table + ROW * r
-        left.number = float(contact_row_at(table, row).guard_number)
-        if row_at(table, row).body_f < 0:
+        contact = contact_of(table, r)
+        left.number = float(contact.guard_number)
+        if contact.body_f < 0:
             continue
         left.residual = point.residual[r]
         for i in range(CONTACT_RECORD):

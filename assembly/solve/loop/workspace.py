@@ -11,39 +11,75 @@ from assembly._kernel import kernel
 from assembly.constraints.program.hessian_blocks import blocks_at, is_blocked
 from assembly.constraints.program.records import (
     EXTRA_COLUMN,
+    RESULTS,
     Iterate,
     LiftedPairs,
+    Program,
     TapeRoom,
     header_at,
 )
 from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
+from assembly.solve.loop.loop_state import LOOP
 from assembly.solve.loop.residuals import arrange, record_of_blocks, shape_of, size_of_shape
 from assembly.solve.loop.restoration import WAY
 
-# What a row has a number of: residuals at the current and the trial iterate, then these (`RowVectors`).
-BY_ROW = 7
-# Of every row: its multiplier, a better one, whether it counts (its weight), what it pushes with, whether a step would
-# break it.
-RowVectors = namedtuple("RowVectors", "y better_y active forces foreseen")
-# The last feasible iterate: poses, tracked values, multipliers.
-Held = namedtuple("Held", "q tracked y")
+# What a row has a number of: residuals at the current and the trial iterate, five fields of `Rows`, one of `Held`.
+BY_ROW = 8
+# The rows: how many there are now, with lifted pairs; mu, whose inverse is the weight of one that counts. Of every row:
+# its multiplier, a better one, its weight (0: it does not count), what it pushes with, whether a step would break it
+# (1 or 0). `gram` is room for least squares of multipliers: J J^T, and a right side in its last row.
+Rows = namedtuple("Rows", "count mu y better_y active forces foreseen gram")
+# The last feasible iterate: poses, tracked values, multipliers, and the numbers of the contacts that clearances had.
+Held = namedtuple("Held", "q tracked y numbers")
+Iterates = namedtuple("Iterates", "current trial held")
 # The linear system of a step: the objective's gradient, vectors, the Hessian of the Lagrangian, its Cholesky factor.
 System = namedtuple("System", "gradient directions hessian factor")
 # Of all unknowns: right side of the system, or scratch; the step; the step before its second-order correction.
 Directions = namedtuple("Directions", "descent step straight")
-# What stays as it is for a whole solve: table and pool, `Structure`, `LiftedPairs`, `TapeRoom`.
-Program = namedtuple("Program", "store structure lifted tapes")
-# All that a solve works in. `numbers`: of the contacts that clearances had at the last feasible iterate; `gram`: room
-# for least squares; `way`: what is known of a way back (`restoration.py`).
-Workspace = namedtuple("Workspace", "here trial held by_row structure lifted numbers tapes gram way system")
+# All that a solve works in. `way`: what is known of a way back (`restoration.py`).
+Workspace = namedtuple("Workspace", "program iterates rows way loop system")
+
+
+@kernel(inline=True, allocates=True)
+def resized(rows, count):
+    """As many rows."""
+    return Rows(count, rows.mu, rows.y, rows.better_y, rows.active, rows.forces, rows.foreseen, rows.gram)
+
+
+@kernel(inline=True, allocates=True)
+def rows_in(loop, rows):
+    """The rows with the loop's number of them and its penalty."""
+    return Rows(loop.rows, loop.mu, rows.y, rows.better_y, rows.active, rows.forces, rows.foreseen, rows.gram)
+
+
+@kernel(inline=True, allocates=True)
+def penalized(rows, mu):
+    """The rows with another penalty."""
+    return Rows(rows.count, mu, rows.y, rows.better_y, rows.active, rows.forces, rows.foreseen, rows.gram)
+
+
+@kernel(inline=True, allocates=True)
+def new_rows(count, mu):
+    """Rows outside the loop, of which only the weights and the forces are asked for."""
+    vectors = np.zeros((5, count))
+    return Rows(count, mu, vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors)
 
 
 @kernel(inline=True, allocates=True)
 def results_of(table, state):
     """The end of a state, behind poses, tracked values, multipliers and residuals."""
     header = header_at(table, 0)
-    return state[7 * header.bodies + TRACK * header.tracked + 2 * header.rows :]
+    end = 7 * header.bodies + TRACK * header.tracked + 2 * header.rows
+    return state[end:]
+
+
+@kernel(inline=True, allocates=True)
+def memory_of(table, state):
+    """What the contact manager remembers, behind the results."""
+    header = header_at(table, 0)
+    end = 7 * header.bodies + TRACK * header.tracked + 2 * header.rows + RESULTS
+    return state[end:]
 
 
 @kernel(inline=True)
@@ -55,10 +91,10 @@ def workspace_needed(table):
     integers, doubles = size_of_shape(table, most, n + 4 * pairs)
     # Poses, tracked values, records, Jacobians, what a row has one of.
     doubles += 21 * bodies + 4 * TRACK * tracks + 2 * record_count(table) * CONTACT_RECORD
-    doubles += 2 * most * (EXTRA_COLUMN + 6 * header.extra) + (BY_ROW + 1) * most
+    doubles += 2 * most * (EXTRA_COLUMN + 6 * header.extra) + BY_ROW * most
     # Of pairs; of tapes; multipliers of least squares; the way back.
     doubles += 4 * pairs + (3 * VECTORS + VARIABLES) * VARIABLES
-    doubles += table[tapes] + table[tapes + 1] + table[tapes + 2] + (most + 1) * most + WAY
+    doubles += table[tapes] + table[tapes + 1] + table[tapes + 2] + (most + 1) * most + WAY + LOOP
     # Of unknowns, while no pair is at a fold.
     blocks = header.block_record
     layout = blocks_at(table, blocks)
@@ -74,30 +110,28 @@ def record_count(table):
 
 
 @kernel(inline=True, allocates=True)
-def carve_points(table, most, doubles, at):
-    """The iterates (current, trial, last feasible), vectors by row, room for a guess of tracked values; where it ends.
-
-    `most` rows at most.
-    """
+def carve_points(table, most, doubles, integers):
+    """The iterates, the rows (`most` at most), room for a guess of tracked values; where the doubles of these end."""
     header = header_at(table, 0)
     bodies, tracks, columns = header.bodies, header.tracked, EXTRA_COLUMN + 6 * header.extra
-    poses = carve(doubles, at, (3, bodies, 7))
-    at += 21 * bodies
+    poses = carve(doubles, 0, (3, bodies, 7))
+    at = 21 * bodies
     tracked = carve(doubles, at, (4, tracks, TRACK))
     at += 4 * tracks * TRACK
     records = carve(doubles, at, (2, record_count(table), CONTACT_RECORD))
     at += 2 * record_count(table) * CONTACT_RECORD
     jacobians = carve(doubles, at, (2, most, columns))
     at += 2 * most * columns
-    by_row = carve(doubles, at, (BY_ROW + 1, most))
-    at += (BY_ROW + 1) * most
-    for k in range(BY_ROW):
-        for r in range(most):
-            by_row[k, r] = 0.0
+    by_row = carve(doubles, at, (BY_ROW, most))
+    at += BY_ROW * most
+    by_row[:] = 0.0
     current = Iterate(poses[0], tracked[0], records[0], by_row[0], jacobians[0])
     trial = Iterate(poses[1], tracked[1], records[1], by_row[1], jacobians[1])
-    vectors = RowVectors(by_row[2], by_row[3], by_row[4], by_row[5], by_row[6])
-    return (current, trial, Held(poses[2], tracked[3], by_row[BY_ROW])), vectors, tracked[2], at
+    gram = carve(doubles, at, (most + 1, most))
+    at += (most + 1) * most
+    rows = Rows(header.rows, 0.0, by_row[2], by_row[3], by_row[4], by_row[5], by_row[6], gram)
+    held = Held(poses[2], tracked[3], by_row[7], carve(integers, header.contacts, (header.guards,)))
+    return Iterates(current, trial, held), rows, tracked[2], at
 
 
 @kernel(inline=True, allocates=True)
@@ -148,22 +182,20 @@ def carve_unknowns(n, order, doubles, at):
 
 
 @kernel(inline=True, allocates=True)
-def carve_all(table, memory, doubles, integers):
-    """All that a solve works in, as `room_needed` counts it; rows and unknowns are those without lifted pairs."""
+def carve_all(store, memory, tips, doubles, integers):
+    """All that a solve works in, as `workspace_needed` counts it; rows and unknowns are those without lifted pairs."""
+    table = store.table
     header = header_at(table, 0)
     pairs = header.contacts
     most, n = header.rows + 4 * pairs, 6 * header.moving
-    (current, trial, held), by_row, guess, at = carve_points(table, most, doubles, 0)
+    iterates, rows, guess, at = carve_points(table, most, doubles, integers)
     shape = shape_of(table, most, n + 4 * pairs, record_of_blocks(table), integers, doubles)
     lifted, at = carve_pairs(table, guess, memory, doubles, at, integers)
-    numbers = carve(integers, pairs, (header.guards,))
     arrange(table, lifted.free, shape, header.rows, n)
     tapes, at = carve_tapes(table, doubles, at)
-    gram = carve(doubles, at, (most + 1, most))
-    at += (most + 1) * most
-    way = carve(doubles, at, (WAY,))
-    system = carve_unknowns(n, shape.sparsity, doubles, at + WAY)
-    return Workspace(current, trial, held, by_row, shape, lifted, numbers, tapes, gram, way, system)
+    way, loop = carve(doubles, at, (WAY,)), carve(doubles, at + WAY, (LOOP,))
+    system = carve_unknowns(n, shape.sparsity, doubles, at + WAY + LOOP)
+    return Workspace(Program(store, shape, lifted, tapes, tips), iterates, rows, way, loop, system)
 
 
 @kernel(inline=True, allocates=True)

@@ -30,7 +30,7 @@ from assembly.errors import InputError
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.features.solid_contact import FEATURE_F, TRACK
-from assembly.solve.diagnosis.residual_check import audit, is_extremal, twist_gradients
+from assembly.solve.diagnosis.residual_check import Claim, audit, is_extremal, twist_gradients
 from assembly.solve.loop.settings import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
 from assembly.solve.measure import Near
 from assembly.solve.oracle.rows import Poses, Rows
@@ -260,14 +260,7 @@ class ReferenceSolver:
         return np.concatenate([*fixed, self._rows.values(), self._terms.values(q)])
 
     def _checked(
-        self,
-        q: Array,
-        parameters: Array,
-        near: Near,
-        forces: Array,
-        status: Status,
-        p: Array,
-        figures: dict[str, Any],
+        self, q: Array, parameters: Array, near: Near, forces: Array, status: Status, p: Array, figures: dict[str, Any]
     ) -> Solution:
         """The solution, its status decided by what an audit finds at q."""
         packed, scene = self._packed, self._scene._scene
@@ -287,14 +280,9 @@ class ReferenceSolver:
             self._pairs,
             lambda pose: self._rows.residuals(pose, near),
             packed.one_sided,
-            q,
-            parameters,
-            forces[self._places],
-            gradient,
-            balance,
-            aside,
             self._moving,
             packed.scale,
+            Claim(q, parameters, forces[self._places], gradient, balance, aside),
         )
         if status is not Status.CONTACT_LOST:
             if found.held and found.balanced and np.isfinite(value[0]):

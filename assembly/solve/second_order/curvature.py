@@ -19,16 +19,15 @@ from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.records import header_at
 from assembly.constraints.program.row_terms import add_row_terms
 from assembly.proximity.extrema.face_face import BEND
-from assembly.proximity.features.solid_contact import TRACK
-from assembly.solve.dense.row_table import new_point, point_at
+from assembly.solve.dense.row_table import arranged, new_point, point_at
 from assembly.solve.linear_algebra.factorize import factorize_shifted, solve_step
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import toward_rows
 from assembly.solve.loop.predict import predict_pairs
-from assembly.solve.loop.report import write_pose
+from assembly.solve.loop.report import write_pose, write_tracked
 from assembly.solve.loop.residuals import add_row, arrange, move, record_of_blocks, shape_of, size_of_shape
 from assembly.solve.loop.violation import off_rows
-from assembly.solve.loop.workspace import unknowns
+from assembly.solve.loop.workspace import new_rows, unknowns
 
 # Rows that hold; so many steps lead back onto them, none longer than this.
 HOLDS, EXACT, STEPS, LONGEST = 1e-11, 1e-14, 12, 1.0
@@ -38,15 +37,6 @@ ITERATIONS, LEAST_SHIFT = 60, 1e-8
 MU, SOFTNESS, GAIN = 1e-6, 1e-2, 0.1
 
 
-@kernel(inner=True)
-def write_tracked(table, tracked, state):
-    """Tracked values of a point into a state."""
-    header = header_at(table, 0)
-    for k in range(header.tracked):
-        for i in range(TRACK):
-            state[7 * header.bodies + TRACK * k + i] = tracked[k, i]
-
-
 @kernel(inner=True, allocates=True)
 def write_curvature(store, state, forces, out, tips, integers, doubles):
     """The same as `curvature_at`, with what it works in."""
@@ -54,8 +44,8 @@ def write_curvature(store, state, forces, out, tips, integers, doubles):
     pairs = header.contacts
     free = np.empty(pairs, np.int64)
     found = point_at(store, state, free)
-    lost, count, point, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
-    if lost >= 0:
+    count, point = found.count, found.iterate
+    if found.lost >= 0:
         return -1
     write_tracked(store.table, point.tracked, state)
     rows, n = header.rows + 4 * count, 6 * header.moving + 4 * count
@@ -68,8 +58,9 @@ def write_curvature(store, state, forces, out, tips, integers, doubles):
     slopes = np.zeros(n)
     for i in range(out.size):
         out[i] = 0.0
-    out[0] = goal(store, shape, rows, loose, room, tips, point, 1, slopes, hessian)
-    add_row_terms(store, loose, room, shape, point, forces, np.zeros(rows), hessian)
+    program = arranged(found, shape, tips)
+    out[0] = goal(program, rows, point, 1, slopes, hessian)
+    add_row_terms(program, point, forces, np.zeros(rows), hessian)
     for r in range(rows):
         out[1 + r] = point.residual[r]
         add_row(shape.bases, point.jacobian, r, 1.0, jacobian[r])
@@ -84,7 +75,7 @@ def write_curvature(store, state, forces, out, tips, integers, doubles):
     signatures=(
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8)",
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], none)",
-    ),
+    )
 )
 def curvature_at(table, pool, state, forces, out, tips):
     """Evaluate a state; tracked values found are written into it. Returns how many folds there are, or -1: no pair.
@@ -111,61 +102,49 @@ def is_at_most(values, limit):
 
 
 @kernel(inner=True, allocates=True)
-def walk_within(store, state, step, share, kept, residual, tips, integers, doubles):
+def walk_within(store, state, step, share, kept, residual, tips, memory):
     """The same as `walk`, with what it works in."""
     header = header_at(store.table, 0)
     pairs = header.contacts
     free = np.empty(pairs, np.int64)
     found = point_at(store, state, free)
-    lost, count, here, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
-    rows, n = header.rows + 4 * count, 6 * header.moving + 4 * count
-    if lost >= 0 or n != step.size:
+    here = found.iterate
+    count, n = header.rows + 4 * found.count, 6 * header.moving + 4 * found.count
+    if found.lost >= 0 or n != step.size:
         return math.inf
+    integers, doubles = memory
     blocks = record_of_blocks(store.table)
     shape = shape_of(store.table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs, blocks, integers, doubles)
-    arrange(store.table, free, shape, rows, n)
+    arrange(store.table, free, shape, count, n)
+    program = arranged(found, shape, tips)
+    lifted = program.lifted
     for r in range(header.rows):
         if kept[r] > 0.0:
             shape.one_sided[r] = 0
     trial = new_point(store.table)
     trial.q[:] = here.q
     system = unknowns(n, shape.sparsity)
-    lagrangian, matrix = system.hessian, system.factor
-    active, forces, way = np.zeros(rows), np.zeros(rows), step.copy()
+    rows, way = new_rows(count, MU), system.directions.step
+    way[:] = step
     before = math.inf
     for _ in range(STEPS):
         move(store.table, here.q, way, share, trial.q)
-        predict_pairs(store, shape.bases, loose, here, trial, way, share)
-        if evaluate(store, loose.guess, BEND, loose, room, trial) >= 0:
+        predict_pairs(store, shape.bases, lifted, here, trial, way, share)
+        if evaluate(program, lifted.guess, BEND, trial) >= 0:
             return math.inf
         here, trial = trial, here
         share = 1.0
-        off = off_rows(store.table, loose, shape.one_sided, here, False)
+        off = off_rows(store.table, lifted, shape.one_sided, here, False)
         if off <= EXACT or (off <= HOLDS and off > GAIN * before):
             write_pose(store, here.q, state)
             write_tracked(store.table, here.tracked, state)
-            for r in range(rows):
+            for r in range(count):
                 residual[r] = here.residual[r]
-            return goal(store, shape, rows, loose, room, tips, here, 0, way, lagrangian)
+            return goal(program, count, here, 0, system.gradient, system.hessian)
         before = off
         if not math.isfinite(off):
             break
-        toward_rows(
-            shape,
-            header.rows,
-            rows,
-            here.residual,
-            here.jacobian,
-            MU,
-            active,
-            SOFTNESS,
-            EXACT,
-            lagrangian,
-            matrix,
-            n,
-            forces,
-            way,
-        )
+        toward_rows(program, here, rows, system, SOFTNESS, EXACT)
         if not is_at_most(way, LONGEST):
             break
     return math.inf
@@ -175,7 +154,7 @@ def walk_within(store, state, step, share, kept, residual, tips, integers, doubl
     signatures=(
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], i8)",
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], none)",
-    ),
+    )
 )
 def walk(table, pool, state, step, share, kept, residual, tips):
     """Move a state by a share of a step, and by least steps back onto the rows. Returns the objective's value there.
@@ -186,9 +165,9 @@ def walk(table, pool, state, step, share, kept, residual, tips):
     header = header_at(table, 0)
     pairs = header.contacts
     integers, doubles = size_of_shape(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs)
-    return walk_within(
-        Store(table, pool), state, step, share, kept, residual, tips, np.empty(integers, np.int64), np.empty(doubles)
-    )
+    # The blocks outlive what is carved from them: they are an argument of the kernel that carves.
+    memory = (np.empty(integers, np.int64), np.empty(doubles))
+    return walk_within(Store(table, pool), state, step, share, kept, residual, tips, memory)
 
 
 @kernel(inner=True, allocates=True)
@@ -196,16 +175,17 @@ def least_within(store, state, forces, active, direction, tips, integers, double
     """The same as `least_curvature`, with what it works in."""
     header = header_at(store.table, 0)
     found = point_at(store, state, np.empty(header.contacts, np.int64))
-    lost, count, point, loose, room = found.lost, found.count, found.iterate, found.lifted, found.tapes
+    point = found.iterate
     rows, n = header.rows, 6 * header.moving
-    if lost >= 0 or count > 0:
+    if found.lost >= 0 or found.count > 0:
         return math.nan
     shape = shape_of(store.table, rows, n, record_of_blocks(store.table), integers, doubles)
-    arrange(store.table, loose.free, shape, rows, n)
+    arrange(store.table, found.program.lifted.free, shape, rows, n)
+    program = arranged(found, shape, tips)
     system = unknowns(n, shape.sparsity)
     gradient, lines, lagrangian, matrix = system.gradient, system.directions, system.hessian, system.factor
-    goal(store, shape, rows, loose, room, tips, point, 1, gradient, lagrangian)
-    add_row_terms(store, loose, room, shape, point, forces, active, lagrangian)
+    goal(program, rows, point, 1, gradient, lagrangian)
+    add_row_terms(program, point, forces, active, lagrangian)
     shift = factorize_shifted(lagrangian, n, shape.sparsity, LEAST_SHIFT, matrix)
     if shift < 0.0:
         return math.nan
@@ -237,7 +217,7 @@ def least_within(store, state, forces, active, direction, tips, integers, double
     signatures=(
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8)",
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], none)",
-    ),
+    )
 )
 def least_curvature(table, pool, state, forces, active, direction, tips):
     """The least curvature of objective + forces . rows along motions that keep the rows; its direction is written.

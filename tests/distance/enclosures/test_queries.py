@@ -354,15 +354,14 @@ def test_budgets_give_true_bounds(budget):
             assert np.isfinite(answer.upper)
 
 
-def test_a_search_longer_than_the_room_that_is_kept():
+def test_a_search_longer_than_the_room_that_it_begins_with():
     circle = asm.curves.ellipse((1.0, 1.0))
     answer = enclosed_distance(circle, np.zeros(2), bound="ellipsoid", polish=False, max_evaluations=5000)
     assert answer.status is Status.BUDGET_SPENT and 5000 <= answer.evaluations <= 5001
     assert answer.lower <= 1.0 <= answer.upper
 
 
-def test_a_small_budget_leaves_room_for_the_next(monkeypatch):
-    monkeypatch.setattr("assembly.distance.enclosures.queries._SPACES", [])
+def test_a_small_budget_leaves_nothing_for_the_next():
     plain = {"bound": "ellipsoid", "polish": False}
     assert enclosed_distance(CIRCLE, HEXAGON + 1, **plain, max_evaluations=1).status is Status.BUDGET_SPENT
     assert enclosed_distance(CIRCLE, HEXAGON + 1, **plain).status is Status.CONVERGED

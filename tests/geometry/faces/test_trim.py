@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from assembly.geometry import shapes
-from assembly.geometry.faces import trim_pieces as pieces
 from assembly.geometry.faces.face import BoundaryPoint, Face
 from assembly.geometry.faces.trim import locate_points
 from assembly.geometry.faces.trim_nearest import nearest_points
+from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.evaluate import CURVE_RECORD
 from assembly.geometry.splines.surface import NurbsSurface
@@ -222,8 +222,8 @@ def test_the_packed_trim_may_stand_anywhere():
     np.testing.assert_array_equal(*sides)
     np.testing.assert_array_equal(*feet)
     # The curves' records are those of the curves themselves.
-    assert moved_table[7 + pieces.TRIM_CURVES] == 4
-    first = moved_table[7 + pieces.TRIM_FIRST]
+    assert trim_at(moved_table, 7).curves == 4
+    first = trim_at(moved_table, 7).first
     for k, curve in enumerate(face.boundary):
         record, own = curve.packed()
         here = moved_table[first + k * CURVE_RECORD : first + (k + 1) * CURVE_RECORD]

@@ -281,7 +281,7 @@ def test_packed_is_cached_and_padded_to_bicubic_up_to_degree_three():
         assert surface.packed()[1] is pool
         assert record.dtype == np.int64 and record.size == spline.SURFACE_RECORD and pool.dtype == np.float64
         p, q = (3, 3) if max(degree) <= 3 else degree
-        assert (record[spline.DEGREE_U], record[spline.DEGREE_V]) == (p, q)
+        assert (spline.surface_at(record, 0).degree_u, spline.surface_at(record, 0).degree_v) == (p, q)
         at_u, at_v = surface.breaks()
         assert (record[spline.SPANS_U], record[spline.SPANS_V]) == (at_u.size - 1, at_v.size - 1)
         assert np.array_equal(pool[record[spline.BREAKS_U] :][: at_u.size], at_u)

@@ -5,11 +5,12 @@ from math import pi
 import numpy as np
 import pytest
 
+from assembly._record import rows_of, size_of
 from assembly.errors import InputError
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.trim import locate_points
-from assembly.geometry.faces.trim_pieces import TRIM_CURVES, TRIM_FIRST
+from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.evaluate import (
     CELL_COUNT,
@@ -51,11 +52,11 @@ class Shell:
         self.pool = np.concatenate([np.full(pool_at, np.nan), pool, np.full(5, np.nan)])
         header = self.table[self.offset : self.offset + shell.SHELL]
         self.faces, self.edges, self.vertices = (
-            self.table[at : at + count * size].reshape(count, size)
-            for count, at, size in zip(
+            rows_of(dtype, self.table[at : at + count * size_of(dtype)].reshape(count, size_of(dtype)))
+            for count, at, dtype in zip(
                 header[::2].tolist(),
                 header[1::2].tolist(),
-                (shell.FACE_RECORD, shell.EDGE_RECORD, shell.VERTEX_RECORD),
+                (shell.FACE_DTYPE, shell.EDGE_DTYPE, shell.VERTEX_DTYPE),
                 strict=True,
             )
         )
@@ -93,22 +94,22 @@ def test_faces_are_scaled_and_keep_their_parameters(packed):
     rng = np.random.default_rng(0)
     for face, record in zip(packed.topology.faces, packed.faces, strict=True):
         (a, b), (c, d) = face.surface.domain
-        at = record[shell.FACE_SURFACE]
+        at = record.surface
         assert packed.table[at + SIGN] == face.sign
         for u, v in zip(rng.uniform(a, b, 10), rng.uniform(c, d, 10), strict=True):
             # Rounding of sums of some sixteen products.
             np.testing.assert_allclose(packed.surface(at, u, v), face.surface.evaluate(u, v) / 3.7, atol=1e-14)
-        trim = record[shell.FACE_TRIM]
+        trim = record.trim
         if not face.boundary:
             assert trim == -1
             continue
-        assert packed.table[trim + TRIM_CURVES] == len(face.boundary)
+        assert trim_at(packed.table, trim).curves == len(face.boundary)
         u, v = rng.uniform(a, b, 50), rng.uniform(c, d, 50)
         sides = np.empty(50, dtype=np.int64)
         locate_points(packed.table, packed.pool, trim, u, v, sides)
         np.testing.assert_array_equal(sides, face.locate(u, v))
         for k, curve in enumerate(face.boundary):
-            at = packed.table[trim + TRIM_FIRST] + CURVE_RECORD * k
+            at = trim_at(packed.table, trim).first + CURVE_RECORD * k
             assert packed.domain(at) == curve.domain
             for t in rng.uniform(*curve.domain, 5):
                 np.testing.assert_allclose(packed.curve(at, t), curve.evaluate(t), atol=1e-13)
@@ -117,74 +118,74 @@ def test_faces_are_scaled_and_keep_their_parameters(packed):
 def test_edges_join_faces_and_vertices(packed):
     for k, record in enumerate(packed.edges):
         edge = packed.topology.edges[k]
-        low, high = packed.domain(record[shell.EDGE_CURVE])
-        listed = packed.table[packed.faces[record[shell.EDGE_FACE_A], shell.FACE_EDGES] + edge.curve_a]
+        low, high = packed.domain(record.curve)
+        listed = packed.table[packed.faces[record.face_a].edges + edge.curve_a]
         assert listed == k
-        assert record[shell.EDGE_SURFACE] == packed.faces[record[shell.EDGE_FACE_A], shell.FACE_SURFACE]
+        assert record.surface == packed.faces[record.face_a].surface
 
         def point(t, record=record):
-            return packed.surface(record[shell.EDGE_SURFACE], *packed.curve(record[shell.EDGE_CURVE], t))
+            return packed.surface(record.surface, *packed.curve(record.curve, t))
 
-        for side, (field, t) in enumerate(((shell.EDGE_START, low), (shell.EDGE_END, high))):
+        for side, (field, t) in enumerate((("start", low), ("end", high))):
             number = record[field]
             if number < 0:
-                assert number == -1 and record[shell.EDGE_START] == record[shell.EDGE_END]
+                assert number == -1 and record.start == record.end
                 np.testing.assert_allclose(point(low), point(high), atol=1e-14)
                 continue
             vertex = packed.vertices[number]
-            at = vertex[shell.VERTEX_POINT]
+            at = vertex.point
             np.testing.assert_allclose(packed.pool[at : at + 3], point(t), atol=1e-14)
-            ends = packed.table[vertex[shell.VERTEX_EDGE_LIST] :][: 2 * vertex[shell.VERTEX_EDGES]].reshape(-1, 2)
+            ends = packed.table[vertex.edge_list :][: 2 * vertex.edges].reshape(-1, 2)
             assert [k, side] in ends.tolist()
-            faces = packed.table[vertex[shell.VERTEX_FACE_LIST] :][: vertex[shell.VERTEX_FACES]]
-            assert record[shell.EDGE_FACE_A] in faces
+            faces = packed.table[vertex.face_list :][: vertex.faces]
+            assert record.face_a in faces
         if edge.face_b is None:
-            fields = shell.EDGE_FACE_B, shell.EDGE_SURFACE_B, shell.EDGE_CURVE_B
+            fields = "face_b", "surface_b", "curve_b"
             assert [record[field] for field in fields] == [-1, -1, -1]
             continue
-        assert record[shell.EDGE_FACE_B] == edge.face_b
-        assert packed.table[packed.faces[edge.face_b, shell.FACE_EDGES] + edge.curve_b] == k
-        assert record[shell.EDGE_SURFACE_B] == packed.faces[edge.face_b, shell.FACE_SURFACE]
-        m0, m1 = packed.pool[record[shell.EDGE_MAP] : record[shell.EDGE_MAP] + 2]
-        start, end = packed.domain(record[shell.EDGE_CURVE_B])
+        assert record.face_b == edge.face_b
+        assert packed.table[packed.faces[edge.face_b].edges + edge.curve_b] == k
+        assert record.surface_b == packed.faces[edge.face_b].surface
+        m0, m1 = packed.pool[record.map : record.map + 2]
+        start, end = packed.domain(record.curve_b)
         for t in low + (high - low) * np.array([0.2, 0.5, 0.8]):
             other = m0 + m1 * t
-            other = start + (other - start) % (end - start) if record[shell.EDGE_START] < 0 else other
-            b = packed.surface(record[shell.EDGE_SURFACE_B], *packed.curve(record[shell.EDGE_CURVE_B], other))
+            other = start + (other - start) % (end - start) if record.start < 0 else other
+            b = packed.surface(record.surface_b, *packed.curve(record.curve_b, other))
             # Linear in parameters that do not go together linearly on circles of other pieces.
             assert np.linalg.norm(b - point(t)) <= 0.1 * edge.length / 3.7
 
 
 def test_vertices_list_their_faces(packed):
     for vertex, record in zip(packed.topology.vertices, packed.vertices, strict=True):
-        assert record[shell.VERTEX_EDGES] == len(vertex.edges)
-        faces = packed.table[record[shell.VERTEX_FACE_LIST] :][: record[shell.VERTEX_FACES]]
+        assert record.edges == len(vertex.edges)
+        faces = packed.table[record.face_list :][: record.faces]
         assert tuple(faces.tolist()) == vertex.faces
 
 
 def test_every_ball_holds_its_part_of_the_edge(packed):
     x = np.linspace(0.0, 1.0, 25)
     for edge, record in zip(packed.topology.edges, packed.edges, strict=True):
-        count = record[shell.EDGE_CELL_COUNT]
-        rows = packed.pool[record[shell.EDGE_CELLS] :][: count * shell.EDGE_CELL_SIZE].reshape(count, -1)
-        low, high = packed.domain(record[shell.EDGE_CURVE])
+        count = record.cell_count
+        rows = packed.pool[record.cells :][: count * shell.EDGE_CELL_SIZE].reshape(count, -1)
+        low, high = packed.domain(record.curve)
         assert rows[0, 0] == low and rows[-1, 1] == high
         np.testing.assert_array_equal(rows[1:, 0], rows[:-1, 1])
         assert 16 <= count <= 256
         assert rows[:, 5].max() <= 0.0625 * edge.length / 3.7 or count == 256
         for t0, t1, *center, radius in rows:
             for t in np.append(t0 + (t1 - t0) * x[:-1], t1):
-                p = packed.surface(record[shell.EDGE_SURFACE], *packed.curve(record[shell.EDGE_CURVE], t))
+                p = packed.surface(record.surface, *packed.curve(record.curve, t))
                 assert np.linalg.norm(p - center) <= radius
 
 
 def test_cells_that_are_flagged_out_hold_no_material(packed):
     rng = np.random.default_rng(1)
     for face, record in zip(packed.topology.faces, packed.faces, strict=True):
-        at = record[shell.FACE_SURFACE]
+        at = record.surface
         count = packed.table[at + CELL_COUNT]
         rows = packed.pool[packed.table[at + CELLS] :][: count * CELL_SIZE].reshape(count, -1)
-        flags = packed.pool[record[shell.FACE_CELL_FLAGS] :][:count]
+        flags = packed.pool[record.cell_flags :][:count]
         assert set(np.unique(flags)) <= {0.0, 1.0}
         out = rows[flags == 0.0]
         if not face.boundary:
@@ -206,8 +207,8 @@ def test_flags_leave_little_over():
     face = disc(2.0, 0.0, True, RINGS["as one"])
     ring = Face(face.surface, face.outer, [arc((0, 0), 1.98, 0.0, 2 * pi, 4)])
     packed = Shell([ring], 1.0)
-    count = packed.table[packed.faces[0, shell.FACE_SURFACE] + CELL_COUNT]
-    flags = packed.pool[packed.faces[0, shell.FACE_CELL_FLAGS] :][:count]
+    count = packed.table[packed.faces[0].surface + CELL_COUNT]
+    flags = packed.pool[packed.faces[0].cell_flags :][:count]
     # The circle runs through some fifth of the cells of the square twice as wide, in each of 16 pieces' boxes.
     assert 0.1 * count < flags.sum() < 0.45 * count
 

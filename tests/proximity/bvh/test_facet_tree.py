@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from assembly._record import rows_of
 from assembly.errors import InputError
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
@@ -169,15 +170,15 @@ def test_packed_trees_stand_where_they_are_put():
     moved, same, offset = pack_tree(tree, 2.0, 100, 1000)
     assert offset == 100
     np.testing.assert_array_equal(pool, same)
-    np.testing.assert_array_equal(moved[layout.NODE_TABLE] - one[layout.NODE_TABLE], 100)
-    np.testing.assert_array_equal(moved[layout.NODE_POOL] - one[layout.NODE_POOL], 1000)
-    np.testing.assert_array_equal(moved[layout.ELEMENT_POOL] - one[layout.ELEMENT_POOL], 1000)
+    header, other = layout.tree_at(one, 0), layout.tree_at(moved, 0)
+    assert other.node_table - header.node_table == 100
+    assert other.node_pool - header.node_pool == other.element_pool - header.element_pool == 1000
     np.testing.assert_array_equal(moved[layout.TREE :], one[layout.TREE :])
-    count = int(one[layout.NODES])
-    nodes = pool[: layout.NODE * count].reshape(count, layout.NODE)
-    center, half = nodes[:, :3], nodes[:, 3:6]
+    count = header.nodes
+    nodes = rows_of(layout.NODE_BOUNDS, pool[: layout.NODE * count].reshape(count, layout.NODE))
+    center, half = nodes.center, nodes.half
     assert (center - half <= 0.5 * tree.nodes.low).all() and (center + half >= 0.5 * tree.nodes.high).all()
-    np.testing.assert_allclose(np.hypot(nodes[:, layout.COS], nodes[:, layout.SIN]), 1.0, atol=1e-15)
+    np.testing.assert_allclose(np.hypot(nodes.cosine, nodes.sine), 1.0, atol=1e-15)
 
 
 def test_bad_input():

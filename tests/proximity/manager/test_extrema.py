@@ -28,8 +28,9 @@ def root_of(f, q_f, g, q_g, start):
     turn, shift = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
     table, pool = np.asarray(table), np.asarray(pool)
     out = np.full((1, roots.ROOT), np.nan)
-    found = roots.surfaces_extremum(Store(table, pool), posed(turn, shift, (0, SURFACE_RECORD)), tuple(start), out, 0)
-    return found, out[0], rotation(q, 0)
+    pair = posed(Store(table, pool), turn, shift, (0, SURFACE_RECORD))
+    found = roots.surfaces_extremum(pair, tuple(start), roots.extremum_at(out, 0))
+    return found, roots.extremum_at(out, 0), rotation(q, 0)
 
 
 @pytest.mark.parametrize(("first", "second"), [("torus", "ellipsoid"), ("ellipsoid", "torus"), ("ellipsoid",) * 2])
@@ -51,16 +52,16 @@ def test_where_newton_fails_the_controller_finds_the_minimum(first, second):
         assert found == roots.MINIMUM_FOUND
         rescued += 1
         # The same descent, from the same start.
-        np.testing.assert_allclose(root[: roots.CODE_F], lowest.parameters, rtol=0, atol=1e-9)
-        assert root[roots.GAP] == pytest.approx(lowest.gap, abs=1e-12)
-        normal = matvec(turn, tuple(root[roots.EXTREMUM_NORMAL : roots.GAP]))
+        np.testing.assert_allclose(root.parameters, lowest.parameters, rtol=0, atol=1e-9)
+        assert root.gap == pytest.approx(lowest.gap, abs=1e-12)
+        normal = matvec(turn, tuple(root.normal))
         np.testing.assert_allclose(normal, lowest.normal, rtol=0, atol=1e-12)
         # Nothing beside it is nearer: the points of both surfaces a little off.
         ends = [as_face("side", side).surface for side in (f, g)]
-        beside = root[:4] + 1e-3 * rng.normal(size=(200, 4))
+        beside = root.parameters + 1e-3 * rng.normal(size=(200, 4))
         p, r = (
             asm.Pose(q[:3], q[3:] / np.linalg.norm(q[3:])).apply(end.evaluate(*beside[:, at : at + 2].T))
             for end, q, at in ((ends[0], q_f, 0), (ends[1], q_g, 2))
         )
-        assert np.linalg.norm(p - r, axis=1).min() >= root[roots.GAP] - 1e-12
+        assert np.linalg.norm(p - r, axis=1).min() >= root.gap - 1e-12
     assert rescued > 3

@@ -7,7 +7,7 @@ import assembly as asm
 from assembly.geometry import shapes
 from assembly.kinematics.pose import retract
 from assembly.proximity.extrema.pairs import gap_gradient
-from assembly.solve.diagnosis.residual_check import Sides, audit, is_extremal, twist_gradients
+from assembly.solve.diagnosis.residual_check import Claim, Sides, audit, is_extremal, twist_gradients
 
 
 def poses(rng, count):
@@ -92,19 +92,8 @@ def test_an_audit_finds_what_is_wrong(gap, one_sided, force, held, balanced):
     gradient = np.zeros((2, 6))
     gradient[1, 0] = -2.0
     start = sides.find(q, None).parameters[None]
-    found = audit(
-        [sides],
-        no_rows,
-        np.array([one_sided]),
-        q,
-        start,
-        np.array([force]),
-        gradient,
-        gradient,
-        np.empty(0),
-        [1],
-        1.0,
-    )
+    claim = Claim(q, start, np.array([force]), gradient, gradient, np.empty(0))
+    found = audit([sides], no_rows, np.array([one_sided]), [1], 1.0, claim)
     assert (found.held, found.balanced) == (held, balanced)
     assert found.residuals[0] == pytest.approx(gap, abs=1e-13)
     assert found.feasibility == pytest.approx(max(-gap, 0.0) if one_sided else abs(gap), abs=1e-13)
@@ -115,19 +104,10 @@ def audit_rows(residuals, one_sided, forces, gradient=0.0, balance=0.0, aside=()
     """An audit of one body without contacts."""
     q = poses(np.random.default_rng(2), 1)
     given = [np.array(values, dtype=float) for values in (residuals, forces, aside)]
-    return audit(
-        [],
-        lambda at: given[0] if at is q else np.full(3, np.nan),
-        np.array(one_sided, dtype=bool),
-        q,
-        np.empty((0, 4)),
-        given[1],
-        np.full((1, 6), gradient),
-        np.full((1, 6), balance),
-        given[2],
-        [0],
-        scale,
-    )
+    slopes = np.full((1, 6), gradient), np.full((1, 6), balance)
+    claim = Claim(q, np.empty((0, 4)), given[1], *slopes, given[2])
+    sides = np.array(one_sided, dtype=bool)
+    return audit([], lambda at: given[0] if at is q else np.full(3, np.nan), sides, [0], scale, claim)
 
 
 @pytest.mark.parametrize(

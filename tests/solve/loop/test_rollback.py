@@ -18,8 +18,9 @@ from assembly.constraints.program.records import (
     SHELL_F,
     WATCH,
 )
-from assembly.proximity.manager.state import CROSSED, MEMORY_HEADER, PAIR_MINIMUM, PAIR_TABLE
-from assembly.solve.loop.rollback import DEEP, has_sunk
+from assembly.proximity.manager.records import CROSSED, MEMORY_HEADER, pair_in
+from assembly.solve.loop.parameters import DEEP
+from assembly.solve.loop.rollback import has_sunk
 from tests.laws.test_level_valleys import MINOR, circle_distance
 
 MAJOR = 0.7
@@ -59,7 +60,7 @@ def test_what_has_sunk():
     r = table[FIRST_CLEARANCE_ROW]
     row = table[ROW_TABLE] + ROW * r
     # Rows know no contact before a solve begins.
-    table[row + MINIMUM] = table[table[table[WATCH] + PAIR_TABLE] + PAIR_MINIMUM]
+    table[row + MINIMUM] = pair_in(table, table[WATCH], 0).minimum
     flank = pool[table[row + MINIMUM] + 1]
     # Half the least radius of curvature.
     assert flank * packed.scale == pytest.approx(0.5 * MINOR, rel=0.2)

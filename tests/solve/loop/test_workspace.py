@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly._record import Store
 from assembly.solve.loop.workspace import carve_all, workspace_needed
 from benchmarks.running import example
 from tests.laws.trim_scenes import trim_scene
@@ -55,19 +56,21 @@ def dexterity():
 
 @pytest.mark.parametrize("scene", [contacts, joints, expressions, many, trims, dexterity])
 def test_nothing_stands_in_one_place(scene):
-    table = scene().packed().table
+    packed = scene().packed()
+    table = packed.table
     sizes = workspace_needed(table)
     doubles, integers = np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
-    space = carve_all(table, np.empty(0), doubles, integers)
-    lifted, shape, system = space.lifted, space.structure, space.system
+    space = carve_all(Store(table, packed.pool), np.empty(0), packed.tips, doubles, integers)
+    lifted, shape, system = space.program.lifted, space.program.structure, space.system
+    current, trial, held = space.iterates
     doubles[:], integers[:] = 0.0, 0
-    used = [*space.here, *space.trial, *space.held, *space.by_row, *space.tapes, space.gram, space.way]
+    used = [*current, *trial, *held[:3], *space.rows[2:], *space.program.tapes, space.way]
     used += [lifted.lengths, lifted.vectors, lifted.variables, lifted.guess, shape.sparsity.scratch]
     used += [system.gradient, *system.directions, system.hessian, system.factor]
     for array in used:
         array += 1.0
     sparsity = [shape.sparsity.places, shape.sparsity.folds]
-    for array in (shape.bases, shape.one_sided, *sparsity, *shape.row_order, lifted.free, space.numbers):
+    for array in (shape.bases, shape.one_sided, *sparsity, *shape.row_order, lifted.free, held.numbers):
         array += 1
     assert doubles.max() == 1.0 and integers.max() == 1
     assert doubles.sum() == sum(array.size for array in used)

@@ -1,6 +1,6 @@
-"""What is known of two spines over a box, lengths s and t along a part of either.
+"""What is known of two centerlines over a box, lengths s and t along a part of either.
 
-Two wires touch where the distance of their spines has a minimum: with d = g(t) - f(s) and F = |d|^2 / 2,
+Two wires touch where the distance of their centerlines has a minimum: with d = g(t) - f(s) and F = |d|^2 / 2,
 
     F_s = -d.f',   F_t = d.g',   F_ss = 1 - d.f'',   F_st = -f'.g',   F_tt = 1 + d.g''
 
@@ -8,8 +8,8 @@ Two wires touch where the distance of their spines has a minimum: with d = g(t) 
 farther than pieces of constant curvature let them. So a box may be told to hold no point of F's slope zero, to hold one
 minimum at most (F convex), or none (F'' indefinite); and after which motion that may no longer be so.
 
-A motion by m moves no point of one spine by more than m, seen from the other, and turns its tangents by no more than
-m / rho.
+A motion by m moves no point of one centerline by more than m, seen from the other, and turns its tangents by no more
+than m / rho.
 """
 
 from __future__ import annotations
@@ -20,10 +20,7 @@ from collections import namedtuple
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.vec import add, blend, dot, matvec, matvec_t, sub
-from assembly.proximity.manager.wires import (
-    centerline_part_at,
-    centerline_point,
-)
+from assembly.proximity.manager.wires import centerline_part_at, centerline_point
 
 # A box: a part of either centerline, and the lengths from its middle where the box begins and ends.
 CENTERLINE_BOX = record_dtype("f8", part_f=1, from_f=1, to_f=1, part_g=1, from_g=1, to_g=1)
@@ -32,6 +29,8 @@ BOX = size_of(CENTERLINE_BOX)
 # The lengths of a box; and at which free ends of the centerlines it is, yes or no.
 Lengths = namedtuple("Lengths", "from_f to_f from_g to_g")
 FreeEnds = namedtuple("FreeEnds", "start_f end_f start_g end_g")
+# A part of either centerline, f and g, in space. pool: where they are, at these places; pose: of g seen from f.
+PosedParts = namedtuple("PosedParts", "pool f g pose")
 # d = g(t) - f(s), unit tangents and curvature vectors of both, in the axes of f.
 Difference = namedtuple("Difference", "d tangent_f curvature_f tangent_g curvature_g")
 # The least and the largest of F_ss, F_tt and |F_st| over a box.
@@ -63,10 +62,11 @@ def segment_distance(d, f, g, h, k):
 
 
 @kernel(inline=True)
-def apart(pool, o, p, pose, s, t):
-    """The Difference at lengths s and t along the parts at o and p."""
-    pf, f, bend_f = centerline_point(pool, o, s)
-    q, g, bend_g = centerline_point(pool, p, t)
+def apart(parts, s, t):
+    """The Difference at lengths s and t along two parts."""
+    pose = parts.pose
+    pf, f, bend_f = centerline_point(parts.pool, parts.f, s)
+    q, g, bend_g = centerline_point(parts.pool, parts.g, t)
     return Difference(
         d=sub(add(matvec(pose.rotation, q), pose.shift), pf),
         tangent_f=f,
@@ -121,13 +121,12 @@ def beyond(slope, hessian, error, rate, h, k):
 
 
 @kernel(inline=True)
-def beyond_joints(pool, o, low, high, d, sign, slack, least, bend):
+def beyond_joints(part, low, high, d, sign, slack, least, bend):
     """The least of F_ss (sign -1) or F_tt (1) over a box and what is just beyond joints at its borders, by curvature
-    vectors that d in the axes of the part at o is multiplied by.
+    vectors that d in the axes of the part is multiplied by.
 
     And the largest curvature there; -1 where no curvature jumps.
     """
-    part = centerline_part_at(pool, o)
     sharpest = -1.0
     half = part.half
     for side in range(2):
@@ -141,23 +140,23 @@ def beyond_joints(pool, o, low, high, d, sign, slack, least, bend):
 
 
 @kernel(inline=True)
-def box_of(pool, o, p, pose, box, open_ends, reach, rho):
-    """What a box, Lengths, of the parts at o and p is.
+def box_of(parts, box, open_ends, reach, rho):
+    """What a box, Lengths, of two parts is.
 
     One that is beyond the reach is EMPTY, for longer than that. `open_ends` are where F_s, and F_t, may have any value
     >= 0, and <= 0: whether the box is at a free end of f where it starts, or ends, and so of g.
 
     Returns
     -------
-    The least distance of the spines over it; what it is; a motion after which that may no longer be so.
+    The least distance of the centerlines over it; what it is; a motion after which that may no longer be so.
     """
     h = 0.5 * (box.to_f - box.from_f)
     k = 0.5 * (box.to_g - box.from_g)
-    middle = apart(pool, o, p, pose, box.from_f + h, box.from_g + k)
+    middle = apart(parts, box.from_f + h, box.from_g + k)
     d, f, g = middle.d, middle.tangent_f, middle.tangent_g
     bend_f, bend_g = middle.curvature_f, middle.curvature_g
-    kf = centerline_part_at(pool, o).bend
-    kg = centerline_part_at(pool, p).bend
+    part_f, part_g = centerline_part_at(parts.pool, parts.f), centerline_part_at(parts.pool, parts.g)
+    kf, kg = part_f.bend, part_g.bend
     turn_f = kf * h
     turn_g = kg * k
     least = segment_distance(d, f, g, h, k) - 0.5 * (turn_f * h + turn_g * k) - ROUNDING
@@ -178,6 +177,7 @@ def box_of(pool, o, p, pose, box, open_ends, reach, rho):
     ss_low, ss_high = ss - vary_ss, ss + vary_ss
     tt_low, tt_high = tt - vary_tt, tt + vary_tt
     st_low, st_high = max(abs(st) - vary_st, 0.0), min(abs(st) + vary_st, 1.0)
+    hessian = Hessian(ss_low, ss_high, tt_low, tt_high, st_low, st_high)
     # Slopes: where a free end lets one of any value of a sign be a minimum's, only the other sign excludes.
     slope = abs(a) - h * max(ss_high, -ss_low) - k * st_high - ROUNDING
     if (open_ends.start_f and a > 0.0) or (open_ends.end_f and a < 0.0):
@@ -188,32 +188,9 @@ def box_of(pool, o, p, pose, box, open_ends, reach, rho):
     slope = max(slope, other)
     sway = 1.0 + far / rho
     is_open = open_ends.start_f or open_ends.end_f or open_ends.start_g or open_ends.end_g
-    what, margin = shape_of(
-        Hessian(ss_low, ss_high, tt_low, tt_high, st_low, st_high),
-        sway * kf,
-        sway * kg,
-        rho,
-        kf == 0.0 and kg == 0.0,
-        is_open,
-    )
+    what, margin = shape_of(hessian, sway * kf, sway * kg, rho, kf == 0.0 and kg == 0.0, is_open)
     if what == CONVEX:
-        # Where the curvature jumps at the border of the box a minimum may be born, and run into it, if F is not convex
-        # beyond.
-        ss_low, bend_f = beyond_joints(pool, o, box.from_f, box.to_f, d, -1.0, h + k, ss_low, kf)
-        tt_low, bend_g = beyond_joints(
-            pool, p, box.from_g, box.to_g, matvec_t(pose.rotation, d), 1.0, h + k, tt_low, kg
-        )
-        if bend_f >= 0.0 or bend_g >= 0.0:
-            bend_f, bend_g = max(bend_f, kf), max(bend_g, kg)
-            over, least_margin = shape_of(
-                Hessian(ss_low, ss_high, tt_low, tt_high, st_low, st_high),
-                sway * bend_f,
-                sway * bend_g,
-                rho,
-                False,
-                True,
-            )
-            margin = min(margin, least_margin) if over == CONVEX else 0.0
+        margin = min(margin, convex_beyond(parts, box, d, hessian, sway, rho))
     slope /= sway
     if not is_open:
         first = (sway + sway * kf * h + k / rho, sway + sway * kg * k + h / rho)
@@ -223,3 +200,22 @@ def box_of(pool, o, p, pose, box, open_ends, reach, rho):
         # What comes into it from beside it is known there; it bears none while F keeps its shape.
         return least, EMPTY, max(slope, margin)
     return least, what, margin
+
+
+@kernel(inline=True)
+def convex_beyond(parts, box, d, hessian, sway, rho):
+    """For how long F is convex just beyond a box over which it is, by its Hessian; infinite without joints.
+
+    Where the curvature jumps at a border of the box a minimum may be born and run into it, if F is not convex beyond.
+    """
+    part_f, part_g = centerline_part_at(parts.pool, parts.f), centerline_part_at(parts.pool, parts.g)
+    slack = 0.5 * (box.to_f - box.from_f) + 0.5 * (box.to_g - box.from_g)
+    ss_low, bend_f = beyond_joints(part_f, box.from_f, box.to_f, d, -1.0, slack, hessian.ss_low, part_f.bend)
+    d_g = matvec_t(parts.pose.rotation, d)
+    tt_low, bend_g = beyond_joints(part_g, box.from_g, box.to_g, d_g, 1.0, slack, hessian.tt_low, part_g.bend)
+    if not (bend_f >= 0.0 or bend_g >= 0.0):
+        return math.inf
+    wider = Hessian(ss_low, hessian.ss_high, tt_low, hessian.tt_high, hessian.st_low, hessian.st_high)
+    bend_f, bend_g = max(bend_f, part_f.bend), max(bend_g, part_g.bend)
+    over, least_margin = shape_of(wider, sway * bend_f, sway * bend_g, rho, False, True)
+    return least_margin if over == CONVEX else 0.0

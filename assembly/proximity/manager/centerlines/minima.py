@@ -1,8 +1,8 @@
-"""Minima of the distance of two spines: of a box where F is convex, and of a thin one
+"""Minima of the distance of two centerlines: of a box where F is convex, and of a thin one
 (`proximity/manager/centerlines/box.py`).
 
-Where F may have two minima beside each other, one spine is followed by feet on the other one: at t(s) with F_t = 0 and
-F_tt > 0,
+Where F may have two minima beside each other, one centerline is followed by feet on the other one: at t(s) with F_t = 0
+and F_tt > 0,
 
     phi(s) = F(s, t(s)),   phi' = F_s,   phi'' = F_ss - F_st^2 / F_tt,
 
@@ -27,6 +27,8 @@ LEVEL, STILL = 1e-10, 1e-16
 NOISE = 1e-14
 # A foot is one where the last step toward it is shorter than this.
 SHORT = 1e-12
+# Two PosedParts of which one is followed: side 0 if that is f, 1 g.
+Course = namedtuple("Course", "parts side")
 # Slopes of F on both centerlines and its second derivatives: x along the followed one, y along the other one.
 Slopes = namedtuple("Slopes", "x y xx yy xy")
 # Room for the minima of a thin box: both ends, and three in each of the pieces between these and two kinks.
@@ -49,7 +51,7 @@ def is_held(slope, x, low, high, far):
 
 
 @kernel(inner=True)
-def convex_minimum(pool, o, p, pose, box, open_ends, s, t):
+def convex_minimum(parts, box, open_ends, s, t):
     """The minimum of F over a box where it is convex, from (s, t): whether it is one of the curves; s, t; whether it is
     the minimum over the box.
 
@@ -58,7 +60,7 @@ def convex_minimum(pool, o, p, pose, box, open_ends, s, t):
     """
     last = math.inf
     for _ in range(STEPS):
-        at = apart(pool, o, p, pose, s, t)
+        at = apart(parts, s, t)
         d, f, g = at.d, at.tangent_f, at.tangent_g
         a = -dot(d, f)
         b = dot(d, g)
@@ -87,7 +89,7 @@ def convex_minimum(pool, o, p, pose, box, open_ends, s, t):
         if size <= 1e-15 or (size < 1e-9 and size >= 0.5 * last):
             break
         last = size
-    at = apart(pool, o, p, pose, s, t)
+    at = apart(parts, s, t)
     d = at.d
     far = math.sqrt(dot(d, d))
     ends_f = (open_ends.start_f and s <= box.from_f, open_ends.end_f and s >= box.to_f)
@@ -98,10 +100,11 @@ def convex_minimum(pool, o, p, pose, box, open_ends, s, t):
 
 
 @kernel(inline=True)
-def slopes_of(pool, o, p, pose, side, x, y):
-    """The Slopes at x and y; on `side` 0 these are x along f and y along g, on side 1 the other way round."""
+def slopes_of(course, x, y):
+    """The Slopes at x along the followed centerline and y along the other one."""
+    side = course.side
     s, t = (x, y) if side == 0 else (y, x)
-    at = apart(pool, o, p, pose, s, t)
+    at = apart(course.parts, s, t)
     d, f, g = at.d, at.tangent_f, at.tangent_g
     along = (-dot(d, f), 1.0 - dot(d, at.curvature_f))
     across = (dot(d, g), 1.0 + dot(d, at.curvature_g))
@@ -111,12 +114,13 @@ def slopes_of(pool, o, p, pose, side, x, y):
 
 
 @kernel(inner=True)
-def projection_at(pool, o, p, pose, side, held, x, y):
-    """The foot of x on the other spine, from y, or y itself if it is `held`: phi', phi'', the foot, whether it is one.
+def projection_at(course, held, x, y):
+    """The foot of x on the other centerline, from y, or y itself if it is `held`: phi', phi'', the foot, whether it is
+    one.
 
-    There is none where F is not convex along the other spine.
+    There is none where F is not convex along the other centerline.
     """
-    at = slopes_of(pool, o, p, pose, side, x, y)
+    at = slopes_of(course, x, y)
     if held:
         return at.x, at.xx, y, True
     step = math.inf
@@ -125,7 +129,7 @@ def projection_at(pool, o, p, pose, side, held, x, y):
             return at.x, at.xx, y, False
         step = -at.y / at.yy
         y += step
-        at = slopes_of(pool, o, p, pose, side, x, y)
+        at = slopes_of(course, x, y)
         if abs(step) <= 1e-15:
             break
     found = at.yy > 0.0 and abs(step) <= SHORT
@@ -133,11 +137,11 @@ def projection_at(pool, o, p, pose, side, held, x, y):
 
 
 @kernel(inner=True)
-def held_at(pool, o, p, pose, side, own, x):
-    """Which end of the other spine's piece is nearest to x: -1 or 1; 0 if it is a point between."""
-    if slopes_of(pool, o, p, pose, side, x, own[0]).y >= 0.0:
+def held_at(course, own, x):
+    """Which end of the other centerline's piece is nearest to x: -1 or 1; 0 if it is a point between."""
+    if slopes_of(course, x, own[0]).y >= 0.0:
         return -1
-    return 1 if slopes_of(pool, o, p, pose, side, x, own[1]).y <= 0.0 else 0
+    return 1 if slopes_of(course, x, own[1]).y <= 0.0 else 0
 
 
 @kernel(inline=True)
@@ -147,12 +151,12 @@ def within(left, right, x):
 
 
 @kernel(inner=True)
-def kink_at(pool, o, p, pose, side, end, left, right):
-    """Where between two places the foot comes to an end of the other spine's piece: F_y = 0 there."""
-    rises = slopes_of(pool, o, p, pose, side, right, end).y > 0.0
+def kink_at(course, end, left, right):
+    """Where between two places the foot comes to an end of the other centerline's piece: F_y = 0 there."""
+    rises = slopes_of(course, right, end).y > 0.0
     x = 0.5 * (left + right)
     for _ in range(HALVINGS):
-        at = slopes_of(pool, o, p, pose, side, x, end)
+        at = slopes_of(course, x, end)
         b, xy = at.y, at.xy
         if abs(b) <= 1e-15 * abs(xy):
             break
@@ -187,11 +191,11 @@ def turns_of(width, a, b, bend_a, bend_b):
 
 
 @kernel(inner=True)
-def rise_of(pool, o, p, pose, side, held, left, right, y):
+def rise_of(course, held, left, right, y):
     """Where phi' rises through zero between two places, the foot there and whether it is one."""
     x = 0.5 * (left + right)
     for _ in range(HALVINGS):
-        slope, bend, y, _found = projection_at(pool, o, p, pose, side, held, x, y)
+        slope, bend, y, _found = projection_at(course, held, x, y)
         if abs(slope) <= 1e-15 * bend:
             break
         if slope <= 0.0:
@@ -201,19 +205,20 @@ def rise_of(pool, o, p, pose, side, held, left, right, y):
         x = within(left, right, x - slope / bend if bend > 0.0 else left)
         if right - left <= 1e-15:
             break
-    _slope, _bend, y, found = projection_at(pool, o, p, pose, side, held, x, y)
+    _slope, _bend, y, found = projection_at(course, held, x, y)
     return x, y, found
 
 
 @kernel(inner=True)
-def piece_minima(pool, o, p, pose, side, held, left, right, y, ends, places, count):
+def piece_minima(course, held, left, right, y, ends, places, count):
     """Minima of phi between two places all of whose feet are `held` at y, or are none of them, found from y on.
 
-    `ends`: whether the followed spine has a free end at either place. Returns how many `places` there are, the larger
-    slope at both ends, and whether there are feet.
+    `ends`: whether the followed centerline has a free end at either place. Returns how many `places` there are, the
+    larger slope at both ends, and whether there are feet.
     """
-    a, bend_a, y_a, found_a = projection_at(pool, o, p, pose, side, held, left, y)
-    b, bend_b, y_b, found_b = projection_at(pool, o, p, pose, side, held, right, y)
+    side = course.side
+    a, bend_a, y_a, found_a = projection_at(course, held, left, y)
+    b, bend_b, y_b, found_b = projection_at(course, held, right, y)
     certain = found_a and found_b
     width = right - left
     low, high = turns_of(width, a, b, bend_a, bend_b)
@@ -226,9 +231,9 @@ def piece_minima(pool, o, p, pose, side, held, left, right, y, ends, places, cou
         new, rises = right, b
         if part < 1.0:
             new = left + part * width
-            rises = projection_at(pool, o, p, pose, side, held, new, y)[0]
+            rises = projection_at(course, held, new, y)[0]
         if new > x and slope <= 0.0 <= rises:
-            there, projection, found = rise_of(pool, o, p, pose, side, held, x, new, y)
+            there, projection, found = rise_of(course, held, x, new, y)
             certain = certain and found
             if found:
                 places[count, side], places[count, 1 - side] = there, projection
@@ -241,19 +246,20 @@ def piece_minima(pool, o, p, pose, side, held, left, right, y, ends, places, cou
 
 
 @kernel(inner=True)
-def near_singular_minima(pool, o, p, pose, box, open_ends, places):
+def near_singular_minima(parts, box, open_ends, places):
     """Minima of phi over a thin box: s and t of each into `places`, (MINIMA, 2).
 
-    That spine is followed across which F is curved the most. Where feet come to a free end phi' has a kink. Between
-    kinks it may go through zero and back where it turns: over a thin box that is where the cubic does that has its
-    values and slopes at both ends.
+    That centerline is followed across which F is curved the most. Where feet come to a free end phi' has a kink.
+    Between kinks it may go through zero and back where it turns: over a thin box that is where the cubic does that has
+    its values and slopes at both ends.
 
     Returns
     -------
     How many there are; whether the valley is level; whether these are all for certain.
     """
-    middle = slopes_of(pool, o, p, pose, 0, 0.5 * (box.from_f + box.to_f), 0.5 * (box.from_g + box.to_g))
+    middle = slopes_of(Course(parts, 0), 0.5 * (box.from_f + box.to_f), 0.5 * (box.from_g + box.to_g))
     side = 0 if middle.yy >= middle.xx else 1
+    course = Course(parts, side)
     # The followed one first.
     own_box = box if side == 0 else Lengths(box.from_g, box.to_g, box.from_f, box.to_f)
     ends = open_ends
@@ -264,8 +270,8 @@ def near_singular_minima(pool, o, p, pose, box, open_ends, places):
     k = 0.5 * (other_right - other_left)
     # Feet may go on beyond the box along the same piece, but not beyond a free end.
     own = (other_left if ends.start_g else other_left - k, other_right if ends.end_g else other_right + k)
-    begin = held_at(pool, o, p, pose, side, own, left)
-    end = held_at(pool, o, p, pose, side, own, right)
+    begin = held_at(course, own, left)
+    end = held_at(course, own, right)
     count = 0
     steepest = 0.0
     certain = True
@@ -277,12 +283,12 @@ def near_singular_minima(pool, o, p, pose, box, open_ends, places):
         if state != end:
             # From the one end of the piece inward, or outward to the other one.
             at = own[0] if min(state, state + way) < 0 else own[1]
-            new = kink_at(pool, o, p, pose, side, at, x, right)
+            new = kink_at(course, at, x, right)
         free = (state == 0) or (ends.start_g if state < 0 else ends.end_g)
         if free:
             y = 0.5 * (own[0] + own[1]) if state == 0 else (own[0] if state < 0 else own[1])
             here = (ends.start_f and x == left, ends.end_f and state == end)
-            count, slope, found = piece_minima(pool, o, p, pose, side, state != 0, x, new, y, here, places, count)
+            count, slope, found = piece_minima(course, state != 0, x, new, y, here, places, count)
             steepest = max(steepest, slope)
             certain = certain and found
         if state == end:

@@ -1,4 +1,4 @@
-"""Parts of two spines that are near each other: by a descent of their trees, or from a list of an earlier one."""
+"""Parts of two centerlines that are near each other: by a descent of their trees, or from a list of an earlier one."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, sub
-from assembly.kinematics.motion import RelativePose
 from assembly.proximity.bvh.neighbor_list import (
     ENTRIES,
     ENTRY,
+    ListKey,
     can_be_listed,
     moved_since,
     neighbor_list_at,
@@ -21,13 +21,7 @@ from assembly.proximity.bvh.neighbor_list import (
 )
 from assembly.proximity.bvh.tree import three_of
 from assembly.proximity.manager.centerlines.box import ROUNDING, centerline_box_at, segment_distance
-from assembly.proximity.manager.wires import (
-    BALL,
-    PART,
-    ball_at,
-    centerline_at,
-    centerline_part_at,
-)
+from assembly.proximity.manager.wires import BALL, PART, ball_at, centerline_at, centerline_part_at
 
 
 @kernel(inline=True)
@@ -61,14 +55,14 @@ def whole_box(store, centerlines, i, j, boxes, b):
 
 
 @kernel(inner=True)
-def descend(store, centerlines, pose, reach, stack, out):
-    """Parts (k, 2) of two spines that may be within a reach of each other.
+def descend(posed, reach, stack, out):
+    """Parts (k, 2) of two centerlines that may be within a reach of each other.
 
     Returns how many, or -1 where there is no room; and how far all others are beyond.
     """
-    f, g = centerlines
-    line = centerline_at(store.table, f)
-    centerline = centerline_at(store.table, g)
+    store, pose = posed.store, posed.pose
+    line = centerline_at(store.table, posed.centerlines[0])
+    centerline = centerline_at(store.table, posed.centerlines[1])
     nodes_f = line.node_pool
     nodes_g = centerline.node_pool
     stack[0, 0] = 0
@@ -112,24 +106,26 @@ def descend(store, centerlines, pose, reach, stack, out):
 
 
 @kernel(inner=True)
-def parts_beyond(store, posed, reach, stack, out):
-    """How far two spines are apart at least, where no parts of them are within a reach of each other."""
-    return descend(store, posed.centerlines, posed.pose, reach, stack, out)[1]
+def parts_beyond(posed, reach, stack, out):
+    """How far two centerlines are apart at least, where no parts of them are within a reach of each other."""
+    return descend(posed, reach, stack, out)[1]
 
 
 @kernel(inner=True)
-def near_parts(store, at, p, posed, moving, reach, ring, stack, out, boxes):
-    """Boxes of parts of two spines that are within a reach of each other; how many, or -1 where there is no room.
+def near_parts(posed, at, p, moving, reach, skin, workspace):
+    """Boxes of parts of two centerlines that are within a reach of each other; how many, or -1 where there is no room.
 
-    From the list at `at`, as `patch_list.listed_pairs` has patches.
+    From the list at `at`, as `neighbor_list.listed_pairs` has patches.
     """
-    turn, shift = posed.pose.rotation, posed.pose.shift
-    centerlines = posed.centerlines
-    f, g = centerlines
-    fits = reaches(store.table, at, moved_since(store, at, p, moving), reach)
-    if fits == 0 and can_be_listed(store, moving, ring + reach):
-        count, _beyond = descend(store, centerlines, RelativePose(turn, shift), reach + ring, stack, out)
-        fits = 1 if write_list(store, at, p, moving, reach, ring, out, count) else -1
+    store, pose, centerlines = posed.store, posed.pose, posed.centerlines
+    stack, out, boxes = workspace.stack, workspace.pairs, workspace.boxes
+    parts_f = centerline_at(store.table, centerlines[0]).part_pool
+    parts_g = centerline_at(store.table, centerlines[1]).part_pool
+    key = ListKey(at, p, moving)
+    fits = reaches(store.table, at, moved_since(store, key), reach)
+    if fits == 0 and can_be_listed(store, moving, skin + reach):
+        count, _beyond = descend(posed, reach + skin, stack, out)
+        fits = 1 if write_list(store, key, reach, skin, out, count) else -1
     if fits == 1:
         many = neighbor_list_at(store.table, at).count
         for k in range(many):
@@ -137,19 +133,11 @@ def near_parts(store, at, p, posed, moving, reach, ring, stack, out, boxes):
             out[k, 0] = entry.f
             out[k, 1] = entry.g
     else:
-        many, _beyond = descend(store, centerlines, RelativePose(turn, shift), reach, stack, out)
+        many, _beyond = descend(posed, reach, stack, out)
     count = 0
     for k in range(many):
         i, j = out[k, 0], out[k, 1]
-        if (
-            parts_apart(
-                store.pool,
-                centerline_at(store.table, f).part_pool + PART * i,
-                centerline_at(store.table, g).part_pool + PART * j,
-                RelativePose(turn, shift),
-            )
-            > reach
-        ):
+        if parts_apart(store.pool, parts_f + PART * i, parts_g + PART * j, pose) > reach:
             continue
         if count == boxes.shape[0]:
             return -1

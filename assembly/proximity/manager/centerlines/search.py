@@ -1,21 +1,21 @@
-"""The search of a look (`proximity/manager/update.py`) for contacts of two round wires, by their spines.
+"""The search of an update (`proximity/manager/update.py`) for contacts of two round wires, by their centerlines.
 
-Wires touch where the distance of their spines has a minimum, less their radii. Boxes of both, lengths along a part of
-either, are halved until it is known of each how many minima it holds (`proximity/manager/centerlines/box.py`); where
-that takes boxes that are
-all but points, feet tell (`minima.py`). So no contact is missed, and it is known how far bodies may go until
-there may be others: what is excluded by a margin stays so for motions that are shorter.
+Wires touch where the distance of their centerlines has a minimum, less their radii. Boxes of both, lengths along a part
+of either, are halved until it is known of each how many minima it holds (`proximity/manager/centerlines/box.py`); where
+that takes boxes that are all but points, feet tell (`minima.py`). So no contact is missed, and it is known how far
+bodies may go until there may be others: what is excluded by a margin stays so for motions that are shorter.
 """
 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
-from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, scale, sub
+from assembly.geometry.vec import cross, dot, matvec_t, scale
 from assembly.proximity.extrema.face_face import pair_frame
 from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.centerlines.box import (
@@ -26,6 +26,7 @@ from assembly.proximity.manager.centerlines.box import (
     UNKNOWN,
     FreeEnds,
     Lengths,
+    PosedParts,
     apart,
     box_of,
     centerline_box_at,
@@ -34,14 +35,14 @@ from assembly.proximity.manager.centerlines.minima import convex_minimum, near_s
 from assembly.proximity.manager.extrema import (
     NEW,
     NOTHING,
-    SAME,
     USELESS,
-    add_extremum,
-    are_one,
+    add_surface_extremum,
     extremum_at,
-    write,
+    is_full,
+    is_known_one,
+    write_frame,
 )
-from assembly.proximity.manager.motion_bounds import MotionBall, PairSearch, no_ball
+from assembly.proximity.manager.motion_bounds import PairSearch, ball_about, no_ball
 from assembly.proximity.manager.wires import (
     PART,
     both_radii,
@@ -55,7 +56,7 @@ from assembly.proximity.manager.wires import (
 
 # Room for boxes that wait.
 BOXES = 2048
-# Where a known root is on the centerlines: part and length from its middle of either.
+# Where a known extremum is on the centerlines: part and length from its middle of either.
 KNOWN_PLACE = record_dtype("f8", part_f=1, at_f=1, part_g=1, at_g=1)
 known_place_at = record_view(KNOWN_PLACE)
 MARK = size_of(KNOWN_PLACE)
@@ -75,51 +76,66 @@ ASTRAY = 1e-9
 MEETING = 1e-12
 
 
+# Limits of a search. least: the least gap; near: how near is near; reach: how far is looked; curved_bound: how far they
+# may go at a fold; merge_radius: extrema nearer to each other are one; rho: no tangent turns by more than a motion over
+# this.
+CenterlineLimits = namedtuple("CenterlineLimits", "least near reach curved_bound merge_radius rho")
+
+
 @kernel(inline=True)
-def open_ends(store, f, g, box):
-    """At which free ends of two spines a box is: f's start and end, g's start and end."""
-    line = centerline_at(store.table, f)
-    centerline = centerline_at(store.table, g)
+def line_of(posed, side):
+    """The record of one centerline."""
+    return centerline_at(posed.store.table, posed.centerlines[side])
+
+
+@kernel(inline=True)
+def open_ends(posed, box):
+    """The free ends of two centerlines at which a box is."""
+    line, centerline = line_of(posed, 0), line_of(posed, 1)
+    parts = parts_of(posed, box.part_f, box.part_g)
     free_f = line.closed == 0
     free_g = centerline.closed == 0
-    i = np.int64(box.part_f)
-    j = np.int64(box.part_g)
-    half_f = centerline_part_at(store.pool, line.part_pool + PART * i).half
-    half_g = centerline_part_at(store.pool, centerline.part_pool + PART * j).half
+    half_f = centerline_part_at(parts.pool, parts.f).half
+    half_g = centerline_part_at(parts.pool, parts.g).half
     return FreeEnds(
-        start_f=free_f and i == 0 and box.from_f <= -half_f,
-        end_f=free_f and i == line.parts - 1 and box.to_f >= half_f,
-        start_g=free_g and j == 0 and box.from_g <= -half_g,
-        end_g=free_g and j == centerline.parts - 1 and box.to_g >= half_g,
+        start_f=free_f and box.part_f == 0 and box.from_f <= -half_f,
+        end_f=free_f and box.part_f == line.parts - 1 and box.to_f >= half_f,
+        start_g=free_g and box.part_g == 0 and box.from_g <= -half_g,
+        end_g=free_g and box.part_g == centerline.parts - 1 and box.to_g >= half_g,
     )
 
 
+@kernel(inline=True)
+def parts_of(posed, i, j):
+    """Part i of the centerline of f, and j of that of g."""
+    f = line_of(posed, 0).part_pool + PART * np.int64(i)
+    g = line_of(posed, 1).part_pool + PART * np.int64(j)
+    return PosedParts(posed.store.pool, f, g, posed.pose)
+
+
 @kernel(inner=True)
-def mark_known(store, posed, extrema, count, marks):
-    """Where on the spines known roots are that are at a minimum: part and length of either; NaN for others."""
-    surfaces = posed.surfaces
-    f, g = posed.centerlines
-    for k in range(count):
-        x = pair_parameters(extremum_at(extrema, k))
-        i, s = centerline_place(store, f, surfaces[0], x[0], x[1])
-        j, t = centerline_place(store, g, surfaces[1], x[2], x[3])
+def mark_known(posed, extrema, marks):
+    """Where on the centerlines known extrema are that are at a minimum: part and length of either; NaN for others."""
+    store, surfaces = posed.store, posed.surfaces
+    for k in range(extrema.count[0]):
+        extremum = extremum_at(extrema.rows, k)
+        x = pair_parameters(extremum)
+        i, s = centerline_place(store, posed.centerlines[0], surfaces[0], x[0], x[1])
+        j, t = centerline_place(store, posed.centerlines[1], surfaces[1], x[2], x[3])
         mark = known_place_at(marks, k)
         mark.part_f, mark.at_f = float(i), s
         mark.part_g, mark.at_g = float(j), t
-        o = centerline_at(store.table, f).part_pool + PART * i
-        p = centerline_at(store.table, g).part_pool + PART * j
-        there = apart(store.pool, o, p, posed.pose, s, t)
+        there = apart(parts_of(posed, i, j), s, t)
         d = there.d
-        if extremum_at(extrema, k).origin == USELESS or not abs(dot(d, there.tangent_f)) + abs(
-            dot(d, there.tangent_g)
-        ) <= AT_EXTREMUM * math.sqrt(dot(d, d)):
-            # Of far sides, at a half ball, or on its way to a root: what is there is looked for.
+        slopes = abs(dot(d, there.tangent_f)) + abs(dot(d, there.tangent_g))
+        if extremum.origin == USELESS or not slopes <= AT_EXTREMUM * math.sqrt(dot(d, d)):
+            # Of far sides, at a half ball, or on its way to an extremum: what is there is looked for.
             mark.part_f = math.nan
 
 
 @kernel(inner=True)
 def is_marked(boxes, b, marks, count):
-    """Whether a known root is in box b."""
+    """Whether a known extremum is in box b."""
     box = centerline_box_at(boxes, b)
     for k in range(count):
         mark = known_place_at(marks, k)
@@ -135,7 +151,7 @@ def is_marked(boxes, b, marks, count):
 
 @kernel(inline=True)
 def across_both(f, g):
-    """A unit vector across two tangents: of spines that cross any is as good."""
+    """A unit vector across two tangents: of centerlines that cross any is as good."""
     n = cross(f, g)
     length = math.sqrt(dot(n, n))
     if length < MEETING:
@@ -146,43 +162,40 @@ def across_both(f, g):
 
 
 @kernel(inner=True)
-def add_minimum(store, posed, i, j, s, t, merge_radius, extrema, count, work):
-    """Add the contact at lengths s and t along parts i and j, if it is none of the known ones. Returns how many."""
-    if count == extrema.shape[0]:
-        return count
+def add_minimum(posed, i, j, s, t, merge_radius, extrema):
+    """Add the contact at lengths s and t along parts i and j, if it is none of the known ones."""
+    if is_full(extrema):
+        return
+    store, surfaces = posed.store, posed.surfaces
     f, g = posed.centerlines
-    o = centerline_at(store.table, f).part_pool + PART * i
-    p = centerline_at(store.table, g).part_pool + PART * j
-    there = apart(store.pool, o, p, posed.pose, s, t)
+    there = apart(parts_of(posed, i, j), s, t)
     d = there.d
     length = math.sqrt(dot(d, d))
     way = scale(1.0 / length, d) if length >= MEETING else across_both(there.tangent_f, there.tangent_g)
-    u_f, v_f = wire_parameters(store, f, posed.surfaces[0], i, s, way)
-    u_g, v_g = wire_parameters(store, g, posed.surfaces[1], j, t, matvec_t(posed.pose.rotation, scale(-1.0, way)))
+    u_f, v_f = wire_parameters(store, f, surfaces[0], i, s, way)
+    u_g, v_g = wire_parameters(store, g, surfaces[1], j, t, matvec_t(posed.pose.rotation, scale(-1.0, way)))
     start = (u_f, v_f, u_g, v_g)
     gap = length - both_radii(store, posed.centerlines)
-    before = count
-    extremum = extremum_at(extrema, before)
-    count, found = add_extremum(store, posed, (0, 0), start, (0.0, 0.0, 0.0), merge_radius, extrema, count, work, 0.0)
+    before = extrema.count[0]
+    extremum = extremum_at(extrema.rows, before)
+    found = add_surface_extremum(posed, start, merge_radius, extrema)
     if found == NOTHING or not abs(extremum.gap - gap) <= ASTRAY:
         # At a fold Newton's method may find nothing, or go elsewhere: the minimum is known without it.
-        frame = pair_frame(store, posed.surfaces[0], posed.surfaces[1], posed.pose, start)
+        extrema.count[0] = before
+        frame = pair_frame(store, surfaces[0], surfaces[1], posed.pose, start)
         if not frame.regular:
-            return before
-        write(extrema, before, start, 0, 0, frame.normal, frame.gap, frame.point_f, frame.point_g, 0.0)
-        for k in range(before):
-            radius = min(merge_radius, SAME) if extremum_at(extrema, k).origin == USELESS else merge_radius
-            if are_one(store, posed, extrema, before, k, radius):
-                return before
-        count = before + 1
-    if count > before:
+            return
+        write_frame(extremum, start, frame, 0.0)
+        if is_known_one(posed, extrema, merge_radius):
+            return
+        extrema.count[0] = before + 1
+    if extrema.count[0] > before:
         extremum.origin = NEW
-    return count
 
 
 @kernel(inline=True)
 def around_box(pool, o, box, side, lo, hi):
-    """A box (lo, hi) made larger so that the part of one spine in a box of both is in it."""
+    """A box (lo, hi) made larger so that the part of one centerline in a box of both is in it."""
     begin, end = (box.from_f, box.to_f) if side == 0 else (box.from_g, box.to_g)
     half = 0.5 * (end - begin)
     middle = centerline_point(pool, o, begin + half)[0]
@@ -205,55 +218,48 @@ def halves(boxes, b):
 
 
 @kernel(inner=True)
-def add_minima(store, posed, box, ends, what, merge_radius, places, extrema, count, work):
-    """Add the minima that a box has. Returns how many roots there are, and whether these are all for certain."""
-    f, g = posed.centerlines
+def add_minima(posed, box, ends, what, merge_radius, places, extrema):
+    """Add the minima that a box has. Returns whether these are all for certain."""
     i = np.int64(box.part_f)
     j = np.int64(box.part_g)
-    o = centerline_at(store.table, f).part_pool + PART * i
-    p = centerline_at(store.table, g).part_pool + PART * j
+    parts = parts_of(posed, i, j)
     part = Lengths(box.from_f, box.to_f, box.from_g, box.to_g)
     certain = True
     settled = False
     if what == CONVEX:
         s, t = 0.5 * (box.from_f + box.to_f), 0.5 * (box.from_g + box.to_g)
-        found, s, t, settled = convex_minimum(store.pool, o, p, posed.pose, part, ends, s, t)
+        found, s, t, settled = convex_minimum(parts, part, ends, s, t)
         if found:
-            count = add_minimum(store, posed, i, j, s, t, merge_radius, extrema, count, work)
+            add_minimum(posed, i, j, s, t, merge_radius, extrema)
     if not settled:
-        many, level, certain = near_singular_minima(store.pool, o, p, posed.pose, part, ends, places)
+        many, level, certain = near_singular_minima(parts, part, ends, places)
         if level:
             # All along it is as good: points here and there stand for it.
-            merge_radius = max(
-                merge_radius,
-                SPARSE / max(centerline_part_at(store.pool, o).bend, centerline_part_at(store.pool, p).bend),
-            )
+            bend = max(centerline_part_at(parts.pool, parts.f).bend, centerline_part_at(parts.pool, parts.g).bend)
+            merge_radius = max(merge_radius, SPARSE / bend)
         for m in range(many):
-            count = add_minimum(store, posed, i, j, places[m, 0], places[m, 1], merge_radius, extrema, count, work)
-    return count, certain
+            add_minimum(posed, i, j, places[m, 0], places[m, 1], merge_radius, extrema)
+    return certain
 
 
 @kernel(inner=True)
-def search_centerlines(store, posed, moving, rho, lengths, merge_radius, boxes, waiting, rooms, extrema, count, work):
-    """Look for all contacts of two wires with gaps up to `near`; known ones are the first `count` roots.
+def search_centerlines(posed, moving, limits, boxes, waiting, rooms, extrema):
+    """Look for all contacts of two wires with gaps up to `near`, of CenterlineLimits; known ones are in the list.
 
-    The `lengths` are the least gap asked for, how near is near, the reach, and the flank: how far bodies may go at a
-    fold. `moving` is the body that moves. There are `waiting` boxes; within the reach nothing is outside of them. The
-    `rooms` are for marks of known roots, and for the minima of a box.
+    `moving` is the body that moves. There are `waiting` boxes; within the reach nothing is outside of them. The `rooms`
+    are for marks of known extrema, and for the minima of a box.
 
     Returns a PairSearch.
     """
-    least, near, reach, flank = lengths
-    f, g = posed.centerlines
-    line = centerline_at(store.table, f)
-    centerline = centerline_at(store.table, g)
-    side = moving.side
-    radii = both_radii(store, posed.centerlines) + least
-    sharpest = max(wire_at(store.pool, line.numbers).sharpest, wire_at(store.pool, centerline.numbers).sharpest)
-    known = count
+    pool = posed.store.pool
+    near, reach, curved_bound = limits.near, limits.reach, limits.curved_bound
+    line, centerline = line_of(posed, 0), line_of(posed, 1)
+    radii = both_radii(posed.store, posed.centerlines) + limits.least
+    sharpest = max(wire_at(pool, line.numbers).sharpest, wire_at(pool, centerline.numbers).sharpest)
+    known = extrema.count[0]
     marks, places = rooms
-    mark_known(store, posed, extrema, known, marks)
-    free = reach
+    mark_known(posed, extrema, marks)
+    rest = reach
     fertile = math.inf
     sure = math.inf
     refined = 0
@@ -262,11 +268,10 @@ def search_centerlines(store, posed, moving, rho, lengths, merge_radius, boxes, 
     while waiting > 0:
         b = waiting - 1
         box = centerline_box_at(boxes, b)
-        o = line.part_pool + PART * np.int64(box.part_f)
-        p = centerline.part_pool + PART * np.int64(box.part_g)
+        parts = parts_of(posed, box.part_f, box.part_g)
+        ends = open_ends(posed, box)
         part = Lengths(box.from_f, box.to_f, box.from_g, box.to_g)
-        ends = open_ends(store, f, g, box)
-        low, what, margin = box_of(store.pool, o, p, posed.pose, part, ends, radii + reach, rho)
+        low, what, margin = box_of(parts, part, ends, radii + reach, limits.rho)
         low -= radii
         # A minimum that a box may hold, and nobody looks for, is as near as the box.
         hollow = what == EMPTY or what == BARREN
@@ -276,7 +281,7 @@ def search_centerlines(store, posed, moving, rho, lengths, merge_radius, boxes, 
             continue
         bend = 0.5 * max(box.to_f - box.from_f, box.to_g - box.from_g) * sharpest
         halve = what == UNKNOWN and low <= near and bend > THIN
-        if not halve and allowed < flank and refined < REFINED and bend > FINE:
+        if not halve and allowed < curved_bound and refined < REFINED and bend > FINE:
             halve = True
             refined += 1
         if halve and waiting < boxes.shape[0]:
@@ -284,24 +289,19 @@ def search_centerlines(store, posed, moving, rho, lengths, merge_radius, boxes, 
             waiting += 1
             continue
         if low <= near and not hollow and not (what == CONVEX and is_marked(boxes, b, marks, known)):
-            count, certain = add_minima(store, posed, box, ends, what, merge_radius, places, extrema, count, work)
-            if halve or count == extrema.shape[0] or not certain:
+            certain = add_minima(posed, box, ends, what, limits.merge_radius, places, extrema)
+            if halve or is_full(extrema) or not certain:
                 # There may be one that is not known.
                 allowed = low
         waiting = b
-        if allowed >= MUCH * reach and allowed >= flank:
-            free = min(free, allowed)
+        if allowed >= MUCH * reach and allowed >= curved_bound:
+            rest = min(rest, allowed)
             continue
-        if allowed < flank:
+        if allowed < curved_bound:
             # A contact may be born beside one that is near: so far it is excluded.
             sure = min(sure, allowed)
-            allowed = flank
+            allowed = curved_bound
         fertile = min(fertile, allowed)
-        lo, hi = around_box(store.pool, p if side == 1 else o, box, side, lo, hi)
-    if not fertile < math.inf:
-        return PairSearch(count, free, fertile, no_ball(), sure)
-    d = sub(hi, lo)
-    center = scale(0.5, add(lo, hi))
-    radius = max(0.5 * math.sqrt(dot(d, d)), rho)
-    ball = MotionBall(center=center, place=add(matvec(moving.turn, center), moving.shift), radius=radius)
-    return PairSearch(count, free, fertile, ball, sure)
+        lo, hi = around_box(pool, parts.g if moving.side == 1 else parts.f, box, moving.side, lo, hi)
+    ball = ball_about(moving, lo, hi, limits.rho) if fertile < math.inf else no_ball()
+    return PairSearch(rest, fertile, ball, sure)

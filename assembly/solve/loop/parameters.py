@@ -1,0 +1,167 @@
+"""The numbers that tune the loop of a solve, in one place.
+
+Of each: its unit in brackets (none: a pure number), what it does, what happens if it is doubled, where it came from.
+Lengths are parts of the scene's size, as all that the loop works with; multipliers and dual residuals are forces of an
+objective of order one. "Chosen" is what follows from nothing: no record tells of other values that were tried. All are
+constants of the compiled code, no settings of a user (those are in `settings.py`).
+"""
+
+from __future__ import annotations
+
+# What rounding is. ---------------------------------------------------------------------------------------------------
+# Rounding of poses far from the origin, in parts of that. Doubled: far scenes are held to half as many digits.
+# From: about two roundings of a double, 2.2e-16 each.
+ROUNDING = 4e-16
+# [length] More than this is no rounding that a solution may have. Doubled: a scene 2.5e9 sizes from the origin may be
+# off twice as much. Chosen.
+MOST_ROUNDING = 1e-6
+# A step of so many roundings of a coordinate at most is no move. Doubled: slopes are laid to rounding sooner. Chosen.
+STEPS_OF_ROUNDING = 8.0
+# [steps] After so many whole steps in a row that gain nothing of the slope, rounding may explain what is left of it.
+# Doubled: such solves take 20 steps more. Chosen.
+STANDS = 20
+# What a step must gain of violations that rounding of far coordinates may explain, or of a dual residual: the part that
+# may be left. Doubled every step gains: solves go on until steps lead away. Chosen.
+GAIN = 0.5
+
+# Contacts. -----------------------------------------------------------------------------------------------------------
+# [det H over |H|^2] A pair this near to a fold gets its coordinates as unknowns. Doubled: more unknowns, steps of more
+# contacts have rows of tangency. Chosen.
+FREE_BELOW = 0.02
+# [length] A clearance's contact that no longer step, nor one halved so far (a share of the step), finds again is given
+# up. Doubled, or HALVED halved: contacts that only switch are given up, or are waited for longer. Chosen.
+LETS_GO, HALVED = 1e-5, 0.0625
+
+# The step. -----------------------------------------------------------------------------------------------------------
+# The least shift of the Hessian. Doubled: the last steps leave twice as much. From: about the root of a double's
+# rounding.
+LEAST_SHIFT = 1e-8
+# Where rows alone count: the shift in parts of the largest violation, down to rounding. Doubled: more steps to where
+# rows depend on each other; halved: longer ones, that overshoot. Chosen; rounding of a matrix of order one.
+SHIFT, TINIEST_SHIFT = 1e-2, 1e-13
+# [length] Rows are close to holding where they are off by less: there the shift above counts, and rows that depend on
+# each other gain nothing any more. Doubled: the shift falls sooner. From: `LEAST_SHIFT` over `SHIFT`.
+CLOSE = 1e-6
+# [rounds] A step is computed so often for one-sided rows that it would break. Where they change places for ever, it is
+# the one without them: half of an exchange may lead uphill. Doubled: a little time where rows change places.
+# From: random rows, of which some take more than four rounds and a few in a hundred never agree.
+FORESEEN = 12
+# [steps] Where so many in a row that hold are cut by half and more, the next ones are damped until one is not: most of
+# these may go where nothing holds, as a ring turns about its own axis. Doubled: twice as many short steps. Chosen.
+OFTEN = 25
+# [radian] A body turns by this much at most in a step. Doubled: predictions of angles and contacts lead astray.
+# From: half a turn, within which an angle is known again, with room to spare.
+TURN = 1.0
+# So often a step is shortened by a larger shift. Doubled: more factorizations a step. Chosen.
+SHORTENINGS = 4
+# [trials] Of a refused step: up to TO_ROWS are bent to where rows hold, then the straight one is tried anew, and up to
+# BENT it is bent to what its linear model leaves of the rows; every third trial is straight. Doubled: time where rows
+# bend, and more scenes end elsewhere. From: starts at exact saddles, of which half as many fail.
+TO_ROWS, BENT = 2, 5
+# [length] A step shorter than this decides nothing: the radius falls no farther, the search ends a billion times below.
+# Doubled: the same. Chosen.
+SHORTEST = 1e-6
+# Where violations are stationary, this much curvature downward makes a saddle of it; a move of this size leads off it
+# (KICK: length, radian). Doubled: weaker saddles are left alone; the move is longer. Chosen.
+SADDLE, KICK = 1e-5, 1e-3
+# So often at most a solve leaves a saddle of its violations. Doubled: later verdicts INFEASIBLE. Chosen.
+KICKS = 3
+
+# Multipliers. --------------------------------------------------------------------------------------------------------
+# [force] Multipliers below this count for nothing against the objective's curvature, which is of order one. Doubled:
+# small forces bend nothing, and their contacts converge slowly, as in `benchmarks/first_order.py`. Chosen.
+WEAK = 1e-3
+# Multipliers this many times stronger than the objective's slope are looked at once more. Doubled: stronger ones are
+# reported of rows that depend on each other. Chosen.
+EXCESS = 10.0
+# [length] One-sided rows that hold by less than this may push. Doubled: more rows to choose from. From: `TOUCHING`.
+NEAR = 1e-9
+# [rounds] One-sided rows are exchanged so often for those that would pull; after BLOCKED rounds that gain nothing one
+# at a time. Doubled: time where rows depend on each other. From: block pivoting, Portugal, Judice and Vicente (1994).
+EXCHANGES, BLOCKED = 40, 3
+# [force] A row is wanted that would take more than this off the objective's slope. Doubled: the same. From: rounding.
+WANTED = 1e-12
+# [rounds] Least squares of multipliers are refined so often. Doubled: time. From: each takes a factor of 1e-10 off.
+ROUNDS = 3
+
+# Back onto the rows. -------------------------------------------------------------------------------------------------
+# [rounds] A step back is computed again so often for one-sided rows that would hold without it; a row pulls that ends
+# above PULLS times what it is off. Doubled: time where many rows repeat each other. Chosen; rounding.
+RELEASES, PULLS = 4, 1e-12
+# The weight of the step's square is one, and SOFTER times that, down to SOFTEST, where it would leave more than
+# LEFT_OVER of the violations, as rows do that all but depend on each other. Doubled: shorter steps that leave more.
+# Chosen.
+LEFT_OVER, SOFTER, SOFTEST = 0.1, 1e-3, 1e-9
+# A step back is shortened by the first where it leads farther off; a tick's may lead off by ASTRAY times once, if the
+# next one leads back; below LEAST_SHARE of a step nothing is found. Doubled: slower, and sooner given up. Chosen.
+SHORTENED, ASTRAY, LEAST_SHARE = 0.25, 10.0, 1e-4
+# [steps] Where a solve with clearances ends at a pose that does not hold, so many more lead back onto the rows.
+# Doubled: failed solves take longer. Chosen.
+SETTLING = 30
+
+# Whether rows can hold at all. ---------------------------------------------------------------------------------------
+# [steps] Every so many the largest violation must have halved, or rows alone are restored to see whether they can
+# hold; so many times. Doubled: contradictions are told after twice as many steps. Chosen.
+PATIENCE, RESTORATIONS = 25, 3
+# [whole steps] So many in a row that leave more than STILL of the largest violation tell that rows contradict each
+# other; one may be by an old factor. Doubled: as many steps more. Chosen.
+STUCK, STILL = 2.0, 0.99
+# [length] Rows that are off by at most LITTLE may repeat each other, tilted by MOST_TILTED [radian]; ROUNDED is
+# rounding, in parts of what counts as held. Doubled: larger contradictions pass for tilted rows. Chosen.
+LITTLE, MOST_TILTED, ROUNDED = 1e-2, 1e-3, 0.01
+# [length, radian] How far bodies may be expected to move to mend what rows are off. Doubled: rows tilted by half as
+# much are taken for contradictions. Chosen.
+NEIGHBORHOOD = 0.02
+# What is off by so many times what counts as held is not so by rounding. Doubled: fewer verdicts INFEASIBLE. Chosen.
+MUCH = 2.0
+# [steps] So many in a row, however long, that leave as much begin to restore, in steps no longer than a neighborhood;
+# so many of these tell that it is mended far away, if at all. Doubled: as many steps more. Chosen.
+DRAGGED, SETTLED = 4.0, 2.0
+# Where SLOW whole steps in a row do not halve the violation, the floor of the penalty gives way, down to HARDEST:
+# rounding, times its inverse, must stay small against the objective's curvature. Doubled: rows of vanishing slopes
+# (a dead center) hold later. From: a double's digits, 2e-16 / 1e-10.
+SLOW, HARDEST = 3.0, 1e-10
+
+# Clearances. ---------------------------------------------------------------------------------------------------------
+# Bodies are too deep in each other beyond this part of how far they may go in one step, half the least radius of
+# theirs. Doubled: deeper than half of what bends most there is no telling on which side they were. From: that.
+DEEP = 1.0
+# How much shorter steps are after one that led too deep; as often as another pose is clear they may be LONGER times as
+# long. Doubled: more returns. Chosen.
+SHORTER, LONGER = 0.25, 2.0
+# [times, steps] So often at most a solve that gets no further begins again, while so many of its steps are left.
+# Doubled: longer failures. Chosen.
+BEGINNINGS, LEFT = 3, 20
+
+# The end. ------------------------------------------------------------------------------------------------------------
+# A saddle is left from where the dual residual [force] and the violation [length] are no more. Doubled: the same, some
+# steps sooner. Chosen.
+NEAR_SADDLE, OFF_SADDLE = 1e-3, 1e-6
+# A factorization tells of the end with a shift up to SMALL_SHIFT where the dual residual was at most NEAR_END. Doubled:
+# flatter minima, and factors farther from the end, count. From: ten times `LEAST_SHIFT`; chosen.
+SMALL_SHIFT, NEAR_END = 1e-7, 1e-3
+# One that needed more than this near an end tells of negative curvature. Doubled: weaker saddles are told later.
+# Chosen.
+CLEAR_SHIFT = 1e-3
+# [force] A one-sided row with a multiplier below this does not push. Nor do multipliers bend anything that are all
+# below it. Doubled: more rows count as touching. Chosen.
+IDLE = 1e-7
+# [steps] Where nothing is asked for but that constraints hold: so many may follow one at which bodies touch. Doubled:
+# a least move at a kink ends later. Chosen.
+LINGERS = 40
+# Where a solve may stray, and its bodies are FAR times farther out, or sizes, after STRAYING steps, it is looked at
+# whether that goes on. Doubled: unbounded scenes are told later. Chosen.
+FAR, STRAYING = 1e3, 60
+
+# Time. ---------------------------------------------------------------------------------------------------------------
+# A tick that does not hold after its iterations has so many times more of them. Doubled: later ticks. Chosen.
+EXTRA_TIME = 4
+# No look begins, and no step from a pose that holds, where this part of a budget is spent: either may take as long as
+# the rest of it. Doubled: ticks overrun their budgets. From: that.
+HALF = 0.5
+# [looks a pair] A tick may end with a look until there were so many of every pair; then a step has to come first.
+# Doubled: ticks of crowded scenes stand twice as long. Chosen.
+LOOKS_ALONE = 4
+# [steps] Short solves have no more: they never look at the clock, but in a large scene, of more [pairs of bodies] to
+# look at than MANY_PAIRS, where a step takes long. Doubled: an interruption waits longer. Chosen.
+SHORT, MANY_PAIRS = 4, 256

@@ -1,0 +1,124 @@
+"""The third phase of a step: whether the solve has arrived, or its time is over; what holds is kept."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.constraints.program.contact import TOUCHING
+from assembly.constraints.program.records import header_at
+from assembly.proximity.manager.update import EVERYTHING, any_crossed
+from assembly.solve.loop.arrival import has_arrived, is_rounding, reach_of
+from assembly.solve.loop.clearances import numbers_of, update_again
+from assembly.solve.loop.deadline import is_spent
+from assembly.solve.loop.loop_state import lead_back
+from assembly.solve.loop.multipliers import least_multipliers
+from assembly.solve.loop.parameters import GAIN, HALF, LINGERS, LONGER, SHORT, STANDS, STRAYING
+from assembly.solve.loop.report import is_clear, keep
+from assembly.solve.loop.rollback import has_sunk, retreat, retreats
+from assembly.solve.loop.settings import ITERATION_LIMIT, OUT_OF_TIME, RUNNING, SOLVED, STALLED
+
+
+@kernel(inline=True)
+def terminate(task, held, current, rows, system):
+    """Whether the step goes on from this iterate; else the loop ends, or begins its next step elsewhere."""
+    loop, program = task.loop, task.program
+    loop.sunk = task.watched and not task.tick and has_sunk(program.store, program.lifted.memory, current.residual)
+    if loop.sunk and loop.iteration == loop.back_at:
+        # Bodies were in each other there too, and nothing had asked: that is no place to return to.
+        loop.holds, loop.leash = 0, math.inf
+    goes_back = retreats(task)
+    arrived = is_solution(task, current, rows, system)
+    looks_last = task.watched and task.limits.last_look == 1.0
+    # Where every last look finds other contacts, the limit ends it.
+    if arrived and not goes_back and not (looks_last and loop.iteration > loop.limit):
+        arrive(task, looks_last, current, rows, system)
+        return False
+    keep_what_holds(task, held, current, rows)
+    if is_over(task, current):
+        return False
+    if goes_back:
+        retreat(task, held, current, rows)
+        return False
+    return True
+
+
+@kernel(inline=True)
+def is_solution(task, current, rows, system):
+    """Whether the iterate holds and its dual residual is none, or rounding."""
+    loop, limits = task.loop, task.limits
+    # What whole steps gain nothing of, several in a row, may be rounding.
+    most = max(GAIN * loop.last_dual, limits.stationarity)
+    stands = loop.alpha * loop.cut == 1.0 and loop.dual > most and loop.violation <= loop.feasible
+    loop.stood = loop.stood + 1 if stands else 0
+    rounded = loop.stood >= STANDS and is_rounding(task.program, current, rows, system, loop.longest, loop.dual)
+    dual = 0.0 if rounded else loop.dual
+    before = loop.last_violation
+    return has_arrived(task.program, task.settings, task.results, current, loop.violation, before, loop.feasible, dual)
+
+
+@kernel(inline=True)
+def arrive(task, looks_last, current, rows, system):
+    """End at a solution, unless a last look at all that is near finds other contacts."""
+    loop, program = task.loop, task.program
+    # A contact that ends right here is lost and found again, however often it is looked for.
+    if looks_last and loop.iteration != loop.looked_at:
+        loop.changed = update_again(program.store, program.lifted, current, EVERYTHING)
+        if loop.changed:
+            loop.iteration += 1
+            loop.looked_at = loop.iteration
+            return
+    table = program.store.table
+    # Deeper than looks reach no row tells of a crossing.
+    crosses = looks_last and any_crossed(table, header_at(table, 0).watch, program.lifted.memory)
+    loop.status = STALLED if crosses else SOLVED
+    loop.over = 1
+    if not crosses:
+        loop.dual = least_multipliers(program.structure, current, rows, system, loop.dual)
+
+
+@kernel(inline=True)
+def keep_what_holds(task, held, current, rows):
+    """Keep what holds, of a tick or where nothing else is asked for; with clearances, what does not cross."""
+    loop = task.loop
+    table = task.program.store.table
+    clear = task.watched and not task.tick and not loop.sunk and is_clear(table, current.residual)
+    lasts = not task.watched and (task.any_pose or loop.first or loop.iteration >= SHORT)
+    if clear or (loop.violation <= loop.feasible and (task.tick or lasts)):
+        loop.holds = 1
+        loop.leash *= LONGER if loop.iteration != loop.back_at else 1.0
+        keep(current, rows, held)
+        if task.watched:
+            numbers_of(table, held.numbers)
+
+
+@kernel(inline=True)
+def is_over(task, current):
+    """Whether the steps or the time are over, or bodies go away. Some ends only lead back onto the rows from here."""
+    loop, limits = task.loop, task.limits
+    store = task.program.store
+    feasible = loop.violation <= loop.feasible
+    if loop.iteration == STRAYING and limits.strays == 1.0 and not reach_of(store, current.q) <= loop.farthest:
+        loop.status, loop.over = ITERATION_LIMIT, 1
+        return True
+    if loop.iteration >= loop.limit and (not task.tick or feasible or loop.iteration >= loop.longest_tick):
+        if task.watched and not task.tick and loop.ended == RUNNING:
+            lead_back(loop, ITERATION_LIMIT)
+        if loop.ended == RUNNING:
+            loop.status, loop.over = ITERATION_LIMIT, 1
+            return True
+    # A least move may be at a kink, where steps go to and fro.
+    touches = loop.lingers > 0 or loop.violation <= TOUCHING
+    loop.lingers += 1 if task.any_pose and not (loop.restoring and not task.watched) and touches else 0
+    if task.settles and loop.ended == RUNNING and loop.lingers > LINGERS:
+        lead_back(loop, STALLED)
+    if loop.ended != RUNNING and (feasible or loop.iteration >= loop.settled_by):
+        loop.status = loop.ended
+        return True
+    # What holds is not left for what there is hardly time to end, and ends what an earlier call began.
+    part = 1.0 if not feasible else (0.0 if loop.done > 0 else HALF)
+    begins = loop.iteration + loop.done > 0 and (loop.iteration > 0 or part < 1.0)
+    if begins and is_spent(store.table, task.settings, loop.begin, part):
+        loop.status, loop.over = OUT_OF_TIME, 1
+        return True
+    return False
