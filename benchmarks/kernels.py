@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes
 from assembly._record import Store
@@ -112,7 +114,9 @@ def all_derivatives(table, pool, records, q, parameters, size, times, out, hessi
     for i in range(records.shape[0]):
         x = (parameters[i, 0], parameters[i, 1], parameters[i, 2], parameters[i, 3])
         for _ in range(times):
-            features = (FACE, records[i, 0]), (FACE, records[i, 1])
+            # A constant has a type of its own, for which the entry would be compiled again.
+            face = np.int64(FACE)
+            features = (face, records[i, 0]), (face, records[i, 1])
             error, _regular = feature_derivatives((table, pool), features, q[i], x, (0.0, 0.0, 0.0), size, out, hessian)
             total += error + hessian[11, 0]
     return total

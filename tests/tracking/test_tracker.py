@@ -244,12 +244,12 @@ def test_the_sign_of_quaternions_does_not_matter():
 
 def test_the_unit_of_length_does_not_matter():
     one, other = ball_on_ball(), ball_on_ball(unit=1e-3)
-    for target in circling(np.array([0.0, 0.0, 2.2]), 0.3, 200):
+    # Without the last target, above a pole of the ball: there roundings of the way decide what stationarity leaves.
+    for target in circling(np.array([0.0, 0.0, 2.2]), 0.3, 200)[:-1]:
         mm, m = one.step(target), other.step(1e-3 * target)
         assert mm.status is m.status
-        # Roundings of the coordinates of the same pose. The last target is above a pole of the ball: what stationarity
-        # asks for leaves 3e-9 there, which roundings of the way turn anywhere.
-        assert np.abs(mm.q[1, :3] - 1e3 * m.q[1, :3]).max() < 1e-8
+        # Roundings of the coordinates of the same pose, carried from tick to tick.
+        assert np.abs(mm.q[1, :3] - 1e3 * m.q[1, :3]).max() < 1e-10
 
 
 def test_the_same_hand_gives_the_same_poses_to_the_bit():
