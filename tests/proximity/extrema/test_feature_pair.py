@@ -407,6 +407,7 @@ def pairs_of_every_kind():
 STEPS = """
 import json
 import numpy as np
+from assembly._record import Store
 from assembly.kinematics.motion import relative_pose, rotation
 from assembly.proximity.extrema.feature_pair import newton_on_features
 from tests.laws.test_feature_pairs import KINDS, random_cases
@@ -415,14 +416,14 @@ rng, out = np.random.default_rng(6), []
 for kinds in KINDS[1:]:
     for case in random_cases(*kinds, 2):
         q = case.q.reshape(2, 7)
-        relative, shift = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
+        pose = relative_pose(q, 0, rotation(q, 0), 1, rotation(q, 1))
         features = (case.packed.kinds[0], case.packed.at[0], case.packed.kinds[1], case.packed.at[1])
         direction = rng.uniform(-1.0, 1.0, 4) * case.moves / case.speed
         row = []
         for off in (1e-2, 1e-3, 1e-4):
             start = tuple((case.x + off * direction).tolist())
             _status, x, _frame = newton_on_features(
-                case.packed.table, case.packed.pool, *features, relative, shift, start, tuple(case.n), 4.0, np.inf, 1
+                Store(case.packed.table, case.packed.pool), *features, pose, start, tuple(case.n), 4.0, np.inf, 1
             )
             row.append(float(np.abs((np.array(x) - case.x) * case.speed).max()))
         out.append(row)
