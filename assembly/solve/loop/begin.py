@@ -184,7 +184,7 @@ def rearrange(program, count, rows, current):
     rows = resized(rows, header.rows + 4 * count)
     n = 6 * header.moving + 4 * count
     arrange(store.table, program.lifted.free, shape, rows.count, n)
-    system = unknowns(n, shape.sparsity)
+    system = unknowns(n, count, shape.sparsity)
     return rows, system, evaluate(program, current.tracked, math.inf, current)
 
 

@@ -9,6 +9,7 @@ from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.records import header_at
 from assembly.constraints.program.row_terms import add_row_terms
 from assembly.solve.linear_algebra.factorize import factorize_shifted
+from assembly.solve.loop.ends import find_ends, hold_ends
 from assembly.solve.loop.line_search import Trust, damped_step
 from assembly.solve.loop.multipliers import curve_rows, leave_out, predict_active_set, weigh_rows
 from assembly.solve.loop.parameters import CLOSE, FORESEEN, KICK, LEAST_SHIFT, SADDLE, SHIFT, TINIEST_SHIFT
@@ -49,8 +50,10 @@ def find_direction(program, current, rows, system, trust, restoring, is_fresh):
     for r in range(rows.count):
         rows.foreseen[r] = 0.0
     if is_fresh:
+        find_ends(program, current, system.directions)
         curve_rows(rows, current.residual, restoring)
         add_row_terms(program, current, rows.forces, rows.active, lagrangian)
+        hold_ends(system)
         shift = factorize_shifted(lagrangian, n, order, shift, matrix)
         if shift < 0.0:
             return shift, shift, 0.0, 0.0
@@ -66,6 +69,7 @@ def find_direction(program, current, rows, system, trust, restoring, is_fresh):
             is_fresh = True
             curve_rows(rows, current.residual, restoring)
             add_row_terms(program, current, rows.forces, rows.active, lagrangian)
+        hold_ends(system)
         shift = factorize_shifted(lagrangian, n, order, max(shift, LEAST_SHIFT), matrix)
         used = shift
         if shift >= 0.0:

@@ -15,9 +15,10 @@ from assembly.constraints.program.objective_terms import objective
 from assembly.constraints.program.records import header_at
 from assembly.proximity.extrema.face_face import BEND
 from assembly.proximity.features.solid_contact import tracked_at
-from assembly.solve.linear_algebra.factorize import factorize_shifted, forward_step, solve_step
+from assembly.solve.linear_algebra.factorize import factorize_shifted, forward_step
 from assembly.solve.loop.clearances import ends_unseen, is_too_far
 from assembly.solve.loop.dexterity import add_dexterities
+from assembly.solve.loop.ends import solve_within
 from assembly.solve.loop.parameters import BENT, HALVED, LETS_GO, SHORTENINGS, SHORTEST, TO_ROWS, TURN
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import add_transposed, merit, move, times
@@ -44,7 +45,7 @@ def damped_step(program, system, trust):
     for attempt in range(SHORTENINGS + 1):
         for i in range(n):
             step[i] = descent[i]
-        solve_step(matrix, n, order, step)
+        solve_within(system, order, step)
         longest = 0.0
         turn = 0.0
         for i in range(n):
@@ -110,7 +111,7 @@ def bend_step(shape, current, trial, rows, system, alpha, promised):
             left = residual[r] + alpha * times(shape.bases, current.jacobian, r, system.directions.straight)
         forces[r] = -(trial.residual[r] - left) * active[r]
     add_transposed(shape.bases, current.jacobian, rows.count, forces, descent)
-    solve_step(system.factor, step.size, shape.sparsity, descent)
+    solve_within(system, shape.sparsity, descent)
     for i in range(step.size):
         step[i] += descent[i] / alpha
 

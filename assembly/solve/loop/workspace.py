@@ -35,8 +35,9 @@ Held = namedtuple("Held", "q tracked y numbers")
 Iterates = namedtuple("Iterates", "current trial held")
 # The linear system of a step: the objective's gradient, vectors, the Hessian of the Lagrangian, its Cholesky factor.
 System = namedtuple("System", "gradient directions hessian factor")
-# Of all unknowns: right side of the system, or scratch; the step; the step before its second-order correction.
-Directions = namedtuple("Directions", "descent step straight")
+# Of all unknowns: right side of the system, or scratch; the step; the step before its second-order correction. Of the
+# coordinates of lifted pairs, the last unknowns: 1 where one is held at the end of its patch (`ends.py`), else 0.
+Directions = namedtuple("Directions", "descent step straight ends")
 # All that a solve works in. `way`: what is known of a way back (`restoration.py`).
 Workspace = namedtuple("Workspace", "program iterates rows way loop system")
 
@@ -173,12 +174,13 @@ def sides_of(n, order):
 
 @kernel(inline=True, allocates=True)
 def carve_unknowns(n, order, doubles, at):
-    """The system of a step of n unknowns."""
+    """The system of a step of n unknowns, while no pair is lifted."""
     hessian, factor = sides_of(n, order)
     vectors = carve(doubles, at, (4, n))
     end = at + 4 * n + hessian[0] * hessian[1]
     matrices = carve(doubles, at + 4 * n, hessian), carve(doubles, end, factor)
-    return System(vectors[0], Directions(vectors[1], vectors[2], vectors[3]), matrices[0], matrices[1])
+    directions = Directions(vectors[1], vectors[2], vectors[3], carve(doubles, at, (0,)))
+    return System(vectors[0], directions, matrices[0], matrices[1])
 
 
 @kernel(inline=True, allocates=True)
@@ -199,8 +201,9 @@ def carve_all(store, memory, tips, doubles, integers):
 
 
 @kernel(inline=True, allocates=True)
-def unknowns(n, order):
-    """The same of its own: where pairs at folds bring more unknowns."""
+def unknowns(n, lifted, order):
+    """The same of its own: where pairs, so many, are lifted and bring more unknowns."""
     hessian, factor = sides_of(n, order)
     vectors = np.empty((4, n))
-    return System(vectors[0], Directions(vectors[1], vectors[2], vectors[3]), np.empty(hessian), np.empty(factor))
+    directions = Directions(vectors[1], vectors[2], vectors[3], np.zeros(4 * lifted))
+    return System(vectors[0], directions, np.empty(hessian), np.empty(factor))

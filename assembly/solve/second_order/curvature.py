@@ -123,7 +123,7 @@ def walk_within(store, state, step, share, kept, residual, tips, memory):
             shape.one_sided[r] = 0
     trial = new_point(store.table)
     trial.q[:] = here.q
-    system = unknowns(n, shape.sparsity)
+    system = unknowns(n, (n - 6 * header.moving) // 4, shape.sparsity)
     rows, way = new_rows(count, MU), system.directions.step
     way[:] = step
     before = math.inf
@@ -182,7 +182,7 @@ def least_within(store, state, forces, active, direction, tips, integers, double
     shape = shape_of(store.table, rows, n, record_of_blocks(store.table), integers, doubles)
     arrange(store.table, found.program.lifted.free, shape, rows, n)
     program = arranged(found, shape, tips)
-    system = unknowns(n, shape.sparsity)
+    system = unknowns(n, 0, shape.sparsity)
     gradient, lines, lagrangian, matrix = system.gradient, system.directions, system.hessian, system.factor
     goal(program, rows, point, 1, gradient, lagrangian)
     add_row_terms(program, point, forces, active, lagrangian)
