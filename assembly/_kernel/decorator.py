@@ -68,8 +68,8 @@ def kernel(
     exact
         No fused multiply-add: for code whose rounding is part of a proof.
     allocates
-        Whether an inline or inner kernel makes arrays. One that does not counts no references to those it is given,
-        which its caller holds: the atomic counts of nested calls cost more than their work.
+        Whether a kernel makes arrays. One that does not counts no references to those it is given, which its caller
+        holds: the atomic counts of nested calls cost more than their work.
 
     Notes
     -----
@@ -77,10 +77,17 @@ def kernel(
     """
     if function is None:
         return lambda f: kernel(f, signatures=signatures, inline=inline, inner=inner, exact=exact, allocates=allocates)
-    fastmath: Any = False if exact else {"contract"}
-    settings: dict[str, Any] = {"fastmath": fastmath, "error_model": "numpy", "nogil": True}
+    # All that a kernel called by another would take over from that one is set: what is compiled once, for whoever calls
+    # it first, is the same for all.
+    settings: dict[str, Any] = {
+        "fastmath": False if exact else {"contract"},
+        "error_model": "numpy",
+        "nogil": True,
+        "forceinline": inline,
+        "_nrt": allocates,
+    }
     if inline or inner:
-        announce(function, {**settings, "forceinline": inline, "_nrt": allocates})
+        announce(function, settings)
         return function
     compiled = njit(pipeline_class=EntryCompiler, **settings)(function)
     if config.DISABLE_JIT:

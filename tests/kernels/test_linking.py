@@ -139,3 +139,43 @@ own = {names.llvm_func_name, names.llvm_cpython_wrapper_name, names.llvm_cfunc_w
 print({seen[-1][name] for name in own}, {kind for name, kind in seen[-1].items() if name not in own})
 """
     assert package.run(code).splitlines()[0] == "{'external'} {'internal'}"
+
+
+ORDERS = """
+from llvmlite.binding import ObjectFileRef
+from small import nested
+for name in {order!r}:
+    getattr(nested, name).compile("(f8[::1],)")
+(compiled,) = nested.twice.overloads.values()
+code = ObjectFileRef.from_data(compiled.library._get_compiled_object())
+texts = (b".text", b".ltext", b"__text")
+print("".join(section.data().hex() for section in code.sections() if section.name() in texts))
+"""
+
+
+def test_an_entry_is_the_same_code_whatever_was_compiled_before_it(package):
+    # What `summed` is compiled for first would have it copied into its callers; it is too long for LLVM to do so.
+    many = "".join(f"            total += values[k] ** {power} / (values[l] + total)\n" for power in range(2, 40))
+    (package.folder / "nested.py").write_text(f"""
+from small._kernel import kernel
+@kernel
+def summed(values):
+    total = 0.0
+    for k in range(values.size):
+        for l in range(k):
+{many}    return total
+@kernel(inline=True)
+def copied(values):
+    return summed(values) + 1.0
+@kernel
+def once(values):
+    return copied(values)
+@kernel
+def twice(values):
+    return summed(values) * summed(values[1:])
+""")
+    code = {
+        package.run(ORDERS.format(order=order), NUMBA_CACHE_DIR=str(package.folder / "-".join(order)))
+        for order in (("twice",), ("once", "twice"), ("summed", "twice"))
+    }
+    assert len(code) == 1 and len(code.pop()) > 100

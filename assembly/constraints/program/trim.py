@@ -360,7 +360,8 @@ def part_of(jacobian, r, rates, k):
         "(Tuple((i8[::1], f8[::1])), i8, "
         "Tuple((i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[::1])), "
         "i8[:, ::1], Tuple((f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])), f8, f8[:, ::1])"
-    )
+    ),
+    allocates=True,
 )
 def trim_terms(scene, r, pairs, bases, point, y, hessian):
     """Upper triangle of hessian += y (second derivative of row r).

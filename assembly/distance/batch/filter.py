@@ -316,7 +316,10 @@ def obstacles_of(full, places, vertices, boxes):
     return Obstacles(places, vertices, boxes, directions, supports, inner_polygons(full, places, vertices, directions))
 
 
-@kernel(signatures=("(i8, Tuple((i8[:, ::1], f8[::1])), Tuple((i8[:, ::1], f8[::1], f8[:, ::1])), f8, f8, i8[:, ::1])"))
+@kernel(
+    signatures=("(i8, Tuple((i8[:, ::1], f8[::1])), Tuple((i8[:, ::1], f8[::1], f8[:, ::1])), f8, f8, i8[:, ::1])"),
+    allocates=True,
+)
 def near_pairs(full, pieces, obstacles, clearance, tolerance, out):
     """Whether curve i comes near obstacle j, to out (curves, obstacles).
 

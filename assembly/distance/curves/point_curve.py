@@ -284,7 +284,7 @@ def work_for(record):
     return np.empty((_DEEPEST + 2) * (SQUARE + (2 * curve.degree + 1) * (1 + curve.rational)))
 
 
-@kernel(signatures="(i8[::1], f8[::1], UniTuple(f8, 3), Tuple((f8, f8, i8, b1)), f8[::1])")
+@kernel(signatures="(i8[::1], f8[::1], UniTuple(f8, 3), Tuple((f8, f8, i8, b1)), f8[::1])", allocates=True)
 def point_distance(record, pool, point, asked, out):
     """Bounds of the distance of a point and a packed curve; a clearance below zero asks for the distance itself."""
     question = Question(*asked)
@@ -303,7 +303,7 @@ def point_distance(record, pool, point, asked, out):
     return nearest_on_curve(record, pool, point, question, work_for(record), np.empty(200, np.int64), out)
 
 
-@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], f8, i8, i8[::1], f8[:, ::1])")
+@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], f8, i8, i8[::1], f8[:, ::1])", allocates=True)
 def point_distances(record, pool, points, tolerance, budget, codes, out):
     """`point_distance` for the rows of an array (n, 3) into rows of `out` and `codes`."""
     question = Question(tolerance, -1.0, budget, True)

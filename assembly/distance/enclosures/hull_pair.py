@@ -70,7 +70,7 @@ def overlap_proven(full, a, count_a, b, count_b, slack, g):
     return False
 
 
-@kernel(signatures="(i8, f8[::1], i8, f8[::1], i8, f8[::1])")
+@kernel(signatures="(i8, f8[::1], i8, f8[::1], i8, f8[::1])", allocates=True)
 def hull_distance(full, a, count_a, b, count_b, state):
     """What `search` of `distance/enclosures/search.py` answers, of two hulls."""
     best = search_state_at(state, 0)

@@ -231,6 +231,7 @@ def roomier(shape, used):
         "(i8, Tuple((i8, i8[::1], f8[::1], i8)), Tuple((i8, i8[::1], f8[::1], i8)), f8[::1], "
         "Tuple((f8, f8, i8, b1)), i8, f8[::1])"
     ),
+    allocates=True,
 )
 def search(full, operand_a, operand_b, center, asked, bound, state):
     """The search of the heading, for Python. `full` is the dimension and one; b may be a hull, a is a curve.

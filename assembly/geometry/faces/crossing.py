@@ -187,7 +187,7 @@ def _meet(pool, a, b, corners, tolerance, size, stack, budget):
     return False, 0.0, 0.0, budget
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8[::1], f8[:, ::1], i8[::1], f8, f8[::1])")
+@kernel(signatures="(i8[::1], f8[::1], i8, i8[::1], f8[:, ::1], i8[::1], f8, f8[::1])", allocates=True)
 def first_crossing(table, pool, trim, pieces, moves, order, tolerance, where):
     """The first two pieces that cross, touch or overlap: their numbers, and the point in `where`; (-1, -1): none.
 

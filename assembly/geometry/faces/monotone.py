@@ -223,7 +223,7 @@ def _weights_differ(c, p):
     return most > MOST_WEIGHTS * least
 
 
-@kernel(signatures="(f8[::1], f8[::1], i8[:, ::1], f8[:, ::1], f8[:, ::1])")
+@kernel(signatures="(f8[::1], f8[::1], i8[:, ::1], f8[:, ::1], f8[:, ::1])", allocates=True)
 def cut_curves(pieces, breaks, shape, binomials, rows):
     """Cut curves into pieces.
 

@@ -77,7 +77,8 @@ def closes(curve, bezier, begin, end, coincident):
 
 
 @kernel(
-    signatures="(Tuple((f8[:, ::1], f8[::1], f8[::1])), i8[:, ::1], f8[:, :, ::1], f8, f8[::1], f8[::1], i8[:, ::1])"
+    signatures="(Tuple((f8[:, ::1], f8[::1], f8[::1])), i8[:, ::1], f8[:, :, ::1], f8, f8[::1], f8[::1], i8[:, ::1])",
+    allocates=True,
 )
 def bezier_tables(curves, shape, powers, coincident, bezier, pool, records):
     """Fill Bezier points (u w, v w, w), pools and records of curves.
@@ -128,7 +129,7 @@ def bezier_tables(curves, shape, powers, coincident, bezier, pool, records):
     return at, place, finite
 
 
-@kernel(signatures="(f8[::1], i8[:, ::1], f8, f8, f8[::1], f8[::1])")
+@kernel(signatures="(f8[::1], i8[:, ::1], f8, f8, f8[::1], f8[::1])", allocates=True)
 def swept_area(pool, records, u, v, nodes, weights):
     """The area that the way from (u, v) to a point sweeps as the point runs along curves."""
     total = 0.0

@@ -136,6 +136,7 @@ def find_features(store, features, q, x, n, size, turn, out):
         "(Tuple((i8[::1], f8[::1])), UniTuple(UniTuple(i8, 2), 2), f8[:, ::1], UniTuple(f8, 4), UniTuple(f8, 3), "
         "f8, f8[:, ::1], f8[:, ::1])"
     ),
+    allocates=True,
 )
 def feature_derivatives(store, features, q, x, n, size, first, hessian):
     """d(parameters)/dq and d(gap)/dq in `first` (5, 14), the gap's Hessian over the twists in `hessian` (12, 12).

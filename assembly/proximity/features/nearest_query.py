@@ -75,7 +75,7 @@ def write_features(store, shells, q, pair, size, codes, out):
     write_pair(q, x, pf, pg, scale(1.0 / length, d) if length > 1e-9 * size else frame.normal, length, out)
 
 
-@kernel(signatures="(i8[::1], f8[::1], UniTuple(i8, 2), f8[:, ::1], f8, i8[::1], f8[::1])")
+@kernel(signatures="(i8[::1], f8[::1], UniTuple(i8, 2), f8[:, ::1], f8, i8[::1], f8[::1])", allocates=True)
 def find_nearest(table, pool, shells, q, size, codes, out):
     """The nearest pair at the poses q (2, 7); its features into codes (2,), the pair into out. Returns the status."""
     store = Store(table, pool)

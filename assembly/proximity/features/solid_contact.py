@@ -129,6 +129,7 @@ def track_solids(store, shells, bodies, q, patience, rows, r):
     signatures=(
         "(Tuple((i8[::1], f8[::1])), UniTuple(i8, 2), UniTuple(i8, 2), f8[:, ::1], UniTuple(i8, 2), f8[:, ::1], i8)"
     ),
+    allocates=True,
 )
 def search_solids(store, shells, bodies, q, searches, tracked, r):
     """The closest features wherever they are, into tracked[r]. Returns 1, or 0 where there are none.

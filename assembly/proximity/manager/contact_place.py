@@ -229,7 +229,7 @@ def mark(manager, p, q, tracked, extrema, stack):
     return known
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], i8, f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], i8, f8[:, ::1], f8[:, ::1], f8[:, ::1])", allocates=True)
 def mark_places(table, pool, at, memory, p, q, tracked, extrema):
     """`mark`, of the contact manager at a place of the table. An update calls this by its address."""
     manager = ContactManager(Store(table, pool), at, memory)

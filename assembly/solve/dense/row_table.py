@@ -182,7 +182,7 @@ def rows_at(table, pool, state, free, residual, jacobian):
     return lost
 
 
-@kernel(signatures="(i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], none)")
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], none)", allocates=True)
 def gradient_at(table, pool, state, free, gradient, tips):
     """The objective's gradient in the twists of all bodies (6 bodies), zero for fixed ones. Returns its value.
 

@@ -14,7 +14,7 @@ from assembly.solve.loop.dexterity import DEPENDENT, DIRECTION, dexterity_at, ti
 from assembly.solve.loop.residuals import place_rows
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], i8[::1], f8[:, ::1])")
+@kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], i8[::1], f8[:, ::1])", allocates=True)
 def tip_at(table, pool, term, state, free, jacobian):
     """The Jacobian of a term of dexterity at a state, in the user's units.
 

@@ -45,6 +45,7 @@ from assembly.solve.loop.workspace import Iterates, carve_all, memory_of, result
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], i8)",
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], none)",
     ),
+    allocates=True,
 )
 def solve_program(table, pool, settings, state, history, tips):
     """Solve in place. State: q (n, 7) | tracked (k, 4) | multipliers (m) | residuals (m) | results.

@@ -75,7 +75,8 @@ def write_curvature(store, state, forces, out, tips, integers, doubles):
     signatures=(
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8)",
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], none)",
-    )
+    ),
+    allocates=True,
 )
 def curvature_at(table, pool, state, forces, out, tips):
     """Evaluate a state; tracked values found are written into it. Returns how many folds there are, or -1: no pair.
@@ -154,7 +155,8 @@ def walk_within(store, state, step, share, kept, residual, tips, memory):
     signatures=(
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], i8)",
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], none)",
-    )
+    ),
+    allocates=True,
 )
 def walk(table, pool, state, step, share, kept, residual, tips):
     """Move a state by a share of a step, and by least steps back onto the rows. Returns the objective's value there.
@@ -217,7 +219,8 @@ def least_within(store, state, forces, active, direction, tips, integers, double
     signatures=(
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8)",
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], none)",
-    )
+    ),
+    allocates=True,
 )
 def least_curvature(table, pool, state, forces, active, direction, tips):
     """The least curvature of objective + forces . rows along motions that keep the rows; its direction is written.
