@@ -278,7 +278,7 @@ def test_a_crossing_is_proven_where_there_is_one():
     assert out[:, 3].tolist() == [1.0, 0.0, 0.0]
 
 
-@kernel
+@kernel(allocates=True)
 def nearest(full, xa, ca_, wa, xb, cb, wb, first, out):
     g = np.zeros(ROOM)
     a, b = ConvexSet(xa, 0, ca_, wa), ConvexSet(xb, 0, cb, wb)

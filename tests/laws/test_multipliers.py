@@ -22,7 +22,7 @@ def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES
     bases = np.tile([0, -1, -1], (rows, 1))
     of_rows = np.arange(rows), np.full(rows, rows - 1)
     given = new_rows(rows, 1.0)._replace(active=active.copy(), gram=np.zeros((rows + 1, rows)))
-    system = System(gradient, Directions(np.zeros(6), None, None), None, None)
+    system = System(gradient, Directions(np.zeros(6), None, None, None), None, None)
     shape, point = Structure(bases, one_sided, None, of_rows), Iterate(None, None, None, residual, wide)
     y = np.full(rows, np.nan)
     pushing_multipliers(shape, point, given, system, exchanges, ROUNDS, y)
@@ -81,7 +81,7 @@ def test_rows_are_foreseen_until_they_agree_and_left_out_again():
         residual, gradient = rng.uniform(0.01, 1.0, rows), rng.normal(size=6)
         given, descent, step = new_rows(rows, mu), -gradient, -gradient
         program, point = Program(Store(table, None), shape, None, None, None), Iterate(None, None, None, residual, wide)
-        system = System(gradient, Directions(descent, step, None), None, None)
+        system = System(gradient, Directions(descent, step, None, None), None, None)
         for count in range(100):
             if predict_active_set(program, point, given, system, False) == 0:
                 rounds.append(count)
