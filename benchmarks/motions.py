@@ -119,7 +119,7 @@ def compared(listed: Listed, extrema: Extrema, tolerance: float, flat: float) ->
 
 @cache
 def _judged(name_f: str, name_g: str) -> tuple[Watch, WireOracle]:
-    """Two wires under watch, and who judges them; making a watch takes longer than a motion."""
+    """Two wires under watch, and who judges them; making a contact manager takes longer than a motion."""
     shapes = SHAPES[name_f], SHAPES[name_g]
     return Watch([surface for _, surface, _ in shapes]), WireOracle([wire for wire, _, _ in shapes])
 

@@ -13,7 +13,7 @@ import assembly as asm
 from assembly._record import Store, rows_of
 from assembly.constraints.program import records as layout
 from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
-from assembly.proximity.manager import records as watch_memory
+from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager import update as watch
 from assembly.proximity.manager.candidates import CROWDED_PART
 
@@ -61,13 +61,13 @@ class Watch:
         # Wires that move fast are looked at far ahead, and as many contacts are listed.
         scene.constrain(asm.Clearance(slots=16))
         self._packed = packed = scene.packed()
-        self._at = int(packed.table[layout.WATCH])
+        self._at = int(packed.table[layout.MANAGER_RECORD])
         self.pairs = [(self.bodies.index(a), self.bodies.index(b)) for a, b in packed.guarded[0]]
-        self._pairs_at = watch_memory.MEMORY_HEADER
-        self._places_at = self._pairs_at + watch_memory.PAIR_MEMORY * len(self.pairs)
-        manager = watch_memory.ContactManager(Store(packed.table, packed.pool), self._at, packed._memory)
-        self._first = int(watch_memory.record_of(manager).first)
-        lengths = [watch_memory.pair_lengths_of(manager, p) for p in range(len(self.pairs))]
+        self._pairs_at = manager_records.MEMORY_HEADER
+        self._places_at = self._pairs_at + manager_records.PAIR_MEMORY * len(self.pairs)
+        manager = manager_records.ContactManager(Store(packed.table, packed.pool), self._at, packed._memory)
+        self._first = int(manager_records.record_of(manager).first)
+        lengths = [manager_records.pair_lengths_of(manager, p) for p in range(len(self.pairs))]
         self._curved = np.array([each.curved_bound for each in lengths])
         self.forget()
 
@@ -78,11 +78,11 @@ class Watch:
 
     @property
     def scale(self) -> float:
-        """The length that is one in the watch's memory."""
+        """The length that is one in the contact manager's memory."""
         return self._packed.scale
 
     def _pairs(self) -> Array:
-        return self.memory[self._pairs_at : self._places_at].reshape(-1, watch_memory.PAIR_MEMORY)
+        return self.memory[self._pairs_at : self._places_at].reshape(-1, manager_records.PAIR_MEMORY)
 
     def look(self, q: Array, everything: bool = True) -> Listed:
         """Look at poses (n, 7); a pair that is not looked at lists nothing.
@@ -95,15 +95,15 @@ class Watch:
         packed, memory = self._packed, self.memory
         scaled = q.copy()
         scaled[:, :3] = (q[:, :3] - packed.reference) / packed.scale
-        calls = watch_memory.memory_header_at(memory, 0).calls + 1.0
+        calls = manager_records.memory_header_at(memory, 0).calls + 1.0
         how = watch.EVERYTHING if everything else watch.IN_TURNS
         watch.update(packed.table, packed.pool, self._at, memory, scaled, self.tracked, how)
-        if memory[watch_memory.CROWDED]:
+        if memory[manager_records.CROWDED]:
             raise RuntimeError("contacts are near for which there is no place")
-        known = rows_of(watch_memory.PAIR_STATE, self._pairs())
+        known = rows_of(manager_records.PAIR_STATE, self._pairs())
         looked = known.called == calls
-        slots = memory[self._places_at :][: watch_memory.PLACE_MEMORY * packed.guards]
-        owner = rows_of(watch_memory.PLACE_STATE, slots.reshape(-1, watch_memory.PLACE_MEMORY)).pair.astype(int)
+        slots = memory[self._places_at :][: manager_records.PLACE_MEMORY * packed.guards]
+        owner = rows_of(manager_records.PLACE_STATE, slots.reshape(-1, manager_records.PLACE_MEMORY)).pair.astype(int)
         rows = np.flatnonzero((owner >= 0) & looked[owner])
         tracked = self.tracked[self._first + rows]
         bodies = np.array(self.pairs)[owner[rows]]
@@ -114,7 +114,7 @@ class Watch:
                 points[k, side] = Rotation.from_quat(q[body, 3:], scalar_first=True).apply(local) + q[body, :3]
         # A look that meets many patches takes what is as near as its allowances, which say what it left out; that of a
         # ball may be less for other reasons, and in a crowd no less than this is looked into.
-        around = np.maximum(known.ball_allowance, CROWDED_PART * self._curved)
-        take = np.minimum(watch_memory.TAKE * known.reach, known.allowance)
+        around = np.maximum(known.ball_bound, CROWDED_PART * self._curved)
+        take = np.minimum(manager_records.TAKE * known.margin, known.motion_bound)
         take = np.minimum(take, around) * packed.scale
         return Listed(bodies, points, tracked[:, PAIR_GAP] * packed.scale, take, looked)

@@ -26,8 +26,8 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.bvh.facet_tree import FacetTree
 from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
-from assembly.proximity.manager import records as watch_memory
-from assembly.proximity.manager import update as watch
+from assembly.proximity.manager import records as manager_records
+from assembly.proximity.manager import update as manager
 from assembly.solve.interruption import Interruption
 
 if TYPE_CHECKING:
@@ -213,27 +213,27 @@ def _seen(packed: Packed, posed: PosedBodies, interruption: Interruption) -> tup
     """Places of pairs that looks of several depths find to cross, and whether all were looked at."""
     q, contacts = posed.q.copy(), len(posed.contacts)
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
-    count = watch_memory.PAIR_MEMORY * len(packed.guarded[0])
+    count = manager_records.PAIR_MEMORY * len(packed.guarded[0])
     deep = max(ROUNDED, posed.touching)
-    watch_at = packed.table[layout.WATCH]
+    record = packed.table[layout.MANAGER_RECORD]
     # Where there is no clock looks are not cut.
-    packed.table[watch_at + watch_memory.CLOCK] = packed.table[layout.CLOCK_AT]
+    packed.table[record + manager_records.CLOCK] = packed.table[layout.CLOCK_AT]
     found: set[int] = set()
     for depth in DEPTHS:
         state = packed.new_state()
         memory = state[packed.memory_at :]
-        memory[watch_memory.OVERLAP] = posed.touching
-        pairs = memory[watch_memory.MEMORY_HEADER :][:count].reshape(-1, watch_memory.PAIR_MEMORY)
-        pairs[:, watch_memory.REACH] = depth
+        memory[manager_records.OVERLAP] = posed.touching
+        pairs = memory[manager_records.MEMORY_HEADER :][:count].reshape(-1, manager_records.PAIR_MEMORY)
+        pairs[:, manager_records.QUERY_MARGIN] = depth
         tracked = np.full((packed.pair_rows, TRACK), np.nan)
         if posed.given is not None:
             tracked[:contacts] = posed.given
         is_cut = True
         while is_cut and not interruption.is_over():
-            memory[watch_memory.DEADLINE] = perf_counter_ns() + watch_memory.SLICE
-            watch.update(packed.table, packed.pool, watch_at, memory, q, tracked, watch.EVERYTHING)
-            is_cut = memory[watch_memory.DEADLINE] < 0.0
-        found |= set(np.flatnonzero(pairs[:, watch_memory.CROSSED] == 1.0).tolist())
+            memory[manager_records.DEADLINE] = perf_counter_ns() + manager_records.SLICE
+            manager.update(packed.table, packed.pool, record, memory, q, tracked, manager.EVERYTHING)
+            is_cut = memory[manager_records.DEADLINE] < 0.0
+        found |= set(np.flatnonzero(pairs[:, manager_records.CROSSED] == 1.0).tolist())
         gaps = tracked[contacts:, PAIR_GAP]
         found |= {pair for gap, (pair, _) in zip(gaps, packed.listed(state), strict=True) if pair >= 0 and gap < -deep}
         if is_cut:

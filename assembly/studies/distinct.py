@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.packing.scene import Packed
-from assembly.constraints.program.records import WATCH
+from assembly.constraints.program.records import MANAGER_RECORD
 from assembly.errors import InputError
 from assembly.kinematics.pose import retract
 from assembly.proximity.features.solid_contact import TRACK
@@ -87,6 +87,6 @@ def _crosses(packed: Packed, state: Array, q: Array) -> bool:
     state[packed.memory_at :] = packed.new_state()[packed.memory_at :]
     tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
     memory = state[packed.memory_at :]
-    update(packed.table, packed.pool, packed.table[WATCH], memory, scaled, tracked, EVERYTHING)
+    update(packed.table, packed.pool, packed.table[MANAGER_RECORD], memory, scaled, tracked, EVERYTHING)
     pairs = memory[MEMORY_HEADER:][: PAIR_MEMORY * sum(map(len, packed.guarded))].reshape(-1, PAIR_MEMORY)
     return bool((pairs[:, CROSSED] == 1.0).any())

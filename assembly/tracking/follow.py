@@ -5,7 +5,7 @@ A contact is carried along the move by the contact velocity formulation,
     du = RATES z,     z = ZED (d_f, d_g)                                   (proximity/extrema/rates.py)
 
 with the twists d that lead from the last poses to these, and corrected there by Newton's method. One that is not found,
-is a minimum no longer, or was corrected by so much that it may be another root now, is left to the watch
+is a minimum no longer, or was corrected by so much that it may be another root now, is left to the contact manager
 (`proximity/manager/update.py`), whose look at the pair of bodies finds all there are.
 """
 
@@ -157,9 +157,9 @@ def correct(store, r, q, guess, tracked, records):
 @kernel(inner=True)
 def look_at_all_of(table, memory, k):
     """Let the next look take up the pair of bodies whose contact is at place k."""
-    pairs, places, _events = memory_places(table, header_at(table, 0).watch)
+    pairs, places, _events = memory_places(table, header_at(table, 0).manager_record)
     p = int(place_at(memory, places + PLACE_MEMORY * k).pair)
-    pair_state_at(memory, pairs + PAIR_MEMORY * p).allowance = 0.0
+    pair_state_at(memory, pairs + PAIR_MEMORY * p).motion_bound = 0.0
 
 
 @kernel(inner=True)
@@ -167,8 +167,8 @@ def doubt_twins(store, memory, k, records):
     """Look at a pair of bodies where contact k came within the spheres of neglect of another one."""
     header = header_at(store.table, 0)
     first = header.first_guard
-    places = memory_places(store.table, header.watch)[1]
-    near = lengths_at(store.pool, manager_at(store.table, header.watch).lengths).neglect
+    places = memory_places(store.table, header.manager_record)[1]
+    near = lengths_at(store.pool, manager_at(store.table, header.manager_record).lengths).merge_radius
     for l in range(k):
         if place_at(memory, places + PLACE_MEMORY * l).pair != place_at(memory, places + PLACE_MEMORY * k).pair:
             continue

@@ -19,7 +19,7 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
 from assembly.proximity.extrema.rates import ARM_F, GAP, NORMAL
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
-from assembly.proximity.manager import records as watch_memory
+from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.events import Event, PairState, events_of
 from assembly.solve.crossings import PosedBodies, find_crossings
 from assembly.solve.interruption import CTRL_C
@@ -170,27 +170,27 @@ class Manager(OwnState):
         self._set_up(2 * old[0].guards)
         pairs, places, events = self._parts(*old[:2])
         new_pairs, new_places, new_events = self._parts(self._packed, self._memory)
-        head = watch_memory.MEMORY_HEADER
+        head = manager_records.MEMORY_HEADER
         self._memory[:head] = old[1][:head]
         new_pairs[:] = pairs
         new_places[: len(places)] = places
         new_places[len(places) :] = 0.0
-        new_places[len(places) :, watch_memory.PLACE_PAIR] = -1.0
+        new_places[len(places) :, manager_records.PLACE_PAIR] = -1.0
         new_events[:] = events
         # Every pair is looked at once more.
-        new_pairs[:, watch_memory.TURN] = nan
+        new_pairs[:, manager_records.TURN] = nan
         self._poses[:] = old[2]
         self._tracked[: len(places)] = old[3]
 
     @staticmethod
     def _parts(packed: Packed, memory: Array) -> tuple[Array, Array, Array]:
         """Views of what a memory knows of pairs, of places, and of events."""
-        pairs_at = watch_memory.MEMORY_HEADER
-        places_at = pairs_at + watch_memory.PAIR_MEMORY * len(packed.guarded[0])
-        events_at = places_at + watch_memory.PLACE_MEMORY * packed.guards
+        pairs_at = manager_records.MEMORY_HEADER
+        places_at = pairs_at + manager_records.PAIR_MEMORY * len(packed.guarded[0])
+        events_at = places_at + manager_records.PLACE_MEMORY * packed.guards
         return (
-            memory[pairs_at:places_at].reshape(-1, watch_memory.PAIR_MEMORY),
-            memory[places_at:events_at].reshape(-1, watch_memory.PLACE_MEMORY),
+            memory[pairs_at:places_at].reshape(-1, manager_records.PAIR_MEMORY),
+            memory[places_at:events_at].reshape(-1, manager_records.PLACE_MEMORY),
             memory[events_at:],
         )
 
@@ -265,7 +265,7 @@ class Manager(OwnState):
             code += self._follow(pose_rows("q", q, len(self._bodies)))
         if code == 0:
             return ()
-        since, self._seen = int(self._seen), self._memory[watch_memory.EVENT_COUNT]
+        since, self._seen = int(self._seen), self._memory[manager_records.EVENT_COUNT]
         return events_of(self._memory, self._pairs, self._packed.scale, since)
 
     def _follow(self, q: Array) -> int:
@@ -275,7 +275,7 @@ class Manager(OwnState):
 
     def _is_full(self) -> bool:
         """Whether every place has a contact."""
-        return bool((self._parts(self._packed, self._memory)[1][:, watch_memory.PLACE_PAIR] >= 0.0).all())
+        return bool((self._parts(self._packed, self._memory)[1][:, manager_records.PLACE_PAIR] >= 0.0).all())
 
     @property
     def contacts(self) -> tuple[ListedContact, ...]:
@@ -284,15 +284,15 @@ class Manager(OwnState):
         places = self._parts(packed, self._memory)[1]
         index = {body: k for k, body in enumerate(body.name for body in self._bodies)}
         found = []
-        for k in np.flatnonzero(places[:, watch_memory.PLACE_PAIR] >= 0.0).tolist():
-            bodies = self._pairs[int(places[k, watch_memory.PLACE_PAIR])]
+        for k in np.flatnonzero(places[:, manager_records.PLACE_PAIR] >= 0.0).tolist():
+            bodies = self._pairs[int(places[k, manager_records.PLACE_PAIR])]
             record = self._records[k]
             gap, normal = float(record[GAP]), record[NORMAL : NORMAL + 3].copy()
             there = self._poses[index[bodies[0]], :3] + record[ARM_F : ARM_F + 3]
             found.append(
                 ListedContact(
                     bodies=bodies,
-                    number=int(places[k, watch_memory.PLACE_NUMBER]),
+                    number=int(places[k, manager_records.PLACE_NUMBER]),
                     parameters=self._tracked[k, :4].copy(),
                     points=np.array([there - gap * normal, there]) * packed.scale + packed.reference,
                     normal=normal,
@@ -307,7 +307,7 @@ class Manager(OwnState):
         pairs = self._parts(self._packed, self._memory)[0]
         return {
             names: _STATES[int(state)]
-            for names, state in zip(self._pairs, pairs[:, watch_memory.STATE].tolist(), strict=True)
+            for names, state in zip(self._pairs, pairs[:, manager_records.STATE].tolist(), strict=True)
         }
 
     @property
@@ -319,9 +319,9 @@ class Manager(OwnState):
         """
         pairs = self._parts(self._packed, self._memory)[0]
         left = np.where(
-            np.isnan(pairs[:, watch_memory.TURN]),
+            np.isnan(pairs[:, manager_records.TURN]),
             -inf,
-            pairs[:, watch_memory.ALLOWANCE] * (1.0 - pairs[:, watch_memory.PART]),
+            pairs[:, manager_records.MOTION_BOUND] * (1.0 - pairs[:, manager_records.PART]),
         )
         bounds = dict(zip(self._pairs, (self._reach + self._packed.scale * left).tolist(), strict=True))
         for contact in self.contacts:

@@ -14,7 +14,7 @@ from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import structure_changes
 from assembly.constraints.model.objectives import FrameDistance, PointDistance
 from assembly.constraints.packing.scene import structure_of
-from assembly.constraints.program.records import CLOCK_AT, WATCH
+from assembly.constraints.program.records import CLOCK_AT, MANAGER_RECORD
 from assembly.errors import FARTHEST, InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion
@@ -37,19 +37,19 @@ from assembly.solve.loop.settings import (
     CARRIES,
     CONTACT_LOST,
     FEASIBILITY,
-    HELD,
     HISTORY,
     ITERATIONS,
+    LAST_FEASIBLE,
     LAST_LOOK,
     OUT_OF_TIME,
     RADIUS,
-    RECALL,
     SECOND_ORDER,
     SOLVED,
     STATIONARITY,
     TICK,
     TOUCHING,
     VIOLATION,
+    WARM_START,
 )
 from assembly.solve.loop.warm_start import warm_start_size
 from assembly.solve.options import Options
@@ -78,12 +78,12 @@ def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
 
     Ticks have no last look. Which rows are in the place of a contact, or are its own pair, their first look tells.
     """
-    watch = packed.table[WATCH]
-    packed.table[watch + VERTEX_CONTACTS] = 0
-    packed.table[watch + CLOCK] = packed.table[CLOCK_AT] if keeps_time else 0
+    record = packed.table[MANAGER_RECORD]
+    packed.table[record + VERTEX_CONTACTS] = 0
+    packed.table[record + CLOCK] = packed.table[CLOCK_AT] if keeps_time else 0
     state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, STAYS] = 0.0
-    if packed.table[watch + MARK_AT]:
-        pairs = state[packed.memory_at + MEMORY_HEADER :][: PAIR_MEMORY * int(packed.table[watch + PAIRS])]
+    if packed.table[record + MARK_AT]:
+        pairs = state[packed.memory_at + MEMORY_HEADER :][: PAIR_MEMORY * int(packed.table[record + PAIRS])]
         pairs.reshape(-1, PAIR_MEMORY)[:, TURN] = np.nan
 
 
@@ -230,11 +230,11 @@ class Tracker(InOneProcess):
         self._followed = Followed(self._scene, packed, names, self._hand, self._place, first.status)
         # Behind the state of a solve are the rows of the last tick; steps have no copy of those.
         self._size = first._state.size
-        recalled = warm_start_size(packed.count, packed.pair_rows)
-        self._state = np.concatenate([first._state, np.zeros(recalled)])
+        warm = warm_start_size(packed.count, packed.pair_rows)
+        self._state = np.concatenate([first._state, np.zeros(warm)])
         if packed.guards:
             _follow_extrema(packed, self._state, budget is not None)
-        self._settings[RECALL] = self._size
+        self._settings[WARM_START] = self._size
         self._pose = self._state[: self._size]
         # Numbers are read from a view in half the time it takes to read them from the array.
         self._view: Any = self._state.data
@@ -293,7 +293,7 @@ class Tracker(InOneProcess):
             if code == CONTACT_LOST or (begun and stands):
                 status = TrackStatus.HELD if stands else TrackStatus.VIOLATED
                 self._pose[:] = self._before
-        elif view[at + HELD] == 1.0:
+        elif view[at + LAST_FEASIBLE] == 1.0:
             status = TrackStatus.HELD
         # After a step too far the next ones are shorter, until they do better.
         radius = self._knobs[RADIUS]

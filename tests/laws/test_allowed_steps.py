@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from assembly._record import Store, place_of, rows_of
-from assembly.constraints.program.records import MOVING, WATCH, Iterate
+from assembly.constraints.program.records import MANAGER_RECORD, MOVING, Iterate
 from assembly.proximity.brep.borders import feature_kind
 from assembly.proximity.brep.records import EDGE, FACE
 from assembly.proximity.bvh.tree import ELEMENT, ELEMENT_DTYPE, tree_at
@@ -46,7 +46,7 @@ class Looked:
         scene = asm.Assembly(rings)
         scene.constrain(asm.Clearance())
         self.packed = packed = scene.packed()
-        self.table, self.pool, self.watch = packed.table, packed.pool, packed.table[WATCH]
+        self.table, self.pool, self.watch = packed.table, packed.pool, packed.table[MANAGER_RECORD]
         self.memory = packed._memory.copy()
         self.q = scene.q.copy()
         self.q[:, :3] = (self.q[:, :3] - packed.reference) / packed.scale
@@ -97,7 +97,7 @@ def test_steps_end_within_what_looks_allow(cases):
             if cut:
                 cuts += 1
                 # What is asked of the next looks: as far as each pair was to go.
-                np.testing.assert_allclose(looked.known().cut_short, end * looked.known().allowance, rtol=1e-12)
+                np.testing.assert_allclose(looked.known().cut_short, end * looked.known().motion_bound, rtol=1e-12)
     assert cuts > scenes
 
 
@@ -106,9 +106,9 @@ def test_a_pair_that_is_nearly_spent_and_hardly_moves_is_not_in_the_way():
     pairs = (pair_in(looked.table, looked.watch, p) for p in looked.pairs)
     bodies = np.array([(pair.body_f, pair.body_g) for pair in pairs])
     # Of balls, which have allowances of their own, there are none.
-    looked.known().ball_allowance[:] = np.inf
+    looked.known().ball_bound[:] = np.inf
     looked.known().sure[:] = np.inf
-    allowances = looked.known().allowance.copy()
+    allowances = looked.known().motion_bound.copy()
     # Of the pair with the least allowance nearly all is used by one body; others of that body have more.
     spent = int(np.argmin(allowances))
     apart = next(p for p in looked.pairs if not set(bodies[p]) & set(bodies[spent]))
@@ -136,7 +136,7 @@ def test_a_point_that_stays_on_an_edge_is_no_root():
     scene.constrain(asm.Clearance())
     packed = scene.packed()
     table, pool = packed.table, packed.pool
-    pair = pair_in(table, table[WATCH], 0)
+    pair = pair_in(table, table[MANAGER_RECORD], 0)
     trees, shells = (pair.tree_f, pair.tree_g), (pair.shell_f, pair.shell_g)
     looked_into = posed(Store(table, pool), None, None, (pair.surface_f, pair.surface_g), shells, trees)
     elements = [
@@ -177,7 +177,7 @@ def test_no_point_goes_farther_than_is_told():
     scene = asm.Assembly(bodies)
     scene.constrain(asm.Clearance())
     packed = scene.packed()
-    table, pool, at = packed.table, packed.pool, packed.table[WATCH]
+    table, pool, at = packed.table, packed.pool, packed.table[MANAGER_RECORD]
     side = int(pair_in(table, at, 0).smaller)
     (u0, u1), (v0, v1) = surfaces[side].domain
     points = surfaces[side].evaluate(*rng.uniform((u0, v0), (u1, v1), (400, 2)).T) / packed.scale

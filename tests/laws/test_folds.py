@@ -9,7 +9,7 @@ import pytest
 
 import assembly as asm
 from assembly._record import Store, rows_of
-from assembly.constraints.program.records import FREE_COLUMN, ROWS, WATCH, Iterate, LiftedPairs
+from assembly.constraints.program.records import FREE_COLUMN, MANAGER_RECORD, ROWS, Iterate, LiftedPairs
 from assembly.geometry.splines.evaluate import SURFACE_RECORD
 from assembly.kinematics.motion import RelativePose, relative_pose, rotation
 from assembly.proximity.extrema.face_face import SINGULAR, solve_pair
@@ -19,7 +19,7 @@ from assembly.proximity.extrema.singular import fold_beyond
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, PAIR_GAP, TRACK
 from assembly.proximity.manager import extrema as roots
 from assembly.proximity.manager import motion_bounds as allowances
-from assembly.proximity.manager import records as watch_memory
+from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager import update as watch
 from assembly.proximity.manager.motion_bounds import MotionBall, allow_ball, mover
 from assembly.proximity.manager.slots import keep_slots_of_given
@@ -132,15 +132,15 @@ def test_a_valley_of_fourth_order_is_a_pair_after_few_steps():
 def test_a_given_contact_goes_from_a_saddle_to_the_nearest_minimum(swapped, listed):
     packed = chain_under_watch()[1]
     table = packed.table.copy()
-    watch, pair = int(table[WATCH]), 1
-    record = watch_memory.pair_in(table, watch, pair)
+    watch, pair = int(table[MANAGER_RECORD]), 1
+    record = manager_records.pair_in(table, watch, pair)
     given = record.given
     assert record.given_count == 1
     table[given + 1] = swapped
     row, place = table[given], record.low
     memory = packed.new_state()[packed.memory_at :].copy()
-    places = watch_memory.memory_places(table, watch)[1]
-    tracked = np.zeros((row + place + int(watch_memory.manager_at(table, watch).first) + 30, TRACK))
+    places = manager_records.memory_places(table, watch)[1]
+    tracked = np.zeros((row + place + int(manager_records.manager_at(table, watch).first) + 30, TRACK))
     found = np.zeros((3, roots.ROOT))
     extrema = rows_of(roots.EXTREMUM, found)
     extrema.beyond, extrema.fold, extrema.gap = np.nan, (-1e-4, 2e-4, 1e-4), (0.0, -2e-10, -1e-10)
@@ -148,17 +148,17 @@ def test_a_given_contact_goes_from_a_saddle_to_the_nearest_minimum(swapped, list
     found[:, :4] = np.arange(12.0).reshape(3, 4)
     extrema.origin = roots.GIVEN_CONTACT, roots.NEW, place if listed else roots.NEW
     if listed:
-        memory[places + watch_memory.PLACE_MEMORY * place] = pair
-        memory[places + watch_memory.PLACE_MEMORY * place + watch_memory.PLACE_NUMBER] = 7.0
-    manager = watch_memory.ContactManager(Store(table, packed.pool), watch, memory)
+        memory[places + manager_records.PLACE_MEMORY * place] = pair
+        memory[places + manager_records.PLACE_MEMORY * place + manager_records.PLACE_NUMBER] = 7.0
+    manager = manager_records.ContactManager(Store(table, packed.pool), watch, memory)
     keep_slots_of_given(manager, pair, list_of(found, 3), tracked)
     expected = [8.0, 9.0, 10.0, 11.0]
     assert tracked[row, :4].tolist() == (expected[2:] + expected[:2] if swapped else expected)
     assert tracked[row, PAIR_GAP] == -1e-10
     assert extrema.origin.tolist() == [roots.USELESS, roots.NEW, roots.GIVEN_CONTACT]
-    assert memory[watch_memory.EVENT_COUNT] == 1.0
+    assert memory[manager_records.EVENT_COUNT] == 1.0
     if listed:
-        assert memory[places + watch_memory.PLACE_MEMORY * place] == -1.0
+        assert memory[places + manager_records.PLACE_MEMORY * place] == -1.0
     # A minimum far below is another contact, and one that is a minimum stays.
     for gap, fold in ((-1e-3, -1e-4), (0.0, 1e-4)):
         extrema.origin = roots.GIVEN_CONTACT, roots.NEW, roots.USELESS
@@ -206,9 +206,9 @@ def test_contacts_of_rings_that_are_deep_in_each_other_are_listed(reach, depth, 
         deep = extrema.gap[(extrema.index == 0) & (extrema.gap < -1e-3) & (extrema.gap > -1.2 * MINOR)]
         if len(deep):
             rings.forget()
-            rings.memory[watch_memory.MEMORY_HEADER + watch_memory.REACH] = reach
+            rings.memory[manager_records.MEMORY_HEADER + manager_records.QUERY_MARGIN] = reach
             found = rings.look(q).gap
-            crossed = rings.memory[watch_memory.MEMORY_HEADER + watch_memory.CROSSED] == 1.0
+            crossed = rings.memory[manager_records.MEMORY_HEADER + manager_records.CROSSED] == 1.0
             assert len(found) or crossed
             for gap in deep[deep > -depth]:
                 # Newton's method on lengths of order one.
@@ -263,26 +263,26 @@ class Clips:
         self.q = np.array([body.q for body in chain.bodies])
         self.q[:, :3] = (self.q[:, :3] - packed.reference) / packed.scale
         self.tracked = np.full((packed.tracked, TRACK), np.nan)
-        self.count = int(self.table[self.table[WATCH] + watch_memory.PAIRS])
+        self.count = int(self.table[self.table[MANAGER_RECORD] + manager_records.PAIRS])
 
     @property
     def pairs(self):
         """What is known of each pair."""
-        known = self.memory[watch_memory.MEMORY_HEADER :][: self.count * watch_memory.PAIR_MEMORY]
+        known = self.memory[manager_records.MEMORY_HEADER :][: self.count * manager_records.PAIR_MEMORY]
         return known.reshape(self.count, -1)
 
     def looked(self, how):
         """How many pairs a look looks at."""
-        before = watch_memory.memory_header_at(self.memory, 0).looks
-        watch.update(self.table, self.pool, self.table[WATCH], self.memory, self.q, self.tracked, how)
-        return watch_memory.memory_header_at(self.memory, 0).looks - before
+        before = manager_records.memory_header_at(self.memory, 0).looks
+        watch.update(self.table, self.pool, self.table[MANAGER_RECORD], self.memory, self.q, self.tracked, how)
+        return manager_records.memory_header_at(self.memory, 0).looks - before
 
 
 def test_the_last_look_asks_of_every_pair_whether_it_crosses():
     clips = Clips()
 
     def unasked():
-        return np.isnan(clips.pairs[:, watch_memory.CROSSED])
+        return np.isnan(clips.pairs[:, manager_records.CROSSED])
 
     # A first look asks; one that a motion calls for does not; the last one asks where nothing moved since, and once.
     assert clips.looked(watch.AS_NEEDED) == clips.count and not unasked().any()
@@ -304,17 +304,17 @@ def test_pairs_are_looked_at_that_need_it(by_spines, part, as_needed, in_turns, 
         as_needed = in_turns = 2
     for how, count in ((watch.AS_NEEDED, as_needed), (watch.IN_TURNS, in_turns), (watch.CAREFUL, careful)):
         clips = Clips()
-        table, watch_at = clips.table, clips.table[WATCH]
+        table, watch_at = clips.table, clips.table[MANAGER_RECORD]
         if not by_spines:
             for p in range(clips.count):
-                watch_memory.pair_in(table, watch_at, p).spine_f = -1
+                manager_records.pair_in(table, watch_at, p).centerline_f = -1
         assert clips.looked(how) == clips.count == 3
-        clips.pairs[:, watch_memory.ALLOWANCE] = 1e-3
+        clips.pairs[:, manager_records.MOTION_BOUND] = 1e-3
         for p in range(clips.count):
             # A ball of no size: it goes where the body's origin does.
-            manager = watch_memory.ContactManager(Store(table, clips.pool), watch_at, clips.memory)
-            place = mover(watch_memory.pair_of(manager, p), clips.q).shift
+            manager = manager_records.ContactManager(Store(table, clips.pool), watch_at, clips.memory)
+            place = mover(manager_records.pair_of(manager, p), clips.q).shift
             ball = MotionBall((0.0, 0.0, 0.0), place, 0.0)
-            allow_ball(watch_memory.pair_state_of(manager, p), ball, np.inf, allowances.STILL * 1e-3)
+            allow_ball(manager_records.pair_state_of(manager, p), ball, np.inf, allowances.STILL * 1e-3)
         clips.q[1, 2] += 1e-3 * part
         assert clips.looked(how) == count

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.proximity.manager import records as watch_memory
+from assembly.proximity.manager import records as manager_records
 from benchmarks.center_lines import paper_clip_wire
 from benchmarks.motions import FLAT, PAIRS, SAME, SHAPES, Errors, compared, wander
 from benchmarks.watching import Watch
@@ -92,8 +92,8 @@ def test_what_is_nearer_than_an_allowance_is_listed(f, g, gap, q):
     listed = rings.look(np.array(q))
     assert WireOracle(wires).minima(np.array(q), 0.1).gap == pytest.approx([gap], abs=1e-9)
     # Near enough for a place, but for the crowd; then the look says that it took in less.
-    reach = rings.memory[watch_memory.MEMORY_HEADER + watch_memory.REACH]
-    assert watch_memory.TAKE * reach * rings.scale > gap
+    reach = rings.memory[manager_records.MEMORY_HEADER + manager_records.QUERY_MARGIN]
+    assert manager_records.TAKE * reach * rings.scale > gap
     assert listed.gap == pytest.approx([gap], abs=1e-9) or listed.take[0] <= gap
 
 

@@ -13,7 +13,7 @@ from assembly.constraints.program.evaluate import evaluate
 from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, IDLE, PAIR_GAP, SLACK, TRACK
 from assembly.proximity.manager import update as watch
-from assembly.proximity.manager.records import PAIR_MEMORY, REACH, memory_places
+from assembly.proximity.manager.records import PAIR_MEMORY, QUERY_MARGIN, memory_places
 from assembly.solve.loop.clearances import place_clearance_rows
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import arrange, move, record_of_blocks
@@ -52,9 +52,9 @@ class Near:
         self.here = self.point(q)
         self.here.tracked[:] = np.nan
         # What is listed is to be farther away, too.
-        pairs, places, _ = memory_places(table, table[layout.WATCH])
-        self.memory[pairs:places].reshape(-1, PAIR_MEMORY)[:, REACH] = 1.0
-        watch.update(table, pool, table[layout.WATCH], self.memory, q, self.here.tracked, watch.EVERYTHING)
+        pairs, places, _ = memory_places(table, table[layout.MANAGER_RECORD])
+        self.memory[pairs:places].reshape(-1, PAIR_MEMORY)[:, QUERY_MARGIN] = 1.0
+        watch.update(table, pool, table[layout.MANAGER_RECORD], self.memory, q, self.here.tracked, watch.EVERYTHING)
         self.program = layout.Program(Store(table, pool), self.shape, self.loose, self.room, None)
         place_clearance_rows(table, self.loose, self.here, new_rows(rows, 1.0), True)
         arrange(table, self.free, self.shape, rows, self.n)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.constraints.program import records as layout
 from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
-from assembly.proximity.manager import records as watch_memory
+from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager import update as watch
 from benchmarks.center_lines import ball_wire, paper_clip_wire, torus_wire
 from benchmarks.wire_oracle import WireOracle
@@ -40,9 +40,11 @@ def judge(f, g):
         tracked = np.full((packed.tracked, TRACK), np.nan)
         q = np.array(q, dtype=float)
         q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
-        watch.update(packed.table, packed.pool, packed.table[layout.WATCH], memory, q, tracked, watch.EVERYTHING)
+        watch.update(
+            packed.table, packed.pool, packed.table[layout.MANAGER_RECORD], memory, q, tracked, watch.EVERYTHING
+        )
         gaps = tracked[np.isfinite(tracked[:, PAIR_GAP]), PAIR_GAP]
-        crossed = memory[watch_memory.MEMORY_HEADER + watch_memory.CROSSED]
+        crossed = memory[manager_records.MEMORY_HEADER + manager_records.CROSSED]
         assert crossed in (0.0, 1.0)
         return crossed == 1.0, packed.scale * gaps.min() if gaps.size else np.nan
 

@@ -15,7 +15,7 @@ from assembly.geometry.shapes.centerline import spine_of
 from assembly.geometry.shapes.path import Path
 from assembly.geometry.vec import dot
 from assembly.kinematics.motion import RelativePose
-from assembly.proximity.manager import records as watch_memory
+from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.centerlines.box import (
     BARREN,
     CONVEX,
@@ -398,7 +398,7 @@ def test_contacts_that_are_born_where_the_curvature_jumps_are_within_what_looks_
     oracle = WireOracle([path_wire(path, 0.1) for path in (bent, rod)])
     rng = np.random.default_rng(0)
     packed, born = watch._packed, 0
-    manager = watch_memory.ContactManager(Store(packed.table, packed.pool), watch._at, watch.memory)
+    manager = manager_records.ContactManager(Store(packed.table, packed.pool), watch._at, watch.memory)
     count = cases(150, 1500)
     for _ in range(count):
         high = 0.2 + 10.0 ** rng.uniform(-3.6, -2.5)
@@ -423,7 +423,7 @@ def test_contacts_that_are_born_where_the_curvature_jumps_are_within_what_looks_
             if (np.abs(minima.points[:, 0, 0] + 0.4) < 0.4).any():
                 # It is in the rod already: the look did not allow as much, or not without another one.
                 part = part_used(manager, 0, scaled)
-                doubt = watch_memory.pair_state_of(manager, 0).doubt
+                doubt = manager_records.pair_state_of(manager, 0).doubt
                 assert max(part, doubt) >= 1.0
                 born += 1
     assert born > count / 75

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from assembly._record import Store, rows_of
-from assembly.constraints.program.records import WATCH
+from assembly.constraints.program.records import MANAGER_RECORD
 from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, SPANS_U, SPANS_V, surface_point
 from assembly.kinematics.motion import RelativePose
 from assembly.proximity.brep.borders import feature_at
@@ -39,7 +39,7 @@ def packed_faces(shape):
     scene.constrain(asm.Clearance())
     packed = scene.packed()
     table = packed.table
-    f, g = pair_in(table, table[WATCH], 0).shell_f, pair_in(table, table[WATCH], 0).shell_g
+    f, g = pair_in(table, table[MANAGER_RECORD], 0).shell_f, pair_in(table, table[MANAGER_RECORD], 0).shell_g
     names = [face.name for face in scene.bodies[0].faces]
     others = [feature_at(table, g, k) for k in range(shell_at(table, g).faces)]
     return table, packed.pool, feature_at(table, f, names.index("top")), others, packed.scale
@@ -144,7 +144,7 @@ def ring_on_a_slab(slab=None):
     )
     scene.constrain(asm.Clearance())
     packed = scene.packed()
-    pair = pair_in(packed.table, packed.table[WATCH], 0)
+    pair = pair_in(packed.table, packed.table[MANAGER_RECORD], 0)
     shells = (pair.shell_f, pair.shell_g)
     return packed.table, packed.pool, packed.scale, shells, [face.name for face in scene.bodies[0].faces].index("top")
 

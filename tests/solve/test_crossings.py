@@ -162,10 +162,10 @@ def test_bad_input(options, message):
 def test_looks_in_slices_find_the_same(monkeypatch):
     solution, expected = row_of_blocks(6)
     looks = []
-    look = crossings.watch.update
+    look = crossings.manager.update
     # A slice that is over when it begins: every look is at one pair.
-    monkeypatch.setattr(crossings.watch_memory, "SLICE", -1)
-    monkeypatch.setattr(crossings.watch, "update", lambda *arguments: looks.append(arguments) or look(*arguments))
+    monkeypatch.setattr(crossings.manager_records, "SLICE", -1)
+    monkeypatch.setattr(crossings.manager, "update", lambda *arguments: looks.append(arguments) or look(*arguments))
     assert solution.find_crossings().pairs == expected
     assert len(looks) == len(crossings.DEPTHS) * len(expected)
 
@@ -177,7 +177,7 @@ def test_looks_in_slices_find_the_same(monkeypatch):
 
     limit = Interruption(time_limit=1e6)
     looks.clear()
-    monkeypatch.setattr(crossings.watch, "update", later)
+    monkeypatch.setattr(crossings.manager, "update", later)
     pairs = crossings.free_pairs(solution._scene.bodies, ())
     partly = crossings.crossings_of(solution, pairs, limit)
     # What was found by then crosses for certain, and the rest is not known.

@@ -10,7 +10,7 @@ import pytest
 import assembly as asm
 from assembly._kernel import kernel
 from assembly._record import place_of
-from assembly.constraints.program.records import RESULTS, WATCH
+from assembly.constraints.program.records import MANAGER_RECORD, RESULTS
 from assembly.kinematics.body import Point
 from assembly.proximity.manager.events import EventKind
 from assembly.proximity.manager.records import (
@@ -66,7 +66,7 @@ def doubts(tracker):
     """How far pairs are beyond where contacts may have been born beside others since they were looked at."""
     packed = tracker._packed
     at = packed.memory_at + MEMORY_HEADER
-    return tracker._state[at : at + PAIR_MEMORY * packed.table[packed.table[WATCH] + PAIRS]][
+    return tracker._state[at : at + PAIR_MEMORY * packed.table[packed.table[MANAGER_RECORD] + PAIRS]][
         place_of(PAIR_STATE, "doubt") :: PAIR_MEMORY
     ]
 
@@ -233,7 +233,7 @@ def test_looks_alone_do_not_go_on_for_ever():
     """However many pairs are due time and again: after four looks at each a step comes first."""
     watch, pairs = 100, 3
     table, settings, results = np.zeros(200, np.int64), np.zeros(SETTINGS), np.zeros(RESULTS)
-    table[WATCH], table[watch + PAIRS], settings[CARRIES] = watch, pairs, 1.0
+    table[MANAGER_RECORD], table[watch + PAIRS], settings[CARRIES] = watch, pairs, 1.0
     memory = np.zeros(MEMORY_HEADER)
     known = memory_header_at(memory, 0)
     known.looks = 7.0

@@ -16,9 +16,9 @@ __all__ = ["Clearance"]
 class Clearance(Constraint):
     """The gap between any two of the bodies is at least `minimum`, everywhere.
 
-    Contacts come and go as the bodies move: a watch lists every extremal pair of points that comes near (`Manager`),
-    each is a row gap >= minimum as long as it is near, and a step is never longer than to where something that is not
-    listed could touch. A solve ends SOLVED only after a look at its pose found no contact that is violated.
+    Contacts come and go as the bodies move: a contact manager lists every extremal pair of points that comes near
+    (`Manager`), each is a row gap >= minimum as long as it is near, and a step is never longer than to where something
+    that is not listed could touch. A solve ends SOLVED only after an update at its pose found no violated contact.
 
     Pairs of points that a `Contact` of the same two bodies has are that contact's: its gap of zero is no violation. A
     `minimum` above zero does not ask for the place of the contact: what is reached from its points, between the two

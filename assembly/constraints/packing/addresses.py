@@ -16,7 +16,7 @@ from assembly.proximity.manager.contact_place import mark_places
 from assembly.proximity.manager.motion_bounds import measure_parts, went_beyond
 from assembly.proximity.manager.update import update
 
-__all__ = ["blocks", "contacts", "deepest", "places", "solids", "surfaces", "tapes", "trims", "watch"]
+__all__ = ["blocks", "contacts", "deepest", "places", "solids", "surfaces", "tapes", "trims", "manager"]
 
 
 def blocks() -> tuple[int, int]:
@@ -59,6 +59,6 @@ def trims() -> tuple[int, int]:
     return address_of(trim_rows), address_of(trim_terms)
 
 
-def watch() -> tuple[int, int, int, int]:
-    """Of `look`, `has_stayed`, `measure_parts` and `went_beyond`."""
+def manager() -> tuple[int, int, int, int]:
+    """Of `update`, `has_stayed`, `measure_parts` and `went_beyond`."""
     return address_of(update), address_of(has_stayed), address_of(measure_parts), address_of(went_beyond)

@@ -22,11 +22,11 @@ from assembly.proximity.brep.solid import is_one_smooth
 from assembly.proximity.bvh.facet_tree import FacetTree
 from assembly.proximity.bvh.neighbor_list import LIST_INTS
 from assembly.proximity.bvh.packing import pack_tree
-from assembly.proximity.manager import records as watch_memory
+from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.centerlines.packing import pack_centerline
 from assembly.proximity.manager.extrema import GIVEN_RECORD
 
-__all__ = ["LAST_REACH", "guarded_pairs", "is_of_surfaces", "pack_watch", "place_count", "table_with_guards"]
+__all__ = ["LAST_MARGIN", "guarded_pairs", "is_of_surfaces", "pack_manager", "slot_count", "table_with_guards"]
 
 Table = NDArray[np.int64]
 Pair = tuple[Body, Body]
@@ -34,8 +34,8 @@ Side = Body | BodyFace
 # A contact of the scene, its sides, and whether it is one of their whole surfaces, without edges.
 GivenContact = tuple[Contact, tuple[Side, Side], bool]
 
-# Of a watch, in parts of the scene's size: how far its looks reach at least, and at most.
-FIRST_REACH, LAST_REACH = 0.005, 0.1
+# Of a contact manager, in parts of the scene's size: how far its looks reach at least, and at most.
+FIRST_MARGIN, LAST_MARGIN = 0.005, 0.1
 # How far bodies may go between looks where contacts may be born, in parts of the smallest radius of curvature of the
 # two; in parts of the scene's size, it is no less than this.
 FLANK, LEAST_FLANK = 0.5, 1e-4
@@ -63,7 +63,7 @@ def guarded_pairs(clearances: Sequence[Clearance], bodies: Sequence[Body]) -> li
     return result
 
 
-def place_count(clearance: Clearance, pairs: Sequence[Pair]) -> int:
+def slot_count(clearance: Clearance, pairs: Sequence[Pair]) -> int:
     """How many contacts may be near at a time."""
     if not pairs:
         return 0
@@ -76,14 +76,14 @@ def is_of_surfaces(pair: Pair) -> bool:
     return all(is_one_smooth(side_faces(body)) for body in pair)
 
 
-def pack_watch(
+def pack_manager(
     writer: SceneWriter,
     clearances: Sequence[Clearance],
     guarded: Sequence[Sequence[Pair]],
     places: Sequence[int],
     contacts: Sequence[GivenContact],
 ) -> int:
-    """Pack the watch of clearances, of which each has pairs and places; where its record begins.
+    """Pack the contact manager of clearances, of which each has pairs and places; where its record begins.
 
     `contacts` are the given ones, in the order of their rows; the first place is behind them.
     """
@@ -94,12 +94,12 @@ def pack_watch(
             pairs.add(pair, clearance.minimum, [first, first + count])
         first += count
     count, pair_table = pairs.write()
-    block = np.zeros(watch_memory.LENGTH_COUNT)
-    lengths = watch_memory.lengths_at(block, 0)
-    lengths.neglect = min(clearance.merge_radius for clearance in clearances)
-    lengths.first_reach, lengths.last_reach = FIRST_REACH, LAST_REACH
-    row = np.zeros(watch_memory.WATCH_RECORD, dtype=np.int64)
-    record = watch_memory.manager_at(row, 0)
+    block = np.zeros(manager_records.LENGTH_COUNT)
+    lengths = manager_records.lengths_at(block, 0)
+    lengths.merge_radius = min(clearance.merge_radius for clearance in clearances)
+    lengths.first_margin, lengths.last_margin = FIRST_MARGIN, LAST_MARGIN
+    row = np.zeros(manager_records.WATCH_RECORD, dtype=np.int64)
+    record = manager_records.manager_at(row, 0)
     record.pairs, record.places, record.pair_table, record.first = count, first, pair_table, len(contacts)
     _, record.lengths = writer.add(pool=block)
     record.lists = min(count, MOST_LISTS)
@@ -121,16 +121,16 @@ def table_with_guards(table: Table, placed: Sequence[Sequence[int]]) -> Table:
     rows = table[first:][: layout.ROW * len(placed)].reshape(-1, layout.ROW)
     for row, (place, number, given) in zip(rows, placed, strict=True):
         if place >= 0:
-            pair = watch_memory.pair_in(table, table[layout.WATCH], place)
+            pair = manager_records.pair_in(table, table[layout.MANAGER_RECORD], place)
             row[[layout.BODY_F, layout.BODY_G]] = pair.body_f, pair.body_g
             row[layout.SURFACE_F : layout.SHELL_G + 1] = pair.surface_f, pair.surface_g, pair.shell_f, pair.shell_g
-            row[layout.MINIMUM] = pair.minimum + watch_memory.IN_PLACE * given
+            row[layout.MINIMUM] = pair.minimum + manager_records.IN_PLACE * given
             row[layout.CLEARANCE_ROW_NUMBER] = number
     return table
 
 
 class _PairPacking:
-    """The pairs of a watch while they are packed; the trees of all their bodies come first."""
+    """The pairs of a contact manager while they are packed; the trees of all their bodies come first."""
 
     def __init__(self, writer: SceneWriter, pairs: Sequence[Pair], contacts: Sequence[GivenContact]) -> None:
         self._writer = writer
@@ -209,6 +209,6 @@ class _PairPacking:
     def write(self) -> tuple[int, int]:
         """How many pairs there are, and where their records begin."""
         given_place, _ = self._writer.add(self._given)
-        table = np.array(self._records, dtype=np.int64).reshape(-1, watch_memory.PAIR_RECORD)
-        rows_of(watch_memory.PAIR_DTYPE, table).given += given_place
+        table = np.array(self._records, dtype=np.int64).reshape(-1, manager_records.PAIR_RECORD)
+        rows_of(manager_records.PAIR_DTYPE, table).given += given_place
         return len(table), self._writer.add(table)[0]

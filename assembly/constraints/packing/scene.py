@@ -20,7 +20,7 @@ from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.objectives import Objective, Posture
 from assembly.constraints.model.trim_contact import TrimContact
 from assembly.constraints.packing import addresses
-from assembly.constraints.packing import manager as watch_packing
+from assembly.constraints.packing import manager as manager_packing
 from assembly.constraints.packing.elimination_order import FEW, block_record
 from assembly.constraints.packing.numbering import number_bodies
 from assembly.constraints.packing.revolutions import Turns
@@ -35,7 +35,7 @@ from assembly.constraints.program.primitives import RECORD as JOINT_FRAMES
 from assembly.errors import FARTHEST, InputError
 from assembly.kinematics.body import Body
 from assembly.proximity.features.solid_contact import TRACK
-from assembly.proximity.manager import records as watch_memory
+from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.events import fresh_memory, listed_places
 
 __all__ = ["Packed", "structure_of"]
@@ -121,9 +121,9 @@ class Packed:
             for contact, whole in zip(self.contacts, self.whole, strict=True)
         ]
         self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
-        self.guarded = watch_packing.guarded_pairs(self.clearances, bodies)
+        self.guarded = manager_packing.guarded_pairs(self.clearances, bodies)
         self.places = [
-            places * watch_packing.place_count(clearance, pairs)
+            places * manager_packing.slot_count(clearance, pairs)
             for clearance, pairs in zip(self.clearances, self.guarded, strict=True)
         ]
         self.guards = sum(self.places)
@@ -139,7 +139,7 @@ class Packed:
         self._memory = np.empty(0)
         if self.guards:
             # The first look sees what crosses at the start as well, if it is no deeper than this.
-            self._memory = fresh_memory(sum(map(len, self.guarded)), self.guards, watch_packing.LAST_REACH)
+            self._memory = fresh_memory(sum(map(len, self.guarded)), self.guards, manager_packing.LAST_MARGIN)
 
     def _write(
         self, bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
@@ -201,10 +201,10 @@ class Packed:
         rows = RowPacking(writer, constraints)
         rows.add_contacts(self.contacts, self.sides, self.whole)
         rows.add_guards(self.clearances, self.places)
-        writer.header[layout.WATCH] = -1
+        writer.header[layout.MANAGER_RECORD] = -1
         if self.guards:
             given = list(zip(self.contacts, self.sides, self.whole, strict=True))
-            writer.header[layout.WATCH] = watch_packing.pack_watch(
+            writer.header[layout.MANAGER_RECORD] = manager_packing.pack_manager(
                 writer, self.clearances, self.guarded, self.places, given
             )
         rows.add_trims(self.contacts)
@@ -234,7 +234,7 @@ class Packed:
 
     def is_crowded(self, state: Array) -> bool:
         """Whether contacts of clearances were near that found no place."""
-        return self.guards > 0 and state[self.memory_at + watch_memory.CROWDED] == 1.0
+        return self.guards > 0 and state[self.memory_at + manager_records.CROWDED] == 1.0
 
     def new_state(self) -> Array:
         """The state of a solve that knows nothing yet."""
@@ -252,7 +252,7 @@ class Packed:
     def table_at(self, state: Array) -> Table:
         """The table with the rows of clearances as a state has them; in the packed one they have no contacts."""
         has_guards = self.guards > 0 and state.size > self.memory_at
-        return watch_packing.table_with_guards(self.table, self._placed(state)) if has_guards else self.table
+        return manager_packing.table_with_guards(self.table, self._placed(state)) if has_guards else self.table
 
     def may_have_outgrown(self) -> bool:
         """Whether the size rests on values and places alone and the values have become others by far."""
@@ -276,7 +276,7 @@ class Packed:
         return taken
 
     def listed(self, state: Array) -> list[tuple[int, int]]:
-        """Of every place of a watch in a state: its pair of bodies, or -1, and the number of its contact."""
+        """Of every place of a contact manager in a state: its pair of bodies, or -1, and the number of its contact."""
         return [(pair, number) for pair, number, _given in self._placed(state)]
 
     def _placed(self, state: Array) -> list[list[int]]:
@@ -292,15 +292,15 @@ class Packed:
             record[[FACTORIZE_AT, SOLVE_AT]] = addresses.blocks()
         if self.pair_rows:
             table[layout.CONTACT_ROWS_AT] = addresses.contacts()
-        if any(self.whole) or any(watch_packing.is_of_surfaces(pair) for pairs in self.guarded for pair in pairs):
+        if any(self.whole) or any(manager_packing.is_of_surfaces(pair) for pairs in self.guarded for pair in pairs):
             table[layout.START_AT : layout.EXTREMAL_AT + 1] = addresses.surfaces()
         if self.shells:
             table[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
         if self.trims:
             table[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
         if self.guards:
-            table[[layout.LOOK_AT, layout.STAYED_AT, layout.PARTS_AT, layout.WENT_AT]] = addresses.watch()
-            manager = watch_memory.manager_at(table, table[layout.WATCH])
+            table[[layout.UPDATE_AT, layout.STAYED_AT, layout.PARTS_AT, layout.WENT_AT]] = addresses.manager()
+            manager = manager_records.manager_at(table, table[layout.MANAGER_RECORD])
             manager.track_solids = table[layout.TRACK_AT]
             manager.mark_address = addresses.places() if manager.mark_address else 0
         if table[table[layout.TAPE_WORKSPACE]] > 0:

@@ -2,7 +2,8 @@
 what stands where.
 
 A contact of two surfaces is a pair of points with a common normal, one of solids the closest features of both
-(`proximity/features/solid_contact.py`). Rows of a clearance are contacts as well, of what its watch has listed.
+(`proximity/features/solid_contact.py`). Rows of a clearance are contacts as well, of what its contact
+manager has listed.
 """
 
 from __future__ import annotations
@@ -277,8 +278,8 @@ def solids_row(store, r, start, patience, point):
     """Row r, of a contact of solids. Returns whether its pair was found.
 
     Where the pair that is tracked is lost, or an edge is farthest there, the closest one there is takes over, if the
-    row is one-sided or a step may end anywhere: the loop shortens steps as long as it can. A clearance has a watch for
-    that.
+    row is one-sided or a step may end anywhere: the loop shortens steps as long as it can. A clearance has a contact
+    manager for that.
     """
     pair = tracked_at(start, r)
     q, tracked, records = point.q, point.tracked, point.records

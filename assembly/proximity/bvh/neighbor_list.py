@@ -1,7 +1,7 @@
 """Pairs of patches that may face each other, or of parts of spines, kept from look to look of a pair of bodies.
 
 A descent of two trees (`proximity/bvh/tree.py`, `proximity/manager/centerlines/parts.py`) finds pairs for one pose. One
-that allows for a ring of
+that allows for a skin of
 poses finds all that any of them has, and not many more: what a look at one of these poses finds is sifted from the
 list. A list is a function of shapes and of the pose that it was made for, whoever asks; there are a few of them in the
 table, and pairs of bodies take turns.
@@ -29,8 +29,8 @@ NEIGHBOR_LIST = record_dtype(
     count=1,  # number of entries; -1: more than there is room for
     turn=4,  # the pose it is for: quaternion of the body that moves
     place=3,  # and the middle of its tree
-    ring=1,  # skin: how far that body may go from there
-    reach=1,  # query margin
+    skin=1,  # skin: how far that body may go from there
+    margin=1,  # query margin
 )
 neighbor_list_at = record_view(NEIGHBOR_LIST)
 ENTRIES = size_of(NEIGHBOR_LIST)
@@ -71,27 +71,27 @@ def moved_since(store, key):
 
 
 @kernel(inner=True)
-def reaches(table, at, moved, reach):
-    """Whether the list at `at` has what is within a reach after so far a motion: 1; 0 if not; -1 if it had no room."""
+def reaches(table, at, moved, margin):
+    """Whether the list at `at` has what is within a margin after so far a motion: 1; 0 if not; -1 if it had no room."""
     neighbors = neighbor_list_at(table, at)
-    if moved > GRAIN * neighbors.ring:
+    if moved > GRAIN * neighbors.skin:
         return 0
     if neighbors.count < 0:
         return -1
-    return 1 if reach + moved <= GRAIN * (neighbors.reach + neighbors.ring) else 0
+    return 1 if margin + moved <= GRAIN * (neighbors.margin + neighbors.skin) else 0
 
 
 @kernel(inner=True)
-def can_be_listed(store, moving, reach):
+def can_be_listed(store, moving, margin):
     """Whether lengths of a list are in its range."""
     root = tree_node(store, moving.tree, 0)
     middle = add(matvec(moving.turn, three_of(root.center)), moving.shift)
-    return dot(middle, middle) < FAR * FAR and reach < FAR and root.radius < FAR
+    return dot(middle, middle) < FAR * FAR and margin < FAR and root.radius < FAR
 
 
 @kernel(inner=True)
-def write_list(store, key, reach, ring, found, count):
-    """Keep `count` pairs (k, 2), made for motions up to `ring`; none where there is no room. Whether there was."""
+def write_list(store, key, margin, skin, found, count):
+    """Keep `count` pairs (k, 2), made for motions up to `skin`; none where there is no room. Whether there was."""
     moving = key.moving
     neighbors = neighbor_list_at(store.table, key.at)
     root = tree_node(store, moving.tree, 0)
@@ -102,8 +102,8 @@ def write_list(store, key, reach, ring, found, count):
     for k in range(3):
         neighbors.place[k] = np.int64(middle[k] / GRAIN)
     # Less by more than what the pose is rounded by, at a radius of FAR.
-    neighbors.ring = np.int64((ring - 1e-10) / GRAIN)
-    neighbors.reach = np.int64(reach / GRAIN)
+    neighbors.skin = np.int64((skin - 1e-10) / GRAIN)
+    neighbors.margin = np.int64(margin / GRAIN)
     if count < 0 or count > ROOM or count > found.shape[0]:
         neighbors.count = -1
         return False
@@ -116,18 +116,18 @@ def write_list(store, key, reach, ring, found, count):
 
 
 @kernel(inner=True)
-def listed_pairs(store, key, trees, pose, reach, ring, stack, candidates):
+def listed_pairs(store, key, trees, pose, margin, skin, stack, candidates):
     """What `pairs_within` finds, from the list of a `ListKey`, which is made anew where it does not reach.
 
-    The pose is that of g seen from f; a new list is for motions up to `ring`. -1 where there is no room for a list.
+    The pose is that of g seen from f; a new list is for motions up to `skin`. -1 where there is no room for a list.
     """
-    fits = reaches(store.table, key.at, moved_since(store, key), reach)
-    if fits < 0 or (fits == 0 and not can_be_listed(store, key.moving, ring + reach)):
+    fits = reaches(store.table, key.at, moved_since(store, key), margin)
+    if fits < 0 or (fits == 0 and not can_be_listed(store, key.moving, skin + margin)):
         return -1
     if fits == 0:
-        tilt = ring / tree_node(store, key.moving.tree, 0).radius
-        count = pairs_about(store, trees, pose, reach, ring, tilt, stack, candidates)
-        if not write_list(store, key, reach, ring, candidates, count):
+        tilt = skin / tree_node(store, key.moving.tree, 0).radius
+        count = pairs_about(store, trees, pose, margin, skin, tilt, stack, candidates)
+        if not write_list(store, key, margin, skin, candidates, count):
             return -1
     count = neighbor_list_at(store.table, key.at).count
-    return still_within(store, trees, pose, reach, key.at + ENTRIES, count, candidates)
+    return still_within(store, trees, pose, margin, key.at + ENTRIES, count, candidates)

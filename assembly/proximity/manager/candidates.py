@@ -17,7 +17,7 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, scale, sub
 from assembly.proximity.bvh.neighbor_list import LIST_INTS, ListKey, listed_pairs
 from assembly.proximity.bvh.tree import box_distance, node_of, pairs_within, seen_from, three_of, view_of
-from assembly.proximity.manager.motion_bounds import LEAST_ALLOWANCE
+from assembly.proximity.manager.motion_bounds import LEAST_MOTION_BOUND
 from assembly.proximity.manager.records import TAKE, header_of, lengths_of, pair_lengths_of, record_of
 
 # The skin of lists of patches that face each other: they are for motions up to so many of the least query margin.
@@ -88,7 +88,7 @@ def candidate_pairs(manager, p, posed, moving, margin, stack, pairs):
     record = record_of(manager)
     least = pair_lengths_of(manager, p).least
     found = np.int64(-1)
-    skin = SKIN * lengths_of(manager).first_reach
+    skin = SKIN * lengths_of(manager).first_margin
     if record.lists > 0 and margin <= skin:
         key = ListKey(record.list_table + LIST_INTS * (p % record.lists), p, moving)
         found = listed_pairs(store, key, trees, pose, margin + least, skin, stack, pairs)
@@ -96,7 +96,7 @@ def candidate_pairs(manager, p, posed, moving, margin, stack, pairs):
         found = pairs_within(store, trees, pose, margin + least, stack, pairs)
         if 0 <= found <= pairs.shape[0]:
             break
-        if margin < LEAST_ALLOWANCE:
+        if margin < LEAST_MOTION_BOUND:
             # There is no room for what is as near as it should not be.
             found = pairs.shape[0] if found > 0 else 0
             header_of(manager).crowded = 1.0

@@ -209,7 +209,7 @@ def mark(manager, p, q, tracked, extrema, stack):
     pair = pair_of(manager, p)
     posed = posed_pair(manager, p, q)
     least = pair_lengths_of(manager, p).least
-    merge_radius = lengths_of(manager).neglect
+    merge_radius = lengths_of(manager).merge_radius
     known = 0
     for c in range(pair.given_count):
         given = given_at(table, pair.given + GIVEN_RECORD * c)

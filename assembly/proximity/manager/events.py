@@ -1,4 +1,4 @@
-"""What a watch did: contacts that came near, went away, were handed back to the global stage, or merged."""
+"""What a contact manager did: contacts that came near, went away, were handed back to the global stage, or merged."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import rows_of
-from assembly.proximity.manager import records as watch_memory
+from assembly.proximity.manager import records as manager_records
 
 __all__ = ["Event", "EventKind", "EventReason", "PairState", "events_of", "fresh_memory", "listed_places"]
 
@@ -74,24 +74,24 @@ _KINDS, _REASONS = tuple(EventKind), tuple(EventReason)
 
 
 def fresh_memory(pairs: int, places: int, reach: float) -> Array:
-    """What a watch knows that has seen nothing yet; `reach` is that of its first looks."""
-    pairs_at = watch_memory.MEMORY_HEADER
-    places_at = pairs_at + watch_memory.PAIR_MEMORY * pairs
-    events_at = places_at + watch_memory.PLACE_MEMORY * places
-    memory = np.zeros(events_at + watch_memory.EVENT * watch_memory.EVENTS)
-    states = memory[pairs_at:places_at].reshape(pairs, watch_memory.PAIR_MEMORY)
-    known = rows_of(watch_memory.PAIR_STATE, states)
+    """What a contact manager knows that has seen nothing yet; `reach` is that of its first looks."""
+    pairs_at = manager_records.MEMORY_HEADER
+    places_at = pairs_at + manager_records.PAIR_MEMORY * pairs
+    events_at = places_at + manager_records.PLACE_MEMORY * places
+    memory = np.zeros(events_at + manager_records.EVENT * manager_records.EVENTS)
+    states = memory[pairs_at:places_at].reshape(pairs, manager_records.PAIR_MEMORY)
+    known = rows_of(manager_records.PAIR_STATE, states)
     known.turn[:, 0] = np.nan
-    known.reach = reach
-    slots = memory[places_at:events_at].reshape(places, watch_memory.PLACE_MEMORY)
-    rows_of(watch_memory.PLACE_STATE, slots).pair = -1.0
+    known.margin = reach
+    slots = memory[places_at:events_at].reshape(places, manager_records.PLACE_MEMORY)
+    rows_of(manager_records.PLACE_STATE, slots).pair = -1.0
     return memory
 
 
 def listed_places(memory: Array, pairs: int, places: int) -> list[list[int]]:
     """Of every place its pair of bodies, or -1, the number of its contact, and 1 if that is in a given one's place."""
-    at = watch_memory.MEMORY_HEADER + watch_memory.PAIR_MEMORY * pairs
-    rows = memory[at : at + watch_memory.PLACE_MEMORY * places].reshape(-1, watch_memory.PLACE_MEMORY)
+    at = manager_records.MEMORY_HEADER + manager_records.PAIR_MEMORY * pairs
+    rows = memory[at : at + manager_records.PLACE_MEMORY * places].reshape(-1, manager_records.PLACE_MEMORY)
     return [[int(value) for value in row] for row in rows.tolist()]
 
 
@@ -107,11 +107,11 @@ def events_of(memory: Array, names: list[tuple[str, str]], scale: float, since: 
         Length of one.
     since : int
     """
-    count = int(watch_memory.memory_header_at(memory, 0).event_count)
-    rows = memory[-watch_memory.EVENT * watch_memory.EVENTS :].reshape(-1, watch_memory.EVENT)
+    count = int(manager_records.memory_header_at(memory, 0).event_count)
+    rows = memory[-manager_records.EVENT * manager_records.EVENTS :].reshape(-1, manager_records.EVENT)
     return tuple(
         Event(_KINDS[int(kind)], _REASONS[int(reason)], names[int(pair)], int(contact), gap * scale)
         for kind, reason, pair, contact, gap, _ in rows[
-            [k % watch_memory.EVENTS for k in range(max(since, count - watch_memory.EVENTS), count)]
+            [k % manager_records.EVENTS for k in range(max(since, count - manager_records.EVENTS), count)]
         ].tolist()
     )

@@ -28,7 +28,7 @@ from assembly.proximity.manager.records import (
 )
 
 # Where nothing may move a pair is looked at after every step.
-LEAST_ALLOWANCE = 1e-12
+LEAST_MOTION_BOUND = 1e-12
 # What moved by less than this part of its motion bound, 1e-9 of the scene's size, is where it was.
 STILL = 1e-8
 # A query margin is for so many moves as the last ones; of round wires, whose updates take a tenth of the time, for
@@ -114,7 +114,7 @@ def root_ball(store, moving):
 def margin_now(manager, p, moving):
     """Keep where the bodies of pair p stand now. Returns its query margin: for some moves as since the last update."""
     header, known, lengths = header_of(manager), pair_state_of(manager, p), lengths_of(manager)
-    margin = known.reach
+    margin = known.margin
     pair = pair_of(manager, p)
     middle, radius = root_ball(manager.store, moving)
     if not math.isnan(known.turn[0]):
@@ -122,9 +122,9 @@ def margin_now(manager, p, moving):
         pace += 2.0 * radius * turned_by(known, moving.quaternion)
         pace /= max(header.calls - known.called, 1.0)
         # After a step that was cut, as far as it was to go; but it goes no farther where contacts may be born.
-        moves = MOVES if pair.spine_f < 0 else MOVES_OF_WIRES
+        moves = MOVES if pair.centerline_f < 0 else MOVES_OF_WIRES
         asked = max(moves * pace, min(known.cut_short, pair_lengths_of(manager, p).curved_bound))
-        margin = min(max(asked, lengths.first_reach), lengths.last_reach)
+        margin = min(max(asked, lengths.first_margin), lengths.last_margin)
     known.cut_short = 0.0
     known.called = header.calls
     center = add(matvec(moving.turn, middle), moving.shift)
@@ -141,7 +141,7 @@ def allow_ball(known, ball, bound, sure):
 
     Infinite: there is no ball. What is `sure` is how far, until a pose that stays is looked at; 0 if any that moved is.
     """
-    known.ball_allowance = bound
+    known.ball_bound = bound
     known.sure = sure
     if bound < math.inf:
         known.ball_radius = ball.radius
@@ -167,10 +167,10 @@ def part_used(manager, p, q):
     moved = moved_from(middle, three_of(known.place), moving) + 2.0 * radius * angle
     if not moved > 0.0:
         return 0.0
-    part = moved / known.allowance
-    if known.ball_allowance < known.allowance or 0.0 < known.sure < math.inf:
+    part = moved / known.motion_bound
+    if known.ball_bound < known.motion_bound or 0.0 < known.sure < math.inf:
         moved = moved_from(three_of(known.ball), three_of(known.ball_place), moving) + 2.0 * known.ball_radius * angle
-        part = max(part, moved / known.ball_allowance)
+        part = max(part, moved / known.ball_bound)
         if known.sure > 0.0:
             known.doubt = moved / known.sure
     if known.sure == 0.0:

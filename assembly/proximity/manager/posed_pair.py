@@ -32,7 +32,7 @@ def posed_pair(manager, p, q):
         surfaces=(pair.surface_f, pair.surface_g),
         shells=(pair.shell_f, pair.shell_g),
         trees=(pair.tree_f, pair.tree_g),
-        centerlines=(pair.spine_f, pair.spine_g),
+        centerlines=(pair.centerline_f, pair.centerline_g),
         offsets=(lengths.offset[0], lengths.offset[1]),
         bodies=(i, j),
         poses=q,

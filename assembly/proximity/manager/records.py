@@ -41,9 +41,9 @@ GOES_ON, ENDS, ABORTED = 0, 1, 2
 # The lengths of a contact manager in the pool [over the size of the scene].
 LENGTHS_DTYPE = record_dtype(
     "f8",
-    neglect=1,  # merge radius: extrema nearer to each other, and along the surfaces, are one
-    first_reach=1,  # query margin of a first update, and the least one
-    last_reach=1,  # the largest query margin
+    merge_radius=1,  # merge radius: extrema nearer to each other, and along the surfaces, are one
+    first_margin=1,  # query margin of a first update, and the least one
+    last_margin=1,  # the largest query margin
 )
 lengths_at = record_view(LENGTHS_DTYPE)
 LENGTH_COUNT = size_of(LENGTHS_DTYPE)
@@ -64,8 +64,8 @@ PAIR_DTYPE = record_dtype(
     given=1,  # where the records of given contacts between the two begin (`extrema.py`)
     given_count=1,
     smaller=1,  # which body's motion is measured: 0 f, 1 g, the smaller one
-    spine_f=1,  # records of the centerlines of two round wires, or -1
-    spine_g=1,
+    centerline_f=1,  # records of the centerlines of two round wires, or -1
+    centerline_g=1,
 )
 pair_at = record_view(PAIR_DTYPE)
 PAIR_RECORD = size_of(PAIR_DTYPE)
@@ -104,14 +104,14 @@ PAIR_STATE = record_dtype(
     "f8",
     turn=4,  # how that body was turned, a quaternion; NaN before the first update
     place=3,  # where the middle of its tree was
-    allowance=1,  # motion bound: until a point of it went so far, nothing that is not listed can touch
-    reach=1,  # query margin
+    motion_bound=1,  # motion bound: until a point of it went so far, nothing that is not listed can touch
+    margin=1,  # query margin
     state=1,  # FAR, NEAR or TRACKING
     called=1,  # calls at the last update
     ball=3,  # motion ball: its middle on the body
     ball_radius=1,
     ball_place=3,  # where its middle was
-    ball_allowance=1,  # motion bound of what is in the ball; infinite: there is no ball
+    ball_bound=1,  # motion bound of what is in the ball; infinite: there is no ball
     part=1,  # which part of its motion bounds is used
     sure=1,  # how far what is in the ball may go until an accepted pose needs an update, as folds may have contacts
     crossed=1,  # 1: the bodies are in each other where no contact says so; NaN: the last update did not ask
@@ -121,8 +121,8 @@ PAIR_STATE = record_dtype(
 )
 pair_state_at = record_view(PAIR_STATE)
 TURN = place_of(PAIR_STATE, "turn")
-ALLOWANCE = place_of(PAIR_STATE, "allowance")
-REACH = place_of(PAIR_STATE, "reach")
+MOTION_BOUND = place_of(PAIR_STATE, "motion_bound")
+QUERY_MARGIN = place_of(PAIR_STATE, "margin")
 STATE = place_of(PAIR_STATE, "state")
 PART = place_of(PAIR_STATE, "part")
 CROSSED = place_of(PAIR_STATE, "crossed")

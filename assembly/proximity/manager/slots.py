@@ -145,7 +145,7 @@ def known_extrema(manager, p, posed, tracked, extrema):
     Returns whether any was lost.
     """
     pair = pair_of(manager, p)
-    merge_radius = lengths_of(manager).neglect
+    merge_radius = lengths_of(manager).merge_radius
     # A contact that is to close a gap would contradict a clearance that asks for one, if both were one extremum.
     radius = merge_radius if pair_lengths_of(manager, p).least == 0.0 else math.inf
     add_given(posed, tracked, pair.given, pair.given_count if posed.surfaces[0] >= 0 else 0, radius, extrema)
@@ -241,7 +241,7 @@ def list_extrema(manager, p, extrema, tracked):
     """
     header, known = header_of(manager), pair_state_of(manager, p)
     wanting = False
-    margin = known.reach
+    margin = known.margin
     least = pair_lengths_of(manager, p).least
     rest = math.inf
     lowest = math.inf

@@ -39,7 +39,7 @@ from assembly.proximity.manager.extrema import (
 )
 from assembly.proximity.manager.flush import any_deep, drop_flush
 from assembly.proximity.manager.motion_bounds import (
-    LEAST_ALLOWANCE,
+    LEAST_MOTION_BOUND,
     STILL,
     PairSearch,
     allow_ball,
@@ -118,8 +118,8 @@ CROSSING = 1e-6
 def list_vertex_contacts(manager, p, posed, workspace, extrema, tracked):
     """Add corners over faces to the extrema of pair p. A listed contact whose extremum is at one stays there."""
     lengths = lengths_of(manager)
-    span = (-lengths.first_reach, pair_state_of(manager, p).reach + pair_lengths_of(manager, p).least)
-    add_vertex_contacts(posed, span, lengths.neglect, workspace.stack, workspace.candidates, extrema)
+    span = (-lengths.first_margin, pair_state_of(manager, p).margin + pair_lengths_of(manager, p).least)
+    add_vertex_contacts(posed, span, lengths.merge_radius, workspace.stack, workspace.candidates, extrema)
     for k in range(extrema.count[0]):
         extremum = extremum_at(extrema.rows, k)
         slot = np.int64(extremum.origin)
@@ -165,11 +165,11 @@ def search_by_patches(manager, p, posed, moving, margin, tracked, workspace, ext
     lengths, asked = lengths_of(manager), pair_lengths_of(manager, p)
     least, curved_bound = asked.least, asked.curved_bound
     found, margin = candidate_pairs(manager, p, posed, moving, margin, stack, pairs)
-    pair_state_of(manager, p).reach = margin
+    pair_state_of(manager, p).margin = margin
     any_gone = known_extrema(manager, p, posed, tracked, extrema)
     facing = Candidates(pairs, distances, found)
     enough = near_enough(posed, least, margin, curved_bound, facing)
-    limits = Limits(curved_bound, enough, (-lengths.last_reach, margin + least), lengths.neglect)
+    limits = Limits(curved_bound, enough, (-lengths.last_margin, margin + least), lengths.merge_radius)
     search = search_patches(posed, moving, limits, facing, extrema, workspace.passed)
     bound = min(search.bound, margin)
     if found == 0:
@@ -185,14 +185,14 @@ def search_by_centerlines(manager, p, posed, moving, margin, tracked, workspace,
     lengths, asked = lengths_of(manager), pair_lengths_of(manager, p)
     least = asked.least
     radii = both_radii(store, posed.centerlines) + least
-    skin = CENTERLINE_SKIN * lengths.first_reach
+    skin = CENTERLINE_SKIN * lengths.first_margin
     at_list = record.list_table + LIST_INTS * (p % record.lists)
     waiting = near_parts(posed, at_list, p, moving, radii + margin, skin, workspace)
-    while waiting < 0 and margin > LEAST_ALLOWANCE:
+    while waiting < 0 and margin > LEAST_MOTION_BOUND:
         # Out of room: what is nearer is looked at more often.
         margin *= 0.5
         waiting = near_parts(posed, at_list, p, moving, radii + margin, skin, workspace)
-    pair_state_of(manager, p).reach = margin
+    pair_state_of(manager, p).margin = margin
     any_gone = known_extrema(manager, p, posed, tracked, extrema)
     if waiting < 0:
         # There is no room for what is as near as it should not be.
@@ -203,7 +203,7 @@ def search_by_centerlines(manager, p, posed, moving, margin, tracked, workspace,
         return PairSearch(beyond, math.inf, no_ball(), math.inf), any_gone, False
     # No tangent turns by more than a motion over this.
     rho = min(2.0 * (radii + margin), 0.99 * root_ball(store, moving)[1])
-    limits = CenterlineLimits(least, TAKE * margin, margin, asked.curved_bound, lengths.neglect, rho)
+    limits = CenterlineLimits(least, TAKE * margin, margin, asked.curved_bound, lengths.merge_radius, rho)
     search = search_centerlines(posed, moving, limits, workspace.boxes, waiting, workspace.marks, extrema)
     return search, any_gone, True
 
@@ -252,15 +252,15 @@ def update_pair(manager, p, q, tracked, workspace, extrema, asks):
 def keep_bounds(manager, p, search, rest, extrema):
     """Keep how far pair p may go until its next update, by a PairSearch and by the `rest`, which has no slot."""
     known = pair_state_of(manager, p)
-    known.allowance = max(min(rest, search.bound), LEAST_ALLOWANCE)
+    known.motion_bound = max(min(rest, search.bound), LEAST_MOTION_BOUND)
     known.part = 0.0
     known.doubt = 0.0
     fertile, sure = search.ball_bound, search.accepted_bound
     if not is_by_patches(manager, p):
-        sure = max(sure, STILL * known.allowance)
+        sure = max(sure, STILL * known.motion_bound)
     elif fertile < math.inf:
-        low = nearest_fold(extrema, pair_lengths_of(manager, p).least, known.reach)
-        sure = 0.0 if low <= FLAT * lengths_of(manager).first_reach else math.inf
+        low = nearest_fold(extrema, pair_lengths_of(manager, p).least, known.margin)
+        sure = 0.0 if low <= FLAT * lengths_of(manager).first_margin else math.inf
         fertile = fertile if sure == 0.0 else min(fertile, low)
     allow_ball(known, search.ball, fertile, sure)
 
@@ -277,7 +277,7 @@ def any_crossed(table, at, memory):
 @kernel(inline=True)
 def is_by_patches(manager, p):
     """Whether pair p is looked at by patches, and not by the centerlines of two round wires."""
-    return pair_of(manager, p).spine_f < 0
+    return pair_of(manager, p).centerline_f < 0
 
 
 @kernel(inner=True)
@@ -292,7 +292,7 @@ def is_due(manager, p, tracked, how, most):
         due = part > (1.0 if how & SPARING != 0 else much)
         if how & IN_TURNS != 0:
             due = due or (p == most and part > USED)
-            due = due or (part > BRIEF and known.cut_short > known.allowance)
+            due = due or (part > BRIEF and known.cut_short > known.motion_bound)
         due = due or (how & CAREFUL != 0 and known.doubt > 1.0)
     return due or any_lost(manager, p, tracked)
 

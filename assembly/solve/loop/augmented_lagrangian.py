@@ -64,7 +64,7 @@ def solve_in(store, settings, state, history, tips, doubles, integers):
     table = store.table
     workspace = carve_all(store, memory_of(table, state), tips, doubles, integers)
     results, limits = results_of(table, state), settings_at(settings, 0)
-    tick, any_pose, watched = limits.tick == 1.0, limits.any_pose == 1.0, header_at(table, 0).watch >= 0
+    tick, any_pose, watched = limits.tick == 1.0, limits.any_pose == 1.0, header_at(table, 0).manager_record >= 0
     task = Task(
         program=workspace.program,
         settings=settings,

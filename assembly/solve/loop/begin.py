@@ -90,8 +90,8 @@ def find_contacts(program, settings, state, current, rows, n):
     header = header_at(store.table, 0)
     free, lengths, memory = lifted.free, lifted.lengths, lifted.memory
     memory_header = memory_header_at(memory, 0)
-    recalled, tick = int(limits.recall), limits.tick == 1.0
-    watched = header.watch >= 0
+    warm, tick = int(limits.warm_start), limits.tick == 1.0
+    watched = header.manager_record >= 0
     came = False
     if watched:
         place_clearance_rows(store.table, lifted, current, rows, True)
@@ -106,7 +106,7 @@ def find_contacts(program, settings, state, current, rows, n):
         return lost, False
     if watched:
         arrange(store.table, free, program.structure, header.rows, n)
-    if recalled == 0 or came or not warm_start(store.table, state, recalled, current):
+    if warm == 0 or came or not warm_start(store.table, state, warm, current):
         lost = evaluate(program, current.tracked, math.inf, current)
         if lost < 0:
             let_touch(store.table, current, overlap_allowed(settings))
@@ -119,7 +119,7 @@ def put_together(program, current, rows):
     store, lifted = program.store, program.lifted
     header = header_at(store.table, 0)
     free, lengths, memory = lifted.free, lifted.lengths, lifted.memory
-    watched = header.watch >= 0
+    watched = header.manager_record >= 0
     assemble(store, program.structure.bases, header.slots, current)
     for k in range(header.contacts):
         current.tracked[k, 0] = math.nan
@@ -150,7 +150,7 @@ def set_out(program, settings, state, current, rows, n):
     results = results_of(store.table, state)
     result = results_at(results, 0)
     result.culprit = -1.0
-    result.held = 0.0
+    result.last_feasible = 0.0
     result.curved = 0.0
     tick = limits.tick == 1.0
     lost, evaluated = find_contacts(program, settings, state, current, rows, n)

@@ -1,4 +1,4 @@
-"""Rows of clearances: places of a watch (`proximity/manager/update.py`) as one-sided contacts of a packed scene."""
+"""Rows of clearances: slots of a contact manager (`proximity/manager/update.py`) as one-sided contacts of a scene."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ def clear_clearance_rows(table):
 def forget_clearance_rows(table, memory):
     """Begin again: nothing has been looked at, and no contact has a place."""
     header = header_at(table, 0)
-    watch = header.watch
-    pairs, places, _events = memory_places(table, watch)
-    for p in range(manager_at(table, watch).pairs):
+    record = header.manager_record
+    pairs, places, _events = memory_places(table, record)
+    for p in range(manager_at(table, record).pairs):
         pair_state_at(memory, pairs + PAIR_MEMORY * p).turn[0] = math.nan
     for k in range(header.guards):
         place_at(memory, places + PLACE_MEMORY * k).pair = -1.0
@@ -63,9 +63,9 @@ def place_clearance_rows(table, lifted, current, rows, begins):
     Where a solve begins, rows know no contacts yet, and multipliers are those of the places.
     """
     header = header_at(table, 0)
-    watch = header.watch
+    record = header.manager_record
     memory, free = lifted.memory, lifted.free
-    places = memory_places(table, watch)[1]
+    places = memory_places(table, record)[1]
     for k in range(header.guards):
         slot = place_at(memory, places + PLACE_MEMORY * k)
         r = header.first_guard + k
@@ -88,7 +88,7 @@ def place_clearance_rows(table, lifted, current, rows, begins):
             contact.body_f = -1
             contact.body_g = -1
             continue
-        pair_record = pair_at(table, manager_at(table, watch).pair_table + PAIR_RECORD * p)
+        pair_record = pair_at(table, manager_at(table, record).pair_table + PAIR_RECORD * p)
         contact.body_f = pair_record.body_f
         contact.body_g = pair_record.body_g
         in_place = slot.given == 1.0
@@ -101,7 +101,7 @@ def place_clearance_rows(table, lifted, current, rows, begins):
 
 @kernel(inner=True)
 def update_around(store, memory, point, how):
-    """The watch's look at a point; whether rows changed.
+    """The contact manager's look at a point; whether rows changed.
 
     A long one asks between two slices whether it is to go on. Where what it is for is thrown away, it ends as one that
     is cut (`solve/loop/deadline.py`), and so do those that come after it; they say that rows changed: nothing is known
@@ -109,15 +109,15 @@ def update_around(store, memory, point, how):
     """
     header = header_at(store.table, 0)
     state = memory_header_at(memory, 0)
-    watch = header.watch
-    manager = manager_at(store.table, watch)
+    record = header.manager_record
+    manager = manager_at(store.table, record)
     asks = manager.go_on_address != 0 and manager.clock != 0
     if asks and state.deadline < 0.0:
         return True
     if asks:
         state.deadline = call_address(manager.clock, ()) + SLICE
     changed = (
-        call_address(header.look_address, (store.table, store.pool, watch, memory, point.q, point.tracked, how)) > 0
+        call_address(header.update_address, (store.table, store.pool, record, memory, point.q, point.tracked, how)) > 0
     )
     aborted = asks and state.deadline < 0.0
     if asks and not aborted:
@@ -127,7 +127,7 @@ def update_around(store, memory, point, how):
 
 @kernel(inner=True)
 def update_again(store, lifted, point, how):
-    """The watch's look at a point that is evaluated; whether rows changed.
+    """The contact manager's look at a point that is evaluated; whether rows changed.
 
     A look puts contacts on their extrema. Those whose coordinates are unknowns are on their way there: their rows have
     been evaluated where they are, and they stay. One that is as far from the extremum that it stands for as two
@@ -140,8 +140,8 @@ def update_again(store, lifted, point, how):
         if free[r] >= 0:
             copy_tracked(tracked, r, scratch)
     changed = update_around(store, memory, point, how)
-    places = memory_places(store.table, header.watch)[1]
-    merge_radius = lengths_at(store.pool, manager_at(store.table, header.watch).lengths).neglect
+    places = memory_places(store.table, header.manager_record)[1]
+    merge_radius = lengths_at(store.pool, manager_at(store.table, header.manager_record).lengths).merge_radius
     for r in range(first, first + header.guards):
         place = places + PLACE_MEMORY * (r - first)
         number = np.int64(place_at(memory, place).number) if place_at(memory, place).pair >= 0.0 else 0
@@ -170,8 +170,8 @@ def numbers_of(table, out):
 def go_back(table, memory, numbers):
     """Keep the contacts that rows had with these numbers; where others came or went, everything is looked at again."""
     header = header_at(table, 0)
-    watch = header.watch
-    pairs, places, _events = memory_places(table, watch)
+    record = header.manager_record
+    pairs, places, _events = memory_places(table, record)
     same = True
     for k in range(header.guards):
         number = contact_of(table, header.first_guard + k).guard_number
@@ -179,7 +179,7 @@ def go_back(table, memory, numbers):
             same = False
             place_at(memory, places + PLACE_MEMORY * k).pair = -1.0
     if not same:
-        for p in range(manager_at(table, watch).pairs):
+        for p in range(manager_at(table, record).pairs):
             pair_state_at(memory, pairs + PAIR_MEMORY * p).turn[0] = math.nan
 
 
@@ -187,30 +187,30 @@ def go_back(table, memory, numbers):
 def measure(store, memory, first, end, q):
     """Measure what pairs from first to before `end` used of their allowances. The largest part that is known."""
     header = header_at(store.table, 0)
-    watch = header.watch
-    most = call_address(header.parts_address, (store.table, store.pool, watch, memory, first, end, q))
-    return pair_state_at(memory, memory_places(store.table, watch)[0] + PAIR_MEMORY * most).part
+    record = header.manager_record
+    most = call_address(header.parts_address, (store.table, store.pool, record, memory, first, end, q))
+    return pair_state_at(memory, memory_places(store.table, record)[0] + PAIR_MEMORY * most).part
 
 
 @kernel(inner=True)
 def allowed_share(store, memory, current, trial, step, share):
-    """How much of a step the watch allows, at most `share`, and whether it is all of that.
+    """How much of a step the contact manager allows, at most `share`, and whether it is all of that.
 
     The poses at the end of the share go into the trial point. Of what it would use of allowances there it is then known
     of which pairs more is known by another look.
     """
     move(store.table, current.q, step, share, trial.q)
-    watch = header_at(store.table, 0).watch
-    manager = manager_at(store.table, watch)
+    record = header_at(store.table, 0).manager_record
+    manager = manager_at(store.table, record)
     if measure(store, memory, 0, manager.pairs, trial.q) <= 1.0:
         return share, True
-    at = memory_places(store.table, watch)[0]
+    at = memory_places(store.table, record)[0]
     allowed = 1.0
     for p in range(manager.pairs):
         # Of every pair by itself: one that is nearly spent, but hardly moves, is not in the way.
         o = pair_state_at(memory, at + PAIR_MEMORY * p)
         end = o.part
-        o.cut_short = end * o.allowance
+        o.cut_short = end * o.motion_bound
         begin = end
         if end > USED:
             measure(store, memory, p, p + 1, current.q)
@@ -219,8 +219,8 @@ def allowed_share(store, memory, current, trial, step, share):
         if end > max(begin, 1.0):
             allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
         flank = pair_at(store.table, manager.pair_table + PAIR_RECORD * p).minimum + 1
-        most = min(store.pool[flank], lengths_at(store.pool, manager.lengths).last_reach)
-        if begin <= STILL and o.reach >= min(o.cut_short, most):
+        most = min(store.pool[flank], lengths_at(store.pool, manager.lengths).last_margin)
+        if begin <= STILL and o.margin >= min(o.cut_short, most):
             # It was looked at right here, as far as another look would.
             o.part = begin
     return share * allowed, False
@@ -228,8 +228,11 @@ def allowed_share(store, memory, current, trial, step, share):
 
 @kernel(inner=True)
 def is_too_far(store, memory, point):
-    """Whether the poses of a point are farther than the watch allows."""
-    return measure(store, memory, 0, manager_at(store.table, header_at(store.table, 0).watch).pairs, point.q) > 1.0
+    """Whether the poses of a point are farther than the contact manager allows."""
+    return (
+        measure(store, memory, 0, manager_at(store.table, header_at(store.table, 0).manager_record).pairs, point.q)
+        > 1.0
+    )
 
 
 @kernel(inner=True)
@@ -240,8 +243,8 @@ def ends_unseen(store, memory, before, after):
     through, and be found at the far side, or nowhere.
     """
     header = header_at(store.table, 0)
-    watch = header.watch
-    places = memory_places(store.table, watch)[1]
+    record = header.manager_record
+    places = memory_places(store.table, record)[1]
     for k in range(header.guards):
         r = header.first_guard + k
         p = np.int64(place_at(memory, places + PLACE_MEMORY * k).pair)
@@ -252,6 +255,6 @@ def ends_unseen(store, memory, before, after):
             and is_of_solids(store.table, r)
         ):
             most = max(before.residual[r], SLIGHTLY)
-            if call_address(header.went_address, (store.table, store.pool, watch, p, before.q, after.q, most)) == 1:
+            if call_address(header.went_address, (store.table, store.pool, record, p, before.q, after.q, most)) == 1:
                 return True
     return False

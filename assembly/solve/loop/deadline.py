@@ -27,7 +27,7 @@ def is_spent(table, settings, begin, part):
 @kernel(inline=True)
 def is_cut(table, memory):
     """Whether a look left out pairs that were due: then this call ends."""
-    return header_at(table, 0).watch >= 0 and memory_header_at(memory, 0).deadline < 0.0
+    return header_at(table, 0).manager_record >= 0 and memory_header_at(memory, 0).deadline < 0.0
 
 
 @kernel(inner=True)
@@ -41,13 +41,13 @@ def begin_tick(table, settings, results, memory):
     state = memory_header_at(memory, 0)
     result = results_at(results, 0)
     limits = settings_at(settings, 0)
-    manager = manager_at(table, header.watch)
+    manager = manager_at(table, header.manager_record)
     begin = call_address(header.clock_address, ()) if limits.budget > 0.0 else 0
     is_new = result.carried == 0.0
     done = 0 if is_new else int(result.carried) - 1
     result.carried = 0.0
     looks = math.inf
-    if header.watch >= 0:
+    if header.manager_record >= 0:
         state.deadline = math.inf
         # Looks of ticks are short, and with a budget end by it.
         asks = limits.tick == 0.0
@@ -80,5 +80,5 @@ def may_end(table, settings, memory, clock, iteration, part):
 def set_deadline(table, settings, memory, begin):
     """After a step looks may end early."""
     limits = settings_at(settings, 0)
-    if limits.carries == 1.0 and header_at(table, 0).watch >= 0 and not is_cut(table, memory):
+    if limits.carries == 1.0 and header_at(table, 0).manager_record >= 0 and not is_cut(table, memory):
         memory_header_at(memory, 0).deadline = begin + HALF * limits.budget

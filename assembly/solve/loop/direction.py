@@ -25,7 +25,7 @@ def first_shift(program, restoring, shift, violation, dual):
     slopes do, too; contacts of a clearance come and go instead.
     """
     least, off = LEAST_SHIFT, dual
-    if restoring and violation < CLOSE and header_at(program.store.table, 0).watch < 0:
+    if restoring and violation < CLOSE and header_at(program.store.table, 0).manager_record < 0:
         least, off = max(min(SHIFT * violation, least), TINIEST_SHIFT), violation
     return max(min(0.25 * shift, off), least)
 

@@ -45,7 +45,7 @@ def tells_crossing(program, current, rows):
     return (
         lost >= 0
         or not is_clear(table, current.residual)
-        or any_crossed(table, header_at(table, 0).watch, lifted.memory)
+        or any_crossed(table, header_at(table, 0).manager_record, lifted.memory)
     )
 
 
@@ -54,7 +54,7 @@ def return_to(program, held, rows, current, tick):
     """Back to the last pose that held; what is near there is looked for again."""
     store, lifted = program.store, program.lifted
     bring_back(held, rows, current)
-    if header_at(store.table, 0).watch >= 0:
+    if header_at(store.table, 0).manager_record >= 0:
         go_back(store.table, lifted.memory, held.numbers)
         if not tick:
             update_around(store, lifted.memory, current, EVERYTHING)
@@ -74,31 +74,31 @@ def finish(program, settings, state, iterates, rows, system, at_end):
     results = results_of(store.table, state)
     result = results_at(results, 0)
     tick = limits.tick == 1.0
-    watched = header.watch >= 0
+    watched = header.manager_record >= 0
     tells = watched and not tick and status != SOLVED and status != CONTACT_LOST
     crosses = tells and tells_crossing(program, current, rows)
     fails = status == STALLED or status == ITERATION_LIMIT or status == INFEASIBLE
     is_wish = limits.any_pose == 1.0 and (fails or status == SOLVED) and not crosses
     if holds and ((tick and not violation <= feasible and result.carried == 0.0) or crosses):
         return_to(program, held, rows, current, tick)
-        result.held = 1.0
+        result.last_feasible = 1.0
     gathered = header.implicit == 1 and limits.gather > 0.0 and result.scatter == 1.0
     if gathered:
         # The way from where bodies were gathered was as short as could be; it is measured from where they were given.
         scaled_poses(store, state, trial.q)
         recenter(store, trial.q)
     write_pose(store, current.q, state)
-    if status != CONTACT_LOST and not (tick and result.held == 0.0):
+    if status != CONTACT_LOST and not (tick and result.last_feasible == 0.0):
         # A tick that went well ends at a pose that was just evaluated.
         bound = 1.25 * feasible
         good, violation = judge(program, state, rows.count, current, trial, bound, tick)
         is_cut_short = status == OUT_OF_TIME and not tick
         if (is_wish or is_cut_short) and holds and not good and not watched:
             return_to(program, held, rows, current, tick)
-            result.held = 1.0
+            result.last_feasible = 1.0
             write_pose(store, current.q, state)
             good, violation = judge(program, state, rows.count, current, trial, bound, tick)
-        if is_wish and good and (fails or result.held == 1.0):
+        if is_wish and good and (fails or result.last_feasible == 1.0):
             status = SOLVED
             value = goal(program, rows.count, trial, 1, gradient, lagrangian)
             dual = multipliers_at(program.structure, trial, rows, system)
@@ -107,13 +107,17 @@ def finish(program, settings, state, iterates, rows, system, at_end):
         if status == SOLVED and not good:
             status = UNSURE if is_near_saddle(store.table, settings, results, violation, dual) else STALLED
     result.improper = write_rows(store.table, current, rows.y, lifted, tick, pool_header_at(store.pool, 0).scale, state)
-    if limits.second_order > 0.0 and result.held + result.carried == 0.0 and status != CONTACT_LOST:
+    if limits.second_order > 0.0 and result.last_feasible + result.carried == 0.0 and status != CONTACT_LOST:
         status = test_end(program, settings, results, status, current, rows, system)
-    if limits.recall > 0.0:
+    if limits.warm_start > 0.0:
         # With clearances what a tick ends with depends on rounding where wires wedge: there, rows are evaluated afresh.
         good = status == SOLVED if watched else status != CONTACT_LOST
         leave(
-            store.table, state, int(limits.recall), current, good and result.held == 0.0 and rows.count == header.rows
+            store.table,
+            state,
+            int(limits.warm_start),
+            current,
+            good and result.last_feasible == 0.0 and rows.count == header.rows,
         )
     if watched:
         clear_clearance_rows(store.table)

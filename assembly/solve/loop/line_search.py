@@ -138,13 +138,18 @@ def search(program, current, trial, rows, system, line, value, restoring):
         move(store.table, current.q, step, alpha, trial.q)
         predict_pairs(store, shape.bases, lifted, current, trial, step, alpha)
         known = line.is_free and alpha == 1.0 and bends % 3 == 0
-        if header.watch >= 0 and not known and is_too_far(store, lifted.memory, trial):
+        if header.manager_record >= 0 and not known and is_too_far(store, lifted.memory, trial):
             # Bent, it would go farther than is known to be free.
             bends = BENT
             alpha *= 0.5
             continue
         lost = evaluate(program, lifted.guess, BEND, trial)
-        if header.watch >= 0 and not line.lets_go and lost < 0 and ends_unseen(store, lifted.memory, current, trial):
+        if (
+            header.manager_record >= 0
+            and not line.lets_go
+            and lost < 0
+            and ends_unseen(store, lifted.memory, current, trial)
+        ):
             # A tick has no last look, which would tell of what it led through.
             bends = BENT
             alpha *= 0.5

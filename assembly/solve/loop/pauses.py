@@ -14,7 +14,9 @@ from assembly.solve.loop.settings import results_at, settings_at
 def is_large(table):
     """Whether a step may take long: of many bodies, or of a look at many pairs of them."""
     header = header_at(table, 0)
-    return header.block_record != 0 or (header.watch >= 0 and manager_at(table, header.watch).pairs > MANY_PAIRS)
+    return header.block_record != 0 or (
+        header.manager_record >= 0 and manager_at(table, header.manager_record).pairs > MANY_PAIRS
+    )
 
 
 @kernel(inline=True)

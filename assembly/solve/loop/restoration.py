@@ -42,7 +42,7 @@ def way_back(program, current, trial, rows, system, progress, enough, tick):
     progress.softness = toward_rows(program, current, rows, system, progress.softness, enough)
     move(store.table, current.q, step, progress.share, trial.q)
     predict_pairs(store, shape.bases, lifted, current, trial, step, progress.share)
-    if header_at(store.table, 0).watch >= 0 and is_too_far(store, lifted.memory, trial):
+    if header_at(store.table, 0).manager_record >= 0 and is_too_far(store, lifted.memory, trial):
         return math.inf
     if evaluate(program, lifted.guess, BEND, trial) >= 0:
         return math.inf

@@ -40,7 +40,7 @@ def has_sunk(store, memory, residual):
             at = row.minimum
             if residual[r] + store.pool[at] < -DEEP * store.pool[at + 1]:
                 return True
-    return any_crossed(store.table, header.watch, memory)
+    return any_crossed(store.table, header.manager_record, memory)
 
 
 @kernel(inner=True)

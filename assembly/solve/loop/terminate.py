@@ -70,7 +70,7 @@ def arrive(task, looks_last, current, rows, system):
             return
     table = program.store.table
     # Deeper than looks reach no row tells of a crossing.
-    crosses = looks_last and any_crossed(table, header_at(table, 0).watch, program.lifted.memory)
+    crosses = looks_last and any_crossed(table, header_at(table, 0).manager_record, program.lifted.memory)
     loop.status = STALLED if crosses else SOLVED
     loop.over = 1
     if not crosses:

@@ -12,21 +12,21 @@ from assembly.constraints.program.records import FREE_COLUMN, header_at
 from assembly.proximity.features.solid_contact import CONTACT_RECORD
 
 # What is left of a contact.
-RECALLED_CONTACT = record_dtype(
+WARM_CONTACT_RECORD = record_dtype(
     "f8",
     number=1,  # of a clearance's contact; 0: of none
     residual=1,
     record=CONTACT_RECORD,  # its row of records (`solid_contact.py`)
     gradient=FREE_COLUMN,  # of the residual, in the twists of both bodies
 )
-recalled_at = record_view(RECALLED_CONTACT)
-RECALLED = size_of(RECALLED_CONTACT)
+warm_contact_at = record_view(WARM_CONTACT_RECORD)
+WARM_CONTACT = size_of(WARM_CONTACT_RECORD)
 
 
 @kernel(inline=True)
 def warm_start_size(bodies, pairs):
     """Doubles of what is left."""
-    return 1 + 7 * bodies + RECALLED * pairs
+    return 1 + 7 * bodies + WARM_CONTACT * pairs
 
 
 @kernel(inline=True)
@@ -47,13 +47,13 @@ def warm_start(table, state, at, point):
             return False
     o = at + 1 + 7 * header.bodies
     for r in range(header.contacts):
-        if recalled_at(state, o + RECALLED * r).number != float(contact_of(table, r).guard_number):
+        if warm_contact_at(state, o + WARM_CONTACT * r).number != float(contact_of(table, r).guard_number):
             return False
     for r in range(header.contacts):
         if contact_of(table, r).body_f < 0:
             idle_row(r, 1.0, point)
             continue
-        left = recalled_at(state, o + RECALLED * r)
+        left = warm_contact_at(state, o + WARM_CONTACT * r)
         point.residual[r] = left.residual
         for i in range(CONTACT_RECORD):
             point.records[r, i] = left.record[i]
@@ -74,7 +74,7 @@ def leave(table, state, at, point, good):
         state[at + 1 + k] = state[k]
     o = at + 1 + 7 * header.bodies
     for r in range(header.contacts):
-        left = recalled_at(state, o + RECALLED * r)
+        left = warm_contact_at(state, o + WARM_CONTACT * r)
         contact = contact_of(table, r)
         left.number = float(contact.guard_number)
         if contact.body_f < 0:

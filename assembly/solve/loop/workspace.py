@@ -139,7 +139,7 @@ def carve_points(table, most, doubles, integers):
 def carve_pairs(table, guess, memory, doubles, at, integers):
     """What pairs need: which are free, the lengths of their coordinates, room for their derivatives; a guess of all.
 
-    With what a watch of clearances remembers. No pair is free yet. And where it ends.
+    With what a contact manager of clearances remembers. No pair is free yet. And where it ends.
     """
     pairs = header_at(table, 0).contacts
     free = carve(integers, 0, (pairs,))

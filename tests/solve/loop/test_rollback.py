@@ -12,11 +12,11 @@ from assembly.constraints.program.records import (
     CLEARANCE_ROW_NUMBER,
     CLEARANCE_ROWS,
     FIRST_CLEARANCE_ROW,
+    MANAGER_RECORD,
     MINIMUM,
     ROW,
     ROW_TABLE,
     SHELL_F,
-    WATCH,
 )
 from assembly.proximity.manager.records import CROSSED, MEMORY_HEADER, pair_in
 from assembly.solve.loop.parameters import DEEP
@@ -60,7 +60,7 @@ def test_what_has_sunk():
     r = table[FIRST_CLEARANCE_ROW]
     row = table[ROW_TABLE] + ROW * r
     # Rows know no contact before a solve begins.
-    table[row + MINIMUM] = pair_in(table, table[WATCH], 0).minimum
+    table[row + MINIMUM] = pair_in(table, table[MANAGER_RECORD], 0).minimum
     flank = pool[table[row + MINIMUM] + 1]
     # Half the least radius of curvature.
     assert flank * packed.scale == pytest.approx(0.5 * MINOR, rel=0.2)
