@@ -174,7 +174,7 @@ class Assembly(Contents):
         if (
             not solution.success
             and not interruption.is_over()
-            and solution._packed.guards
+            and solution._packed.clearance_rows
             and not isinstance(q0, Solution)
             and settings[ITERATIONS] > 0.0
         ):

@@ -62,7 +62,7 @@ class Watch:
         scene.constrain(asm.Clearance(slots=16))
         self._packed = packed = scene.packed()
         self._at = int(packed.table[layout.MANAGER_RECORD])
-        self.pairs = [(self.bodies.index(a), self.bodies.index(b)) for a, b in packed.guarded[0]]
+        self.pairs = [(self.bodies.index(a), self.bodies.index(b)) for a, b in packed.clearance_pairs[0]]
         self._pairs_at = manager_records.MEMORY_HEADER
         self._places_at = self._pairs_at + manager_records.PAIR_MEMORY * len(self.pairs)
         manager = manager_records.ContactManager(Store(packed.table, packed.pool), self._at, packed._memory)
@@ -102,7 +102,7 @@ class Watch:
             raise RuntimeError("contacts are near for which there is no place")
         known = rows_of(manager_records.PAIR_STATE, self._pairs())
         looked = known.called == calls
-        slots = memory[self._places_at :][: manager_records.PLACE_MEMORY * packed.guards]
+        slots = memory[self._places_at :][: manager_records.PLACE_MEMORY * packed.clearance_rows]
         owner = rows_of(manager_records.PLACE_STATE, slots.reshape(-1, manager_records.PLACE_MEMORY)).pair.astype(int)
         rows = np.flatnonzero((owner >= 0) & looked[owner])
         tracked = self.tracked[self._first + rows]

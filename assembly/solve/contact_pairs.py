@@ -42,7 +42,7 @@ def contact_pairs(solution: Solution) -> dict[str, ContactPair]:
 def _listed(solution: Solution) -> dict[str, ContactPair]:
     """The pairs that clearances have listed, the oldest first: "clearance: a-b", "clearance: a-b 2", ..."""
     packed, scene = solution._packed, solution._scene
-    owners = [(item, pair) for item, own in zip(packed.clearances, packed.guarded, strict=True) for pair in own]
+    owners = [(item, pair) for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True) for pair in own]
     found: dict[str, ContactPair] = {}
     if solution._state.size <= packed.memory_at:
         return found

@@ -213,7 +213,7 @@ def _seen(packed: Packed, posed: PosedBodies, interruption: Interruption) -> tup
     """Places of pairs that looks of several depths find to cross, and whether all were looked at."""
     q, contacts = posed.q.copy(), len(posed.contacts)
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
-    count = manager_records.PAIR_MEMORY * len(packed.guarded[0])
+    count = manager_records.PAIR_MEMORY * len(packed.clearance_pairs[0])
     deep = max(ROUNDED, posed.touching)
     record = packed.table[layout.MANAGER_RECORD]
     # Where there is no clock looks are not cut.

@@ -41,7 +41,11 @@ def are_one(solution: Solution, other: Solution) -> bool:
     value, unit = solution.objective, packed.unit
     # Contacts that a clearance leaves out are not told from others where they are found anew; of a dexterity no pose is
     # as good by chance.
-    if (packed.guards and packed.contacts) or packed.tips is not None or not _alike(value, other.objective, unit):
+    if (
+        (packed.clearance_rows and packed.contacts)
+        or packed.tips is not None
+        or not _alike(value, other.objective, unit)
+    ):
         return False
     way, sizes = moves(solution.q, other.q, packed.scale), np.repeat([packed.scale, 1.0], 3)
     between = (_objective_at(packed, solution, retract(solution.q, part * way * sizes)) for part in BETWEEN)
@@ -67,7 +71,7 @@ def _objective_at(packed: Packed, solution: Solution, q: Array) -> float:
     state[: packed.contacts_at] = q.ravel()
     # A round body that turned is touched elsewhere: contacts are found anew.
     state[packed.contacts_at : packed.angles_at] = np.nan
-    if packed.guards and _crosses(packed, state, q):
+    if packed.clearance_rows and _crosses(packed, state, q):
         return np.inf
     try:
         rows = rows_of(packed, state)
@@ -88,5 +92,5 @@ def _crosses(packed: Packed, state: Array, q: Array) -> bool:
     tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
     memory = state[packed.memory_at :]
     update(packed.table, packed.pool, packed.table[MANAGER_RECORD], memory, scaled, tracked, EVERYTHING)
-    pairs = memory[MEMORY_HEADER:][: PAIR_MEMORY * sum(map(len, packed.guarded))].reshape(-1, PAIR_MEMORY)
+    pairs = memory[MEMORY_HEADER:][: PAIR_MEMORY * sum(map(len, packed.clearance_pairs))].reshape(-1, PAIR_MEMORY)
     return bool((pairs[:, CROSSED] == 1.0).any())

@@ -43,7 +43,7 @@ def may_hold_elsewhere(solution: Solution) -> bool:
     other, a ball under the floor that it is to touch, linked rings apart. Nor where equations contradict each other
     wherever bodies are.
     """
-    if solution._packed.guards or solution._packed.contacts:
+    if solution._packed.clearance_rows or solution._packed.contacts:
         return False
     ended = solution.status in (Status.INFEASIBLE, Status.STALLED)
     if not ended or is_certain(solution._packed):

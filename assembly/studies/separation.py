@@ -55,7 +55,9 @@ def separated(scene: Assembly, q: Array, options: Mapping[str, Any], interruptio
     not found.
     """
     others = [item for item in scene.constraints if not isinstance(item, Clearance)]
-    guarded = [pair for item in scene.constraints if isinstance(item, Clearance) for pair in item.pairs(scene.bodies)]
+    kept_apart = [
+        pair for item in scene.constraints if isinstance(item, Clearance) for pair in item.pairs(scene.bodies)
+    ]
     rows = {body.name: row for row, body in enumerate(scene.bodies)}
     often: Counter[tuple[str, str]] = Counter()
     contacts: list[Contact] = []
@@ -63,7 +65,7 @@ def separated(scene: Assembly, q: Array, options: Mapping[str, Any], interruptio
     touching = options.get("touching", Options.touching) * scene.packed().scale
     for _ in range(ROUNDS):
         found: list[_Crossing] = []
-        for a, b in guarded:
+        for a, b in kept_apart:
             # Of very many pairs this takes longer than a solve.
             if interruption.is_over():
                 return poses

@@ -166,7 +166,7 @@ def look_at_all_of(table, memory, k):
 def doubt_twins(store, memory, k, records):
     """Look at a pair of bodies where contact k came within the spheres of neglect of another one."""
     header = header_at(store.table, 0)
-    first = header.first_guard
+    first = header.first_clearance_row
     places = memory_places(store.table, header.manager_record)[1]
     near = lengths_at(store.pool, manager_at(store.table, header.manager_record).lengths).merge_radius
     for l in range(k):
@@ -198,7 +198,7 @@ def follow(table, pool, q, last, room, free, memory):
     # Nothing evaluates rows here: what would be their residuals and multipliers is room alone.
     listed = Iterate(poses, tracked, records, numbers[0], numbers)
     lifted = LiftedPairs(free, None, None, None, guess, memory)
-    rows = Rows(header.guards, 0.0, numbers[0], numbers[1], None, None, None, None)
+    rows = Rows(header.clearance_rows, 0.0, numbers[0], numbers[1], None, None, None, None)
     events = state.event_count
     if not place_bodies(store, q, standing):
         return -1
@@ -206,8 +206,8 @@ def follow(table, pool, q, last, room, free, memory):
     for b in range(header.bodies):
         for k in range(7):
             poses[b, k] = standing[b, k]
-    first = header.first_guard
-    for k in range(header.guards):
+    first = header.first_clearance_row
+    for k in range(header.clearance_rows):
         r = first + k
         if contact_of(table, r).body_f < 0:
             continue
@@ -221,13 +221,13 @@ def follow(table, pool, q, last, room, free, memory):
             look_at_all_of(table, memory, k)
         doubt_twins(store, memory, k, records)
     update_around(store, memory, listed, IN_TURNS)
-    for k in range(header.guards):
-        before[first + k, 0] = float(contact_of(table, first + k).guard_number)
+    for k in range(header.clearance_rows):
+        before[first + k, 0] = float(contact_of(table, first + k).clearance_number)
     place_clearance_rows(table, lifted, listed, rows, False)
-    for k in range(header.guards):
+    for k in range(header.clearance_rows):
         r = first + k
         contact = contact_of(table, r)
-        if contact.body_f >= 0 and float(contact.guard_number) != before[r, 0]:
+        if contact.body_f >= 0 and float(contact.clearance_number) != before[r, 0]:
             copy_tracked(tracked, r, guess)
             correct(store, r, poses, guess, tracked, records)
     return int(state.event_count - events)

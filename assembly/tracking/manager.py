@@ -148,26 +148,26 @@ class Manager(OwnState):
         # What is to be listed is what comes nearer than this.
         everything = _Everything(self._bodies, self._reach, merge_radius=self._merge_radius, slots=slots)
         packed = self._packed = Packed(self._bodies, [everything], ())
-        count, guards = packed.count, packed.guards
+        count, rows = packed.count, packed.clearance_rows
         self._memory = packed.new_state()[packed.memory_at :]
         self._poses = np.full((count, 7), np.nan)
         self._poses[:, 3:] = [1.0, 0.0, 0.0, 0.0]
-        self._tracked = np.full((guards, TRACK), np.nan)
-        self._records = np.zeros((guards, CONTACT_RECORD))
+        self._tracked = np.full((rows, TRACK), np.nan)
+        self._records = np.zeros((rows, CONTACT_RECORD))
         self._last = (self._poses, self._tracked, self._records)
-        self._room = (
+        self._workspace = (
             np.empty((count, 7)),
             np.zeros((count, 6)),
-            np.zeros((guards, TRACK)),
-            np.zeros((guards, TRACK)),
-            np.zeros((2, guards)),
+            np.zeros((rows, TRACK)),
+            np.zeros((rows, TRACK)),
+            np.zeros((2, rows)),
         )
-        self._free = np.full(guards, -1, dtype=np.int64)
+        self._free = np.full(rows, -1, dtype=np.int64)
 
     def _grow(self) -> None:
         """Twice as many places; what is known stays."""
         old = (self._packed, self._memory, self._poses, self._tracked)
-        self._set_up(2 * old[0].guards)
+        self._set_up(2 * old[0].clearance_rows)
         pairs, places, events = self._parts(*old[:2])
         new_pairs, new_places, new_events = self._parts(self._packed, self._memory)
         head = manager_records.MEMORY_HEADER
@@ -186,8 +186,8 @@ class Manager(OwnState):
     def _parts(packed: Packed, memory: Array) -> tuple[Array, Array, Array]:
         """Views of what a memory knows of pairs, of places, and of events."""
         pairs_at = manager_records.MEMORY_HEADER
-        places_at = pairs_at + manager_records.PAIR_MEMORY * len(packed.guarded[0])
-        events_at = places_at + manager_records.PLACE_MEMORY * packed.guards
+        places_at = pairs_at + manager_records.PAIR_MEMORY * len(packed.clearance_pairs[0])
+        events_at = places_at + manager_records.PLACE_MEMORY * packed.clearance_rows
         return (
             memory[pairs_at:places_at].reshape(-1, manager_records.PAIR_MEMORY),
             memory[places_at:events_at].reshape(-1, manager_records.PLACE_MEMORY),
@@ -271,7 +271,7 @@ class Manager(OwnState):
     def _follow(self, q: Array) -> int:
         """One call of the kernel."""
         packed = self._packed
-        return int(follow(packed.table, packed.pool, q, self._last, self._room, self._free, self._memory))
+        return int(follow(packed.table, packed.pool, q, self._last, self._workspace, self._free, self._memory))
 
     def _is_full(self) -> bool:
         """Whether every place has a contact."""

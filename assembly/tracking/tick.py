@@ -106,7 +106,7 @@ class Step(ReadOnlyArrays):
     def events(self) -> tuple[Event, ...]:
         """What became of contacts since the step before, in the memory of its state."""
         followed, packed = self._followed, self._followed.packed
-        if not packed.guards or self._state[packed.memory_at + EVENT_COUNT] == self._seen:
+        if not packed.clearance_rows or self._state[packed.memory_at + EVENT_COUNT] == self._seen:
             return ()
         return events_of(self._state[packed.memory_at :], followed.names, packed.scale, int(self._seen))
 

@@ -226,13 +226,13 @@ class Tracker(InOneProcess):
         """What ticks work in, and what they read and write directly."""
         packed, budget = self._packed, self._budget
         self._history = np.zeros((1, HISTORY))
-        names = [(a.name, b.name) for pairs in packed.guarded for a, b in pairs]
+        names = [(a.name, b.name) for pairs in packed.clearance_pairs for a, b in pairs]
         self._followed = Followed(self._scene, packed, names, self._hand, self._place, first.status)
         # Behind the state of a solve are the rows of the last tick; steps have no copy of those.
         self._size = first._state.size
         warm = warm_start_size(packed.count, packed.pair_rows)
         self._state = np.concatenate([first._state, np.zeros(warm)])
-        if packed.guards:
+        if packed.clearance_rows:
             _follow_extrema(packed, self._state, budget is not None)
         self._settings[WARM_START] = self._size
         self._pose = self._state[: self._size]
@@ -242,7 +242,7 @@ class Tracker(InOneProcess):
         self._knobs: Any = self._settings.data
         self._arguments = (packed.table, packed.pool, self._settings, self._state, self._history, packed.tips)
         self._radius = float(self._settings[RADIUS])
-        self._seen = float(self._state[packed.memory_at + EVENT_COUNT]) if packed.guards else 0.0
+        self._seen = float(self._state[packed.memory_at + EVENT_COUNT]) if packed.clearance_rows else 0.0
         self._pool = packed.pool.data
         self._reference = packed.reference.tolist()
         self._at = next(at for target, at in packed._targets if target is self._hand)
@@ -302,7 +302,7 @@ class Tracker(InOneProcess):
         elif radius < self._radius:
             self._knobs[RADIUS] = min(4.0 * radius, self._radius)
         seen = self._seen
-        if packed.guards:
+        if packed.clearance_rows:
             self._seen = view[packed.memory_at + EVENT_COUNT]
         # What steps keep nobody writes to.
         self._before = self._pose.copy()

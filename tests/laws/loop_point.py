@@ -49,7 +49,7 @@ class LoopPoint:
         room = (np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES)))
         self.loose = layout.LiftedPairs(free, np.empty((pairs, 4)), *room, np.empty((tracks, TRACK)), np.empty(0))
         at = table[layout.TAPE_WORKSPACE]
-        self.room = layout.TapeRoom(*(np.empty(size) for size in table[at : at + 3]))
+        self.room = layout.TapeWorkspace(*(np.empty(size) for size in table[at : at + 3]))
         arrange(table, free, self.shape, self.rows, self.n)
         self.program = layout.Program(Store(table, self.pool), self.shape, self.loose, self.room, packed.tips)
         if tracked is None:

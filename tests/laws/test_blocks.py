@@ -67,8 +67,8 @@ def test_the_step_is_that_of_the_dense_matrix(shape, count):
     n = 6 * count
     shift = 0.25
     # The factor writes every place it reads.
-    panels, seats, turned = np.full(36 * blocks[FACTORED], np.nan), np.empty(n, np.int64), np.full(36, np.nan)
-    assert factorize_blocks(upper, blocks, shift, panels, seats, turned)
+    panels, positions, turned = np.full(36 * blocks[FACTORED], np.nan), np.empty(n, np.int64), np.full(36, np.nan)
+    assert factorize_blocks(upper, blocks, shift, panels, positions, turned)
     assert np.isfinite(panels).all()
     whole = dense + shift * np.eye(n)
     x = rng.normal(size=n)
@@ -86,8 +86,8 @@ def test_the_step_is_that_of_the_dense_matrix(shape, count):
     assert not greatest_diagonal(broken, blocks) < np.inf
     # One direction downward is enough.
     least = np.linalg.eigvalsh(dense)[0]
-    assert factorize_blocks(upper, blocks, -0.999 * least, panels, seats, turned)
-    assert not factorize_blocks(upper, blocks, -1.001 * least, panels, seats, turned)
+    assert factorize_blocks(upper, blocks, -0.999 * least, panels, positions, turned)
+    assert not factorize_blocks(upper, blocks, -1.001 * least, panels, positions, turned)
 
 
 def test_trees_have_no_fill_and_grids_little():

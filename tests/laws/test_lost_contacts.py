@@ -25,7 +25,7 @@ from assembly.solve.loop.contacts import start_contacts
 LEAST = 0.25
 
 
-def guards(gap, solids=True):
+def clearance_rows(gap, solids=True):
     """The table, the pool, what is tracked and a point of two rows of a clearance, of which the first is open."""
     table = np.zeros(HEADER + 2 * ROW, dtype=np.int64)
     table[ROW_TABLE], table[FIRST_CLEARANCE_ROW], table[CLEARANCE_ROWS] = HEADER, 0, 2
@@ -42,7 +42,7 @@ def guards(gap, solids=True):
 @pytest.mark.parametrize("solids", [True, False])
 @pytest.mark.parametrize("gap", [1.0, 1e-12, -1e-12, -5e-10, -2e-9, -0.5])
 def test_a_contact_that_ends_stays_behind_where_it_is_open_or_solids_touch(gap, solids):
-    table, pool, start, point = guards(gap, solids)
+    table, pool, start, point = clearance_rows(gap, solids)
     stays_behind = lost_clearance_row(Store(table, pool), 1, start, point, False, False)
     assert stays_behind == (gap > (-1e-9 if solids else 0.0))
     _q, tracked, records, residual, jacobian = point
@@ -62,14 +62,14 @@ def test_a_contact_that_ends_stays_behind_where_it_is_open_or_solids_touch(gap, 
 
 def test_a_contact_that_is_not_open_stays_behind_where_it_goes_or_is_past_its_face():
     for past, goes, told in ((False, True, -0.5), (True, False, 0.0)):
-        table, pool, start, point = guards(-0.5)
+        table, pool, start, point = clearance_rows(-0.5)
         assert lost_clearance_row(Store(table, pool), 1, start, point, past, goes)
         assert point.residual[1] == told and np.isnan(point.tracked[1, 0])
 
 
 def test_only_contacts_of_solids_that_are_hardly_in_each_other_may_go():
     for gap, solids, expected in ((-0.9 * HARDLY, True, True), (-1.1 * HARDLY, True, False), (-1e-12, False, False)):
-        table, *_rest = guards(gap, solids)
+        table, *_rest = clearance_rows(gap, solids)
         assert may_go(table, 1, np.array([1.0, gap])) == expected
     # A row of the scene's own is no clearance's.
     table[FIRST_CLEARANCE_ROW], table[CLEARANCE_ROWS] = 0, 1
@@ -77,7 +77,7 @@ def test_only_contacts_of_solids_that_are_hardly_in_each_other_may_go():
 
 
 def test_contacts_that_could_go_are_held_again_as_before():
-    table, _pool, start, _point = guards(0.0)
+    table, _pool, start, _point = clearance_rows(0.0)
     for holds in (0.0, 1.0, 2.0, 3.0):
         start[:, STAYS] = MAY_GO - holds, holds
         hold_all(table, start)
@@ -86,7 +86,7 @@ def test_contacts_that_could_go_are_held_again_as_before():
 
 def test_a_start_leaves_to_the_watch_what_a_clearance_has_lost():
     for solids in (True, False):
-        table, pool, start, _point = guards(0.0, solids)
+        table, pool, start, _point = clearance_rows(0.0, solids)
         table[CONTACTS] = 2
         start[:, 0] = np.nan
         assert start_contacts(Store(table, pool), None, start, np.full(2, -1), None) == -1

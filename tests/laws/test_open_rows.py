@@ -46,7 +46,7 @@ class Near:
         self.memory = packed._memory.copy()
         self.loose = layout.LiftedPairs(self.free, np.empty((rows, 4)), *room, np.zeros((rows, TRACK)), self.memory)
         at = table[layout.TAPE_WORKSPACE]
-        self.room = layout.TapeRoom(*(np.empty(size) for size in table[at : at + 3]))
+        self.room = layout.TapeWorkspace(*(np.empty(size) for size in table[at : at + 3]))
         q = scene.q.copy()
         q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
         self.here = self.point(q)

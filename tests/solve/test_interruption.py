@@ -207,7 +207,9 @@ def crowded() -> asm.Assembly:
 def seen(packed: Packed, state: np.ndarray) -> int:
     """How many pairs the contact manager of a state has looked at."""
     pairs = state[packed.memory_at + manager_records.MEMORY_HEADER :]
-    pairs = pairs[: manager_records.PAIR_MEMORY * len(packed.guarded[0])].reshape(-1, manager_records.PAIR_MEMORY)
+    pairs = pairs[: manager_records.PAIR_MEMORY * len(packed.clearance_pairs[0])].reshape(
+        -1, manager_records.PAIR_MEMORY
+    )
     return int((~np.isnan(pairs[:, manager_records.TURN])).sum())
 
 

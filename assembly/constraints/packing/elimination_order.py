@@ -27,7 +27,7 @@ from assembly.constraints.program.hessian_blocks import (
     MEETING_ROW,
     PANEL,
     PLACE,
-    SEAT,
+    POSITION,
 )
 
 __all__ = ["FEW", "block_record"]
@@ -52,7 +52,7 @@ def block_record(count: int, groups: Sequence[Sequence[int]]) -> Table:
     for row in rows:
         row.sort()
     panels = _fill([[column for column, _ in row] for row in rows])
-    seats = [{column: k for k, column in enumerate(panel)} for panel in panels]
+    positions = [{column: k for k, column in enumerate(panel)} for panel in panels]
     meeting: list[list[tuple[int, int]]] = [[] for _ in range(count)]
     for k, panel in enumerate(panels):
         for at, column in enumerate(panel[1:], 1):
@@ -61,7 +61,7 @@ def block_record(count: int, groups: Sequence[Sequence[int]]) -> Table:
         PLACE: place.tolist(),
         FIRST: _starts(rows),
         COLUMN: [column for row in rows for column, _ in row],
-        SEAT: [2 * seats[k][column] + turned for k, row in enumerate(rows) for column, turned in row],
+        POSITION: [2 * positions[k][column] + turned for k, row in enumerate(rows) for column, turned in row],
         PANEL: _starts(panels),
         ACROSS: [column for panel in panels for column in panel],
         MEETING: _starts(meeting),

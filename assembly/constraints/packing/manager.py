@@ -26,7 +26,7 @@ from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.centerlines.packing import pack_centerline
 from assembly.proximity.manager.extrema import GIVEN_RECORD
 
-__all__ = ["LAST_MARGIN", "guarded_pairs", "is_of_surfaces", "pack_manager", "slot_count", "table_with_guards"]
+__all__ = ["LAST_MARGIN", "clearance_pairs", "is_of_surfaces", "pack_manager", "slot_count", "table_with_clearances"]
 
 Table = NDArray[np.int64]
 Pair = tuple[Body, Body]
@@ -46,7 +46,7 @@ SEAMS = 3.0
 MOST_LISTS = 64
 
 
-def guarded_pairs(clearances: Sequence[Clearance], bodies: Sequence[Body]) -> list[list[Pair]]:
+def clearance_pairs(clearances: Sequence[Clearance], bodies: Sequence[Body]) -> list[list[Pair]]:
     """The pairs that each clearance keeps apart; no pair may be that of two."""
     owner: dict[frozenset[int], str] = {}
     result = []
@@ -79,7 +79,7 @@ def is_of_surfaces(pair: Pair) -> bool:
 def pack_manager(
     writer: SceneWriter,
     clearances: Sequence[Clearance],
-    guarded: Sequence[Sequence[Pair]],
+    pairs_of_clearances: Sequence[Sequence[Pair]],
     places: Sequence[int],
     contacts: Sequence[GivenContact],
 ) -> int:
@@ -87,9 +87,9 @@ def pack_manager(
 
     `contacts` are the given ones, in the order of their rows; the first place is behind them.
     """
-    pairs = _PairPacking(writer, [pair for own in guarded for pair in own], contacts)
+    pairs = _PairPacking(writer, [pair for own in pairs_of_clearances for pair in own], contacts)
     first = 0
-    for clearance, own, count in zip(clearances, guarded, places, strict=True):
+    for clearance, own, count in zip(clearances, pairs_of_clearances, places, strict=True):
         for pair in own:
             pairs.add(pair, clearance.minimum, [first, first + count])
         first += count
@@ -110,7 +110,7 @@ def pack_manager(
     return writer.add(row)[0]
 
 
-def table_with_guards(table: Table, placed: Sequence[Sequence[int]]) -> Table:
+def table_with_clearances(table: Table, placed: Sequence[Sequence[int]]) -> Table:
     """A table whose rows of clearances have contacts.
 
     `placed` has for every row its pair or -1, the number of its contact, and 1 where that is in the place of a given

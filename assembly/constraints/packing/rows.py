@@ -79,7 +79,7 @@ class RowPacking:
                 row += [-1, -1, *(writer.shell(side_faces(side)) for side in pair), layout.ZERO]
             self._add(contact, row)
 
-    def add_guards(self, clearances: Sequence[Clearance], places: Sequence[int]) -> None:
+    def add_clearance_rows(self, clearances: Sequence[Clearance], places: Sequence[int]) -> None:
         """Idle rows, as many of each clearance as it has places."""
         header = self._writer.header
         header[layout.FIRST_CLEARANCE_ROW], header[layout.CLEARANCE_ROWS] = len(self._rows), sum(places)

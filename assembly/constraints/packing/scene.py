@@ -76,9 +76,9 @@ class Packed:
     whole : list of bool
         Whether a contact is one of two whole surfaces, without edges.
     clearances : list of Clearance
-    guarded : list of list of (Body, Body)
+    clearance_pairs : list of list of (Body, Body)
         The pairs of bodies of every clearance.
-    guards : int
+    clearance_rows : int
         Rows of clearances, behind those of contacts.
     spans : list of int arrays
         The rows of every constraint.
@@ -121,12 +121,12 @@ class Packed:
             for contact, whole in zip(self.contacts, self.whole, strict=True)
         ]
         self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
-        self.guarded = manager_packing.guarded_pairs(self.clearances, bodies)
+        self.clearance_pairs = manager_packing.clearance_pairs(self.clearances, bodies)
         self.places = [
             places * manager_packing.slot_count(clearance, pairs)
-            for clearance, pairs in zip(self.clearances, self.guarded, strict=True)
+            for clearance, pairs in zip(self.clearances, self.clearance_pairs, strict=True)
         ]
-        self.guards = sum(self.places)
+        self.clearance_rows = sum(self.places)
         self._write(bodies, constraints, objectives)
         self._take_addresses()
         # Where the parts of a state begin: tracked values, multipliers, residuals, results.
@@ -137,9 +137,11 @@ class Packed:
         self.results_at = self.residuals_at + self.rows
         self.memory_at = self.results_at + layout.RESULTS
         self._memory = np.empty(0)
-        if self.guards:
+        if self.clearance_rows:
             # The first look sees what crosses at the start as well, if it is no deeper than this.
-            self._memory = fresh_memory(sum(map(len, self.guarded)), self.guards, manager_packing.LAST_MARGIN)
+            self._memory = fresh_memory(
+                sum(map(len, self.clearance_pairs)), self.clearance_rows, manager_packing.LAST_MARGIN
+            )
 
     def _write(
         self, bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
@@ -168,7 +170,7 @@ class Packed:
         terms.write()
         writer.add_shared()
         # Rows of clearances are of any bodies, those of trims and dexterities are not by blocks.
-        if header[layout.MOVING] > FEW and not (self.guards or self.trims or header[layout.DEXTERITIES]):
+        if header[layout.MOVING] > FEW and not (self.clearance_rows or self.trims or header[layout.DEXTERITIES]):
             groups += [writer.places_of(term.bodies) for _, term in goals if isinstance(term, Expression)]
             record = block_record(int(header[layout.MOVING]), [slots[group].tolist() for group in groups])
             header[layout.BLOCK_RECORD], header[layout.BLOCK_LENGTH] = writer.add(record)[0], record.size
@@ -180,7 +182,7 @@ class Packed:
         self._places, self._frames = writer.places, writer.frames
         self._targets, self._turns = terms.targets, terms.turns
         self._turned = Turns(self._angles, [(equation, at) for equation, at, _ in self._values])
-        self.chooses_turns = self._turned.chosen and not self.guards
+        self.chooses_turns = self._turned.chosen and not self.clearance_rows
         told = self._turned.told
         self._standing = np.array(
             [(self._frames[item.frames], item.kind, item.component) for item in told], dtype=np.int64
@@ -200,12 +202,12 @@ class Packed:
         """Write rows, and keep what tells of them."""
         rows = RowPacking(writer, constraints)
         rows.add_contacts(self.contacts, self.sides, self.whole)
-        rows.add_guards(self.clearances, self.places)
+        rows.add_clearance_rows(self.clearances, self.places)
         writer.header[layout.MANAGER_RECORD] = -1
-        if self.guards:
+        if self.clearance_rows:
             given = list(zip(self.contacts, self.sides, self.whole, strict=True))
             writer.header[layout.MANAGER_RECORD] = manager_packing.pack_manager(
-                writer, self.clearances, self.guarded, self.places, given
+                writer, self.clearances, self.clearance_pairs, self.places, given
             )
         rows.add_trims(self.contacts)
         rows.add_joints(slots)
@@ -230,11 +232,11 @@ class Packed:
     @property
     def pair_rows(self) -> int:
         """Rows of contacts, given ones and those of clearances."""
-        return len(self.contacts) + self.guards
+        return len(self.contacts) + self.clearance_rows
 
     def is_crowded(self, state: Array) -> bool:
         """Whether contacts of clearances were near that found no place."""
-        return self.guards > 0 and state[self.memory_at + manager_records.CROWDED] == 1.0
+        return self.clearance_rows > 0 and state[self.memory_at + manager_records.CROWDED] == 1.0
 
     def new_state(self) -> Array:
         """The state of a solve that knows nothing yet."""
@@ -251,8 +253,8 @@ class Packed:
 
     def table_at(self, state: Array) -> Table:
         """The table with the rows of clearances as a state has them; in the packed one they have no contacts."""
-        has_guards = self.guards > 0 and state.size > self.memory_at
-        return manager_packing.table_with_guards(self.table, self._placed(state)) if has_guards else self.table
+        has_clearances = self.clearance_rows > 0 and state.size > self.memory_at
+        return manager_packing.table_with_clearances(self.table, self._placed(state)) if has_clearances else self.table
 
     def may_have_outgrown(self) -> bool:
         """Whether the size rests on values and places alone and the values have become others by far."""
@@ -281,7 +283,7 @@ class Packed:
 
     def _placed(self, state: Array) -> list[list[int]]:
         """The same, and whether it is in the place of a given contact."""
-        return listed_places(state[self.memory_at :], sum(map(len, self.guarded)), self.guards)
+        return listed_places(state[self.memory_at :], sum(map(len, self.clearance_pairs)), self.clearance_rows)
 
     def _take_addresses(self) -> None:
         """Where the kernels are that only contacts, trims, clearances, expressions or many bodies ask for."""
@@ -292,13 +294,15 @@ class Packed:
             record[[FACTORIZE_AT, SOLVE_AT]] = addresses.blocks()
         if self.pair_rows:
             table[layout.CONTACT_ROWS_AT] = addresses.contacts()
-        if any(self.whole) or any(manager_packing.is_of_surfaces(pair) for pairs in self.guarded for pair in pairs):
+        if any(self.whole) or any(
+            manager_packing.is_of_surfaces(pair) for pairs in self.clearance_pairs for pair in pairs
+        ):
             table[layout.START_AT : layout.EXTREMAL_AT + 1] = addresses.surfaces()
         if self.shells:
             table[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
         if self.trims:
             table[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
-        if self.guards:
+        if self.clearance_rows:
             table[[layout.UPDATE_AT, layout.STAYED_AT, layout.PARTS_AT, layout.WENT_AT]] = addresses.manager()
             manager = manager_records.manager_at(table, table[layout.MANAGER_RECORD])
             manager.track_solids = table[layout.TRACK_AT]

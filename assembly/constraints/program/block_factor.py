@@ -34,18 +34,18 @@ def greatest_diagonal(lagrangian, blocks):
 
 
 @kernel(inner=True)
-def place_panel(lagrangian, blocks, i, shift, panels, o, count, seats):
-    """Row i of the Hessian + shift I into the panel of so many blocks at o; where its columns stand, into seats."""
+def place_panel(lagrangian, blocks, i, shift, panels, o, count, positions):
+    """Row i of the Hessian + shift I into the panel of so many blocks at o; where its columns stand, into positions."""
     layout = blocks_at(blocks, 0)
     first = blocks[layout.panel + i]
     for p in range(count):
-        seats[blocks[layout.across + first + p]] = o + 36 * p
+        positions[blocks[layout.across + first + p]] = o + 36 * p
     for l in range(o, o + 36 * count):
         panels[l] = 0.0
     for e in range(blocks[layout.first + i], blocks[layout.first + i + 1]):
-        seat = blocks[layout.seat + e]
-        at = o + 36 * (seat // 2)
-        if seat % 2 == 1:
+        position = blocks[layout.position + e]
+        at = o + 36 * (position // 2)
+        if position % 2 == 1:
             for r in range(6):
                 for c in range(6):
                     panels[at + 6 * c + r] = lagrangian[6 * e + c, r]
@@ -132,7 +132,7 @@ def finish_panel(panels, o, count):
 
 
 @kernel(signatures="(f8[:, ::1], i8[::1], f8, f8[::1], i8[::1], f8[::1])")
-def factorize_blocks(lagrangian, blocks, shift, panels, seats, turned):
+def factorize_blocks(lagrangian, blocks, shift, panels, positions, turned):
     """The factor U of lagrangian + shift I = U^T U into the panels, diagonals inverted. Returns 1, or 0: there is none.
 
     Called by its address, as few scenes are large.
@@ -142,7 +142,7 @@ def factorize_blocks(lagrangian, blocks, shift, panels, seats, turned):
         first = blocks[layout.panel + i]
         count = blocks[layout.panel + i + 1] - first
         o = 36 * first
-        place_panel(lagrangian, blocks, i, shift, panels, o, count, seats)
+        place_panel(lagrangian, blocks, i, shift, panels, o, count, positions)
         for e in range(blocks[layout.meeting + i], blocks[layout.meeting + i + 1]):
             k = blocks[layout.meeting_row + e]
             p = blocks[layout.panel + k] + blocks[layout.meeting_at + e]
@@ -150,9 +150,9 @@ def factorize_blocks(lagrangian, blocks, shift, panels, seats, turned):
             turn_block(panels, 36 * p, turned)
             while p < end:
                 # As many blocks at once as are neighbors in both.
-                at = seats[blocks[layout.across + p]]
+                at = positions[blocks[layout.across + p]]
                 run = 1
-                while p + run < end and seats[blocks[layout.across + p + run]] == at + 36 * run:
+                while p + run < end and positions[blocks[layout.across + p + run]] == at + 36 * run:
                     run += 1
                 subtract_blocks(panels, at, turned, 36 * p, run)
                 p += run

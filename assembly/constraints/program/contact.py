@@ -181,7 +181,7 @@ def track_row(store, q, start, patience, records, tracked, r):
 def is_clearance_row(table, r):
     """Whether row r is a clearance's."""
     header = header_at(table, 0)
-    return header.first_guard <= r < header.first_guard + header.guards
+    return header.first_clearance_row <= r < header.first_clearance_row + header.clearance_rows
 
 
 @kernel(inline=True)
@@ -206,7 +206,7 @@ def may_go(table, r, residual):
 def hold_all(table, tracked):
     """No contact may be given up any more."""
     header = header_at(table, 0)
-    for r in range(header.first_guard, header.first_guard + header.guards):
+    for r in range(header.first_clearance_row, header.first_clearance_row + header.clearance_rows):
         pair = tracked_at(tracked, r)
         if pair.stays <= MAY_GO:
             pair.stays = MAY_GO - pair.stays

@@ -37,7 +37,7 @@ HEADER_RECORD = record_dtype(
     joint_table=1,
     tape_table=1,
     term_table=1,
-    tape_room=1,  # where the sizes of the workspace of tapes are: inputs, outputs, intermediate values
+    tape_workspace=1,  # where the sizes of the workspace of tapes are: inputs, outputs, intermediate values
     gather_table=1,  # how scattered bodies are put together (`solve/loop/initial_guess.py`)
     implicit=1,  # 1: the user gave no objective; it is the least move
     dexterities=1,  # terms that are dexterities
@@ -49,8 +49,8 @@ HEADER_RECORD = record_dtype(
     deepest_address=1,  # the same of solids that are in each other; 0: not needed yet
     trim_rows_address=1,  # rows of trims
     trim_terms_address=1,  # their second derivatives
-    first_guard=1,  # first row of a clearance, among those of contacts; one without bodies is idle
-    guards=1,  # how many rows clearances have
+    first_clearance_row=1,  # first row of a clearance, among those of contacts; one without bodies is idle
+    clearance_rows=1,  # how many rows clearances have
     manager_record=1,  # the contact manager (`proximity/manager/update.py`); -1: no clearance
     update_address=1,  # its update
     clock_address=1,  # tells the time [ns]; 0: nothing does
@@ -82,7 +82,7 @@ ROW_TABLE = place_of(HEADER_RECORD, "row_table")
 JOINT_TABLE = place_of(HEADER_RECORD, "joint_table")
 TAPE_TABLE = place_of(HEADER_RECORD, "tape_table")
 TERM_TABLE = place_of(HEADER_RECORD, "term_table")
-TAPE_WORKSPACE = place_of(HEADER_RECORD, "tape_room")
+TAPE_WORKSPACE = place_of(HEADER_RECORD, "tape_workspace")
 GATHER_TABLE = place_of(HEADER_RECORD, "gather_table")
 IMPLICIT = place_of(HEADER_RECORD, "implicit")
 DEXTERITIES = place_of(HEADER_RECORD, "dexterities")
@@ -94,8 +94,8 @@ NEAREST_AT = place_of(HEADER_RECORD, "nearest_address")
 DEEPEST_AT = place_of(HEADER_RECORD, "deepest_address")
 TRIM_ROWS_AT = place_of(HEADER_RECORD, "trim_rows_address")
 TRIM_TERMS_AT = place_of(HEADER_RECORD, "trim_terms_address")
-FIRST_CLEARANCE_ROW = place_of(HEADER_RECORD, "first_guard")
-CLEARANCE_ROWS = place_of(HEADER_RECORD, "guards")
+FIRST_CLEARANCE_ROW = place_of(HEADER_RECORD, "first_clearance_row")
+CLEARANCE_ROWS = place_of(HEADER_RECORD, "clearance_rows")
 MANAGER_RECORD = place_of(HEADER_RECORD, "manager_record")
 UPDATE_AT = place_of(HEADER_RECORD, "update_address")
 CLOCK_AT = place_of(HEADER_RECORD, "clock_address")
@@ -137,7 +137,7 @@ CONTACT_ROW_RECORD = record_dtype(
     shell_f=1,  # -1: of two surfaces
     shell_g=1,
     minimum=1,  # where the gap that counts as none is in the pool
-    guard_number=1,  # of a clearance's row: the number of the contact it has now; 0: none
+    clearance_number=1,  # of a clearance's row: the number of the contact it has now; 0: none
 )
 contact_row_at = record_view(CONTACT_ROW_RECORD)
 SURFACE_F = place_of(CONTACT_ROW_RECORD, "surface_f")
@@ -145,7 +145,7 @@ SURFACE_G = place_of(CONTACT_ROW_RECORD, "surface_g")
 SHELL_F = place_of(CONTACT_ROW_RECORD, "shell_f")
 SHELL_G = place_of(CONTACT_ROW_RECORD, "shell_g")
 MINIMUM = place_of(CONTACT_ROW_RECORD, "minimum")
-CLEARANCE_ROW_NUMBER = place_of(CONTACT_ROW_RECORD, "guard_number")
+CLEARANCE_ROW_NUMBER = place_of(CONTACT_ROW_RECORD, "clearance_number")
 # A row of a trim.
 TRIM_ROW_RECORD = record_dtype(
     "i8",
@@ -257,6 +257,6 @@ LiftedPairs = namedtuple("LiftedPairs", "free lengths vectors variables guess me
 # that is not known yet); `tips`: None where no term of the objective is a dexterity.
 Program = namedtuple("Program", "store structure lifted tapes tips")
 # What the instructions of tapes work in.
-TapeRoom = namedtuple("TapeRoom", "inputs outputs work")
+TapeWorkspace = namedtuple("TapeWorkspace", "inputs outputs work")
 # Where the Hessian of the Lagrangian and its factor have entries (`envelope.py`).
 Sparsity = namedtuple("Sparsity", "places folds scratch blocks")

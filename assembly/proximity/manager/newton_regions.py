@@ -33,7 +33,7 @@ TOGETHER = 0.25
 NEWTON_WAY = record_dtype(
     "f8",
     parameters=4,  # where its first step led
-    barren=1,  # 1: it came to no extremum of its own
+    no_extremum=1,  # 1: it came to no extremum of its own
 )
 newton_way_at = record_view(NEWTON_WAY)
 PASSED = size_of(NEWTON_WAY)
@@ -123,6 +123,6 @@ def stays(posed, start, half, passed, count):
                 led = newton_way_at(passed, count)
                 for l in range(4):
                     led.parameters[l] = x[l]
-                led.barren = 0.0
+                led.no_extremum = 0.0
                 count += 1
     return STAYED, x, count

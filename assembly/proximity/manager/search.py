@@ -59,7 +59,7 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
         way, near, visited = stays(posed, start, half, passed, visited)
         stayed = way != LEFT
         if way >= 0:
-            return -1, folding or newton_way_at(passed, way).barren == 1.0, Progress(folding, visited, slides)
+            return -1, folding or newton_way_at(passed, way).no_extremum == 1.0, Progress(folding, visited, slides)
     result = NOTHING
     if stayed or not folding:
         # Where nothing folds, it tells whether it goes to an extremum that is known.
@@ -83,7 +83,7 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
     if extrema.count[0] == before or result != MINIMUM_FOUND:
         # Patches that face each other and hold no extremum of their own.
         if visited > mine:
-            newton_way_at(passed, mine).barren = 1.0
+            newton_way_at(passed, mine).no_extremum = 1.0
         return -1, True, progress
     return before, False, progress
 
@@ -93,7 +93,7 @@ def search_patches(posed, moving, limits, facing, extrema, passed):
     """Look into pairs of patches, `facing`, for minima that are not known, within Limits. Returns a PairSearch."""
     curved_bound, enough, span = limits.curved_bound, limits.enough, limits.span
     rest = math.inf
-    fertile = math.inf
+    birth_bound = math.inf
     folding = False
     for k in range(extrema.count[0]):
         folding = folding or not is_alone(extremum_at(extrema.rows, k))
@@ -116,7 +116,7 @@ def search_patches(posed, moving, limits, facing, extrema, passed):
             new, bears, progress = search_candidate(posed, e, d, limits.merge_radius, extrema, passed, progress)
             bound = max(bound, curved_bound)
         if bears:
-            fertile = min(fertile, bound)
+            birth_bound = min(birth_bound, bound)
             lo, hi = around(posed.store, moving.tree, d if moving.side == 1 else e, lo, hi)
         if new >= 0:
             extremum = extremum_at(extrema.rows, new)
@@ -124,4 +124,4 @@ def search_patches(posed, moving, limits, facing, extrema, passed):
             alien = extremum.gap > span[1] or extremum.gap < span[0]
             alien = alien or (extremum.gap < 0.0 and is_outside(posed, extremum))
             extremum.origin = USELESS if alien else NEW
-    return PairSearch(rest, fertile, ball_about(moving, lo, hi, 0.0), math.inf)
+    return PairSearch(rest, birth_bound, ball_about(moving, lo, hi, 0.0), math.inf)

@@ -255,14 +255,14 @@ def keep_bounds(manager, p, search, rest, extrema):
     known.motion_bound = max(min(rest, search.bound), LEAST_MOTION_BOUND)
     known.part = 0.0
     known.doubt = 0.0
-    fertile, sure = search.ball_bound, search.accepted_bound
+    birth_bound, sure = search.ball_bound, search.accepted_bound
     if not is_by_patches(manager, p):
         sure = max(sure, STILL * known.motion_bound)
-    elif fertile < math.inf:
+    elif birth_bound < math.inf:
         low = nearest_fold(extrema, pair_lengths_of(manager, p).least, known.margin)
         sure = 0.0 if low <= FLAT * lengths_of(manager).first_margin else math.inf
-        fertile = fertile if sure == 0.0 else min(fertile, low)
-    allow_ball(known, search.ball, fertile, sure)
+        birth_bound = birth_bound if sure == 0.0 else min(birth_bound, low)
+    allow_ball(known, search.ball, birth_bound, sure)
 
 
 @kernel(inner=True)

@@ -68,7 +68,7 @@ def attempt(
         if known is not None:
             return known
     # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
-    table = packed.table.copy() if packed.guards else packed.table
+    table = packed.table.copy() if packed.clearance_rows else packed.table
     outcome = begin(packed, interruption, table, settings, start(), turns)
     if outcome.code == SOLVED:
         return outcome

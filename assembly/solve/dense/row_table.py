@@ -25,7 +25,7 @@ from assembly.constraints.program.records import (
     Iterate,
     LiftedPairs,
     Program,
-    TapeRoom,
+    TapeWorkspace,
     body_coordinate_at,
     header_at,
     jacobian_row_at,
@@ -125,8 +125,8 @@ def point_at(store, state, free):
     start = np.empty((tracks, TRACK))
     point = new_point(store.table)
     tracked = point.tracked
-    o = header.tape_room
-    room = TapeRoom(np.empty(store.table[o]), np.empty(store.table[o + 1]), np.empty(store.table[o + 2]))
+    o = header.tape_workspace
+    room = TapeWorkspace(np.empty(store.table[o]), np.empty(store.table[o + 1]), np.empty(store.table[o + 2]))
     loose = LiftedPairs(
         free,
         np.empty((pairs, 4)),

@@ -27,21 +27,19 @@ from assembly.proximity.manager.records import (
     place_at,
 )
 from assembly.proximity.manager.update import USED
+from assembly.solve.loop.parameters import SLIGHTLY
 from assembly.solve.loop.residuals import move
-
-# Where solids are in each other by no more, in sizes of the scene, the next look lists what is to part them.
-SLIGHTLY = 1e-5
 
 
 @kernel(inner=True)
 def clear_clearance_rows(table):
     """No row has a contact: so a packed scene is left, whose solutions have contacts of their own."""
     header = header_at(table, 0)
-    for k in range(header.first_guard, header.first_guard + header.guards):
+    for k in range(header.first_clearance_row, header.first_clearance_row + header.clearance_rows):
         contact = contact_of(table, k)
         contact.body_f = -1
         contact.body_g = -1
-        contact.guard_number = 0
+        contact.clearance_number = 0
 
 
 @kernel(inner=True)
@@ -52,7 +50,7 @@ def forget_clearance_rows(table, memory):
     pairs, places, _events = memory_places(table, record)
     for p in range(manager_at(table, record).pairs):
         pair_state_at(memory, pairs + PAIR_MEMORY * p).turn[0] = math.nan
-    for k in range(header.guards):
+    for k in range(header.clearance_rows):
         place_at(memory, places + PLACE_MEMORY * k).pair = -1.0
 
 
@@ -66,16 +64,16 @@ def place_clearance_rows(table, lifted, current, rows, begins):
     record = header.manager_record
     memory, free = lifted.memory, lifted.free
     places = memory_places(table, record)[1]
-    for k in range(header.guards):
+    for k in range(header.clearance_rows):
         slot = place_at(memory, places + PLACE_MEMORY * k)
-        r = header.first_guard + k
+        r = header.first_clearance_row + k
         contact_record = contact_record_at(current.records, r)
         contact = contact_of(table, r)
         p = np.int64(slot.pair)
         number = np.int64(slot.number) if p >= 0 else 0
-        if number == contact.guard_number:
+        if number == contact.clearance_number:
             continue
-        contact.guard_number = number
+        contact.clearance_number = number
         if not begins:
             rows.y[r] = 0.0
             rows.better_y[r] = 0.0
@@ -135,18 +133,18 @@ def update_again(store, lifted, point, how):
     """
     header = header_at(store.table, 0)
     memory, free, scratch, tracked = lifted.memory, lifted.free, lifted.guess, point.tracked
-    first = header.first_guard
-    for r in range(first, first + header.guards):
+    first = header.first_clearance_row
+    for r in range(first, first + header.clearance_rows):
         if free[r] >= 0:
             copy_tracked(tracked, r, scratch)
     changed = update_around(store, memory, point, how)
     places = memory_places(store.table, header.manager_record)[1]
     merge_radius = lengths_at(store.pool, manager_at(store.table, header.manager_record).lengths).merge_radius
-    for r in range(first, first + header.guards):
+    for r in range(first, first + header.clearance_rows):
         place = places + PLACE_MEMORY * (r - first)
         number = np.int64(place_at(memory, place).number) if place_at(memory, place).pair >= 0.0 else 0
         contact = contact_of(store.table, r)
-        if free[r] >= 0 and number == contact.guard_number:
+        if free[r] >= 0 and number == contact.clearance_number:
             f, g = contact.surface_f, contact.surface_g
             if (
                 call_address(header.stayed_address, (store.table, store.pool, f, g, tracked, scratch, r, merge_radius))
@@ -162,8 +160,8 @@ def update_again(store, lifted, point, how):
 def numbers_of(table, out):
     """The numbers of the contacts that rows have now."""
     header = header_at(table, 0)
-    for k in range(header.guards):
-        out[k] = contact_of(table, header.first_guard + k).guard_number
+    for k in range(header.clearance_rows):
+        out[k] = contact_of(table, header.first_clearance_row + k).clearance_number
 
 
 @kernel(inner=True)
@@ -173,8 +171,8 @@ def go_back(table, memory, numbers):
     record = header.manager_record
     pairs, places, _events = memory_places(table, record)
     same = True
-    for k in range(header.guards):
-        number = contact_of(table, header.first_guard + k).guard_number
+    for k in range(header.clearance_rows):
+        number = contact_of(table, header.first_clearance_row + k).clearance_number
         if number != numbers[k]:
             same = False
             place_at(memory, places + PLACE_MEMORY * k).pair = -1.0
@@ -245,8 +243,8 @@ def ends_unseen(store, memory, before, after):
     header = header_at(store.table, 0)
     record = header.manager_record
     places = memory_places(store.table, record)[1]
-    for k in range(header.guards):
-        r = header.first_guard + k
+    for k in range(header.clearance_rows):
+        r = header.first_clearance_row + k
         p = np.int64(place_at(memory, places + PLACE_MEMORY * k).pair)
         if (
             p >= 0

@@ -18,9 +18,7 @@ from assembly.constraints.program.records import ROW, SIGNED, header_at, trim_ro
 from assembly.geometry.splines.pole import limits
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
 from assembly.proximity.features.solid_contact import FEATURE_F, TRACK, contact_record_at, tracked_at
-
-# A parameter along which a point moves less, from end to end and over the scene's size, is one at a pole.
-POLAR = 1e-6
+from assembly.solve.loop.parameters import POLAR
 
 
 @kernel(inner=True)

@@ -32,6 +32,7 @@ from assembly.constraints.program.row_terms import add_row_terms
 from assembly.geometry.vec import add, cross, matvec, scale
 from assembly.kinematics.motion import rotation
 from assembly.solve.linear_algebra.singular_values import measure_jacobian
+from assembly.solve.loop.parameters import DIFFERENCE, KEPT, UNDETERMINED
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.rates import rate_system, settle
 from assembly.solve.loop.residuals import move, slot, times
@@ -69,12 +70,6 @@ Adjoint = namedtuple("Adjoint", "p y loads")
 # The end effector of a term: its task, the arm from its body's origin, where that body's twist stands among the
 # unknowns (negative: fixed), factors of velocities and angular velocities.
 EndEffector = namedtuple("EndEffector", "task arm place linear angular")
-# What rows may change by unit rates of the inputs, and how much of the tip's motion may be left open.
-UNDETERMINED = 1e-6
-# Rows that change by less than this are as good as kept.
-KEPT = 1e-12
-# Step of the differences of the gradient that make the Hessian, which only speeds the loop.
-STEP = 1e-6
 
 
 @kernel(inner=True)
@@ -365,7 +360,7 @@ def add_dexterities(program, count, current, order, gradient, hessian):
         for j in range(n):
             for i in range(n):
                 other[i] = 0.0
-            step[j] = STEP
+            step[j] = DIFFERENCE
             move(store.table, current.q, step, 1.0, beside.q)
             predict_pairs(store, program.structure.bases, program.lifted, current, beside, step, 1.0)
             step[j] = 0.0
@@ -373,6 +368,6 @@ def add_dexterities(program, count, current, order, gradient, hessian):
                 continue
             if math.isfinite(dexterity(program, term, count, beside, 1, other)):
                 for i in range(n):
-                    bend = 0.5 * (other[i] - slope[i]) / STEP
+                    bend = 0.5 * (other[i] - slope[i]) / DIFFERENCE
                     hessian[min(i, j), max(i, j)] += 2.0 * bend if i == j else bend
     return value

@@ -31,16 +31,8 @@ from assembly.constraints.program.records import (
 )
 from assembly.kinematics.motion import retract
 from assembly.solve.linear_algebra.factorize import factorize, substitute
+from assembly.solve.loop.parameters import DAMPING, FIT_STEPS, FITTED, LOWER, MOST_DAMPING, SCATTERED
 
-# Bodies are gathered where a start violates a row of a joint by more than this.
-SCATTERED = 0.5
-STEPS = 50
-# Half the sum of squares of a body's rows that is as good as zero.
-ENOUGH = 1e-26
-# The damping at first, and where no step is found any more.
-DAMPING, STUCK = 1e-4, 1e6
-# A place where rows are smaller by less than this is no better one.
-LOWER = 0.9
 # What the fit of one body works in: J^T J, the same with damping, how far its rows reach, a row, J^T c, the step; its
 # poses at the start, at best, and before a step.
 FitRoom = namedtuple("FitRoom", "matrix damped last row slope step poses")
@@ -163,12 +155,12 @@ def fit_body(store, bases, placed, joint, point, workspace):
     matrix, damped, last, _row, slope, step, poses = workspace
     damping = DAMPING
     cost = body_rows(store, placed, joint, point)
-    for _step in range(STEPS):
-        if cost <= ENOUGH or damping > STUCK:
+    for _step in range(FIT_STEPS):
+        if cost <= FITTED or damping > MOST_DAMPING:
             break
         normal_equations(store.table, bases, placed, joint, point, workspace)
         copy_pose(q, body, poses, BEFORE)
-        while damping <= STUCK:
+        while damping <= MOST_DAMPING:
             for i in range(6):
                 step[i] = -slope[i]
                 for j in range(i, 6):
@@ -212,13 +204,13 @@ def assemble(store, bases, slots, point):
         o = placed.first + placed.count
         copy_pose(q, body, poses, START)
         cost = fit_body(store, bases, placed, -1, point, workspace)
-        if cost <= ENOUGH or not is_half_around(store.table, residual, placed):
+        if cost <= FITTED or not is_half_around(store.table, residual, placed):
             continue
         copy_pose(q, body, poses, BEST)
         tried = -1
         for l in range(placed.first, o):
             joint = joint_row_at(store.table, header.row_table + ROW * store.table[l]).joint
-            if cost <= ENOUGH:
+            if cost <= FITTED:
                 break
             if joint == tried:
                 continue

@@ -31,6 +31,12 @@ FREE_BELOW = 0.02
 # [length] A clearance's contact that no longer step, nor one halved so far (a share of the step), finds again is given
 # up. Doubled, or HALVED halved: contacts that only switch are given up, or are waited for longer. Chosen.
 LETS_GO, HALVED = 1e-5, 0.0625
+# [length] Where solids are in each other by no more than this, the next update lists what is to part them. Doubled:
+# solids may sink deeper before a step is cut. Chosen.
+SLIGHTLY = 1e-5
+# [length] A parameter along which a point moves less, from end to end, is one at a pole, and no unknown. Doubled:
+# slivers of patches count as poles a little earlier. Chosen.
+POLAR = 1e-6
 
 # The step. -----------------------------------------------------------------------------------------------------------
 # The least shift of the Hessian. Doubled: the last steps leave twice as much. From: about the root of a double's
@@ -152,6 +158,39 @@ LINGERS = 40
 # Where a solve may stray, and its bodies are FAR times farther out, or sizes, after STRAYING steps, it is looked at
 # whether that goes on. Doubled: unbounded scenes are told later. Chosen.
 FAR, STRAYING = 1e3, 60
+
+# Initial assembly (`initial_guess.py`). ------------------------------------------------------------------------------
+# [length, or a sine] Bodies are gathered where a start violates a row of a joint by more than this. Doubled: more
+# starts go to the loop as they are, which takes longer from there. Chosen.
+SCATTERED = 0.5
+# [steps] Of the fit of one body to those that are placed. Doubled: fits that creep go on longer. Chosen.
+FIT_STEPS = 50
+# [length squared] Half the sum of squares of a body's rows that is as good as zero. Doubled: nothing. From: rows to
+# 1e-13.
+FITTED = 1e-26
+# The damping of that fit at first, in parts of the matrix of rows of order one, and where no step is found any more.
+# Doubled: a first step shorter; a few more factorizations before a fit gives up. Chosen.
+DAMPING, MOST_DAMPING = 1e-4, 1e6
+# A place for a body is better than another one whose sum of squares is larger by so much. Doubled is no place ever
+# better; nearer to one, rounding decides. Chosen.
+LOWER = 0.9
+
+# Rates and dexterity (`rates.py`, `dexterity.py`). -------------------------------------------------------------------
+# Rows are of order one: singular values below the root of this count as zero. Doubled: nearly dependent rows are a
+# compromise a little earlier. Chosen.
+REST = 1e-10
+# [passes] Of what corrects rates for REST, and the part of them by which the last one changes them: errors shrink by
+# the same factor each. Doubled: mechanisms next to a singular pose are taken a little nearer to it. Chosen; half the
+# digits of a double.
+PASSES, RATES_ENOUGH = 8, 1e-8
+# How much of an end effector's motion its inputs may leave open, and rows may change by them. Doubled: more mechanisms
+# count as determined. Chosen: well above RATES_ENOUGH.
+UNDETERMINED = 1e-6
+# Rows that change by less than this are as good as kept. Doubled: nothing. From: rounding of rows of order one.
+KEPT = 1e-12
+# [length, radians] Step of the differences of a dexterity's gradient that make its Hessian, which only speeds the loop.
+# Doubled: curvature is off by twice as much. Chosen.
+DIFFERENCE = 1e-6
 
 # Time. ---------------------------------------------------------------------------------------------------------------
 # A tick that does not hold after its iterations has so many times more of them. Doubled: later ticks. Chosen.

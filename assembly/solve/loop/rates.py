@@ -25,13 +25,9 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.constraints.program.row_terms import width
 from assembly.solve.linear_algebra.factorize import factorize, substitute
+from assembly.solve.loop.parameters import PASSES, RATES_ENOUGH, REST
 from assembly.solve.loop.residuals import add_row, clear_row, times
 
-# Rows are of order one: singular values below the root of this count as zero.
-REST = 1e-10
-PASSES = 8
-# A pass that changes rates by no more than this part of them is the last one: errors shrink by the same factor each.
-ENOUGH = 1e-8
 # Rows A (those in the list `used`) and B, and what solves them: the factors of M and G with how far their rows reach,
 # and rows M^-1 B^T.
 RateSystem = namedtuple("RateSystem", "bases jacobian used inputs matrix last solved gram ends")
@@ -154,9 +150,9 @@ def settle(system, g, h, v, z):
             change = max(change, abs(x[i]))
         passes += 1
         before = size
-        if change <= ENOUGH * longest:
+        if change <= RATES_ENOUGH * longest:
             # What the next pass would change is its square.
-            return size * ENOUGH
+            return size * RATES_ENOUGH
         for i in range(n):
             rest[i] = g[i]
         for j in range(k):
@@ -173,7 +169,7 @@ def settle(system, g, h, v, z):
             size = max(size, abs(missing[j]))
         if not size < 0.1 * before or passes == PASSES:
             break
-    if size > ENOUGH * start:
+    if size > RATES_ENOUGH * start:
         substitute(matrix, n, last, rest)
         for i in range(n):
             v[i] -= passes * rest[i]

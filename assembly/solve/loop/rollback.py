@@ -32,10 +32,10 @@ def has_sunk(store, memory, residual):
     Of solids rows lead out the way they came: corners stay on their faces.
     """
     header = header_at(store.table, 0)
-    for k in range(header.guards):
-        r = header.first_guard + k
+    for k in range(header.clearance_rows):
+        r = header.first_clearance_row + k
         row = contact_of(store.table, r)
-        if row.guard_number > 0 and row.shell_f < 0:
+        if row.clearance_number > 0 and row.shell_f < 0:
             # How far bodies may go in one step is behind the least gap, which the residual is less.
             at = row.minimum
             if residual[r] + store.pool[at] < -DEEP * store.pool[at + 1]:

@@ -47,7 +47,7 @@ def warm_start(table, state, at, point):
             return False
     o = at + 1 + 7 * header.bodies
     for r in range(header.contacts):
-        if warm_contact_at(state, o + WARM_CONTACT * r).number != float(contact_of(table, r).guard_number):
+        if warm_contact_at(state, o + WARM_CONTACT * r).number != float(contact_of(table, r).clearance_number):
             return False
     for r in range(header.contacts):
         if contact_of(table, r).body_f < 0:
@@ -76,7 +76,7 @@ def leave(table, state, at, point, good):
     for r in range(header.contacts):
         left = warm_contact_at(state, o + WARM_CONTACT * r)
         contact = contact_of(table, r)
-        left.number = float(contact.guard_number)
+        left.number = float(contact.clearance_number)
         if contact.body_f < 0:
             continue
         left.residual = point.residual[r]

@@ -15,7 +15,7 @@ from assembly.constraints.program.records import (
     Iterate,
     LiftedPairs,
     Program,
-    TapeRoom,
+    TapeWorkspace,
     header_at,
 )
 from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
@@ -87,7 +87,7 @@ def memory_of(table, state):
 def workspace_needed(table):
     """How many doubles and integers a solve works in: what is carved below, and by `shape_of`."""
     header = header_at(table, 0)
-    pairs, bodies, tracks, tapes = header.contacts, header.bodies, header.tracked, header.tape_room
+    pairs, bodies, tracks, tapes = header.contacts, header.bodies, header.tracked, header.tape_workspace
     most, n = header.rows + 4 * pairs, 6 * header.moving
     integers, doubles = size_of_shape(table, most, n + 4 * pairs)
     # Poses, tracked values, records, Jacobians, what a row has one of.
@@ -100,7 +100,7 @@ def workspace_needed(table):
     blocks = header.block_record
     layout = blocks_at(table, blocks)
     doubles += 4 * n + (36 * (layout.blocks + layout.factored) if blocks > 0 else 2 * n * n)
-    return doubles, integers + pairs + header.guards
+    return doubles, integers + pairs + header.clearance_rows
 
 
 @kernel(inline=True)
@@ -131,7 +131,7 @@ def carve_points(table, most, doubles, integers):
     gram = carve(doubles, at, (most + 1, most))
     at += (most + 1) * most
     rows = Rows(header.rows, 0.0, by_row[2], by_row[3], by_row[4], by_row[5], by_row[6], gram)
-    held = Held(poses[2], tracked[3], by_row[7], carve(integers, header.contacts, (header.guards,)))
+    held = Held(poses[2], tracked[3], by_row[7], carve(integers, header.contacts, (header.clearance_rows,)))
     return Iterates(current, trial, held), rows, tracked[2], at
 
 
@@ -156,11 +156,11 @@ def carve_pairs(table, guess, memory, doubles, at, integers):
 @kernel(inline=True, allocates=True)
 def carve_tapes(table, doubles, at):
     """What the instructions of expressions work in, and where it ends."""
-    o = header_at(table, 0).tape_room
+    o = header_at(table, 0).tape_workspace
     inputs = carve(doubles, at, (table[o],))
     outputs = carve(doubles, at + table[o], (table[o + 1],))
     work = carve(doubles, at + table[o] + table[o + 1], (table[o + 2],))
-    return TapeRoom(inputs, outputs, work), at + table[o] + table[o + 1] + table[o + 2]
+    return TapeWorkspace(inputs, outputs, work), at + table[o] + table[o + 1] + table[o + 2]
 
 
 @kernel(inline=True)

@@ -70,7 +70,7 @@ Run = Callable[[Array, Array], Outcome]
 
 def lower_neighbor(look: Look, way: Way) -> Neighbor | None:
     """A pose that holds and is lower, as far along a way as they become lower; None where there is none."""
-    shy = look.packed.guards > 0
+    shy = look.packed.clearance_rows > 0
     share = min(SHY, way.share) if shy else way.share
     best: Neighbor | None = None
     while SHORTEST <= share <= LONGEST:

@@ -260,7 +260,7 @@ def search_centerlines(posed, moving, limits, boxes, waiting, rooms, extrema):
     marks, places = rooms
     mark_known(posed, extrema, marks)
     rest = reach
-    fertile = math.inf
+    birth_bound = math.inf
     sure = math.inf
     refined = 0
     lo = (math.inf, math.inf, math.inf)
@@ -301,7 +301,7 @@ def search_centerlines(posed, moving, limits, boxes, waiting, rooms, extrema):
             # A contact may be born beside one that is near: so far it is excluded.
             sure = min(sure, allowed)
             allowed = curved_bound
-        fertile = min(fertile, allowed)
+        birth_bound = min(birth_bound, allowed)
         lo, hi = around_box(pool, parts.g if moving.side == 1 else parts.f, box, moving.side, lo, hi)
-    ball = ball_about(moving, lo, hi, limits.rho) if fertile < math.inf else no_ball()
-    return PairSearch(rest, fertile, ball, sure)
+    ball = ball_about(moving, lo, hi, limits.rho) if birth_bound < math.inf else no_ball()
+    return PairSearch(rest, birth_bound, ball, sure)
