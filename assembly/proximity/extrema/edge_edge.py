@@ -32,13 +32,12 @@ from assembly.proximity.extrema.feature_jets import (
     edge_advance,
     edge_held,
     edge_side,
-    fold_of,
     inverse,
     other_jet,
     pair_response,
     vertex_side,
 )
-from assembly.proximity.extrema.pair_matrix import RANK
+from assembly.proximity.extrema.pair_matrix import RANK, VANISHING, fold_of
 
 # Points closer than this part of the size coincide: their difference has no direction.
 COINCIDENT = 1e-13
@@ -228,7 +227,7 @@ def solve_off_face(store, f, g, pose, x, normal, limits):
             elif inverse(step.h, step.scope, RANK)[1]:
                 status = CONVERGED
             else:
-                status = SINGULAR if off < 1e-9 * size else NOT_CONVERGED
+                status = SINGULAR if off < VANISHING * size else NOT_CONVERGED
             break
         if iteration >= limits.steps or not length < 1e300 or bend > limits.turn:
             break

@@ -218,13 +218,6 @@ def pair_response(f, g, beta, unit):
     return inverse(h, unit * (1.0 + abs(beta) * unit), RANK)[0]
 
 
-@kernel(inline=True)
-def fold_of(h, size):
-    """det H / |H|^2: how far a pair is from a fold, where it ceases to be isolated; zero where H is nothing."""
-    norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-    return (h[0] * h[3] - h[1] * h[2]) / norm2 if norm2 > 1e-18 * size * size else 0.0
-
-
 @kernel(inner=True)
 def across(a, b):
     """A unit vector orthogonal to the unit vector a (or to nothing, a = 0), along b as far as it may."""

@@ -11,11 +11,10 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import find_span, surface_at
 from assembly.proximity.extrema.face_face import pair_frame
-from assembly.proximity.extrema.feature_jets import fold_of
-from assembly.proximity.extrema.pair_matrix import pair_matrix
+from assembly.proximity.extrema.pair_matrix import FLAT, fold_of, pair_matrix
 
-# A root this far from a fold is the only one in its patches and those beside them, which turn by half a radian at most.
-ALONE, BESIDE = 0.05, 3.0
+# So many half widths from the middle of a patch is beside it.
+BESIDE = 3.0
 
 
 @kernel(inline=True)
@@ -68,5 +67,5 @@ def fold_beyond(store, posed, x, half):
                 continue
             frame = pair_frame(store, f, g, posed.pose, (u, v, s, t))
             if frame.regular:
-                least = min(least, fold_of(pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9).h, 1.0))
+                least = min(least, fold_of(pair_matrix(frame.shape_f, frame.shape_g, frame.gap, FLAT).h, 1.0))
     return least

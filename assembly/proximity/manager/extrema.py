@@ -26,8 +26,8 @@ from assembly.proximity.extrema.face_face import CONVERGED, NOT_CONVERGED, SINGU
 from assembly.proximity.extrema.feature_pair import two_face_frame
 from assembly.proximity.extrema.feedback import descend_pair
 from assembly.proximity.extrema.global_start import opposed
+from assembly.proximity.extrema.pair_matrix import is_the_only_one
 from assembly.proximity.extrema.rates import derivatives_at
-from assembly.proximity.extrema.singular import ALONE
 from assembly.proximity.features.solid_contact import contact_record_at, pair_parameters, tracked_at
 
 # An extremum of the distance of two bodies. Points and the normal are in the axes of f.
@@ -285,4 +285,4 @@ def add_given(posed, tracked, listed, many, merge_radius, extrema):
 @kernel(inline=True)
 def is_alone(extremum):
     """Whether an extremum is far from a fold, beyond knot lines too as far as it is known."""
-    return extremum.fold > ALONE and not extremum.beyond <= ALONE
+    return is_the_only_one(extremum.fold) and (math.isnan(extremum.beyond) or is_the_only_one(extremum.beyond))
