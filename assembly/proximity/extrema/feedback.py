@@ -234,7 +234,7 @@ def step_along(store, r, u, v, own, ways, step, factor):
 
 
 @kernel(inner=True)
-def finish(store, surfaces, pose, x, size, reach):
+def finish_by_newton(store, surfaces, pose, x, size, reach):
     """Newton's method from x: whether it came to the extremum that the descent leads to, and the `PairSolution`.
 
     That is one no farther apart than x, off by no more than `reach` on either surface; with reach = 0, where the
@@ -306,7 +306,7 @@ def descend_pair(store, surfaces, pose, x, size, limit):
             bend = max(step_f * model.bend_f, step_g * model.bend_g)
             if not held and bend < near and mu <= 1e-3 * first:
                 # `solve_pair` takes the rest; should it go elsewhere, the descent goes on to a nearer start.
-                same, found = finish(store, surfaces, pose, x, size, 8.0 * step + 1e-9 * size)
+                same, found = finish_by_newton(store, surfaces, pose, x, size, 8.0 * step + 1e-9 * size)
                 if same:
                     return with_steps(found, count)
                 near *= 0.1
@@ -337,7 +337,7 @@ def descend_pair(store, surfaces, pose, x, size, limit):
     if status == NOT_CONVERGED and at.square <= TOUCH * TOUCH * size * size:
         status = CROSSED
     if status == CROSSED:
-        same, found = finish(store, surfaces, pose, x, size, 0.0)
+        same, found = finish_by_newton(store, surfaces, pose, x, size, 0.0)
         if same:
             return with_steps(found, count)
     frame = pair_frame(store, f, g, pose, x)

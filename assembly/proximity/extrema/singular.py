@@ -18,7 +18,7 @@ BESIDE = 3.0
 
 
 @kernel(inline=True)
-def across(store, r, direction, x, most):
+def beyond_knot(store, r, direction, x, most):
     """A parameter just beyond the knot line nearest to x, or x itself where none is within `most`."""
     patch = surface_at(store.table, r)
     o = patch.breaks_u if direction == 0 else patch.breaks_v
@@ -49,10 +49,10 @@ def fold_beyond(store, posed, x, half):
     """
     f, g = posed.surfaces[0], posed.surfaces[1]
     y = (
-        across(store, f, 0, x[0], BESIDE * half[0]),
-        across(store, f, 1, x[1], BESIDE * half[1]),
-        across(store, g, 0, x[2], BESIDE * half[2]),
-        across(store, g, 1, x[3], BESIDE * half[3]),
+        beyond_knot(store, f, 0, x[0], BESIDE * half[0]),
+        beyond_knot(store, f, 1, x[1], BESIDE * half[1]),
+        beyond_knot(store, g, 0, x[2], BESIDE * half[2]),
+        beyond_knot(store, g, 1, x[3], BESIDE * half[3]),
     )
     least = math.inf
     for i in range(4):

@@ -37,7 +37,7 @@ ROUGH = 0.1
 
 
 @kernel(inner=True)
-def middle_of(store, shell):
+def middle_of_faces(store, shell):
     """The middle of the cells of a shell's faces, and how far these reach from there."""
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
@@ -130,7 +130,7 @@ def conforming_pair(store, shells, pose, size):
     same = IDENTITY.rotation
     ways = np.empty((WAYS, 3))
     for side in range(2):
-        center, reach = middle_of(store, shell_g if side == 0 else shell_f)
+        center, reach = middle_of_faces(store, shell_g if side == 0 else shell_f)
         if not reach > 0.0:
             continue
         about = add(matvec(pose.rotation, center), pose.shift) if side == 0 else center

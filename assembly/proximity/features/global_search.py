@@ -38,7 +38,7 @@ from assembly.proximity.features.ball_tree import (
     cell_in,
     give_model,
     grow,
-    is_full,
+    is_tree_full,
     model_in,
     plant,
 )
@@ -236,7 +236,7 @@ def search_ended(search, top, left):
     if left == 0 or first.bound >= state.limit:
         return APART
     state.place = first.tie
-    full = is_full(search.trees[0]) or is_full(search.trees[1]) or left + 160 > WAITING
+    full = is_tree_full(search.trees[0]) or is_tree_full(search.trees[1]) or left + 160 > WAITING
     return UNPROVEN if full else -1
 
 

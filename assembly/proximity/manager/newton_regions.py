@@ -54,7 +54,7 @@ def is_beside(store, surfaces, x, y, half, part):
 
 
 @kernel(inner=True)
-def is_known(posed, e, d, extrema):
+def known_in_region(posed, e, d, extrema):
     """The features of elements e and d, the parameters of their middles, whether a known extremum is all there is.
 
     And whether one is there that is near a fold, on this side of a knot line or beyond: a second extremum may be beside

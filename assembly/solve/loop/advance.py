@@ -13,7 +13,7 @@ from assembly.solve.loop.contacts import is_near_fold
 from assembly.solve.loop.deadline import is_cut, may_end
 from assembly.solve.loop.direction import find_direction, first_shift, propose, short_share
 from assembly.solve.loop.inertia import note_factor
-from assembly.solve.loop.line_search import Line, Trust, search
+from assembly.solve.loop.line_search import Line, Trust, search_line
 from assembly.solve.loop.loop_state import lead_back
 from assembly.solve.loop.parameters import FREE_BELOW_AT_LAST, HALF, OFTEN, RESTORATIONS, SHORTEST
 from assembly.solve.loop.residuals import violation_of
@@ -84,7 +84,7 @@ def take_step(task, current, trial, rows, system):
     loop.cuts = loop.cuts + 1 if task.watched and loop.cut < 0.5 and loop.violation <= TOUCHING else 0
     loop.cut_length = 2.0 * loop.longest if loop.cuts > 0 else math.inf
     line = Line(loop.slope, loop.longest, not task.tick, loop.may_go == 1)
-    accepted, alpha, lost = search(task.program, current, trial, rows, system, line, loop.value, restoring)
+    accepted, alpha, lost = search_line(task.program, current, trial, rows, system, line, loop.value, restoring)
     loop.measured, loop.alpha, loop.lost = accepted, alpha, lost
     if not accepted:
         refuse(task, current)

@@ -184,7 +184,7 @@ def go_back(table, memory, numbers):
 
 
 @kernel(inner=True)
-def measure(store, memory, first, end, q):
+def measure_pairs(store, memory, first, end, q):
     """Measure what pairs from first to before `end` used of their allowances. The largest part that is known."""
     header = header_at(store.table, 0)
     watch = header.watch
@@ -202,7 +202,7 @@ def allowed_share(store, memory, current, trial, step, share):
     move(store.table, current.q, step, share, trial.q)
     watch = header_at(store.table, 0).watch
     manager = manager_at(store.table, watch)
-    if measure(store, memory, 0, manager.pairs, trial.q) <= 1.0:
+    if measure_pairs(store, memory, 0, manager.pairs, trial.q) <= 1.0:
         return share, True
     at = memory_places(store.table, watch)[0]
     allowed = 1.0
@@ -213,7 +213,7 @@ def allowed_share(store, memory, current, trial, step, share):
         o.cut_short = end * o.allowance
         begin = end
         if end > USED:
-            measure(store, memory, p, p + 1, current.q)
+            measure_pairs(store, memory, p, p + 1, current.q)
             begin = o.part
             o.part = end
         if end > max(begin, 1.0):
@@ -229,7 +229,9 @@ def allowed_share(store, memory, current, trial, step, share):
 @kernel(inner=True)
 def is_too_far(store, memory, point):
     """Whether the poses of a point are farther than the watch allows."""
-    return measure(store, memory, 0, manager_at(store.table, header_at(store.table, 0).watch).pairs, point.q) > 1.0
+    return (
+        measure_pairs(store, memory, 0, manager_at(store.table, header_at(store.table, 0).watch).pairs, point.q) > 1.0
+    )
 
 
 @kernel(inner=True)

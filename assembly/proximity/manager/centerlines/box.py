@@ -62,7 +62,7 @@ def segment_distance(d, f, g, h, k):
 
 
 @kernel(inline=True)
-def apart(parts, s, t):
+def difference_at(parts, s, t):
     """The Difference at lengths s and t along two parts."""
     pose = parts.pose
     pf, f, bend_f = centerline_point(parts.pool, parts.f, s)
@@ -152,7 +152,7 @@ def box_of(parts, box, open_ends, reach, rho):
     """
     h = 0.5 * (box.to_f - box.from_f)
     k = 0.5 * (box.to_g - box.from_g)
-    middle = apart(parts, box.from_f + h, box.from_g + k)
+    middle = difference_at(parts, box.from_f + h, box.from_g + k)
     d, f, g = middle.d, middle.tangent_f, middle.tangent_g
     bend_f, bend_g = middle.curvature_f, middle.curvature_g
     part_f, part_g = centerline_part_at(parts.pool, parts.f), centerline_part_at(parts.pool, parts.g)
