@@ -23,8 +23,8 @@ from assembly.proximity.manager.centerlines.box import (
     FreeEnds,
     Lengths,
     PosedParts,
-    difference_at,
     box_of,
+    difference_at,
 )
 from assembly.proximity.manager.centerlines.packing import pack_centerline
 from assembly.proximity.manager.motion_bounds import part_used

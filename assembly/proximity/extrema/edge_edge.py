@@ -25,7 +25,7 @@ from assembly.proximity.extrema.face_face import (
 from assembly.proximity.extrema.feature_jets import (
     BEYOND,
     FINE,
-    ROUNDING,
+    RESIDUAL_ROUNDING,
     SLACK,
     FeatureFrame,
     across,
@@ -220,7 +220,7 @@ def solve_off_face(store, f, g, pose, x, normal, limits):
         bend_g = abs(s2) * max(curve_g.bend, 2.0 / size)
         bend = max(bend_f, bend_g)
         off = max(abs(step.residual[0]), abs(step.residual[1]))
-        small = off <= (ROUNDING if step.fine else SLACK) * size
+        small = off <= (RESIDUAL_ROUNDING if step.fine else SLACK) * size
         if small or (length <= 4e-14 * size and bend < 1e-9) or (bend < STAGNANT and length > 0.25 * previous):
             if step.point_f != at_f or step.point_g != at_g:
                 status = LEFT_PATCH

@@ -33,7 +33,7 @@ from assembly.proximity.extrema.face_face import (
 from assembly.proximity.extrema.feature_jets import (
     BEYOND,
     FINE,
-    ROUNDING,
+    RESIDUAL_ROUNDING,
     SLACK,
     FeatureFrame,
     edge_advance,
@@ -278,7 +278,7 @@ def solve_on_face(store, face, other, pose, x, limits):
         bend_g = 0.0 if step.is_point or step.slides else step.length * max(edge.curved, 2.0 / size)
         bend = max(bend_f, bend_g)
         off = max(abs(over.residual[0]), abs(over.residual[1]))
-        level = ROUNDING if step.fine else SLACK
+        level = RESIDUAL_ROUNDING if step.fine else SLACK
         small = off <= level * size and abs(tilt) <= level
         settled = (length <= 4e-14 * size and bend < 1e-9) or stagnates(
             length, bend, previous, status, own.point, q, size

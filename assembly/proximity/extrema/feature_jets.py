@@ -47,7 +47,7 @@ from assembly.proximity.extrema.pair_matrix import RANK
 # Newton's own matrix is damped below this ratio: its residuals are right to rounding, unlike the rates it stands for.
 FINE = 1e-13
 # Residuals below this part of the size are rounding.
-ROUNDING = 2e-15
+RESIDUAL_ROUNDING = 2e-15
 # The same where the equations are singular: a step would be rounding over almost nothing.
 SLACK = 1e-13
 # A slope (or a length over the size) at the end of an edge that leads beyond it by less is rounding.

@@ -46,7 +46,7 @@ MEET = 1e-10
 # Where the descent ends with points nearer than this part of the size, they would meet: surfaces that touch.
 TOUCH = 1e-5
 # What of a gradient is rounding, as a part of the size.
-ROUNDING = 1e-13
+GRADIENT_ROUNDING = 1e-13
 # A first damping, against curvatures of |d|^2 / 2, which are one for points that move along a plane.
 DAMPING = 1e-2
 # The least damping, so that points that may slide without coming closer stay; one whose steps are too short to count.
@@ -199,8 +199,8 @@ def descent_model(store, surfaces, pose, x, at, size):
     xf, yf, xg, yg = at.f.tangent_x, at.f.tangent_y, at.g.tangent_x, at.g.tangent_y
     gf = (-dot(xf, at.d), -dot(yf, at.d))
     gg = (dot(xg, at.d_g), dot(yg, at.d_g))
-    tf = free_directions(store, f, x[0], x[1], at.f.rates, gf, ROUNDING * size)
-    tg = free_directions(store, g, x[2], x[3], at.g.rates, gg, ROUNDING * size)
+    tf = free_directions(store, f, x[0], x[1], at.f.rates, gf, GRADIENT_ROUNDING * size)
+    tg = free_directions(store, g, x[2], x[3], at.g.rates, gg, GRADIENT_ROUNDING * size)
     h_f = reduced(dot(at.f.normal, at.d), at.f.shape, tf)
     h_g = reduced(-dot(at.g.normal, at.d_g), at.g.shape, tg)
     if tf.count == 1:

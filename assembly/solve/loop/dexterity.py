@@ -25,7 +25,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.constraints.program.evaluate import evaluate
-from assembly.constraints.program.objective_terms import DEXTERITY, TERM, three_at, term_at
+from assembly.constraints.program.objective_terms import DEXTERITY, TERM, term_at, three_at
 from assembly.constraints.program.primitives import add_coordinate_hessian, coordinate
 from assembly.constraints.program.records import BODY_COORDINATE, ROW, Iterate, body_coordinate_at, header_at, row_at
 from assembly.constraints.program.row_terms import add_row_terms

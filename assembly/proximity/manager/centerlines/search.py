@@ -27,9 +27,9 @@ from assembly.proximity.manager.centerlines.box import (
     FreeEnds,
     Lengths,
     PosedParts,
-    difference_at,
     box_of,
     centerline_box_at,
+    difference_at,
 )
 from assembly.proximity.manager.centerlines.minima import convex_minimum, near_singular_minima
 from assembly.proximity.manager.extrema import (
@@ -38,8 +38,8 @@ from assembly.proximity.manager.extrema import (
     USELESS,
     add_surface_extremum,
     extremum_at,
-    is_list_full,
     is_known_one,
+    is_list_full,
     write_frame,
 )
 from assembly.proximity.manager.motion_bounds import PairSearch, ball_about, no_ball
