@@ -25,6 +25,8 @@ def two_face_frame(frame, matrix):
     h = matrix.h
     e = frame.rates_f
     fold = fold_of(h, 1.0)
+    # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
+    proper = is_no_saddle(fold) and h[0] + h[3] <= 0.0
     return FeatureFrame(
         normal=frame.normal,
         tangent_x=frame.tangent_x,
@@ -40,8 +42,7 @@ def two_face_frame(frame, matrix):
         residual=frame.residual,
         regular=frame.regular,
         isolated=matrix.isolated,
-        # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
-        proper=is_no_saddle(fold) and h[0] + h[3] <= 0.0,
+        proper=proper,
         fold=fold,
     )
 
