@@ -21,7 +21,11 @@ NO_PAIRS = Pairs(0, 0, 0, 0)
 
 
 def best_first(
-    state_at: Callable[..., Any], bound: Callable[..., Any], ended: Callable[..., Any], branch: Callable[..., Any]
+    state_at: Callable[..., Any],
+    bound: Callable[..., Any],
+    ended: Callable[..., Any],
+    branch: Callable[..., Any],
+    floor: float = 0.0,
 ) -> Callable[..., Any]:
     """The body of a kernel (search, left, pairs) -> (status, left): a search with `left` pairs in its heap goes on.
 
@@ -39,12 +43,14 @@ def best_first(
         (search, top, left) -> status, or below zero to go on: `top` is L, `left` how many pairs wait in search.heap.
     branch
         (search, bound, i, j) -> a bound of the pair, and the pairs that take its place: none where it is let go.
+    floor
+        No bound is less than this: 0, as distances are, if it means nothing else below zero.
     """
 
     def advance(search: Any, left: Any, pairs: Any) -> Any:
         state = state_at(search.state, 0)
         first = waiting_pair_at(search.heap, 0)
-        least = 0.0
+        least = floor
         while True:
             for i in range(pairs.begin_a, pairs.end_a):
                 for j in range(pairs.begin_b, pairs.end_b):

@@ -27,7 +27,7 @@ def put_pair(heap, k, bound, tie, a, b):
 
 
 @kernel(inline=True)
-def move_pair(heap, source, target):
+def move_waiting(heap, source, target):
     """Copy a pair to another place."""
     pair = waiting_pair_at(heap, PAIR * source)
     put_pair(heap, target, pair.bound, pair.tie, pair.a, pair.b)
@@ -47,7 +47,7 @@ def push(heap, count, bound, tie, a, b):
         parent = (k - 1) >> 1
         if goes_before(waiting_pair_at(heap, PAIR * parent), bound, tie):
             break
-        move_pair(heap, parent, k)
+        move_waiting(heap, parent, k)
         k = parent
     put_pair(heap, k, bound, tie, a, b)
 
@@ -68,7 +68,7 @@ def drop_first(heap, count):
             child += 1
         if not goes_before(waiting_pair_at(heap, PAIR * child), bound, tie):
             break
-        move_pair(heap, child, k)
+        move_waiting(heap, child, k)
         k = child
     put_pair(heap, k, bound, tie, a, b)
 

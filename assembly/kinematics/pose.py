@@ -35,6 +35,8 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
+# A body's place where none is given: x y z qw qx qy qz.
+IDENTITY_ROW = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 # A quaternion typed to two digits is off by less; a forgotten normalization is off by more.
 UNIT_TOLERANCE = 1e-2
 # Rounding of a normalization: within it a quaternion is left as it is, so that normalizing twice changes no bit.

@@ -9,7 +9,7 @@ import numpy as np
 from assembly.constraints.model.contact import side_faces
 from assembly.constraints.program.records import DEEPEST_AT, NEAREST_AT, ROW, ROW_TABLE, SHELL_F, SHELL_G
 from assembly.kinematics.body import Body, BodyFace
-from assembly.proximity.extrema.pairs import ContactPair, PairStatus, extremal_pair
+from assembly.proximity.extrema.pairs import STATUSES, ContactPair, PairStatus, extremal_pair
 from assembly.proximity.extrema.rates import ARM_F, GAP, NORMAL
 from assembly.proximity.features.features import closest_features, features_of
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, FEATURE_F, FEATURE_G, search_solids, track_solids
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from assembly.solve.solution import Solution
 
 __all__ = ["contact_pairs"]
-
-_STATUSES = tuple(PairStatus)
 
 
 def contact_pairs(solution: Solution) -> dict[str, ContactPair]:
@@ -93,7 +91,7 @@ def _solids(
         points=np.array([there - gap * normal, there]) * packed.scale + packed.reference,
         normal=normal,
         gap=float(gap) * packed.scale,
-        status=_STATUSES[status],
+        status=STATUSES[status],
         features=(names[0], names[1]),
     )
 

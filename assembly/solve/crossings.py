@@ -46,7 +46,7 @@ DEPTHS = (0.005, 0.015, 0.05)
 # more than looks take for nothing.
 PLACES = 8
 # What rounding may make of boxes, in parts of where they end.
-ROUNDING = 1e-12
+END_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -191,7 +191,7 @@ def _box(body: Body, row: Array) -> tuple[Array, Array]:
     """The lower and the upper corner of a box around a body at a pose."""
     points = np.concatenate([face.face.surface.control_points.reshape(-1, 3) for face in body.faces])
     points = points @ rotation_matrix(row[3:]).T + row[:3]
-    margin = ROUNDING * np.abs(points).max()
+    margin = END_ROUNDING * np.abs(points).max()
     return points.min(axis=0) - margin, points.max(axis=0) + margin
 
 

@@ -42,6 +42,7 @@ from assembly.proximity.manager.records import (
 )
 from assembly.proximity.manager.update import IN_TURNS
 from assembly.solve.loop.clearances import place_clearance_rows, update_around
+from assembly.solve.loop.contacts import is_near_fold
 from assembly.solve.loop.workspace import Rows
 
 # A correction by more than this part of the prediction and of the surface's domain puts the root in doubt; so does a
@@ -215,7 +216,7 @@ def follow(table, pool, q, last, room, free, memory):
         predict(store, r, tracked, records, twists, guess)
         if not correct(store, r, poses, guess, tracked, records):
             continue
-        if abs(contact_record_at(records, r).fold) < NEAR_FOLD:
+        if is_near_fold(records, r, NEAR_FOLD):
             look_at_all_of(table, memory, k)
         elif not is_of_solids(table, r) and is_astray(store, r, before, guess, tracked):
             look_at_all_of(table, memory, k)

@@ -34,7 +34,7 @@ _COLUMNS = ("time", "x", "y", "z", "qw", "qx", "qy", "qz")
 # Two traces meet where one ends and the other begins within this, relative to their largest coordinate; radians.
 _MEETING = 1e-9
 # Part of an interval by which rounding may make a duration shorter.
-_ROUNDING = 1e-9
+_DURATION_ROUNDING = 1e-9
 
 
 class Speed(NamedTuple):
@@ -99,7 +99,7 @@ class Trace(ReadOnlyArrays):
         """
         when = real_array("times", times, ("k",))
         path = cls(when, _target_rows("points", points, len(when)))
-        count = max(int(np.ceil(path.duration * positive("rate", rate) - _ROUNDING)), 1) + 1
+        count = max(int(np.ceil(path.duration * positive("rate", rate) - _DURATION_ROUNDING)), 1) + 1
         even = np.linspace(when[0], when[-1], count)
         return cls(even, path._evaluated(path._fit("clamped"), even))
 
@@ -202,7 +202,7 @@ class Trace(ReadOnlyArrays):
             A rate that is not positive, or leaves a single sample.
         """
         frequency = positive("rate", rate)
-        count = int(np.floor(self.duration * frequency + _ROUNDING)) + 1
+        count = int(np.floor(self.duration * frequency + _DURATION_ROUNDING)) + 1
         if count < 2:
             raise InputError(f"rate is {frequency:g} for {self.duration:g} s; expected two samples at least")
         times = self.times[0] + np.arange(count) / frequency

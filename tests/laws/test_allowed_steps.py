@@ -17,7 +17,7 @@ from assembly.proximity.features.solid_contact import TRACK
 from assembly.proximity.manager import update as watch
 from assembly.proximity.manager.extrema import ROOT, extremum_at
 from assembly.proximity.manager.motion_bounds import part_used, went
-from assembly.proximity.manager.newton_regions import is_known
+from assembly.proximity.manager.newton_regions import known_in_region
 from assembly.proximity.manager.records import (
     PAIR_MEMORY,
     PAIR_STATE,
@@ -158,7 +158,7 @@ def test_a_point_that_stays_on_an_edge_is_no_root():
             root.fold, root.beyond = 1.0, np.nan
             for corner, known in ((NOTHING, True), (FEATURES, True), (POINT, False)):
                 root.corner = corner
-                assert is_known(looked_into, e[0], d[0], list_of(roots, 1))[2] == known
+                assert known_in_region(looked_into, e[0], d[0], list_of(roots, 1))[2] == known
             seen += 1
     assert seen > 4
 

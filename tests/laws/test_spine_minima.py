@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from assembly.geometry.vec import dot
-from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, apart
+from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, difference_at
 from assembly.proximity.manager.centerlines.minima import MINIMA, near_singular_minima
 from assembly.proximity.manager.centerlines.search import THIN
 from assembly.proximity.manager.wires import centerline_part_at
@@ -22,7 +22,7 @@ CLOSED = (False, False, False, False)
 
 def slopes(two, pose, s, t):
     """F_s, F_t, F_ss, F_tt, of numbers or of arrays of them."""
-    d, f, c, g, e = apart(two.parts(pose), s, t)
+    d, f, c, g, e = difference_at(two.parts(pose), s, t)
     return -dot(d, f), dot(d, g), 1.0 - dot(d, c), 1.0 + dot(d, e)
 
 
@@ -134,7 +134,7 @@ def test_minima_of_thin_boxes_are_those_of_samples(cases):
         box = (s - h, s + h, t - k, t + k)
         # Slopes near zero somewhere in the box: else nearly all have no minimum.
         at = rng.uniform(box[0], box[1]), rng.uniform(box[2], box[3])
-        d, f, _, g, _ = (np.array(row) for row in apart(two.parts(), *at))
+        d, f, _, g, _ = (np.array(row) for row in difference_at(two.parts(), *at))
         normal = np.cross(f, g)
         if np.linalg.norm(normal) < 1e-6:
             continue
@@ -158,7 +158,7 @@ def test_minima_beside_a_turn_of_the_slope_are_found(cases):
         if side == 1 or curved < 0.2:
             continue
         # Where phi'' vanishes beside the box's middle phi' turns: F_ss F_tt = F_st^2 by the distance of the spines.
-        d, f, c, g, e = (np.array(row) for row in apart(two.parts(), s, t))
+        d, f, c, g, e = (np.array(row) for row in difference_at(two.parts(), s, t))
         normal = np.cross(f, g)
         cc, ee = c @ normal, e @ normal
         # (1 - x c.n) (1 + x e.n) = (f.g)^2 for d = x n.

@@ -23,8 +23,8 @@ from assembly.proximity.manager.centerlines.box import (
     FreeEnds,
     Lengths,
     PosedParts,
-    apart,
     box_of,
+    difference_at,
 )
 from assembly.proximity.manager.centerlines.packing import pack_centerline
 from assembly.proximity.manager.motion_bounds import part_used
@@ -188,7 +188,7 @@ class Two:
     def at(self, s, t):
         """Distances, slopes F_s, F_t and second derivatives F_ss, F_st, F_tt at arrays of places."""
         # Plain Python of a kernel, which takes arrays for numbers.
-        d, f, c, g, e = apart(self.parts(), s, t)
+        d, f, c, g, e = difference_at(self.parts(), s, t)
         rows = np.sqrt(dot(d, d)), -dot(d, f), dot(d, g), 1.0 - dot(d, c), -dot(f, g), 1.0 + dot(d, e)
         return np.array(np.broadcast_arrays(*rows))
 

@@ -21,7 +21,7 @@ Objectives = Sequence[tuple[float, Objective]]
 # Squares of shorter lengths, and of parts of them, have no doubles. Farther than FARTHEST are two coordinates of it.
 LEAST, MOST = 1.0 / FARTHEST, 10.0 * FARTHEST
 # Places that are nearer to each other, as a part of their coordinates, are one: that is rounding.
-ROUNDING = 4e-15
+ONE_PLACE = 4e-15
 
 
 def scene_size(bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Objectives) -> float:
@@ -145,4 +145,4 @@ def _farthest(points: Sequence[Array]) -> float:
     scaled = places / unit
     square = max(float(((scaled[k:] - place) ** 2).sum(axis=1).max()) for k, place in enumerate(scaled))
     far = unit * float(np.sqrt(square))
-    return far if far > ROUNDING * largest else 0.0
+    return far if far > ONE_PLACE * largest else 0.0

@@ -54,7 +54,7 @@ POSTURE_PARAMETERS = size_of(POSTURE_FIELDS)
 
 
 @kernel(inline=True)
-def load(array, o):
+def three_at(array, o):
     return (array[o], array[o + 1], array[o + 2])
 
 

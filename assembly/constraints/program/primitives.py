@@ -24,7 +24,7 @@ from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.kinematics.motion import rotation
-from assembly.proximity.extrema.rates import load, put
+from assembly.proximity.extrema.rates import load_row, put_row
 
 COINCIDENT, SLIDE, DISTANCE, DOT, SWING, TURN, AZIMUTH, ANGLE = 0, 1, 2, 3, 4, 5, 6, 7
 # A coordinate's value, and n, arm_f, arm_g, h of its gradient -(n, arm_f x n + h), (n, arm_g x n + h).
@@ -72,11 +72,11 @@ def place_frames(pool, o, q, i, j, records, k):
     frames = joint_frames_at(records, k)
     turn = rotation(q, i)
     for l in range(4):
-        put(records, k, ARM_A + 3 * l, matvec(turn, (pool[o + 3 * l], pool[o + 3 * l + 1], pool[o + 3 * l + 2])))
+        put_row(records, k, ARM_A + 3 * l, matvec(turn, (pool[o + 3 * l], pool[o + 3 * l + 1], pool[o + 3 * l + 2])))
     turn = rotation(q, j)
     o += 12
     for l in range(4):
-        put(records, k, ARM_B + 3 * l, matvec(turn, (pool[o + 3 * l], pool[o + 3 * l + 1], pool[o + 3 * l + 2])))
+        put_row(records, k, ARM_B + 3 * l, matvec(turn, (pool[o + 3 * l], pool[o + 3 * l + 1], pool[o + 3 * l + 2])))
     for l in range(3):
         # The positions are subtracted first: a common offset cancels.
         frames.apart[l] = (q[j, l] - q[i, l]) + (frames.arm_b[l] - frames.arm_a[l])
@@ -91,9 +91,9 @@ def world_axis(component, length):
 
 @kernel(inline=True)
 def distance_direction(records, k):
-    d = load(records, k, APART)
+    d = load_row(records, k, APART)
     length = math.sqrt(dot(d, d))
-    n = load(records, k, AXES_A + 6)
+    n = load_row(records, k, AXES_A + 6)
     if length > UNDEFINED:
         n = scale(1.0 / length, d)
     return length, n
@@ -102,12 +102,12 @@ def distance_direction(records, k):
 @kernel(inline=True)
 def tilt(records, k):
     """cos(theta), sin(theta) and the unit vector along z_a x z_b."""
-    z = load(records, k, AXES_A + 6)
-    v = load(records, k, AXES_B + 6)
+    z = load_row(records, k, AXES_A + 6)
+    v = load_row(records, k, AXES_B + 6)
     across = cross(z, v)
     c = dot(z, v)
     s = math.sqrt(dot(across, across))
-    n = load(records, k, AXES_A + 3)  # z_a x x_a: as if z_b had left the axis toward x_a
+    n = load_row(records, k, AXES_A + 3)  # z_a x x_a: as if z_b had left the axis toward x_a
     if s > UNDEFINED:
         n = scale(1.0 / s, across)
     return c, s, n
@@ -121,9 +121,9 @@ def swing(component, records, k):
     sym((phi u + m z_a) z_b^T) and 2 e sym(hu p^T) + w p p^T. In the series p = z_b x z_a, m = j = phi' u.z_b,
     e = phi', w = phi'' u.z_b; elsewhere p has unit length, because z_b x z_a / sin(theta) is finite.
     """
-    u = load(records, k, AXES_A + 3 * component)
-    v = load(records, k, AXES_B + 6)
-    z = load(records, k, AXES_A + 6)
+    u = load_row(records, k, AXES_A + 3 * component)
+    v = load_row(records, k, AXES_B + 6)
+    z = load_row(records, k, AXES_A + 6)
     a = dot(u, v)
     hu = cross(v, u)
     x = 1.0 - dot(z, v)
@@ -163,35 +163,37 @@ def coordinate(kind, component, records, k, near):
         value = joint_frames_at(records, k).apart[component]
         n = world_axis(component, 1.0)
     elif kind == SLIDE:
-        n = load(records, k, AXES_A + 3 * component)
-        d = load(records, k, APART)
+        n = load_row(records, k, AXES_A + 3 * component)
+        d = load_row(records, k, APART)
         value = dot(n, d)
     elif kind == SWING:
         part = swing(component, records, k)
         value = part.value
         h = blend(part.phi, part.hu, part.j, part.p)
     elif kind == TURN:
-        x = load(records, k, AXES_A)
-        y = load(records, k, AXES_A + 3)
-        xb = load(records, k, AXES_B)
-        yb = load(records, k, AXES_B + 3)
+        x = load_row(records, k, AXES_A)
+        y = load_row(records, k, AXES_A + 3)
+        xb = load_row(records, k, AXES_B)
+        yb = load_row(records, k, AXES_B + 3)
         # h = (z_a + z_b) / (1 + z_a.z_b), and 1 + z_a.z_b = |z_a + z_b|^2 / 2.
-        m = add(load(records, k, AXES_A + 6), load(records, k, AXES_B + 6))
+        m = add(load_row(records, k, AXES_A + 6), load_row(records, k, AXES_B + 6))
         length = math.sqrt(dot(m, m))
         if length > UNDEFINED:
             value = unwrap(math.atan2(dot(y, xb) - dot(x, yb), dot(x, xb) + dot(y, yb)), near)
             h = scale(2.0 / (length * max(length, POLE)), m)
     elif kind == DOT:
-        u = load(records, k, AXES_A + 3 * (component // 3))
-        v = load(records, k, AXES_B + 3 * (component % 3))
+        u = load_row(records, k, AXES_A + 3 * (component // 3))
+        v = load_row(records, k, AXES_B + 3 * (component % 3))
         value = dot(u, v)
         h = cross(v, u)
     elif kind == AZIMUTH:
-        v = load(records, k, AXES_B + 3 * component)
-        across = cross(load(records, k, AXES_A + 6), v)
+        v = load_row(records, k, AXES_B + 3 * component)
+        across = cross(load_row(records, k, AXES_A + 6), v)
         sine = math.sqrt(dot(across, across))
         if sine > UNDEFINED:
-            value = unwrap(math.atan2(dot(load(records, k, AXES_A + 3), v), dot(load(records, k, AXES_A), v)), near)
+            value = unwrap(
+                math.atan2(dot(load_row(records, k, AXES_A + 3), v), dot(load_row(records, k, AXES_A), v)), near
+            )
             h = scale(1.0 / (sine * max(sine, POLE)), cross(v, across))
     elif kind == ANGLE:
         c, s, h = tilt(records, k)
@@ -199,8 +201,8 @@ def coordinate(kind, component, records, k, near):
     else:
         value, n = distance_direction(records, k)
     # `records` is used last where the branches meet: else Numba counts references to it, which costs half a row.
-    arm_f = add(load(records, k, ARM_A), d)
-    arm_g = load(records, k, ARM_B)
+    arm_f = add(load_row(records, k, ARM_A), d)
+    arm_g = load_row(records, k, ARM_B)
     return Coordinate(value, n, arm_f, arm_g, h)
 
 
@@ -209,10 +211,10 @@ def write_gradient(n, arm_f, arm_g, h, factor, jacobian, r, column):
     """jacobian[r, column : column + 12] = factor (-(n, arm_f x n + h), (n, arm_g x n + h))."""
     n = scale(factor, n)
     h = scale(factor, h)
-    put(jacobian, r, column, scale(-1.0, n))
-    put(jacobian, r, column + 3, sub(cross(n, arm_f), h))
-    put(jacobian, r, column + 6, n)
-    put(jacobian, r, column + 9, add(cross(arm_g, n), h))
+    put_row(jacobian, r, column, scale(-1.0, n))
+    put_row(jacobian, r, column + 3, sub(cross(n, arm_f), h))
+    put_row(jacobian, r, column + 6, n)
+    put_row(jacobian, r, column + 9, add(cross(arm_g, n), h))
 
 
 @kernel(inline=True)
@@ -272,11 +274,11 @@ def add_stretch(hessian, a, b, r, t, n, w):
 @kernel(inline=True)
 def add_point_terms(kind, component, records, k, y, hessian, f, g):
     """`add_coordinate_hessian` of COINCIDENT, SLIDE and DISTANCE."""
-    arm_f = load(records, k, ARM_A)
-    arm_g = load(records, k, ARM_B)
+    arm_f = load_row(records, k, ARM_A)
+    arm_g = load_row(records, k, ARM_B)
     if kind == SLIDE:
-        n = scale(y, load(records, k, AXES_A + 3 * component))
-        arm_f = add(arm_f, load(records, k, APART))
+        n = scale(y, load_row(records, k, AXES_A + 3 * component))
+        arm_f = add(arm_f, load_row(records, k, APART))
         if f >= 0:
             # The axis turns with f: n.(x_g + arm_g - x_f), the rest of d being fixed to it.
             add_block(hessian, f, f + 3, general(ZERO, ZERO, ZERO, ZERO, n, 0.0))
@@ -312,7 +314,7 @@ def add_point_terms(kind, component, records, k, y, hessian, f, g):
 @kernel(inline=True)
 def turning_form(kind, component, records, k):
     """The second derivative of a coordinate of angles."""
-    z = load(records, k, AXES_A + 6)
+    z = load_row(records, k, AXES_A + 6)
     a = ZERO
     b = ZERO
     c = ZERO
@@ -323,25 +325,25 @@ def turning_form(kind, component, records, k):
         part = swing(component, records, k)
         c = part.p
         a = blend(part.phi, part.u, part.m, z)
-        b = load(records, k, AXES_B + 6)
+        b = load_row(records, k, AXES_B + 6)
         t = dot(a, b)
         d = blend(2.0 * part.rate, part.hu, part.second, c)
         h = blend(part.phi, part.hu, part.j, c)
     elif kind == TURN:
         # h = 2 m / |m|^2, and |m|^2 / 2 = 1 + z_a.z_b changes along m x z_a.
-        m = add(z, load(records, k, AXES_B + 6))
+        m = add(z, load_row(records, k, AXES_B + 6))
         square = dot(m, m)
         if square >= POLE * POLE:
             h = scale(2.0 / square, m)
             a = scale(-2.0 / square, h)
             b = cross(m, z)
     elif kind == DOT:
-        a = load(records, k, AXES_A + 3 * (component // 3))
-        b = load(records, k, AXES_B + 3 * (component % 3))
+        a = load_row(records, k, AXES_A + 3 * (component // 3))
+        b = load_row(records, k, AXES_B + 3 * (component % 3))
         t = dot(a, b)
         h = cross(b, a)
     elif kind == AZIMUTH:
-        v = load(records, k, AXES_B + 3 * component)
+        v = load_row(records, k, AXES_B + 3 * component)
         across = cross(z, v)
         square = dot(across, across)
         if square >= POLE * POLE:
@@ -353,7 +355,7 @@ def turning_form(kind, component, records, k):
         cosine, s, h = tilt(records, k)
         steep = 1.0 / max(s, CLOSE)
         a = scale(-steep, z)
-        b = load(records, k, AXES_B + 6)
+        b = load_row(records, k, AXES_B + 6)
         t = -steep * cosine
         c = h
         d = scale(t, h)

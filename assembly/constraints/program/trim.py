@@ -71,7 +71,7 @@ def clear(jacobian, r):
 
 
 @kernel(inner=True)
-def add_coordinate(lifted, records, k, i, factor, jacobian, r):
+def add_coordinate_rate(lifted, records, k, i, factor, jacobian, r):
     """Row r += factor times the derivative of coordinate i of contact k: an unknown, or by the contact velocity."""
     if lifted.free[k] >= 0:
         jacobian_row_at(jacobian, r).lifted[i] += factor / lifted.lengths[k, i]
@@ -100,8 +100,8 @@ def signed_row(store, r, lifted, point):
     s, n, _bend = trim_distance(store, row.loop, tracked[k, o], tracked[k, o + 1])
     residual[r] = factor * s
     clear(jacobian, r)
-    add_coordinate(lifted, records, k, o, factor * n[0], jacobian, r)
-    add_coordinate(lifted, records, k, o + 1, factor * n[1], jacobian, r)
+    add_coordinate_rate(lifted, records, k, o, factor * n[0], jacobian, r)
+    add_coordinate_rate(lifted, records, k, o + 1, factor * n[1], jacobian, r)
 
 
 @kernel(inner=True)
@@ -213,12 +213,12 @@ def vector_rows(store, first, lifted, point):
         if form == PARAMETRIC:
             residual[r] = factor * (x[o + l] - at[l])
             slope = factor * rate[l]
-            add_coordinate(lifted, records, k, o + l, factor, jacobian, r)
+            add_coordinate_rate(lifted, records, k, o + l, factor, jacobian, r)
         elif form == CARTESIAN:
             residual[r] = p[l] - c[l]
             slope = along[l]
-            add_coordinate(lifted, records, k, o, pu[l], jacobian, r)
-            add_coordinate(lifted, records, k, o + 1, pv[l], jacobian, r)
+            add_coordinate_rate(lifted, records, k, o, pu[l], jacobian, r)
+            add_coordinate_rate(lifted, records, k, o + 1, pv[l], jacobian, r)
         else:
             axis = (turn[l], turn[3 + l], turn[6 + l])
             arm = arm_f if side == 0 else arm_g
@@ -226,16 +226,16 @@ def vector_rows(store, first, lifted, point):
             slope = along[l]
             if not free:
                 # The other side's own coordinates have no rates at its poles.
-                add_coordinate(lifted, records, k, o, pu[l], jacobian, r)
-                add_coordinate(lifted, records, k, o + 1, pv[l], jacobian, r)
+                add_coordinate_rate(lifted, records, k, o, pu[l], jacobian, r)
+                add_coordinate_rate(lifted, records, k, o + 1, pv[l], jacobian, r)
                 for j in range(FREE_COLUMN):
                     jacobian[r, j] += toward[l] * jacobian[k, j]
                 if moves:
                     add_rate(records, scratch, o, -slope, jacobian, r)
                 continue
             material_rates(axis, arm_f, arm_g, 1.0 - 2.0 * side, jacobian, r)
-            add_coordinate(lifted, records, k, 2 - o, dot(axis, du), jacobian, r)
-            add_coordinate(lifted, records, k, 3 - o, dot(axis, dv), jacobian, r)
+            add_coordinate_rate(lifted, records, k, 2 - o, dot(axis, du), jacobian, r)
+            add_coordinate_rate(lifted, records, k, 3 - o, dot(axis, dv), jacobian, r)
         if moves:
             add_rate(records, scratch, o, -slope, jacobian, r)
     if trim.by_length == 1:
@@ -383,12 +383,12 @@ def trim_terms(scene, r, pairs, bases, point, y, hessian):
     rates = np.zeros((1, jacobian.shape[1]))
     factor = pool[row.factor]
     if row.form != SIGNED:
-        add_coordinate(lifted, records, k, o, n[0], rates, 0)
-        add_coordinate(lifted, records, k, o + 1, n[1], rates, 0)
+        add_coordinate_rate(lifted, records, k, o, n[0], rates, 0)
+        add_coordinate_rate(lifted, records, k, o + 1, n[1], rates, 0)
         factor = part_of(jacobian, r, rates, k)
         clear(rates, 0)
     # s_uu = bend t t^T, t along the loop.
-    add_coordinate(lifted, records, k, o, -n[1], rates, 0)
-    add_coordinate(lifted, records, k, o + 1, n[0], rates, 0)
+    add_coordinate_rate(lifted, records, k, o, -n[1], rates, 0)
+    add_coordinate_rate(lifted, records, k, o + 1, n[0], rates, 0)
     add_gram(places, rates, 0, y * factor * bend, hessian)
     return 0

@@ -28,7 +28,7 @@ _PARTS, _LEAST = 64, 4
 # What part of the tolerance chords are meant to keep to: what is measured in the end is a little more or less.
 _AIM = 0.85
 # A chord in excess of a whole number by less is not worth another; the measurement has the last word.
-_SPARE = 0.02
+SPARE = 0.02
 # Tangents that differ by more [rad] on the two sides of a knot make a corner.
 _KINK = 1e-3
 # Ends of curves nearer than this part of the boundary's extent are one corner.
@@ -195,7 +195,7 @@ def _steps(face: Face, tolerance: float, angle: float) -> list[Array]:
         for low, high in pairwise(stretches):
             # The last term makes it increase where the boundary is straight.
             grown = np.concatenate([[0.0], np.cumsum(own[low:high])]) + 1e-9 * np.arange(high - low + 1)
-            count = max(int(np.ceil(grown[-1] - _SPARE)), 1)
+            count = max(int(np.ceil(grown[-1] - SPARE)), 1)
             at = np.interp(np.linspace(0.0, grown[-1], count + 1), grown, t[low : high + 1])
             found.append(np.append(at[1:-1], t[high]))
         steps.append(np.concatenate(found))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.meshing.border import cross, on_surface
+from assembly.geometry.meshing.border import SPARE, cross, on_surface
 from assembly.geometry.splines.surface import NurbsSurface
 
 __all__ = ["Axis", "axes", "unit"]
@@ -22,7 +22,6 @@ Array = NDArray[np.float64]
 _MOST, _LEAST, _ACROSS = 12, 2, 24
 # Normals that differ by more [rad] on the two sides of a knot make a crease; how far beside it, in parts of a span.
 _CREASE, _BESIDE = 0.02, 1e-9
-_SPARE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +142,7 @@ def axes(surface: NurbsSurface, box: Array, tolerance: float, angle: float) -> t
         stops = np.concatenate([[box[0, d]], creases, [box[1, d]]])
         lines = [stops[:1]]
         for low, high in zip(stops[:-1], stops[1:], strict=True):
-            count = max(int(np.ceil(np.ptp(np.interp([low, high], ends[d], needed)) - _SPARE)), 1)
+            count = max(int(np.ceil(np.ptp(np.interp([low, high], ends[d], needed)) - SPARE)), 1)
             begin, end = np.interp([low, high], ends[d], grown)
             reached = np.linspace(begin, end, count + 1)
             lines.append(np.append(np.interp(reached[1:-1], grown, ends[d]), high))

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 # Tangents shorter than this part of the surface's size, or nearer to parallel, have no normal.
 _SHORT, _PARALLEL = 1e-12, 1e-9
 # Rounding of a point, over its distance from the origin.
-_ROUNDING = 8e-15
+_POINT_ROUNDING = 8e-15
 
 
 def crease_lines(surface: NurbsSurface) -> tuple[Array, Array]:
@@ -51,7 +51,7 @@ def _jumps(surface: NurbsSurface, axis: int, lines: NDArray[np.intp]) -> NDArray
     count = 3 * degree + 1
     x = (np.arange(count) + 0.5) / count
     reach = float(np.abs(surface.control_points).max())
-    least = max(_SHORT * surface.size, _ROUNDING * reach)
+    least = max(_SHORT * surface.size, _POINT_ROUNDING * reach)
     # Rows of points along the line and beside it (lines, rows, samples, 3), from the line on.
     basis = bezier.bernstein(degree, x)
     sides = []
@@ -62,7 +62,7 @@ def _jumps(surface: NurbsSurface, axis: int, lines: NDArray[np.intp]) -> NDArray
     (out, noise), (back, more) = (_normals(rows, along, least) for rows in sides)
     # The first rows lead backward.
     turn = np.arctan2(np.linalg.norm(np.cross(-out, back), axis=-1), -(out * back).sum(axis=-1))
-    jumps = (turn > CORNER + _ROUNDING * reach * (noise + more)).any(axis=1)
+    jumps = (turn > CORNER + _POINT_ROUNDING * reach * (noise + more)).any(axis=1)
     # A line that is one point inside of the surface, as the waist of a double cone, parts it as a crease does.
     spread = np.abs(sides[1][:, 0] - sides[1][:, 0].mean(axis=1, keepdims=True)).max(axis=(1, 2))
     return np.asarray(jumps | (spread <= least))

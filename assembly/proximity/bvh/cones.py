@@ -17,9 +17,9 @@ Indices = NDArray[np.int64]
 # All directions.
 FULL = pi
 # Wider cones around vectors are not convex, or nearly so: nothing is known of combinations of the vectors.
-_CONVEX = 1.5
-# Rounding of a unit vector and of an angle.
-_ROUNDING = 1e-14
+CONVEX = 1.5
+# Rounding of a unit vector, of an angle and of a box, in parts of its extent.
+MARGIN = 1e-14
 # Steps of the axis towards the direction that is farthest off; the k-th goes 1 / (k + 2) of the way.
 _STEPS = 8
 
@@ -61,8 +61,8 @@ def around_vectors(vectors: Array, slack: Array, vanish: NDArray[np.bool_]) -> t
     # How far the true direction may be off, and how far the vector's own is.
     sine = np.where(counts, np.minimum(slack[:, None], length) / np.maximum(length, 1e-300), 0.0)
     angle = np.where(counts, between(unit, axis[:, None]) + np.arcsin(sine), 0.0)
-    half = angle.max(axis=1) + 2.0 * _ROUNDING
-    sure = counts.any(axis=1) & (half < _CONVEX) & (np.where(counts, length, 1.0) > 0.0).all(axis=1)
+    half = angle.max(axis=1) + 2.0 * MARGIN
+    sure = counts.any(axis=1) & (half < CONVEX) & (np.where(counts, length, 1.0) > 0.0).all(axis=1)
     return axis, np.where(sure, half, FULL)
 
 
@@ -82,4 +82,4 @@ def around_cones(axis: Array, half: Array, begins: Indices) -> tuple[Array, Arra
         owner = np.searchsorted(begins, hits, side="right") - 1
         far = hits[np.unique(owner, return_index=True)[1]]
         middle = _unit(middle + (axis[far] - middle) / (step + 3.0))
-    return best, np.where(least < FULL, np.minimum(least + 2.0 * _ROUNDING, FULL), FULL)
+    return best, np.where(least < FULL, np.minimum(least + 2.0 * MARGIN, FULL), FULL)

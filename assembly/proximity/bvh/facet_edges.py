@@ -18,7 +18,7 @@ from assembly.geometry.splines.curve import NurbsCurve
 from assembly.proximity.brep.boundary_curves import Batch, Rim, Survey
 from assembly.proximity.brep.edge_cells import box_hulls, box_parts, interval_parts
 from assembly.proximity.brep.topology import Topology
-from assembly.proximity.bvh.cones import FULL, around_cones, around_vectors, between
+from assembly.proximity.bvh.cones import CONVEX, FULL, MARGIN, around_cones, around_vectors, between
 from assembly.proximity.bvh.facet_elements import Elements
 from assembly.proximity.bvh.normal_nets import Nets, nets_of, restricted, restriction
 
@@ -27,13 +27,10 @@ __all__ = ["edge_elements"]
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-_ROUNDING = 1e-14
 # Parts of an edge are no longer than this part of its face; every edge has so many at first, halved so often at most.
 _PART, _FIRST, _HALVINGS = 0.25, 4, 6
 # Steps of Newton's method to the same point on the other face, and how much wider the other parts are made.
 _STEPS, _WIDER = 8, 0.05
-# Wider cones are not convex: nothing is known of what is between two of them.
-_CONVEX = 1.5
 
 
 class _Curves:
@@ -46,7 +43,7 @@ class _Curves:
         self.start = np.concatenate([at[:-1] for at in self.breaks])
         self.stop = np.concatenate([at[1:] for at in self.breaks])
         sizes = np.array([np.abs(curve.control_points).max(axis=0) for curve in curves])
-        self.slack = _ROUNDING * np.repeat(sizes, counts, axis=0)
+        self.slack = MARGIN * np.repeat(sizes, counts, axis=0)
         degrees = np.repeat([curve.degree for curve in curves], counts)
         pieces = [piece for curve in curves for piece in curve.bezier_pieces()]
         self.groups = [
@@ -163,7 +160,7 @@ class _Edges:
         one, other = begins[paired], begins[paired] + 1
         concave[paired] = self._concave(edge[paired], t[paired], (axis[one], half[one]), (axis[other], half[other]))
         axis, half = around_cones(axis, half, begins)
-        half = np.where(paired & (half < _CONVEX), half, FULL)
+        half = np.where(paired & (half < CONVEX), half, FULL)
         low, high = self._hulls(edge, boxes)
         # Points of the second face's curve are as far off as two points that are one.
         pad = np.where(paired, self.topology.tolerance, 0.0)[:, None]
@@ -236,7 +233,7 @@ class _Edges:
             mine = np.flatnonzero(face == number)
             xyz, owner = box_hulls(self.topology.faces[number].surface, boxes[mine])
             begins = np.flatnonzero(np.diff(owner, prepend=-1))
-            pad = _ROUNDING * self.nets[number].extent
+            pad = MARGIN * self.nets[number].extent
             low[mine] = np.minimum.reduceat(xyz.min(axis=1), begins) - pad
             high[mine] = np.maximum.reduceat(xyz.max(axis=1), begins) + pad
         return low, high

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.bezier import elevation
 from assembly.proximity.brep.edge_cells import CLEAR, OUTSIDE, box_sides
-from assembly.proximity.bvh.cones import around_vectors
+from assembly.proximity.bvh.cones import MARGIN, around_vectors
 from assembly.proximity.bvh.normal_nets import Nets, bezier_product, nets_of, restricted
 
 __all__ = ["Patches", "patches_by_angle", "patches_by_count"]
@@ -25,7 +25,6 @@ __all__ = ["Patches", "patches_by_angle", "patches_by_count"]
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-_ROUNDING = 1e-14
 # Patches a face, at most, and the least extent of one against the face, where no halving makes a cone narrow.
 _MOST, _FINEST = 20_000, 1e-4
 # A patch is no longer than so many times its width unless it is short against its face, and one that the boundary
@@ -128,7 +127,7 @@ class _Divided:
         at = piece[:, 0], piece[:, 1]
         points = restricted(nets.points[at], box)
         xyz = points[..., :3] / points[..., 3:]
-        pad = _ROUNDING * nets.extent
+        pad = MARGIN * nets.extent
         corners = xyz[:, [0, -1, -1, 0], [0, 0, -1, -1]]
         flat = xyz.reshape(len(xyz), -1, 3)
         normals = restricted(nets.normals[at], box)

@@ -20,7 +20,7 @@ __all__ = ["Nets", "bezier_product", "nets_of", "restricted", "restriction"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-_ROUNDING = 2.3e-16
+_UNIT_ROUNDING = 2.3e-16
 
 
 class Nets(NamedTuple):
@@ -101,10 +101,10 @@ def nets_of(face: Face) -> Nets:
         weight = largest[3]
         size = weight * largest[1] * largest[2] + largest[0] * (rates[1] * largest[1] + rates[0] * largest[2])
     # The products' own rounding, and that of the coordinates, which derivatives magnify.
-    off = 16.0 * _ROUNDING * extent * largest[3]
+    off = 16.0 * _UNIT_ROUNDING * extent * largest[3]
     slack = weight * off * 2.0 * (p * largest[2] + q * largest[1])
     slack += off * (rates[1] * (largest[1] + 2.0 * p * largest[0]) + rates[0] * (largest[2] + 2.0 * q * largest[0]))
-    slack += 32.0 * (p + q) * _ROUNDING * size
+    slack += 32.0 * (p + q) * _UNIT_ROUNDING * size
     # An edge that is one point, to the tolerance that makes it a pole, is one: the normal's points there vanish.
     bits = surface._pole_bits
     poles = np.zeros(slack.shape, dtype=bool)

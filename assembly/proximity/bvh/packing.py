@@ -15,7 +15,7 @@ __all__ = ["pack_tree"]
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 # Rounding of a center and of half widths.
-_ROUNDING = 4.5e-16
+_BOUNDS_ROUNDING = 4.5e-16
 
 
 def pack_tree(tree: FacetTree, scale: float, table_at: int = 0, pool_at: int = 0) -> tuple[Table, Array, int]:
@@ -53,12 +53,12 @@ def pack_tree(tree: FacetTree, scale: float, table_at: int = 0, pool_at: int = 0
     bounds = rows_of(layout.NODE_BOUNDS, pool[: layout.NODE * count].reshape(count, layout.NODE))
     center = 0.5 * factor * (nodes.low + nodes.high)
     half = 0.5 * factor * (nodes.high - nodes.low)
-    half += _ROUNDING * (np.abs(center) + 2.0 * half)
+    half += _BOUNDS_ROUNDING * (np.abs(center) + 2.0 * half)
     bounds.center, bounds.half, bounds.axis = center, half, nodes.axis
     full = nodes.half_angle >= np.pi
     bounds.cosine = np.where(full, -1.0, np.cos(nodes.half_angle))
     bounds.sine = np.where(full, 0.0, np.sin(nodes.half_angle))
-    bounds.radius = factor * nodes.radius + 4.0 * _ROUNDING * np.linalg.norm(np.abs(center) + half, axis=1)
+    bounds.radius = factor * nodes.radius + 4.0 * _BOUNDS_ROUNDING * np.linalg.norm(np.abs(center) + half, axis=1)
     box = tree.parameters
     rows = rows_of(layout.ELEMENT_DTYPE, pool[layout.NODE * count :].reshape(elements, layout.ELEMENT))
     rows.middle = 0.5 * (box[:, ::2] + box[:, 1::2])

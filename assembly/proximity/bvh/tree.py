@@ -67,7 +67,7 @@ ELEMENT_DTYPE = record_dtype(
 element_at = record_view(ELEMENT_DTYPE)
 ELEMENT = size_of(ELEMENT_DTYPE)
 # Rounding of unit vectors and of coordinates, relative: what is in doubt is kept.
-ROUNDING = 1e-13
+TREE_ROUNDING = 1e-13
 
 
 @kernel(inline=True)
@@ -165,7 +165,7 @@ def admits(node, other, seen, view, margin):
     so = node.sine
     cp = other.cosine
     sp = other.sine
-    if so * cp + co * sp > ROUNDING and -dot(axis_o, axis_p) < co * cp - so * sp - tilt:
+    if so * cp + co * sp > TREE_ROUNDING and -dot(axis_o, axis_p) < co * cp - so * sp - tilt:
         return False
     d = sub(center, three_of(node.center))
     dd = dot(d, d)
@@ -221,7 +221,7 @@ def rounding(store, trees, shift):
     c = three_of(f.center)
     e = three_of(g.center)
     size += math.sqrt(dot(c, c)) + math.sqrt(dot(e, e)) + math.sqrt(dot(shift, shift))
-    return ROUNDING * size
+    return TREE_ROUNDING * size
 
 
 @kernel(inner=True)
@@ -236,7 +236,7 @@ def pairs_about(store, trees, pose, reach, ring, tilt, stack, out):
     """
     tree_f, tree_g = trees
     slack = ring + rounding(store, trees, pose.shift)
-    margin = Margin(reach + slack, slack, tilt + ROUNDING)
+    margin = Margin(reach + slack, slack, tilt + TREE_ROUNDING)
     view = view_of(pose)
     back = view_of(inverse_pose(pose))
     room = stack.shape[0]
@@ -296,7 +296,7 @@ def still_within(store, trees, pose, reach, listed, count, out):
     As long as `out` holds them; their number.
     """
     slack = rounding(store, trees, pose.shift)
-    margin = Margin(reach + slack, slack, ROUNDING)
+    margin = Margin(reach + slack, slack, TREE_ROUNDING)
     view = view_of(pose)
     found = 0
     for k in range(count):

@@ -19,7 +19,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS, SURFACE_RECORD
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace, Point
-from assembly.kinematics.pose import check_quaternion
+from assembly.kinematics.pose import IDENTITY_ROW, check_quaternion
 from assembly.proximity.controllers.laws import (
     DISTANCE,
     ERROR,
@@ -41,7 +41,6 @@ Mode = Literal["interior", "edge", "corner"]
 FORMS: tuple[Form, ...] = ("unit", "covariant", "contravariant")
 MODES: tuple[Mode, ...] = ("interior", "edge", "corner")
 _OFFSETS = [BREAKS_U, BREAKS_V, COEFFICIENTS, CELLS]
-_IDENTITY = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 # Points nearer than this part of the size meet.
 _MEET = 1e-12
 
@@ -112,7 +111,7 @@ def _poses(name: str, side: object, q: ArrayLike | None) -> Array:
     """Rows (n, 7): those given, or where the side's body stands."""
     if q is None:
         body = side.body if isinstance(side, (BodyFace, Point)) else None
-        return np.array([_IDENTITY if body is None else body.q], dtype=np.float64)
+        return np.array([IDENTITY_ROW if body is None else body.q], dtype=np.float64)
     rows = real_array(name, q, ("n", 7)) if np.ndim(q) > 1 else vector(name, q, 7)[None]
     for k, (_x, _y, _z, *e) in enumerate(rows.tolist()):
         check_quaternion(f"{name}[{k}, 3:]", e)

@@ -137,7 +137,7 @@ def second_form(s, d):
 
 
 @kernel(inline=True)
-def largest(h, b, held_u, held_v):
+def largest_eigenvalue(h, b, held_u, held_v):
     """Largest eigenvalue of B H in size, over the parameters that are not held."""
     if held_u and held_v:
         return 0.0
@@ -173,7 +173,7 @@ def free_error(psi, su, sv, held_u, held_v):
 
 
 @kernel(inline=True)
-def keep(h, held_u, held_v):
+def without_held(h, held_u, held_v):
     """A second form without the parameters that are held: one in their places."""
     return (
         1.0 if held_u else h[0],
@@ -204,8 +204,8 @@ def control_rates(store, g, placed, x, law, dt):
     error = free_error(psi, s[1], s[2], held_u, held_v)
     zero = (0.0, 0.0, 0.0)
     # Where D's curvature cancels that of the metric, H says nothing of larger steps: B I bounds the gain then.
-    metric_f = largest(second_form(s, zero), b, held_u, held_v)
-    top = max(largest(h, b, held_u, held_v), metric_f)
+    metric_f = largest_eigenvalue(second_form(s, zero), b, held_u, held_v)
+    top = max(largest_eigenvalue(h, b, held_u, held_v), metric_f)
     rr = 0.0
     rs = 0.0
     held_r = False
@@ -222,8 +222,8 @@ def control_rates(store, g, placed, x, law, dt):
         power -= chi[0] * rr + chi[1] * rs
         error += free_error(chi, t[1], t[2], held_r, held_s)
         # A bound for both together: the couplings -f_i.h_j add at most the mean of those of B I.
-        metric_g = largest(second_form(t, zero), c, held_r, held_s)
-        top = max(top, largest(k, c, held_r, held_s), metric_g) + math.sqrt(metric_f * metric_g)
+        metric_g = largest_eigenvalue(second_form(t, zero), c, held_r, held_s)
+        top = max(top, largest_eigenvalue(k, c, held_r, held_s), metric_g) + math.sqrt(metric_f * metric_g)
     limit = 1.0 / (dt * top) if top > 0.0 else 0.0
     gain = law.gain if law.gain > 0.0 else limit
     if law.rate > 0.0:
@@ -245,7 +245,9 @@ def control_rates(store, g, placed, x, law, dt):
                 0.0 if held_v or held_r else -dot(fv, t[1]),
                 0.0 if held_v or held_s else -dot(fv, t[2]),
             )
-        add_f, add_g, definite = descent_step(keep(h, held_u, held_v), p, keep(k, held_r, held_s), bf, bg, 0.0)
+        add_f, add_g, definite = descent_step(
+            without_held(h, held_u, held_v), p, without_held(k, held_r, held_s), bf, bg, 0.0
+        )
         if definite:
             rates = (rates[0] + add_f[0], rates[1] + add_f[1], rates[2] + add_g[0], rates[3] + add_g[1])
     return ControlStep(rates, distance, math.sqrt(error), mode_f, mode_g, gain)

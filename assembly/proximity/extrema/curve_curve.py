@@ -26,13 +26,12 @@ from assembly.kinematics.pose import pose_row
 from assembly.proximity.brep.records import EDGE, EDGE_RECORD, FACE
 from assembly.proximity.brep.writer import edge_over
 from assembly.proximity.extrema.feature_query import PAIR, feature_derivatives, feature_pair_at, find_features
-from assembly.proximity.extrema.pairs import EXTREMAL, PairStatus, Side, as_face
+from assembly.proximity.extrema.pairs import EXTREMAL, STATUSES, PairStatus, Side, as_face
 
 __all__ = ["CurvePair", "curve_contact_jacobian", "curve_gap_gradient", "curve_gap_hessian", "extremal_curve_pair"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-_STATUSES = tuple(PairStatus)
 # Ends of a curve are one point within this part of its size, and its tangents there one direction within this angle.
 CLOSED = 1e-9
 SMOOTH = 1e-6
@@ -207,7 +206,7 @@ def extremal_curve_pair(
     status = find_features(store, query.features, query.q, query.x, nothing, packed.size, np.inf, out)
     pair = feature_pair_at(out, 0)
     points = np.array([pair.point_f, pair.point_g])
-    return CurvePair(pair.parameters[:3], points, pair.normal, float(pair.gap), _STATUSES[status])
+    return CurvePair(pair.parameters[:3], points, pair.normal, float(pair.gap), STATUSES[status])
 
 
 def _derivatives(

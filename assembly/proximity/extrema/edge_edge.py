@@ -25,20 +25,19 @@ from assembly.proximity.extrema.face_face import (
 from assembly.proximity.extrema.feature_jets import (
     BEYOND,
     FINE,
-    ROUNDING,
+    RESIDUAL_ROUNDING,
     SLACK,
     FeatureFrame,
     across,
     edge_advance,
     edge_held,
     edge_side,
-    fold_of,
     inverse,
     other_jet,
     pair_response,
     vertex_side,
 )
-from assembly.proximity.extrema.pair_matrix import RANK
+from assembly.proximity.extrema.pair_matrix import RANK, VANISHING, fold_of
 
 # Points closer than this part of the size coincide: their difference has no direction.
 COINCIDENT = 1e-13
@@ -221,14 +220,14 @@ def solve_off_face(store, f, g, pose, x, normal, limits):
         bend_g = abs(s2) * max(curve_g.bend, 2.0 / size)
         bend = max(bend_f, bend_g)
         off = max(abs(step.residual[0]), abs(step.residual[1]))
-        small = off <= (ROUNDING if step.fine else SLACK) * size
+        small = off <= (RESIDUAL_ROUNDING if step.fine else SLACK) * size
         if small or (length <= 4e-14 * size and bend < 1e-9) or (bend < STAGNANT and length > 0.25 * previous):
             if step.point_f != at_f or step.point_g != at_g:
                 status = LEFT_PATCH
             elif inverse(step.h, step.scope, RANK)[1]:
                 status = CONVERGED
             else:
-                status = SINGULAR if off < 1e-9 * size else NOT_CONVERGED
+                status = SINGULAR if off < VANISHING * size else NOT_CONVERGED
             break
         if iteration >= limits.steps or not length < 1e300 or bend > limits.turn:
             break

@@ -33,7 +33,7 @@ from assembly.proximity.extrema.face_face import (
 from assembly.proximity.extrema.feature_jets import (
     BEYOND,
     FINE,
-    ROUNDING,
+    RESIDUAL_ROUNDING,
     SLACK,
     FeatureFrame,
     edge_advance,
@@ -41,18 +41,15 @@ from assembly.proximity.extrema.feature_jets import (
     edge_side,
     edge_stride,
     face_side,
-    fold_of,
     inverse,
     other_jet,
     pair_response,
     vertex_side,
 )
-from assembly.proximity.extrema.pair_matrix import RANK, curvature_bound
+from assembly.proximity.extrema.pair_matrix import RANK, VANISHING, curvature_bound, fold_of, is_no_saddle
 
 # A curve is steep where the part of its tangent along a face is below this (squared, of its length squared).
 STEEP = 1e-12
-# Where nothing is isolated, a residual below this (over the size, or a tilt) is none.
-LEVEL = 1e-9
 
 # What Newton's method came to for a face and an edge, a vertex or a point, in the axes of the face.
 FaceEdgePair = namedtuple(
@@ -188,7 +185,7 @@ def edge_step(store, other, over, edge, limits):
     by = k[1] * ax + k[2] * ay - r[1]
     length = abs(bx) + abs(by)
     dt = (c0 * bx + c1 * by) / edge.speed
-    slides = limits.steps > 0 and (edge.steep or (not fine and abs(edge.tilt) >= LEVEL))
+    slides = limits.steps > 0 and (edge.steep or (not fine and abs(edge.tilt) >= VANISHING))
     if slides:
         # The gap falls along all of this: on to where the edge bends or ends.
         length = limits.size
@@ -226,7 +223,7 @@ def face_edge_pair(status, x, over, edge, step, regular):
     tilt = 0.0 if is_point else edge.tilt
     is_regular = regular and not (edge.steep and not is_point)
     # Past a center of curvature the foot is no nearest point of the face; nor is the edge's where it bends away.
-    nearest = is_point or (fold < LEVEL and k[0] + k[2] > 0.0 and k[0] * k[2] > k[1] * k[1])
+    nearest = is_point or (is_no_saddle(-fold) and k[0] + k[2] > 0.0 and k[0] * k[2] > k[1] * k[1])
     # Positive, as of two faces, where the pair is closest or deepest.
     fold = fold if is_point else -fold
     return FaceEdgePair(
@@ -281,7 +278,7 @@ def solve_on_face(store, face, other, pose, x, limits):
         bend_g = 0.0 if step.is_point or step.slides else step.length * max(edge.curved, 2.0 / size)
         bend = max(bend_f, bend_g)
         off = max(abs(over.residual[0]), abs(over.residual[1]))
-        level = ROUNDING if step.fine else SLACK
+        level = RESIDUAL_ROUNDING if step.fine else SLACK
         small = off <= level * size and abs(tilt) <= level
         settled = (length <= 4e-14 * size and bend < 1e-9) or stagnates(
             length, bend, previous, status, own.point, q, size
@@ -292,7 +289,7 @@ def solve_on_face(store, face, other, pose, x, limits):
             elif inverse(step.h, scope_of(step, over.gap), RANK)[1]:
                 status = CONVERGED
             else:
-                status = SINGULAR if abs(tilt) < LEVEL and off < LEVEL * size else NOT_CONVERGED
+                status = SINGULAR if abs(tilt) < VANISHING and off < VANISHING * size else NOT_CONVERGED
             break
         if iteration >= limits.steps or not length < 1e300 or bend > limits.turn:
             break

@@ -47,7 +47,7 @@ from assembly.proximity.extrema.pair_matrix import RANK
 # Newton's own matrix is damped below this ratio: its residuals are right to rounding, unlike the rates it stands for.
 FINE = 1e-13
 # Residuals below this part of the size are rounding.
-ROUNDING = 2e-15
+RESIDUAL_ROUNDING = 2e-15
 # The same where the equations are singular: a step would be rounding over almost nothing.
 SLACK = 1e-13
 # A slope (or a length over the size) at the end of an edge that leads beyond it by less is rounding.
@@ -216,13 +216,6 @@ def pair_response(f, g, beta, unit):
         g.y12 * v12 + g.y22 * v22 - g.x12 * f.y12 - g.x22 * f.y22,
     )
     return inverse(h, unit * (1.0 + abs(beta) * unit), RANK)[0]
-
-
-@kernel(inline=True)
-def fold_of(h, size):
-    """det H / |H|^2: how far a pair is from a fold, where it ceases to be isolated; zero where H is nothing."""
-    norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
-    return (h[0] * h[3] - h[1] * h[2]) / norm2 if norm2 > 1e-18 * size * size else 0.0
 
 
 @kernel(inner=True)

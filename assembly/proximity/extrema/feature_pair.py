@@ -15,8 +15,8 @@ from assembly.proximity.brep.records import FACE
 from assembly.proximity.extrema.edge_edge import solve_off_face
 from assembly.proximity.extrema.face_edge import face_frame, solve_on_face, turned_frame
 from assembly.proximity.extrema.face_face import CLOSE, LIMIT, pair_frame, solve_pair
-from assembly.proximity.extrema.feature_jets import FeatureFrame, NewtonLimits, face_side, fold_of
-from assembly.proximity.extrema.pair_matrix import pair_matrix
+from assembly.proximity.extrema.feature_jets import FeatureFrame, NewtonLimits, face_side
+from assembly.proximity.extrema.pair_matrix import flat_below, fold_of, is_no_saddle, pair_matrix
 
 
 @kernel(inner=True)
@@ -24,10 +24,9 @@ def two_face_frame(frame, matrix):
     """The frame of two faces, from their `PairFrame` and `PairMatrix`."""
     h = matrix.h
     e = frame.rates_f
-    det = h[0] * h[3] - h[1] * h[2]
-    norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
+    fold = fold_of(h, 1.0)
     # Relative curvature -H (I + beta A)^-1: indefinite means the surfaces cross beside the point.
-    proper = det > -1e-9 * norm2 and h[0] + h[3] <= 0.0
+    proper = is_no_saddle(fold) and h[0] + h[3] <= 0.0
     return FeatureFrame(
         normal=frame.normal,
         tangent_x=frame.tangent_x,
@@ -44,7 +43,7 @@ def two_face_frame(frame, matrix):
         regular=frame.regular,
         isolated=matrix.isolated,
         proper=proper,
-        fold=fold_of(h, 1.0),
+        fold=fold,
     )
 
 
@@ -116,5 +115,5 @@ def features_at(store, f, g, pose, x, n, size):
     """The frame of two features at parameters x, extremal or not."""
     if f.kind == FACE and g.kind == FACE:
         frame = pair_frame(store, f.record, g.record, pose, x)
-        return two_face_frame(frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9 / size))
+        return two_face_frame(frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, flat_below(size)))
     return newton_on_features(store, f, g, pose, x, n, NewtonLimits(size, math.inf, 0))[2]

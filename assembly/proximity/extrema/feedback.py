@@ -31,7 +31,7 @@ from assembly.proximity.extrema.face_face import (
     pair_frame,
     solve_pair,
 )
-from assembly.proximity.extrema.pair_matrix import curvature_bound, pair_matrix
+from assembly.proximity.extrema.pair_matrix import curvature_bound, flat_below, pair_matrix
 
 # Beside the statuses of `solve_pair`: the surfaces cross where the descent led.
 CROSSED = 4
@@ -46,7 +46,7 @@ MEET = 1e-10
 # Where the descent ends with points nearer than this part of the size, they would meet: surfaces that touch.
 TOUCH = 1e-5
 # What of a gradient is rounding, as a part of the size.
-ROUNDING = 1e-13
+GRADIENT_ROUNDING = 1e-13
 # A first damping, against curvatures of |d|^2 / 2, which are one for points that move along a plane.
 DAMPING = 1e-2
 # The least damping, so that points that may slide without coming closer stay; one whose steps are too short to count.
@@ -199,8 +199,8 @@ def descent_model(store, surfaces, pose, x, at, size):
     xf, yf, xg, yg = at.f.tangent_x, at.f.tangent_y, at.g.tangent_x, at.g.tangent_y
     gf = (-dot(xf, at.d), -dot(yf, at.d))
     gg = (dot(xg, at.d_g), dot(yg, at.d_g))
-    tf = free_directions(store, f, x[0], x[1], at.f.rates, gf, ROUNDING * size)
-    tg = free_directions(store, g, x[2], x[3], at.g.rates, gg, ROUNDING * size)
+    tf = free_directions(store, f, x[0], x[1], at.f.rates, gf, GRADIENT_ROUNDING * size)
+    tg = free_directions(store, g, x[2], x[3], at.g.rates, gg, GRADIENT_ROUNDING * size)
     h_f = reduced(dot(at.f.normal, at.d), at.f.shape, tf)
     h_g = reduced(-dot(at.g.normal, at.d_g), at.g.shape, tg)
     if tf.count == 1:
@@ -234,7 +234,7 @@ def step_along(store, r, u, v, own, ways, step, factor):
 
 
 @kernel(inner=True)
-def finish(store, surfaces, pose, x, size, reach):
+def finish_by_newton(store, surfaces, pose, x, size, reach):
     """Newton's method from x: whether it came to the extremum that the descent leads to, and the `PairSolution`.
 
     That is one no farther apart than x, off by no more than `reach` on either surface; with reach = 0, where the
@@ -306,7 +306,7 @@ def descend_pair(store, surfaces, pose, x, size, limit):
             bend = max(step_f * model.bend_f, step_g * model.bend_g)
             if not held and bend < near and mu <= 1e-3 * first:
                 # `solve_pair` takes the rest; should it go elsewhere, the descent goes on to a nearer start.
-                same, found = finish(store, surfaces, pose, x, size, 8.0 * step + 1e-9 * size)
+                same, found = finish_by_newton(store, surfaces, pose, x, size, 8.0 * step + 1e-9 * size)
                 if same:
                     return with_steps(found, count)
                 near *= 0.1
@@ -337,8 +337,8 @@ def descend_pair(store, surfaces, pose, x, size, limit):
     if status == NOT_CONVERGED and at.square <= TOUCH * TOUCH * size * size:
         status = CROSSED
     if status == CROSSED:
-        same, found = finish(store, surfaces, pose, x, size, 0.0)
+        same, found = finish_by_newton(store, surfaces, pose, x, size, 0.0)
         if same:
             return with_steps(found, count)
     frame = pair_frame(store, f, g, pose, x)
-    return PairSolution(status, x, count, frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9 / size))
+    return PairSolution(status, x, count, frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, flat_below(size)))

@@ -23,6 +23,7 @@ from assembly.geometry.splines.evaluate import surface_at, surface_point, third_
 from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 from assembly.proximity.extrema.face_face import pair_frame
+from assembly.proximity.extrema.pair_matrix import VANISHING
 
 VARIABLES = 16
 # Rates (3, 16) of the vectors that the rows are made of, a column a local variable.
@@ -111,7 +112,7 @@ def is_extremal(store, surfaces, bodies, q, tracked, r, tolerance):
     frame = pair_frame(Store(table, pool), surfaces[0], surfaces[1], pose, x)
     residual = frame.residual
     tilt = max(abs(residual[2]), abs(residual[3]))
-    holds = frame.regular and tilt <= 1e-9 and max(abs(residual[0]), abs(residual[1])) <= tolerance
+    holds = frame.regular and tilt <= VANISHING and max(abs(residual[0]), abs(residual[1])) <= tolerance
     return 1 if holds else 0
 
 

@@ -20,6 +20,21 @@ RANK, WEAK = 1e-7, 1e-5
 UNSURE, LEVEL = 0.1, 1e-10
 # Farther off than this, in radians, it is not known whether there is a valley.
 NEAR = 0.1
+# [1 / length, times the size] Curvatures below this are rounding: what is left of a plane's. Doubled: spheres twice as
+# large count as planes. Chosen.
+FLAT = 1e-9
+# [rad, length over the size] Where nothing is isolated, a residual below this is none. Doubled: points of a continuum
+# are twice as far off. Chosen.
+VANISHING = 1e-9
+# [det H over |H|^2] A pair this far on the wrong side of its fold may still be a minimum. Doubled: so may a saddle
+# twice as far. Chosen, above what rounding makes of H where its terms cancel.
+FOLDED = 1e-9
+# [det H over |H|^2] A pair this near to a fold is one of a continuum as far as Newton's method can tell. Doubled:
+# narrow minima count as any point of a valley. Chosen.
+CONTINUUM = 1e-6
+# [det H over |H|^2] A pair this far from a fold is the only one in its patches and those beside them, which turn by
+# half a radian at most. Doubled: more of them are searched. Chosen.
+ALONE = 0.05
 # A highest pair along a valley that bends by so many times as much is kept.
 PLAIN = 10.0
 
@@ -33,6 +48,37 @@ PairMatrix = namedtuple(
         "isolated",  # whether H is regular: else the pair is one of a continuum
     ],
 )
+
+
+@kernel(inline=True)
+def fold_of(h, size):
+    """det H / |H|^2: how far a pair is from a fold, where it ceases to be isolated; zero where H is nothing."""
+    norm2 = h[0] * h[0] + h[1] * h[1] + h[2] * h[2] + h[3] * h[3]
+    return (h[0] * h[3] - h[1] * h[2]) / norm2 if norm2 > 1e-18 * size * size else 0.0
+
+
+@kernel(inline=True)
+def is_no_saddle(fold):
+    """Whether surfaces do not cross beside a pair, by how far it is from a fold; at one nothing tells."""
+    return fold > -FOLDED
+
+
+@kernel(inline=True)
+def is_of_continuum(fold):
+    """Whether a pair is any one of a continuum, by how far it is from a fold."""
+    return abs(fold) <= CONTINUUM
+
+
+@kernel(inline=True)
+def is_the_only_one(fold):
+    """Whether a pair is a minimum with no other one beside it, by how far it is from a fold."""
+    return fold > ALONE
+
+
+@kernel(inline=True)
+def flat_below(size):
+    """The curvature below which a scene of this size counts as flat."""
+    return FLAT / size
 
 
 @kernel(inline=True)

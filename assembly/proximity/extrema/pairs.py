@@ -48,7 +48,7 @@ class PairStatus(Enum):
     NOT_CONVERGED = "Newton did not converge; give a nearer start, or none for a global one"
 
 
-_STATUSES = tuple(PairStatus)
+STATUSES = tuple(PairStatus)
 # Where the records of the two surfaces are in the table of a query.
 _SURFACES = 0, SURFACE_RECORD
 
@@ -165,7 +165,7 @@ def extremal_pair(
         x = inside("start", vector("start", start, 4), (f.surface, g.surface))
     out = np.empty(PLACED)
     status = find_pair(table, pool, _SURFACES, q, x, size, out)
-    return _contact_pair(out, _STATUSES[status])
+    return _contact_pair(out, STATUSES[status])
 
 
 def descend(
@@ -205,7 +205,7 @@ def descend(
     x = inside("start", vector("start", start, 4), (f.surface, g.surface))
     out = np.empty(PLACED)
     status = find_descent(table, pool, _SURFACES, q, x, size, steps, out)
-    return _contact_pair(out, PairStatus.NOT_CONVERGED if status == CROSSED else _STATUSES[status])
+    return _contact_pair(out, PairStatus.NOT_CONVERGED if status == CROSSED else STATUSES[status])
 
 
 def _contact_pair(out: Array, status: PairStatus) -> ContactPair:

@@ -42,12 +42,12 @@ RECORD = size_of(GAP_DERIVATIVES)
 
 
 @kernel(inline=True)
-def load(array, row, o):
+def load_row(array, row, o):
     return (array[row, o], array[row, o + 1], array[row, o + 2])
 
 
 @kernel(inline=True)
-def put(array, row, o, a):
+def put_row(array, row, o, a):
     array[row, o] = a[0]
     array[row, o + 1] = a[1]
     array[row, o + 2] = a[2]
@@ -56,23 +56,23 @@ def put(array, row, o, a):
 @kernel(inline=True)
 def store_velocities(x, y, arm_f, arm_g, records, row):
     """z over the twists: x.v, y.v, and (x, y).(omega x n) = (y.omega, -x.omega)."""
-    put(records, row, ZED, neg(x))
-    put(records, row, ZED + 3, cross(x, arm_f))
-    put(records, row, ZED + 6, x)
-    put(records, row, ZED + 9, cross(arm_g, x))
-    put(records, row, ZED + 12, neg(y))
-    put(records, row, ZED + 15, cross(y, arm_f))
-    put(records, row, ZED + 18, y)
-    put(records, row, ZED + 21, cross(arm_g, y))
+    put_row(records, row, ZED, neg(x))
+    put_row(records, row, ZED + 3, cross(x, arm_f))
+    put_row(records, row, ZED + 6, x)
+    put_row(records, row, ZED + 9, cross(arm_g, x))
+    put_row(records, row, ZED + 12, neg(y))
+    put_row(records, row, ZED + 15, cross(y, arm_f))
+    put_row(records, row, ZED + 18, y)
+    put_row(records, row, ZED + 21, cross(arm_g, y))
     zero = (0.0, 0.0, 0.0)
-    put(records, row, ZED + 24, zero)
-    put(records, row, ZED + 27, neg(y))
-    put(records, row, ZED + 30, zero)
-    put(records, row, ZED + 33, y)
-    put(records, row, ZED + 36, zero)
-    put(records, row, ZED + 39, x)
-    put(records, row, ZED + 42, zero)
-    put(records, row, ZED + 45, neg(x))
+    put_row(records, row, ZED + 24, zero)
+    put_row(records, row, ZED + 27, neg(y))
+    put_row(records, row, ZED + 30, zero)
+    put_row(records, row, ZED + 33, y)
+    put_row(records, row, ZED + 36, zero)
+    put_row(records, row, ZED + 39, x)
+    put_row(records, row, ZED + 42, zero)
+    put_row(records, row, ZED + 45, neg(x))
 
 
 @kernel(inner=True)
@@ -89,9 +89,9 @@ def feature_record(turn, shift, frame, offset, records, row):
     arm_f = matvec(turn, frame.point_g)
     arm_g = matvec(turn, sub(frame.point_g, shift))
     derivatives.gap = frame.gap
-    put(records, row, NORMAL, matvec(turn, frame.normal))
-    put(records, row, ARM_F, arm_f)
-    put(records, row, ARM_G, arm_g)
+    put_row(records, row, NORMAL, matvec(turn, frame.normal))
+    put_row(records, row, ARM_F, arm_f)
+    put_row(records, row, ARM_G, arm_g)
     store_velocities(x, y, arm_f, arm_g, records, row)
     # s = S z, S = H^-1 [Y_g^T, -X_g^T].
     m = (
@@ -126,11 +126,11 @@ def feature_record(turn, shift, frame, offset, records, row):
 @kernel(inline=True)
 def gradient_row(records, row, out, r):
     """The gap's gradient in the twists of f, then g, into out[r]: the contact wrench."""
-    n = load(records, row, NORMAL)
-    put(out, r, 0, scale(-1.0, n))
-    put(out, r, 3, cross(n, load(records, row, ARM_F)))
-    put(out, r, 6, n)
-    put(out, r, 9, cross(load(records, row, ARM_G), n))
+    n = load_row(records, row, NORMAL)
+    put_row(out, r, 0, scale(-1.0, n))
+    put_row(out, r, 3, cross(n, load_row(records, row, ARM_F)))
+    put_row(out, r, 6, n)
+    put_row(out, r, 9, cross(load_row(records, row, ARM_G), n))
 
 
 @kernel(inline=True)
@@ -195,9 +195,9 @@ def add_gap_terms(records, jacobian, r, factor, weight, out, f, g):
                 out[g + j - 6, f + i] += value
     if factor == 0.0:
         return
-    n = load(records, r, NORMAL)
-    arm_f = load(records, r, ARM_F)
-    arm_g = load(records, r, ARM_G)
+    n = load_row(records, r, NORMAL)
+    arm_f = load_row(records, r, ARM_F)
+    arm_g = load_row(records, r, ARM_G)
     if f >= 0:
         add_spin(n, arm_f, factor, out, f + 3)
         add_cross(n, -factor, out, f + 3, f)

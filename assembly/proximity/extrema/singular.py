@@ -11,15 +11,14 @@ import math
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import find_span, surface_at
 from assembly.proximity.extrema.face_face import pair_frame
-from assembly.proximity.extrema.feature_jets import fold_of
-from assembly.proximity.extrema.pair_matrix import pair_matrix
+from assembly.proximity.extrema.pair_matrix import FLAT, fold_of, pair_matrix
 
-# A root this far from a fold is the only one in its patches and those beside them, which turn by half a radian at most.
-ALONE, BESIDE = 0.05, 3.0
+# So many half widths from the middle of a patch is beside it.
+BESIDE = 3.0
 
 
 @kernel(inline=True)
-def across(store, r, direction, x, most):
+def beyond_knot(store, r, direction, x, most):
     """A parameter just beyond the knot line nearest to x, or x itself where none is within `most`."""
     patch = surface_at(store.table, r)
     o = patch.breaks_u if direction == 0 else patch.breaks_v
@@ -50,10 +49,10 @@ def fold_beyond(store, posed, x, half):
     """
     f, g = posed.surfaces[0], posed.surfaces[1]
     y = (
-        across(store, f, 0, x[0], BESIDE * half[0]),
-        across(store, f, 1, x[1], BESIDE * half[1]),
-        across(store, g, 0, x[2], BESIDE * half[2]),
-        across(store, g, 1, x[3], BESIDE * half[3]),
+        beyond_knot(store, f, 0, x[0], BESIDE * half[0]),
+        beyond_knot(store, f, 1, x[1], BESIDE * half[1]),
+        beyond_knot(store, g, 0, x[2], BESIDE * half[2]),
+        beyond_knot(store, g, 1, x[3], BESIDE * half[3]),
     )
     least = math.inf
     for i in range(4):
@@ -68,5 +67,5 @@ def fold_beyond(store, posed, x, half):
                 continue
             frame = pair_frame(store, f, g, posed.pose, (u, v, s, t))
             if frame.regular:
-                least = min(least, fold_of(pair_matrix(frame.shape_f, frame.shape_g, frame.gap, 1e-9).h, 1.0))
+                least = min(least, fold_of(pair_matrix(frame.shape_f, frame.shape_g, frame.gap, FLAT).h, 1.0))
     return least

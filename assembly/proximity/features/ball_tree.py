@@ -344,7 +344,7 @@ def open_feature(store, tree, i):
 
 
 @kernel(inline=True)
-def is_full(tree):
+def is_tree_full(tree):
     """Whether there is no room for the parts of another cell."""
     return tree.used[0] + 160 > tree.nodes.shape[0]
 

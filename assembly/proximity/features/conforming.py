@@ -27,7 +27,7 @@ from assembly.proximity.extrema.crossing import tangents
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
 from assembly.proximity.extrema.feature_pair import solve_features
 from assembly.proximity.features.ball_tree import feature_cells, used_cell
-from assembly.proximity.features.global_search import CROSSING, FoundPair, search
+from assembly.proximity.features.global_search import CROSSING, FoundPair, nearest_of_shells
 from assembly.proximity.features.separating_normals import WAYS, FeaturePoint, add_ways, points_of, way_at
 
 # Points of shells that are deeper in each other than this part of the size tell a crossing from conforming faces.
@@ -37,7 +37,7 @@ ROUGH = 0.1
 
 
 @kernel(inner=True)
-def middle_of(store, shell):
+def middle_of_faces(store, shell):
     """The middle of the cells of a shell's faces, and how far these reach from there."""
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
@@ -130,13 +130,13 @@ def conforming_pair(store, shells, pose, size):
     same = IDENTITY.rotation
     ways = np.empty((WAYS, 3))
     for side in range(2):
-        center, reach = middle_of(store, shell_g if side == 0 else shell_f)
+        center, reach = middle_of_faces(store, shell_g if side == 0 else shell_f)
         if not reach > 0.0:
             continue
         about = add(matvec(pose.rotation, center), pose.shift) if side == 0 else center
         part = NEARLY * size / reach
         larger = grown(pose, about, 1.0 - part if side == 0 else 1.0 / (1.0 - part))
-        nearest = search(store, shells, larger, size, ROUGH)
+        nearest = nearest_of_shells(store, shells, larger, size, ROUGH)
         x = nearest.x
         if nearest.status == CROSSING or nearest.codes[0] < 0:
             continue

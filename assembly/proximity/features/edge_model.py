@@ -20,7 +20,7 @@ from assembly.geometry.splines.evaluate import (
 from assembly.geometry.vec import add, blend, dot, scale
 from assembly.proximity.brep.records import edge_at
 from assembly.proximity.features.quadratic_model import (
-    ROUNDING,
+    COEFFICIENT_ROUNDING,
     Box,
     Quadratic,
     expand,
@@ -115,7 +115,7 @@ def edge_model(store, edge, pose, model, work):
     r = edge_record.surface
     far = abs(pose.shift[0]) + abs(pose.shift[1]) + abs(pose.shift[2])
     if r < 0:
-        e = length(left) + ROUNDING * (far + abs(c0[0]) + abs(c0[1]) + abs(c0[2]))
+        e = length(left) + COEFFICIENT_ROUNDING * (far + abs(c0[0]) + abs(c0[1]) + abs(c0[2]))
         place_model(pose, own, e, model)
         return
     u0, v0, _clamped = into_domain(store, r, c0[0], c0[1])
@@ -136,5 +136,5 @@ def edge_model(store, edge, pose, model, work):
         e += 0.5 * length(suu) * more_u * (2.0 * abs(c1[0]) + more_u)
         e += 0.5 * length(svv) * more_v * (2.0 * abs(c1[1]) + more_v)
         e += length(suv) * (abs(c1[0]) * more_v + abs(c1[1]) * more_u + more_u * more_v)
-        e += ROUNDING * (far + abs(s0[0]) + abs(s0[1]) + abs(s0[2]))
+        e += COEFFICIENT_ROUNDING * (far + abs(s0[0]) + abs(s0[1]) + abs(s0[2]))
     place_model(pose, Quadratic(s0, linear, zero, square, zero, zero), e, model)

@@ -20,7 +20,7 @@ from assembly.errors import InputError, check_coordinates, number
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
-from assembly.kinematics.pose import pose_row
+from assembly.kinematics.pose import IDENTITY_ROW, pose_row
 from assembly.proximity.brep.packing import pack_shell
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.features.nearest_query import (
@@ -44,7 +44,6 @@ Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 Shape = Body | BodyFace | Face | NurbsSurface | Iterable[Face | NurbsSurface]
 Faces = tuple[Face, ...]
-_IDENTITY = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
 class FeatureStatus(Enum):
@@ -145,7 +144,7 @@ def _pose(name: str, shape: Shape, q: ArrayLike | None) -> Array:
     if q is None:
         if isinstance(shape, BodyFace):
             shape = shape.body
-        return np.asarray(shape.q) if isinstance(shape, Body) else np.array(_IDENTITY)
+        return np.asarray(shape.q) if isinstance(shape, Body) else np.array(IDENTITY_ROW)
     row = pose_row(name, q)
     check_coordinates(name, row[:3].tolist())
     return row

@@ -21,6 +21,8 @@ from collections import namedtuple
 
 import numpy as np
 
+from assembly._best_first import NO_PAIRS, Pairs, best_first
+from assembly._heap import PAIR, waiting_pair_at
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.vec import dot, sub
@@ -36,11 +38,11 @@ from assembly.proximity.features.ball_tree import (
     cell_in,
     give_model,
     grow,
-    is_full,
+    is_tree_full,
     model_in,
     plant,
 )
-from assembly.proximity.features.quadratic_model import ball_bound, pair_bound
+from assembly.proximity.features.quadratic_model import ball_bound, pair_bound, put
 from assembly.proximity.features.region_tests import (
     FAR,
     KNOWN,
@@ -64,95 +66,30 @@ TINY = 2.5e-10
 SMOOTH = 1.2
 
 
-@kernel(inner=True)
-def push(keys, slots, count, key, slot):
-    """Put into the heap."""
-    i = count
-    while i > 0:
-        parent = (i - 1) >> 1
-        if keys[parent] <= key:
-            break
-        keys[i] = keys[parent]
-        slots[i] = slots[parent]
-        i = parent
-    keys[i] = key
-    slots[i] = slot
-
-
-@kernel(inner=True)
-def drop_first(keys, slots, count):
-    """Take the least out of the heap of `count`, which has one less then."""
-    last = count - 1
-    key = keys[last]
-    slot = slots[last]
-    i = 0
-    while True:
-        child = 2 * i + 1
-        if child >= last:
-            break
-        if child + 1 < last and keys[child + 1] < keys[child]:
-            child += 1
-        if keys[child] >= key:
-            break
-        keys[i] = keys[child]
-        slots[i] = slots[child]
-        i = child
-    keys[i] = key
-    slots[i] = slot
-
-
-# Pairs of nodes that wait to be looked at, a slot each. keys, slots: their least distances and their slots, a heap;
-# pairs: the two nodes, and what is known (NEW, BOUNDED or GUESS); normals: near that of the pair, or zero where it is
-# not known; free: slots that were left; counts: how many pairs wait, slots were in use, slots are free.
-PairQueue = namedtuple("PairQueue", "keys slots pairs normals free counts")
-QUEUE_COUNTS = record_dtype("i8", waiting=1, used=1, free=1)
-counts_at = record_view(QUEUE_COUNTS)
-COUNTS = size_of(QUEUE_COUNTS)
-# A pair whose bound is that of balls, or that of models; one that is only tried as a start.
-NEW, BOUNDED, GUESS = 0, 1, 2
-
-
-@kernel(inner=True, allocates=True)
-def new_queue():
-    """An empty `PairQueue`."""
-    return PairQueue(
-        keys=np.empty(WAITING),
-        slots=np.empty(WAITING, np.int64),
-        pairs=np.empty((WAITING, 3), np.int64),
-        normals=np.empty((WAITING, 3)),
-        free=np.empty(WAITING, np.int64),
-        counts=np.zeros(COUNTS, np.int64),
-    )
-
-
-@kernel(inner=True)
-def add_pair(queue, key, i, j, known, n):
-    """Let a pair wait; it is left out where there is no room."""
-    counts = counts_at(queue.counts, 0)
-    if counts.free > 0:
-        counts.free -= 1
-        slot = queue.free[counts.free]
-    elif counts.used < WAITING:
-        slot = counts.used
-        counts.used += 1
-    else:
-        return
-    queue.pairs[slot, 0], queue.pairs[slot, 1], queue.pairs[slot, 2] = i, j, known
-    queue.normals[slot, 0], queue.normals[slot, 1], queue.normals[slot, 2] = n
-    push(queue.keys, queue.slots, counts.waiting, key, slot)
-    counts.waiting += 1
-
-
-@kernel(inner=True)
-def take_first(queue):
-    """The slot of the pair with the least distance, which does not wait any more: it is there until one is added."""
-    counts = counts_at(queue.counts, 0)
-    slot = queue.slots[0]
-    drop_first(queue.keys, queue.slots, counts.waiting)
-    counts.waiting -= 1
-    queue.free[counts.free] = slot
-    counts.free += 1
-    return slot
+# What a search keeps.
+SEARCH_STATE = record_dtype(
+    "f8",
+    limit=1,  # pairs of at least this bound are let go [length]
+    let_go=1,  # the least bound of those, and of pairs too small to be cut [length]
+    lower=1,  # no points are nearer than this [length]
+    gap=1,  # of the nearest pair known; infinite before there is one [length]
+    parameters=4,  # its coordinates, (u, v) of f, then of g
+    feature_f=1,  # numbers of its features; -1: none yet
+    feature_g=1,
+    crosses=1,  # 1: shells cross there
+    effort=1,  # pairs looked at
+    known=1,  # extrema found
+    place=1,  # row of the normal near that of the pair that is next; 0: only its balls bound it
+    by_models=1,  # 1: pairs are bounded by their models, else by their balls
+    normal=3,  # where models begin to look for a bound
+    used=1,  # rows of normals that were ever used
+    free=1,  # the first row that was left, which begins with the next one; 0: none
+)
+search_state_at = record_view(SEARCH_STATE)
+STATE = size_of(SEARCH_STATE)
+# A search. trees: of the shells; pose: of g; heap: of `assembly/_heap.py`; normals: a row a pair that waits and that
+# models bound; extrema: a KNOWN_EXTREMUM a row; state: a SEARCH_STATE.
+ShellTrees = namedtuple("ShellTrees", "store trees pose size rough heap normals extrema state")
 
 
 # Where Newton's method leads. curvature: the least of g relative to f; stretch: 1 over the least of f's metric K.
@@ -208,13 +145,6 @@ FoundPair = namedtuple("FoundPair", "found codes x normal gap")
 
 
 @kernel(inline=True)
-def pair_at(trees, i, j, x, gap):
-    """The `FoundPair` at x of the features of two nodes."""
-    codes = (cell_in(trees[0], i).feature, cell_in(trees[1], j).feature)
-    return FoundPair(True, codes, x, (0.0, 0.0, 0.0), gap)
-
-
-@kernel(inline=True)
 def middles(trees, i, j):
     """The coordinates in the middles of two cells."""
     f, g = model_in(trees[0], i), model_in(trees[1], j)
@@ -252,25 +182,6 @@ def nearest_cells(store, trees):
 
 
 @kernel(inner=True)
-def split_pair(store, trees, i, j, n, best, most, queue):
-    """Let the pairs of the parts of one node and the other one wait, but for those `most` or more apart."""
-    cells = are_cells(trees, i, j)
-    down_f = larger_first(trees, i, j)
-    tree = trees[0] if down_f else trees[1]
-    cell = grow(store, tree, i if down_f else j)
-    for k in range(cell.child, cell.child + cell.children):
-        p, q = (k, j) if down_f else (i, k)
-        a, b = model_in(trees[0], p), model_in(trees[1], q)
-        if cells:
-            give_model(store, tree, k)
-            key, m = pair_bound(a, b, n, abs(best.gap))
-        else:
-            key, m = ball_bound(a, b), n
-        if key < most:
-            add_pair(queue, key, p, q, BOUNDED if cells else NEW, m)
-
-
-@kernel(inner=True)
 def note_extremum(extremum, trees, i, j, near):
     """Write an extremum of the features of two nodes."""
     for l in range(4):
@@ -281,87 +192,140 @@ def note_extremum(extremum, trees, i, j, near):
     extremum.feature_g = cell_in(trees[1], j).feature
 
 
-@kernel(inline=True)
-def within(best, size, rough):
-    """The distance from which on a pair may be left out."""
-    return (1.0 - rough) * abs(best.gap) - 1e-13 * size
+@kernel(inner=True)
+def keep_pair(search, i, j, x, gap):
+    """Note the nearest pair known, at x of the features of two nodes, and which bounds are let go for it."""
+    state = search_state_at(search.state, 0)
+    for l in range(4):
+        state.parameters[l] = x[l]
+    state.feature_f = cell_in(search.trees[0], i).feature
+    state.feature_g = cell_in(search.trees[1], j).feature
+    state.gap = gap
+    state.limit = (1.0 - search.rough) * abs(gap) - 1e-13 * search.size
+
+
+@kernel(inner=True)
+def node_bound(search, i, j):
+    """Lower bound of the distance of two nodes, and the row of its normal: of equal ones the first row is next."""
+    state, trees = search_state_at(search.state, 0), search.trees
+    f, g = model_in(trees[0], i), model_in(trees[1], j)
+    if state.by_models == 0.0:
+        return ball_bound(f, g), 0
+    give_model(search.store, trees[0], i)
+    give_model(search.store, trees[1], j)
+    bound, n = pair_bound(f, g, three_of(state.normal), abs(state.gap))
+    if not bound < state.limit:
+        return bound, 0
+    row = int(state.free)
+    if row > 0:
+        state.free = search.normals[row, 0]
+    else:
+        state.used += 1.0
+        row = int(state.used)
+    put(search.normals[row], n)
+    return bound, row
+
+
+@kernel(inner=True)
+def search_ended(search, top, left):
+    """Why the search ends; -1: not yet."""
+    state, first = search_state_at(search.state, 0), waiting_pair_at(search.heap, 0)
+    state.lower = max(min(top, state.limit), 0.0)
+    if state.crosses == 1.0:
+        return CROSSING
+    if left == 0 or first.bound >= state.limit:
+        return APART
+    state.place = first.tie
+    full = is_tree_full(search.trees[0]) or is_tree_full(search.trees[1]) or left + 160 > WAITING
+    return UNPROVEN if full else -1
+
+
+@kernel(inner=True)
+def examine(search, bound, i, j, n, is_guess):
+    """See what is in a pair of cells, at a guess even if no extremum is. Whether something else may be."""
+    store, trees, extrema = search.store, search.trees, search.extrema
+    state = search_state_at(search.state, 0)
+    f, g = model_in(trees[0], i), model_in(trees[1], j)
+    d = sub(g.point, f.point)
+    start = middles(trees, i, j)
+    if math.sqrt(dot(d, d)) < abs(state.gap) and are_feasible(store, trees, i, j, start):
+        keep_pair(search, i, j, start, math.sqrt(dot(d, d)))
+    if not is_guess and excluded(trees, i, j, bound > 0.0):
+        return False
+    known = int(state.known)
+    settled, beside = is_known(store, trees, i, j, extrema[:known])
+    if settled:
+        return False
+    one, other = feature_in(store.table, trees[0], i), feature_in(store.table, trees[1], j)
+    # Beside an extremum Newton's method would find that one again.
+    if is_guess or (max(f.bend, g.bend) < SMOOTH and beside > FAR):
+        near = extremum_near(store, one, other, search.pose, start, n, search.size)
+        if near.status == CONVERGED or near.status == SINGULAR:
+            if abs(near.gap) < abs(state.gap) and are_feasible(store, trees, i, j, near.x):
+                keep_pair(search, i, j, near.x, near.gap)
+            if known < EXTREMA:
+                note_extremum(known_extremum_at(extrema, known), trees, i, j, near)
+                state.known += 1.0
+                if is_known(store, trees, i, j, extrema[known : known + 1])[0]:
+                    return False
+    if bound <= 0.0 and f.bend + g.bend < SMOOTH:
+        x, crosses = crossing_point(store, one, other, search.pose, start, search.size)
+        if crosses and are_feasible(store, trees, i, j, x):
+            keep_pair(search, i, j, x, 0.0)
+            state.crosses = 1.0
+            return False
+    return side_of(store, trees[0], i) != OUTSIDE and side_of(store, trees[1], j) != OUTSIDE
+
+
+@kernel(inner=True)
+def branch(search, bound, i, j):
+    """The bound of a pair, and the pairs of the parts of one node with the other one; infinite if nothing is in it."""
+    state, trees = search_state_at(search.state, 0), search.trees
+    row = int(state.place)
+    normal = (0.0, 0.0, 0.0)
+    if row > 0:
+        normal = three_of(search.normals[row])
+        search.normals[row, 0], state.free = state.free, row
+    put(state.normal, normal)
+    cells = are_cells(trees, i, j)
+    state.by_models = 1.0 if cells else 0.0
+    if cells and row == 0:
+        return bound, Pairs(i, i + 1, j, j + 1)
+    state.effort += 1.0
+    if cells:
+        if not examine(search, bound, i, j, normal, False):
+            return math.inf, NO_PAIRS
+        if max(model_in(trees[0], i).radius, model_in(trees[1], j).radius) < TINY * search.size:
+            return bound, NO_PAIRS
+    down_f = larger_first(trees, i, j)
+    cell = grow(search.store, trees[0] if down_f else trees[1], i if down_f else j)
+    if cell.children == 0:
+        return math.inf, NO_PAIRS
+    parts = (cell.child, cell.child + cell.children)
+    return bound, Pairs(parts[0], parts[1], j, j + 1) if down_f else Pairs(i, i + 1, parts[0], parts[1])
+
+
+# Bounds may be negative: how deep balls overlap tells where shells may cross.
+advance = kernel(inner=True)(best_first(search_state_at, node_bound, search_ended, branch, floor=-math.inf))
 
 
 @kernel(inner=True, allocates=True)
-def search(store, shells, pose, size, rough):
+def nearest_of_shells(store, shells, pose, size, rough):
     """The nearest points of two shells, g seen from f, or any that are farther by a part of that, `rough`, at most."""
     trees = (plant(store, shells[0], IDENTITY), plant(store, shells[1], pose))
-    queue = new_queue()
-    counts = counts_at(queue.counts, 0)
-    extrema = np.empty((EXTREMA, KNOWN))
-    known = 0
-    # The least bound of a pair that was too small to be cut.
-    uncut = math.inf
-    status = APART
-    nowhere = (0.0, 0.0, 0.0)
-    best = FoundPair(False, (-1, -1), (0.0, 0.0, 0.0, 0.0), nowhere, math.inf)
-    lower = math.inf
-    effort = 0
-    first_f, first_g = nearest_cells(store, trees)
-    add_pair(queue, -math.inf, first_f, first_g, GUESS, nowhere)
-    add_pair(queue, ball_bound(model_in(trees[0], 0), model_in(trees[1], 0)), 0, 0, NEW, nowhere)
-    while counts.waiting > 0:
-        key = queue.keys[0]
-        if key >= within(best, size, rough):
-            break
-        slot = take_first(queue)
-        i, j, ready = queue.pairs[slot, 0], queue.pairs[slot, 1], queue.pairs[slot, 2]
-        n = (queue.normals[slot, 0], queue.normals[slot, 1], queue.normals[slot, 2])
-        effort += 1
-        lower = max(key, 0.0)
-        if is_full(trees[0]) or is_full(trees[1]) or counts.waiting + 160 > WAITING:
-            status = UNPROVEN
-            break
-        f, g = model_in(trees[0], i), model_in(trees[1], j)
-        if are_cells(trees, i, j):
-            give_model(store, trees[0], i)
-            give_model(store, trees[1], j)
-            if ready == NEW:
-                key, n = pair_bound(f, g, n, abs(best.gap))
-                if key >= within(best, size, rough):
-                    continue
-                if counts.waiting > 0 and key > queue.keys[0]:
-                    add_pair(queue, key, i, j, BOUNDED, n)
-                    continue
-            d = sub(g.point, f.point)
-            start = middles(trees, i, j)
-            if math.sqrt(dot(d, d)) < abs(best.gap) and are_feasible(store, trees, i, j, start):
-                best = pair_at(trees, i, j, start, math.sqrt(dot(d, d)))
-            if ready != GUESS and excluded(trees, i, j, key > 0.0):
-                continue
-            settled, beside = is_known(store, trees, i, j, extrema[:known])
-            if settled:
-                continue
-            one, other = feature_in(store.table, trees[0], i), feature_in(store.table, trees[1], j)
-            # Beside an extremum Newton's method would find that one again.
-            if ready == GUESS or (max(f.bend, g.bend) < SMOOTH and beside > FAR):
-                near = extremum_near(store, one, other, pose, start, n, size)
-                if near.status == CONVERGED or near.status == SINGULAR:
-                    if abs(near.gap) < abs(best.gap) and are_feasible(store, trees, i, j, near.x):
-                        best = pair_at(trees, i, j, near.x, near.gap)
-                    if known < EXTREMA:
-                        note_extremum(known_extremum_at(extrema, known), trees, i, j, near)
-                        known += 1
-                        if is_known(store, trees, i, j, extrema[known - 1 : known])[0]:
-                            continue
-            if key <= 0.0 and f.bend + g.bend < SMOOTH:
-                x, crosses = crossing_point(store, one, other, pose, start, size)
-                if crosses and are_feasible(store, trees, i, j, x):
-                    return ShellSearch(CROSSING, pair_at(trees, i, j, x, 0.0).codes, x, 0.0, 0.0, effort)
-            if ready == GUESS or side_of(store, trees[0], i) == OUTSIDE or side_of(store, trees[1], j) == OUTSIDE:
-                continue
-            if max(f.radius, g.radius) < TINY * size:
-                uncut = min(uncut, key)
-                continue
-        split_pair(store, trees, i, j, n, best, within(best, size, rough), queue)
-    if status == APART:
-        lower = within(best, size, rough)
-    elif not best.found:
+    heap, normals = np.empty(WAITING * PAIR), np.empty((WAITING, 3))
+    search = ShellTrees(store, trees, pose, size, rough, heap, normals, np.empty((EXTREMA, KNOWN)), np.zeros(STATE))
+    best = search_state_at(search.state, 0)
+    best.limit = best.let_go = best.gap = math.inf
+    best.feature_f = best.feature_g = -1.0
+    i, j = nearest_cells(store, trees)
+    give_model(store, trees[0], i)
+    give_model(store, trees[1], j)
+    examine(search, -math.inf, i, j, (0.0, 0.0, 0.0), True)
+    status, _left = advance(search, 0, Pairs(0, 1, 0, 1))
+    if status == UNPROVEN and best.feature_f < 0.0:
         # Out of room before any point inside the trims: where the search began.
-        best = pair_at(trees, first_f, first_g, middles(trees, first_f, first_g), math.inf)
-    return ShellSearch(status, best.codes, best.x, best.gap, max(min(lower, uncut), 0.0), effort)
+        keep_pair(search, i, j, middles(trees, i, j), math.inf)
+    codes = (int(best.feature_f), int(best.feature_g))
+    x = (best.parameters[0], best.parameters[1], best.parameters[2], best.parameters[3])
+    return ShellSearch(status, codes, x, best.gap, best.lower, int(best.effort))

@@ -16,7 +16,7 @@ from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
 from assembly.proximity.extrema.feature_pair import solve_features
 from assembly.proximity.extrema.feature_query import pose_of_second, write_pair
 from assembly.proximity.features.conforming import NEARLY, conforming_pair
-from assembly.proximity.features.global_search import APART, CROSSING, UNPROVEN, FoundPair, search
+from assembly.proximity.features.global_search import APART, CROSSING, UNPROVEN, FoundPair, nearest_of_shells
 from assembly.proximity.features.penetration import PENETRATING, TOUCHING, deepest
 from assembly.proximity.features.separating_normals import WAYS, overlap_at
 from assembly.proximity.features.switching import track_features
@@ -81,7 +81,7 @@ def find_nearest(table, pool, shells, q, size, codes, out):
     store = Store(table, pool)
     answer = answer_at(out, 0)
     pose = pose_of_second(q)
-    nearest = search(store, shells, pose, size, 0.0)
+    nearest = nearest_of_shells(store, shells, pose, size, 0.0)
     status = nearest.status
     none = (0.0, 0.0, 0.0)
     found = FoundPair(True, nearest.codes, nearest.x, none, nearest.gap)

@@ -20,7 +20,7 @@ from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import face_at, shell_at
 from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR
 from assembly.proximity.extrema.global_start import global_start
-from assembly.proximity.features.global_search import CROSSING, FoundPair, search
+from assembly.proximity.features.global_search import CROSSING, FoundPair, nearest_of_shells
 from assembly.proximity.features.separating_normals import (
     WAYS,
     add_end_ways,
@@ -122,7 +122,7 @@ def deepest(store, shells, pose, codes, x, size):
             for k in range(count):
                 away = scale(reach, way_at(ways, k))
                 place = add(pose.shift, away)
-                out = search(store, shells, RelativePose(pose.rotation, place), size, ROUGH)
+                out = nearest_of_shells(store, shells, RelativePose(pose.rotation, place), size, ROUGH)
                 if out.status == CROSSING or not out.lower > 0.0:
                     continue
                 back = walk_back(store, shells, pose, away, out.codes, out.x, size)
@@ -138,7 +138,7 @@ def deepest(store, shells, pose, codes, x, size):
                     # They touch here. If that is all, the least move parts them. Where they touch along a line or
                     # all over a face a search so near may not come to its proof: that none is found has to do.
                     place = add(pose.shift, scale(PARTED / reach * size, away))
-                    parted = search(store, shells, RelativePose(pose.rotation, place), size, ROUGH)
+                    parted = nearest_of_shells(store, shells, RelativePose(pose.rotation, place), size, ROUGH)
                     if parted.status == CROSSING:
                         continue
                 best = back

@@ -51,7 +51,7 @@ NODE = size_of(QUADRATIC_MODEL)
 # Where weights vary by more than this over a box it has no model: e is infinite and its sphere is what bounds it.
 LEAST_WEIGHT = 0.1
 # Roundings of coordinates in points and coefficients.
-ROUNDING = 1e-15
+COEFFICIENT_ROUNDING = 1e-15
 
 
 # The quadratic S0 + p s + q t + l s^2 + m s t + k t^2.
@@ -233,7 +233,7 @@ def face_model(store, r, pose, model, work):
     nn = dot(n, n)
     n = scale(1.0 / math.sqrt(nn), n) if nn > 1e-20 * dot(p, p) * dot(q, q) and nn > 0.0 else (0.0, 0.0, 0.0)
     left = remainder(store, r, span, box, quadratic, n, work)
-    noise = ROUNDING * (
+    noise = COEFFICIENT_ROUNDING * (
         abs(s0[0]) + abs(s0[1]) + abs(s0[2]) + abs(pose.shift[0]) + abs(pose.shift[1]) + abs(pose.shift[2])
     )
     place_model(pose, quadratic, left.rest + noise, model)

@@ -67,7 +67,7 @@ def pair_parameters(record):
 
 
 @kernel(inline=True)
-def write_tracked(x, codes, n, tracked, r):
+def write_tracked_pair(x, codes, n, tracked, r):
     """Parameters, features and normal of a pair."""
     pair = tracked_at(tracked, r)
     for k in range(4):
@@ -88,7 +88,7 @@ def write_record(turn, shift, frame, offset, records, r):
 
 
 @kernel(inner=True)
-def track_row(store, shells, pose, start, r, patience):
+def track_contact(store, shells, pose, start, r, patience):
     """`track_features` from the tracked values start[r], or `hold_features`."""
     pair = tracked_at(start, r)
     codes = (np.int64(pair.feature_f), np.int64(pair.feature_g))
@@ -116,11 +116,11 @@ def track_solids(store, shells, bodies, q, patience, rows, r):
     i, j = bodies
     turn = rotation(q, i)
     pose = relative_pose(q, i, turn, j, rotation(q, j))
-    found = track_row(Store(table, pool), shells, pose, start, r, patience)
+    found = track_contact(Store(table, pool), shells, pose, start, r, patience)
     status, frame = found.status, found.frame
     if status == CONVERGED or status == SINGULAR:
         write_record(turn, pose.shift, frame, offset_side(frame.side_f, frame.gap), records, r)
-        write_tracked(found.x, found.codes, frame.normal, tracked, r)
+        write_tracked_pair(found.x, found.codes, frame.normal, tracked, r)
         tracked_at(tracked, r).stays = tracked_at(start, r).stays
     return status
 
@@ -158,6 +158,6 @@ def search_solids(store, shells, bodies, q, searches, tracked, r):
         # Solids that only touch have no depth: their crossing point is where the pair is.
         if status != CROSSING:
             n = matvec_t(rotation(q, i), (answer.normal[0], answer.normal[1], answer.normal[2]))
-    write_tracked((out[0], out[1], out[2], out[3]), codes, n, tracked, r)
+    write_tracked_pair((out[0], out[1], out[2], out[3]), codes, n, tracked, r)
     tracked_at(tracked, r).stays = 0.0
     return 1

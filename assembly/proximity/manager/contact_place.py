@@ -31,7 +31,7 @@ from assembly.proximity.manager.extrema import (
     extremum_at,
     given_at,
 )
-from assembly.proximity.manager.overlap import DEPTH, next_near, patch_at, projection_at, seen_by_other, surface_of
+from assembly.proximity.manager.overlap import DEPTH, next_near, patch_at, projection_at, seen_by_other, surface_of_code
 from assembly.proximity.manager.posed_pair import posed_pair
 from assembly.proximity.manager.records import ContactManager, lengths_of, pair_lengths_of, pair_of
 
@@ -56,7 +56,7 @@ def point_of(store, surface, shell, code, u, v):
 
 
 @kernel(inline=True)
-def apart(a, b):
+def distance_between(a, b):
     """The distance of two points."""
     d = sub(a, b)
     return math.sqrt(dot(d, d))
@@ -95,7 +95,7 @@ def nearest_point(posed, side, y, distance, stack):
             break
         element = patch_at(posed, side, e)
         code = np.int64(element.feature)
-        if surface_of(posed, side, code) >= 0:
+        if surface_of_code(posed, side, code) >= 0:
             off, n, found = projection_at(posed, side, e, y)
             p = sub(y, scale(off, n))
             if not found:
@@ -105,7 +105,7 @@ def nearest_point(posed, side, y, distance, stack):
             p = point_on_edge(store, feature_at(store.table, shell, code), middle - half, middle + half, y)
         else:
             p = vertex_point(store, feature_at(store.table, shell, code))
-        away = apart(p, y)
+        away = distance_between(p, y)
         if away <= least:
             least, best, some = away, p, True
     return best, some
@@ -117,7 +117,7 @@ def between_bodies(posed, c, distance, stack):
     p, found_f = nearest_point(posed, 0, c, distance, stack)
     q, found_g = nearest_point(posed, 1, seen_by_other(posed, 0, c), distance, stack)
     q = seen_by_other(posed, 1, q)
-    return scale(0.5, add(p, q)), apart(q, p), found_f and found_g
+    return scale(0.5, add(p, q)), distance_between(q, p), found_f and found_g
 
 
 @kernel(inner=True)
@@ -126,7 +126,7 @@ def leads_to(posed, begin, end, level, stack):
 
     It goes straight for the end, and after every stride back to where both bodies are equally far.
     """
-    left = apart(end, begin)
+    left = distance_between(end, begin)
     stride = left / STRIDES
     c = begin
     for _ in range(LONGEST):
@@ -141,7 +141,7 @@ def leads_to(posed, begin, end, level, stack):
             near = gap < level
             if near:
                 break
-        before, left = left, apart(end, c)
+        before, left = left, distance_between(end, c)
         if not near or left > before - GAINED * stride:
             return False
     return False
@@ -160,7 +160,7 @@ def contact_points(posed, given, tracked):
 
 
 @kernel(inner=True, allocates=True)
-def spread(posed, extrema, begin, limits, stack):
+def spread_place(posed, extrema, begin, limits, stack):
     """Mark the extrema in the place of a contact whose points have their middle at `begin`.
 
     From extremum to extremum, the nearest first: each is tried from the nearest point that is known to be in the place.
@@ -179,7 +179,7 @@ def spread(posed, extrema, begin, limits, stack):
         c = scale(0.5, add(three_of(extremum.point_f), three_of(extremum.point_g)))
         middles[k, 0], middles[k, 1], middles[k, 2] = c
         source[k, 0], source[k, 1], source[k, 2] = begin
-        nearest[k] = apart(c, begin)
+        nearest[k] = distance_between(c, begin)
         may = extremum.origin == NEW or extremum.origin >= LISTED
         eligible[k] = may and extremum.place == ELSEWHERE and lowest <= extremum.gap < level
     while True:
@@ -196,7 +196,7 @@ def spread(posed, extrema, begin, limits, stack):
         extremum_at(extrema, best).place = BESIDE_CONTACT
         eligible[best] = False
         for k in range(count):
-            away = apart(three_of(middles[k]), end)
+            away = distance_between(three_of(middles[k]), end)
             if away < nearest[k]:
                 nearest[k] = away
                 source[k, 0], source[k, 1], source[k, 2] = end
@@ -220,12 +220,15 @@ def mark(manager, p, q, tracked, extrema, stack):
         a, b = contact_points(posed, given, tracked)
         for k in range(extrema.shape[0]):
             extremum = extremum_at(extrema, k)
-            if max(apart(three_of(extremum.point_f), a), apart(three_of(extremum.point_g), b)) <= merge_radius:
+            if (
+                max(distance_between(three_of(extremum.point_f), a), distance_between(three_of(extremum.point_g), b))
+                <= merge_radius
+            ):
                 extremum.place = OF_CONTACT
-        gap = apart(a, b) if contact.gap > 0.0 else 0.0
+        gap = distance_between(a, b) if contact.gap > 0.0 else 0.0
         # A contact that may stay open, and is by more than the least gap, excuses nothing that is nearer.
         lowest = least if given.opens == 1 and gap >= least else -math.inf
-        spread(posed, extrema, scale(0.5, add(a, b)), (lowest, gap + least), stack)
+        spread_place(posed, extrema, scale(0.5, add(a, b)), (lowest, gap + least), stack)
     return known
 
 

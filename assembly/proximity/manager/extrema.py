@@ -26,8 +26,8 @@ from assembly.proximity.extrema.face_face import CONVERGED, NOT_CONVERGED, SINGU
 from assembly.proximity.extrema.feature_pair import two_face_frame
 from assembly.proximity.extrema.feedback import descend_pair
 from assembly.proximity.extrema.global_start import opposed
+from assembly.proximity.extrema.pair_matrix import is_the_only_one
 from assembly.proximity.extrema.rates import derivatives_at
-from assembly.proximity.extrema.singular import ALONE
 from assembly.proximity.features.solid_contact import contact_record_at, pair_parameters, tracked_at
 
 # An extremum of the distance of two bodies. Points and the normal are in the axes of f.
@@ -75,7 +75,7 @@ DESCENTS = 40
 
 
 @kernel(inline=True)
-def between(store, r, u, v, s, t):
+def middle_parameters(store, r, u, v, s, t):
     """The middle of two pairs of parameters, the shorter way around."""
     patch = surface_at(store.table, r)
     a = 0.5 * (u + s)
@@ -99,7 +99,7 @@ def square_to(a, b):
 
 
 @kernel(inline=True)
-def is_full(extrema):
+def is_list_full(extrema):
     """Whether a list has no room for another extremum."""
     return extrema.count[0] == extrema.rows.shape[0]
 
@@ -124,7 +124,7 @@ def are_one(posed, rows, i, k, merge_radius):
             if codes[side] >= shell_at(store.table, shell).faces:
                 continue
             surface = feature_at(store.table, shell, np.int64(codes[side]))
-        u, v = between(store, surface, x[2 * side], x[2 * side + 1], y[2 * side], y[2 * side + 1])
+        u, v = middle_parameters(store, surface, x[2 * side], x[2 * side + 1], y[2 * side], y[2 * side + 1])
         p = surface_point(store.table, store.pool, surface, u, v)[0]
         if side == 1:
             p = add(matvec(posed.pose.rotation, p), posed.pose.shift)
@@ -261,14 +261,14 @@ def add_given(posed, tracked, listed, many, merge_radius, extrema):
     for c in range(many):
         given = given_at(store.table, listed + GIVEN_RECORD * c)
         x = pair_parameters(tracked_at(tracked, given.row))
-        if math.isnan(x[0]) or is_full(extrema):
+        if math.isnan(x[0]) or is_list_full(extrema):
             continue
         if given.swapped == 1:
             x = (x[2], x[3], x[0], x[1])
         before = extrema.count[0]
         found = add_surface_extremum(posed, x, 0.0, extrema)
         count = extrema.count[0]
-        if posed.surfaces[0] >= 0 and (found == NOTHING or (count > before and not is_full(extrema))):
+        if posed.surfaces[0] >= 0 and (found == NOTHING or (count > before and not is_list_full(extrema))):
             frame = pair_frame(store, posed.surfaces[0], posed.surfaces[1], posed.pose, x)
             if frame.regular:
                 write_frame(extremum_at(extrema.rows, count), x, frame, 0.0)
@@ -285,4 +285,4 @@ def add_given(posed, tracked, listed, many, merge_radius, extrema):
 @kernel(inline=True)
 def is_alone(extremum):
     """Whether an extremum is far from a fold, beyond knot lines too as far as it is known."""
-    return extremum.fold > ALONE and not extremum.beyond <= ALONE
+    return is_the_only_one(extremum.fold) and (math.isnan(extremum.beyond) or is_the_only_one(extremum.beyond))

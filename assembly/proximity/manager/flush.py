@@ -23,7 +23,7 @@ SHORT = 1e-3
 # and their normals oppose each other but for this cosine.
 OPPOSED = 1e-6
 # Depths that are rounding, and room for faces about a point.
-ROUNDING, FACES_ABOUT = 1e-9, 16
+DEPTH_ROUNDING, FACES_ABOUT = 1e-9, 16
 
 
 @kernel(inner=True)
@@ -68,7 +68,7 @@ def drop_flush(manager, p, posed, extrema, tracked):
     for k in range(extrema.count[0]):
         extremum = extremum_at(extrema.rows, k)
         is_listed = np.int64(extremum.origin) >= LISTED
-        if not extremum.gap < -ROUNDING or not (extremum.origin == NEW or is_listed):
+        if not extremum.gap < -DEPTH_ROUNDING or not (extremum.origin == NEW or is_listed):
             continue
         if not is_between_flush_faces(posed, extremum, stack, normals):
             continue
@@ -82,6 +82,6 @@ def any_deep(extrema):
     """Whether any extremum is deeper than rounding."""
     for k in range(extrema.count[0]):
         extremum = extremum_at(extrema.rows, k)
-        if extremum.gap < -ROUNDING and extremum.origin != USELESS:
+        if extremum.gap < -DEPTH_ROUNDING and extremum.origin != USELESS:
             return True
     return False

@@ -80,7 +80,7 @@ def mover(pair, q):
 
 
 @kernel(inline=True)
-def apart(e, f):
+def quaternion_distance(e, f):
     """|e - f| of two quaternions with their best signs, 2 sin(a / 4) of the angle a between the turns."""
     square = 0.0
     other = 0.0
@@ -93,7 +93,7 @@ def apart(e, f):
 @kernel(inline=True)
 def turned_by(known, e):
     """The same of the turn e of a pair and that of its last update."""
-    return apart(e, (known.turn[0], known.turn[1], known.turn[2], known.turn[3]))
+    return quaternion_distance(e, (known.turn[0], known.turn[1], known.turn[2], known.turn[3]))
 
 
 @kernel(inline=True)
@@ -184,7 +184,7 @@ def went(store, pair, before, after):
     was, now = mover(pair, before), mover(pair, after)
     middle, radius = root_ball(store, was)
     moved = moved_from(middle, add(matvec(was.turn, middle), was.shift), now)
-    return moved + 2.0 * radius * apart(was.quaternion, now.quaternion)
+    return moved + 2.0 * radius * quaternion_distance(was.quaternion, now.quaternion)
 
 
 @kernel(inner=True)
@@ -198,7 +198,7 @@ def used_most(manager):
 
 
 @kernel(inner=True)
-def measure(manager, first, end, q):
+def measure_motion(manager, first, end, q):
     """Keep which parts of their motion bounds the pairs from first to before `end` used at poses q.
 
     Returns the pair that had used most, of all, when it was last measured.
@@ -210,8 +210,8 @@ def measure(manager, first, end, q):
 
 @kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], i8, i8, f8[:, ::1])")
 def measure_parts(table, pool, at, memory, first, end, q):
-    """`measure`, of the contact manager at a place of the table. A solve calls this by its address."""
-    return measure(ContactManager(Store(table, pool), at, memory), first, end, q)
+    """`measure_motion`, of the contact manager at a place of the table. A solve calls this by its address."""
+    return measure_motion(ContactManager(Store(table, pool), at, memory), first, end, q)
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1], f8)")

@@ -14,8 +14,8 @@ from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import surface_at
 from assembly.geometry.vec import blend
 from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_frame
-from assembly.proximity.extrema.pair_matrix import curvature_bound, pair_matrix
-from assembly.proximity.manager.newton_regions import FLAT, is_beside
+from assembly.proximity.extrema.pair_matrix import FLAT, curvature_bound, pair_matrix
+from assembly.proximity.manager.newton_regions import is_beside
 
 # Across a valley surfaces part by this part of their curvatures at least; along it by this part of that at most.
 STEEP, LEVEL = 0.05, 0.1

@@ -13,6 +13,7 @@ from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import dot, sub
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import FACE, FACE_RECORD, shell_at
+from assembly.proximity.extrema.pair_matrix import is_of_continuum
 from assembly.proximity.features.holding import HELD_F, HELD_G
 from assembly.proximity.features.region_tests import is_feasible
 from assembly.proximity.features.solid_contact import pair_parameters
@@ -23,8 +24,6 @@ from assembly.proximity.manager.near_singular import across_near_singular, into_
 APART = 0.5
 # Points nearer than this, in parts of the scene's size, are along each other whichever way.
 NEAR = 1e-3
-# An extremum this near to a fold, det H over |H|^2, is one of a continuum as far as Newton's method can tell.
-CONTINUUM = 1e-6
 
 
 @kernel(inner=True)
@@ -44,7 +43,7 @@ def features_of(posed, codes):
 @kernel(inner=True)
 def is_loose(extremum):
     """Whether an extremum is any one of a continuum, where it is by chance."""
-    return extremum.corner == 0.0 and abs(extremum.fold) <= CONTINUUM
+    return extremum.corner == 0.0 and is_of_continuum(extremum.fold)
 
 
 @kernel(inner=True)

@@ -14,8 +14,8 @@ from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.splines.domain import is_within
 from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_frame, pair_step
-from assembly.proximity.extrema.pair_matrix import across_first, pair_matrix
-from assembly.proximity.extrema.singular import ALONE, BESIDE, fold_beyond
+from assembly.proximity.extrema.pair_matrix import FLAT, across_first, is_the_only_one, pair_matrix
+from assembly.proximity.extrema.singular import BESIDE, fold_beyond
 from assembly.proximity.features.holding import POINT
 from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.extrema import extremum_at, is_alone
@@ -23,8 +23,6 @@ from assembly.proximity.manager.overlap import patch_at
 
 # Steps; and below so many radians, that a step turns a normal, it is as good as there.
 STEPS, CLOSE = 6, 0.02
-# Curvatures below this, over the scene's size, are rounding.
-FLAT = 1e-9
 # What became of it.
 LEFT, STAYED = -1, -2
 # Sequences whose first steps lead as close together as this part of a patch go the same way.
@@ -56,7 +54,7 @@ def is_beside(store, surfaces, x, y, half, part):
 
 
 @kernel(inner=True)
-def is_known(posed, e, d, extrema):
+def known_in_region(posed, e, d, extrema):
     """The features of elements e and d, the parameters of their middles, whether a known extremum is all there is.
 
     And whether one is there that is near a fold, on this side of a knot line or beyond: a second extremum may be beside
@@ -71,7 +69,7 @@ def is_known(posed, e, d, extrema):
         extremum = extremum_at(extrema.rows, k)
         if extremum.code_f != codes[0] or extremum.code_g != codes[1]:
             continue
-        if not extremum.fold > ALONE or extremum.corner >= POINT:
+        if not is_the_only_one(extremum.fold) or extremum.corner >= POINT:
             # A point that stays where it is is no extremum: where the edge, or the face, is nearest may be beside it.
             continue
         x = pair_parameters(extremum)

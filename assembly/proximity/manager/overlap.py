@@ -67,7 +67,7 @@ def meets_box(pool, o, a, d):
 
 
 @kernel(inner=True)
-def surface_of(posed, side, code):
+def surface_of_code(posed, side, code):
     """The surface record of a feature of one body, or -1 where it is no face."""
     surface, shell = posed.surfaces[side], posed.shells[side]
     if surface >= 0:
@@ -146,7 +146,7 @@ def facets_cut(posed, side, a, d, end, beside):
             used = with_children(stack, used, child)
             continue
         code = at.feature
-        r = surface_of(posed, side, code)
+        r = surface_of_code(posed, side, code)
         if r < 0:
             continue
         e = tree.element_pool + ELEMENT * (-1 - child)
@@ -179,7 +179,7 @@ def projection_at(posed, side, e, y):
     store = posed.store
     patch = patch_at(posed, side, e)
     code = np.int64(patch.feature)
-    f = surface_of(posed, side, code)
+    f = surface_of_code(posed, side, code)
     if f < 0:
         return 0.0, y, False
     u, v = patch.middle[0], patch.middle[1]
@@ -251,7 +251,7 @@ def middle(posed, side, e):
     store = posed.store
     patch = patch_at(posed, side, e)
     code = np.int64(patch.feature)
-    f = surface_of(posed, side, code)
+    f = surface_of_code(posed, side, code)
     if f < 0 or not in_trim(posed, side, code, patch.middle[0], patch.middle[1]):
         return (0.0, 0.0, 0.0), False
     return surface_point(store.table, store.pool, f, patch.middle[0], patch.middle[1])[0], True
@@ -282,7 +282,7 @@ def below_part(posed, side, k, below):
                 a, some = middle(posed, side, e)
                 if some:
                     patch = patch_at(posed, side, e)
-                    f = surface_of(posed, side, np.int64(patch.feature))
+                    f = surface_of_code(posed, side, np.int64(patch.feature))
                     _p, su, sv, _uu, _uv, _vv = surface_point(
                         store.table, store.pool, f, patch.middle[0], patch.middle[1]
                     )

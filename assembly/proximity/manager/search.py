@@ -22,10 +22,10 @@ from assembly.proximity.manager.extrema import (
     add_extremum,
     extremum_at,
     is_alone,
-    is_full,
+    is_list_full,
 )
 from assembly.proximity.manager.motion_bounds import PairSearch, ball_about
-from assembly.proximity.manager.newton_regions import LEFT, half_widths, is_known, newton_way_at, stays
+from assembly.proximity.manager.newton_regions import LEFT, half_widths, known_in_region, newton_way_at, stays
 from assembly.proximity.manager.overlap import is_outside
 
 # Starts that an update leads down the slope of the gap, because Newton's method found no minimum from there.
@@ -47,7 +47,7 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
     Returns which one is a new minimum, or -1; whether a motion may bring one forth; and the Progress.
     """
     folding, visited, slides = progress
-    codes, start, inside, folds = is_known(posed, e, d, extrema)
+    codes, start, inside, folds = known_in_region(posed, e, d, extrema)
     folding = folding or folds
     if inside:
         return -1, False, Progress(folding, visited, slides)
@@ -74,7 +74,7 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
         slides += 1
         stride = element_ball(posed.store, posed.trees[0], e)[1]
         start, stayed = slide_down(posed.store, posed.surfaces[0], posed.surfaces[1], posed.pose, start, stride, half)
-        if stayed and not is_full(extrema):
+        if stayed and not is_list_full(extrema):
             result = add_extremum(posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, 0.0)
     progress = Progress(folding, visited, slides)
     if result == ALIKE and not folding:
@@ -101,7 +101,7 @@ def search_patches(posed, moving, limits, facing, extrema, passed):
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
     for c in range(facing.found):
-        if is_full(extrema):
+        if is_list_full(extrema):
             break
         bound = facing.distances[c]
         if bound > curved_bound and bound > enough:

@@ -24,7 +24,7 @@ from assembly.proximity.manager.extrema import (
     add_given,
     extremum_at,
     given_at,
-    is_full,
+    is_list_full,
 )
 from assembly.proximity.manager.near_singular_points import sunk
 from assembly.proximity.manager.overlap import is_outside
@@ -62,7 +62,7 @@ SHALLOW = 1e-7
 
 
 @kernel(inner=True)
-def note(manager, kind, reason, p, number, gap):
+def log_event(manager, kind, reason, p, number, gap):
     """Write an event into the log."""
     header = header_of(manager)
     events = memory_places(manager.store.table, manager.at)[2]
@@ -162,7 +162,7 @@ def known_extrema(manager, p, posed, tracked, extrema):
         lost = math.isnan(tracked_pair.parameters[0])
         before = extrema.count[0]
         extremum = extremum_at(extrema.rows, before)
-        if not lost and not is_full(extrema):
+        if not lost and not is_list_full(extrema):
             start = pair_parameters(tracked_pair)
             codes = (np.int64(tracked_pair.feature_f), np.int64(tracked_pair.feature_g))
             n = three_of(tracked_pair.normal)
@@ -176,13 +176,13 @@ def known_extrema(manager, p, posed, tracked, extrema):
             extremum.origin = LISTED + k
             if vertex_contact >= HELD_F and extremum.gap < tracked_pair.gap - SUNK:
                 # The same contact elsewhere: who solves has to know.
-                note(manager, HANDED_OFF, SAME_EXTREMUM, p, slot.number, extremum.gap)
+                log_event(manager, HANDED_OFF, SAME_EXTREMUM, p, slot.number, extremum.gap)
             track_extremum(extremum, tracked_pair)
         else:
             # A corner that went past its face is none of these.
             any_gone = any_gone or (lost and vertex_contact == 0.0)
             kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_EXTREMUM)
-            note(manager, kind, reason, p, slot.number, tracked_pair.gap)
+            log_event(manager, kind, reason, p, slot.number, tracked_pair.gap)
             release(manager, k, tracked)
     return any_gone
 
@@ -198,7 +198,7 @@ def gap_beyond(extrema, i, least):
 def give_up(manager, p, extremum, kind, reason, tracked):
     """Free the slot of a listed extremum, and note it."""
     k = np.int64(extremum.origin) - LISTED
-    note(manager, kind, reason, p, slot_of(manager, k).number, extremum.gap)
+    log_event(manager, kind, reason, p, slot_of(manager, k).number, extremum.gap)
     release(manager, k, tracked)
 
 
@@ -266,7 +266,7 @@ def list_extrema(manager, p, extrema, tracked):
             if gap <= TAKE * margin and not wanting:
                 wanting = True
                 if known.wanting == 0.0:
-                    note(manager, REFUSED, NO_PLACE, p, 0.0, extremum.gap)
+                    log_event(manager, REFUSED, NO_PLACE, p, 0.0, extremum.gap)
             continue
         slot = slot_of(manager, k)
         slot.pair = float(p)
@@ -276,7 +276,7 @@ def list_extrema(manager, p, extrema, tracked):
         tracked_pair = tracked_at(tracked, record_of(manager).first + k)
         track_extremum(extremum, tracked_pair)
         tracked_pair.allowed = -gap if -header.overlap <= gap < 0.0 else 0.0
-        note(manager, ADDED, CAME_NEAR, p, header.born, extremum.gap)
+        log_event(manager, ADDED, CAME_NEAR, p, header.born, extremum.gap)
     known.wanting = 1.0 if wanting else 0.0
     return rest, lowest, wanting
 
@@ -326,7 +326,7 @@ def keep_slots_of_given(manager, p, extrema, tracked):
             pair.parameters[l] = minimum.parameters[(l + swap) % 4]
         pair.gap = minimum.gap
         if minimum.origin == NEW:
-            note(manager, HANDED_OFF, LOST, p, 0.0, minimum.gap)
+            log_event(manager, HANDED_OFF, LOST, p, 0.0, minimum.gap)
         else:
             give_up(manager, p, minimum, MERGED, SAME_EXTREMUM, tracked)
         minimum.origin = saddle.origin

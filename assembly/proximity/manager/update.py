@@ -44,7 +44,7 @@ from assembly.proximity.manager.motion_bounds import (
     PairSearch,
     allow_ball,
     margin_now,
-    measure,
+    measure_motion,
     mover,
     no_ball,
     root_ball,
@@ -347,7 +347,7 @@ def update(table, pool, at, memory, q, tracked, how):
     header, pairs = header_of(manager), record_of(manager).pairs
     before = header.event_count
     header.calls += 1.0
-    most = measure(manager, 0, pairs, q) if how & MEASURED == 0 else used_most(manager)
+    most = measure_motion(manager, 0, pairs, q) if how & MEASURED == 0 else used_most(manager)
     for p in range(pairs):
         if is_due(manager, p, tracked, how, most):
             update_due(manager, q, tracked, how, p, most)

@@ -21,7 +21,7 @@ from assembly.proximity.bvh.tree import pairs_about, three_of
 from assembly.proximity.extrema.feature_jets import edge_jet
 from assembly.proximity.features.holding import FEATURES, HELD_F, HELD_G, POINT, TILT
 from assembly.proximity.features.solid_contact import pair_parameters
-from assembly.proximity.manager.extrema import NEW, NOTHING, add_extremum, extremum_at, is_full, solids_extremum
+from assembly.proximity.manager.extrema import NEW, NOTHING, add_extremum, extremum_at, is_list_full, solids_extremum
 from assembly.proximity.manager.near_singular import into_near_singular
 from assembly.proximity.manager.near_singular_points import (
     features_of,
@@ -56,7 +56,7 @@ def is_vertex_contact(posed, codes):
 @kernel(inner=True)
 def hold_extrema(posed, extrema):
     """Make corners of those extrema that are at one: rows that jump from corner to corner hold none of them."""
-    if is_full(extrema):
+    if is_list_full(extrema):
         return
     for k in range(extrema.count[0]):
         extremum = extremum_at(extrema.rows, k)
@@ -130,7 +130,7 @@ def add_vertex_contacts(posed, span, merge_radius, stack, candidates, extrema):
     tree_f, tree_g = posed.trees
     found = pairs_about(posed.store, posed.trees, posed.pose, span[1], 0.0, TILT, stack, candidates)
     for c in range(min(found, candidates.shape[0])):
-        if is_full(extrema):
+        if is_list_full(extrema):
             break
         f, g = patch_at(posed, 0, candidates[c, 0]), patch_at(posed, 1, candidates[c, 1])
         codes = (np.int64(f.feature), np.int64(g.feature))
@@ -144,7 +144,7 @@ def add_vertex_contacts(posed, span, merge_radius, stack, candidates, extrema):
         kinds = kinds_of(posed, codes)
         side = 0 if kinds[0] == EDGE else 1
         width = f.half[0] if side == 0 else g.half[0]
-        if kinds[side] == EDGE and kinds[1 - side] == FACE and not is_full(extrema):
+        if kinds[side] == EDGE and kinds[1 - side] == FACE and not is_list_full(extrema):
             if is_next(posed, codes, side, start, width, extrema):
                 add_vertex_contact(posed, codes, start, span, merge_radius, extrema, POINT)
     if 0 <= found <= candidates.shape[0]:

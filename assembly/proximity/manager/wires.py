@@ -74,7 +74,7 @@ QUARTER = 0.5 * math.pi
 
 
 @kernel(inline=True)
-def turned(x):
+def sine_and_versine(x):
     """sin x and 1 - cos x of an angle up to 0.7: to the last bits, in half the time of the library's."""
     # Taylor's series; literal quotients are constants.
     y = x * x
@@ -94,7 +94,7 @@ def centerline_point(pool, o, s):
     if bend == 0.0:
         return add(p, scale(s, t)), t, (0.0, 0.0, 0.0)
     n = three_of(part.normal)
-    a, b = turned(bend * s)
+    a, b = sine_and_versine(bend * s)
     radius = 1.0 / bend
     point = add(p, blend(radius * a, t, radius * b, n))
     return point, blend(1.0 - b, t, a, n), blend(bend * (1.0 - b), n, -bend * a, t)
@@ -107,7 +107,7 @@ def arc_place(angle, whole):
 
 
 @kernel(inline=True)
-def in_span(pool, breaks, k, x):
+def at_part_of_span(pool, breaks, k, x):
     """The parameter at x, from -1 to 1 over span k."""
     low, high = pool[breaks + k], pool[breaks + k + 1]
     return min(max(0.5 * (low + high) + 0.5 * x * (high - low), low), high)
@@ -151,17 +151,17 @@ def wire_parameters(store, centerline, surface, part, s, way):
     spans_v = wire.spans_u if along == 1 else wire.spans_v
     share = 4.0 * QUARTER / spans_v
     j = min(int(phi / share), spans_v - 1)
-    v = in_span(store.pool, breaks_v, j, arc_place(phi - j * share, share))
+    v = at_part_of_span(store.pool, breaks_v, j, arc_place(phi - j * share, share))
     first = 0 if line.closed == 1 else 1
     lean = math.atan2(ahead, math.sqrt(dot(across, across)))
     if first == 1 and part == 0 and s <= -part_record.half and lean < 0.0:
-        u = in_span(store.pool, breaks_u, 0, arc_place(QUARTER + lean, QUARTER))
+        u = at_part_of_span(store.pool, breaks_u, 0, arc_place(QUARTER + lean, QUARTER))
     elif first == 1 and part == line.parts - 1 and s >= part_record.half and lean > 0.0:
-        u = in_span(store.pool, breaks_u, k + 2, arc_place(lean, QUARTER))
+        u = at_part_of_span(store.pool, breaks_u, k + 2, arc_place(lean, QUARTER))
     else:
         at = part_record.place + s
         x = arc_place(bend * at, bend * length) if bend > 0.0 else 2.0 * at / length - 1.0
-        u = in_span(store.pool, breaks_u, first + k, x)
+        u = at_part_of_span(store.pool, breaks_u, first + k, x)
     if along == 1:
         return v, u
     return u, v

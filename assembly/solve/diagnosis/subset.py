@@ -25,7 +25,7 @@ from assembly.solve.attempts.balance import balanced
 from assembly.solve.attempts.starts import Spread
 from assembly.solve.dense.jacobian import Rows
 from assembly.solve.dense.rank import HELD
-from assembly.solve.interruption import Interruption
+from assembly.solve.interruption import STATUSES, Interruption
 from assembly.solve.loop.settings import ANY_POSE, GATHER
 from assembly.solve.options import Options
 from assembly.solve.result import Result
@@ -34,7 +34,6 @@ from assembly.solve.scene import Scene, Status
 __all__ = ["Problem", "Snapshot"]
 
 Array = NDArray[np.float64]
-_STATUSES = tuple(Status)
 
 
 class _Value(Constraint):
@@ -120,7 +119,7 @@ class Problem:
         outcome = begin(packed, interruption, packed.table, settings, self.start(q, after), turns)
         outcome = balanced(packed, settings, outcome, partial(go_on_once, interruption))
         interruption.check("what constraints allow")
-        return Result(self._scene, packed, outcome.state, _STATUSES[outcome.code], 0.0, outcome.history)
+        return Result(self._scene, packed, outcome.state, STATUSES[outcome.code], 0.0, outcome.history)
 
     def violations(self, solution: Result) -> Array:
         """Violations of the constraints, in their order: lengths over the size of the whole scene."""

@@ -7,15 +7,15 @@ import math
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import TOUCHING, is_of_solids
 from assembly.constraints.program.records import header_at
-from assembly.proximity.features.solid_contact import contact_record_at
 from assembly.proximity.manager.update import AS_NEEDED, MEASURED
 from assembly.solve.loop.clearances import allowed_share, update_again
+from assembly.solve.loop.contacts import is_near_fold
 from assembly.solve.loop.deadline import is_cut, may_end
 from assembly.solve.loop.direction import find_direction, first_shift, propose, short_share
 from assembly.solve.loop.inertia import note_factor
-from assembly.solve.loop.line_search import Line, Trust, search
+from assembly.solve.loop.line_search import Line, Trust, search_line
 from assembly.solve.loop.loop_state import lead_back
-from assembly.solve.loop.parameters import HALF, OFTEN, RESTORATIONS, SHORTEST
+from assembly.solve.loop.parameters import FREE_BELOW_AT_LAST, HALF, OFTEN, RESTORATIONS, SHORTEST
 from assembly.solve.loop.residuals import violation_of
 from assembly.solve.loop.restore import begin_restoring
 from assembly.solve.loop.settings import OUT_OF_TIME, RUNNING, STALLED
@@ -84,7 +84,7 @@ def take_step(task, current, trial, rows, system):
     loop.cuts = loop.cuts + 1 if task.watched and loop.cut < 0.5 and loop.violation <= TOUCHING else 0
     loop.cut_length = 2.0 * loop.longest if loop.cuts > 0 else math.inf
     line = Line(loop.slope, loop.longest, not task.tick, loop.may_go == 1)
-    accepted, alpha, lost = search(task.program, current, trial, rows, system, line, loop.value, restoring)
+    accepted, alpha, lost = search_line(task.program, current, trial, rows, system, line, loop.value, restoring)
     loop.measured, loop.alpha, loop.lost = accepted, alpha, lost
     if not accepted:
         refuse(task, current)
@@ -99,9 +99,9 @@ def refuse(task, current):
     pairs = header_at(table, 0).contacts
     if loop.lost < 0:
         # Perhaps a fold is near enough to matter; else nothing moves any more.
-        loop.below = 0.3
+        loop.below = FREE_BELOW_AT_LAST
         for k in range(pairs):
-            near = free[k] < 0 and abs(contact_record_at(current.records, k).fold) < loop.below
+            near = free[k] < 0 and is_near_fold(current.records, k, loop.below)
             if near and not is_of_solids(table, k):
                 loop.lost = k
     if loop.lost >= 0 and free[loop.lost] < 0 and not is_of_solids(table, loop.lost):

@@ -8,7 +8,7 @@ from assembly.solve.linear_algebra.factorize import greatest_on_diagonal
 from assembly.solve.loop.inertia import DOWNWARD
 from assembly.solve.loop.multipliers import strongest
 from assembly.solve.loop.parameters import GAIN, MOST_ROUNDING, NEAR_SADDLE, OFF_SADDLE, ROUNDING, STEPS_OF_ROUNDING
-from assembly.solve.loop.residuals import turned
+from assembly.solve.loop.residuals import largest_turn
 from assembly.solve.loop.settings import TESTED, results_at, settings_at
 
 
@@ -26,7 +26,7 @@ def reach_of(store, q):
 @kernel(inner=True)
 def rounding_at(store, settings, current):
     """The violation that is none: what is asked for, or what rounding of coordinates and of whole turns violates."""
-    reach = max(reach_of(store, current.q), turned(store, current.tracked))
+    reach = max(reach_of(store, current.q), largest_turn(store, current.tracked))
     return max(settings_at(settings, 0).feasibility, min(ROUNDING * reach, MOST_ROUNDING))
 
 

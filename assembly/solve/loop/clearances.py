@@ -182,8 +182,8 @@ def go_back(table, memory, numbers):
 
 
 @kernel(inner=True)
-def measure(store, memory, first, end, q):
-    """Measure what pairs from first to before `end` used of their allowances. The largest part that is known."""
+def measure_pairs(store, memory, first, end, q):
+    """Measure what pairs from first to before `end` used of their motion bounds. The largest part that is known."""
     header = header_at(store.table, 0)
     record = header.manager_record
     most = call_address(header.parts_address, (store.table, store.pool, record, memory, first, end, q))
@@ -194,13 +194,13 @@ def measure(store, memory, first, end, q):
 def allowed_share(store, memory, current, trial, step, share):
     """How much of a step the contact manager allows, at most `share`, and whether it is all of that.
 
-    The poses at the end of the share go into the trial point. Of what it would use of allowances there it is then known
+    The poses at the end of the share go into the trial point. Of what it would use of motion bounds there it is then known
     of which pairs more is known by another look.
     """
     move(store.table, current.q, step, share, trial.q)
     record = header_at(store.table, 0).manager_record
     manager = manager_at(store.table, record)
-    if measure(store, memory, 0, manager.pairs, trial.q) <= 1.0:
+    if measure_pairs(store, memory, 0, manager.pairs, trial.q) <= 1.0:
         return share, True
     at = memory_places(store.table, record)[0]
     allowed = 1.0
@@ -211,7 +211,7 @@ def allowed_share(store, memory, current, trial, step, share):
         o.cut_short = end * o.motion_bound
         begin = end
         if end > USED:
-            measure(store, memory, p, p + 1, current.q)
+            measure_pairs(store, memory, p, p + 1, current.q)
             begin = o.part
             o.part = end
         if end > max(begin, 1.0):
@@ -227,10 +227,8 @@ def allowed_share(store, memory, current, trial, step, share):
 @kernel(inner=True)
 def is_too_far(store, memory, point):
     """Whether the poses of a point are farther than the contact manager allows."""
-    return (
-        measure(store, memory, 0, manager_at(store.table, header_at(store.table, 0).manager_record).pairs, point.q)
-        > 1.0
-    )
+    pairs = manager_at(store.table, header_at(store.table, 0).manager_record).pairs
+    return measure_pairs(store, memory, 0, pairs, point.q) > 1.0
 
 
 @kernel(inner=True)

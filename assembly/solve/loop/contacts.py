@@ -72,6 +72,12 @@ def start_contacts(store, q, contacts, free, lengths):
     return -1
 
 
+@kernel(inline=True)
+def is_near_fold(records, k, below):
+    """Whether the pair of contact k is so near to a fold that its coordinates are to be unknowns."""
+    return abs(contact_record_at(records, k).fold) < below
+
+
 @kernel(inner=True)
 def free_folds(store, lifted, point, active, below, lost, trims):
     """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
@@ -91,7 +97,7 @@ def free_folds(store, lifted, point, active, below, lost, trims):
                 free_pair(store, k, contacts, free, lengths)
     for k in range(header.contacts):
         idle = contact_of(store.table, k).one_sided == 1 and active[k] == 0.0
-        if free[k] < 0 and not idle and (abs(contact_record_at(records, k).fold) < below or k == lost):
+        if free[k] < 0 and not idle and (is_near_fold(records, k, below) or k == lost):
             free_pair(store, k, contacts, free, lengths)
         if free[k] >= 0:
             free[k] = count

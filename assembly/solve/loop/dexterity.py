@@ -25,7 +25,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.constraints.program.evaluate import evaluate
-from assembly.constraints.program.objective_terms import DEXTERITY, TERM, load, term_at
+from assembly.constraints.program.objective_terms import DEXTERITY, TERM, term_at, three_at
 from assembly.constraints.program.primitives import add_coordinate_hessian, coordinate
 from assembly.constraints.program.records import BODY_COORDINATE, ROW, Iterate, body_coordinate_at, header_at, row_at
 from assembly.constraints.program.row_terms import add_row_terms
@@ -99,7 +99,7 @@ def task_rows(task):
 def end_effector(store, term, q):
     """The end effector of a term at poses."""
     weights = dexterity_weights_at(store.pool, term.parameters)
-    arm = matvec(rotation(q, term.body), load(store.pool, term.parameters + ARM))
+    arm = matvec(rotation(q, term.body), three_at(store.pool, term.parameters + ARM))
     task = dexterity_at(store.table, term.tape).task
     return EndEffector(task, arm, slot(store.table, term.body), weights.linear, weights.angular)
 
@@ -186,7 +186,7 @@ def row_rates(bases, jacobian, used, v):
 
 
 @kernel(inner=True)
-def largest(values):
+def largest_value(values):
     """The largest absolute value; infinite if one is no number."""
     worst = 0.0
     for value in values.flat:
@@ -243,10 +243,10 @@ def tip_map(store, term, bases, rows, n, point, order):
             add_tip_force(effector, unit, 0, g)
             unit[r, 0] = 0.0
             left = settle(system, g, h, p[r], y[r])
-            if not left <= leeway * largest(g):
+            if not left <= leeway * largest_value(g):
                 outcome = OPEN
         changes = row_rates(bases, point.jacobian, used, v)
-        if not max(missed, largest(changes)) <= leeway:
+        if not max(missed, largest_value(changes)) <= leeway:
             outcome = DEPENDENT
     loads = row_rates(bases, point.jacobian, used, p)
     return TipMap(outcome, tip, used, InputRates(v, z, changes), Adjoint(p, y, loads))
@@ -323,7 +323,7 @@ def dexterity(program, term, count, point, order, gradient):
             for l in range(used.size):
                 forces[used[l]] += w * loads[r, l]
         bend(program, record, point, forces, turn, v[i], hessian, gradient)
-        if largest(changes[i]) > KEPT:
+        if largest_value(changes[i]) > KEPT:
             for l in range(used.size):
                 forces[used[l]] = changes[i, l]
             bend(program, record, point, forces, z[i], pull, hessian, gradient)

@@ -117,7 +117,7 @@ def bend_step(shape, current, trial, rows, system, alpha, promised):
 
 
 @kernel(inline=True)
-def search(program, current, trial, rows, system, line, value, restoring):
+def search_line(program, current, trial, rows, system, line, value, restoring):
     """Try alpha times the step, alpha from 1 down, until the augmented Lagrangian falls enough.
 
     The trial point is left in `trial`. Returns whether one was accepted, alpha, and the contact lost by the last trial

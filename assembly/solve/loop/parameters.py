@@ -28,6 +28,9 @@ GAIN = 0.5
 # [det H over |H|^2] A pair this near to a fold gets its coordinates as unknowns. Doubled: more unknowns, steps of more
 # contacts have rows of tangency. Chosen.
 FREE_BELOW = 0.02
+# [det H over |H|^2] The same where no part of a step is accepted. Doubled: pairs that have nothing to do with it are
+# lifted. Chosen.
+FREE_BELOW_AT_LAST = 0.3
 # [length] A clearance's contact that no longer step, nor one halved so far (a share of the step), finds again is given
 # up. Doubled, or HALVED halved: contacts that only switch are given up, or are waited for longer. Chosen.
 LETS_GO, HALVED = 1e-5, 0.0625

@@ -47,7 +47,7 @@ def reach(bases, r):
 
 
 @kernel(inner=True)
-def add_square(x, low, high, matrix, last):
+def add_row_square(x, low, high, matrix, last):
     """Upper triangle of matrix += x^T x, for a row x that is zero outside low .. high."""
     last[low] = max(last[low], high)
     for i in range(low, high + 1):
@@ -71,7 +71,7 @@ def rate_system(bases, jacobian, used, b):
         low, high = reach(bases, used[l])
         if high >= 0:
             add_row(bases, jacobian, used[l], 1.0, x)
-            add_square(x, low, high, matrix, last)
+            add_row_square(x, low, high, matrix, last)
             clear_row(bases, used[l], x)
     for j in range(k):
         low = n
@@ -81,7 +81,7 @@ def rate_system(bases, jacobian, used, b):
                 low = min(low, i)
                 high = i
         if high >= 0:
-            add_square(b[j], low, high, matrix, last)
+            add_row_square(b[j], low, high, matrix, last)
     for i in range(n):
         matrix[i, i] += REST
         if i > 0:

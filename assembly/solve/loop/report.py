@@ -77,7 +77,7 @@ def is_clear(table, residual):
 
 
 @kernel(inner=True)
-def keep(current, rows, held):
+def keep_point(current, rows, held):
     """Copy poses, tracked values and multipliers of a point."""
     for b in range(held.q.shape[0]):
         for k in range(7):
@@ -90,7 +90,7 @@ def keep(current, rows, held):
 
 @kernel(inner=True)
 def bring_back(held, rows, current):
-    """The point that `keep` copied."""
+    """The point that `keep_point` copied."""
     for b in range(held.q.shape[0]):
         for k in range(7):
             current.q[b, k] = held.q[b, k]

@@ -305,7 +305,7 @@ def move(table, q, d, alpha, out):
 
 
 @kernel(inner=True)
-def turned(store, tracked):
+def largest_turn(store, tracked):
     """The largest product of a factor and an angle in a row."""
     header = header_at(store.table, 0)
     most = 0.0

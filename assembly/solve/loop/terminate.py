@@ -14,7 +14,7 @@ from assembly.solve.loop.deadline import is_spent
 from assembly.solve.loop.loop_state import lead_back
 from assembly.solve.loop.multipliers import least_multipliers
 from assembly.solve.loop.parameters import GAIN, HALF, LINGERS, LONGER, SHORT, STANDS, STRAYING
-from assembly.solve.loop.report import is_clear, keep
+from assembly.solve.loop.report import is_clear, keep_point
 from assembly.solve.loop.rollback import has_sunk, retreat, retreats
 from assembly.solve.loop.settings import ITERATION_LIMIT, OUT_OF_TIME, RUNNING, SOLVED, STALLED
 
@@ -87,7 +87,7 @@ def keep_what_holds(task, held, current, rows):
     if clear or (loop.violation <= loop.feasible and (task.tick or lasts)):
         loop.holds = 1
         loop.leash *= LONGER if loop.iteration != loop.back_at else 1.0
-        keep(current, rows, held)
+        keep_point(current, rows, held)
         if task.watched:
             numbers_of(table, held.numbers)
 

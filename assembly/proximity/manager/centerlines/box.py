@@ -40,7 +40,7 @@ UNKNOWN, EMPTY, CONVEX, BARREN = 0, 1, 2, 3
 # Motions are no longer than this part of rho.
 TURNS = 0.5
 # Slopes, lengths and F'' are off by less; what is so near zero may be zero.
-ROUNDING = 1e-13
+BOX_ROUNDING = 1e-13
 # Contacts of lines more parallel than this, in radians, stay where they are as the lines turn.
 PARALLEL = 1e-5
 
@@ -62,7 +62,7 @@ def segment_distance(d, f, g, h, k):
 
 
 @kernel(inline=True)
-def apart(parts, s, t):
+def difference_at(parts, s, t):
     """The Difference at lengths s and t along two parts."""
     pose = parts.pose
     pf, f, bend_f = centerline_point(parts.pool, parts.f, s)
@@ -92,14 +92,14 @@ def shape_of(hessian, kf, kg, rho, straight, is_open):
     longest = TURNS * rho
     if ss_low > 0.0 and tt_low > 0.0:
         det = ss_low * tt_low - st_high * st_high
-        if det > ROUNDING:
+        if det > BOX_ROUNDING:
             margin = det / (kf * tt_low + kg * ss_low + (2.0 * st_high + TURNS) / rho)
             return CONVEX, min(margin, min(min(ss_low / (kf + 1e-300), tt_low / (kg + 1e-300)), longest))
     if not is_open:
         if ss_high < 0.0 or tt_high < 0.0:
             return BARREN, min(max(-ss_high / (kf + 1e-300), -tt_high / (kg + 1e-300)), longest)
         det = st_low * st_low - ss_high * tt_high
-        if det > ROUNDING:
+        if det > BOX_ROUNDING:
             # Entries that grow as they may: (ss + kf m) (tt + kg m) < (st - m / rho)^2.
             return BARREN, min(det / (kf * tt_high + kg * ss_high + kf * kg * longest + 2.0 * st_low / rho), longest)
     return UNKNOWN, 0.0
@@ -115,8 +115,8 @@ def beyond(slope, hessian, error, rate, h, k):
     ss, tt, st = hessian
     det = abs(ss * tt - st * st)
     ss, tt, off = abs(ss), abs(tt), abs(st)
-    x = abs(hessian[1] * slope[0] - st * slope[1]) - tt * error[0] - off * error[1] - det * h - ROUNDING
-    y = abs(hessian[0] * slope[1] - st * slope[0]) - off * error[0] - ss * error[1] - det * k - ROUNDING
+    x = abs(hessian[1] * slope[0] - st * slope[1]) - tt * error[0] - off * error[1] - det * h - BOX_ROUNDING
+    y = abs(hessian[0] * slope[1] - st * slope[0]) - off * error[0] - ss * error[1] - det * k - BOX_ROUNDING
     return max(x / (tt * rate[0] + off * rate[1] + 1e-300), y / (off * rate[0] + ss * rate[1] + 1e-300))
 
 
@@ -152,14 +152,14 @@ def box_of(parts, box, open_ends, reach, rho):
     """
     h = 0.5 * (box.to_f - box.from_f)
     k = 0.5 * (box.to_g - box.from_g)
-    middle = apart(parts, box.from_f + h, box.from_g + k)
+    middle = difference_at(parts, box.from_f + h, box.from_g + k)
     d, f, g = middle.d, middle.tangent_f, middle.tangent_g
     bend_f, bend_g = middle.curvature_f, middle.curvature_g
     part_f, part_g = centerline_part_at(parts.pool, parts.f), centerline_part_at(parts.pool, parts.g)
     kf, kg = part_f.bend, part_g.bend
     turn_f = kf * h
     turn_g = kg * k
-    least = segment_distance(d, f, g, h, k) - 0.5 * (turn_f * h + turn_g * k) - ROUNDING
+    least = segment_distance(d, f, g, h, k) - 0.5 * (turn_f * h + turn_g * k) - BOX_ROUNDING
     if least > reach:
         return least, EMPTY, math.inf
     a = -dot(d, f)
@@ -179,10 +179,10 @@ def box_of(parts, box, open_ends, reach, rho):
     st_low, st_high = max(abs(st) - vary_st, 0.0), min(abs(st) + vary_st, 1.0)
     hessian = Hessian(ss_low, ss_high, tt_low, tt_high, st_low, st_high)
     # Slopes: where a free end lets one of any value of a sign be a minimum's, only the other sign excludes.
-    slope = abs(a) - h * max(ss_high, -ss_low) - k * st_high - ROUNDING
+    slope = abs(a) - h * max(ss_high, -ss_low) - k * st_high - BOX_ROUNDING
     if (open_ends.start_f and a > 0.0) or (open_ends.end_f and a < 0.0):
         slope = -1.0
-    other = abs(b) - k * max(tt_high, -tt_low) - h * st_high - ROUNDING
+    other = abs(b) - k * max(tt_high, -tt_low) - h * st_high - BOX_ROUNDING
     if (open_ends.start_g and b > 0.0) or (open_ends.end_g and b < 0.0):
         other = -1.0
     slope = max(slope, other)

@@ -16,7 +16,7 @@ from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import dot
-from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, apart
+from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, difference_at
 
 # Steps of Newton's method, of feet, and until an interval cannot be halved any more.
 STEPS, PROJECTIONS, HALVINGS = 30, 12, 60
@@ -60,7 +60,7 @@ def convex_minimum(parts, box, open_ends, s, t):
     """
     last = math.inf
     for _ in range(STEPS):
-        at = apart(parts, s, t)
+        at = difference_at(parts, s, t)
         d, f, g = at.d, at.tangent_f, at.tangent_g
         a = -dot(d, f)
         b = dot(d, g)
@@ -89,7 +89,7 @@ def convex_minimum(parts, box, open_ends, s, t):
         if size <= 1e-15 or (size < 1e-9 and size >= 0.5 * last):
             break
         last = size
-    at = apart(parts, s, t)
+    at = difference_at(parts, s, t)
     d = at.d
     far = math.sqrt(dot(d, d))
     ends_f = (open_ends.start_f and s <= box.from_f, open_ends.end_f and s >= box.to_f)
@@ -104,7 +104,7 @@ def slopes_of(course, x, y):
     """The Slopes at x along the followed centerline and y along the other one."""
     side = course.side
     s, t = (x, y) if side == 0 else (y, x)
-    at = apart(course.parts, s, t)
+    at = difference_at(course.parts, s, t)
     d, f, g = at.d, at.tangent_f, at.tangent_g
     along = (-dot(d, f), 1.0 - dot(d, at.curvature_f))
     across = (dot(d, g), 1.0 + dot(d, at.curvature_g))
@@ -114,7 +114,7 @@ def slopes_of(course, x, y):
 
 
 @kernel(inner=True)
-def projection_at(course, held, x, y):
+def projection_on_centerline(course, held, x, y):
     """The foot of x on the other centerline, from y, or y itself if it is `held`: phi', phi'', the foot, whether it is
     one.
 
@@ -145,7 +145,7 @@ def held_at(course, own, x):
 
 
 @kernel(inline=True)
-def within(left, right, x):
+def or_middle(left, right, x):
     """x where it is inside of an interval, else the interval's middle."""
     return x if left < x < right else 0.5 * (left + right)
 
@@ -164,7 +164,7 @@ def kink_at(course, end, left, right):
             right = x
         else:
             left = x
-        x = within(left, right, x - b / xy if xy != 0.0 else left)
+        x = or_middle(left, right, x - b / xy if xy != 0.0 else left)
         if right - left <= 1e-15:
             break
     return x
@@ -195,17 +195,17 @@ def rise_of(course, held, left, right, y):
     """Where phi' rises through zero between two places, the foot there and whether it is one."""
     x = 0.5 * (left + right)
     for _ in range(HALVINGS):
-        slope, bend, y, _found = projection_at(course, held, x, y)
+        slope, bend, y, _found = projection_on_centerline(course, held, x, y)
         if abs(slope) <= 1e-15 * bend:
             break
         if slope <= 0.0:
             left = x
         else:
             right = x
-        x = within(left, right, x - slope / bend if bend > 0.0 else left)
+        x = or_middle(left, right, x - slope / bend if bend > 0.0 else left)
         if right - left <= 1e-15:
             break
-    _slope, _bend, y, found = projection_at(course, held, x, y)
+    _slope, _bend, y, found = projection_on_centerline(course, held, x, y)
     return x, y, found
 
 
@@ -217,8 +217,8 @@ def piece_minima(course, held, left, right, y, ends, places, count):
     larger slope at both ends, and whether there are feet.
     """
     side = course.side
-    a, bend_a, y_a, found_a = projection_at(course, held, left, y)
-    b, bend_b, y_b, found_b = projection_at(course, held, right, y)
+    a, bend_a, y_a, found_a = projection_on_centerline(course, held, left, y)
+    b, bend_b, y_b, found_b = projection_on_centerline(course, held, right, y)
     certain = found_a and found_b
     width = right - left
     low, high = turns_of(width, a, b, bend_a, bend_b)
@@ -231,7 +231,7 @@ def piece_minima(course, held, left, right, y, ends, places, count):
         new, rises = right, b
         if part < 1.0:
             new = left + part * width
-            rises = projection_at(course, held, new, y)[0]
+            rises = projection_on_centerline(course, held, new, y)[0]
         if new > x and slope <= 0.0 <= rises:
             there, projection, found = rise_of(course, held, x, new, y)
             certain = certain and found

@@ -12,7 +12,7 @@ __all__ = ["pack_centerline"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-_ROUNDING = 1e-15
+_BALL_ROUNDING = 1e-15
 # Parts of pieces turn by no more than this; lines are cut to so many times the length of such a part of the
 # sharpest, and into no more than so many.
 _TURN, _LINE, _MOST = 0.3, 2.0, 64
@@ -108,7 +108,7 @@ def _tree(ends: Array, scale: float) -> tuple[Table, Array]:
         center = 0.5 * ((part - radii).min(axis=0) + (part + radii).max(axis=0))
         radius = (np.linalg.norm(part - center, axis=1) + radii[:, 0]).max()
         size = float(radius + np.abs(center).max())
-        balls[at] = np.append(center, radius + 8.0 * _ROUNDING * size) / scale
+        balls[at] = np.append(center, radius + 8.0 * _BALL_ROUNDING * size) / scale
         if high - low == 1:
             children[at] = -1 - low
         else:

@@ -20,7 +20,7 @@ from assembly.proximity.bvh.neighbor_list import (
     write_list,
 )
 from assembly.proximity.bvh.tree import three_of
-from assembly.proximity.manager.centerlines.box import ROUNDING, centerline_box_at, segment_distance
+from assembly.proximity.manager.centerlines.box import BOX_ROUNDING, centerline_box_at, segment_distance
 from assembly.proximity.manager.wires import BALL, PART, ball_at, centerline_at, centerline_part_at
 
 
@@ -41,7 +41,7 @@ def parts_apart(pool, o, p, pose):
     k = part_record.half
     d = sub(add(matvec(pose.rotation, three_of(part_record.point)), pose.shift), three_of(part.point))
     least = segment_distance(d, three_of(part.tangent), matvec(pose.rotation, three_of(part_record.tangent)), h, k)
-    return least - 0.5 * (part.bend * h * h + part_record.bend * k * k) - ROUNDING
+    return least - 0.5 * (part.bend * h * h + part_record.bend * k * k) - BOX_ROUNDING
 
 
 @kernel(inline=True)

@@ -27,9 +27,9 @@ from assembly.proximity.manager.centerlines.box import (
     FreeEnds,
     Lengths,
     PosedParts,
-    apart,
     box_of,
     centerline_box_at,
+    difference_at,
 )
 from assembly.proximity.manager.centerlines.minima import convex_minimum, near_singular_minima
 from assembly.proximity.manager.extrema import (
@@ -38,8 +38,8 @@ from assembly.proximity.manager.extrema import (
     USELESS,
     add_surface_extremum,
     extremum_at,
-    is_full,
     is_known_one,
+    is_list_full,
     write_frame,
 )
 from assembly.proximity.manager.motion_bounds import PairSearch, ball_about, no_ball
@@ -125,7 +125,7 @@ def mark_known(posed, extrema, marks):
         mark = known_place_at(marks, k)
         mark.part_f, mark.at_f = float(i), s
         mark.part_g, mark.at_g = float(j), t
-        there = apart(parts_of(posed, i, j), s, t)
+        there = difference_at(parts_of(posed, i, j), s, t)
         d = there.d
         slopes = abs(dot(d, there.tangent_f)) + abs(dot(d, there.tangent_g))
         if extremum.origin == USELESS or not slopes <= AT_EXTREMUM * math.sqrt(dot(d, d)):
@@ -164,11 +164,11 @@ def across_both(f, g):
 @kernel(inner=True)
 def add_minimum(posed, i, j, s, t, merge_radius, extrema):
     """Add the contact at lengths s and t along parts i and j, if it is none of the known ones."""
-    if is_full(extrema):
+    if is_list_full(extrema):
         return
     store, surfaces = posed.store, posed.surfaces
     f, g = posed.centerlines
-    there = apart(parts_of(posed, i, j), s, t)
+    there = difference_at(parts_of(posed, i, j), s, t)
     d = there.d
     length = math.sqrt(dot(d, d))
     way = scale(1.0 / length, d) if length >= MEETING else across_both(there.tangent_f, there.tangent_g)
@@ -290,7 +290,7 @@ def search_centerlines(posed, moving, limits, boxes, waiting, rooms, extrema):
             continue
         if low <= near and not hollow and not (what == CONVEX and is_marked(boxes, b, marks, known)):
             certain = add_minima(posed, box, ends, what, limits.merge_radius, places, extrema)
-            if halve or is_full(extrema) or not certain:
+            if halve or is_list_full(extrema) or not certain:
                 # There may be one that is not known.
                 allowed = low
         waiting = b
