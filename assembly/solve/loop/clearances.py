@@ -194,8 +194,8 @@ def measure_pairs(store, memory, first, end, q):
 def allowed_share(store, memory, current, trial, step, share):
     """How much of a step the contact manager allows, at most `share`, and whether it is all of that.
 
-    The poses at the end of the share go into the trial point. Of what it would use of motion bounds there it is then known
-    of which pairs more is known by another look.
+    The poses at the end of the share go into the trial point. Of what it would use of motion bounds there it is then
+    known of which pairs more is known by another update.
     """
     move(store.table, current.q, step, share, trial.q)
     record = header_at(store.table, 0).manager_record
