@@ -15,7 +15,7 @@ from assembly.constraints.program import records as layout
 from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
 from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager import update as watch
-from assembly.proximity.manager.candidates import CROWDED_PART
+from assembly.proximity.manager.parameters import CROWDED_PART, TAKE
 
 __all__ = ["Listed", "Watch"]
 
@@ -115,6 +115,6 @@ class Watch:
         # A look that meets many patches takes what is as near as its allowances, which say what it left out; that of a
         # ball may be less for other reasons, and in a crowd no less than this is looked into.
         around = np.maximum(known.ball_bound, CROWDED_PART * self._curved)
-        take = np.minimum(manager_records.TAKE * known.margin, known.motion_bound)
+        take = np.minimum(TAKE * known.margin, known.motion_bound)
         take = np.minimum(take, around) * packed.scale
         return Listed(bodies, points, tracked[:, PAIR_GAP] * packed.scale, take, looked)

@@ -28,6 +28,7 @@ from assembly.proximity.bvh.facet_tree import FacetTree
 from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
 from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager import update as manager
+from assembly.proximity.manager.parameters import SLICE
 from assembly.solve.interruption import Interruption
 
 if TYPE_CHECKING:
@@ -230,7 +231,7 @@ def _seen(packed: Packed, posed: PosedBodies, interruption: Interruption) -> tup
             tracked[:contacts] = posed.given
         is_cut = True
         while is_cut and not interruption.is_over():
-            memory[manager_records.DEADLINE] = perf_counter_ns() + manager_records.SLICE
+            memory[manager_records.DEADLINE] = perf_counter_ns() + SLICE
             manager.update(packed.table, packed.pool, record, memory, q, tracked, manager.EVERYTHING)
             is_cut = memory[manager_records.DEADLINE] < 0.0
         found |= set(np.flatnonzero(pairs[:, manager_records.CROSSED] == 1.0).tolist())

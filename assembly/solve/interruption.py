@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from assembly._address import callback_address
 from assembly.errors import InputError, number
-from assembly.proximity.manager.records import ABORTED, ENDS, GOES_ON, SLICE
+from assembly.proximity.manager.parameters import SLICE
+from assembly.proximity.manager.records import ABORTED, ENDS, GOES_ON
 from assembly.solve.loop.settings import ASK_AT, COUNT, OBJECTIVE, OUT_OF_TIME, VIOLATION
 from assembly.solve.scene import Status
 

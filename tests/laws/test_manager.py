@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from assembly.proximity.manager import records as manager_records
+from assembly.proximity.manager.parameters import TAKE
 from benchmarks.center_lines import paper_clip_wire
 from benchmarks.motions import FLAT, PAIRS, SAME, SHAPES, Errors, compared, wander
 from benchmarks.watching import Watch
@@ -93,7 +94,7 @@ def test_what_is_nearer_than_an_allowance_is_listed(f, g, gap, q):
     assert WireOracle(wires).minima(np.array(q), 0.1).gap == pytest.approx([gap], abs=1e-9)
     # Near enough for a place, but for the crowd; then the look says that it took in less.
     reach = rings.memory[manager_records.MEMORY_HEADER + manager_records.QUERY_MARGIN]
-    assert manager_records.TAKE * reach * rings.scale > gap
+    assert TAKE * reach * rings.scale > gap
     assert listed.gap == pytest.approx([gap], abs=1e-9) or listed.take[0] <= gap
 
 

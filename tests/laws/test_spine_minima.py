@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from assembly.geometry.vec import dot
 from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, difference_at
 from assembly.proximity.manager.centerlines.minima import MINIMA, near_singular_minima
-from assembly.proximity.manager.centerlines.search import THIN
+from assembly.proximity.manager.parameters import THIN
 from assembly.proximity.manager.wires import centerline_part_at
 from benchmarks.motions import SHAPES
 from benchmarks.watching import Watch

@@ -15,6 +15,7 @@ import assembly as asm
 from assembly.constraints.packing.scene import Packed
 from assembly.errors import InputError
 from assembly.proximity.manager import records as manager_records
+from assembly.proximity.manager.parameters import SLICE
 from assembly.solve import interruption
 from assembly.solve.loop import pauses
 from assembly.solve.loop.settings import ASK_AT
@@ -42,7 +43,7 @@ def scene() -> asm.Assembly:
 def whole(scene) -> asm.Solution:
     """The solve that nobody ends."""
     solution = scene.solve(**LIMIT)
-    assert solution.success and solution.seconds > 2 * manager_records.SLICE / 1e9, "too short for what is tested here"
+    assert solution.success and solution.seconds > 2 * SLICE / 1e9, "too short for what is tested here"
     return solution
 
 
@@ -64,7 +65,7 @@ def test_asking_changes_nothing(scene, whole):
     np.testing.assert_array_equal(solution.q, whole.q)
     assert solution.iterations == whole.iterations and solution.status is asm.Status.SOLVED
     # Between slices: at most one question in each.
-    assert 1 <= len(asked) <= solution.seconds * 1e9 / manager_records.SLICE + 1
+    assert 1 <= len(asked) <= solution.seconds * 1e9 / SLICE + 1
     iterations = [iteration for iteration, _, _ in asked]
     assert iterations == sorted(iterations) and iterations[-1] <= solution.iterations
     assert all(np.isfinite(value) and feasibility >= 0.0 for _, value, feasibility in asked)
@@ -216,7 +217,7 @@ def seen(packed: Packed, state: np.ndarray) -> int:
 def test_one_look_at_many_pairs_asks(crowded):
     # With no iteration at all nobody but the look at the start can ask.
     other = crowded.solve(max_iterations=0)
-    assert other.seconds > manager_records.SLICE / 1e9, "too short for what is tested here"
+    assert other.seconds > SLICE / 1e9, "too short for what is tested here"
     asked: list[tuple[int, float, float]] = []
     solution = crowded.solve(max_iterations=0, callback=lambda *progress: asked.append(progress))
     assert asked and asked[0][0] == 0

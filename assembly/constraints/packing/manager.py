@@ -25,8 +25,9 @@ from assembly.proximity.bvh.packing import pack_tree
 from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.centerlines.packing import pack_centerline
 from assembly.proximity.manager.extrema import GIVEN_RECORD
+from assembly.proximity.manager.parameters import FIRST_MARGIN, LAST_MARGIN
 
-__all__ = ["LAST_MARGIN", "clearance_pairs", "is_of_surfaces", "pack_manager", "slot_count", "table_with_clearances"]
+__all__ = ["clearance_pairs", "is_of_surfaces", "pack_manager", "slot_count", "table_with_clearances"]
 
 Table = NDArray[np.int64]
 Pair = tuple[Body, Body]
@@ -34,8 +35,6 @@ Side = Body | BodyFace
 # A contact of the scene, its sides, and whether it is one of their whole surfaces, without edges.
 GivenContact = tuple[Contact, tuple[Side, Side], bool]
 
-# Of a contact manager, in parts of the scene's size: how far its looks reach at least, and at most.
-FIRST_MARGIN, LAST_MARGIN = 0.005, 0.1
 # How far bodies may go between looks where contacts may be born, in parts of the smallest radius of curvature of the
 # two; in parts of the scene's size, it is no less than this.
 FLANK, LEAST_FLANK = 0.5, 1e-4
@@ -98,7 +97,7 @@ def pack_manager(
     lengths = manager_records.lengths_at(block, 0)
     lengths.merge_radius = min(clearance.merge_radius for clearance in clearances)
     lengths.first_margin, lengths.last_margin = FIRST_MARGIN, LAST_MARGIN
-    row = np.zeros(manager_records.WATCH_RECORD, dtype=np.int64)
+    row = np.zeros(manager_records.MANAGER_SIZE, dtype=np.int64)
     record = manager_records.manager_at(row, 0)
     record.pairs, record.places, record.pair_table, record.first = count, first, pair_table, len(contacts)
     _, record.lengths = writer.add(pool=block)

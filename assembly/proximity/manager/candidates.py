@@ -17,14 +17,8 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, scale, sub
 from assembly.proximity.bvh.neighbor_list import LIST_INTS, ListKey, listed_pairs
 from assembly.proximity.bvh.tree import box_distance, node_of, pairs_within, seen_from, three_of, view_of
-from assembly.proximity.manager.motion_bounds import LEAST_MOTION_BOUND
-from assembly.proximity.manager.records import TAKE, header_of, lengths_of, pair_lengths_of, record_of
-
-# The skin of lists of patches that face each other: they are for motions up to so many of the least query margin.
-SKIN = 2.0
-# So many pairs of patches are looked into, if there are others that are farther apart; in a crowd, all that are nearer
-# than this part of what a ball may go where contacts may be born. Less makes updates cheaper and steps shorter.
-FEW, CROWDED_PART = 40, 0.5
+from assembly.proximity.manager.parameters import CROWDED_PART, FEW, LEAST_MOTION_BOUND, SKIN, TAKE
+from assembly.proximity.manager.records import header_of, lengths_of, pair_lengths_of, record_of
 
 
 @kernel(inline=True)

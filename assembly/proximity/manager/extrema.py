@@ -29,6 +29,7 @@ from assembly.proximity.extrema.global_start import opposed
 from assembly.proximity.extrema.pair_matrix import is_the_only_one
 from assembly.proximity.extrema.rates import derivatives_at
 from assembly.proximity.features.solid_contact import contact_record_at, pair_parameters, tracked_at
+from assembly.proximity.manager.parameters import DESCENTS
 
 # An extremum of the distance of two bodies. Points and the normal are in the axes of f.
 EXTREMUM = record_dtype(
@@ -70,8 +71,6 @@ ELSEWHERE, BESIDE_CONTACT, OF_CONTACT = 0.0, 1.0, 2.0
 NOTHING, ALIKE, SADDLE, MINIMUM_FOUND = 0, 1, 2, 3
 # Roots of no use are the same within this radius, in parts of the scene's size.
 SAME = 1e-6
-# Steps of the controller where Newton's method fails.
-DESCENTS = 40
 
 
 @kernel(inline=True)

@@ -16,6 +16,7 @@ from assembly._record import Store
 from assembly.geometry.vec import add, dot, matvec, matvec_t, quaternion_matrix, quaternion_product, scale, sub
 from assembly.kinematics.motion import rotation
 from assembly.proximity.bvh.tree import node_at, three_of, tree_at
+from assembly.proximity.manager.parameters import MOVES, MOVES_OF_WIRES, STILL
 from assembly.proximity.manager.records import (
     ContactManager,
     header_of,
@@ -26,15 +27,6 @@ from assembly.proximity.manager.records import (
     pair_state_of,
     record_of,
 )
-
-# Where nothing may move a pair is looked at after every step.
-LEAST_MOTION_BOUND = 1e-12
-# What moved by less than this part of its motion bound, 1e-9 of the scene's size, is where it was.
-STILL = 1e-8
-# A query margin is for so many moves as the last ones; of round wires, whose updates take a tenth of the time, for
-# fewer.
-MOVES, MOVES_OF_WIRES = 12.0, 6.0
-
 
 # The body of a pair whose motion is measured. side: 0 if that is f, 1 g; tree: its tree; turn, shift: its pose seen
 # from the other body, a rotation matrix by rows and its origin; quaternion: the same turn.

@@ -33,10 +33,8 @@ PAIRS = place_of(MANAGER_DTYPE, "pairs")
 VERTEX_CONTACTS = place_of(MANAGER_DTYPE, "corners")
 CLOCK = place_of(MANAGER_DTYPE, "clock")
 MARK_AT = place_of(MANAGER_DTYPE, "mark_address")
-WATCH_RECORD = size_of(MANAGER_DTYPE)
-# Nanoseconds between two questions whether to go on, and answers: on, to an end with what there is, or nowhere, because
-# an exception throws all away.
-SLICE = 50_000_000
+MANAGER_SIZE = size_of(MANAGER_DTYPE)
+# Answers to whether to go on: on, to an end with what there is, or nowhere, because an exception throws all away.
 GOES_ON, ENDS, ABORTED = 0, 1, 2
 # The lengths of a contact manager in the pool [over the size of the scene].
 LENGTHS_DTYPE = record_dtype(
@@ -153,8 +151,6 @@ event_at = record_view(EVENT_DTYPE)
 EVENT, EVENTS = size_of(EVENT_DTYPE), 64
 ADDED, REMOVED, HANDED_OFF, MERGED, REFUSED = 0, 1, 2, 3, 4
 CAME_NEAR, WENT_AWAY, LOST, SAME_EXTREMUM, NO_PLACE = 0, 1, 2, 3, 4
-# Extrema nearer than this part of the query margin are listed; those that are, stay so up to the second.
-TAKE, KEEP = 0.4, 0.8
 # A contact manager. store: table and pool of its scene; at: where its record is in the table; memory: what it knows.
 ContactManager = namedtuple("ContactManager", "store at memory")
 

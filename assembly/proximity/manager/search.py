@@ -27,10 +27,7 @@ from assembly.proximity.manager.extrema import (
 from assembly.proximity.manager.motion_bounds import PairSearch, ball_about
 from assembly.proximity.manager.newton_regions import LEFT, half_widths, known_in_region, newton_way_at, stays
 from assembly.proximity.manager.overlap import is_outside
-
-# Starts that an update leads down the slope of the gap, because Newton's method found no minimum from there.
-SLIDES_A_LOOK = 6
-
+from assembly.proximity.manager.parameters import SLIDES
 
 # How far a search has come. folding: whether an extremum is near a fold; visited: how many ways of Newton's method are
 # remembered; slides: how many starts went down a slope.
@@ -67,7 +64,7 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
     if extrema.count[0] > before:
         folding = folding or not is_alone(extremum_at(extrema.rows, before))
     minimum = result == MINIMUM_FOUND or (result == ALIKE and extremum_at(extrema.rows, extrema.count[0]).fold > 0.0)
-    if folding and smooth and stayed and not minimum and slides < SLIDES_A_LOOK:
+    if folding and smooth and stayed and not minimum and slides < SLIDES:
         # Near a fold Newton's method may go to the saddle, past the minimum beside it.
         if extrema.count[0] > before:
             before += 1

@@ -28,20 +28,19 @@ from assembly.proximity.manager.extrema import (
 )
 from assembly.proximity.manager.near_singular_points import sunk
 from assembly.proximity.manager.overlap import is_outside
+from assembly.proximity.manager.parameters import KEEP, TAKE
 from assembly.proximity.manager.records import (
     ADDED,
     CAME_NEAR,
     EVENT,
     EVENTS,
     HANDED_OFF,
-    KEEP,
     LOST,
     MERGED,
     NO_PLACE,
     REFUSED,
     REMOVED,
     SAME_EXTREMUM,
-    TAKE,
     WENT_AWAY,
     event_at,
     header_of,

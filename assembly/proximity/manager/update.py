@@ -39,8 +39,6 @@ from assembly.proximity.manager.extrema import (
 )
 from assembly.proximity.manager.flush import any_deep, drop_flush
 from assembly.proximity.manager.motion_bounds import (
-    LEAST_MOTION_BOUND,
-    STILL,
     PairSearch,
     allow_ball,
     margin_now,
@@ -52,6 +50,18 @@ from assembly.proximity.manager.motion_bounds import (
 )
 from assembly.proximity.manager.newton_regions import PASSED
 from assembly.proximity.manager.overlap import crosses
+from assembly.proximity.manager.parameters import (
+    BRIEF,
+    CENTERLINE_SKIN,
+    CROSSING,
+    LEAST_MOTION_BOUND,
+    NEAR_FOLD,
+    SLICE,
+    SPENT,
+    STILL,
+    TAKE,
+    USED,
+)
 from assembly.proximity.manager.posed_pair import posed_pair
 from assembly.proximity.manager.records import (
     ABORTED,
@@ -59,8 +69,6 @@ from assembly.proximity.manager.records import (
     MEMORY_HEADER,
     NEAR,
     PAIR_MEMORY,
-    SLICE,
-    TAKE,
     TRACKING,
     ContactManager,
     header_of,
@@ -90,17 +98,9 @@ from assembly.proximity.manager.wires import both_radii
 # MEASURED: which parts of motion bounds are used is known. SPARING: only at those that used up all of it, as no pose
 # does that is allowed.
 AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS, DOUBTFUL, MEASURED, SPARING = 0, 1, 2, 4, 8, 16, 32
-# A pair is looked at again when so much of its motion bound is used: the second, but the first of round wires, whose
-# updates take little; in turns, the one that used most of it at the first, and any that cut a step since its last
-# update at the third: what is left would cut the next one to nothing.
-USED, SPENT, BRIEF = 0.5, 0.85, 0.35
 # Room: extrema and pairs of patches of an update.
 EXTREMA = 96
 CANDIDATES, STACK = 8192, 1024
-# Folds nearer than this part of the least query margin are looked at after every move.
-FLAT = 0.2
-# The skin of lists of parts of centerlines that are near: they are for motions up to so many of the least query margin.
-CENTERLINE_SKIN = 4.0
 # Arrays of an update. stack: nodes of both trees that wait, (k, 2); candidates: pairs of patches, (k, 2), and their
 # distances; passed: ways of Newton's method, (WAYS, PASSED); pairs: parts of centerlines, (k, 2); boxes: of both
 # (`centerlines/search.py`); marks: of known extrema, and minima of a box.
@@ -110,8 +110,6 @@ WAYS = 64
 # Whether an update tells if bodies cross where no contact says so. A contact that lost its extremum is a reason to ask
 # in a solve; a tick has no time for it.
 NEVER, WHERE_LOST, ALWAYS = 0, 1, 2
-# Bodies cross that are in each other by more than this, or than what is called touching where that is known.
-CROSSING = 1e-6
 
 
 @kernel(inner=True)
@@ -260,7 +258,7 @@ def keep_bounds(manager, p, search, rest, extrema):
         sure = max(sure, STILL * known.motion_bound)
     elif birth_bound < math.inf:
         low = nearest_fold(extrema, pair_lengths_of(manager, p).least, known.margin)
-        sure = 0.0 if low <= FLAT * lengths_of(manager).first_margin else math.inf
+        sure = 0.0 if low <= NEAR_FOLD * lengths_of(manager).first_margin else math.inf
         birth_bound = birth_bound if sure == 0.0 else min(birth_bound, low)
     allow_ball(known, search.ball, birth_bound, sure)
 

@@ -11,13 +11,12 @@ from assembly._kernel import kernel
 from assembly.constraints.program.contact import contact_of, copy_tracked, is_of_solids
 from assembly.constraints.program.records import header_at
 from assembly.proximity.features.solid_contact import contact_record_at
-from assembly.proximity.manager.motion_bounds import STILL
+from assembly.proximity.manager.parameters import SLICE, STILL, USED
 from assembly.proximity.manager.records import (
     IN_PLACE,
     PAIR_MEMORY,
     PAIR_RECORD,
     PLACE_MEMORY,
-    SLICE,
     lengths_at,
     manager_at,
     memory_header_at,
@@ -26,7 +25,6 @@ from assembly.proximity.manager.records import (
     pair_state_at,
     place_at,
 )
-from assembly.proximity.manager.update import USED
 from assembly.solve.loop.parameters import SLIGHTLY
 from assembly.solve.loop.residuals import move
 

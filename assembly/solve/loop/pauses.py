@@ -5,7 +5,8 @@ from __future__ import annotations
 from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.program.records import header_at, pool_header_at
-from assembly.proximity.manager.records import GOES_ON, SLICE, manager_at
+from assembly.proximity.manager.parameters import SLICE
+from assembly.proximity.manager.records import GOES_ON, manager_at
 from assembly.solve.loop.parameters import MANY_PAIRS, SHORT
 from assembly.solve.loop.settings import results_at, settings_at
 

@@ -20,6 +20,7 @@ from collections import namedtuple
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.vec import add, blend, dot, matvec, matvec_t, sub
+from assembly.proximity.manager.parameters import TURNS
 from assembly.proximity.manager.wires import centerline_part_at, centerline_point
 
 # A box: a part of either centerline, and the lengths from its middle where the box begins and ends.
@@ -37,8 +38,6 @@ Difference = namedtuple("Difference", "d tangent_f curvature_f tangent_g curvatu
 Hessian = namedtuple("Hessian", "ss_low ss_high tt_low tt_high st_low st_high")
 # What a box is: nothing is known, no slope zero in it, F convex over it, F'' indefinite over it.
 UNKNOWN, EMPTY, CONVEX, BARREN = 0, 1, 2, 3
-# Motions are no longer than this part of rho.
-TURNS = 0.5
 # Slopes, lengths and F'' are off by less; what is so near zero may be zero.
 BOX_ROUNDING = 1e-13
 # Contacts of lines more parallel than this, in radians, stay where they are as the lines turn.

@@ -43,6 +43,7 @@ from assembly.proximity.manager.extrema import (
     write_frame,
 )
 from assembly.proximity.manager.motion_bounds import PairSearch, ball_about, no_ball
+from assembly.proximity.manager.parameters import FINE, MUCH, REFINED, SPARSE, THIN
 from assembly.proximity.manager.wires import (
     PART,
     both_radii,
@@ -60,14 +61,6 @@ BOXES = 2048
 KNOWN_PLACE = record_dtype("f8", part_f=1, at_f=1, part_g=1, at_g=1)
 known_place_at = record_view(KNOWN_PLACE)
 MARK = size_of(KNOWN_PLACE)
-# Boxes over half of which no tangent turns by more than this are thin enough for feet to tell.
-THIN = 0.025
-# So many boxes are halved only because they allow little, down to so many radians.
-REFINED, FINE = 16, 0.05
-# What may go by more than this part of a reach is not worth a ball.
-MUCH = 0.6
-# Of a level valley points are contacts that are farther from each other than so many radii.
-SPARSE = 0.5
 # Slopes of the distance below this say that a known contact is a minimum's.
 AT_EXTREMUM = 1e-9
 # Newton's method on the surfaces ends at the minimum it began at, if the gap is the same but for this.
