@@ -82,3 +82,23 @@ def test_a_search_finds_the_least_distance(seed):
     assert state.bounded < 64 * 64 / 4
     # What was let go, or still waits, is no nearer.
     assert state.let_go >= state.upper and (left == 0 or waiting_pair_at(search.heap, 0).bound >= state.upper)
+
+
+def test_bounds_below_zero_count_where_they_are_to():
+    search = Lists(np.zeros(4), np.zeros(4), np.empty(9 * PAIR), np.zeros(4))
+    depths = (-1.0, -4.0, -2.0, -3.0)
+    for floor, wanted in ((-math.inf, [1, 3, 2, 0]), (0.0, [3])):
+        state = state_at(search.state, 0)
+        state.limit = state.let_go = math.inf
+        taken = []
+
+        def note(_search, key, i, _j, taken=taken):
+            taken.append(int(i))
+            return key, NO_PAIRS
+
+        driver = best_first(
+            state_at, lambda _search, i, _j: (depths[i], 0.0), lambda _s, _t, left: -(left > 0), note, floor
+        )
+        driver(search, 0, Pairs(0, 4, 0, 1))
+        assert sorted(taken) == [0, 1, 2, 3] and taken[: len(wanted)] == wanted
+        assert state.let_go == max(floor, -4.0)

@@ -127,32 +127,31 @@ def pack_pieces(curve: NurbsCurve) -> tuple[Ints, Array]:
     head[ERROR] = (2.0 if rational else 1.0) * roundings * UNIT * reach
     head[CENTER : CENTER + 3] = center
     head[WEIGHT_RATIO] = weights.max() / weights.min() * (1.0 + 4.0 * UNIT)
-    blocks = [head, at, degree_tables(n), net.ravel(), boxes.ravel(), squares.ravel()]
-    breaks = HEAD
-    binomials = breaks + len(at)
-    middle = binomials + 3 * (n + 1)
-    square_binomials = middle + 3 * (n + 1)
-    pieces = square_binomials + 2 * n + 1
-    tree = pieces + net.size
-    record = np.array(
-        [n, spans, rational, breaks, binomials, middle, pieces, tree, tree + boxes.size, square_binomials],
-        dtype=np.int64,
-    )
+    return _laid_out(n, rational, [head, at, degree_tables(n), net, boxes, squares])
+
+
+def _laid_out(degree: int, rational: bool, blocks: list[Array]) -> tuple[Ints, Array]:
+    """Record and pool of head, breaks, tables of the degree, pieces, boxes of the tree and squares."""
+    ends = np.cumsum([block.size for block in blocks])
+    n = degree + 1
+    breaks, binomials, pieces, tree, squares = ends[:5]
+    places = [breaks, binomials, binomials + 3 * n, pieces, tree, squares, binomials + 6 * n]
+    record = np.array([degree, blocks[1].size - 1, rational, *places], dtype=np.int64)
     assert record.size == RECORD
-    return record, np.concatenate(blocks)
+    return record, np.concatenate([block.ravel() for block in blocks])
+
+
+@cache
+def _origin() -> tuple[Ints, Array]:
+    head = np.zeros(HEAD)
+    head[WEIGHT_RATIO] = 1.0
+    ends, net, square = np.array([0.0, 1.0]), np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.0, 0.0, 0.0, 0.0, 1.0])
+    return _laid_out(0, False, [head, ends, degree_tables(0), net, np.zeros(6), square])
 
 
 def pack_point(point: Array) -> tuple[Ints, Array]:
-    """The same of a point (d,): a curve of degree 0."""
-    head = np.zeros(HEAD)
-    head[CENTER : CENTER + len(point)] = point
-    head[WEIGHT_RATIO] = 1.0
-    pool = np.concatenate(
-        [head, [0.0, 1.0], degree_tables(0), [0.0, 0.0, 0.0, 1.0], np.zeros(6), [0.0, 0.0, 0.0, 0.0, 1.0]]
-    )
-    binomials = HEAD + 2
-    record = np.array(
-        [0, 1, 0, HEAD, binomials, binomials + 3, binomials + 7, binomials + 11, binomials + 17, binomials + 6],
-        dtype=np.int64,
-    )
+    """The same of a point (d,): a curve of degree 0, whose record is not to be changed."""
+    record, pool = _origin()
+    pool = pool.copy()
+    pool[CENTER : CENTER + len(point)] = point
     return record, pool

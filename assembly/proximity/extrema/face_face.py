@@ -29,11 +29,11 @@ from assembly.geometry.splines.evaluate import (
 from assembly.geometry.splines.pole import CHART, SurfaceFrame, limits, nearest_pole, polar_step, pole_frame
 from assembly.geometry.vec import add, blend, cross, dot, matvec, matvec_t, scale, sub
 from assembly.proximity.extrema.pair_matrix import (
+    FLAT,
     VANISHING,
     PairMatrix,
     across_first,
     curvature_bound,
-    flat_below,
     null_ways,
     pair_matrix,
     right_side,
@@ -254,7 +254,7 @@ def step_of_other(a, c, k, h, step_f, step_g, size):
     """
     ax, ay = step_f
     bx, by = step_g
-    if abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3]) <= flat_below(size):
+    if abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3]) <= FLAT / size:
         # Two planes: all ways are along it.
         ax, ay, bx, by = ax - bx, ay - by, 0.0, 0.0
     else:
@@ -351,7 +351,7 @@ def solve_pair(store, surfaces, pose, x, size, turn, close, downhill):
     led to its least, as a search asks; without, a pair that is followed stays where it is in a continuum.
     """
     f, g = surfaces
-    flat = flat_below(size)
+    flat = FLAT / size
     previous = 1e300
     status = NOT_CONVERGED
     level = False

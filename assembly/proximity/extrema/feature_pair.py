@@ -16,7 +16,7 @@ from assembly.proximity.extrema.edge_edge import solve_off_face
 from assembly.proximity.extrema.face_edge import face_frame, solve_on_face, turned_frame
 from assembly.proximity.extrema.face_face import CLOSE, LIMIT, pair_frame, solve_pair
 from assembly.proximity.extrema.feature_jets import FeatureFrame, NewtonLimits, face_side
-from assembly.proximity.extrema.pair_matrix import flat_below, fold_of, is_no_saddle, pair_matrix
+from assembly.proximity.extrema.pair_matrix import FLAT, fold_of, is_no_saddle, pair_matrix
 
 
 @kernel(inner=True)
@@ -115,5 +115,5 @@ def features_at(store, f, g, pose, x, n, size):
     """The frame of two features at parameters x, extremal or not."""
     if f.kind == FACE and g.kind == FACE:
         frame = pair_frame(store, f.record, g.record, pose, x)
-        return two_face_frame(frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, flat_below(size)))
+        return two_face_frame(frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, FLAT / size))
     return newton_on_features(store, f, g, pose, x, n, NewtonLimits(size, math.inf, 0))[2]

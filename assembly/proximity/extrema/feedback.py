@@ -31,7 +31,7 @@ from assembly.proximity.extrema.face_face import (
     pair_frame,
     solve_pair,
 )
-from assembly.proximity.extrema.pair_matrix import curvature_bound, flat_below, pair_matrix
+from assembly.proximity.extrema.pair_matrix import FLAT, curvature_bound, pair_matrix
 
 # Beside the statuses of `solve_pair`: the surfaces cross where the descent led.
 CROSSED = 4
@@ -341,4 +341,4 @@ def descend_pair(store, surfaces, pose, x, size, limit):
         if same:
             return with_steps(found, count)
     frame = pair_frame(store, f, g, pose, x)
-    return PairSolution(status, x, count, frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, flat_below(size)))
+    return PairSolution(status, x, count, frame, pair_matrix(frame.shape_f, frame.shape_g, frame.gap, FLAT / size))

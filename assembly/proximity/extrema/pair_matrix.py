@@ -64,21 +64,9 @@ def is_no_saddle(fold):
 
 
 @kernel(inline=True)
-def is_of_continuum(fold):
-    """Whether a pair is any one of a continuum, by how far it is from a fold."""
-    return abs(fold) <= CONTINUUM
-
-
-@kernel(inline=True)
 def is_the_only_one(fold):
     """Whether a pair is a minimum with no other one beside it, by how far it is from a fold."""
     return fold > ALONE
-
-
-@kernel(inline=True)
-def flat_below(size):
-    """The curvature below which a scene of this size counts as flat."""
-    return FLAT / size
 
 
 @kernel(inline=True)

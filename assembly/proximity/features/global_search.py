@@ -65,7 +65,6 @@ TINY = 2.5e-10
 # Newton's method is tried where normals turn by less.
 SMOOTH = 1.2
 
-
 # What a search keeps.
 SEARCH_STATE = record_dtype(
     "f8",
@@ -90,8 +89,6 @@ STATE = size_of(SEARCH_STATE)
 # A search. trees: of the shells; pose: of g; heap: of `assembly/_heap.py`; normals: a row a pair that waits and that
 # models bound; extrema: a KNOWN_EXTREMUM a row; state: a SEARCH_STATE.
 ShellTrees = namedtuple("ShellTrees", "store trees pose size rough heap normals extrema state")
-
-
 # Where Newton's method leads. curvature: the least of g relative to f; stretch: 1 over the least of f's metric K.
 NearExtremum = namedtuple("NearExtremum", "status x gap curvature stretch")
 

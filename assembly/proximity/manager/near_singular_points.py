@@ -13,7 +13,7 @@ from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import dot, sub
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import FACE, FACE_RECORD, shell_at
-from assembly.proximity.extrema.pair_matrix import is_of_continuum
+from assembly.proximity.extrema.pair_matrix import CONTINUUM
 from assembly.proximity.features.holding import HELD_F, HELD_G
 from assembly.proximity.features.region_tests import is_feasible
 from assembly.proximity.features.solid_contact import pair_parameters
@@ -43,7 +43,7 @@ def features_of(posed, codes):
 @kernel(inner=True)
 def is_loose(extremum):
     """Whether an extremum is any one of a continuum, where it is by chance."""
-    return extremum.corner == 0.0 and is_of_continuum(extremum.fold)
+    return extremum.corner == 0.0 and abs(extremum.fold) <= CONTINUUM
 
 
 @kernel(inner=True)
