@@ -1,7 +1,7 @@
 """Newton's method in a box: a minimum between two bounds, and one of any number of coordinates by shortened steps.
 
-Both are bodies of kernels, made from kernels that evaluate. What these return is a named tuple, which may hold more than
-the method asks for and is returned: nobody evaluates again where the method ended.
+Both are bodies of kernels, made from kernels that evaluate. What these return is a named tuple, which may hold more
+than the method asks for and is returned: nobody evaluates again where the method ended.
 """
 
 from __future__ import annotations
@@ -13,17 +13,19 @@ from typing import Any
 
 from assembly._kernel import kernel
 
-__all__ = ["Interval", "bracketed_newton", "curve_newton", "damped_newton", "held_in"]
+__all__ = ["Interval", "Sight", "bracketed_newton", "curve_newton", "damped_newton", "held_in"]
 
 # Bisection alone needs so many steps from any interval to two neighboring doubles of its size, and some.
 _BISECTIONS = 80
 # A fall of the merit by this part of it is rounding, as is a step that promises no more.
 _ROUNDING = 1e-15
-_PROMISE = 1e-17
+_PROMISE = 1e-16
 # A curve counts as straight where the curvature of the squared distance is less than this part of its speed's square.
 _STRAIGHT = 0.1
 # Where a parameter may be: held at the ends, or wrapped round.
 Interval = namedtuple("Interval", "low high closed")
+# A point as a place of a curve sees it (see `curve_newton`).
+Sight = namedtuple("Sight", "merit slope curvature square")
 
 
 def bracketed_newton(evaluate: Callable[..., Any], *, inside: bool, resolution: float = 2e-16) -> Callable[..., Any]:
@@ -156,7 +158,7 @@ def curve_newton(evaluate: Callable[..., Any], *, steps: int) -> Callable[..., A
     Parameters
     ----------
     evaluate
-        (problem, x) -> at: the merit |d|^2 / 2, d from the point to the curve; its slope d.c' and its curvature
-        c'.c' + d.c''; and the square c'.c'. Without c'' the method is Gauss and Newton's.
+        (problem, x) -> at, with the fields of a `Sight`: the merit |d|^2 / 2, d from the point to the curve; its slope
+        d.c' and its curvature c'.c' + d.c''; and the square c'.c'. Without c'' the method is Gauss and Newton's.
     """
     return damped_newton(evaluate, _step_along, _move_along, steps=steps)

@@ -12,11 +12,10 @@ from collections import namedtuple
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._newton import bracketed_newton
+from assembly._newton import Sight, bracketed_newton
 from assembly._record import Store
 from assembly.geometry.faces.trim_pieces import (
     LET_GO,
-    Sight,
     bounds_of,
     links_of,
     next_part,

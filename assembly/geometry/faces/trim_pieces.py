@@ -16,7 +16,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes
-from assembly._newton import Interval, bracketed_newton, curve_newton, held_in
+from assembly._newton import Interval, Sight, bracketed_newton, curve_newton, held_in
 from assembly._record import record_dtype, record_view, size_of
 
 # A trim in the table: the boundary of a face in its parameters.
@@ -170,9 +170,8 @@ def piece_at(pool, piece, axis, target, start, end):
     return t, found.point, found.direction
 
 
-# A piece and a point of the plane; how a parameter of the piece sees it (see `curve_newton`).
+# A piece and a point of the plane.
 PieceQuery = namedtuple("PieceQuery", "pool piece q interval")
-Sight = namedtuple("Sight", "merit slope curvature square")
 
 
 @kernel(inline=True)
