@@ -21,7 +21,7 @@ _BISECTIONS = 80
 _ROUNDING = 1e-15
 _PROMISE = 1e-16
 # A curve counts as straight where the curvature of the squared distance is less than this part of its speed's square.
-_STRAIGHT = 0.1
+_STRAIGHT = 1e-3
 # Where a parameter may be: held at the ends, or wrapped round.
 Interval = namedtuple("Interval", "low high closed")
 # A point as a place of a curve sees it (see `curve_newton`).
