@@ -119,7 +119,7 @@ def damped_newton(
             else:
                 failures += 1
                 part *= 0.25
-                if failures > shortenings or at.merit == least:
+                if failures > shortenings:
                     break
             x = move(problem, place, part, step)
             if x == place:
@@ -141,7 +141,8 @@ def held_in(interval, x):
 @kernel(inline=True)
 def _step_along(problem, x, at):
     """Newton's step along a curve; where the squared distance is not convex, as if the curve were straight."""
-    width = problem.interval.high - problem.interval.low
+    # A whole turn would lead back.
+    width = (0.5 if problem.interval.closed else 1.0) * (problem.interval.high - problem.interval.low)
     curvature = at.curvature if at.curvature > _STRAIGHT * at.square else max(at.square, 1e-300)
     step = min(max(-at.slope / curvature, -width), width)
     return step, not at.slope * step < -_PROMISE * at.merit
