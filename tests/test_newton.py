@@ -62,6 +62,22 @@ def test_a_function_of_one_sign_has_its_minimum_at_an_end(side):
         assert x == pytest.approx(1.0 + side, abs=1e-15) and at.slope * side < 0.0, name
 
 
+def test_an_end_is_gone_to_where_the_root_may_be_there_only():
+    for name in ("a line", "a cubic"):
+        seen = []
+        x, _at = bracketed_newton(rising(RISING[name], seen), inside=False)(3.0, 0.0, 2.0, 0.7)
+        assert x == 2.0 and len(seen) <= 4
+    seen = []
+    bracketed_newton(rising(RISING["far from straight"], seen), inside=True)(0.7, 0.0, 2.0, 1.3)
+    assert 0.0 < min(seen) and max(seen) < 2.0
+
+
+def test_a_start_at_the_root_is_all_that_is_evaluated():
+    seen = []
+    assert bracketed_newton(rising(RISING["no derivative"], seen), inside=True)(0.5, 0.0, 2.0, 0.5)[0] == 0.5
+    assert seen == [0.5]
+
+
 def test_a_root_at_an_end_is_found():
     for inside in (True, False):
         for root in (0.0, 2.0):
@@ -199,6 +215,19 @@ def test_how_often_a_step_is_cut_and_how_many_places_there_are():
     assert scripted(rising, steps=30, shortenings=0) == (0.0, 5.0, [0.0, 1.0])
     assert scripted(rising, steps=30, shortenings=2)[2] == [0.0, 1.0, 0.25, 0.0625]
     assert scripted([5.0, 4.0, 3.0, 2.0, 1.0], steps=3) == (2.0, 3.0, [0.0, 1.0, 2.0])
+    # In a row, that is.
+    assert scripted([5.0, 6.0, 4.0, 6.0, 3.0, 0.0], steps=9, shortenings=1)[:2] == (1.5, 0.0)
+
+
+def test_a_step_that_leads_nowhere_ends():
+    stays = []
+
+    def evaluate(_problem, x):
+        stays.append(x)
+        return Known(5.0, None, None)
+
+    damped_newton(evaluate, lambda *_: (1.0, False), lambda _p, x, part, step: x, steps=60)(None, 0.0)
+    assert stays == [0.0]
 
 
 def test_a_merit_that_falls_by_rounding_or_not_enough_ends():
@@ -255,6 +284,19 @@ def test_the_nearest_point_of_an_arc_may_be_an_end():
         for start in (0.2, 0.5, 1.2):
             t = nearest_place(Curve(2.0 * circle(angle)[0], arc, circle), start)
             assert t == pytest.approx(end, abs=1e-14)
+
+
+def test_a_step_is_no_longer_than_the_interval():
+    seen = []
+
+    def noted(t):
+        seen.append(t)
+        return circle(t)
+
+    # As if the curve were straight it leads a million times around, to the end that is farther away.
+    curve = Curve(1e6 * circle(math.pi)[0], Interval(0.0, 5.9, False), noted)
+    assert nearest_place(curve, 0.5) == pytest.approx(math.pi, abs=1e-13)
+    assert len(seen) <= 9
 
 
 def test_where_a_curve_stands_still_nothing_moves():
