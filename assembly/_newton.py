@@ -19,9 +19,11 @@ __all__ = ["Interval", "Sight", "bracketed_newton", "curve_newton", "damped_newt
 _BISECTIONS = 80
 # A fall of the merit by this part of it is rounding, as is a step that promises no more.
 _ROUNDING = 1e-15
-_PROMISE = 1e-16
+_PROMISE = 1e-15
 # A curve counts as straight where the curvature of the squared distance is less than this part of its speed's square.
 _STRAIGHT = 1e-3
+# A step of more than this part of the interval that promises nothing is rounding, where the curve stands still.
+_LONG = 1e-3
 # Where a parameter may be: held at the ends, or wrapped round.
 Interval = namedtuple("Interval", "low high closed")
 # A point as a place of a curve sees it (see `curve_newton`).
@@ -77,11 +79,11 @@ def damped_newton(
     shortenings: int = 12,
     fall: float = 1.0,
 ) -> Callable[..., Any]:
-    """The body of a kernel (problem, x) -> (x, at, step): from x down to a local minimum of a merit, in a box.
+    """The body of a kernel (problem, x) -> (place, at, last): from x down to a local minimum of a merit, in a box.
 
-    A step is cut to a quarter until the merit falls; it ends where that is of no use. It returns
-    the best place, what is known there, and the step from there that was not taken, or did not lead down: where the
-    merit does not tell places apart any more a step is still good, and `move` takes it.
+    A step is cut to a quarter until the merit falls. Returned are the best place, what is known there, and where the
+    next step leads from there, which was not evaluated: where the merit does not tell places apart any more, a step of
+    Newton's method still does. It is the best place itself if that step did not lower the merit.
 
     Parameters
     ----------
@@ -101,30 +103,24 @@ def damped_newton(
 
     def descend(problem: Any, x: Any) -> Any:
         least = math.inf
-        part = 1.0
-        failures = 0
-        # Where the least merit is, as soon as there is one.
-        place = x
         for k in range(steps):
             at = evaluate(problem, x)
             if k == 0 or at.merit < fall * least:
-                slow = at.merit > least * (1.0 - _ROUNDING)
-                least = at.merit
                 place, known = x, at
                 step, done = step_from(problem, x, at)
-                if done or slow:
-                    break
+                stops = not done and at.merit > least * (1.0 - _ROUNDING)
+                least = at.merit
                 part = 1.0
                 failures = 0
             else:
-                failures += 1
                 part *= 0.25
-                if failures > shortenings:
-                    break
-            x = move(problem, place, part, step)
-            if x == place:
+                failures += 1
+                stops = failures > shortenings or k == steps - 1
+            last = place if stops else move(problem, place, part, step)
+            if stops or done or last == place:
                 break
-        return place, known, step
+            x = last
+        return place, known, last
 
     return descend
 
@@ -145,7 +141,8 @@ def _step_along(problem, x, at):
     width = (0.5 if problem.interval.closed else 1.0) * (problem.interval.high - problem.interval.low)
     curvature = at.curvature if at.curvature > _STRAIGHT * at.square else max(at.square, 1e-300)
     step = min(max(-at.slope / curvature, -width), width)
-    return step, not at.slope * step < -_PROMISE * at.merit
+    done = not at.slope * step < -_PROMISE * at.merit
+    return (0.0 if done and abs(step) > _LONG * width else step), done
 
 
 @kernel(inline=True)

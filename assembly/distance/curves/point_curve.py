@@ -20,7 +20,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._lanes import lane
-from assembly._newton import Interval, Sight, curve_newton, held_in
+from assembly._newton import Interval, Sight, curve_newton
 from assembly.distance.curves.nodes import length
 from assembly.distance.curves.search import curve_answer_at, first_point
 from assembly.distance.curves.squared_distance import (
@@ -99,9 +99,7 @@ _nearest_from = kernel(inner=True)(curve_newton(_seen, steps=16))
 @kernel(inner=True)
 def minimize(query, span, low, high, x):
     """A local minimum of the distance on [low, high] by Newton's method from x."""
-    interval = Interval(low, high, False)
-    x, _at, step = _nearest_from(SpanQuery(query, span, interval), x)
-    return seen_at(query, span, held_in(interval, x + step))
+    return seen_at(query, span, _nearest_from(SpanQuery(query, span, Interval(low, high, False)), x)[2])
 
 
 @kernel(inline=True)

@@ -214,7 +214,7 @@ def nearest_in_patches(a, b, curve, shift, w):
     for i in range(a.free + b.free, 4):
         work.place[i] = work.step[i] = 0.0
     start = (work.place[0], work.place[1], work.place[2], work.place[3])
-    place, _at, _step = _descend(PatchQuery(a, b, curve, shift, w), start)
+    place, _at, _last = _descend(PatchQuery(a, b, curve, shift, w), start)
     work.place[0], work.place[1], work.place[2], work.place[3] = place
 
 

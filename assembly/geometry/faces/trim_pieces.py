@@ -16,7 +16,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes
-from assembly._newton import Interval, Sight, bracketed_newton, curve_newton, held_in
+from assembly._newton import Interval, Sight, bracketed_newton, curve_newton
 from assembly._record import record_dtype, record_view, size_of
 
 # A trim in the table: the boundary of a face in its parameters.
@@ -185,7 +185,7 @@ def _seen(query, t):
 
 
 _nearest_in = kernel(inner=True)(bracketed_newton(_seen, inside=False))
-_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=9))
+_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=20))
 
 
 @kernel(inline=True)
@@ -260,9 +260,7 @@ def nearest_on_piece(pool, piece, bounds, q, best):
 @kernel(inner=True)
 def polished(pool, piece, t, q):
     """A parameter near that of a nearest point, brought to it by Newton's method as long as that goes downhill."""
-    interval = Interval(piece.t0, piece.t1, False)
-    t, _at, step = _nearest_from(PieceQuery(pool, piece, q, interval), t)
-    return held_in(interval, t + step)
+    return _nearest_from(PieceQuery(pool, piece, q, Interval(piece.t0, piece.t1, False)), t)[2]
 
 
 @kernel(signatures="(f8[::1], i8[::1], i8[::1], f8[::1], f8[::1], f8[:, ::1])")

@@ -96,8 +96,7 @@ def nearest_on_border(store, surface, curve, t, p):
     """The parameter near t of a curve on a surface whose point is nearest to p."""
     arc = spline_curve_at(store.table, curve)
     interval = Interval(store.pool[arc.breaks], store.pool[arc.breaks + arc.spans], arc.closed == 1)
-    t, _at, step = _nearest_from(BorderQuery(store, surface, curve, p, interval), held_in(interval, t))
-    return held_in(interval, t + step)
+    return _nearest_from(BorderQuery(store, surface, curve, p, interval), held_in(interval, t))[2]
 
 
 @kernel(inner=True)

@@ -6,7 +6,7 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly._newton import Interval, Sight, curve_newton, held_in
+from assembly._newton import Interval, Sight, curve_newton
 from assembly._record import Store
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import curve_lanes, surface_point, xyz
@@ -94,7 +94,6 @@ def nearest_on_boundaries(store, boundaries, which, points, guess, close, out):
         t = guess[i]
         at = _seen(query, t)
         if 2.0 * at.merit > close * close:
-            t, at, step = _nearest_from(query, samples[_nearest_sample(samples, first, stop, p), 0])
-            t = held_in(interval, t + step)
+            _t, at, t = _nearest_from(query, samples[_nearest_sample(samples, first, stop, p), 0])
         out[i, 0] = t
         out[i, 1] = math.sqrt(2.0 * at.merit)

@@ -97,5 +97,5 @@ _nearest = kernel(inner=True)(damped_newton(_look, _least_step, _move, steps=12,
 @kernel(inner=True)
 def crossing_point(store, f, g, pose, x, size):
     """Coordinates where d = 0 near x, by least steps, and whether they were found."""
-    x, at, _step = _nearest(CrossingQuery(store, f, g, pose, size), x)
+    x, at, _last = _nearest(CrossingQuery(store, f, g, pose, size), x)
     return x, at.merit <= MET * size

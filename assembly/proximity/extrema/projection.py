@@ -69,9 +69,8 @@ _descend = kernel(inner=True)(damped_newton(_look, _step_from, _move, steps=20))
 @kernel(inner=True)
 def projection_of(store, g, y, s, t):
     """The `Projection` on surface g of a point y, by Newton's method from (s, t)."""
-    query = ProjectionQuery(store, g, y)
-    x, at, step = _descend(query, (s, t))
-    return Projection(_move(query, x, 1.0, step), at.distance, at.normal, at.settled)
+    _place, at, last = _descend(ProjectionQuery(store, g, y), (s, t))
+    return Projection(last, at.distance, at.normal, at.settled)
 
 
 @kernel(inner=True)

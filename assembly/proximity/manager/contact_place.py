@@ -14,7 +14,7 @@ from collections import namedtuple
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._newton import Interval, Sight, curve_newton, held_in
+from assembly._newton import Interval, Sight, curve_newton
 from assembly._record import Store
 from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import add, dot, scale, sub
@@ -79,9 +79,8 @@ _nearest_from = kernel(inner=True)(curve_newton(_seen, steps=9))
 @kernel(inner=True)
 def point_on_edge(store, edge, low, high, y):
     """The point of a part of an edge that Newton's method takes for the nearest one to y."""
-    interval = Interval(low, high, False)
-    t, _at, step = _nearest_from(EdgeQuery(store, edge, y, interval), 0.5 * (low + high))
-    return edge_jet(store, edge, held_in(interval, t + step))[0]
+    query = EdgeQuery(store, edge, y, Interval(low, high, False))
+    return edge_jet(store, edge, _nearest_from(query, 0.5 * (low + high))[2])[0]
 
 
 @kernel(inner=True)

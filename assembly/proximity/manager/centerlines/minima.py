@@ -27,7 +27,7 @@ LEVEL, STILL = 1e-10, 1e-16
 # A valley with no more slope than this at both ends is level: rounding tells where it has minima.
 NOISE = 1e-14
 # A foot is one where a step toward it would be shorter than this; one that lowers F by less of it is rounding.
-SHORT, PROMISE = 1e-12, 1e-16
+SHORT, PROMISE = 1e-12, 1e-15
 # Two PosedParts of which one is followed: side 0 if that is f, 1 g.
 Course = namedtuple("Course", "parts side")
 # F, its slopes on both centerlines and its second derivatives: x along the followed one, y along the other one.
@@ -118,8 +118,7 @@ def convex_minimum(parts, box, open_ends, s, t):
     bottom.
     """
     query = BoxQuery(Course(parts, 0), box)
-    place, _at, step = _least_in_box(query, (s, t))
-    s, t = _move_in_box(query, place, 1.0, step)
+    s, t = _least_in_box(query, (s, t))[2]
     at = slopes_of(query.course, s, t)
     far = math.sqrt(2.0 * at.merit)
     ends_f = (open_ends.start_f and s <= box.from_f, open_ends.end_f and s >= box.to_f)
@@ -153,8 +152,7 @@ def projection_at(query, x):
     """The `Projected` of x: its foot on the other centerline."""
     y = query.y
     if not query.held:
-        y, _at, step = _foot(FootQuery(query.course, x), y)
-        y += step
+        y = _foot(FootQuery(query.course, x), y)[2]
     at = slopes_of(query.course, x, y)
     if query.held:
         return Projected(at.x, at.xx, y, True)
