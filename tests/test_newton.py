@@ -190,7 +190,7 @@ def test_the_merit_falls_from_place_to_place():
     assert np.abs(x).max() <= 1e-7
 
 
-def scripted(merits, **options):
+def scripted(merits, promise=0.0, **options):
     """What a descent along a line does whose merits are told one after the other."""
     places = []
 
@@ -199,7 +199,7 @@ def scripted(merits, **options):
         return Known(merits[len(places) - 1], None, None)
 
     def step(_problem, x, at):
-        return 1.0, at.merit == 0.0
+        return 1.0, at.merit == promise
 
     found = damped_newton(evaluate, step, lambda _p, x, part, step: x + part * step, **options)(None, 0.0)
     return found[0], found[1].merit, places, found[2]
@@ -225,6 +225,7 @@ def test_the_last_step_is_taken_unless_the_merit_spoke_against_it():
     assert scripted([5.0, 4.0, 6.0, 6.0], steps=9, shortenings=1)[0::3] == (1.0, 1.0)
     assert scripted([5.0, 4.0, 6.0, 6.0], steps=4)[0::3] == (1.0, 1.0)
     assert scripted([5.0, 5.0 - 1e-15], steps=9)[0::3] == (1.0, 1.0)
+    assert scripted([5.0, 5.0 - 1e-15], 5.0 - 1e-15, steps=9)[0::3] == (1.0, 2.0)
 
 
 def test_a_step_that_leads_nowhere_ends():
