@@ -9,9 +9,11 @@ shortened. Nothing here is part of a proof: what was found is bounded afterwards
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly._lanes import lane
+from assembly._newton import damped_newton
 from assembly.distance.curves.bounds import difference
 from assembly.distance.curves.nodes import ROWS
 from assembly.geometry.splines.bezier_pieces import bezier_curve_at, bezier_derivatives, bezier_value
@@ -19,7 +21,9 @@ from assembly.geometry.splines.evaluate import xyz
 from assembly.geometry.vec import dot
 
 _STEPS = 40
-_SHORTENINGS = 12
+PieceQuery = namedtuple("PieceQuery", "a b shift")
+# |D|^2, D, and the derivatives of both pieces.
+PiecePoints = namedtuple("PiecePoints", "merit d du hu dv hv")
 
 
 @kernel(inner=True)
@@ -73,42 +77,35 @@ def newton_step(gx, gy, p, q, r, x, y):
     return min(max(dx, -x), 1.0 - x), min(max(dy, -y), 1.0 - y)
 
 
+@kernel(inline=True)
+def _look(query, place):
+    u, du, hu = node_derivatives(query.a, place[0])
+    v, dv, hv = node_derivatives(query.b, place[1])
+    d = difference(u, v, query.shift)
+    return PiecePoints(dot(d, d), d, du, hu, dv, hv)
+
+
+@kernel(inline=True)
+def _step_from(query, place, at):
+    d, du, dv = at.d, at.du, at.dv
+    xx = dot(du, du) + dot(d, at.hu)
+    yy = 1.0 if bezier_curve_at(query.b.record, 0).degree == 0 else dot(dv, dv) - dot(d, at.hv)
+    gx = dot(d, du)
+    gy = -dot(d, dv)
+    sx, sy = newton_step(gx, gy, xx, -dot(du, dv), yy, place[0], place[1])
+    # Below this no step changes F in its last place.
+    return (sx, sy), gx * sx + gy * sy > -1e-17 * at.merit or abs(sx) + abs(sy) < 1e-16
+
+
+@kernel(inline=True)
+def _move(query, place, part, step):
+    return min(max(place[0] + part * step[0], 0.0), 1.0), min(max(place[1] + part * step[1], 0.0), 1.0)
+
+
+_descend = kernel(inner=True)(damped_newton(_look, _step_from, _move, steps=_STEPS))
+
+
 @kernel(inner=True)
 def nearest_points(a, b, shift, x, y):
     """Parameters of a local minimum reached from (x, y)."""
-    best = math.inf
-    at_x = x
-    at_y = y
-    sx = sy = 0.0
-    part = 1.0
-    shortenings = 0
-    flat = bezier_curve_at(b.record, 0).degree == 0
-    for _ in range(_STEPS):
-        u, du, hu = node_derivatives(a, x)
-        v, dv, hv = node_derivatives(b, y)
-        d = difference(u, v, shift)
-        f = dot(d, d)
-        if f < best:
-            slow = f > best * (1.0 - 1e-15)
-            best = f
-            at_x = x
-            at_y = y
-            xx = dot(du, du) + dot(d, hu)
-            yy = 1.0 if flat else dot(dv, dv) - dot(d, hv)
-            gx = dot(d, du)
-            gy = -dot(d, dv)
-            sx, sy = newton_step(gx, gy, xx, -dot(du, dv), yy, x, y)
-            # Below this no step changes F in its last place.
-            if slow or gx * sx + gy * sy > -1e-17 * f or abs(sx) + abs(sy) < 1e-16:
-                part = 1.0
-                break
-            part = 1.0
-            shortenings = 0
-        else:
-            part *= 0.25
-            shortenings += 1
-            if shortenings > _SHORTENINGS:
-                return at_x, at_y
-        x = min(max(at_x + part * sx, 0.0), 1.0)
-        y = min(max(at_y + part * sy, 0.0), 1.0)
-    return at_x, at_y
+    return _descend(PieceQuery(a, b, shift), (x, y))[0]

@@ -20,6 +20,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._lanes import lane
+from assembly._newton import Interval, Sight, curve_newton
 from assembly.distance.curves.nodes import length
 from assembly.distance.curves.search import curve_answer_at, first_point
 from assembly.distance.curves.squared_distance import (
@@ -50,12 +51,13 @@ _PATIENCE = 64
 _EARLY = 6
 # Status of such a query, beside those of `distance/piece_search.py`.
 UNFINISHED = 6
-_NEWTON = 12
 _NEAR_END = 1e-3
 # What is asked of a point and a curve. p: the point about the curve's center; reach: no point of the curve is farther
 # from it; error, away: how far an evaluated point, and the packed curve, may be off; step: bounds within this of each
 # other are one; work: intervals of a span.
 PointQuery = namedtuple("PointQuery", "record pool p reach error away step clearance budget work")
+# The same on an interval of a span.
+SpanQuery = namedtuple("SpanQuery", "query span interval")
 
 
 @kernel(inner=True)
@@ -79,35 +81,25 @@ def seen_at(query, span, x):
     return SpanPoint(x, c.weight, sub(c.place, query.p), c.first, c.second, c.weight_rate)
 
 
+@kernel(inline=True)
+def _seen(asked, x):
+    point = seen_at(asked.query, asked.span, x)
+    square = dot(point.first, point.first)
+    return Sight(
+        0.5 * dot(point.place, point.place),
+        dot(point.place, point.first),
+        square + dot(point.place, point.second),
+        square,
+    )
+
+
+_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=16))
+
+
 @kernel(inner=True)
 def minimize(query, span, low, high, x):
     """A local minimum of the distance on [low, high] by Newton's method from x."""
-    best = seen_at(query, span, x)
-    least = dot(best.place, best.place)
-    for _ in range(_NEWTON):
-        slope = dot(best.place, best.first)
-        speed = dot(best.first, best.first)
-        curvature = speed + dot(best.place, best.second)
-        # Not convex there: as if the curve were straight.
-        step = -slope / (curvature if curvature > 0.05 * speed else speed) if speed > 0.0 else 0.0
-        if not abs(step) < high - low:
-            step = math.copysign(high - low, step)
-        shorter = 0
-        while True:
-            x = min(max(best.x + step, low), high)
-            if abs(x - best.x) <= 1e-16 * (1.0 + abs(best.x)):
-                return best
-            found = seen_at(query, span, x)
-            square = dot(found.place, found.place)
-            if square < least:
-                break
-            shorter += 1
-            if shorter > 8 or slope * step > -1e-16 * least:
-                return best
-            step *= 0.25
-        least = square
-        best = found
-    return best
+    return seen_at(query, span, _nearest_from(SpanQuery(query, span, Interval(low, high, False)), x)[2])
 
 
 @kernel(inline=True)

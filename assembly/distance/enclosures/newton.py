@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
+from assembly._newton import damped_newton
 from assembly._record import Store
 from assembly.distance.enclosures.enclosure import FORMULA, HULL
 from assembly.distance.enclosures.gjk import INSIDE, POINT, ConvexSet, gjk, inside_weights, on_b, simplex_at
@@ -14,6 +16,9 @@ from assembly.geometry.splines.bezier_ranges import BEZIER_AT, piece_points, ran
 from assembly.geometry.vec import blend, dot, sub
 
 _ROUNDS = 24
+PlaceQuery = namedtuple("PlaceQuery", "search place bounds_s bounds_t")
+# |r|^2, r = a - b, the derivatives of both, and the part of a' across the feature of a hull that carries b.
+PlacePoints = namedtuple("PlacePoints", "merit r a1 a2 b1 b2 c1")
 
 
 @kernel(inner=True)
@@ -108,67 +113,55 @@ def step_length(slope, curvature, square):
     return -slope / (curvature if curvature > 1e-8 * square else square + 1e-300)
 
 
+@kernel(inline=True)
+def _look(query, x):
+    a_shape, b_shape, place, g = query.search.a, query.search.b, query.place, query.search.g
+    a, a1, a2 = local_point(a_shape.kind, a_shape.table, a_shape.pool, place.span_a, x[0], a_shape.room)
+    if b_shape.kind == HULL:
+        zero = (0.0, 0.0, 0.0)
+        b, kept, inside, _off = hull_point(query.search.full, b_shape.pool, b_shape.count, a, g)
+        r = zero if inside else sub(a, b)
+        return PlacePoints(dot(r, r), r, a1, a2, zero, zero, a1 if inside else across(a1, kept, query.search.full, g))
+    b, b1, b2 = local_point(b_shape.kind, b_shape.table, b_shape.pool, place.span_b, x[1], b_shape.room)
+    r = sub(a, b)
+    return PlacePoints(dot(r, r), r, a1, a2, b1, b2, a1)
+
+
+@kernel(inline=True)
+def _step_from(query, x, at):
+    r, bounds_s, bounds_t = at.r, query.bounds_s, query.bounds_t
+    gs = dot(r, at.a1)
+    gt = -dot(r, at.b1)
+    ss = dot(at.c1, at.c1)
+    tt = dot(at.b1, at.b1)
+    st = -dot(at.a1, at.b1)
+    p = ss + dot(r, at.a2)
+    q = tt - dot(r, at.b2)
+    free_s, free_t = is_free(x[0], gs, bounds_s), is_free(x[1], gt, bounds_t)
+    step = (0.0, 0.0)
+    if free_s and free_t:
+        det = p * q - st * st
+        if not (p > 0.0 and det > 1e-14 * p * abs(q)):
+            p, q = 1.0001 * ss + 1e-300, 1.0001 * tt + 1e-300
+            det = p * q - st * st
+        step = (-(q * gs - st * gt) / det, -(p * gt - st * gs) / det)
+    elif free_s:
+        step = (step_length(gs, p, ss), 0.0)
+    elif free_t:
+        step = (0.0, step_length(gt, q, tt))
+    goes = abs(step[0]) > 1e-15 * (bounds_s[1] - bounds_s[0]) or abs(step[1]) > 1e-15 * (bounds_t[1] - bounds_t[0])
+    return step, not (goes and abs(step[0]) < math.inf and abs(step[1]) < math.inf and at.merit > 0.0)
+
+
+@kernel(inline=True)
+def _move(query, x, part, step):
+    return held(x[0], part * step[0], query.bounds_s), held(x[1], part * step[1], query.bounds_t)
+
+
+_descend = kernel(inner=True)(damped_newton(_look, _step_from, _move, steps=_ROUNDS))
+
+
 @kernel(inner=True)
 def newton(search, place, bounds_s, bounds_t):
     """Parameters of a local minimum within bounds from a place on both shapes. b is a curve or a hull."""
-    a_shape, b_shape, g = search.a, search.b, search.g
-    hull = b_shape.kind == HULL
-    best = math.inf
-    s, t = place.s, place.t
-    at = (s, t)
-    step = (0.0, 0.0)
-    for _ in range(_ROUNDS):
-        a, a1, a2 = local_point(a_shape.kind, a_shape.table, a_shape.pool, place.span_a, s, a_shape.room)
-        b1 = (0.0, 0.0, 0.0)
-        b2 = b1
-        c1 = a1
-        if hull:
-            b, kept, inside, _off = hull_point(search.full, b_shape.pool, b_shape.count, a, g)
-            if inside:
-                return s, t
-            c1 = across(a1, kept, search.full, g)
-        else:
-            b, b1, b2 = local_point(b_shape.kind, b_shape.table, b_shape.pool, place.span_b, t, b_shape.room)
-        r = sub(a, b)
-        f = dot(r, r)
-        if not (f < best):
-            # No descent: half the way, until it is too short to matter.
-            step = (0.25 * step[0], 0.25 * step[1])
-            s = held(at[0], step[0], bounds_s)
-            t = held(at[1], step[1], bounds_t)
-            if f == best or (s == at[0] and t == at[1]):
-                break
-            continue
-        best = f
-        at = (s, t)
-        gs = dot(r, a1)
-        gt = -dot(r, b1)
-        ss = dot(c1, c1)
-        tt = dot(b1, b1)
-        st = -dot(a1, b1)
-        p = ss + dot(r, a2)
-        q = tt - dot(r, b2)
-        free_s, free_t = is_free(s, gs, bounds_s), is_free(t, gt, bounds_t)
-        if not free_s and not free_t:
-            break
-        if free_s and free_t:
-            det = p * q - st * st
-            if not (p > 0.0 and det > 1e-14 * p * abs(q)):
-                p, q = 1.0001 * ss + 1e-300, 1.0001 * tt + 1e-300
-                det = p * q - st * st
-            step = (-(q * gs - st * gt) / det, -(p * gt - st * gs) / det)
-        elif free_s:
-            step = (step_length(gs, p, ss), 0.0)
-        else:
-            step = (0.0, step_length(gt, q, tt))
-        if not (abs(step[0]) < math.inf and abs(step[1]) < math.inf):
-            break
-        s = held(s, step[0], bounds_s)
-        t = held(t, step[1], bounds_t)
-        if s == at[0] and t == at[1]:
-            break
-        if abs(s - at[0]) <= 1e-15 * (bounds_s[1] - bounds_s[0]) and abs(t - at[1]) <= 1e-15 * (
-            bounds_t[1] - bounds_t[0]
-        ):
-            break
-    return at
+    return _descend(PlaceQuery(search, place, bounds_s, bounds_t), (place.s, place.t))[0]

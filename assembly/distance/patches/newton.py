@@ -12,6 +12,7 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
+from assembly._newton import damped_newton
 from assembly.distance.curves.bounds import least_change
 from assembly.distance.patches.formula_nodes import formula_derivatives
 from assembly.distance.patches.nodes import ROWS, bezier_surface_at, plus
@@ -34,8 +35,9 @@ from assembly.geometry.splines.bezier_pieces import UNIT
 
 # What a place of two patches proves: bounds of the distance, the upper one that of its points, and these.
 PatchPoints = namedtuple("PatchPoints", "lower upper on_a on_b")
+PatchQuery = namedtuple("PatchQuery", "a b curve shift w")
+PatchMerit = namedtuple("PatchMerit", "merit")
 _STEPS = 30
-_SHORTENINGS = 12
 
 
 @kernel(inner=True)
@@ -164,43 +166,56 @@ def newton_direction(w, n):
         raised = min(10.0 * raised, -1e-6 * size)
 
 
+@kernel(inline=True)
+def _look(query, place):
+    work = patch_work_at(query.w, 0)
+    work.place[0], work.place[1], work.place[2], work.place[3] = place
+    load_points(query.a, query.b, query.curve, query.shift, query.w)
+    return PatchMerit(vector_dot(query.w, D, D))
+
+
+@kernel(inline=True)
+def _step_from(query, place, at):
+    work = patch_work_at(query.w, 0)
+    n = query.a.free + query.b.free
+    load_hessian(query.w, n)
+    newton_direction(query.w, n)
+    fall = 0.0
+    way = 0.0
+    for i in range(n):
+        fall += work.g[i] * work.step[i]
+        way += abs(work.step[i])
+    step = work.step
+    return (step[0], step[1], step[2], step[3]), fall > -1e-17 * at.merit or way < 1e-16
+
+
+@kernel(inline=True)
+def _moved(x, step):
+    return min(max(x + step, 0.0), 1.0)
+
+
+@kernel(inline=True)
+def _move(query, x, part, step):
+    return (
+        _moved(x[0], part * step[0]),
+        _moved(x[1], part * step[1]),
+        _moved(x[2], part * step[2]),
+        _moved(x[3], part * step[3]),
+    )
+
+
+_descend = kernel(inner=True)(damped_newton(_look, _step_from, _move, steps=_STEPS))
+
+
 @kernel(inner=True)
 def nearest_in_patches(a, b, curve, shift, w):
     """From PLACE to a local minimum in the unit cube."""
     work = patch_work_at(w, 0)
-    n = a.free + b.free
-    best = math.inf
-    part = 1.0
-    shortenings = 0
-    for i in range(n):
-        work.best[i] = work.place[i]
-    for _ in range(_STEPS):
-        load_points(a, b, curve, shift, w)
-        f = vector_dot(w, D, D)
-        if f < best:
-            slow = f > best * (1.0 - 1e-15)
-            best = f
-            load_hessian(w, n)
-            newton_direction(w, n)
-            fall = 0.0
-            way = 0.0
-            for i in range(n):
-                work.best[i] = work.place[i]
-                fall += work.g[i] * work.step[i]
-                way += abs(work.step[i])
-            if slow or fall > -1e-17 * f or way < 1e-16:
-                break
-            part = 1.0
-            shortenings = 0
-        else:
-            part *= 0.25
-            shortenings += 1
-            if shortenings > _SHORTENINGS:
-                break
-        for i in range(n):
-            work.place[i] = min(max(work.best[i] + part * work.step[i], 0.0), 1.0)
-    for i in range(n):
-        work.place[i] = work.best[i]
+    for i in range(a.free + b.free, 4):
+        work.place[i] = work.step[i] = 0.0
+    start = (work.place[0], work.place[1], work.place[2], work.place[3])
+    place, _at, _last = _descend(PatchQuery(a, b, curve, shift, w), start)
+    work.place[0], work.place[1], work.place[2], work.place[3] = place
 
 
 @kernel(inner=True, exact=True)

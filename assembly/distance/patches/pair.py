@@ -44,7 +44,6 @@ PATCH_WORK = record_dtype(
     g=4,  # gradient
     z=4,  # a place in the models
     place=4,  # a place in the unit cube
-    best=4,  # the best place so far
     step=4,  # of Newton
     factor=16,  # of the matrix of a step
     patch_j=6,  # first derivatives of one patch

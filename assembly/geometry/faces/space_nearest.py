@@ -12,12 +12,12 @@ from collections import namedtuple
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._newton import Sight, bracketed_newton
 from assembly._record import Store
 from assembly.geometry.faces.trim_pieces import (
     LET_GO,
     bounds_of,
     links_of,
-    next_in_bracket,
     next_part,
     piece_bend,
     piece_of,
@@ -59,32 +59,20 @@ def _on_curve(store, curve, t):
     return s, blend(du, su, dv, sv), bend
 
 
-@kernel(inner=True)
-def _newton(store, curve, a, b, t, q):
-    """The nearest point of an interval on which the distance is convex; half its square and its parameter."""
-    low = a
-    high = b
-    f = 0.0
-    for _ in range(60):
-        p, d, h = _on_curve(store, curve, t)
-        e = sub(p, q)
-        f = 0.5 * dot(e, e)
-        g = dot(e, d)
-        if g == 0.0:
-            break
-        if g > 0.0:
-            high = t
-            if t == a:
-                break
-        else:
-            low = t
-            if t == b:
-                break
-        step = next_in_bracket(t, g, dot(d, d) + dot(e, h), (a, b), (low, high))
-        if abs(step - t) <= 2e-16 * max(abs(t), b - a):
-            break
-        t = step
-    return f, t
+# A piece on its surface and a point.
+SpaceQuery = namedtuple("SpaceQuery", "store curve q")
+
+
+@kernel(inline=True)
+def _seen(query, t):
+    """The point of the question from a parameter of the piece."""
+    p, d, h = _on_curve(query.store, query.curve, t)
+    e = sub(p, query.q)
+    speed = dot(d, d)
+    return Sight(0.5 * dot(e, e), dot(e, d), speed + dot(e, h), speed)
+
+
+_nearest_in = kernel(inner=True)(bracketed_newton(_seen, inside=False))
 
 
 @kernel(inner=True)
@@ -120,9 +108,9 @@ def _search(store, curve, bounds, q, best):
         if low < best:
             if curvature > third * half:
                 begin = t0 + index * h
-                f, t = _newton(store, curve, begin, min(begin + h, t1), m, q)
-                if f < best:
-                    best = f
+                t, near = _nearest_in(SpaceQuery(store, curve, q), begin, min(begin + h, t1), m)
+                if near.merit < best:
+                    best = near.merit
                     found = t
             elif low < best - LET_GO * best and level < 50:
                 level += 1

@@ -16,6 +16,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes
+from assembly._newton import Interval, Sight, bracketed_newton, curve_newton
 from assembly._record import record_dtype, record_view, size_of
 
 # A trim in the table: the boundary of a face in its parameters.
@@ -144,73 +145,47 @@ def piece_bend(pool, piece, t):
     return (lane(a, 0), lane(a, 1)), (lane(b, 0), lane(b, 1)), (lane(c, 0), lane(c, 1))
 
 
-@kernel(inner=True)
-def piece_at(pool, piece, axis, target, start, end):
-    """The parameter at which a piece that runs one way has a coordinate, and its point and direction there."""
-    rising = end > start
-    low = piece.t0
-    high = piece.t1
-    t = low + (high - low) * (target - start) / (end - start)
-    x, y, dx, dy = piece_line(pool, piece, t)
-    for _ in range(80):
-        value = x - target if axis == 0 else y - target
-        slope = dx if axis == 0 else dy
-        if value == 0.0:
-            break
-        if (value > 0.0) == rising:
-            high = t
-        else:
-            low = t
-        step = t - value / slope if slope != 0.0 else low
-        if not low < step < high:
-            step = 0.5 * (low + high)
-        if abs(step - t) <= 3e-16 * abs(step):
-            break
-        t = step
-        x, y, dx, dy = piece_line(pool, piece, t)
-    return t, (x, y), (dx, dy)
-
-
-@kernel(inner=True)
-def _newton(pool, piece, a, b, t, q):
-    """The nearest point of [a, b], over which the distance is convex; half its square and its parameter."""
-    low = a
-    high = b
-    f = 0.0
-    for _ in range(60):
-        (x, y), (dx, dy), (ddx, ddy) = piece_bend(pool, piece, t)
-        ex = x - q[0]
-        ey = y - q[1]
-        f = 0.5 * (ex * ex + ey * ey)
-        g = ex * dx + ey * dy
-        if g == 0.0:
-            break
-        if g > 0.0:
-            high = t
-            if t == a:
-                break
-        else:
-            low = t
-            if t == b:
-                break
-        curvature = dx * dx + dy * dy + ex * ddx + ey * ddy
-        step = next_in_bracket(t, g, curvature, (a, b), (low, high))
-        if abs(step - t) <= 2e-16 * max(abs(t), b - a):
-            break
-        t = step
-    return f, t
+# Where a piece that runs one way has a coordinate. sense: -1 where that falls along the piece.
+PieceCut = namedtuple("PieceCut", "pool piece axis target sense")
+# A point of it; how far beyond the target that is, counted as it rises, is the slope of a convex function.
+CutPoint = namedtuple("CutPoint", "slope curvature point direction")
 
 
 @kernel(inline=True)
-def next_in_bracket(t, slope, curvature, interval, bracket):
-    """Newton's next parameter, at an end of its interval or else inside of the bracket of the minimum."""
-    low, high = bracket
-    step = t - slope / curvature if curvature > 0.0 else 0.5 * (low + high)
-    if step <= interval[0]:
-        return interval[0]
-    if step >= interval[1]:
-        return interval[1]
-    return step if low < step < high else 0.5 * (low + high)
+def _cut_point(cut, t):
+    x, y, dx, dy = piece_line(cut.pool, cut.piece, t)
+    beyond, rate = (x - cut.target, dx) if cut.axis == 0 else (y - cut.target, dy)
+    return CutPoint(cut.sense * beyond, cut.sense * rate, (x, y), (dx, dy))
+
+
+_cut = kernel(inner=True)(bracketed_newton(_cut_point, inside=True, resolution=3e-16))
+
+
+@kernel(inner=True)
+def piece_at(pool, piece, axis, target, start, end):
+    """The parameter at which a piece that runs one way has a coordinate, and its point and direction there."""
+    low, high = piece.t0, piece.t1
+    t = low + (high - low) * (target - start) / (end - start)
+    t, found = _cut(PieceCut(pool, piece, axis, target, 1.0 if end > start else -1.0), low, high, t)
+    return t, found.point, found.direction
+
+
+# A piece and a point of the plane.
+PieceQuery = namedtuple("PieceQuery", "pool piece q interval")
+
+
+@kernel(inline=True)
+def _seen(query, t):
+    """The point of the question from a parameter of the piece."""
+    (x, y), (dx, dy), (ddx, ddy) = piece_bend(query.pool, query.piece, t)
+    ex = x - query.q[0]
+    ey = y - query.q[1]
+    speed = dx * dx + dy * dy
+    return Sight(0.5 * (ex * ex + ey * ey), ex * dx + ey * dy, speed + ex * ddx + ey * ddy, speed)
+
+
+_nearest_in = kernel(inner=True)(bracketed_newton(_seen, inside=False))
+_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=20))
 
 
 @kernel(inline=True)
@@ -232,6 +207,7 @@ def nearest_on_piece(pool, piece, bounds, q, best):
     """
     t0, t1 = piece.t0, piece.t1
     m1, m2, m3 = bounds
+    query = PieceQuery(pool, piece, q, Interval(t0, t1, False))
     found = t0 - 1.0
     level = 0
     index = 0
@@ -266,9 +242,9 @@ def nearest_on_piece(pool, piece, bounds, q, best):
         if low < best:
             if curvature > third * half:
                 begin = t0 + index * h
-                f, t = _newton(pool, piece, begin, min(begin + h, t1), m, q)
-                if f < best:
-                    best = f
+                t, near = _nearest_in(query, begin, min(begin + h, t1), m)
+                if near.merit < best:
+                    best = near.merit
                     found = t
             elif low < best - LET_GO * best and level < 50:
                 level += 1
@@ -284,27 +260,7 @@ def nearest_on_piece(pool, piece, bounds, q, best):
 @kernel(inner=True)
 def polished(pool, piece, t, q):
     """A parameter near that of a nearest point, brought to it by Newton's method as long as that goes downhill."""
-    (x, y), (dx, dy), (ddx, ddy) = piece_bend(pool, piece, t)
-    for _ in range(8):
-        ex = x - q[0]
-        ey = y - q[1]
-        speed = dx * dx + dy * dy
-        curvature = speed + ex * ddx + ey * ddy
-        if not curvature > 1e-3 * speed:
-            break
-        step = min(max(t - (ex * dx + ey * dy) / curvature, piece.t0), piece.t1)
-        if step == t:
-            break
-        (x, y), (dx, dy), (ddx, ddy) = piece_bend(pool, piece, step)
-        ax = x - q[0]
-        ay = y - q[1]
-        if ax * ax + ay * ay > (ex * ex + ey * ey) * (1.0 + 4e-16):
-            break
-        near = abs(step - t) <= 4e-16 * max(abs(t), piece.t1 - piece.t0)
-        t = step
-        if near:
-            break
-    return t
+    return _nearest_from(PieceQuery(pool, piece, q, Interval(piece.t0, piece.t1, False)), t)[2]
 
 
 @kernel(signatures="(f8[::1], i8[::1], i8[::1], f8[::1], f8[::1], f8[:, ::1])")

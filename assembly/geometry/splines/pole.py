@@ -16,6 +16,7 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
+from assembly._newton import Interval, bracketed_newton, held_in
 from assembly.geometry.splines.evaluate import surface_at, surface_point
 from assembly.geometry.vec import add, blend, cross, dot, scale, sub
 
@@ -165,6 +166,21 @@ def pole_frame(store, r, edge, u, v):
     )
 
 
+# The spoke of a pole that points along a way w in its tangent plane. sense: 1 where spokes turn about n as they should.
+SpokeQuery = namedtuple("SpokeQuery", "store surface edge w n sense interval")
+SpokeTurn = namedtuple("SpokeTurn", "slope curvature")
+
+
+@kernel(inline=True)
+def _spoke_turn(query, angle):
+    """(w x E).n, which rises where a spoke E comes past w, and its rate: a slope and a curvature."""
+    _p, e, turn, _bent = spoke(query.store, query.surface, query.edge, held_in(query.interval, angle))
+    return SpokeTurn(-query.sense * dot(cross(e, query.w), query.n), -query.sense * dot(cross(turn, query.w), query.n))
+
+
+_spoke_along = kernel(inner=True)(bracketed_newton(_spoke_turn, inside=False))
+
+
 @kernel(inner=True)
 def polar_step(store, r, edge, u, v, step):
     """Parameters after a tangential step (body axes) from (u, v) near the pole of `edge`, over it if it leads there."""
@@ -181,7 +197,7 @@ def polar_step(store, r, edge, u, v, step):
     reach = math.sqrt(dot(w, w))
     if not reach > 1e-300:
         return (lo if edge == 1 else hi, v) if edge <= 2 else (u, lo if edge == 4 else hi)
-    # The spoke that points along w: the best of a few, then Newton on (E x w).n = 0.
+    # The spoke that points along w is next to the best of a few.
     best = -2.0
     angle = along
     for k in range(16):
@@ -191,17 +207,12 @@ def polar_step(store, r, edge, u, v, step):
         if cosine > best:
             best = cosine
             angle = candidate
-    for _ in range(6):
-        _p, ek, tk, _bk = spoke(store, r, edge, angle)
-        slope = dot(cross(tk, w), n)
-        if slope == 0.0:
-            break
-        change = -dot(cross(ek, w), n) / slope
-        angle += max(min(change, 0.1 * (other_hi - other_lo)), -0.1 * (other_hi - other_lo))
-        if angle < other_lo or angle > other_hi:
-            if closed == 1:
-                angle -= (other_hi - other_lo) * math.floor((angle - other_lo) / (other_hi - other_lo))
-            angle = min(max(angle, other_lo), other_hi)
+    interval = Interval(other_lo, other_hi, closed == 1)
+    wide = (other_hi - other_lo) / 16.0
+    low = angle - wide if interval.closed else max(angle - wide, other_lo)
+    high = angle + wide if interval.closed else min(angle + wide, other_hi)
+    query = SpokeQuery(store, r, edge, w, n, 1.0 if dot(cross(e, turn), n) > 0.0 else -1.0, interval)
+    angle = held_in(interval, _spoke_along(query, low, high, angle)[0])
     _p, ek, _tk, _bk = spoke(store, r, edge, angle)
     delta = min(reach / math.sqrt(dot(ek, ek)), hi - lo)
     depth = lo + delta if edge == 1 or edge == 4 else hi - delta

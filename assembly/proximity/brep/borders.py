@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import namedtuple
 
 from assembly._kernel import kernel
+from assembly._newton import Interval, Sight, curve_newton, held_in
 from assembly.geometry.faces.trim_nearest import trim_nearest
 from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.domain import into_domain
@@ -74,53 +75,45 @@ def on_surface(store, surface, curve, t):
     return EdgePoint(u=u, v=v, point=p, tangent=blend(along[0], su, along[1], sv), normal=cross(su, sv))
 
 
+# A plane curve on a surface and a point in space.
+BorderQuery = namedtuple("BorderQuery", "store surface curve p interval")
+
+
 @kernel(inline=True)
-def clamp_to_curve(store, curve, t):
-    """A parameter within a curve's domain, or wrapped round it where the curve is closed."""
+def _seen(query, t):
+    """The point of the question from a place of the curve; curvature is left out, as the point is next to the curve."""
+    at = on_surface(query.store, query.surface, query.curve, t)
+    d = sub(at.point, query.p)
+    square = dot(at.tangent, at.tangent)
+    return Sight(0.5 * dot(d, d), dot(d, at.tangent), square, square)
+
+
+_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=3))
+
+
+@kernel(inner=True)
+def nearest_on_border(store, surface, curve, t, p):
+    """The parameter near t of a curve on a surface whose point is nearest to p."""
     arc = spline_curve_at(store.table, curve)
-    at = arc.breaks
-    low = store.pool[at]
-    high = store.pool[at + arc.spans]
-    if low <= t <= high:
-        return t
-    if arc.closed == 1:
-        return min(max(low + (t - low) % (high - low), low), high)
-    return low if t < low else high
+    interval = Interval(store.pool[arc.breaks], store.pool[arc.breaks + arc.spans], arc.closed == 1)
+    return _nearest_from(BorderQuery(store, surface, curve, p, interval), held_in(interval, t))[2]
 
 
 @kernel(inner=True)
 def other_parameter(store, edge, t, p):
     """The parameter of an edge on its second face, at its point p with parameter t on the first."""
     edge_record = edge_at(store.table, edge)
-    curve = edge_record.curve_b
-    surface = edge_record.surface_b
     at = edge_record.map
-    s = clamp_to_curve(store, curve, store.pool[at] + store.pool[at + 1] * t)
-    # The map is of first order; its error is smaller than the steps below can take away.
-    for _ in range(3):
-        on_edge = on_surface(store, surface, curve, s)
-        b, along = on_edge.point, on_edge.tangent
-        square = dot(along, along)
-        if not square > 0.0:
-            break
-        s = clamp_to_curve(store, curve, s + dot(sub(p, b), along) / square)
-    return s
+    # The map is of first order; its error is smaller than three steps can take away.
+    s = store.pool[at] + store.pool[at + 1] * t
+    return nearest_on_border(store, edge_record.surface_b, edge_record.curve_b, s, p)
 
 
 @kernel(inner=True)
 def first_parameter(store, edge, t, p):
     """The parameter of an edge near t whose point is nearest to p."""
     edge_record = edge_at(store.table, edge)
-    curve = edge_record.curve
-    t = clamp_to_curve(store, curve, t)
-    for _ in range(3):
-        on_edge = on_surface(store, edge_record.surface, curve, t)
-        a, along = on_edge.point, on_edge.tangent
-        square = dot(along, along)
-        if not square > 0.0:
-            break
-        t = clamp_to_curve(store, curve, t + dot(sub(p, a), along) / square)
-    return t
+    return nearest_on_border(store, edge_record.surface, edge_record.curve, t, p)
 
 
 @kernel(inline=True)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
+from assembly._newton import Interval, Sight, curve_newton
 from assembly._record import Store
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import curve_lanes, surface_point, xyz
 from assembly.geometry.vec import blend, cross, dot, sub
-
-_NEWTON_STEPS = 12
 
 
 @kernel(inner=True)
@@ -33,6 +33,22 @@ def along_boundaries(table, pool, surfaces, curves, which, t, out):
         for j in range(3):
             for m in range(3):
                 out[i, 3 * j + m] = jet[j][m]
+
+
+# A boundary curve and a point in space.
+BoundaryQuery = namedtuple("BoundaryQuery", "store surface curve p interval")
+
+
+@kernel(inline=True)
+def _seen(query, t):
+    """The point of the question from a place of the curve, as in Gauss and Newton's method."""
+    c, rate, _normal = _jet(query.store, query.surface, query.curve, t)
+    gap = sub(c, query.p)
+    square = dot(rate, rate)
+    return Sight(0.5 * dot(gap, gap), dot(gap, rate), square, square)
+
+
+_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=12))
 
 
 @kernel(inner=True)
@@ -63,8 +79,8 @@ def nearest_on_boundaries(store, boundaries, which, points, guess, close, out):
     `boundaries` are the surfaces and the curves, whether these are closed, where their samples (t, x, y, z) begin, and
     the samples.
 
-    Gauss and Newton's iteration, which converges quadratically for points on the curve: from the guess if it is right
-    to `close`, else from the nearest of the curve's samples. Distances are measured a step before the parameter.
+    The guess if it is right to `close`, else what Gauss and Newton's method comes to from the nearest of the curve's
+    samples, quadratically for points on the curve. Distances are measured a step before the parameter.
     """
     table, pool = store
     surfaces, curves, closed, begins, samples = boundaries
@@ -73,31 +89,11 @@ def nearest_on_boundaries(store, boundaries, which, points, guess, close, out):
         p = (points[i, 0], points[i, 1], points[i, 2])
         first = begins[k]
         stop = begins[k + 1]
-        low = samples[first, 0]
-        high = samples[stop - 1, 0]
+        interval = Interval(samples[first, 0], samples[stop - 1, 0], closed[k])
+        query = BoundaryQuery(Store(table, pool), surfaces[k], curves[k], p, interval)
         t = guess[i]
-        c, rate, _normal = _jet(Store(table, pool), surfaces[k], curves[k], t)
-        gap = sub(p, c)
-        best = t
-        least = math.sqrt(dot(gap, gap))
-        if least > close:
-            t = samples[_nearest_sample(samples, first, stop, p), 0]
-            least = math.inf
-            for _ in range(_NEWTON_STEPS):
-                c, rate, _normal = _jet(Store(table, pool), surfaces[k], curves[k], t)
-                gap = sub(p, c)
-                distance = math.sqrt(dot(gap, gap))
-                speed = max(dot(rate, rate), 1e-300)
-                step = dot(gap, rate) / speed
-                t += step
-                if closed[k]:
-                    t -= (high - low) * math.floor((t - low) / (high - low))
-                t = min(max(t, low), high)
-                if not distance < least:
-                    break
-                best = t
-                least = distance
-                if abs(step) * math.sqrt(speed) <= close:
-                    break
-        out[i, 0] = best
-        out[i, 1] = least
+        at = _seen(query, t)
+        if 2.0 * at.merit > close * close:
+            _t, at, t = _nearest_from(query, samples[_nearest_sample(samples, first, stop, p), 0])
+        out[i, 0] = t
+        out[i, 1] = math.sqrt(2.0 * at.merit)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,10 +17,11 @@ from assembly.proximity.bvh.cones import FULL, between
 if TYPE_CHECKING:
     from assembly.proximity.bvh.facet_tree import FacetTree
 
-__all__ = ["edge_point", "largest_excess", "other_parameter", "triangle_distance"]
+__all__ = ["edge_point", "largest_excess", "other_parameter", "same_points", "triangle_distance"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 # Normals are not asked for where |Su x Sv| is below this part of |Su| |Sv|.
 _SINGULAR = 1e-9
 # Pairs of points and elements looked at together.
@@ -64,17 +66,28 @@ def other_parameter(topology: Topology, edge: Edge, t: Array) -> Array:
     a, b = topology.faces[edge.face_a], topology.faces[edge.face_b]
     points, _ = edge_point(a.surface, a.boundary[edge.curve_a], t)
     curve = b.boundary[edge.curve_b]
-    low, high = curve.domain
-    closed = edge.start is None
-    at = edge.map_b[0] + edge.map_b[1] * t
-    step = 0.05 * (high - low)
+    guess = edge.map_b[0] + edge.map_b[1] * t
+    return same_points(lambda at: edge_point(b.surface, curve, at), points, guess, curve.domain, edge.start is None)
+
+
+def same_points(
+    along: Callable[[Array], tuple[Array, Array]],
+    points: Array,
+    guess: Array,
+    domain: tuple[Array, Array] | tuple[float, float],
+    closed: Mask | bool,
+) -> Array:
+    """Where curves, of which `along` gives points and derivatives, are at points; beyond the domain of closed ones."""
+    low, high = domain
+    most = 0.05 * np.subtract(high, low)
+    at = guess
     for _ in range(_STEPS):
-        inside = low + np.mod(at - low, high - low) if closed else np.clip(at, low, high)
-        p, rate = edge_point(b.surface, curve, inside)
+        inside = np.where(closed, low + np.mod(at - low, np.subtract(high, low)), np.clip(at, low, high))
+        p, rate = along(inside)
         square = (rate**2).sum(axis=1)
         move = ((points - p) * rate).sum(axis=1) / np.where(square > 0.0, square, 1.0)
-        at = (at if closed else inside) + np.clip(move, -step, step)
-    return np.asarray(at if closed else np.clip(at, low, high))
+        at = np.where(closed, at, inside) + np.clip(move, -most, most)
+    return np.asarray(np.where(closed, at, np.clip(at, low, high)))
 
 
 class _Checked:

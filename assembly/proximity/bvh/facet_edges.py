@@ -19,6 +19,7 @@ from assembly.proximity.brep.boundary_curves import Batch, Rim, Survey
 from assembly.proximity.brep.edge_cells import box_hulls, box_parts, interval_parts
 from assembly.proximity.brep.topology import Topology
 from assembly.proximity.bvh.cones import CONVEX, FULL, MARGIN, around_cones, around_vectors, between
+from assembly.proximity.bvh.facet_check import same_points
 from assembly.proximity.bvh.facet_elements import Elements
 from assembly.proximity.bvh.normal_nets import Nets, nets_of, restricted, restriction
 
@@ -29,8 +30,8 @@ Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 # Parts of an edge are no longer than this part of its face; every edge has so many at first, halved so often at most.
 _PART, _FIRST, _HALVINGS = 0.25, 4, 6
-# Steps of Newton's method to the same point on the other face, and how much wider the other parts are made.
-_STEPS, _WIDER = 8, 0.05
+# How much wider parts are made that are found by Newton's method on the other face.
+_WIDER = 0.05
 
 
 class _Curves:
@@ -173,7 +174,12 @@ class _Edges:
         """Boxes around the second face's curve over parts of edges, and the part each belongs to."""
         row = np.repeat(np.arange(len(edge)), 2)
         points, _, _ = self.batch_a.along(edge[row], t.ravel())
-        ends = self.other_parameter(edge[row], t.ravel(), points).reshape(-1, 2)
+        guess = self.map_b[edge[row], 0] + self.map_b[edge[row], 1] * t.ravel()
+        domain = self.domain_b[edge[row], 0], self.domain_b[edge[row], 1]
+        found = same_points(
+            lambda at: self.batch_b.along(edge[row], at)[:2], points, guess, domain, self.closed[edge[row]]
+        )
+        ends = found.reshape(-1, 2)
         low, high = ends.min(axis=1), ends.max(axis=1)
         wider = _WIDER * (high - low) + 1e-9 * np.diff(self.domain_b[edge], axis=1)[:, 0]
         low, high = low - wider, high + wider
@@ -192,20 +198,6 @@ class _Edges:
             return np.empty(0, dtype=np.int64), np.empty((0, 4))
         boxes = self.curves_b.boxes(np.concatenate(spans), np.concatenate(starts), np.concatenate(stops))
         return np.concatenate(owners), boxes
-
-    def other_parameter(self, edge: Indices, t: Array, points: Array) -> Array:
-        """Where edges are at the same points on their second faces; beyond the domain of closed ones."""
-        low, high = self.domain_b[edge].T
-        closed = self.closed[edge]
-        at = self.map_b[edge, 0] + self.map_b[edge, 1] * t
-        most = 0.05 * (high - low)
-        for _ in range(_STEPS):
-            inside = np.where(closed, low + np.mod(at - low, high - low), np.clip(at, low, high))
-            p, rate, _ = self.batch_b.along(edge, inside)
-            square = (rate**2).sum(axis=1)
-            move = ((points - p) * rate).sum(axis=1) / np.where(square > 0.0, square, 1.0)
-            at = np.where(closed, at, inside) + np.clip(move, -most, most)
-        return np.asarray(np.where(closed, at, np.clip(at, low, high)))
 
     def _normals(self, face: Indices, boxes: Array, owner: Indices) -> tuple[Array, Array]:
         """Cones around outward normals over boxes (n, 4) in (u, v) of faces; one an owner, in the order of owners."""

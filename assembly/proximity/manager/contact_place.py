@@ -9,10 +9,12 @@ contact that is still open is taken as closed: what it will leave open by less t
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly._newton import Interval, Sight, curve_newton
 from assembly._record import Store
 from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import add, dot, scale, sub
@@ -39,8 +41,8 @@ from assembly.proximity.manager.records import ContactManager, lengths_of, pair_
 STRIDES, LONGEST = 32, 96
 # How often a point is put between the bodies anew after a stride, and which part of a stride has to be gained.
 CENTERINGS, GAINED = 3, 0.05
-# Steps of Newton's method to the nearest point of an edge.
-EDGE_STEPS = 8
+# A part of an edge and a point.
+EdgeQuery = namedtuple("EdgeQuery", "store edge y interval")
 
 
 @kernel(inner=True)
@@ -62,22 +64,23 @@ def distance_between(a, b):
     return math.sqrt(dot(d, d))
 
 
+@kernel(inline=True)
+def _seen(query, t):
+    """The point of the question from a place of the edge."""
+    p, along, bent = edge_jet(query.store, query.edge, t)
+    d = sub(p, query.y)
+    square = dot(along, along)
+    return Sight(0.5 * dot(d, d), dot(d, along), square + dot(d, bent), square)
+
+
+_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=9))
+
+
 @kernel(inner=True)
 def point_on_edge(store, edge, low, high, y):
     """The point of a part of an edge that Newton's method takes for the nearest one to y."""
-    t = 0.5 * (low + high)
-    for _ in range(EDGE_STEPS):
-        p, along, bent = edge_jet(store, edge, t)
-        d = sub(p, y)
-        slope = dot(d, along)
-        square = dot(along, along)
-        curvature = square + dot(d, bent)
-        step = -slope / (curvature if curvature > 0.1 * square else max(square, 1e-300))
-        before = t
-        t = min(max(t + step, low), high)
-        if abs(t - before) <= 1e-12 * (high - low):
-            break
-    return edge_jet(store, edge, t)[0]
+    query = EdgeQuery(store, edge, y, Interval(low, high, False))
+    return edge_jet(store, edge, _nearest_from(query, 0.5 * (low + high))[2])[0]
 
 
 @kernel(inner=True)

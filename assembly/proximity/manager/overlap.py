@@ -36,8 +36,6 @@ from assembly.proximity.manager.edge_piercing import cut_at, patch_vertex_contac
 
 # Room for the descent of a segment.
 DEPTH = 256
-# How often Newton's steps to a foot begin again where they end.
-PROJECTIONS = 4
 # A segment that passes a facet by less than this part of its sides cuts it, where being cut by two is no harm: one
 # through a common side may miss both.
 BETWEEN = 1e-9
@@ -184,10 +182,6 @@ def projection_at(posed, side, e, y):
         return 0.0, y, False
     u, v = patch.middle[0], patch.middle[1]
     foot = projection_of(store, f, y, u, v)
-    for _ in range(PROJECTIONS):
-        if foot.settled:
-            break
-        foot = projection_of(store, f, y, foot.parameters[0], foot.parameters[1])
     s, t = foot.parameters
     beside = is_within(store, f, s, t, u, v, BESIDE * patch.half[0], BESIDE * patch.half[1])
     return foot.distance, foot.normal, foot.settled and beside and in_trim(posed, side, code, s, t)

@@ -15,22 +15,32 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
+from assembly._newton import bracketed_newton, damped_newton
 from assembly.geometry.vec import dot
 from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, difference_at
 
-# Steps of Newton's method, of feet, and until an interval cannot be halved any more.
-STEPS, PROJECTIONS, HALVINGS = 30, 12, 60
+# Steps of Newton's method over a box, and to a foot.
+STEPS, PROJECTIONS = 30, 13
 # Slopes of the distance below this count as zero at the borders of a box: the next box has the same point. Those of F
 # below the second are rounding.
 LEVEL, STILL = 1e-10, 1e-16
 # A valley with no more slope than this at both ends is level: rounding tells where it has minima.
 NOISE = 1e-14
-# A foot is one where the last step toward it is shorter than this.
-SHORT = 1e-12
+# A foot is one where a step toward it would be shorter than this; one that lowers F by less of it is rounding.
+SHORT, PROMISE = 1e-12, 1e-15
 # Two PosedParts of which one is followed: side 0 if that is f, 1 g.
 Course = namedtuple("Course", "parts side")
-# Slopes of F on both centerlines and its second derivatives: x along the followed one, y along the other one.
-Slopes = namedtuple("Slopes", "x y xx yy xy")
+# F, its slopes on both centerlines and its second derivatives: x along the followed one, y along the other one.
+Slopes = namedtuple("Slopes", "merit x y xx yy xy")
+BoxQuery = namedtuple("BoxQuery", "course box")
+# The foot of x on the other centerline. A course with feet that are found from y on, or are `held` there. A course
+# whose feet come to an `end` of the other centerline; sense: -1 where F_y falls there.
+FootQuery = namedtuple("FootQuery", "course x")
+CourseQuery = namedtuple("CourseQuery", "course held y")
+KinkQuery = namedtuple("KinkQuery", "course end sense")
+# phi' and phi'', the foot, and whether it is one. F_y at an end and its rate.
+Projected = namedtuple("Projected", "slope curvature foot found")
+SlopeAtEnd = namedtuple("SlopeAtEnd", "slope curvature")
 # Room for the minima of a thin box: both ends, and three in each of the pieces between these and two kinks.
 MINIMA = 11
 
@@ -50,55 +60,6 @@ def is_held(slope, x, low, high, far):
     return abs(slope) <= max(LEVEL * far, STILL) or (x <= low and slope > 0.0) or (x >= high and slope < 0.0)
 
 
-@kernel(inner=True)
-def convex_minimum(parts, box, open_ends, s, t):
-    """The minimum of F over a box where it is convex, from (s, t): whether it is one of the curves; s, t; whether it is
-    the minimum over the box.
-
-    It is none of the curves where the box alone ends it. Along a valley that is all but level steps may end before its
-    bottom.
-    """
-    last = math.inf
-    for _ in range(STEPS):
-        at = difference_at(parts, s, t)
-        d, f, g = at.d, at.tangent_f, at.tangent_g
-        a = -dot(d, f)
-        b = dot(d, g)
-        ss = 1.0 - dot(d, at.curvature_f)
-        tt = 1.0 + dot(d, at.curvature_g)
-        st = -dot(f, g)
-        hold_s = (s <= box.from_f and a > 0.0) or (s >= box.to_f and a < 0.0)
-        hold_t = (t <= box.from_g and b > 0.0) or (t >= box.to_g and b < 0.0)
-        if (hold_s or abs(a) <= STILL) and (hold_t or abs(b) <= STILL):
-            # Along a valley that is all but level steps do not end.
-            break
-        if hold_s or hold_t:
-            x = 0.0 if hold_s else -a / ss
-            y = 0.0 if hold_t else -b / tt
-        else:
-            det = ss * tt - st * st
-            # Lines that are parallel as far as rounding tells: across the valley only.
-            i = 1.0 / det if det > 1e-14 else 0.0
-            x = i * (st * b - tt * a) if i > 0.0 else 0.5 * (-a)
-            y = i * (st * a - ss * b) if i > 0.0 else 0.5 * (-b)
-        s_new = min(max(s + x, box.from_f), box.to_f)
-        t_new = min(max(t + y, box.from_g), box.to_g)
-        size = abs(s_new - s) + abs(t_new - t)
-        s = s_new
-        t = t_new
-        if size <= 1e-15 or (size < 1e-9 and size >= 0.5 * last):
-            break
-        last = size
-    at = difference_at(parts, s, t)
-    d = at.d
-    far = math.sqrt(dot(d, d))
-    ends_f = (open_ends.start_f and s <= box.from_f, open_ends.end_f and s >= box.to_f)
-    ends_g = (open_ends.start_g and t <= box.from_g, open_ends.end_g and t >= box.to_g)
-    a, b = -dot(d, at.tangent_f), dot(d, at.tangent_g)
-    ends = is_held(a, s, box.from_f, box.to_f, far) and is_held(b, t, box.from_g, box.to_g, far)
-    return is_least(a, far, ends_f) and is_least(b, far, ends_g), s, t, ends
-
-
 @kernel(inline=True)
 def slopes_of(course, x, y):
     """The Slopes at x along the followed centerline and y along the other one."""
@@ -110,30 +71,103 @@ def slopes_of(course, x, y):
     across = (dot(d, g), 1.0 + dot(d, at.curvature_g))
     if side == 1:
         along, across = across, along
-    return Slopes(x=along[0], y=across[0], xx=along[1], yy=across[1], xy=-dot(f, g))
+    return Slopes(merit=0.5 * dot(d, d), x=along[0], y=across[0], xx=along[1], yy=across[1], xy=-dot(f, g))
+
+
+@kernel(inline=True)
+def _slopes_in_box(query, place):
+    return slopes_of(query.course, place[0], place[1])
+
+
+@kernel(inline=True)
+def _step_in_box(query, place, at):
+    """Newton's step over a box where F is convex, lengths held at the ends that the slope leads out of."""
+    box = query.box
+    s, t = place
+    a, b, ss, tt, st = at.x, at.y, at.xx, at.yy, at.xy
+    hold_s = (s <= box.from_f and a > 0.0) or (s >= box.to_f and a < 0.0)
+    hold_t = (t <= box.from_g and b > 0.0) or (t >= box.to_g and b < 0.0)
+    if hold_s or hold_t:
+        x = 0.0 if hold_s else -a / ss
+        y = 0.0 if hold_t else -b / tt
+    else:
+        det = ss * tt - st * st
+        # Lines that are parallel as far as rounding tells: across the valley only.
+        i = 1.0 / det if det > 1e-14 else 0.0
+        x = i * (st * b - tt * a) if i > 0.0 else 0.5 * (-a)
+        y = i * (st * a - ss * b) if i > 0.0 else 0.5 * (-b)
+    return (x, y), not a * x + b * y < -PROMISE * at.merit
+
+
+@kernel(inline=True)
+def _move_in_box(query, place, part, step):
+    box = query.box
+    s = min(max(place[0] + part * step[0], box.from_f), box.to_f)
+    return s, min(max(place[1] + part * step[1], box.from_g), box.to_g)
+
+
+_least_in_box = kernel(inner=True)(damped_newton(_slopes_in_box, _step_in_box, _move_in_box, steps=STEPS))
 
 
 @kernel(inner=True)
-def projection_on_centerline(course, held, x, y):
-    """The foot of x on the other centerline, from y, or y itself if it is `held`: phi', phi'', the foot, whether it is
-    one.
+def convex_minimum(parts, box, open_ends, s, t):
+    """The minimum of F over a box where it is convex, from (s, t): whether it is one of the curves; s, t; whether it is
+    the minimum over the box.
 
-    There is none where F is not convex along the other centerline.
+    It is none of the curves where the box alone ends it. Along a valley that is all but level steps may end before its
+    bottom.
     """
-    at = slopes_of(course, x, y)
-    if held:
-        return at.x, at.xx, y, True
-    step = math.inf
-    for _ in range(PROJECTIONS):
-        if not at.yy > 0.0:
-            return at.x, at.xx, y, False
-        step = -at.y / at.yy
-        y += step
-        at = slopes_of(course, x, y)
-        if abs(step) <= 1e-15:
-            break
-    found = at.yy > 0.0 and abs(step) <= SHORT
-    return at.x, at.xx - at.xy * at.xy / at.yy if found else at.xx, y, found
+    query = BoxQuery(Course(parts, 0), box)
+    s, t = _least_in_box(query, (s, t))[2]
+    at = slopes_of(query.course, s, t)
+    far = math.sqrt(2.0 * at.merit)
+    ends_f = (open_ends.start_f and s <= box.from_f, open_ends.end_f and s >= box.to_f)
+    ends_g = (open_ends.start_g and t <= box.from_g, open_ends.end_g and t >= box.to_g)
+    ends = is_held(at.x, s, box.from_f, box.to_f, far) and is_held(at.y, t, box.from_g, box.to_g, far)
+    return is_least(at.x, far, ends_f) and is_least(at.y, far, ends_g), s, t, ends
+
+
+@kernel(inline=True)
+def _slopes_across(query, y):
+    return slopes_of(query.course, query.x, y)
+
+
+@kernel(inline=True)
+def _step_across(query, y, at):
+    """Newton's step to a foot; there is none from where F is not convex along the other centerline."""
+    step = -at.y / at.yy if at.yy > 0.0 else 0.0
+    return step, not at.y * step < -PROMISE * at.merit
+
+
+@kernel(inline=True)
+def _move_across(query, y, part, step):
+    return y + part * step
+
+
+_foot = kernel(inner=True)(damped_newton(_slopes_across, _step_across, _move_across, steps=PROJECTIONS))
+
+
+@kernel(inner=True)
+def projection_at(query, x):
+    """The `Projected` of x: its foot on the other centerline."""
+    y = query.y
+    if not query.held:
+        y = _foot(FootQuery(query.course, x), y)[2]
+    at = slopes_of(query.course, x, y)
+    if query.held:
+        return Projected(at.x, at.xx, y, True)
+    found = at.yy > 0.0 and abs(at.y) <= SHORT * at.yy
+    return Projected(at.x, at.xx - at.xy * at.xy / at.yy if found else at.xx, y, found)
+
+
+@kernel(inline=True)
+def _slope_at_end(query, x):
+    at = slopes_of(query.course, x, query.end)
+    return SlopeAtEnd(query.sense * at.y, query.sense * at.xy)
+
+
+_rise = kernel(inner=True)(bracketed_newton(projection_at, inside=True, resolution=1e-15))
+_kink = kernel(inner=True)(bracketed_newton(_slope_at_end, inside=True, resolution=1e-15))
 
 
 @kernel(inner=True)
@@ -144,30 +178,11 @@ def held_at(course, own, x):
     return 1 if slopes_of(course, x, own[1]).y <= 0.0 else 0
 
 
-@kernel(inline=True)
-def or_middle(left, right, x):
-    """x where it is inside of an interval, else the interval's middle."""
-    return x if left < x < right else 0.5 * (left + right)
-
-
 @kernel(inner=True)
 def kink_at(course, end, left, right):
     """Where between two places the foot comes to an end of the other centerline's piece: F_y = 0 there."""
-    rises = slopes_of(course, right, end).y > 0.0
-    x = 0.5 * (left + right)
-    for _ in range(HALVINGS):
-        at = slopes_of(course, x, end)
-        b, xy = at.y, at.xy
-        if abs(b) <= 1e-15 * abs(xy):
-            break
-        if (b > 0.0) == rises:
-            right = x
-        else:
-            left = x
-        x = or_middle(left, right, x - b / xy if xy != 0.0 else left)
-        if right - left <= 1e-15:
-            break
-    return x
+    sense = 1.0 if slopes_of(course, right, end).y > 0.0 else -1.0
+    return _kink(KinkQuery(course, end, sense), left, right, 0.5 * (left + right))[0]
 
 
 @kernel(inline=True)
@@ -191,25 +206,6 @@ def turns_of(width, a, b, bend_a, bend_b):
 
 
 @kernel(inner=True)
-def rise_of(course, held, left, right, y):
-    """Where phi' rises through zero between two places, the foot there and whether it is one."""
-    x = 0.5 * (left + right)
-    for _ in range(HALVINGS):
-        slope, bend, y, _found = projection_on_centerline(course, held, x, y)
-        if abs(slope) <= 1e-15 * bend:
-            break
-        if slope <= 0.0:
-            left = x
-        else:
-            right = x
-        x = or_middle(left, right, x - slope / bend if bend > 0.0 else left)
-        if right - left <= 1e-15:
-            break
-    _slope, _bend, y, found = projection_on_centerline(course, held, x, y)
-    return x, y, found
-
-
-@kernel(inner=True)
 def piece_minima(course, held, left, right, y, ends, places, count):
     """Minima of phi between two places all of whose feet are `held` at y, or are none of them, found from y on.
 
@@ -217,32 +213,33 @@ def piece_minima(course, held, left, right, y, ends, places, count):
     larger slope at both ends, and whether there are feet.
     """
     side = course.side
-    a, bend_a, y_a, found_a = projection_on_centerline(course, held, left, y)
-    b, bend_b, y_b, found_b = projection_on_centerline(course, held, right, y)
-    certain = found_a and found_b
+    query = CourseQuery(course, held, y)
+    a, b = projection_at(query, left), projection_at(query, right)
+    certain = a.found and b.found
     width = right - left
-    low, high = turns_of(width, a, b, bend_a, bend_b)
-    if ends[0] and a > 0.0 and found_a:
-        places[count, side], places[count, 1 - side] = left, y_a
+    low, high = turns_of(width, a.slope, b.slope, a.curvature, b.curvature)
+    if ends[0] and a.slope > 0.0 and a.found:
+        places[count, side], places[count, 1 - side] = left, a.foot
         count += 1
-    x, slope = left, a
+    x, slope = left, a.slope
     for step in range(3):
         part = low if step == 0 else (high if step == 1 else 1.0)
-        new, rises = right, b
+        new, rises = right, b.slope
         if part < 1.0:
             new = left + part * width
-            rises = projection_on_centerline(course, held, new, y)[0]
+            rises = projection_at(query, new).slope
         if new > x and slope <= 0.0 <= rises:
-            there, projection, found = rise_of(course, held, x, new, y)
-            certain = certain and found
-            if found:
-                places[count, side], places[count, 1 - side] = there, projection
+            # Where phi' rises through zero.
+            there, at = _rise(query, x, new, 0.5 * (x + new))
+            certain = certain and at.found
+            if at.found:
+                places[count, side], places[count, 1 - side] = there, at.foot
                 count += 1
         x, slope = new, rises
-    if ends[1] and b < 0.0 and found_b:
-        places[count, side], places[count, 1 - side] = right, y_b
+    if ends[1] and b.slope < 0.0 and b.found:
+        places[count, side], places[count, 1 - side] = right, b.foot
         count += 1
-    return count, max(abs(a), abs(b)), certain
+    return count, max(abs(a.slope), abs(b.slope)), certain
 
 
 @kernel(inner=True)
