@@ -164,7 +164,7 @@ def test_looks_in_slices_find_the_same(monkeypatch):
     looks = []
     look = crossings.manager.update
     # A slice that is over when it begins: every look is at one pair.
-    monkeypatch.setattr(crossings.manager_records, "SLICE", -1)
+    monkeypatch.setattr(crossings, "SLICE", -1)
     monkeypatch.setattr(crossings.manager, "update", lambda *arguments: looks.append(arguments) or look(*arguments))
     assert solution.find_crossings().pairs == expected
     assert len(looks) == len(crossings.DEPTHS) * len(expected)
