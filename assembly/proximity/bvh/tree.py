@@ -20,7 +20,6 @@ from collections import namedtuple
 
 import numpy as np
 
-from assembly._descent import NONE, STOP, descend_pairs
 from assembly._kernel import kernel
 from assembly._record import Store, record_dtype, record_view, size_of
 from assembly.geometry.vec import add, dot, matvec, matvec_t, scale, sub
@@ -225,60 +224,6 @@ def rounding(store, trees, shift):
     return TREE_ROUNDING * size
 
 
-# A walk down the trees of f and g. ahead, back: how f sees g, and g sees f; out: room for pairs (n, 2).
-TreeWalk = namedtuple("TreeWalk", "store trees pose ahead back margin out")
-
-
-@kernel(inline=True)
-def walk_at(store, trees, pose, margin, out):
-    """The `TreeWalk` at a pose."""
-    return TreeWalk(store, trees, pose, view_of(pose), view_of(inverse_pose(pose)), margin, out)
-
-
-@kernel(inline=True)
-def node_in(walk, side, k):
-    """The NODE_BOUNDS of node k of f, or of g."""
-    return tree_node(walk.store, walk.trees[side], k)
-
-
-@kernel(inline=True)
-def children_at(walk, i, j):
-    """First children, or -1 - element, of node i of f and of node j of g, and whether the way down is on f."""
-    child_f, child_g = child_of(walk.store, walk.trees[0], i), child_of(walk.store, walk.trees[1], j)
-    on_f = child_g < 0 or (child_f >= 0 and node_in(walk, 0, i).radius >= node_in(walk, 1, j).radius)
-    return child_f, child_g, on_f
-
-
-@kernel(inline=True)
-def note_pair(walk, count, child_f, child_g):
-    """Write the pair of elements of two leaves, where there is room. How many there are then."""
-    if count < walk.out.shape[0]:
-        walk.out[count, 0] = -1 - child_f
-        walk.out[count, 1] = -1 - child_g
-    return count + 1
-
-
-@kernel(inline=True)
-def admitted_below(walk, i, j, count):
-    """A step down to the leaves that `margin` admits."""
-    f, g = node_in(walk, 0, i), node_in(walk, 1, j)
-    child_f, child_g, on_f = children_at(walk, i, j)
-    if child_f < 0 and child_g < 0:
-        if facing(f, g, walk.pose, walk.margin.slack + walk.margin.tilt * walk.margin.reach):
-            count = note_pair(walk, count, child_f, child_g)
-        return count, on_f, NONE, NONE
-    side = 0 if on_f else 1
-    child, view = child_f if on_f else child_g, walk.ahead if on_f else walk.back
-    other = node_in(walk, 1 - side, j if on_f else i)
-    seen = seen_from(view, other)
-    first = admits(node_in(walk, side, child), other, seen, view, walk.margin)
-    second = admits(node_in(walk, side, child + 1), other, seen, view, walk.margin)
-    return count, on_f, child if first else NONE, child + 1 if second else NONE
-
-
-descend_admitted = kernel(inner=True)(descend_pairs(admitted_below))
-
-
 @kernel(inner=True)
 def pairs_about(store, trees, pose, reach, ring, tilt, stack, out):
     """Elements (k, 2) that may hold an extremal pair with |gap| <= reach at this pose, or at one near it; their number.
@@ -289,13 +234,53 @@ def pairs_about(store, trees, pose, reach, ring, tilt, stack, out):
 
     -1 where the stack (n, 2) is too short; more than `out` holds where `out` is: then what it holds are the first.
     """
+    tree_f, tree_g = trees
     slack = ring + rounding(store, trees, pose.shift)
-    walk = walk_at(store, trees, pose, Margin(reach + slack, slack, tilt + TREE_ROUNDING), out)
-    g = tree_node(store, trees[1], 0)
-    if not admits(tree_node(store, trees[0], 0), g, seen_from(walk.ahead, g), walk.ahead, walk.margin):
+    margin = Margin(reach + slack, slack, tilt + TREE_ROUNDING)
+    view = view_of(pose)
+    back = view_of(inverse_pose(pose))
+    room = stack.shape[0]
+    count = 0
+    if room < 1:
+        return -1
+    g = tree_node(store, tree_g, 0)
+    if not admits(tree_node(store, tree_f, 0), g, seen_from(view, g), view, margin):
         return 0
-    count, fits = descend_admitted(walk, 0, stack)
-    return count if fits else -1
+    stack[0, 0] = 0
+    stack[0, 1] = 0
+    used = 1
+    while used > 0:
+        used -= 1
+        i = stack[used, 0]
+        j = stack[used, 1]
+        f = tree_node(store, tree_f, i)
+        g = tree_node(store, tree_g, j)
+        child_f = child_of(store, tree_f, i)
+        child_g = child_of(store, tree_g, j)
+        if child_f < 0 and child_g < 0:
+            if facing(f, g, pose, slack + margin.tilt * margin.reach):
+                if count < out.shape[0]:
+                    out[count, 0] = -1 - child_f
+                    out[count, 1] = -1 - child_g
+                count += 1
+            continue
+        if used + 2 > room:
+            return -1
+        if child_g < 0 or (child_f >= 0 and f.radius >= g.radius):
+            seen = seen_from(view, g)
+            for k in range(child_f, child_f + 2):
+                if admits(tree_node(store, tree_f, k), g, seen, view, margin):
+                    stack[used, 0] = k
+                    stack[used, 1] = j
+                    used += 1
+        else:
+            seen = seen_from(back, f)
+            for k in range(child_g, child_g + 2):
+                if admits(tree_node(store, tree_g, k), f, seen, back, margin):
+                    stack[used, 0] = i
+                    stack[used, 1] = k
+                    used += 1
+    return count
 
 
 @kernel(inner=True)
@@ -342,63 +327,88 @@ def box_distance(node, other, seen, view):
     return max(along, excess(matvec_t(view.rotation, d), matvec_t(view.bulk, ho), three_of(other.half)))
 
 
-@kernel(inline=True)
-def meeting_below(walk, i, j, count):
-    """A step down to leaves whose boxes meet."""
-    f, g = node_in(walk, 0, i), node_in(walk, 1, j)
-    child_f, child_g, on_f = children_at(walk, i, j)
-    if count == walk.out.shape[0]:
-        return count, on_f, NONE, STOP
-    if box_distance(f, g, seen_from(walk.ahead, g), walk.ahead) > 0.0:
-        return count, on_f, NONE, NONE
-    if child_f < 0 and child_g < 0:
-        return note_pair(walk, count, child_f, child_g), on_f, NONE, NONE
-    child = child_f if on_f else child_g
-    return count, on_f, child, child + 1
-
-
-descend_meeting = kernel(inner=True)(descend_pairs(meeting_below))
-
-
 @kernel(inner=True)
 def overlapping(store, trees, pose, stack, out):
     """Elements (k, 2) of two trees whose boxes meet; how many `out` holds of them."""
-    return descend_meeting(walk_at(store, trees, pose, Margin(0.0, 0.0, 0.0), out), 0, stack)[0]
-
-
-@kernel(inline=True)
-def nearer_below(walk, i, j, best):
-    """A step down to leaves whose boxes are nearer than the square `best`."""
-    f, g = node_in(walk, 0, i), node_in(walk, 1, j)
-    child_f, child_g, on_f = children_at(walk, i, j)
-    bound = box_distance(f, g, seen_from(walk.ahead, g), walk.ahead)
-    # What was found since the pair was put on the stack may exclude it.
-    if bound >= best or (child_f < 0 and child_g < 0):
-        return min(bound, best), on_f, NONE, NONE
-    side = 0 if on_f else 1
-    child, view = child_f if on_f else child_g, walk.ahead if on_f else walk.back
-    other = node_in(walk, 1 - side, j if on_f else i)
-    seen = seen_from(view, other)
-    one = box_distance(node_in(walk, side, child), other, seen, view)
-    two = box_distance(node_in(walk, side, child + 1), other, seen, view)
-    nearer = child if one <= two else child + 1
-    farther = 2 * child + 1 - nearer
-    return best, on_f, farther if max(one, two) < best else NONE, nearer if min(one, two) < best else NONE
-
-
-descend_nearer = kernel(inner=True)(descend_pairs(nearer_below))
+    tree_f, tree_g = trees
+    view = view_of(pose)
+    count = 0
+    stack[0, 0] = 0
+    stack[0, 1] = 0
+    used = 1
+    while used > 0 and count < out.shape[0]:
+        used -= 1
+        i = stack[used, 0]
+        j = stack[used, 1]
+        f = tree_node(store, tree_f, i)
+        g = tree_node(store, tree_g, j)
+        if box_distance(f, g, seen_from(view, g), view) > 0.0:
+            continue
+        child_f = child_of(store, tree_f, i)
+        child_g = child_of(store, tree_g, j)
+        if child_f < 0 and child_g < 0:
+            out[count, 0] = -1 - child_f
+            out[count, 1] = -1 - child_g
+            count += 1
+        elif used + 2 <= stack.shape[0]:
+            down_f = child_g < 0 or (child_f >= 0 and f.radius >= g.radius)
+            for k in range(2):
+                stack[used, 0] = child_f + k if down_f else i
+                stack[used, 1] = j if down_f else child_g + k
+                used += 1
+    return count
 
 
 @kernel(inner=True)
 def least_distance(store, trees, pose, upper, stack):
     """A lower bound of the distance of two trees' elements, at most `upper`: that of their boxes.
 
-    Zero where the stack (n, 2) is too short.
+    A stack (n, 2) that is too short makes what is found lower, not wrong.
     """
+    tree_f, tree_g = trees
     slack = rounding(store, trees, pose.shift)
-    walk = walk_at(store, trees, pose, Margin(0.0, 0.0, 0.0), stack)
-    best, fits = descend_nearer(walk, (upper + slack) * (upper + slack), stack)
-    return max(math.sqrt(best) - slack, 0.0) if fits else 0.0
+    view = view_of(pose)
+    back = view_of(inverse_pose(pose))
+    room = stack.shape[0]
+    best = (upper + slack) * (upper + slack)
+    if room < 1:
+        return 0.0
+    stack[0, 0] = 0
+    stack[0, 1] = 0
+    used = 1
+    while used > 0:
+        used -= 1
+        i = stack[used, 0]
+        j = stack[used, 1]
+        f = tree_node(store, tree_f, i)
+        g = tree_node(store, tree_g, j)
+        seen = seen_from(view, g)
+        bound = box_distance(f, g, seen, view)
+        # What was found since the pair was put here may exclude it.
+        if bound >= best:
+            continue
+        child_f = child_of(store, tree_f, i)
+        child_g = child_of(store, tree_g, j)
+        if (child_f < 0 and child_g < 0) or used + 2 > room:
+            best = bound
+            continue
+        descend_f = child_g < 0 or (child_f >= 0 and f.radius >= g.radius)
+        if descend_f:
+            one = box_distance(tree_node(store, tree_f, child_f), g, seen, view)
+            other = box_distance(tree_node(store, tree_f, child_f + 1), g, seen, view)
+        else:
+            seen = seen_from(back, f)
+            one = box_distance(tree_node(store, tree_g, child_g), f, seen, back)
+            other = box_distance(tree_node(store, tree_g, child_g + 1), f, seen, back)
+        # The nearer one comes last, and is looked at first.
+        near = 0 if one <= other else 1
+        for k in range(2):
+            side = near if k == 1 else 1 - near
+            if (one if side == 0 else other) < best:
+                stack[used, 0] = child_f + side if descend_f else i
+                stack[used, 1] = j if descend_f else child_g + side
+                used += 1
+    return max(math.sqrt(best) - slack, 0.0)
 
 
 @kernel(signatures="(i8[::1], f8[::1], UniTuple(i8, 2), UniTuple(f8, 9), UniTuple(f8, 3), f8, i8[:, ::1])")

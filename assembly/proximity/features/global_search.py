@@ -56,7 +56,7 @@ from assembly.proximity.features.region_tests import (
 
 # What became of a search: apart, all other pairs excluded; shells cross; out of room, the best pair known.
 APART, CROSSING, UNPROVEN = 0, 1, 2
-# Pairs of nodes that may wait at a time, and pairs that may be cut.
+# Pairs of nodes that may wait at a time.
 WAITING = 65536
 # Extrema kept.
 EXTREMA = 256
@@ -233,7 +233,7 @@ def search_ended(search, top, left):
     if left == 0 or first.bound >= state.limit:
         return APART
     state.place = first.tie
-    full = is_tree_full(search.trees[0]) or is_tree_full(search.trees[1]) or left + 160 > WAITING
+    full = is_tree_full(search.trees[0]) or is_tree_full(search.trees[1]) or left > WAITING
     return UNPROVEN if full else -1
 
 
@@ -292,7 +292,8 @@ def branch(search, bound, i, j):
     if cells:
         if not examine(search, bound, i, j, normal, False):
             return math.inf, NO_PAIRS
-        if max(model_in(trees[0], i).radius, model_in(trees[1], j).radius) < TINY * search.size:
+        tiny = max(model_in(trees[0], i).radius, model_in(trees[1], j).radius) < TINY * search.size
+        if tiny or bound >= state.limit:
             return bound, NO_PAIRS
     down_f = larger_first(trees, i, j)
     cell = grow(search.store, trees[0] if down_f else trees[1], i if down_f else j)
@@ -310,7 +311,9 @@ advance = kernel(inner=True)(best_first(search_state_at, node_bound, search_ende
 def nearest_of_shells(store, shells, pose, size, rough):
     """The nearest points of two shells, g seen from f, or any that are farther by a part of that, `rough`, at most."""
     trees = (plant(store, shells[0], IDENTITY), plant(store, shells[1], pose))
-    heap, normals = np.empty(WAITING * PAIR), np.empty((WAITING, 3))
+    # A node has no more parts than there are nodes, a cell at most four.
+    heap = np.empty((WAITING + trees[0].nodes.shape[0] + trees[1].nodes.shape[0]) * PAIR)
+    normals = np.empty((WAITING + 8, 3))
     search = ShellTrees(store, trees, pose, size, rough, heap, normals, np.empty((EXTREMA, KNOWN)), np.zeros(STATE))
     best = search_state_at(search.state, 0)
     best.limit = best.let_go = best.gap = math.inf

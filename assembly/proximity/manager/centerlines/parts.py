@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 
-from assembly._descent import NONE, STOP, descend_pairs
+import numpy as np
+
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, sub
 from assembly.proximity.bvh.neighbor_list import (
@@ -54,47 +54,55 @@ def whole_box(store, centerlines, i, j, boxes, b):
     box.part_g, box.from_g, box.to_g = float(j), -half_g, half_g
 
 
-# A walk down the trees of two centerlines. out: room for pairs of parts (n, 2).
-CenterlineWalk = namedtuple("CenterlineWalk", "posed reach out")
-
-
-@kernel(inline=True)
-def near_below(walk, i, j, found):
-    """A step down to parts within a reach; found: how many, -1 without room, and how far all others are beyond."""
-    count, beyond = found
-    store, pose = walk.posed.store, walk.posed.pose
-    f, g = centerline_at(store.table, walk.posed.centerlines[0]), centerline_at(store.table, walk.posed.centerlines[1])
-    o, p = f.node_pool + BALL * i, g.node_pool + BALL * j
-    apart = balls_apart(store.pool, o, p, pose)
-    child_f, child_g = store.table[f.node_table + i], store.table[g.node_table + j]
-    leaves = child_f < 0 and child_g < 0
-    if leaves and apart <= walk.reach:
-        at_f, at_g = f.part_pool + PART * (-1 - child_f), g.part_pool + PART * (-1 - child_g)
-        apart = parts_apart(store.pool, at_f, at_g, pose)
-    if apart > walk.reach:
-        return (count, min(beyond, apart)), True, NONE, NONE
-    if leaves:
-        if count == walk.out.shape[0]:
-            return (-1, 0.0), True, NONE, STOP
-        walk.out[count, 0] = -1 - child_f
-        walk.out[count, 1] = -1 - child_g
-        return (count + 1, beyond), True, NONE, NONE
-    on_f = child_g < 0 or (child_f >= 0 and ball_at(store.pool, o).radius >= ball_at(store.pool, p).radius)
-    child = child_f if on_f else child_g
-    return found, on_f, child, child + 1
-
-
-descend_near = kernel(inner=True)(descend_pairs(near_below))
-
-
 @kernel(inner=True)
 def descend(posed, reach, stack, out):
     """Parts (k, 2) of two centerlines that may be within a reach of each other.
 
     Returns how many, or -1 where there is no room; and how far all others are beyond.
     """
-    found, fits = descend_near(CenterlineWalk(posed, reach, out), (0, math.inf), stack)
-    return found if fits else (-1, 0.0)
+    store, pose = posed.store, posed.pose
+    line = centerline_at(store.table, posed.centerlines[0])
+    centerline = centerline_at(store.table, posed.centerlines[1])
+    nodes_f = line.node_pool
+    nodes_g = centerline.node_pool
+    stack[0, 0] = 0
+    stack[0, 1] = 0
+    used = 1
+    count = 0
+    beyond = math.inf
+    while used > 0:
+        used -= 1
+        i = stack[used, 0]
+        j = stack[used, 1]
+        o = nodes_f + BALL * i
+        p = nodes_g + BALL * j
+        apart = balls_apart(store.pool, o, p, pose)
+        if apart > reach:
+            beyond = min(beyond, apart)
+            continue
+        child_f = store.table[line.node_table + i]
+        child_g = store.table[centerline.node_table + j]
+        if child_f < 0 and child_g < 0:
+            part_f = np.int64(-1 - child_f)
+            part_g = np.int64(-1 - child_g)
+            apart = parts_apart(store.pool, line.part_pool + PART * part_f, centerline.part_pool + PART * part_g, pose)
+            if apart > reach:
+                beyond = min(beyond, apart)
+                continue
+            if count == out.shape[0]:
+                return -1, 0.0
+            out[count, 0] = part_f
+            out[count, 1] = part_g
+            count += 1
+            continue
+        if used + 2 > stack.shape[0]:
+            return -1, 0.0
+        down_f = child_g < 0 or (child_f >= 0 and ball_at(store.pool, o).radius >= ball_at(store.pool, p).radius)
+        for k in range(2):
+            stack[used, 0] = child_f + k if down_f else i
+            stack[used, 1] = j if down_f else child_g + k
+            used += 1
+    return count, beyond
 
 
 @kernel(inner=True)
