@@ -117,7 +117,7 @@ def damped_newton(
                 failures += 1
                 stops = failures > shortenings or k == steps - 1
             last = place if stops else move(problem, place, part, step)
-            if stops or done or last == place:
+            if done or last == place:
                 break
             x = last
         return place, known, last

@@ -72,7 +72,7 @@ def _seen(query, t):
     return Sight(0.5 * dot(e, e), dot(e, d), speed + dot(e, h), speed)
 
 
-_nearest_in = kernel(inner=True)(bracketed_newton(_seen, inside=False))
+_nearest_in = kernel(inline=True)(bracketed_newton(_seen, inside=False))
 
 
 @kernel(inner=True)

@@ -158,7 +158,7 @@ def _cut_point(cut, t):
     return CutPoint(cut.sense * beyond, cut.sense * rate, (x, y), (dx, dy))
 
 
-_cut = kernel(inner=True)(bracketed_newton(_cut_point, inside=True, resolution=3e-16))
+_cut = kernel(inline=True)(bracketed_newton(_cut_point, inside=True, resolution=3e-16))
 
 
 @kernel(inner=True)
@@ -184,8 +184,8 @@ def _seen(query, t):
     return Sight(0.5 * (ex * ex + ey * ey), ex * dx + ey * dy, speed + ex * ddx + ey * ddy, speed)
 
 
-_nearest_in = kernel(inner=True)(bracketed_newton(_seen, inside=False))
-_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=20))
+_nearest_in = kernel(inline=True)(bracketed_newton(_seen, inside=False))
+_nearest_from = kernel(inline=True)(curve_newton(_seen, steps=20))
 
 
 @kernel(inline=True)
