@@ -8,7 +8,8 @@ from collections import namedtuple
 import numpy as np
 import pytest
 
-from assembly._newton import Interval, Sight, bracketed_newton, curve_newton, damped_newton, held_in
+from assembly._newton import bracketed_newton, damped_newton
+from assembly.geometry.nearest_place import Interval, Sight, held_in, move_along, step_along
 
 Value = namedtuple("Value", "slope curvature x")
 RISING = {
@@ -268,7 +269,7 @@ def circle(t):
 
 
 # Where a curve counts as straight steps are short: a circle far from its point is.
-nearest = curve_newton(see, steps=200)
+nearest = damped_newton(see, step_along, move_along, steps=200)
 
 
 def nearest_place(curve, t):

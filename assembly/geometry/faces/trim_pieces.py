@@ -16,8 +16,9 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes
-from assembly._newton import Interval, Sight, bracketed_newton, curve_newton
+from assembly._newton import bracketed_newton, damped_newton
 from assembly._record import record_dtype, record_view, size_of
+from assembly.geometry.nearest_place import Interval, Sight, move_along, step_along
 
 # A trim in the table: the boundary of a face in its parameters.
 TRIM = record_dtype(
@@ -185,7 +186,7 @@ def _seen(query, t):
 
 
 _nearest_in = kernel(inline=True)(bracketed_newton(_seen, inside=False))
-_nearest_from = kernel(inline=True)(curve_newton(_seen, steps=20))
+_nearest_from = kernel(inline=True)(damped_newton(_seen, step_along, move_along, steps=20))
 
 
 @kernel(inline=True)

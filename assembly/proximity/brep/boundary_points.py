@@ -6,11 +6,12 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly._newton import Interval, Sight, curve_newton, held_in
+from assembly._newton import damped_newton
 from assembly._record import Store
+from assembly.geometry.nearest_place import Interval, held_in, move_along, sight_of, step_along
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import curve_lanes, surface_point, xyz
-from assembly.geometry.vec import blend, cross, dot, sub
+from assembly.geometry.vec import blend, cross, sub
 
 
 @kernel(inner=True)
@@ -43,12 +44,10 @@ BoundaryQuery = namedtuple("BoundaryQuery", "store surface curve p interval")
 def _seen(query, t):
     """The point of the question from a place of the curve, as in Gauss and Newton's method."""
     c, rate, _normal = _jet(query.store, query.surface, query.curve, t)
-    gap = sub(c, query.p)
-    square = dot(rate, rate)
-    return Sight(0.5 * dot(gap, gap), dot(gap, rate), square, square)
+    return sight_of(sub(c, query.p), rate, (0.0, 0.0, 0.0))
 
 
-_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=12))
+_nearest_from = kernel(inner=True)(damped_newton(_seen, step_along, move_along, steps=12))
 
 
 @kernel(inner=True)
