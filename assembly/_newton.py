@@ -7,27 +7,15 @@ than the method asks for and is returned: nobody evaluates again where the metho
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 from collections.abc import Callable
 from typing import Any
 
-from assembly._kernel import kernel
-
-__all__ = ["Interval", "Sight", "bracketed_newton", "curve_newton", "damped_newton", "held_in"]
+__all__ = ["bracketed_newton", "damped_newton"]
 
 # Bisection alone needs so many steps from any interval to two neighboring doubles of its size, and some.
 _BISECTIONS = 80
-# A fall of the merit by this part of it is rounding, as is a step that promises no more.
+# A fall of the merit by this part of it is rounding.
 _ROUNDING = 1e-15
-_PROMISE = 1e-15
-# A curve counts as straight where the curvature of the squared distance is less than this part of its speed's square.
-_STRAIGHT = 1e-3
-# A step of more than this part of the interval that promises nothing is rounding, where the curve stands still.
-_LONG = 1e-3
-# Where a parameter may be: held at the ends, or wrapped round.
-Interval = namedtuple("Interval", "low high closed")
-# A point as a place of a curve sees it (see `curve_newton`).
-Sight = namedtuple("Sight", "merit slope curvature square")
 
 
 def bracketed_newton(evaluate: Callable[..., Any], *, inside: bool, resolution: float = 2e-16) -> Callable[..., Any]:
@@ -53,16 +41,27 @@ def bracketed_newton(evaluate: Callable[..., Any], *, inside: bool, resolution: 
         left = _BISECTIONS
         while True:
             at = evaluate(problem, x)
+            if at.slope == 0.0 or left == 0:
+                return x, at
             if at.slope > 0.0:
+                if x == low:
+                    return x, at
                 above = x
             else:
+                if x == high:
+                    return x, at
                 below = x
+            new = x - at.slope / at.curvature if at.curvature > 0.0 else x
             # An end that was not visited is gone to once.
-            new = min(max(x - at.slope / at.curvature, low), high) if at.curvature > 0.0 else x
-            if not below < new < above:
+            if new <= low and below < low:
+                new = low
+            elif new >= high and above > high:
+                new = high
+            elif not below < new < above:
                 new = 0.5 * (max(below, low) + min(above, high))
-            ends = at.slope == 0.0 or not below < new < above
-            if ends or abs(new - x) <= resolution * max(abs(x), high - low) or left == 0:
+                if not below < new < above:
+                    return x, at
+            if abs(new - x) <= resolution * max(abs(x), high - low):
                 return x, at
             x = new
             left -= 1
@@ -117,46 +116,9 @@ def damped_newton(
                 failures += 1
                 stops = failures > shortenings or k == steps - 1
             last = place if stops else move(problem, place, part, step)
-            if stops or done or last == place:
+            if done or last == place:
                 break
             x = last
         return place, known, last
 
     return descend
-
-
-@kernel(inline=True)
-def held_in(interval, x):
-    """A parameter wrapped where the interval is closed, held at its ends elsewhere."""
-    low, high = interval.low, interval.high
-    if interval.closed and not low <= x <= high:
-        x -= (high - low) * math.floor((x - low) / (high - low))
-    return min(max(x, low), high)
-
-
-@kernel(inline=True)
-def _step_along(problem, x, at):
-    """Newton's step along a curve; where the squared distance is not convex, as if the curve were straight."""
-    # A whole turn would lead back.
-    width = (0.5 if problem.interval.closed else 1.0) * (problem.interval.high - problem.interval.low)
-    curvature = at.curvature if at.curvature > _STRAIGHT * at.square else max(at.square, 1e-300)
-    step = min(max(-at.slope / curvature, -width), width)
-    done = not at.slope * step < -_PROMISE * at.merit
-    return (0.0 if done and abs(step) > _LONG * width else step), done
-
-
-@kernel(inline=True)
-def _move_along(problem, x, part, step):
-    return held_in(problem.interval, x + part * step)
-
-
-def curve_newton(evaluate: Callable[..., Any], *, steps: int) -> Callable[..., Any]:
-    """As `damped_newton`, to the nearest place of a curve from x in problem.interval, an `Interval`.
-
-    Parameters
-    ----------
-    evaluate
-        (problem, x) -> at, with the fields of a `Sight`: the merit |d|^2 / 2, d from the point to the curve; its slope
-        d.c' and its curvature c'.c' + d.c''; and the square c'.c'. Without c'' the method is Gauss and Newton's.
-    """
-    return damped_newton(evaluate, _step_along, _move_along, steps=steps)

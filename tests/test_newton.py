@@ -8,7 +8,8 @@ from collections import namedtuple
 import numpy as np
 import pytest
 
-from assembly._newton import Interval, Sight, bracketed_newton, curve_newton, damped_newton, held_in
+from assembly._newton import bracketed_newton, damped_newton
+from assembly.geometry.nearest_place import Interval, held_in, move_along, sight_of, step_along
 
 Value = namedtuple("Value", "slope curvature x")
 RISING = {
@@ -101,6 +102,26 @@ def test_coarse_roots_take_fewer_places():
         assert abs(x - 0.3) <= 3.0 * resolution
         counts.append(len(seen))
     assert counts[1] < counts[0] / 3
+
+
+def test_a_step_is_measured_by_the_interval_too():
+    seen = []
+    bracketed_newton(rising(RISING["no derivative"], seen), inside=True, resolution=1e-3)(0.0, -1.0, 2.0, 0.9)
+    assert len(seen) <= 12
+
+
+def test_neighboring_doubles_have_none_between():
+    for root in (1.0, 520.3, 537.6, 1e3):
+        seen = []
+        bracketed_newton(rising(RISING["a jump"], seen), inside=True)(root, root - 1.0, root + 2.0, root + 0.7)
+        assert len(seen) <= 60
+
+
+def test_a_sight_has_the_derivatives_of_its_merit():
+    curve, h = Curve(np.array([0.3, 0.8]), None, circle), 1e-4
+    before, at, after = (see(curve, 0.4 + k * h) for k in (-1, 0, 1))
+    assert at.slope == pytest.approx((after.merit - before.merit) / (2.0 * h), abs=1e-8)
+    assert at.curvature == pytest.approx((after.merit - 2.0 * at.merit + before.merit) / h**2, abs=1e-7)
 
 
 def test_what_is_not_a_number_ends():
@@ -256,10 +277,8 @@ Curve = namedtuple("Curve", "p interval jet")
 
 
 def see(curve, t):
-    c, first, second = curve.jet(t)
-    d = c - curve.p
-    square = first @ first
-    return Sight(0.5 * d @ d, d @ first, square + d @ second, square)
+    c, first, second = (np.append(x, 0.0) for x in curve.jet(t))
+    return sight_of(c - np.append(curve.p, 0.0), first, second)
 
 
 def circle(t):
@@ -268,7 +287,7 @@ def circle(t):
 
 
 # Where a curve counts as straight steps are short: a circle far from its point is.
-nearest = curve_newton(see, steps=200)
+nearest = damped_newton(see, step_along, move_along, steps=200)
 
 
 def nearest_place(curve, t):

@@ -20,7 +20,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._lanes import lane
-from assembly._newton import Interval, Sight, curve_newton
+from assembly._newton import damped_newton
 from assembly.distance.curves.nodes import length
 from assembly.distance.curves.search import curve_answer_at, first_point
 from assembly.distance.curves.squared_distance import (
@@ -34,6 +34,7 @@ from assembly.distance.curves.squared_distance import (
     mend,
 )
 from assembly.distance.piece_search import APART, Question, ended, in_span
+from assembly.geometry.nearest_place import Interval, move_along, sight_of, step_along
 from assembly.geometry.splines.bezier_pieces import (
     BOX,
     UNIT,
@@ -42,7 +43,7 @@ from assembly.geometry.splines.bezier_pieces import (
     bezier_head_at,
 )
 from assembly.geometry.splines.evaluate import xyz
-from assembly.geometry.vec import dot, sub
+from assembly.geometry.vec import sub
 
 _DEEPEST = 40
 # Intervals of a span before it is left to `curve_distance`: beside a point where the curve hardly moves, squares lose
@@ -84,16 +85,10 @@ def seen_at(query, span, x):
 @kernel(inline=True)
 def _seen(asked, x):
     point = seen_at(asked.query, asked.span, x)
-    square = dot(point.first, point.first)
-    return Sight(
-        0.5 * dot(point.place, point.place),
-        dot(point.place, point.first),
-        square + dot(point.place, point.second),
-        square,
-    )
+    return sight_of(point.place, point.first, point.second)
 
 
-_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=16))
+_nearest_from = kernel(inner=True)(damped_newton(_seen, step_along, move_along, steps=16))
 
 
 @kernel(inner=True)

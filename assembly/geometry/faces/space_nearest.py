@@ -12,7 +12,7 @@ from collections import namedtuple
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._newton import Sight, bracketed_newton
+from assembly._newton import bracketed_newton
 from assembly._record import Store
 from assembly.geometry.faces.trim_pieces import (
     LET_GO,
@@ -23,6 +23,7 @@ from assembly.geometry.faces.trim_pieces import (
     piece_of,
     trim_at,
 )
+from assembly.geometry.nearest_place import sight_of
 from assembly.geometry.splines.evaluate import into_domain, surface_at, surface_point
 from assembly.geometry.vec import add, blend, dot, scale, sub
 
@@ -67,12 +68,10 @@ SpaceQuery = namedtuple("SpaceQuery", "store curve q")
 def _seen(query, t):
     """The point of the question from a parameter of the piece."""
     p, d, h = _on_curve(query.store, query.curve, t)
-    e = sub(p, query.q)
-    speed = dot(d, d)
-    return Sight(0.5 * dot(e, e), dot(e, d), speed + dot(e, h), speed)
+    return sight_of(sub(p, query.q), d, h)
 
 
-_nearest_in = kernel(inner=True)(bracketed_newton(_seen, inside=False))
+_nearest_in = kernel(inline=True)(bracketed_newton(_seen, inside=False))
 
 
 @kernel(inner=True)

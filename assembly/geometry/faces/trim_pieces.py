@@ -16,8 +16,9 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._lanes import lane, load_lanes
-from assembly._newton import Interval, Sight, bracketed_newton, curve_newton
+from assembly._newton import bracketed_newton, damped_newton
 from assembly._record import record_dtype, record_view, size_of
+from assembly.geometry.nearest_place import Interval, Sight, move_along, step_along
 
 # A trim in the table: the boundary of a face in its parameters.
 TRIM = record_dtype(
@@ -158,7 +159,7 @@ def _cut_point(cut, t):
     return CutPoint(cut.sense * beyond, cut.sense * rate, (x, y), (dx, dy))
 
 
-_cut = kernel(inner=True)(bracketed_newton(_cut_point, inside=True, resolution=3e-16))
+_cut = kernel(inline=True)(bracketed_newton(_cut_point, inside=True, resolution=3e-16))
 
 
 @kernel(inner=True)
@@ -184,8 +185,8 @@ def _seen(query, t):
     return Sight(0.5 * (ex * ex + ey * ey), ex * dx + ey * dy, speed + ex * ddx + ey * ddy, speed)
 
 
-_nearest_in = kernel(inner=True)(bracketed_newton(_seen, inside=False))
-_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=20))
+_nearest_in = kernel(inline=True)(bracketed_newton(_seen, inside=False))
+_nearest_from = kernel(inline=True)(damped_newton(_seen, step_along, move_along, steps=20))
 
 
 @kernel(inline=True)

@@ -16,7 +16,8 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly._newton import Interval, bracketed_newton, held_in
+from assembly._newton import bracketed_newton
+from assembly.geometry.nearest_place import Interval, held_in
 from assembly.geometry.splines.evaluate import surface_at, surface_point
 from assembly.geometry.vec import add, blend, cross, dot, scale, sub
 

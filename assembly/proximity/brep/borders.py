@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly._newton import Interval, Sight, curve_newton, held_in
+from assembly._newton import damped_newton
 from assembly.geometry.faces.trim_nearest import trim_nearest
 from assembly.geometry.faces.trim_pieces import trim_at
+from assembly.geometry.nearest_place import Interval, held_in, move_along, sight_of, step_along
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import (
     CURVE_RECORD,
@@ -16,7 +17,7 @@ from assembly.geometry.splines.evaluate import (
     surface_point,
     xyz,
 )
-from assembly.geometry.vec import blend, cross, dot, sub
+from assembly.geometry.vec import blend, cross, sub
 from assembly.proximity.brep.records import (
     EDGE,
     EDGE_RECORD,
@@ -83,12 +84,10 @@ BorderQuery = namedtuple("BorderQuery", "store surface curve p interval")
 def _seen(query, t):
     """The point of the question from a place of the curve; curvature is left out, as the point is next to the curve."""
     at = on_surface(query.store, query.surface, query.curve, t)
-    d = sub(at.point, query.p)
-    square = dot(at.tangent, at.tangent)
-    return Sight(0.5 * dot(d, d), dot(d, at.tangent), square, square)
+    return sight_of(sub(at.point, query.p), at.tangent, (0.0, 0.0, 0.0))
 
 
-_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=3))
+_nearest_from = kernel(inner=True)(damped_newton(_seen, step_along, move_along, steps=3))
 
 
 @kernel(inner=True)

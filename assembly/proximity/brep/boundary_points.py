@@ -6,11 +6,12 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly._newton import Interval, Sight, curve_newton
+from assembly._newton import damped_newton
 from assembly._record import Store
+from assembly.geometry.nearest_place import Interval, held_in, move_along, sight_of, step_along
 from assembly.geometry.splines.domain import into_domain
 from assembly.geometry.splines.evaluate import curve_lanes, surface_point, xyz
-from assembly.geometry.vec import blend, cross, dot, sub
+from assembly.geometry.vec import blend, cross, sub
 
 
 @kernel(inner=True)
@@ -43,17 +44,15 @@ BoundaryQuery = namedtuple("BoundaryQuery", "store surface curve p interval")
 def _seen(query, t):
     """The point of the question from a place of the curve, as in Gauss and Newton's method."""
     c, rate, _normal = _jet(query.store, query.surface, query.curve, t)
-    gap = sub(c, query.p)
-    square = dot(rate, rate)
-    return Sight(0.5 * dot(gap, gap), dot(gap, rate), square, square)
+    return sight_of(sub(c, query.p), rate, (0.0, 0.0, 0.0))
 
 
-_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=12))
+_nearest_from = kernel(inner=True)(damped_newton(_seen, step_along, move_along, steps=12))
 
 
 @kernel(inner=True)
 def _nearest_sample(samples, first, stop, p):
-    """Index of the row (t, x, y, z) that is nearest to a point."""
+    """Index of the row (t, x, y, z) that is nearest to a point, and the square of its distance."""
     best = math.inf
     found = first
     for i in range(first, stop):
@@ -64,7 +63,7 @@ def _nearest_sample(samples, first, stop, p):
         if d < best:
             best = d
             found = i
-    return found
+    return found, best
 
 
 @kernel(
@@ -79,8 +78,8 @@ def nearest_on_boundaries(store, boundaries, which, points, guess, close, out):
     `boundaries` are the surfaces and the curves, whether these are closed, where their samples (t, x, y, z) begin, and
     the samples.
 
-    The guess if it is right to `close`, else what Gauss and Newton's method comes to from the nearest of the curve's
-    samples, quadratically for points on the curve. Distances are measured a step before the parameter.
+    The guess if it is right to `close`, else what Gauss and Newton's method comes to from there or from the nearest of
+    the curve's samples, quadratically for points on the curve. Distances are measured a step before the parameter.
     """
     table, pool = store
     surfaces, curves, closed, begins, samples = boundaries
@@ -91,9 +90,10 @@ def nearest_on_boundaries(store, boundaries, which, points, guess, close, out):
         stop = begins[k + 1]
         interval = Interval(samples[first, 0], samples[stop - 1, 0], closed[k])
         query = BoundaryQuery(Store(table, pool), surfaces[k], curves[k], p, interval)
-        t = guess[i]
+        t = held_in(interval, guess[i])
         at = _seen(query, t)
         if 2.0 * at.merit > close * close:
-            _t, at, t = _nearest_from(query, samples[_nearest_sample(samples, first, stop, p), 0])
+            sample, square = _nearest_sample(samples, first, stop, p)
+            _t, at, t = _nearest_from(query, samples[sample, 0] if square < 2.0 * at.merit else t)
         out[i, 0] = t
         out[i, 1] = math.sqrt(2.0 * at.merit)

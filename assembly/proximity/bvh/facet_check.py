@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,23 +10,21 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.proximity.brep.boundary_curves import Batch, Rim, Survey
 from assembly.proximity.brep.topology import Edge, Topology
 from assembly.proximity.bvh.cones import FULL, between
 
 if TYPE_CHECKING:
     from assembly.proximity.bvh.facet_tree import FacetTree
 
-__all__ = ["edge_point", "largest_excess", "other_parameter", "same_points", "triangle_distance"]
+__all__ = ["edge_point", "largest_excess", "other_parameter", "triangle_distance"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 # Normals are not asked for where |Su x Sv| is below this part of |Su| |Sv|.
 _SINGULAR = 1e-9
 # Pairs of points and elements looked at together.
 _PAIRS = 4_000_000
-# Steps of Newton's method to the same point of an edge on its other face.
-_STEPS = 8
 
 
 def triangle_distance(points: Array, triangles: Array) -> Array:
@@ -61,33 +58,15 @@ def edge_point(surface: NurbsSurface, curve: NurbsCurve, t: Array) -> tuple[Arra
 
 
 def other_parameter(topology: Topology, edge: Edge, t: Array) -> Array:
-    """Where an edge with two faces is at the same points on its second one; beyond the domain of a closed curve."""
+    """Where an edge with two faces is at the same points on its second one."""
     assert edge.face_b is not None and edge.curve_b is not None
     a, b = topology.faces[edge.face_a], topology.faces[edge.face_b]
     points, _ = edge_point(a.surface, a.boundary[edge.curve_a], t)
     curve = b.boundary[edge.curve_b]
+    survey, rim = Survey([b], topology.tolerance), Rim(0, edge.curve_b, curve, topology.tolerance)
+    survey.measure([rim])
     guess = edge.map_b[0] + edge.map_b[1] * t
-    return same_points(lambda at: edge_point(b.surface, curve, at), points, guess, curve.domain, edge.start is None)
-
-
-def same_points(
-    along: Callable[[Array], tuple[Array, Array]],
-    points: Array,
-    guess: Array,
-    domain: tuple[Array, Array] | tuple[float, float],
-    closed: Mask | bool,
-) -> Array:
-    """Where curves, of which `along` gives points and derivatives, are at points; beyond the domain of closed ones."""
-    low, high = domain
-    most = 0.05 * np.subtract(high, low)
-    at = guess
-    for _ in range(_STEPS):
-        inside = np.where(closed, low + np.mod(at - low, np.subtract(high, low)), np.clip(at, low, high))
-        p, rate = along(inside)
-        square = (rate**2).sum(axis=1)
-        move = ((points - p) * rate).sum(axis=1) / np.where(square > 0.0, square, 1.0)
-        at = np.where(closed, at, inside) + np.clip(move, -most, most)
-    return np.asarray(np.where(closed, at, np.clip(at, low, high)))
+    return Batch(survey, [rim]).nearest(np.zeros(t.size, dtype=np.int64), points, guess)[0]
 
 
 class _Checked:
@@ -208,9 +187,7 @@ def _check_edge(checked: _Checked, number: int, samples: int, rng: np.random.Gen
     assert edge.curve_b is not None
     other = topology.faces[edge.face_b]
     curve_b = other.boundary[edge.curve_b]
-    low, high = curve_b.domain
     at = other_parameter(topology, edge, t)
-    at = low + np.mod(at - low, high - low) if edge.start is None else at
     a = _normals(face, curve.evaluate(t))
     b = _normals(other, curve_b.evaluate(at))
     convex = face.sign * (np.cross(a, b) * along).sum(axis=1) > 1e-9 * np.linalg.norm(along, axis=1)

@@ -19,7 +19,6 @@ from assembly.proximity.brep.boundary_curves import Batch, Rim, Survey
 from assembly.proximity.brep.edge_cells import box_hulls, box_parts, interval_parts
 from assembly.proximity.brep.topology import Topology
 from assembly.proximity.bvh.cones import CONVEX, FULL, MARGIN, around_cones, around_vectors, between
-from assembly.proximity.bvh.facet_check import same_points
 from assembly.proximity.bvh.facet_elements import Elements
 from assembly.proximity.bvh.normal_nets import Nets, nets_of, restricted, restriction
 
@@ -111,6 +110,8 @@ class _Edges:
             Batch(survey, [Rim(*place, curve, topology.tolerance) for place, curve in zip(side, row, strict=True)])
             for side, row in zip(sides, curves, strict=True)
         )
+        survey.measure(self.batch_b.rims)
+        self.wraps_b = np.array([rim.closed for rim in self.batch_b.rims], dtype=bool)
         self.domain_b = np.array([curve.domain for curve in curves[1]]).reshape(-1, 2)
         self.closed = np.array([edge.start is None for edge in edges])
         self.map_b = np.array([edge.map_b for edge in edges]).reshape(-1, 2)
@@ -174,12 +175,7 @@ class _Edges:
         """Boxes around the second face's curve over parts of edges, and the part each belongs to."""
         row = np.repeat(np.arange(len(edge)), 2)
         points, _, _ = self.batch_a.along(edge[row], t.ravel())
-        guess = self.map_b[edge[row], 0] + self.map_b[edge[row], 1] * t.ravel()
-        domain = self.domain_b[edge[row], 0], self.domain_b[edge[row], 1]
-        found = same_points(
-            lambda at: self.batch_b.along(edge[row], at)[:2], points, guess, domain, self.closed[edge[row]]
-        )
-        ends = found.reshape(-1, 2)
+        ends = self._at_points(edge[row], t.ravel(), points).reshape(-1, 2)
         low, high = ends.min(axis=1), ends.max(axis=1)
         wider = _WIDER * (high - low) + 1e-9 * np.diff(self.domain_b[edge], axis=1)[:, 0]
         low, high = low - wider, high + wider
@@ -198,6 +194,15 @@ class _Edges:
             return np.empty(0, dtype=np.int64), np.empty((0, 4))
         boxes = self.curves_b.boxes(np.concatenate(spans), np.concatenate(starts), np.concatenate(stops))
         return np.concatenate(owners), boxes
+
+    def _at_points(self, edge: Indices, t: Array, points: Array) -> Array:
+        """Where edges are at the same points on their second faces; beyond the domain of closed ones."""
+        low, high = self.domain_b[edge].T
+        guess = self.map_b[edge, 0] + self.map_b[edge, 1] * t
+        found, _ = self.batch_b.nearest(edge, points, guess)
+        turns = np.where(self.wraps_b[edge], np.round((guess - found) / (high - low)), 0.0)
+        found = found + turns * (high - low)
+        return np.asarray(np.where(self.closed[edge], found, np.clip(found, low, high)))
 
     def _normals(self, face: Indices, boxes: Array, owner: Indices) -> tuple[Array, Array]:
         """Cones around outward normals over boxes (n, 4) in (u, v) of faces; one an owner, in the order of owners."""

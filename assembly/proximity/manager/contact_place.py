@@ -14,8 +14,9 @@ from collections import namedtuple
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._newton import Interval, Sight, curve_newton
+from assembly._newton import damped_newton
 from assembly._record import Store
+from assembly.geometry.nearest_place import Interval, move_along, sight_of, step_along
 from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import add, dot, scale, sub
 from assembly.proximity.brep.borders import feature_at, feature_kind
@@ -68,12 +69,10 @@ def distance_between(a, b):
 def _seen(query, t):
     """The point of the question from a place of the edge."""
     p, along, bent = edge_jet(query.store, query.edge, t)
-    d = sub(p, query.y)
-    square = dot(along, along)
-    return Sight(0.5 * dot(d, d), dot(d, along), square + dot(d, bent), square)
+    return sight_of(sub(p, query.y), along, bent)
 
 
-_nearest_from = kernel(inner=True)(curve_newton(_seen, steps=9))
+_nearest_from = kernel(inner=True)(damped_newton(_seen, step_along, move_along, steps=9))
 
 
 @kernel(inner=True)
