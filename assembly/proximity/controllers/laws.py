@@ -271,8 +271,8 @@ def lowering(store, g, pose, x, step, dt):
         y = moved(store, g, x, step.rates, dt)
         target = pose.shift
         if g >= 0:
-            target = add(matvec(pose.rotation, surface_point(store.table, store.pool, g, y[2], y[3])[0]), pose.shift)
-        p = surface_point(store.table, store.pool, F, y[0], y[1])[0]
+            target = add(matvec(pose.rotation, surface_point(store.table, store.pool, g, y[2], y[3]).point), pose.shift)
+        p = surface_point(store.table, store.pool, F, y[0], y[1]).point
         d = sub(p, target)
         # At rest distances differ by the rounding of the points.
         rounding = 1e-14 * (math.sqrt(dot(p, p)) + math.sqrt(dot(target, target)))
@@ -299,8 +299,8 @@ def posed_target(store, g, pose, after, x, dt):
     drift_g = (0.0, 0.0, 0.0)
     was, comes = pose.shift, after.shift
     if g >= 0:
-        here = surface_point(store.table, store.pool, F, x[0], x[1])[0]
-        there = surface_point(store.table, store.pool, g, x[2], x[3])[0]
+        here = surface_point(store.table, store.pool, F, x[0], x[1]).point
+        there = surface_point(store.table, store.pool, g, x[2], x[3]).point
         before = matvec_t(pose.rotation, sub(here, pose.shift))
         drift_g = scale(i, sub(matvec_t(after.rotation, sub(here, after.shift)), before))
         was = add(matvec(pose.rotation, there), pose.shift)

@@ -246,7 +246,7 @@ def other_jet(store, other, pose, t, s):
     if other.kind == VERTEX:
         return add(matvec(pose.rotation, vertex_point(store, other.record)), pose.shift), zero, zero
     if other.kind == FACE_POINT:
-        p = surface_point(store.table, store.pool, other.record, t, s)[0]
+        p = surface_point(store.table, store.pool, other.record, t, s).point
         return add(matvec(pose.rotation, p), pose.shift), zero, zero
     p, ct, ctt = edge_jet(store, other.record, t)
     if other.kind == EDGE_POINT:

@@ -138,12 +138,12 @@ def approach(store, f, g, pose, x):
             u, v, _clamped = into_domain(store, g, cs + (k % 3 - 1) * gu, ct + (k // 3 - 1) * gv)
             at[k, 0] = u
             at[k, 1] = v
-            point = surface_point(store.table, store.pool, g, u, v)[0]
+            point = surface_point(store.table, store.pool, g, u, v).point
             points[k, 0], points[k, 1], points[k, 2] = add(matvec(pose.rotation, point), pose.shift)
         before = best
         for k in range(9):
             u, v, _clamped = into_domain(store, f, cu + (k % 3 - 1) * fu, cv + (k // 3 - 1) * fv)
-            p = surface_point(store.table, store.pool, f, u, v)[0]
+            p = surface_point(store.table, store.pool, f, u, v).point
             for j in range(9):
                 d = (points[j, 0] - p[0]) ** 2 + (points[j, 1] - p[1]) ** 2 + (points[j, 2] - p[2]) ** 2
                 if d < best:

@@ -93,10 +93,10 @@ def coordinate_lengths(table, pool, f, g, x, lengths, k):
     """The lengths s_i into lengths[k]: |f_u|, |f_v|, |g_u|, |g_v|."""
     a = surface_point(table, pool, f, x[0], x[1])
     b = surface_point(table, pool, g, x[2], x[3])
-    lengths[k, 0] = math.sqrt(dot(a[1], a[1]))
-    lengths[k, 1] = math.sqrt(dot(a[2], a[2]))
-    lengths[k, 2] = math.sqrt(dot(b[1], b[1]))
-    lengths[k, 3] = math.sqrt(dot(b[2], b[2]))
+    lengths[k, 0] = math.sqrt(dot(a.u, a.u))
+    lengths[k, 1] = math.sqrt(dot(a.v, a.v))
+    lengths[k, 2] = math.sqrt(dot(b.u, b.u))
+    lengths[k, 3] = math.sqrt(dot(b.v, b.v))
     return 0
 
 
@@ -119,8 +119,8 @@ def is_extremal(store, surfaces, bodies, q, tracked, r, tolerance):
 @kernel(inner=True)
 def moved_along(store, surface, tracked, was, r, i):
     """How far the point on a surface is from where it was; its parameters are in columns i and i + 1 of row r."""
-    p = surface_point(store.table, store.pool, surface, tracked[r, i], tracked[r, i + 1])[0]
-    d = sub(p, surface_point(store.table, store.pool, surface, was[r, i], was[r, i + 1])[0])
+    p = surface_point(store.table, store.pool, surface, tracked[r, i], tracked[r, i + 1]).point
+    d = sub(p, surface_point(store.table, store.pool, surface, was[r, i], was[r, i + 1]).point)
     return math.sqrt(dot(d, d))
 
 

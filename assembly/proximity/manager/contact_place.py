@@ -50,12 +50,14 @@ EdgeQuery = namedtuple("EdgeQuery", "store edge y interval")
 def point_of(store, surface, shell, code, u, v):
     """The point of a surface, or of a feature of a shell, in the axes of its body."""
     if surface >= 0:
-        return surface_point(store.table, store.pool, surface, u, v)[0]
+        return surface_point(store.table, store.pool, surface, u, v).point
     kind = feature_kind(store.table, shell, code)
     feature = feature_at(store.table, shell, code)
     if kind == VERTEX:
         return vertex_point(store, feature)
-    return edge_jet(store, feature, u)[0] if kind == EDGE else surface_point(store.table, store.pool, feature, u, v)[0]
+    return (
+        edge_jet(store, feature, u)[0] if kind == EDGE else surface_point(store.table, store.pool, feature, u, v).point
+    )
 
 
 @kernel(inline=True)

@@ -88,10 +88,10 @@ def patch_vertex_contacts(store, surface, patch):
     v = patch.middle[1] - patch.half[1]
     wide = 2.0 * patch.half[0]
     high = 2.0 * patch.half[1]
-    p = surface_point(store.table, store.pool, surface, u, v)[0]
-    q = surface_point(store.table, store.pool, surface, u + wide, v)[0]
-    s = surface_point(store.table, store.pool, surface, u + wide, v + high)[0]
-    t = surface_point(store.table, store.pool, surface, u, v + high)[0]
+    p = surface_point(store.table, store.pool, surface, u, v).point
+    q = surface_point(store.table, store.pool, surface, u + wide, v).point
+    s = surface_point(store.table, store.pool, surface, u + wide, v + high).point
+    t = surface_point(store.table, store.pool, surface, u, v + high).point
     return (u, v, wide, high), (p, q, s, t)
 
 

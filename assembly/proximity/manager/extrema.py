@@ -124,7 +124,7 @@ def are_one(posed, rows, i, k, merge_radius):
                 continue
             surface = feature_at(store.table, shell, np.int64(codes[side]))
         u, v = middle_parameters(store, surface, x[2 * side], x[2 * side + 1], y[2 * side], y[2 * side + 1])
-        p = surface_point(store.table, store.pool, surface, u, v)[0]
+        p = surface_point(store.table, store.pool, surface, u, v).point
         if side == 1:
             p = add(matvec(posed.pose.rotation, p), posed.pose.shift)
         if square_to(p, a) > square and square_to(p, b) > square:

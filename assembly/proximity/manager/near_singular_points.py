@@ -54,14 +54,14 @@ def is_next_in_near_singular(posed, codes, surfaces, x, along, extrema, count):
     lie beside it rather than along it, in another valley.
     """
     store = posed.store
-    p = surface_point(store.table, store.pool, surfaces[0], x[0], x[1])[0]
+    p = surface_point(store.table, store.pool, surfaces[0], x[0], x[1]).point
     for k in range(count):
         extremum = extremum_at(extrema.rows, k)
         alike = extremum.code_f == codes[0] and extremum.code_g == codes[1]
         if alike and extremum.origin != USELESS and not is_loose(extremum):
             y = pair_parameters(extremum)
             step = across_near_singular(store, surfaces[0], surfaces[1], posed.pose, y)
-            way = sub(p, surface_point(store.table, store.pool, surfaces[0], y[0], y[1])[0])
+            way = sub(p, surface_point(store.table, store.pool, surfaces[0], y[0], y[1]).point)
             square = dot(way, way)
             part = dot(way, along)
             if step.found and dot(along, step.along) > APART and 2.0 * part * part >= square - NEAR * NEAR:

@@ -248,7 +248,7 @@ def middle(posed, side, e):
     f = surface_of_code(posed, side, code)
     if f < 0 or not in_trim(posed, side, code, patch.middle[0], patch.middle[1]):
         return (0.0, 0.0, 0.0), False
-    return surface_point(store.table, store.pool, f, patch.middle[0], patch.middle[1])[0], True
+    return surface_point(store.table, store.pool, f, patch.middle[0], patch.middle[1]).point, True
 
 
 @kernel(inline=True)
