@@ -55,7 +55,7 @@ class Looked:
         self.pairs = range(int(self.table[self.watch + PAIRS]))
 
     def parts(self, q):
-        """Which parts of their allowances pairs have used."""
+        """Which parts of their motion bounds pairs have used."""
         manager = ContactManager(Store(self.table, self.pool), self.watch, self.memory)
         return np.array([part_used(manager, p, q) for p in self.pairs])
 
@@ -105,19 +105,19 @@ def test_a_pair_that_is_nearly_spent_and_hardly_moves_is_not_in_the_way():
     looked = Looked(np.random.default_rng(9))
     pairs = (pair_in(looked.table, looked.watch, p) for p in looked.pairs)
     bodies = np.array([(pair.body_f, pair.body_g) for pair in pairs])
-    # Of balls, which have allowances of their own, there are none.
+    # Of balls, which have motion bounds of their own, there are none.
     looked.known().ball_bound[:] = np.inf
     looked.known().sure[:] = np.inf
-    allowances = looked.known().motion_bound.copy()
-    # Of the pair with the least allowance nearly all is used by one body; others of that body have more.
-    spent = int(np.argmin(allowances))
+    motion_bounds = looked.known().motion_bound.copy()
+    # Of the pair with the least motion bound nearly all is used by one body; others of that body have more.
+    spent = int(np.argmin(motion_bounds))
     apart = next(p for p in looked.pairs if not set(bodies[p]) & set(bodies[spent]))
     q, step = looked.q.copy(), np.zeros(6 * int(looked.table[MOVING]))
-    q[bodies[spent, 1], 2] += 0.99 * allowances[spent]
+    q[bodies[spent, 1], 2] += 0.99 * motion_bounds[spent]
     assert looked.parts(q).max() == pytest.approx(0.99, abs=1e-9)
     # Another pair is to go five times as far as it may.
-    step[6 * bodies[apart, 1] + 2] = 5.0 * allowances[apart]
-    step[6 * bodies[spent, 1] + 2] = 1e-4 * allowances[spent]
+    step[6 * bodies[apart, 1] + 2] = 5.0 * motion_bounds[apart]
+    step[6 * bodies[spent, 1] + 2] = 1e-4 * motion_bounds[spent]
     begin, end = looked.parts(q), looked.parts(looked.moved(q, step, 1.0))
     assert begin[spent] > 0.98 and 0.98 < end[spent] < 1.0
     # As if each pair were alone; together the spent one would leave them a twentieth.
@@ -126,7 +126,7 @@ def test_a_pair_that_is_nearly_spent_and_hardly_moves_is_not_in_the_way():
     assert min(asked) > 1.5 * 0.05 / (end.max() - begin.max())
     # One that goes on is allowed a twentieth.
     step[:] = 0.0
-    step[6 * bodies[spent, 1] + 2] = allowances[spent]
+    step[6 * bodies[spent, 1] + 2] = motion_bounds[spent]
     assert looked.allowed(q, step, 1.0)[0] == pytest.approx(0.05, rel=1e-9)
 
 

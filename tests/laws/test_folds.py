@@ -18,7 +18,7 @@ from assembly.proximity.extrema.pairs import _key, _packed, as_face, extremal_pa
 from assembly.proximity.extrema.singular import fold_beyond
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, PAIR_GAP, TRACK
 from assembly.proximity.manager import extrema as roots
-from assembly.proximity.manager import motion_bounds as allowances
+from assembly.proximity.manager import motion_bounds
 from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager import update as watch
 from assembly.proximity.manager.motion_bounds import MotionBall, allow_ball, mover
@@ -315,6 +315,6 @@ def test_pairs_are_looked_at_that_need_it(by_spines, part, as_needed, in_turns, 
             manager = manager_records.ContactManager(Store(table, clips.pool), watch_at, clips.memory)
             place = mover(manager_records.pair_of(manager, p), clips.q).shift
             ball = MotionBall((0.0, 0.0, 0.0), place, 0.0)
-            allow_ball(manager_records.pair_state_of(manager, p), ball, np.inf, allowances.STILL * 1e-3)
+            allow_ball(manager_records.pair_state_of(manager, p), ball, np.inf, motion_bounds.STILL * 1e-3)
         clips.q[1, 2] += 1e-3 * part
         assert clips.looked(how) == count

@@ -87,7 +87,7 @@ def test_no_contact_is_missed_doubled_or_made_up(f, g, cases):
 
 
 @pytest.mark.parametrize(("f", "g", "gap", "q"), CROWDED)
-def test_what_is_nearer_than_an_allowance_is_listed(f, g, gap, q):
+def test_what_is_nearer_than_a_motion_bound_is_listed(f, g, gap, q):
     wires, surfaces, _ = zip(SHAPES[f], SHAPES[g], strict=True)
     rings = Watch(surfaces)
     listed = rings.look(np.array(q))
