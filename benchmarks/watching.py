@@ -112,8 +112,8 @@ class Watch:
             for side, body in enumerate(pair):
                 local = self.surfaces[body].evaluate(*row[2 * side : 2 * side + 2])
                 points[k, side] = Rotation.from_quat(q[body, 3:], scalar_first=True).apply(local) + q[body, :3]
-        # A look that meets many patches takes what is as near as its motion bounds, which say what it left out; that of a
-        # ball may be less for other reasons, and in a crowd no less than this is looked into.
+        # An update that meets many patches takes what is as near as its motion bounds, which say what it left out; that
+        # of a ball may be less for other reasons, and in a crowd no less than this is looked into.
         around = np.maximum(known.ball_bound, CROWDED_PART * self._curved)
         take = np.minimum(TAKE * known.margin, known.motion_bound)
         take = np.minimum(take, around) * packed.scale
