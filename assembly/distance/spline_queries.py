@@ -22,7 +22,7 @@ from assembly.distance.patches.packing import pack_patches
 from assembly.distance.patches.search import PATCH_ANSWER, patch_distance
 from assembly.distance.piece_search import MEETING
 from assembly.distance.separation import Separation, SeparationStatus
-from assembly.geometry.expression.formula import ROOM
+from assembly.geometry.expression.formula import WORKSPACE
 from assembly.geometry.splines.bezier_packing import pack_point
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
@@ -139,7 +139,7 @@ def surface_distance(a: Any, b: Any, question: Question) -> Separation:
     first, second = (b, a) if swap else (a, b)
     record, pool, kept = _patches(second)
     # Room for the formula's runs is a call's own.
-    curve = None if kept is None else (*kept, np.empty(int(kept[0][ROOM])))
+    curve = None if kept is None else (*kept, np.empty(int(kept[0][WORKSPACE])))
     code = int(patch_distance(*_patches(first)[:2], record, pool, curve, question, out))
     count = 2 if isinstance(second, NurbsSurface) else 0 if type(second) is np.ndarray else 1
     own = out[4 : 4 + count]

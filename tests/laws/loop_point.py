@@ -46,12 +46,12 @@ class LoopPoint:
         )
         self.shape = room_of_shape(table, self.rows, self.n, record_of_blocks(table) if blocks else table[:0])
         free = np.full(pairs, -1, dtype=np.int64)
-        room = (np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES)))
-        self.loose = layout.LiftedPairs(free, np.empty((pairs, 4)), *room, np.empty((tracks, TRACK)), np.empty(0))
+        workspace = (np.empty((VECTORS, 3, VARIABLES)), np.empty((VARIABLES, VARIABLES)))
+        self.loose = layout.LiftedPairs(free, np.empty((pairs, 4)), *workspace, np.empty((tracks, TRACK)), np.empty(0))
         at = table[layout.TAPE_WORKSPACE]
-        self.room = layout.TapeWorkspace(*(np.empty(size) for size in table[at : at + 3]))
+        self.workspace = layout.TapeWorkspace(*(np.empty(size) for size in table[at : at + 3]))
         arrange(table, free, self.shape, self.rows, self.n)
-        self.program = layout.Program(Store(table, self.pool), self.shape, self.loose, self.room, packed.tips)
+        self.program = layout.Program(Store(table, self.pool), self.shape, self.loose, self.workspace, packed.tips)
         if tracked is None:
             state = np.zeros(packed.results_at)
             state[packed.contacts_at : packed.angles_at] = np.nan

@@ -142,7 +142,7 @@ def test_ranges_of_pieces_with_weights_of_all_sizes(spread):
             t0 = (0.0, 1.0 - width, rng.uniform(0, 1 - width))[rng.integers(3)]
             t1 = min(t0 + width, 1.0)
             x = np.zeros(PIECE)
-            enclose(operand.kind, operand.table, operand.pool, np.empty(operand.room), 0, t0, t1, x)
+            enclose(operand.kind, operand.table, operand.pool, np.empty(operand.workspace), 0, t0, t1, x)
             for s in (Fraction(t0), Fraction(t1), *(Fraction(float(v)) for v in np.linspace(t0, t1, 7)[1:-1])):
                 for value, at in zip(exact_values(points, weights, s), (BOX, SPEED), strict=True):
                     for k, v in enumerate(value):
@@ -232,8 +232,8 @@ def test_bounds_by_second_derivatives(i, j, cases):
     rows_a, rows_b = local_intervals(a, rng, count), local_intervals(b, rng, count)
     out = np.empty((count, 5))
     pair_bounds(
-        *(one.kind, one.table, one.pool, np.empty(one.room), rows_a),
-        *(two.kind, two.table, two.pool, np.empty(two.room), rows_b),
+        *(one.kind, one.table, one.pool, np.empty(one.workspace), rows_a),
+        *(two.kind, two.table, two.pool, np.empty(two.workspace), rows_b),
         *(np.empty(PIECE), np.empty(PIECE), out),
     )
     sharp = 0
@@ -271,8 +271,8 @@ def test_a_crossing_is_proven_where_there_is_one():
     # They meet at t = 0.0249...: inside the first interval, outside the others.
     rows_b = np.array([[-0.1, 0.1, 0, 0, 0], [0.05, 0.25, 0, 0, 0], [-0.5, -0.3, 0, 0, 0]])
     pair_bounds(
-        *(one.kind, one.table, one.pool, np.empty(one.room), rows),
-        *(two.kind, two.table, two.pool, np.empty(two.room), rows_b),
+        *(one.kind, one.table, one.pool, np.empty(one.workspace), rows),
+        *(two.kind, two.table, two.pool, np.empty(two.workspace), rows_b),
         *(np.empty(PIECE), np.empty(PIECE), out),
     )
     assert out[:, 3].tolist() == [1.0, 0.0, 0.0]

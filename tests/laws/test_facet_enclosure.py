@@ -321,15 +321,15 @@ def test_what_has_no_room_says_so():
 def test_plain_python_finds_the_same():
     rng = np.random.default_rng(16)
     descent = Descent(BODIES["cylinder"], BODIES["box"])
-    room = np.empty((20_000, 2), dtype=np.int64)
+    workspace = np.empty((20_000, 2), dtype=np.int64)
     for _ in range(4):
         (_, _, f, n), (_, _, g, m) = (sample(tree, rng) for tree in descent.trees)
         turn, shift = placed(rng, f, n, g, m, rng.uniform(-0.1, 0.1))
         pose = RelativePose(tuple(turn.ravel().tolist()), tuple(shift.tolist()))
         arrays = Store(descent.table, descent.pool), (descent.f, descent.g)
         # An inner kernel is plain Python when it is called from Python.
-        count = pairs_within(*arrays, pose, 0.2, descent.stack, room)
-        assert {tuple(row) for row in room[:count].tolist()} == descent.found(turn, shift, 0.2)
+        count = pairs_within(*arrays, pose, 0.2, descent.stack, workspace)
+        assert {tuple(row) for row in workspace[:count].tolist()} == descent.found(turn, shift, 0.2)
         lower = least_distance(*arrays, pose, 5.0, descent.stack)
         assert descent.lower(turn, shift, 5.0) == pytest.approx(lower, rel=1e-12, abs=1e-12)
 

@@ -31,7 +31,7 @@ ORACLE = 4e-16
 
 def packed(curve):
     record, pool, (table, tape) = pack_formula(curve)
-    return record, pool, (table, tape, np.empty(int(table[formula.ROOM])))
+    return record, pool, (table, tape, np.empty(int(table[formula.WORKSPACE])))
 
 
 def described(curve, rng, depth):

@@ -253,8 +253,8 @@ def test_many_arcs_as_one_by_one(count):
     curve = asm.curves.heart()
     t0, t1 = np.sort(np.random.default_rng(count).uniform(0.0, 6.0, (2, count)), axis=0)
     table, pool = curve.packed()
-    room = np.zeros(int(table[formula.ROOM]))
-    one = [formula.arc_bound(Store(table, pool), *ends, room) for ends in zip(t0, t1, strict=True)]
+    workspace = np.zeros(int(table[formula.WORKSPACE]))
+    one = [formula.arc_bound(Store(table, pool), *ends, workspace) for ends in zip(t0, t1, strict=True)]
     assert curve.arc_lengths(t0, t1) == pytest.approx(one, rel=1e-10)
 
 

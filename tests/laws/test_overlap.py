@@ -172,7 +172,7 @@ def test_a_peg_that_leans_in_a_bore_does_not_cross_it(angle, tilt):
     )
     along = np.linspace(-0.5 * length, 0.5 * length, 6001)
 
-    def room(far):
+    def workspace(far):
         least = np.inf
         for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)):
             points = turn.apply(np.stack([np.full_like(along, x * side), np.full_like(along, y * side), along], axis=1))
@@ -184,10 +184,10 @@ def test_a_peg_that_leans_in_a_bore_does_not_cross_it(angle, tilt):
     low, high = 0.0, 1.0
     while high - low > 1e-9:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if room(middle) > 1e-3 else (low, middle)
+        low, high = (middle, high) if workspace(middle) > 1e-3 else (low, middle)
     place = low * np.array([np.cos(angle), np.sin(angle), 0.0])
     q = np.array([[0.0, 0.0, 0.0, *UPRIGHT], [*place, *turn.as_quat(scalar_first=True)]])
-    assert room(low) > 0.9e-3 and not crossed(q)[0]
+    assert workspace(low) > 0.9e-3 and not crossed(q)[0]
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def test_a_list_has_what_is_in_reach_at_poses_near_its_own(names, side):
     descent = Descent(*(BODIES[name] for name in names))
     table = np.append(descent.table, np.full(LIST_INTS, -1))
     pool, at = descent.pool, descent.table.size
-    room = np.empty((4_000, 2), dtype=np.int64)
+    workspace = np.empty((4_000, 2), dtype=np.int64)
     kept = sifted = 0
     for _ in range(2):
         (_, _, f, n), (_, _, g, m) = (sample(tree, rng) for tree in descent.trees)
@@ -58,13 +58,13 @@ def test_a_list_has_what_is_in_reach_at_poses_near_its_own(names, side):
             there = RelativePose(tuple(turn.ravel().tolist()), tuple(shift.tolist()))
             before = table[at:].copy()
             key = ListKey(at, 0, moving)
-            count = listed_pairs(Store(table, pool), key, trees, there, REACH, 1.01 * RING, descent.stack, room)
+            count = listed_pairs(Store(table, pool), key, trees, there, REACH, 1.01 * RING, descent.stack, workspace)
             if count < 0:
                 assert neighbor_list_at(table, at).count == -1
                 break
-            listed = {tuple(row) for row in room[:count].tolist()}
-            count = pairs_within(Store(table, pool), trees, there, REACH, descent.stack, room)
-            assert {tuple(row) for row in room[:count].tolist()} <= listed
+            listed = {tuple(row) for row in workspace[:count].tolist()}
+            count = pairs_within(Store(table, pool), trees, there, REACH, descent.stack, workspace)
+            assert {tuple(row) for row in workspace[:count].tolist()} <= listed
             sifted += len(listed)
             kept += int(k > 0 and (before == table[at:]).all())
     assert kept > 1 and sifted > 0

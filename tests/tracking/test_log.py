@@ -36,13 +36,15 @@ class Change:
         return f"{self.name}: {self.kind.value}"
 
 
-def recorded(ticks=1000, stride=1, budget=5e-5, room=None):
+def recorded(ticks=1000, stride=1, budget=5e-5, workspace=None):
     """A log, and what it is of: seconds, violations, statuses, iterations, poses."""
     rng = np.random.default_rng(ticks)
     seconds, violations = rng.lognormal(-11.0, 0.5, ticks), rng.uniform(0.0, 1e-12, ticks)
     statuses, steps = rng.integers(0, 2, ticks), rng.integers(1, 9, ticks)
     q = rng.normal(size=(ticks, 2, 7))
-    recorder = asm.TrackLog.recorder(2.0 + 0.001 * np.arange(room or ticks), 2, Ended, stride=stride, budget=budget)
+    recorder = asm.TrackLog.recorder(
+        2.0 + 0.001 * np.arange(workspace or ticks), 2, Ended, stride=stride, budget=budget
+    )
     for k in range(ticks):
         recorder.record(k, q[k], seconds[k], violations[k], statuses[k], steps[k])
         if k % 100 == 7:
@@ -64,7 +66,7 @@ def test_a_log_holds_what_was_recorded(stride):
 
 
 def test_a_log_may_end_early():
-    log, (_, _, _, _, q) = recorded(ticks=11, stride=5, room=1000)
+    log, (_, _, _, _, q) = recorded(ticks=11, stride=5, workspace=1000)
     assert len(log) == len(log.times) == 11
     np.testing.assert_array_equal(log.q, q[[0, 5, 10]])
     # The log does not change with the recorder.

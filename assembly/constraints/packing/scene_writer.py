@@ -103,15 +103,15 @@ class SceneWriter(Writer):
     def tape(self, expression: Expression, row: int) -> list[int]:
         """The record of an expression whose instructions are written now; `row` is its first one, -1 of a term."""
         offsets = []
-        room = self._tape_room
+        workspace = self._tape_room
         for instructions in expression.tapes:
             table = instructions.table.copy()
             table[tape.CONSTANTS] += self.pool_at
             offsets.append(self.add(table, instructions.constants)[0])
-            room[2] = max(room[2], int(table[tape.WORK]))
+            workspace[2] = max(workspace[2], int(table[tape.WORK]))
         bodies, count = len(expression.bodies), expression.count
-        room[0] = max(room[0], 7 * bodies + count)
-        room[1] = max(room[1], count + 6 * bodies * count, 36 * bodies**2)
+        workspace[0] = max(workspace[0], 7 * bodies + count)
+        workspace[1] = max(workspace[1], count + 6 * bodies * count, 36 * bodies**2)
         listed, at = self.add(self.places_of(expression.bodies), [expression.scale])
         return [*offsets, count, bodies, listed, row, at, 0]
 

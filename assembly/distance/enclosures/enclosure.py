@@ -38,7 +38,7 @@ from assembly.geometry.splines import bezier_ranges
 from assembly.geometry.splines.bezier_ranges import (
     bezier_point_bounds,
     bezier_range_bounds,
-    range_room_at,
+    range_workspace_at,
     ranged_curve_at,
 )
 
@@ -98,37 +98,37 @@ def copy_values(source, at, target, to):
 
 
 @kernel(inner=True, exact=True)
-def point_values(kind, table, pool, span, t, room, out, o):
+def point_values(kind, table, pool, span, t, workspace, out, o):
     """Intervals of C, C', C'' at t to out[o:], nine pairs."""
     if kind == FORMULA:
-        point_bounds(Store(table, pool), t, room)
-        copy_values(room, formula.RESULTS, out, o)
+        point_bounds(Store(table, pool), t, workspace)
+        copy_values(workspace, formula.RESULTS, out, o)
     else:
         at = bezier_ranges.BEZIER_AT
-        bezier_point_bounds(Store(table, pool), span, t, room, at)
-        copy_values(room, at, out, o)
+        bezier_point_bounds(Store(table, pool), span, t, workspace, at)
+        copy_values(workspace, at, out, o)
 
 
 @kernel(inline=True)
-def set_ranges(piece, room, at):
+def set_ranges(piece, workspace, at):
     """The ranges of C and of its three derivatives, six numbers each, from room[at:]."""
     for k in range(6):
-        piece.box[k] = room[at + k]
-        piece.speed[k] = room[at + 6 + k]
-        piece.bend[k] = room[at + 12 + k]
-        piece.jerk[k] = room[at + 18 + k]
+        piece.box[k] = workspace[at + k]
+        piece.speed[k] = workspace[at + 6 + k]
+        piece.bend[k] = workspace[at + 12 + k]
+        piece.jerk[k] = workspace[at + 18 + k]
 
 
 @kernel(inner=True, exact=True)
-def fill_piece(kind, table, pool, room, x, o):
+def fill_piece(kind, table, pool, workspace, x, o):
     """All of the record at x[o:] from its interval, its ends with how far these may be off, and its Bezier piece."""
     piece = enclosed_piece_at(x, o)
-    work = range_room_at(room, 0)
+    work = range_workspace_at(workspace, 0)
     t0 = piece.t0
     t1 = piece.t1
     middle = 0.5 * (t0 + t1)
     span = int(piece.span)
-    point_values(kind, table, pool, span, middle, room, x, o + MID)
+    point_values(kind, table, pool, span, middle, workspace, x, o + MID)
     for k in range(3):
         piece.pm[k] = middle_of(x, o + MID, k)
     piece.off_mid = off_of(x, o + MID)
@@ -136,13 +136,13 @@ def fill_piece(kind, table, pool, room, x, o):
     width = math.inf
     arc = math.inf
     if kind == FORMULA:
-        range_bounds(Store(table, pool), t0, t1, room)
-        set_ranges(piece, room, formula.RESULTS)
+        range_bounds(Store(table, pool), t0, t1, workspace)
+        set_ranges(piece, workspace, formula.RESULTS)
         if formula_at(table, 0).arc_tape != 0:
-            arc = arc_bound(Store(table, pool), t0, t1, room)
+            arc = arc_bound(Store(table, pool), t0, t1, workspace)
     else:
-        bezier_range_bounds(Store(table, pool), span, t0, t1, room)
-        set_ranges(piece, room, 0)
+        bezier_range_bounds(Store(table, pool), span, t0, t1, workspace)
+        set_ranges(piece, workspace, 0)
         width = work.width
     refine(x, o + BOX, up(max(middle - t0, t1 - middle)), o + MID)
     step = up(t1 - t0)
@@ -171,7 +171,7 @@ def fill_piece(kind, table, pool, room, x, o):
 
 
 @kernel(inner=True, exact=True)
-def split_piece(kind, table, pool, room, x, o, p):
+def split_piece(kind, table, pool, workspace, x, o, p):
     """Both halves of the piece at x[o:] to x[p:] and behind it. Returns whether doubles can tell the halves apart."""
     piece = enclosed_piece_at(x, o)
     t0 = piece.t0
@@ -192,26 +192,26 @@ def split_piece(kind, table, pool, room, x, o, p):
         half.span = piece.span
         half.first_end = piece.first_end if side == 0 else 0.0
         half.last_end = 0.0 if side == 0 else piece.last_end
-        fill_piece(kind, table, pool, room, x, q)
+        fill_piece(kind, table, pool, workspace, x, q)
     return True
 
 
 @kernel(inner=True, exact=True)
-def fill_ends(kind, table, pool, room, span, x, o):
+def fill_ends(kind, table, pool, workspace, span, x, o):
     """The ends of the piece at x[o:], and how far they may be off."""
     piece = enclosed_piece_at(x, o)
-    point_values(kind, table, pool, span, piece.t0, room, x, o + MID)
+    point_values(kind, table, pool, span, piece.t0, workspace, x, o + MID)
     for k in range(3):
         piece.p0[k] = middle_of(x, o + MID, k)
     piece.off_0 = off_of(x, o + MID)
-    point_values(kind, table, pool, span, piece.t1, room, x, o + MID)
+    point_values(kind, table, pool, span, piece.t1, workspace, x, o + MID)
     for k in range(3):
         piece.p1[k] = middle_of(x, o + MID, k)
     piece.off_1 = off_of(x, o + MID)
 
 
 @kernel(inner=True, exact=True)
-def first_pieces(kind, table, pool, room, x):
+def first_pieces(kind, table, pool, workspace, x):
     """Records of the smooth parts of a curve to x. Returns how many."""
     head = formula_head_at(pool, 0)
     count = 1 if kind == FORMULA else ranged_curve_at(table, 0).pieces
@@ -223,8 +223,8 @@ def first_pieces(kind, table, pool, room, x):
         piece.span = i
         piece.first_end = 1.0
         piece.last_end = 1.0
-        fill_ends(kind, table, pool, room, i, x, o)
-        fill_piece(kind, table, pool, room, x, o)
+        fill_ends(kind, table, pool, workspace, i, x, o)
+        fill_piece(kind, table, pool, workspace, x, o)
     return count
 
 
@@ -317,13 +317,13 @@ def separation_along(xa, oa, xb, ob, count_b, n, bound):
 
 
 @kernel(signatures="(i8, i8[::1], f8[::1], f8[::1], i8, f8, f8, f8[::1])")
-def enclose(kind, table, pool, room, span, t0, t1, x):
+def enclose(kind, table, pool, workspace, span, t0, t1, x):
     """The record of the piece over [t0, t1], to x; of a smooth part `span` of the curve."""
     piece = enclosed_piece_at(x, 0)
     piece.t0, piece.t1, piece.span = t0, t1, span
     piece.first_end, piece.last_end = 1.0, 1.0
-    fill_ends(kind, table, pool, room, span, x, 0)
-    fill_piece(kind, table, pool, room, x, 0)
+    fill_ends(kind, table, pool, workspace, span, x, 0)
+    fill_piece(kind, table, pool, workspace, x, 0)
 
 
 @kernel(signatures="(f8[::1], f8[:, ::1], i8, f8[::1])")

@@ -10,7 +10,7 @@ from assembly._newton import damped_newton
 from assembly._record import Store
 from assembly.distance.enclosures.enclosure import FORMULA, HULL
 from assembly.distance.enclosures.gjk import INSIDE, POINT, ConvexSet, gjk, inside_weights, on_b, simplex_at
-from assembly.geometry.expression.formula import formula_point, formula_room_at
+from assembly.geometry.expression.formula import formula_point, formula_workspace_at
 from assembly.geometry.interval import UNIT
 from assembly.geometry.splines.bezier_ranges import BEZIER_AT, piece_points, ranged_curve_at, value, weighted_point_at
 from assembly.geometry.vec import blend, dot, sub
@@ -22,26 +22,26 @@ PlacePoints = namedtuple("PlacePoints", "merit r a1 a2 b1 b2 c1")
 
 
 @kernel(inner=True)
-def local_point(kind, table, pool, span, t, room):
+def local_point(kind, table, pool, span, t, workspace):
     """C, C', C'' at t."""
     if kind == FORMULA:
-        formula_point(Store(table, pool), t, room)
-        c = formula_room_at(room, 0).results
+        formula_point(Store(table, pool), t, workspace)
+        c = formula_workspace_at(workspace, 0).results
         return (c[0], c[1], c[2]), (c[3], c[4], c[5]), (c[6], c[7], c[8])
-    found = weighted_point_at(room, BEZIER_AT)
+    found = weighted_point_at(workspace, BEZIER_AT)
     o, n = piece_points(table, span, 0)
-    value(pool, o, n, t, room, BEZIER_AT)
+    value(pool, o, n, t, workspace, BEZIER_AT)
     w = found.weight
     p = (found.position[0], found.position[1], found.position[2])
     o, n = piece_points(table, span, 1)
-    value(pool, o, n, t, room, BEZIER_AT)
+    value(pool, o, n, t, workspace, BEZIER_AT)
     w1 = found.weight
     d = (found.position[0], found.position[1], found.position[2])
     o, n = piece_points(table, span, 2)
     dd = (0.0, 0.0, 0.0)
     w2 = 0.0
     if n >= 0:
-        value(pool, o, n, t, room, BEZIER_AT)
+        value(pool, o, n, t, workspace, BEZIER_AT)
         w2 = found.weight
         dd = (found.position[0], found.position[1], found.position[2])
     if ranged_curve_at(table, 0).rational == 0:
@@ -116,13 +116,13 @@ def step_length(slope, curvature, square):
 @kernel(inline=True)
 def _look(query, x):
     a_shape, b_shape, place, g = query.search.a, query.search.b, query.place, query.search.g
-    a, a1, a2 = local_point(a_shape.kind, a_shape.table, a_shape.pool, place.span_a, x[0], a_shape.room)
+    a, a1, a2 = local_point(a_shape.kind, a_shape.table, a_shape.pool, place.span_a, x[0], a_shape.workspace)
     if b_shape.kind == HULL:
         zero = (0.0, 0.0, 0.0)
         b, kept, inside, _off = hull_point(query.search.full, b_shape.pool, b_shape.count, a, g)
         r = zero if inside else sub(a, b)
         return PlacePoints(dot(r, r), r, a1, a2, zero, zero, a1 if inside else across(a1, kept, query.search.full, g))
-    b, b1, b2 = local_point(b_shape.kind, b_shape.table, b_shape.pool, place.span_b, x[1], b_shape.room)
+    b, b1, b2 = local_point(b_shape.kind, b_shape.table, b_shape.pool, place.span_b, x[1], b_shape.workspace)
     r = sub(a, b)
     return PlacePoints(dot(r, r), r, a1, a2, b1, b2, a1)
 

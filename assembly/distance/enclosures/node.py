@@ -86,7 +86,7 @@ OTHER_VALUES = place_of(SEARCH_ROOM, "other_values")
 SCRATCH = size_of(SEARCH_ROOM)
 # A shape as a search reads it: its kind, table and pool, room for its evaluation, the first halves (-1: none yet) and
 # the records of its pieces, and the vertices of a hull, which are its pool; a curve has none.
-EnclosedShape = namedtuple("EnclosedShape", "kind table pool room halves pieces count")
+EnclosedShape = namedtuple("EnclosedShape", "kind table pool workspace halves pieces count")
 # full: the dimension and one; a, b: shapes, a a curve; bound: kind of enclosure; state: a block of SEARCH_ROOM; spare:
 # two records of pieces, the first of a point that stands still if b is a hull; g: a simplex.
 EnclosureSearch = namedtuple("EnclosureSearch", "full a b question bound heap state spare g")
@@ -210,14 +210,14 @@ def middles(state, at):
 def note_parameters(search, place):
     """Values at two parameters to the state, and their points if they are nearer than the best."""
     a, b, state = search.a, search.b, search.state
-    point_values(a.kind, a.table, a.pool, place.span_a, place.s, a.room, state, VALUES)
+    point_values(a.kind, a.table, a.pool, place.span_a, place.s, a.workspace, state, VALUES)
     if b.kind == HULL:
         if b.count == 1:
             copy_values(b.pieces, MID, state, OTHER_VALUES)
         point = (b.pool[0], b.pool[1], b.pool[2])
         off = 0.0
     else:
-        point_values(b.kind, b.table, b.pool, place.span_b, place.t, b.room, state, OTHER_VALUES)
+        point_values(b.kind, b.table, b.pool, place.span_b, place.t, b.workspace, state, OTHER_VALUES)
         point = middles(state, OTHER_VALUES)
         off = off_of(state, OTHER_VALUES)
     on_a = middles(state, VALUES)

@@ -76,7 +76,7 @@ def enclosure(curve: FormulaCurve | NurbsCurve, t0: float, t1: float) -> Enclosu
     operand = packed_operand("curve", curve)
     part, s0, s1 = _local(operand, first, last)
     record = np.zeros(e.PIECE)
-    e.enclose(operand.kind, operand.table, operand.pool, np.empty(operand.room), part, s0, s1, record)
+    e.enclose(operand.kind, operand.table, operand.pool, np.empty(operand.workspace), part, s0, s1, record)
     d = operand.dimension
     return Enclosure(
         interval=(first, last),

@@ -54,7 +54,7 @@ class Operand(NamedTuple):
     parts: int
     table: NDArray[np.int64]
     pool: Array
-    room: int
+    workspace: int
 
 
 # Under these names a curve keeps its center, and what it was packed to about it and about another one.
@@ -130,7 +130,7 @@ def enclosed_distance(
     why = int(
         es.search(
             first.dimension + 1,
-            *((shape.kind, shape.table, shape.pool, shape.room) for shape in (first, second)),
+            *((shape.kind, shape.table, shape.pool, shape.workspace) for shape in (first, second)),
             *(center, (goal, gap, budget, bool(polish)), BOUNDS[bound], state),
         )
     )
@@ -260,7 +260,7 @@ def _hull_table(dimension: int, count: int) -> NDArray[np.int64]:
 
 def _formula(curve: FormulaCurve, center: Array) -> Operand:
     table, pool = about(curve, center)
-    return Operand(FORMULA, curve.dimension, 1, table, pool, int(table[formula.ROOM]))
+    return Operand(FORMULA, curve.dimension, 1, table, pool, int(table[formula.WORKSPACE]))
 
 
 def _spline(curve: NurbsCurve, center: Array) -> Operand:
@@ -303,5 +303,5 @@ def _spline(curve: NurbsCurve, center: Array) -> Operand:
     packed = np.concatenate(pool)
     if not isfinite(float(packed.sum())):
         raise InputError("control points overflow in the derivatives of the curve; expected a scale nearer to one")
-    room = bezier_ranges.BEZIER_AT + 32 + 4 * (n + 2)
-    return Operand(BEZIER, dimension, len(pieces), table, packed, room)
+    workspace = bezier_ranges.BEZIER_AT + 32 + 4 * (n + 2)
+    return Operand(BEZIER, dimension, len(pieces), table, packed, workspace)

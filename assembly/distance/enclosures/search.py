@@ -67,8 +67,8 @@ def proven_hit(search):
             return False
         piece_a.t0, piece_a.t1, piece_a.span = s - h, s + h, best.span_a
         piece_b.t0, piece_b.t1, piece_b.span = t - k, t + k, best.span_b
-        fill_piece(a.kind, a.table, a.pool, a.room, x, 0)
-        fill_piece(b.kind, b.table, b.pool, b.room, x, PIECE)
+        fill_piece(a.kind, a.table, a.pool, a.workspace, x, 0)
+        fill_piece(b.kind, b.table, b.pool, b.workspace, x, PIECE)
         if crossing_proven(x, 0, x, PIECE):
             return True
     return False
@@ -167,7 +167,7 @@ def first_half(shape, k, used):
     if shape.kind == HULL:
         return -1, used
     x, halves = shape.pieces, shape.halves
-    if halves[k] < 0 and split_piece(shape.kind, shape.table, shape.pool, shape.room, x, PIECE * k, PIECE * used):
+    if halves[k] < 0 and split_piece(shape.kind, shape.table, shape.pool, shape.workspace, x, PIECE * k, PIECE * used):
         halves[k], halves[used], halves[used + 1] = used, -1, -1
         used += 2
     return halves[k], used
@@ -200,13 +200,13 @@ advance = kernel(inner=True)(best_first(search_state_at, pair_bound, search_ende
 @kernel(inline=True, allocates=True)
 def new_shape(operand, center):
     """A curve with its smooth parts as pieces, or a hull about the center; how many pieces, and how far it is off."""
-    kind, table, pool, room = operand
+    kind, table, pool, workspace = operand
     parts = ranged_curve_at(table, 0).pieces if kind == BEZIER else 1
     x = np.empty((parts + _ROOM) * PIECE)
     halves = np.full(parts + _ROOM, -1)
-    shape = EnclosedShape(kind, table, pool, np.empty(room), halves, x, 0)
+    shape = EnclosedShape(kind, table, pool, np.empty(workspace), halves, x, 0)
     if kind != HULL:
-        first_pieces(kind, table, pool, shape.room, x)
+        first_pieces(kind, table, pool, shape.workspace, x)
         return shape, parts, 0.0
     count = table[1]
     vertices, off = about_center(pool, count, center)
@@ -214,7 +214,7 @@ def new_shape(operand, center):
         point_piece(vertices, 0, x)
     else:
         enclosed_piece_at(x, 0).length = -1.0
-    return EnclosedShape(kind, table, vertices, shape.room, halves, x, count), parts, off
+    return EnclosedShape(kind, table, vertices, shape.workspace, halves, x, count), parts, off
 
 
 @kernel(inner=True, allocates=True)
@@ -223,7 +223,7 @@ def roomier(shape, used):
     if not is_full(shape, used):
         return shape
     halves, pieces = longer(shape.halves, 4 * shape.halves.size), longer(shape.pieces, 4 * shape.pieces.size)
-    return EnclosedShape(shape.kind, shape.table, shape.pool, shape.room, halves, pieces, shape.count)
+    return EnclosedShape(shape.kind, shape.table, shape.pool, shape.workspace, halves, pieces, shape.count)
 
 
 @kernel(

@@ -40,7 +40,7 @@ from assembly.distance.patches.pair import patch_work_at
 from assembly.geometry.expression.formula import (
     RESULTS,
     formula_head_at,
-    formula_room_at,
+    formula_workspace_at,
     point_bounds,
     range_bounds,
     refine,
@@ -134,17 +134,17 @@ def is_dot(nodes, o):
 def describe_formula(curve, short, nodes, o, x):
     """Box and model of a piece from its interval; x (42) is for work, `short` the radius of a dot."""
     node = patch_node_at(nodes, o)
-    table, pool, room = curve
+    table, pool, workspace = curve
     t0 = node.low_u
     t1 = node.high_u
     half = half_width(t0, t1)
     h = 2.0 * half
     ranges = ranges_at(x, 0)
-    results = formula_room_at(room, 0).results
-    range_bounds(Store(table, pool), t0, t1, room)
+    results = formula_workspace_at(workspace, 0).results
+    range_bounds(Store(table, pool), t0, t1, workspace)
     for k in range(24):
         ranges.over[k] = results[k]
-    point_bounds(Store(table, pool), 0.5 * (t0 + t1), room)
+    point_bounds(Store(table, pool), 0.5 * (t0 + t1), workspace)
     for k in range(18):
         ranges.middle[k] = results[k]
     refine(x, 0, half, _MIDDLE)
@@ -219,23 +219,23 @@ def formula_derivatives(curve, nodes, o, x, w):
     """
     work = patch_work_at(w, 0)
     node = patch_node_at(nodes, o)
-    table, pool, room = curve
+    table, pool, workspace = curve
     t0 = node.low_u
     t1 = node.high_u
     h = 2.0 * half_width(t0, t1)
     t = formula_parameter(nodes, o, x)
-    point_bounds(Store(table, pool), t, room)
+    point_bounds(Store(table, pool), t, workspace)
     at = RESULTS
     size = 0.0
     for k in range(3):
-        work.patch_j[k] = h * known_middle(room, at + _SPEED, k)
-        work.patch_k[k] = h * h * known_middle(room, at + _BEND, k)
+        work.patch_j[k] = h * known_middle(workspace, at + _SPEED, k)
+        work.patch_k[k] = h * h * known_middle(workspace, at + _BEND, k)
         size += abs(work.patch_j[k])
-    work.off[0] = bounded(off_of(room, at))
-    work.off[1] = bounded(h * off_of(room, at + _SPEED) + 2.0 * UNIT * size)
+    work.off[0] = bounded(off_of(workspace, at))
+    work.off[1] = bounded(h * off_of(workspace, at + _SPEED) + 2.0 * UNIT * size)
     work.off[2] = up(up(t - t0) / h)
     work.off[3] = up(up(t1 - t) / h)
-    return known_middle(room, at, 0), known_middle(room, at, 1), known_middle(room, at, 2)
+    return known_middle(workspace, at, 0), known_middle(workspace, at, 1), known_middle(workspace, at, 2)
 
 
 @kernel(inline=True)

@@ -29,11 +29,11 @@ FORMULA = record_dtype(
     arc_tape=1,  # where the tape of the arc length begins; 0: none
     has_range=1,  # 1: the range of C itself is among the ranges
     continuous=1,  # 1: no operation of C jumps, so that jumps are those of derivatives and C' bounds C across them
-    room=1,  # doubles of room for a run
+    workspace=1,  # doubles that a run works in
     arc_plain=1,  # 1: the tape of the arc length is for plain doubles (`geometry/expression/rounding.py`)
 )
 formula_at = record_view(FORMULA)
-ROOM = place_of(FORMULA, "room")
+WORKSPACE = place_of(FORMULA, "workspace")
 FORMULA_RECORD = size_of(FORMULA)
 # The same in the pool.
 FORMULA_HEAD = record_dtype(
@@ -46,14 +46,14 @@ formula_head_at = record_view(FORMULA_HEAD)
 CENTER = place_of(FORMULA_HEAD, "center")
 FORMULA_POOL = size_of(FORMULA_HEAD)
 # Room for a run; the work of the tape stands behind it.
-FORMULA_ROOM = record_dtype(
+FORMULA_WORKSPACE = record_dtype(
     "f8",
     arguments=4,  # t, or ends of intervals
     results=24,  # numbers, or pairs of intervals, of C, then of its derivatives
 )
-formula_room_at = record_view(FORMULA_ROOM)
-RESULTS = place_of(FORMULA_ROOM, "results")
-WORK_AT = size_of(FORMULA_ROOM)
+formula_workspace_at = record_view(FORMULA_WORKSPACE)
+RESULTS = place_of(FORMULA_WORKSPACE, "results")
+WORK_AT = size_of(FORMULA_WORKSPACE)
 # Numbers of C, C', C'' at a point, and of C, C', C'', C''' over an interval; what is written of an interval.
 _VALUES, _ORDERS = 9, 12
 FORMULA_RANGE = record_dtype(
@@ -66,31 +66,31 @@ formula_range_at = record_view(FORMULA_RANGE)
 
 
 @kernel(inline=True, exact=True)
-def run(store, tape, room):
-    """Run a tape on the numbers in a room."""
-    run_tape(store, tape, room, room[WORK_AT:], room[RESULTS:])
+def run(store, tape, workspace):
+    """Run a tape on the numbers in a workspace."""
+    run_tape(store, tape, workspace, workspace[WORK_AT:], workspace[RESULTS:])
 
 
 @kernel(inline=True, exact=True)
-def bound(store, tape, room):
-    """Run a tape on the intervals in a room; what it tells of kinks and jumps."""
-    return run_bounds(store, tape, room, room[WORK_AT:], room[RESULTS:])
+def bound(store, tape, workspace):
+    """Run a tape on the intervals in a workspace; what it tells of kinks and jumps."""
+    return run_bounds(store, tape, workspace, workspace[WORK_AT:], workspace[RESULTS:])
 
 
 @kernel(inner=True)
-def formula_point(store, t, room):
-    """C, C', C'' at t to the results of the room, nine doubles."""
-    room[0] = t
-    run(store, formula_at(store.table, 0).point_tape, room)
-    results = formula_room_at(room, 0).results
+def formula_point(store, t, workspace):
+    """C, C', C'' at t to the results of the workspace, nine doubles."""
+    workspace[0] = t
+    run(store, formula_at(store.table, 0).point_tape, workspace)
+    results = formula_workspace_at(workspace, 0).results
     for k in range(3):
         results[k] -= formula_head_at(store.pool, 0).center[k]
 
 
 @kernel(inline=True)
-def forget(table, room, first, last):
+def forget(table, workspace, first, last):
     """The whole line for orders of the results, as far as there are coordinates."""
-    results = formula_room_at(room, 0).results
+    results = formula_workspace_at(workspace, 0).results
     for order in range(first, last):
         for k in range(formula_at(table, 0).dimension):
             o = 6 * order + 2 * k
@@ -99,16 +99,16 @@ def forget(table, room, first, last):
 
 
 @kernel(inline=True)
-def settle(store, room, told, orders):
+def settle(store, workspace, told, orders):
     """What a run tells forgets of its derivatives, below `orders`; C with its error, about the center."""
     head = formula_head_at(store.pool, 0)
     formula = formula_at(store.table, 0)
     if told >= KINK:
-        forget(store.table, room, 2, orders)
+        forget(store.table, workspace, 2, orders)
     if told >= JUMP and formula.continuous == 0:
-        forget(store.table, room, 1, 2)
+        forget(store.table, workspace, 1, 2)
     error = head.error
-    results = formula_room_at(room, 0).results
+    results = formula_workspace_at(workspace, 0).results
     for k in range(formula.dimension):
         o = 2 * k
         if error > 0.0:
@@ -120,24 +120,24 @@ def settle(store, room, told, orders):
 
 
 @kernel(inner=True, exact=True)
-def point_bounds(store, t, room):
-    """Intervals of C, C', C'' at t to the results of the room, nine pairs."""
-    room[0] = t
-    room[1] = t
-    told = bound(store, formula_at(store.table, 0).point_tape, room)
-    settle(store, room, told, 3)
+def point_bounds(store, t, workspace):
+    """Intervals of C, C', C'' at t to the results of the workspace, nine pairs."""
+    workspace[0] = t
+    workspace[1] = t
+    told = bound(store, formula_at(store.table, 0).point_tape, workspace)
+    settle(store, workspace, told, 3)
 
 
 @kernel(inner=True, exact=True)
-def range_bounds(store, lo, hi, room):
-    """Intervals of C, C', C'', C''' over [lo, hi] to the results of the room, twelve pairs."""
+def range_bounds(store, lo, hi, workspace):
+    """Intervals of C, C', C'', C''' over [lo, hi] to the results of the workspace, twelve pairs."""
     formula = formula_at(store.table, 0)
-    room[0] = lo
-    room[1] = hi
-    told = bound(store, formula.range_tape, room)
+    workspace[0] = lo
+    workspace[1] = hi
+    told = bound(store, formula.range_tape, workspace)
     if formula.has_range == 0:
-        forget(store.table, room, 0, 1)
-    settle(store, room, told, 4)
+        forget(store.table, workspace, 0, 1)
+    settle(store, workspace, told, 4)
     return told
 
 
@@ -165,32 +165,32 @@ def refine(values, o, half, m):
 
 
 @kernel(inner=True, exact=True)
-def arc_bound(store, lo, hi, room):
+def arc_bound(store, lo, hi, workspace):
     """Upper bound of the length of arc over [lo, hi] by the user's expression; infinite where it has no length."""
     formula = formula_at(store.table, 0)
-    results = formula_room_at(room, 0).results
+    results = formula_workspace_at(workspace, 0).results
     if formula.arc_tape == 0:
         return math.inf
     if formula.arc_plain != 0:
-        room[0] = lo
-        room[1] = hi
-        run(store, formula.arc_tape, room)
+        workspace[0] = lo
+        workspace[1] = hi
+        run(store, formula.arc_tape, workspace)
         return results[0] if results[0] >= 0.0 else math.inf
-    room[0] = lo
-    room[1] = lo
-    room[2] = hi
-    room[3] = hi
-    bound(store, formula.arc_tape, room)
+    workspace[0] = lo
+    workspace[1] = lo
+    workspace[2] = hi
+    workspace[3] = hi
+    bound(store, formula.arc_tape, workspace)
     return results[1] if results[1] >= 0.0 else math.inf
 
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1])")
-def formula_points(table, pool, t, out, room):
+def formula_points(table, pool, t, out, workspace):
     """C, C', C'' at every t to out (n, 9). Returns the first place where C is not finite, or -1."""
-    results = formula_room_at(room, 0).results
+    results = formula_workspace_at(workspace, 0).results
     bad = -1
     for i in range(t.size):
-        formula_point(Store(table, pool), t[i], room)
+        formula_point(Store(table, pool), t[i], workspace)
         for k in range(_VALUES):
             out[i, k] = results[k]
         if bad < 0 and not math.isfinite(out[i, 0] + out[i, 1] + out[i, 2]):
@@ -199,31 +199,31 @@ def formula_points(table, pool, t, out, room):
 
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1])")
-def formula_ranges(table, pool, lo, hi, out, room):
+def formula_ranges(table, pool, lo, hi, out, workspace):
     """Bounds over the intervals [lo[i], hi[i]] to out (n, 43).
 
     Twelve pairs over the interval, nine pairs at its middle, and the user's bound of the length of arc. Returns what
     the runs tell, the worst of it.
     """
     store = Store(table, pool)
-    results = formula_room_at(room, 0).results
+    results = formula_workspace_at(workspace, 0).results
     told = SMOOTH
     for i in range(lo.size):
         row = formula_range_at(out, i)
-        told = max(told, range_bounds(store, lo[i], hi[i], room))
+        told = max(told, range_bounds(store, lo[i], hi[i], workspace))
         for k in range(2 * _ORDERS):
             row.over[k] = results[k]
         middle = 0.5 * (lo[i] + hi[i])
-        point_bounds(store, middle, room)
+        point_bounds(store, middle, workspace)
         for k in range(2 * _VALUES):
             row.middle[k] = results[k]
         refine(out[i], 0, up(max(middle - lo[i], hi[i] - middle)), 2 * _ORDERS)
-        row.arc = arc_bound(store, lo[i], hi[i], room)
+        row.arc = arc_bound(store, lo[i], hi[i], workspace)
     return told
 
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
-def arc_bounds(table, pool, lo, hi, out, room):
+def arc_bounds(table, pool, lo, hi, out, workspace):
     """`arc_bound` of every interval [lo[i], hi[i]]; many at a time where plain doubles do."""
     store = Store(table, pool)
     formula = formula_at(table, 0)
@@ -233,4 +233,4 @@ def arc_bounds(table, pool, lo, hi, out, room):
             run_lanes(table, formula.arc_tape, lo, hi, i, work, out)
         return
     for i in range(lo.size):
-        out[i] = arc_bound(store, lo[i], hi[i], room)
+        out[i] = arc_bound(store, lo[i], hi[i], workspace)

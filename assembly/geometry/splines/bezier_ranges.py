@@ -55,7 +55,7 @@ RANGE_ROOM = record_dtype(
     width=1,  # of its ellipsoid, squared length
     spare=3,
 )
-range_room_at = record_view(RANGE_ROOM)
+range_workspace_at = record_view(RANGE_ROOM)
 RANGES = place_of(RANGE_ROOM, "ranges")
 BEZIER_AT = size_of(RANGE_ROOM)
 # A point with its weight.
@@ -76,17 +76,17 @@ largest_at = record_view(LARGEST_RECORD)
 
 
 @kernel(inner=True, exact=True)
-def restrict(pool, o, n, s0, s1, room, at):
+def restrict(pool, o, n, s0, s1, workspace, at):
     """Bezier points of [s0, s1] of a polynomial of degree n, whose points begin at pool[o], to room[at:]."""
     for k in range(4 * (n + 1)):
-        room[at + k] = pool[o + k]
+        workspace[at + k] = pool[o + k]
     if s1 < 1.0:
         c = 1.0 - s1
         for r in range(1, n + 1):
             for i in range(n, r - 1, -1):
                 p = at + 4 * i
                 for k in range(4):
-                    room[p + k] = c * room[p - 4 + k] + s1 * room[p + k]
+                    workspace[p + k] = c * workspace[p - 4 + k] + s1 * workspace[p + k]
     if s0 > 0.0:
         s = s0 / s1
         c = 1.0 - s
@@ -94,20 +94,20 @@ def restrict(pool, o, n, s0, s1, room, at):
             for i in range(n - r + 1):
                 p = at + 4 * i
                 for k in range(4):
-                    room[p + k] = c * room[p + k] + s * room[p + 4 + k]
+                    workspace[p + k] = c * workspace[p + k] + s * workspace[p + 4 + k]
 
 
 @kernel(inner=True, exact=True)
-def value(pool, o, n, s, room, at):
+def value(pool, o, n, s, workspace, at):
     """Values of a polynomial at s to room[at:], four; with room for its points there."""
     for k in range(4 * (n + 1)):
-        room[at + k] = pool[o + k]
+        workspace[at + k] = pool[o + k]
     c = 1.0 - s
     for r in range(1, n + 1):
         for i in range(n - r + 1):
             p = at + 4 * i
             for k in range(4):
-                room[p + k] = c * room[p + k] + s * room[p + 4 + k]
+                workspace[p + k] = c * workspace[p + k] + s * workspace[p + 4 + k]
 
 
 @kernel(inline=True)
@@ -131,7 +131,7 @@ def units(table):
 
 
 @kernel(inner=True, exact=True)
-def project(store, free, count, room, at):
+def project(store, free, count, workspace, at):
     """Pairs of C and of w from homogeneous points at room[free:], to room[at:], eight numbers."""
     part = units(store.table)
     off = 4.0 * part * largest_at(store.pool, ranged_curve_at(store.table, 0).largest).position
@@ -140,47 +140,47 @@ def project(store, free, count, room, at):
         hi = -math.inf
         for i in range(count):
             o = free + 4 * i
-            x = room[o + k] / room[o + 3] if k < 3 else room[o + 3]
+            x = workspace[o + k] / workspace[o + 3] if k < 3 else workspace[o + 3]
             lo = min(lo, x)
             hi = max(hi, x)
         if k < 3:
-            room[at + 2 * k], room[at + 2 * k + 1] = widened(lo - off, hi + off, 2.0 * UNIT)
+            workspace[at + 2 * k], workspace[at + 2 * k + 1] = widened(lo - off, hi + off, 2.0 * UNIT)
         else:
-            room[at + 6], room[at + 7] = lo * (1.0 - 2.0 * part), hi * (1.0 + 2.0 * part)
+            workspace[at + 6], workspace[at + 7] = lo * (1.0 - 2.0 * part), hi * (1.0 + 2.0 * part)
 
 
 @kernel(inner=True, exact=True)
-def quotients(room, at, orders):
+def quotients(workspace, at, orders):
     """Derivatives of C from pairs (lo, hi) of C, w and of X, w by order (eight numbers each) at room[at:], in place.
 
     Six numbers an order are written to room[at + 6 order:], behind what is still to be read.
     """
-    w = (room[at + 6], room[at + 7])
-    w1 = (room[at + 14], room[at + 15])
-    w2 = (room[at + 22], room[at + 23])
-    w3 = (room[at + 30], room[at + 31]) if orders > 3 else (0.0, 0.0)
+    w = (workspace[at + 6], workspace[at + 7])
+    w1 = (workspace[at + 14], workspace[at + 15])
+    w2 = (workspace[at + 22], workspace[at + 23])
+    w3 = (workspace[at + 30], workspace[at + 31]) if orders > 3 else (0.0, 0.0)
     for k in range(3):
-        c = (room[at + 2 * k], room[at + 2 * k + 1])
-        x1 = (room[at + 8 + 2 * k], room[at + 9 + 2 * k])
+        c = (workspace[at + 2 * k], workspace[at + 2 * k + 1])
+        x1 = (workspace[at + 8 + 2 * k], workspace[at + 9 + 2 * k])
         c1 = iquotient(idifference(x1, iproduct(c, w1)), w)
-        x2 = (room[at + 16 + 2 * k], room[at + 17 + 2 * k])
+        x2 = (workspace[at + 16 + 2 * k], workspace[at + 17 + 2 * k])
         twice = iproduct(c1, (2.0 * w1[0], 2.0 * w1[1]))
         c2 = iquotient(idifference(idifference(x2, twice), iproduct(c, w2)), w)
-        room[at + 8 + 2 * k], room[at + 9 + 2 * k] = c1
-        room[at + 16 + 2 * k], room[at + 17 + 2 * k] = c2
+        workspace[at + 8 + 2 * k], workspace[at + 9 + 2 * k] = c1
+        workspace[at + 16 + 2 * k], workspace[at + 17 + 2 * k] = c2
         if orders > 3:
-            x3 = (room[at + 24 + 2 * k], room[at + 25 + 2 * k])
+            x3 = (workspace[at + 24 + 2 * k], workspace[at + 25 + 2 * k])
             thrice = iproduct(c2, (3.0 * w1[0], 3.0 * w1[1]))
             c3 = idifference(idifference(x3, thrice), iproduct(c1, (3.0 * w2[0], 3.0 * w2[1])))
             c3 = iquotient(idifference(c3, iproduct(c, w3)), w)
-            room[at + 24 + 2 * k], room[at + 25 + 2 * k] = c3
+            workspace[at + 24 + 2 * k], workspace[at + 25 + 2 * k] = c3
     for order in range(1, orders):
         for k in range(6):
-            room[at + 6 * order + k] = room[at + 8 * order + k]
+            workspace[at + 6 * order + k] = workspace[at + 8 * order + k]
 
 
 @kernel(inner=True, exact=True)
-def bezier_point_bounds(store, span, s, room, at):
+def bezier_point_bounds(store, span, s, workspace, at):
     """Intervals of C, C', C'' (by s) at s of a piece to room[at:], nine pairs; room behind them is used."""
     curve = ranged_curve_at(store.table, 0)
     free = at + 32
@@ -188,31 +188,31 @@ def bezier_point_bounds(store, span, s, room, at):
         o, n = piece_points(store.table, span, order)
         error = error_of(store, order)
         for k in range(4):
-            room[free + k] = 0.0
+            workspace[free + k] = 0.0
         if n >= 0:
-            value(store.pool, o, n, s, room, free)
+            value(store.pool, o, n, s, workspace, free)
         if order == 0 and curve.rational != 0:
-            project(store, free, 1, room, at)
+            project(store, free, 1, workspace, at)
             continue
         for k in range(4):
-            lo, hi = room[free + k] - error, room[free + k] + error
-            room[at + 8 * order + 2 * k], room[at + 8 * order + 2 * k + 1] = widened(lo, hi, UNIT)
+            lo, hi = workspace[free + k] - error, workspace[free + k] + error
+            workspace[at + 8 * order + 2 * k], workspace[at + 8 * order + 2 * k + 1] = widened(lo, hi, UNIT)
     if curve.rational == 0:
         for order in range(1, 3):
             for k in range(6):
-                room[at + 6 * order + k] = room[at + 8 * order + k]
+                workspace[at + 6 * order + k] = workspace[at + 8 * order + k]
     else:
-        quotients(room, at, 3)
+        quotients(workspace, at, 3)
 
 
 @kernel(inner=True, exact=True)
-def bezier_range_bounds(store, span, s0, s1, room):
+def bezier_range_bounds(store, span, s0, s1, workspace):
     """Intervals of C, C', C'', C''' (by s) over [s0, s1] of a piece to room, twelve pairs, and the width of an arc.
 
     The width of a polynomial piece is (s1 - s0) int |C' - chi / (s1 - s0)|^2 ds by the closed form of its Bezier
     points, a quadratic form in differences and so free of cancellation; of a rational piece it is infinite here.
     """
-    work = range_room_at(room, 0)
+    work = range_workspace_at(workspace, 0)
     polynomial = ranged_curve_at(store.table, 0).rational == 0
     work.width = math.inf
     free = BEZIER_AT
@@ -224,33 +224,33 @@ def bezier_range_bounds(store, span, s0, s1, room):
         error = error_of(store, order)
         if n < 0:
             for k in range(8):
-                room[8 * order + k] = 0.0
+                workspace[8 * order + k] = 0.0
             continue
-        restrict(store.pool, o, n, s0, s1, room, free)
+        restrict(store.pool, o, n, s0, s1, workspace, free)
         if order == 0 and not polynomial:
-            project(store, free, n + 1, room, RANGES)
+            project(store, free, n + 1, workspace, RANGES)
             continue
         for k in range(4):
-            lo = room[free + k]
+            lo = workspace[free + k]
             hi = lo
             for i in range(1, n + 1):
-                x = room[free + 4 * i + k]
+                x = workspace[free + 4 * i + k]
                 lo = min(lo, x)
                 hi = max(hi, x)
             place = RANGES + 8 * order + 2 * k
-            room[place], room[place + 1] = widened(lo - error, hi + error, UNIT)
+            workspace[place], workspace[place + 1] = widened(lo - error, hi + error, UNIT)
         if polynomial and order == 1:
-            work.width = gram_width(store, n, s1 - s0, room, free, error)
+            work.width = gram_width(store, n, s1 - s0, workspace, free, error)
     if polynomial:
         for order in range(1, 4):
             for k in range(6):
-                room[6 * order + k] = room[8 * order + k]
+                workspace[6 * order + k] = workspace[8 * order + k]
     else:
-        quotients(room, RANGES, 4)
+        quotients(workspace, RANGES, 4)
 
 
 @kernel(inner=True, exact=True)
-def gram_width(store, n, step, room, at, error):
+def gram_width(store, n, step, workspace, at, error):
     """(step)^2 times the variance of C' from its Bezier points at room[at:], of degree n; rounded up."""
     curve = ranged_curve_at(store.table, 0)
     total = 0.0
@@ -258,16 +258,18 @@ def gram_width(store, n, step, room, at, error):
     for k in range(3):
         mean = 0.0
         for i in range(n + 1):
-            mean += room[at + 4 * i + k]
+            mean += workspace[at + 4 * i + k]
         mean /= n + 1
         for i in range(n + 1):
-            room[at + 4 * i + k] -= mean
+            workspace[at + 4 * i + k] -= mean
     g = curve.gram
     for i in range(n + 1):
         for j in range(n + 1):
             p = at + 4 * i
             q = at + 4 * j
-            scalar = room[p] * room[q] + room[p + 1] * room[q + 1] + room[p + 2] * room[q + 2]
+            scalar = (
+                workspace[p] * workspace[q] + workspace[p + 1] * workspace[q + 1] + workspace[p + 2] * workspace[q + 2]
+            )
             total += store.pool[g + (n + 1) * i + j] * scalar
             off += store.pool[g + (n + 1) * i + j] * abs(scalar)
     # Points are off by `error` each, and a mean by as much: in the norm of the variance, which is at most the largest

@@ -31,8 +31,8 @@ def packed_curves(curves: Sequence[NurbsCurve]) -> tuple[Array, Array, Ints]:
     weights = np.concatenate([curve.weights for curve in curves])
     knots = np.concatenate([curve.knots for curve in curves])
     degree, count = shape[:, 0], shape[:, 1]
-    room = (count - degree) * (degree + 1)
-    bezier, pool = np.empty(3 * int(room.sum())), np.empty(int((4 * room + count - degree + 1).sum()))
+    workspace = (count - degree) * (degree + 1)
+    bezier, pool = np.empty(3 * int(workspace.sum())), np.empty(int((4 * workspace + count - degree + 1).sum()))
     records = np.empty((len(curves), CURVE_RECORD), dtype=np.int64)
     filled, used, finite = bezier_tables(
         (points, weights, knots), shape, _power_matrices(), COINCIDENT, bezier, pool, records

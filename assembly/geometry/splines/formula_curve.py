@@ -111,11 +111,11 @@ class FormulaCurve:
         self._table, self._pool = _packed_record(
             column, parameter, self.domain, slope, _arc_expression(arc_length, self.domain), self.error
         )
-        self._room = np.zeros(int(formula_at(self._table, 0).room))
+        self._workspace = np.zeros(int(formula_at(self._table, 0).workspace))
         self._has_arc = arc_length is not None
         at = np.linspace(*self.domain, _LOOKS)
         out = np.empty((_LOOKS, 9))
-        bad = formula_points(self._table, self._pool, at, out, self._room)
+        bad = formula_points(self._table, self._pool, at, out, self._workspace)
         if bad >= 0:
             raise InputError(
                 f"expression is {out[bad, : self.dimension].tolist()} at {at[bad]:g}; "
@@ -163,7 +163,7 @@ class FormulaCurve:
         if not inside.all():
             raise InputError(f"t is {row[~inside][0]}; expected a parameter in the domain [{low:g}, {high:g}]")
         out = np.empty((row.size, 9))
-        formula_points(self._table, self._pool, row if row.flags.writeable else row.copy(), out, self._room.copy())
+        formula_points(self._table, self._pool, row if row.flags.writeable else row.copy(), out, self._workspace.copy())
         values = out.reshape((*at.shape, 3, 3))[..., : order + 1, : self.dimension]
         finite = np.isfinite(values).all(axis=(-2, -1)).ravel()
         if not finite.all():
@@ -208,7 +208,7 @@ class FormulaCurve:
         if not ((first >= low) & (last <= high) & (first <= last)).all():
             raise InputError(f"t0, t1 are {first}, {last}; expected intervals in the domain [{low:g}, {high:g}]")
         out = np.empty((first.size, 43))
-        formula_ranges(self._table, self._pool, first.ravel().copy(), last.ravel().copy(), out, self._room.copy())
+        formula_ranges(self._table, self._pool, first.ravel().copy(), last.ravel().copy(), out, self._workspace.copy())
         boxes = out[:, :24].reshape((*first.shape, 4, 3, 2))
         return np.swapaxes(boxes, -1, -2)[..., : self.dimension], out[:, 42].reshape(first.shape)
 
@@ -263,7 +263,7 @@ class FormulaCurve:
     def arc_lengths(self, t0: Array, t1: Array) -> Array:
         """The user's bound of the length of arc of intervals, rounded up, without any check."""
         out = np.empty(t0.size)
-        arc_bounds(self._table, self._pool, t0, t1, out, self._room.copy())
+        arc_bounds(self._table, self._pool, t0, t1, out, self._workspace.copy())
         return out
 
 
@@ -373,5 +373,5 @@ def _packed_record(
         pool.append(tape.constants)
         used += row.size
         constants += tape.constants.size
-    head.room = WORK_AT + 2 * work
+    head.workspace = WORK_AT + 2 * work
     return np.concatenate(table), np.concatenate(pool)

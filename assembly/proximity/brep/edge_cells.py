@@ -190,9 +190,9 @@ def edge_cells(surface: NurbsSurface, curves: Sequence[NurbsCurve], lengths: Seq
         for k, cell in enumerate(cells):
             rows = np.column_stack([cell, center[at : at + len(cell)], radius[at : at + len(cell)]])
             at += len(cell)
-            room = max(_MOST - counts[k], 0)
+            workspace = max(_MOST - counts[k], 0)
             large = np.flatnonzero(rows[:, 5] > _PART * lengths[k])
-            large = large[np.argsort(-rows[large, 5], kind="stable")][:room]
+            large = large[np.argsort(-rows[large, 5], kind="stable")][:workspace]
             kept = np.ones(len(rows), dtype=bool)
             kept[large] = False
             done[k].append(rows[kept])

@@ -239,9 +239,9 @@ def pairs_about(store, trees, pose, reach, ring, tilt, stack, out):
     margin = Margin(reach + slack, slack, tilt + TREE_ROUNDING)
     view = view_of(pose)
     back = view_of(inverse_pose(pose))
-    room = stack.shape[0]
+    workspace = stack.shape[0]
     count = 0
-    if room < 1:
+    if workspace < 1:
         return -1
     g = tree_node(store, tree_g, 0)
     if not admits(tree_node(store, tree_f, 0), g, seen_from(view, g), view, margin):
@@ -264,7 +264,7 @@ def pairs_about(store, trees, pose, reach, ring, tilt, stack, out):
                     out[count, 1] = -1 - child_g
                 count += 1
             continue
-        if used + 2 > room:
+        if used + 2 > workspace:
             return -1
         if child_g < 0 or (child_f >= 0 and f.radius >= g.radius):
             seen = seen_from(view, g)
@@ -369,9 +369,9 @@ def least_distance(store, trees, pose, upper, stack):
     slack = rounding(store, trees, pose.shift)
     view = view_of(pose)
     back = view_of(inverse_pose(pose))
-    room = stack.shape[0]
+    workspace = stack.shape[0]
     best = (upper + slack) * (upper + slack)
-    if room < 1:
+    if workspace < 1:
         return 0.0
     stack[0, 0] = 0
     stack[0, 1] = 0
@@ -389,7 +389,7 @@ def least_distance(store, trees, pose, upper, stack):
             continue
         child_f = child_of(store, tree_f, i)
         child_g = child_of(store, tree_g, j)
-        if (child_f < 0 and child_g < 0) or used + 2 > room:
+        if (child_f < 0 and child_g < 0) or used + 2 > workspace:
             best = bound
             continue
         descend_f = child_g < 0 or (child_f >= 0 and f.radius >= g.radius)

@@ -106,17 +106,17 @@ def _packed(key: _Key) -> _Packed:
     )
     table: list[Table] = []
     pool: list[Array] = []
-    room = 0
+    workspace = 0
     for face in [Face(surface, reversed=is_reversed)] + ([] if carrier is None else [Face(carrier)]):
         record, numbers = face.packed()
         record = record.copy()
-        record[list(OFFSETS)] += room
+        record[list(OFFSETS)] += workspace
         table.append(record)
         pool.append(numbers)
-        room += numbers.size
+        workspace += numbers.size
     record, numbers = curve.packed()
     record = record.copy()
-    record[[CURVE_BREAKS, CURVE_COEFFICIENTS]] += room
+    record[[CURVE_BREAKS, CURVE_COEFFICIENTS]] += workspace
     edge = edge_over(-1 if carrier is None else SURFACE_RECORD, sum(part.size for part in table), endless)
     size = max(surface.size, curve.size if carrier is None else carrier.size)
     return _Packed(np.concatenate([*table, record, edge]), np.concatenate([*pool, numbers]), size, endless)

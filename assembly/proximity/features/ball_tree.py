@@ -91,7 +91,7 @@ def feature_cells(table, shell, k):
 
 
 @kernel(inner=True)
-def room(store, shell):
+def workspace(store, shell):
     """How many nodes a shell's tree may need."""
     solid = shell_at(store.table, shell)
     features = solid.faces + solid.edges + solid.vertices
@@ -187,7 +187,7 @@ def used_cell(store, record, kind, c):
 @kernel(inner=True, allocates=True)
 def plant(store, shell, pose):
     """A `BallTree` of the nodes of a shell and of its features."""
-    most = room(store, shell)
+    most = workspace(store, shell)
     tree = BallTree(
         shell=shell,
         pose=pose,

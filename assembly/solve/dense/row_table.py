@@ -126,7 +126,7 @@ def point_at(store, state, free):
     point = new_point(store.table)
     tracked = point.tracked
     o = header.tape_workspace
-    room = TapeWorkspace(np.empty(store.table[o]), np.empty(store.table[o + 1]), np.empty(store.table[o + 2]))
+    workspace = TapeWorkspace(np.empty(store.table[o]), np.empty(store.table[o + 1]), np.empty(store.table[o + 2]))
     loose = LiftedPairs(
         free,
         np.empty((pairs, 4)),
@@ -135,7 +135,7 @@ def point_at(store, state, free):
         np.empty((tracks, TRACK)),
         np.empty(0),
     )
-    program = Program(store, None, loose, room, None)
+    program = Program(store, None, loose, workspace, None)
     scaled_poses(store, state, point.q)
     read_tracked(store.table, state, tracked)
     for k in range(pairs):

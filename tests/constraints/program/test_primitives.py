@@ -99,7 +99,7 @@ def moved(pool, q, twist):
     return placed(pool, out)
 
 
-def room(kind, component, records):
+def workspace(kind, component, records):
     """About how far the coordinate is from where it has no derivative."""
     z = records[1, P.AXES_A + 6 : P.AXES_A + 9]
     v = records[1, P.AXES_B + 6 : P.AXES_B + 9]
@@ -116,7 +116,7 @@ def check_derivatives(kind, component, seed, swing=None):
     """The value along retracted twists: central differences of sixth order for both derivatives."""
     pool, q = scene(seed, swing)
     records = placed(pool, q)
-    reach = room(kind, component, records)
+    reach = workspace(kind, component, records)
     assert reach > 1e-3
     start = value(kind, component, records)
     first, second = gradient(kind, component, records), hessian(kind, component, records)

@@ -312,9 +312,9 @@ def test_the_default_clip_is_a_gem_clip_around_the_origin():
     st.floats(0.1, 30.0),
     st.tuples(st.floats(0.01, 0.999), st.floats(0.01, 0.999), st.floats(0.01, 0.999)),
 )
-def test_a_clip_does_not_run_into_itself(wire_radius, gap, room, second, parts):
+def test_a_clip_does_not_run_into_itself(wire_radius, gap, workspace, second, parts):
     pitch = 2 * wire_radius + gap
-    width = 4 * wire_radius + 2 * pitch + room
+    width = 4 * wire_radius + 2 * pitch + workspace
     length = second + width - pitch / 2
     legs = second * np.array([parts[0], parts[1], parts[1] * parts[2]])
     clip = shapes.paper_clip(length, width, wire_radius, gap=gap, legs=legs)

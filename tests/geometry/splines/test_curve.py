@@ -134,9 +134,9 @@ def test_knot_insertion_keeps_the_curve(seed, degree, kind, part, times):
     curve = random_curve(seed, degree, kind)
     low, high = curve.domain
     value = min(max(low + part * (high - low), low), high)
-    room = degree - int(np.count_nonzero(curve.knots == value))
+    workspace = degree - int(np.count_nonzero(curve.knots == value))
     near = np.abs(curve.breaks() - value)
-    if times > room:
+    if times > workspace:
         with pytest.raises(ValueError, match="times is"):
             curve.insert_knot(value, times)
         return

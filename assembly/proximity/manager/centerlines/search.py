@@ -236,7 +236,7 @@ def add_minima(posed, box, ends, what, merge_radius, places, extrema):
 
 
 @kernel(inner=True)
-def search_centerlines(posed, moving, limits, boxes, waiting, rooms, extrema):
+def search_centerlines(posed, moving, limits, boxes, waiting, workspaces, extrema):
     """Look for all contacts of two wires with gaps up to `near`, of CenterlineLimits; known ones are in the list.
 
     `moving` is the body that moves. There are `waiting` boxes; within the reach nothing is outside of them. The `rooms`
@@ -250,7 +250,7 @@ def search_centerlines(posed, moving, limits, boxes, waiting, rooms, extrema):
     radii = both_radii(posed.store, posed.centerlines) + limits.least
     sharpest = max(wire_at(pool, line.numbers).sharpest, wire_at(pool, centerline.numbers).sharpest)
     known = extrema.count[0]
-    marks, places = rooms
+    marks, places = workspaces
     mark_known(posed, extrema, marks)
     rest = reach
     birth_bound = math.inf
