@@ -35,8 +35,8 @@ def best_first(
     Parameters
     ----------
     state_at
-        View of search.state, a record with the fields `limit` (a pair of at least this bound is let go) and `let_go`
-        (the least bound of those; infinite at first), which the steps keep.
+        View of search.state, a record with two fields. `limit`: a pair with a bound of at least this is let go; the
+        other kernels lower it. `let_go`: the least bound of such pairs, infinite at first; it is kept here.
     bound
         (search, i, j) -> lower bound of the distance of two pieces, and what decides between equal ones.
     ended

@@ -1,7 +1,7 @@
-"""Newton's method in a box: a minimum between two bounds, and one of any number of coordinates by shortened steps.
+"""Newton's method in a box: for one variable with bisection (`bracketed_newton`), for several with shortened steps.
 
-Both are bodies of kernels, made from kernels that evaluate. What these return is a named tuple, which may hold more
-than the method asks for and is returned: nobody evaluates again where the method ended.
+Each function makes the body of a kernel from a kernel that evaluates. The latter returns a named tuple with the fields
+the method needs, and maybe more; that of the place found is handed on, so that callers need not evaluate it again.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def bracketed_newton(evaluate: Callable[..., Any], *, inside: bool, resolution: 
         Whether the slope is known to be negative at the low end and positive at the high one. Else the minimum may be
         at an end.
     resolution
-        A step of no more than this part of x and the interval's width is none.
+        The search ends with a step of at most this factor times the larger of |x| and the interval's width.
     """
 
     def minimum(problem: Any, low: Any, high: Any, x: Any) -> Any:
@@ -52,7 +52,7 @@ def bracketed_newton(evaluate: Callable[..., Any], *, inside: bool, resolution: 
                     return x, at
                 below = x
             new = x - at.slope / at.curvature if at.curvature > 0.0 else x
-            # An end that was not visited is gone to once.
+            # Where Newton leads to an end of the interval or beyond, that end is evaluated once.
             if new <= low and below < low:
                 new = low
             elif new >= high and above > high:
@@ -97,7 +97,7 @@ def damped_newton(
     shortenings
         How often in a row a step is cut.
     fall
-        A merit of not less than this part of the last one has not fallen.
+        A merit has fallen if it is less than this factor times the least one so far.
     """
 
     def descend(problem: Any, x: Any) -> Any:

@@ -25,7 +25,7 @@ from assembly.proximity.bvh.packing import pack_tree
 from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.centerlines.packing import pack_centerline
 from assembly.proximity.manager.extrema import GIVEN_RECORD
-from assembly.proximity.manager.parameters import FIRST_MARGIN, LAST_MARGIN
+from assembly.proximity.manager.parameters import LARGEST_MARGIN, LEAST_MARGIN
 
 __all__ = ["clearance_pairs", "is_of_surfaces", "pack_manager", "slot_count", "table_with_clearances"]
 
@@ -96,7 +96,7 @@ def pack_manager(
     block = np.zeros(manager_records.LENGTH_COUNT)
     lengths = manager_records.lengths_at(block, 0)
     lengths.merge_radius = min(clearance.merge_radius for clearance in clearances)
-    lengths.first_margin, lengths.last_margin = FIRST_MARGIN, LAST_MARGIN
+    lengths.least_margin, lengths.largest_margin = LEAST_MARGIN, LARGEST_MARGIN
     row = np.zeros(manager_records.MANAGER_SIZE, dtype=np.int64)
     record = manager_records.manager_at(row, 0)
     record.pairs, record.places, record.pair_table, record.first = count, first, pair_table, len(contacts)

@@ -37,7 +37,7 @@ from assembly.kinematics.body import Body
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.events import fresh_memory, listed_places
-from assembly.proximity.manager.parameters import LAST_MARGIN
+from assembly.proximity.manager.parameters import LARGEST_MARGIN
 
 __all__ = ["Packed", "structure_of"]
 
@@ -140,7 +140,7 @@ class Packed:
         self._memory = np.empty(0)
         if self.clearance_rows:
             # The first look sees what crosses at the start as well, if it is no deeper than this.
-            self._memory = fresh_memory(sum(map(len, self.clearance_pairs)), self.clearance_rows, LAST_MARGIN)
+            self._memory = fresh_memory(sum(map(len, self.clearance_pairs)), self.clearance_rows, LARGEST_MARGIN)
 
     def _write(
         self, bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]

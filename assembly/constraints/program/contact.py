@@ -192,7 +192,7 @@ def least_gap(store, r, tracked):
 
 @kernel(inline=True)
 def is_of_solids(table, r):
-    """Whether row r is a contact of solids, or has no contact."""
+    """Whether row r is a contact of solids; the answer for an idle row means nothing."""
     return contact_of(table, r).shell_f >= 0
 
 

@@ -5,8 +5,8 @@ then a record a row (contacts first, then trims), a joint, a tape and an objecti
 (`Iterate`), of
 
     q              (n, 7)       poses, scaled, positions relative to a reference
-    tracked        (k, 12)      of every contact parameters, features, normal and gap of its pair
-                                (`proximity/features/solid_contact.py`), then (first column) unwrapped angles of joints
+    tracked        (k, TRACK)   a `TRACKED_PAIR` of every contact (`proximity/features/solid_contact.py`), then angles
+                                of joints, counted on past whole turns, in the first column
     records        (k + j, R)   what the derivatives of gaps need (see `track_contact`), then frames of joints, then
                                 one of trims that are vectors
     residual       (m,)         rows: contacts, trims, joints, tapes; behind them four for every free pair

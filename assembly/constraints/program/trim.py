@@ -14,7 +14,7 @@ another (the loop's extremum is then the contact's), each a multiple of s; so ar
 be. Off the loop the vector u - c = s n has two independent rates, n s_q and s n_q, of which the second forbids what the
 loop allows, to slide along it: the closer to the loop, the larger the multiplier that says so. So the first two forms
 count by their signed length, one row that is zero where the vector is. The third contains the gap and has no such sign.
-The loop of a solve calls the two kernels at the end by their addresses.
+The loop of a solve calls `trim_rows` and `trim_terms` by their addresses.
 """
 
 from __future__ import annotations

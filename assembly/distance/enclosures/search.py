@@ -1,4 +1,4 @@
-"""Branch and bound for the distance of two curves, or of a curve and a hull: what is certain after every step.
+"""Branch and bound for the distance of two curves, or of a curve and a hull (paper 003, algorithms 1 to 4).
 
 A node is a pair of pieces with a lower bound of its distance. The heap gives the node with the least one, L; U is
 the distance of the best points known. Then L <= distance <= U always, and a search ends when the question is answered:

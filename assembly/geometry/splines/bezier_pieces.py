@@ -121,7 +121,7 @@ def bezier_derivatives(rows, o, pool, binomials, n, x):
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], b1, i8, f8[::1])")
 def evaluate_pieces(record, pool, t, closed, order, out):
-    """`spline.evaluate_curve` from Bezier pieces: as accurate at any degree."""
+    """As `evaluate_curve` (`geometry/splines/evaluate.py`), from Bezier pieces, which are accurate at any degree."""
     curve = bezier_curve_at(record, 0)
     count = t.size
     n = curve.degree

@@ -1,8 +1,8 @@
-"""The matrix of Newton's method for an extremal pair, and its inverse where surfaces hardly part: along a valley.
+"""The 2 x 2 matrix H of Newton's method and of the contact velocities (paper 001, equation 14), and its inverse.
 
 With A and C the shape operators of two surfaces and beta their gap, H = C (I + beta A) - A
-(`proximity/extrema/face_face.py`); -H is how
-they part. Where it is singular, or nearly so, the pair is one of a continuum, of which the least may be far away.
+(`proximity/extrema/face_face.py`). At contact, beta = 0, the gap changes by -a.H a / 2 with a tangential move a. Where
+H is singular or nearly so, the pair is one of a continuum (a near-singular minimum) whose least gap may be far away.
 """
 
 from __future__ import annotations

@@ -82,7 +82,7 @@ def candidate_pairs(manager, p, posed, moving, margin, stack, pairs):
     record = record_of(manager)
     least = pair_lengths_of(manager, p).least
     found = np.int64(-1)
-    skin = SKIN * lengths_of(manager).first_margin
+    skin = SKIN * lengths_of(manager).least_margin
     if record.lists > 0 and margin <= skin:
         key = ListKey(record.list_table + LIST_INTS * (p % record.lists), p, moving)
         found = listed_pairs(store, key, trees, pose, margin + least, skin, stack, pairs)

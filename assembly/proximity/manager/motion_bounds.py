@@ -116,7 +116,7 @@ def margin_now(manager, p, moving):
         # After a step that was cut, as far as it was to go; but it goes no farther where contacts may be born.
         moves = MOVES if pair.centerline_f < 0 else MOVES_OF_WIRES
         asked = max(moves * pace, min(known.cut_short, pair_lengths_of(manager, p).curved_bound))
-        margin = min(max(asked, lengths.first_margin), lengths.last_margin)
+        margin = min(max(asked, lengths.least_margin), lengths.largest_margin)
     known.cut_short = 0.0
     known.called = header.calls
     center = add(matvec(moving.turn, middle), moving.shift)

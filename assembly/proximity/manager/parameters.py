@@ -8,9 +8,9 @@ tried. All are constants of the compiled code; what a user may set are the optio
 from __future__ import annotations
 
 # What is listed. -----------------------------------------------------------------------------------------------------
-# [length] The query margin of a first update, the least one, and the largest. Doubled: fewer updates, each of more
-# pairs of patches; the largest doubled: bodies far from each other go farther between two updates. Chosen.
-FIRST_MARGIN, LAST_MARGIN = 0.005, 0.1
+# [length] The least query margin and the largest one, with which the first update of a pair begins. The least doubled:
+# fewer updates, each of more pairs of patches; the largest doubled: distant bodies need fewer updates. Chosen.
+LEAST_MARGIN, LARGEST_MARGIN = 0.005, 0.1
 # Extrema nearer than the first part of the query margin are listed; those that are, stay so up to the second. Doubled:
 # more rows, of contacts that are far; with both parts equal they would come and go with every update. Chosen.
 TAKE, KEEP = 0.4, 0.8
@@ -19,9 +19,9 @@ TAKE, KEEP = 0.4, 0.8
 CROSSING = 1e-6
 
 # When a pair is looked at again. -------------------------------------------------------------------------------------
-# Parts of a pair's motion bound. It is updated when SPENT is used (USED, if it is of round wires, whose updates take
-# little); in turns, the one that used most at USED, and any that cut a step since its last update at BRIEF: what is
-# left would cut the next one to nothing. Larger: fewer updates, and steps cut shorter before one comes. Chosen.
+# Parts of a pair's motion bound after which the pair is updated: SPENT, or USED for two round wires, whose updates are
+# cheap. In a solve (IN_TURNS) the pair that used most is updated from USED on, and one that cut a step since its last
+# update from BRIEF on. Larger: fewer updates, and shorter steps before them. Chosen.
 USED, SPENT, BRIEF = 0.5, 0.85, 0.35
 # A query margin is for so many moves as the last ones; of round wires, whose updates take a tenth of the time, for
 # fewer. Doubled: half as many updates, each of more pairs. Chosen.
@@ -55,9 +55,9 @@ DESCENTS = 40
 SLICE = 50_000_000
 
 # Round wires. --------------------------------------------------------------------------------------------------------
-# [radians] Boxes over half of which no tangent turns by more than THIN are searched by projections; so many others are
-# halved only because they allow little motion, down to FINE. THIN doubled: more than one minimum in a box, which is
-# then halved after all; REFINED doubled: dearer updates, longer steps. Chosen.
+# [radians, boxes, radians] A box is halved until no tangent turns by more than THIN over half of it, and then searched
+# by projections. Up to REFINED boxes are halved, down to FINE, only because they limit the motion. THIN doubled: a box
+# may hold more than one minimum, and is then halved after all; REFINED doubled: slower updates, longer steps. Chosen.
 THIN, REFINED, FINE = 0.025, 16, 0.05
 # Motions in a box are no longer than this part of its smallest radius of curvature, and no separate motion ball is kept
 # above that part of the query margin. Doubled: bounds of turns grow faster than motions; balls that save no update.

@@ -40,8 +40,8 @@ GOES_ON, ENDS, ABORTED = 0, 1, 2
 LENGTHS_DTYPE = record_dtype(
     "f8",
     merge_radius=1,  # merge radius: extrema nearer to each other, and along the surfaces, are one
-    first_margin=1,  # query margin of a first update, and the least one
-    last_margin=1,  # the largest query margin
+    least_margin=1,  # the least query margin
+    largest_margin=1,  # the largest one, and that of a first update
 )
 lengths_at = record_view(LENGTHS_DTYPE)
 LENGTH_COUNT = size_of(LENGTHS_DTYPE)

@@ -116,7 +116,7 @@ NEVER, WHERE_LOST, ALWAYS = 0, 1, 2
 def list_vertex_contacts(manager, p, posed, workspace, extrema, tracked):
     """Add corners over faces to the extrema of pair p. A listed contact whose extremum is at one stays there."""
     lengths = lengths_of(manager)
-    span = (-lengths.first_margin, pair_state_of(manager, p).margin + pair_lengths_of(manager, p).least)
+    span = (-lengths.least_margin, pair_state_of(manager, p).margin + pair_lengths_of(manager, p).least)
     add_vertex_contacts(posed, span, lengths.merge_radius, workspace.stack, workspace.candidates, extrema)
     for k in range(extrema.count[0]):
         extremum = extremum_at(extrema.rows, k)
@@ -167,7 +167,7 @@ def search_by_patches(manager, p, posed, moving, margin, tracked, workspace, ext
     any_gone = known_extrema(manager, p, posed, tracked, extrema)
     facing = Candidates(pairs, distances, found)
     enough = near_enough(posed, least, margin, curved_bound, facing)
-    limits = Limits(curved_bound, enough, (-lengths.last_margin, margin + least), lengths.merge_radius)
+    limits = Limits(curved_bound, enough, (-lengths.largest_margin, margin + least), lengths.merge_radius)
     search = search_patches(posed, moving, limits, facing, extrema, workspace.passed)
     bound = min(search.bound, margin)
     if found == 0:
@@ -183,7 +183,7 @@ def search_by_centerlines(manager, p, posed, moving, margin, tracked, workspace,
     lengths, asked = lengths_of(manager), pair_lengths_of(manager, p)
     least = asked.least
     radii = both_radii(store, posed.centerlines) + least
-    skin = CENTERLINE_SKIN * lengths.first_margin
+    skin = CENTERLINE_SKIN * lengths.least_margin
     at_list = record.list_table + LIST_INTS * (p % record.lists)
     waiting = near_parts(posed, at_list, p, moving, radii + margin, skin, workspace)
     while waiting < 0 and margin > LEAST_MOTION_BOUND:
@@ -258,7 +258,7 @@ def keep_bounds(manager, p, search, rest, extrema):
         sure = max(sure, STILL * known.motion_bound)
     elif birth_bound < math.inf:
         low = nearest_fold(extrema, pair_lengths_of(manager, p).least, known.margin)
-        sure = 0.0 if low <= NEAR_FOLD * lengths_of(manager).first_margin else math.inf
+        sure = 0.0 if low <= NEAR_FOLD * lengths_of(manager).least_margin else math.inf
         birth_bound = birth_bound if sure == 0.0 else min(birth_bound, low)
     allow_ball(known, search.ball, birth_bound, sure)
 

@@ -36,9 +36,9 @@ from assembly.constraints.program.records import (
 )
 from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
-from assembly.solve.loop.contacts import free_folds, start_contacts
+from assembly.solve.loop.contacts import lift_folds, start_contacts
 from assembly.solve.loop.line_search import goal
-from assembly.solve.loop.parameters import FREE_BELOW
+from assembly.solve.loop.parameters import LIFT_BELOW
 from assembly.solve.loop.report import read_tracked, scaled_poses, write_tracked
 from assembly.solve.loop.residuals import arrange, shape_of, size_of_shape
 
@@ -145,14 +145,14 @@ def point_at(store, state, free):
     if lost < 0:
         # Every contact counts here, also one that pushes nothing.
         active = np.ones(point.residual.size)
-        count = free_folds(store, loose, point, active, -1.0, -1, False)
+        count = lift_folds(store, loose, point, active, -1.0, -1, False)
         before = -1
         while count != before:
             for k in range(tracks):
                 copy_tracked(tracked, k, start)
             lost = evaluate(program, start, math.inf, point)
             before = count
-            count = free_folds(store, loose, point, active, FREE_BELOW, lost, False)
+            count = lift_folds(store, loose, point, active, LIFT_BELOW, lost, False)
     return PointFound(lost, count, point, program)
 
 

@@ -15,7 +15,7 @@ from assembly.solve.loop.direction import find_direction, first_shift, propose, 
 from assembly.solve.loop.inertia import note_factor
 from assembly.solve.loop.line_search import Line, Trust, search_line
 from assembly.solve.loop.loop_state import lead_back
-from assembly.solve.loop.parameters import FREE_BELOW_AT_LAST, HALF, OFTEN, RESTORATIONS, SHORTEST
+from assembly.solve.loop.parameters import HALF, LIFT_BELOW_AT_LAST, OFTEN, RESTORATIONS, SHORTEST
 from assembly.solve.loop.residuals import violation_of
 from assembly.solve.loop.restore import begin_restoring
 from assembly.solve.loop.settings import OUT_OF_TIME, RUNNING, STALLED
@@ -99,7 +99,7 @@ def refuse(task, current):
     pairs = header_at(table, 0).contacts
     if loop.lost < 0:
         # Perhaps a fold is near enough to matter; else nothing moves any more.
-        loop.below = FREE_BELOW_AT_LAST
+        loop.below = LIFT_BELOW_AT_LAST
         for k in range(pairs):
             near = free[k] < 0 and is_near_fold(current.records, k, loop.below)
             if near and not is_of_solids(table, k):

@@ -25,7 +25,7 @@ def reach_of(store, q):
 
 @kernel(inner=True)
 def rounding_at(store, settings, current):
-    """The violation that is none: what is asked for, or what rounding of coordinates and of whole turns violates."""
+    """The largest violation that counts as none: the tolerance, or what rounding of coordinates and angles causes."""
     reach = max(reach_of(store, current.q), largest_turn(store, current.tracked))
     return max(settings_at(settings, 0).feasibility, min(ROUNDING * reach, MOST_ROUNDING))
 
@@ -55,8 +55,8 @@ def is_near_saddle(table, settings, results, violation, dual):
 def has_arrived(program, settings, results, current, violation, last_violation, feasible, dual):
     """Whether rows hold and the Lagrangian is stationary, or all but so at a saddle that is to be left.
 
-    Of a start that was far out rows held to its rounding. They are to hold to that of where bodies are now, unless
-    steps gain nothing more.
+    `feasible` includes rounding at the start, which is large if bodies began far from the origin. Where they are now it
+    may be less, and rows are to hold to that, unless the last step did not halve the violation.
     """
     limits = settings_at(settings, 0)
     store = program.store

@@ -10,9 +10,10 @@ factorization of that matrix tells its inertia; d is raised until it exists. dx 
 along which a line search runs (`solve/loop/line_search.py`); multipliers follow every step. -mu I makes redundant rows
 harmless.
 
-A step has six phases: observe (`observe.py`: which contacts there are), evaluate (residuals, objective, multipliers),
-terminate (`terminate.py`), direction (`advance.py`, `direction.py`: the system above), line search (`line_search.py`)
-and accept. What is special is a policy beside these: lifted pairs at folds (`contacts.py`), the contact manager
+A step has six phases: observe (`observe.py`: which contacts there are), evaluate (`observe.py`: violation, objective,
+multipliers), terminate (`terminate.py`), direction (`advance.py`, `direction.py`: the system above), line search
+(`line_search.py`, which evaluates the rows at the next iterate) and accept (`advance.py`). Special cases have files of
+their own: lifted pairs at folds (`contacts.py`) and at ends of patches (`ends.py`), the contact manager
 (`clearances.py`), ticks and budgets (`deadline.py`), a return to the last feasible iterate (`rollback.py`), rows that
 are restored alone or led back (`restore.py`), scattered bodies (`initial_guess.py`), second order (`inertia.py`).
 """
@@ -48,7 +49,7 @@ from assembly.solve.loop.workspace import Iterates, carve_all, memory_of, result
     allocates=True,
 )
 def solve_program(table, pool, settings, state, history, tips):
-    """Solve in place. State: q (n, 7) | tracked (k, 4) | multipliers (m) | residuals (m) | results.
+    """Solve in place. State: q (n, 7) | tracked (k, TRACK) | multipliers (m) | residuals (m) | results | memory.
 
     `tips` is None where no term of the objective is a dexterity.
     """

@@ -16,10 +16,10 @@ from assembly.proximity.manager.records import memory_header_at
 from assembly.proximity.manager.update import AS_NEEDED, SPARING
 from assembly.solve.loop.arrival import reach_of, rounding_at
 from assembly.solve.loop.clearances import forget_clearance_rows, place_clearance_rows, update_around
-from assembly.solve.loop.contacts import free_folds, start_contacts
+from assembly.solve.loop.contacts import lift_folds, start_contacts
 from assembly.solve.loop.deadline import begin_tick
 from assembly.solve.loop.initial_guess import assemble, scattered
-from assembly.solve.loop.parameters import EXTRA_TIME, FAR, FREE_BELOW, PATIENCE
+from assembly.solve.loop.parameters import EXTRA_TIME, FAR, LIFT_BELOW, PATIENCE
 from assembly.solve.loop.report import read_tracked
 from assembly.solve.loop.residuals import arrange
 from assembly.solve.loop.restoration import begin_way, restoration_at
@@ -82,8 +82,8 @@ def find_contacts(program, settings, state, current, rows, n):
     """Find the contacts of the start and evaluate its rows, unless the last tick left them in its state.
 
     Bodies of a contact or a clearance that are in each other by no more than touching there may stay so.
-    Returns the contact that has no pair, or -1, and whether that was told by evaluating the rows: which are not
-    evaluated yet where a contact has no pair to begin with, or is at a fold.
+    Returns the contact that has no pair, or -1, and whether the rows were evaluated. They are not where a contact has
+    no pair to start from, or where pairs are lifted, for which rows have to be rearranged first.
     """
     limits = settings_at(settings, 0)
     store, lifted = program.store, program.lifted
@@ -101,7 +101,7 @@ def find_contacts(program, settings, state, current, rows, n):
         came = update_around(store, memory, current, SPARING if tick else AS_NEEDED)
         memory_header.overlap = 0.0
         place_clearance_rows(store.table, lifted, current, rows, False)
-    count = free_folds(store, lifted, current, rows.active, -1.0, -1, limits.free_trims == 1.0)
+    count = lift_folds(store, lifted, current, rows.active, -1.0, -1, limits.lift_trims == 1.0)
     if lost >= 0 or count > 0:
         return lost, False
     if watched:
@@ -205,11 +205,11 @@ def begin_loop(task, current):
     loop.shift = 2.0 * task.result.first_shift if task.tick else 0.0
     loop.used_shift, loop.radius, loop.leash, loop.cut_length = 0.0, limits.radius, math.inf, math.inf
     loop.longest, loop.slope, loop.cut, loop.alpha = 0.0, 0.0, 1.0, 0.0
-    loop.below = FREE_BELOW
+    loop.below = LIFT_BELOW
     loop.check_violation = loop.entered = loop.restored = math.inf
     loop.rows = header_at(store.table, 0).rows
     loop.over = loop.iteration = loop.asked = loop.late = loop.changed = 0
-    loop.lifted = loop.lifts = loop.folded = loop.first = loop.kept = loop.is_fresh = loop.cuts = loop.stood = 0
+    loop.lifted = loop.lifts = loop.folded = loop.first = loop.kept = loop.cuts = loop.stood = 0
     loop.measured = loop.may_go = 1
     loop.restoring = loop.restorations = loop.kicks = loop.holds = loop.sunk = loop.begun = 0
     loop.lingers = loop.settled_by = 0

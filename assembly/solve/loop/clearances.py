@@ -31,7 +31,7 @@ from assembly.solve.loop.residuals import move
 
 @kernel(inner=True)
 def clear_clearance_rows(table):
-    """No row has a contact: so a packed scene is left, whose solutions have contacts of their own."""
+    """Empty all clearance rows at the end of a solve: every solution keeps its own list of contacts in its state."""
     header = header_at(table, 0)
     for k in range(header.first_clearance_row, header.first_clearance_row + header.clearance_rows):
         contact = contact_of(table, k)
@@ -54,9 +54,9 @@ def forget_clearance_rows(table, memory):
 
 @kernel(inner=True)
 def place_clearance_rows(table, lifted, current, rows, begins):
-    """Make every row the contact that its place has; multipliers of one that is new are zero.
+    """Write into every clearance row the contact in its slot; a new contact gets the multiplier zero.
 
-    Where a solve begins, rows know no contacts yet, and multipliers are those of the places.
+    If the solve `begins`, the rows are still empty, and the multipliers in the state are kept.
     """
     header = header_at(table, 0)
     record = header.manager_record
@@ -99,9 +99,9 @@ def place_clearance_rows(table, lifted, current, rows, begins):
 def update_around(store, memory, point, how):
     """The contact manager's look at a point; whether rows changed.
 
-    A long one asks between two slices whether it is to go on. Where what it is for is thrown away, it ends as one that
-    is cut (`solve/loop/deadline.py`), and so do those that come after it; they say that rows changed: nothing is known
-    to hold.
+    In a long one the caller is asked every 50 ms (SLICE) whether to go on. If not, this update and all later ones of
+    the solve end at once, as with a spent budget (`is_cut` in `solve/loop/deadline.py`), and return True: which
+    contacts there are is then unknown.
     """
     header = header_at(store.table, 0)
     state = memory_header_at(memory, 0)
@@ -125,9 +125,9 @@ def update_around(store, memory, point, how):
 def update_again(store, lifted, point, how):
     """The contact manager's look at a point that is evaluated; whether rows changed.
 
-    A look puts contacts on their extrema. Those whose coordinates are unknowns are on their way there: their rows have
-    been evaluated where they are, and they stay. One that is as far from the extremum that it stands for as two
-    contacts are from each other may be on its way to a saddle, and goes there.
+    An update moves every contact onto its extremum. The coordinates of lifted pairs are unknowns of the solve, and
+    their rows have been evaluated: their old values are put back. But where the extremum is farther away than the merge
+    radius, the pair may be converging to a saddle, and the extremum's coordinates are taken.
     """
     header = header_at(store.table, 0)
     memory, free, scratch, tracked = lifted.memory, lifted.free, lifted.guess, point.tracked
@@ -192,8 +192,9 @@ def measure_pairs(store, memory, first, end, q):
 def allowed_share(store, memory, current, trial, step, share):
     """How much of a step the contact manager allows, at most `share`, and whether it is all of that.
 
-    The poses at the end of the share go into the trial point. Of what it would use of motion bounds there it is then
-    known of which pairs more is known by another update.
+    The poses at the end of the share go into the trial iterate. Every pair is left with the part of its motion bound
+    that this step would use, so that an update (MEASURED) can begin with the largest; except where the pair was updated
+    at these poses as far out as another update would look: then with the part used here.
     """
     move(store.table, current.q, step, share, trial.q)
     record = header_at(store.table, 0).manager_record
@@ -215,7 +216,7 @@ def allowed_share(store, memory, current, trial, step, share):
         if end > max(begin, 1.0):
             allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
         flank = pair_at(store.table, manager.pair_table + PAIR_RECORD * p).minimum + 1
-        most = min(store.pool[flank], lengths_at(store.pool, manager.lengths).last_margin)
+        most = min(store.pool[flank], lengths_at(store.pool, manager.lengths).largest_margin)
         if begin <= STILL and o.margin >= min(o.cut_short, most):
             # It was looked at right here, as far as another look would.
             o.part = begin

@@ -22,10 +22,10 @@ from assembly.solve.loop.parameters import POLAR
 
 
 @kernel(inner=True)
-def free_pair(store, k, contacts, free, lengths):
+def lift_pair(store, k, contacts, free, lengths):
     """Make the coordinates of contact k unknowns; False where they cannot be: at a pole, and of solids.
 
-    Features of solids switch, which coordinates on two fixed faces would not know.
+    The closest features of solids change from face to face, and coordinates on two fixed faces cannot follow that.
     """
     contact = contact_of(store.table, k)
     x = (contacts[k, 0], contacts[k, 1], contacts[k, 2], contacts[k, 3])
@@ -67,7 +67,7 @@ def start_contacts(store, q, contacts, free, lengths):
         for l in range(FEATURE_F, TRACK):
             contacts[k, l] = 0.0
         if status != CONVERGED and status != SINGULAR:
-            if not free_pair(store, k, contacts, free, lengths):
+            if not lift_pair(store, k, contacts, free, lengths):
                 return k
     return -1
 
@@ -79,7 +79,7 @@ def is_near_fold(records, k, below):
 
 
 @kernel(inner=True)
-def free_folds(store, lifted, point, active, below, lost, trims):
+def lift_folds(store, lifted, point, active, below, lost, trims):
     """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
 
     An idle one-sided row asks nothing of its pair. With `trims`, pairs whose trims count are freed as well: the second
@@ -94,11 +94,11 @@ def free_folds(store, lifted, point, active, below, lost, trims):
             k = trim.contact
             counts = trim.form == SIGNED and not (trim.one_sided == 1 and active[r] == 0.0)
             if free[k] < 0 and counts:
-                free_pair(store, k, contacts, free, lengths)
+                lift_pair(store, k, contacts, free, lengths)
     for k in range(header.contacts):
         idle = contact_of(store.table, k).one_sided == 1 and active[k] == 0.0
         if free[k] < 0 and not idle and (is_near_fold(records, k, below) or k == lost):
-            free_pair(store, k, contacts, free, lengths)
+            lift_pair(store, k, contacts, free, lengths)
         if free[k] >= 0:
             free[k] = count
             count += 1
@@ -106,7 +106,7 @@ def free_folds(store, lifted, point, active, below, lost, trims):
 
 
 @kernel(inner=True)
-def free_pairs_hold(store, q, contacts, free, tolerance):
+def lifted_pairs_hold(store, q, contacts, free, tolerance):
     """Whether every free pair is extremal by the frames of tracked pairs, which know poles.
 
     Its own rows do not tell at a pole or an apex: there a tangent vanishes, and its row with it.

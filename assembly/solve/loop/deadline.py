@@ -1,8 +1,8 @@
 """The time of a tick: when it is spent, and how the next tick goes on with what is not done.
 
 A tick whose budget is spent where its pose does not hold, or where not everything that is near is known yet, leaves
-where it is (`CARRIED`): the tracker returns the last pose that held, and the next tick goes on from there. Each does
-something for good: a step of the loop, or a look at a pair of bodies.
+where it is (`CARRIED`): the tracker returns the last pose that held, and the next tick goes on from there. Each
+makes progress that lasts: a step of the loop, or the update of a pair of bodies.
 """
 
 from __future__ import annotations

@@ -79,7 +79,7 @@ def find_direction(program, current, rows, system, trust, restoring, is_fresh):
 
 @kernel(inline=True)
 def short_share(radius, longest, turn):
-    """How much of a step is within the radius, and turns no body by more than a radian."""
+    """The share of a step within the radius, with no component of a rotation vector above one radian."""
     share = min(1.0, radius / longest) if longest > 0.0 else 1.0
     return min(share, 1.0 / turn) if turn > 0.0 else share
 

@@ -2,7 +2,8 @@
 
 With H the Hessian of the Lagrangian, J the rows that push and Z a basis of the motions that keep them, Z^T H Z has no
 eigenvalue below -d if H + J^T J / mu + d I has a Cholesky factor, whatever mu is (Debreu, Finsler). The last step of a
-solve has made one. Rows that touch without pushing count for nothing: in the factor they would hide a half space.
+solve has made one. One-sided rows at their bound with a zero multiplier must not be in J: they allow motions to one
+side, and J^T J / mu would add curvature to these.
 """
 
 from __future__ import annotations
@@ -19,15 +20,24 @@ from assembly.solve.loop.workspace import penalized
 
 # What a factorization told: of negative curvature near an end, or nothing.
 DOWNWARD, UNKNOWN = -2.0, -1.0
+# 2^31 - 1: squares of what is below it are integers of 64 bits.
+PRIME = 2147483647
 
 
 @kernel(inner=True)
-def pushing_sum(count, one_sided, weights, least):
-    """A sum that tells which one-sided rows have a weight above the least: of the squares of their places."""
+def checksum_of_rows(count, one_sided, weights, least):
+    """A checksum of the one-sided rows whose weight is above the least.
+
+    The sum of a polynomial of degree 16 in their numbers, modulo a prime. Of low powers many sets have the same sum
+    (3^2 + 4^2 = 5^2); that two sets have this one in common is a chance of one in 2^31.
+    """
     total = 0.0
     for r in range(count):
         if one_sided[r] == 1 and weights[r] > least:
-            total += (r + 1.0) * (r + 1.0)
+            number = r + 1
+            for _ in range(4):
+                number = (number * number + 12345) % PRIME
+            total += number
     return total
 
 
@@ -35,15 +45,15 @@ def pushing_sum(count, one_sided, weights, least):
 def note_factor(results, rows, one_sided, shift, dual, restoring):
     """Keep what the new factorization of a step of a solve told: whether it is convex.
 
-    One that is leaves one and a sum that tells which one-sided rows it had; one that tells of negative curvature is
-    DOWNWARD: near an end a step tries a shift no larger than the dual residual first.
+    `curved` becomes 1 plus the checksum of its one-sided rows if it is, DOWNWARD if it needed a shift of CLEAR_SHIFT
+    although the dual residual, which bounds the shift tried first, was less, and UNKNOWN otherwise.
     """
     result = results_at(results, 0)
     force = strongest(rows.y, rows.count)
     # Weak multipliers are left out of the matrix (`multipliers.curve_rows`).
     bends = force >= WEAK or force <= IDLE
     if shift <= SMALL_SHIFT and dual <= NEAR_END and bends and not restoring:
-        result.curved = 1.0 + pushing_sum(rows.count, one_sided, rows.active, 0.0)
+        result.curved = 1.0 + checksum_of_rows(rows.count, one_sided, rows.active, 0.0)
     else:
         result.curved = DOWNWARD if shift >= CLEAR_SHIFT > dual and not restoring else UNKNOWN
 
@@ -58,7 +68,7 @@ def told_convex(results, rows, one_sided, residual):
         rows.forces[r] = -rows.y[r]
         if one_sided[r] == 1 and abs(residual[r]) <= NEAR and rows.y[r] >= -IDLE:
             return False
-    return result.curved == 1.0 + pushing_sum(rows.count, one_sided, rows.forces, IDLE)
+    return result.curved == 1.0 + checksum_of_rows(rows.count, one_sided, rows.forces, IDLE)
 
 
 @kernel(inner=True)

@@ -178,9 +178,9 @@ def dual_residual(shape, point, rows, system, y):
 def least_squares_multipliers(shape, point, rows, system, rounds, y):
     """The multipliers of the active rows, of either sign, that leave the smallest grad f + J^T y.
 
-    After the first round it is again for what that 1e-10 leaves, where rows all but depend on each other; where they do
-    so altogether every round adds rounding to what nothing determines. The last row of `gram` is room for the right
-    side.
+    J J^T + 1e-10 I is factorized. Further rounds refine what the 1e-10 leaves where rows nearly depend on each other;
+    where they depend on each other exactly, every round adds rounding to an undetermined part. The last row of `gram`
+    is workspace for the right side.
     """
     bases, jacobian, active = shape.bases, point.jacobian, rows.active
     gram, count, scratch = rows.gram, rows.count, system.directions.descent
@@ -271,8 +271,9 @@ def take_better(rows):
 def choose_multipliers(shape, point, rows, system, shortened, vectors, holds, good):
     """The better of y, of what the last step proposed, and of least squares, into y.
 
-    These are for after a shortened step, and for where rows hold and neither of the others is good: it depends on which
-    rows push then. There, and with rows of `vectors`, they are refined. Returns the dual residual.
+    Least squares are computed after a `shortened` step, and where rows hold (`holds`) but the best of the others leaves
+    a dual residual above `good`: the active set may be wrong, and one-sided rows are exchanged. In the latter case, and
+    with vector trims (`vectors`), they are refined. Returns the dual residual.
     """
     dual = dual_residual(shape, point, rows, system, rows.better_y)
     # Where they are as good as they should be, the old ones need no look.

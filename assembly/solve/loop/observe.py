@@ -10,11 +10,11 @@ from assembly.constraints.program.records import header_at
 from assembly.proximity.manager.update import AS_NEEDED, CAREFUL, DOUBTFUL, IN_TURNS, MEASURED, SPARING
 from assembly.solve.loop.begin import let_touch, overlap_allowed, rearrange
 from assembly.solve.loop.clearances import place_clearance_rows, update_again
-from assembly.solve.loop.contacts import free_folds
+from assembly.solve.loop.contacts import lift_folds
 from assembly.solve.loop.deadline import is_cut, may_end, set_deadline
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import choose_multipliers, weigh_rows
-from assembly.solve.loop.parameters import FREE_BELOW
+from assembly.solve.loop.parameters import LIFT_BELOW
 from assembly.solve.loop.pauses import pause
 from assembly.solve.loop.report import log
 from assembly.solve.loop.restoration import begin_way
@@ -48,8 +48,8 @@ def observe(task, current, rows):
         # Nothing is known of its row yet.
         rows.active[loop.lost] = 1.0 / rows.mu
     if header_at(table, 0).contacts > 0:
-        free_trims = limits.free_trims == 1.0
-        loop.lifted = free_folds(task.program.store, lifted, current, rows.active, loop.below, loop.lost, free_trims)
+        lift_trims = limits.lift_trims == 1.0
+        loop.lifted = lift_folds(task.program.store, lifted, current, rows.active, loop.below, loop.lost, lift_trims)
 
 
 @kernel(inline=True, allocates=True)
@@ -79,7 +79,7 @@ def evaluate_iterate(task, history, current, rows, system):
     program = task.program
     table = program.store.table
     header = header_at(table, 0)
-    loop.below = FREE_BELOW
+    loop.below = LIFT_BELOW
     if loop.lost >= 0 and program.lifted.free[loop.lost] < 0:
         # A pair that is lost and cannot be lifted (an idle row, a pole): nothing moves any more.
         task.result.culprit = float(loop.lost)

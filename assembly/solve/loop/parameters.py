@@ -27,10 +27,10 @@ GAIN = 0.5
 # Contacts. -----------------------------------------------------------------------------------------------------------
 # [det H over |H|^2] A pair this near to a fold gets its coordinates as unknowns. Doubled: more unknowns, steps of more
 # contacts have rows of tangency. Chosen.
-FREE_BELOW = 0.02
+LIFT_BELOW = 0.02
 # [det H over |H|^2] The same where no part of a step is accepted. Doubled: pairs that have nothing to do with it are
 # lifted. Chosen.
-FREE_BELOW_AT_LAST = 0.3
+LIFT_BELOW_AT_LAST = 0.3
 # [length] A clearance's contact that no longer step, nor one halved so far (a share of the step), finds again is given
 # up. Doubled, or HALVED halved: contacts that only switch are given up, or are waited for longer. Chosen.
 LETS_GO, HALVED = 1e-5, 0.0625
@@ -55,11 +55,12 @@ CLOSE = 1e-6
 # the one without them: half of an exchange may lead uphill. Doubled: a little time where rows change places.
 # From: random rows, of which some take more than four rounds and a few in a hundred never agree.
 FORESEEN = 12
-# [steps] Where so many in a row that hold are cut by half and more, the next ones are damped until one is not: most of
-# these may go where nothing holds, as a ring turns about its own axis. Doubled: twice as many short steps. Chosen.
+# [steps] After so many feasible steps in a row that motion bounds cut by more than half, steps are damped, until one is
+# cut less: they may be long in directions that no row and no objective resists, as a ring's spin about its own axis.
+# Doubled: twice as many short steps. Chosen.
 OFTEN = 25
-# [radian] A body turns by this much at most in a step. Doubled: predictions of angles and contacts lead astray.
-# From: half a turn, within which an angle is known again, with room to spare.
+# [radian] The largest component of a body's rotation vector in a straight step; its angle may be sqrt(3) times as much.
+# Doubled: predictions of angles and contacts fail. From: half a turn, within which an angle is identified; a margin.
 TURN = 1.0
 # So often a step is shortened by a larger shift. Doubled: more factorizations a step. Chosen.
 SHORTENINGS = 4
@@ -94,12 +95,13 @@ WANTED = 1e-12
 ROUNDS = 3
 
 # Back onto the rows. -------------------------------------------------------------------------------------------------
-# [rounds] A step back is computed again so often for one-sided rows that would hold without it; a row pulls that ends
-# above PULLS times what it is off. Doubled: time where many rows repeat each other. Chosen; rounding.
+# [rounds] A step back is computed at most RELEASES times more, without the one-sided rows that pull: those whose
+# residual after the step is above PULLS times its present size. Doubled: time where many rows repeat each other.
+# Chosen; PULLS is rounding.
 RELEASES, PULLS = 4, 1e-12
-# The weight of the step's square is one, and SOFTER times that, down to SOFTEST, where it would leave more than
-# LEFT_OVER of the violations, as rows do that all but depend on each other. Doubled: shorter steps that leave more.
-# Chosen.
+# The damping of a step back is 1e-2 at first (`begin_loop`). While the step would leave more than LEFT_OVER of the
+# largest violation, as where rows nearly depend on each other, it is multiplied by SOFTER, down to SOFTEST. Doubled:
+# shorter steps that leave more. Chosen.
 LEFT_OVER, SOFTER, SOFTEST = 0.1, 1e-3, 1e-9
 # A step back is shortened by the first where it leads farther off; a tick's may lead off by ASTRAY times once, if the
 # next one leads back; below LEAST_SHARE of a step nothing is found. Doubled: slower, and sooner given up. Chosen.
@@ -132,8 +134,8 @@ DRAGGED, SETTLED = 4.0, 2.0
 SLOW, HARDEST = 3.0, 1e-10
 
 # Clearances. ---------------------------------------------------------------------------------------------------------
-# Bodies are too deep in each other beyond this part of how far they may go in one step, half the least radius of
-# theirs. Doubled: deeper than half of what bends most there is no telling on which side they were. From: that.
+# Bodies are too deep in each other beyond this factor times half their least radius of curvature. Doubled: rows may
+# lead out on the far side. From: beyond that depth the side from which they came is not known.
 DEEP = 1.0
 # How much shorter steps are after one that led too deep; as often as another pose is clear they may be LONGER times as
 # long. Doubled: more returns. Chosen.
@@ -155,8 +157,8 @@ CLEAR_SHIFT = 1e-3
 # [force] A one-sided row with a multiplier below this does not push. Nor do multipliers bend anything that are all
 # below it. Doubled: more rows count as touching. Chosen.
 IDLE = 1e-7
-# [steps] Where nothing is asked for but that constraints hold: so many may follow one at which bodies touch. Doubled:
-# a least move at a kink ends later. Chosen.
+# [steps] Without a user's objective: at most so many after the violation was first at most 1e-9 (`contact.TOUCHING`).
+# Doubled: a least move that oscillates at a kink ends later. Chosen.
 LINGERS = 40
 # Where a solve may stray, and its bodies are FAR times farther out, or sizes, after STRAYING steps, it is looked at
 # whether that goes on. Doubled: unbounded scenes are told later. Chosen.
@@ -174,8 +176,8 @@ FITTED = 1e-26
 # The damping of that fit at first, in parts of the matrix of rows of order one, and where no step is found any more.
 # Doubled: a first step shorter; a few more factorizations before a fit gives up. Chosen.
 DAMPING, MOST_DAMPING = 1e-4, 1e6
-# A place for a body is better than another one whose sum of squares is larger by so much. Doubled is no place ever
-# better; nearer to one, rounding decides. Chosen.
+# A place for a body is better than the best one so far if its sum of squares is less than this factor times that one's.
+# Doubled, above one: worse places are taken. Close to one: rounding decides. Chosen.
 LOWER = 0.9
 
 # Rates and dexterity (`rates.py`, `dexterity.py`). -------------------------------------------------------------------
@@ -196,14 +198,14 @@ KEPT = 1e-12
 DIFFERENCE = 1e-6
 
 # Time. ---------------------------------------------------------------------------------------------------------------
-# A tick that does not hold after its iterations has so many times more of them. Doubled: later ticks. Chosen.
+# A tick that does not hold after its iterations may make this many times as many in all. Doubled: later ticks. Chosen.
 EXTRA_TIME = 4
-# No look begins, and no step from a pose that holds, where this part of a budget is spent: either may take as long as
-# the rest of it. Doubled: ticks overrun their budgets. From: that.
+# After this part of a tick's budget no update of the manager begins, and no step from a feasible iterate: either may
+# take as long as the rest. Doubled: ticks overrun their budgets. Chosen.
 HALF = 0.5
 # [looks a pair] A tick may end with a look until there were so many of every pair; then a step has to come first.
 # Doubled: ticks of crowded scenes stand twice as long. Chosen.
 LOOKS_ALONE = 4
-# [steps] Short solves have no more: they never look at the clock, but in a large scene, of more [pairs of bodies] to
-# look at than MANY_PAIRS, where a step takes long. Doubled: an interruption waits longer. Chosen.
+# [steps, pairs of bodies] In its first SHORT steps a solve does not ask whether to go on, except in a large scene: one
+# with a sparse Hessian, or of more than MANY_PAIRS. Doubled: an interruption waits longer. Chosen.
 SHORT, MANY_PAIRS = 4, 256

@@ -49,9 +49,9 @@ def stays_open(store, bases, k, current, trial, d, alpha):
 def predict_pairs(store, bases, lifted, current, trial, d, alpha):
     """Contact coordinates along alpha d: by the contact velocity, or, for a free pair, by its own unknowns.
 
-    Gaps follow to first order, angles start from where they are: a step turns no body by more than a radian. The guess
-    goes into `lifted`. Rows of clearances that stay open for certain are marked there as IDLE, and their derivatives go
-    on to the trial point as they are.
+    Gaps follow to first order. Angles start from their current values: no component of a straight step's rotation
+    vectors is above a radian. The guess goes into `lifted`. Rows of clearances that stay open for certain are marked
+    there as idle, and their derivatives are copied to the trial iterate.
     """
     header = header_at(store.table, 0)
     tracked, records, jacobian = current.tracked, current.records, current.jacobian

@@ -11,7 +11,7 @@ from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.records import ROW, header_at, pool_header_at, row_at
 from assembly.proximity.extrema.face_face import BEND
 from assembly.proximity.features.solid_contact import TRACK, contact_record_at
-from assembly.solve.loop.contacts import free_pairs_hold
+from assembly.solve.loop.contacts import lifted_pairs_hold
 from assembly.solve.loop.settings import HISTORY
 from assembly.solve.loop.violation import off_rows, off_tangency
 
@@ -117,7 +117,7 @@ def judge(program, state, count, current, trial, bound, lax):
     for k in range(header_at(store.table, 0).contacts):
         copy_tracked(trial.tracked, k, current.tracked)
     violation = off_rows(store.table, lifted, program.structure.one_sided, trial, lax)
-    holds = free_pairs_hold(store, trial.q, current.tracked, lifted.free, 1e-9)
+    holds = lifted_pairs_hold(store, trial.q, current.tracked, lifted.free, 1e-9)
     return holds and violation <= bound, violation
 
 

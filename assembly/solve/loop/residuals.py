@@ -141,7 +141,7 @@ def place_unknowns(table, bases, rows, n, order):
 
 @kernel(inner=True)
 def order_rows(bases, rows, n, sequence, last_row, latest):
-    """Rows in the order of their first bodies, and how far those of J J^T reach then (see `linear.factorize`).
+    """Rows in the order of their first bodies, and how far those of J J^T reach then (see `factorize`).
 
     `latest` is room for n + 1 numbers.
     """

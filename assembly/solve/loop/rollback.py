@@ -1,8 +1,9 @@
 """Back from where bodies have sunk into each other: from there rows lead out on either side, the far one as well.
 
-A step may go as far as bodies may between looks, and a contact may slide around a thin wire on the way. Where bodies
-are deeper in each other than half of what bends most there is no telling on which side they were, and where they cross
-unseen no row says so. The solve goes back to the last pose at which nothing crossed, and on from there on a leash.
+In a step bodies may go as far as their motion bounds allow, and a contact may slide around a thin wire on the way.
+Where bodies overlap by more than half their least radius of curvature, the side they came from is unknown, and where
+they cross without a listed contact, no row says so. The solve goes back to the last pose at which nothing crossed, and
+its next steps are bounded by the loop's `leash`.
 
 A solve that gets no further goes back to such a pose, too, and begins again there. Which contacts are listed depends on
 the way it came: one that ends where bodies touch holds every step, and steps that are cut again and again leave short
@@ -19,7 +20,7 @@ from assembly.constraints.program.records import header_at
 from assembly.proximity.manager.update import AS_NEEDED, any_crossed
 from assembly.solve.loop.clearances import forget_clearance_rows, place_clearance_rows, update_around
 from assembly.solve.loop.finish import return_to
-from assembly.solve.loop.parameters import BEGINNINGS, DEEP, FREE_BELOW, LEFT, PATIENCE, SHORTER, SHORTEST
+from assembly.solve.loop.parameters import BEGINNINGS, DEEP, LEFT, LIFT_BELOW, PATIENCE, SHORTER, SHORTEST
 from assembly.solve.loop.report import bring_back
 from assembly.solve.loop.settings import RUNNING, STALLED
 from assembly.solve.loop.workspace import rows_in
@@ -95,5 +96,5 @@ def goes_on(task, held, current, rows):
         loop.restoring = loop.restorations = loop.cuts = 0
         loop.cut_length = loop.check_violation = math.inf
         loop.check_at = loop.iteration + PATIENCE
-        loop.lost, loop.below = -1, FREE_BELOW
+        loop.lost, loop.below = -1, LIFT_BELOW
     return loop.status == RUNNING

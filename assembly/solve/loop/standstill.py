@@ -25,10 +25,10 @@ from assembly.solve.loop.settings import settings_at
 
 @kernel(inline=True)
 def out_of_reach(violation):
-    """The largest |J^T c|, but for rounding, where what rows are off is what no motion nearby changes.
+    """The largest |J^T c| at which no motion within a neighborhood removes the violation; rounding is not included.
 
-    Rows that repeat each other, tilted by s, have |J^T c| = s |c|, and agree a step |c| / s away. Of those that are off
-    by much J^T c = 0 tells.
+    Two rows that repeat each other, tilted by an angle s, have |J^T c| = s |c|, and would agree after a step |c| / s.
+    For violations above LITTLE the bound is zero: only J^T c = 0 counts.
     """
     return min(violation / NEIGHBORHOOD, MOST_TILTED) * violation if violation <= LITTLE else 0.0
 

@@ -16,7 +16,8 @@ from assembly.solve.loop.residuals import violation_of
 def untouched(residual, jacobian, r, e, work):
     """To first order, how the gap in row r changes where the rows of tangency, from e on, come to hold.
 
-    By d = -T^-1 t in the coordinates, T and t those of the tangency. Infinite where T is singular.
+    The coordinates change by d = -T^-1 t, with t the residuals of the tangency and T their Jacobian in the coordinates.
+    Infinite where T is singular.
     """
     c = FREE_COLUMN
     for i in range(4):
@@ -47,9 +48,9 @@ def untouched(residual, jacobian, r, e, work):
 
 @kernel(inner=True)
 def off_tangency(residual, jacobian, r, e, lax, work):
-    """What a free pair whose rows of tangency begin at e is off them, at most, or what its gap in row r changes by it.
+    """The largest residual of a lifted pair's rows of tangency, which begin at e.
 
-    The latter if `lax`: no more than the former, times a way that is no longer than the scene.
+    If `lax`, the change of the gap in row r that it causes to first order, where that is less.
     """
     off = 0.0
     for i in range(4):

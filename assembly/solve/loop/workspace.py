@@ -44,7 +44,7 @@ Workspace = namedtuple("Workspace", "program iterates rows way loop system")
 
 @kernel(inline=True, allocates=True)
 def resized(rows, count):
-    """As many rows."""
+    """The same rows with another count of them."""
     return Rows(count, rows.mu, rows.y, rows.better_y, rows.active, rows.forces, rows.foreseen, rows.gram)
 
 
@@ -202,7 +202,7 @@ def carve_all(store, memory, tips, doubles, integers):
 
 @kernel(inline=True, allocates=True)
 def unknowns(n, lifted, order):
-    """The same of its own: where pairs, so many, are lifted and bring more unknowns."""
+    """A newly allocated system of n unknowns, of which the last 4 `lifted` are coordinates of lifted pairs."""
     hessian, factor = sides_of(n, order)
     vectors = np.empty((4, n))
     directions = Directions(vectors[1], vectors[2], vectors[3], np.zeros(4 * lifted))
