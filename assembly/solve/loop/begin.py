@@ -67,14 +67,19 @@ def let_touch(table, current, touching):
 
 
 @kernel(inline=True)
+def goes_on_from_last(settings):
+    """Whether this is a tick, or a solve from a solution: it begins where the last one ended, with its pairs."""
+    limits = settings_at(settings, 0)
+    return limits.tick == 1.0 or limits.penalty <= limits.penalty_floor
+
+
+@kernel(inline=True)
 def overlap_allowed(settings):
     """How far bodies of contacts may be in each other at the start of this solve and stay so.
 
     A solve or a tick that goes on from the last one has its allowance with its pairs, and gets none on top.
     """
-    limits = settings_at(settings, 0)
-    begins = limits.tick == 0.0 and limits.penalty > limits.penalty_floor
-    return limits.touching if begins else 0.0
+    return 0.0 if goes_on_from_last(settings) else settings_at(settings, 0).touching
 
 
 @kernel(inline=True)
@@ -152,10 +157,10 @@ def set_out(program, settings, state, current, rows, n):
     result.culprit = -1.0
     result.last_feasible = 0.0
     result.curved = 0.0
-    tick = limits.tick == 1.0
     lost, evaluated = find_contacts(program, settings, state, current, rows, n)
-    # A tick begins where the last one ended: there a pair that Newton's method loses is at a fold.
-    folded = lost >= 0 and evaluated and tick and not is_of_solids(store.table, lost)
+    # What goes on begins where the last one ended: there a pair that Newton's method loses is at a fold, or at the end
+    # of a patch, where its coordinates were unknowns.
+    folded = lost >= 0 and evaluated and goes_on_from_last(settings) and not is_of_solids(store.table, lost)
     status = CONTACT_LOST if lost >= 0 and not folded else RUNNING
     result.scatter = 1.0 if status == RUNNING and scattered(store.table, current.residual, shape.one_sided) else 0.0
     if limits.gather > 0.0 and result.scatter == 1.0:

@@ -51,3 +51,25 @@ def test_a_shaft_that_stands_out_over_the_edge_of_a_plane(end, off):
     assert solution.status is asm.Status.SOLVED
     assert solution.iterations <= 10
     assert abs(abs(solution.pose(shaft).position[2]) - 0.5) < 1e-11
+
+
+POSES = [  # of a cylinder beside a cone: it comes to rest with its end on the other one
+    ((1.066, 0.0, 1.021), (0.9973, -0.0463, 0.0292, 0.0480)),
+    ((1.1, 0.1, 0.9), (0.998, 0.03, 0.03, 0.0480)),
+    ((0.9, -0.2, 1.1), (0.997, 0.0463, -0.02, 0.05)),
+]
+
+
+@pytest.mark.parametrize(("position", "quaternion"), POSES)
+def test_a_solve_goes_on_from_a_contact_at_an_end(position, quaternion):
+    # By Newton's method on the surfaces alone such a pair is not found again.
+    cone = asm.Body("cone", asm.shapes.cone(0.8, 1.5, 0.2), fixed=True)
+    shaft = asm.Body("shaft", asm.shapes.cylinder(0.5, 1.0), position=position, quaternion=quaternion)
+    scene = asm.Assembly([cone, shaft])
+    scene.constrain(asm.Contact(cone, shaft, "touch"))
+    first = scene.solve()
+    assert first.status is asm.Status.SOLVED
+    again = scene.solve(first)
+    assert again.status is asm.Status.SOLVED
+    assert again.iterations == 0
+    assert abs(again.q - first.q).max() < 1e-15
