@@ -313,7 +313,7 @@ def _arc_expression(arc_length: Any, domain: tuple[float, float]) -> tuple[ca.SX
         ) from error
     try:
         bound = ca.SX(value)
-    except (TypeError, NotImplementedError, RuntimeError):
+    except (TypeError, NotImplementedError, RuntimeError):  # CasADi's words say nothing of the argument
         raise TypeError("arc_length returns no casadi.SX expression; expected one of the two ends") from None
     if not bound.is_scalar():
         raise InputError(f"arc_length returns shape {bound.shape}; expected one number")
