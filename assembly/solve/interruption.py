@@ -2,7 +2,7 @@
 
 The compiled loop runs without the interpreter. Every 50 ms at most (`solve/loop/pauses.py`) it calls an address in its
 settings:
-there the interpreter runs again, so that handlers of signals do, and an answer other than 0 ends the loop. A look at
+there the interpreter runs again, so that handlers of signals do, and an answer other than 0 ends the loop. An update of
 very many pairs of bodies asks as often; what it returns is whole, but where an exception throws it away.
 
 Decompositions of large matrices run in a thread of their own, as they let nobody ask (`wait_for`).
@@ -42,7 +42,7 @@ class Interruption:
     time_limit : float, optional
         Seconds from now.
     callback : callable, optional
-        Called with the iteration, the objective and the feasibility [the scene's unit]; True ends the solve. In a look
+        Called with the iteration, the objective and the feasibility [the scene's unit]; True ends the solve. In an update
         before the first iteration they are not known: nan and inf.
 
     Attributes

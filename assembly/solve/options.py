@@ -13,7 +13,7 @@ from assembly.solve.loop.settings import (
     FEASIBILITY,
     FIT,
     ITERATIONS,
-    LAST_LOOK,
+    FINAL_UPDATE,
     PENALTY,
     PENALTY_FLOOR,
     RADIUS,
@@ -109,7 +109,7 @@ class Options:
         out[PENALTY_FLOOR] = self.penalty_floor
         out[RADIUS] = self.radius
         out[FIT] = self.fit
-        out[LAST_LOOK] = 1.0
+        out[FINAL_UPDATE] = 1.0
         out[TOUCHING] = self.touching
         out[SECOND_ORDER] = 1.0
         return out

@@ -1,4 +1,4 @@
-"""Listed contacts that follow bodies which somebody else moves, and the look at what came near them.
+"""Listed contacts that follow bodies which somebody else moves, and the update of what came near them.
 
 A contact is carried along the move by the contact velocity formulation,
 
@@ -6,7 +6,7 @@ A contact is carried along the move by the contact velocity formulation,
 
 with the twists d that lead from the last poses to these, and corrected there by Newton's method. One that is not found,
 is a minimum no longer, or was corrected by so much that it may be another root now, is left to the contact manager
-(`proximity/manager/update.py`), whose look at the pair of bodies finds all there are.
+(`proximity/manager/update.py`), whose update of the pair of bodies finds all there are.
 """
 
 from __future__ import annotations
@@ -156,8 +156,8 @@ def correct(store, r, q, guess, tracked, records):
 
 
 @kernel(inner=True)
-def look_at_all_of(table, memory, k):
-    """Let the next look take up the pair of bodies whose contact is at place k."""
+def make_due(table, memory, k):
+    """Let the next update take up the pair of bodies whose contact is at place k."""
     pairs, places, _events = memory_places(table, header_at(table, 0).manager_record)
     p = int(place_at(memory, places + PLACE_MEMORY * k).pair)
     pair_state_at(memory, pairs + PAIR_MEMORY * p).motion_bound = 0.0
@@ -165,7 +165,7 @@ def look_at_all_of(table, memory, k):
 
 @kernel(inner=True)
 def doubt_twins(store, memory, k, records):
-    """Look at a pair of bodies where contact k came within the spheres of neglect of another one."""
+    """Make a pair of bodies due where contact k came within the spheres of neglect of another one."""
     header = header_at(store.table, 0)
     first = header.first_clearance_row
     places = memory_places(store.table, header.manager_record)[1]
@@ -178,14 +178,14 @@ def doubt_twins(store, memory, k, records):
             d = derivatives_at(records, first + k).arm_f[i] - derivatives_at(records, first + l).arm_f[i]
             square += d * d
         if square <= near * near:
-            look_at_all_of(store.table, memory, k)
+            make_due(store.table, memory, k)
 
 
 @kernel(
     signatures=("(i8[::1], f8[::1], f8[:, ::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[:, ::1], 5), i8[::1], f8[::1])")
 )
 def follow(table, pool, q, last, room, free, memory):
-    """Bodies stand at q (n, 7) in the user's coordinates now: carry the listed contacts, look, list what is near.
+    """Bodies stand at q (n, 7) in the user's coordinates now: carry the listed contacts, update, list what is near.
 
     `last` are poses, tracked values and records of the last call, and become those of this one; `room` is for poses,
     twists, two times tracked values, and two rows of numbers. Returns the number of events, or -1, and nothing has
@@ -217,9 +217,9 @@ def follow(table, pool, q, last, room, free, memory):
         if not correct(store, r, poses, guess, tracked, records):
             continue
         if is_near_fold(records, r, NEAR_FOLD):
-            look_at_all_of(table, memory, k)
+            make_due(table, memory, k)
         elif not is_of_solids(table, r) and is_astray(store, r, before, guess, tracked):
-            look_at_all_of(table, memory, k)
+            make_due(table, memory, k)
         doubt_twins(store, memory, k, records)
     update_around(store, memory, listed, IN_TURNS)
     for k in range(header.clearance_rows):

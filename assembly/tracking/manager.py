@@ -80,8 +80,8 @@ class Manager(OwnState):
 
     Every `update` says where bodies stand. A contact that is listed is carried along by the contact velocity
     formulation and corrected by Newton's method; one that loses its extremum, or is corrected by so much that it may
-    have come to another one, is handed back to a look at its pair of bodies. Other pairs are looked at when the
-    bodies have moved by what the last look left them.
+    have come to another one, is handed back to an update of its pair of bodies. Other pairs are updated when the
+    bodies have moved by what the last update left them.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ class Manager(OwnState):
         new_places[len(places) :] = 0.0
         new_places[len(places) :, manager_records.PLACE_PAIR] = -1.0
         new_events[:] = events
-        # Every pair is looked at once more.
+        # Every pair is updated once more.
         new_pairs[:, manager_records.TURN] = nan
         self._poses[:] = old[2]
         self._tracked[: len(places)] = old[3]
@@ -226,7 +226,7 @@ class Manager(OwnState):
     def crossings(self) -> tuple[tuple[str, str], ...]:
         """Names of the pairs of bodies that are in each other by more than `touching`, or wholly; () before an update.
 
-        Where the last update put them. All pairs are looked at anew when this is read, which takes longer than an
+        Where the last update put them. All pairs are searched anew when this is read, which takes longer than an
         update.
         """
         if np.isnan(self._poses).any():
@@ -314,8 +314,8 @@ class Manager(OwnState):
     def gaps(self) -> dict[tuple[str, str], float]:
         """A lower bound of the gap of every pair of bodies: exact where the nearest contact is listed.
 
-        Of what is not listed, the reach and what the last look left to the bodies, less what they moved since. It
-        holds for bodies that are apart, or cross no deeper than looks see; minus infinity before the first update.
+        Of what is not listed, the reach and what the last update left to the bodies, less what they moved since. It
+        holds for bodies that are apart, or cross no deeper than updates see; minus infinity before the first update.
         """
         pairs = self._parts(self._packed, self._memory)[0]
         left = np.where(

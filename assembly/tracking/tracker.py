@@ -40,7 +40,7 @@ from assembly.solve.loop.settings import (
     HISTORY,
     ITERATIONS,
     LAST_FEASIBLE,
-    LAST_LOOK,
+    FINAL_UPDATE,
     OUT_OF_TIME,
     RADIUS,
     SECOND_ORDER,
@@ -76,7 +76,7 @@ _CODES = {status: k for k, status in enumerate(TrackStatus)}
 def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
     """Let rows of clearances follow extrema, from edges onto faces as well, which corners do not.
 
-    Ticks have no last look. Which rows are in the place of a contact, or are its own pair, their first look tells.
+    Ticks have no final update. Which rows are in the place of a contact, or are its own pair, their first update tells.
     """
     record = packed.table[MANAGER_RECORD]
     packed.table[record + VERTEX_CONTACTS] = 0
@@ -130,7 +130,7 @@ def _tick_settings(limit: float, iterations: int, second_order: bool) -> Array:
     settings[TICK] = 1.0
     # A tick begins where the last one ended: what bodies may be in each other there was told at the start.
     settings[TOUCHING] = 0.0
-    settings[LAST_LOOK] = 0.0
+    settings[FINAL_UPDATE] = 0.0
     settings[SECOND_ORDER] = float(second_order)
     return settings
 

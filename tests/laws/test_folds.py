@@ -273,12 +273,12 @@ class Clips:
 
     def looked(self, how):
         """How many pairs a look looks at."""
-        before = manager_records.memory_header_at(self.memory, 0).looks
+        before = manager_records.memory_header_at(self.memory, 0).updates
         watch.update(self.table, self.pool, self.table[MANAGER_RECORD], self.memory, self.q, self.tracked, how)
-        return manager_records.memory_header_at(self.memory, 0).looks - before
+        return manager_records.memory_header_at(self.memory, 0).updates - before
 
 
-def test_the_last_look_asks_of_every_pair_whether_it_crosses():
+def test_the_final_update_asks_of_every_pair_whether_it_crosses():
     clips = Clips()
 
     def unasked():

@@ -220,7 +220,7 @@ def test_balls_less_deep_than_a_tenth_of_the_scene_are_pushed_apart():
     ],
 )
 def test_bodies_deep_in_each_other_are_moved_apart(a, b, x):
-    # Deeper than looks reach: no row knows of them.
+    # Deeper than updates reach: no row knows of them.
     bodies = [asm.Body("a", a, fixed=True), asm.Body("b", b, (x, 0, 0))]
     scene = asm.Assembly(bodies)
     scene.constrain(asm.Clearance())

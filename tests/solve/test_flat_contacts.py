@@ -167,7 +167,7 @@ def random_turn(rng):
 def test_rings_that_come_to_lie_on_a_plate(major, minor, cases):
     # Of a ring that is all but flat the lowest point runs around it. With that point alone for a row all of these were
     # rocked through the plate; points of the valley between the two faces hold them. Nor got a thin ring there in 300
-    # steps that was the first of the two, before it was the smaller one's motion that looks are measured by.
+    # steps that was the first of the two, before it was the smaller one's motion that updates are measured by.
     rng = np.random.default_rng(3)
     plate = asm.Body("plate", asm.shapes.box(4.0, 4.0, 0.1), fixed=True)
     ring = asm.Face(asm.shapes.torus(major, minor))

@@ -192,7 +192,7 @@ PAIRS = CROWD * (CROWD - 1) // 2
 
 
 def crowd(count: int = CROWD) -> asm.Assembly:
-    """Ellipsoids in each other, so that one look at their pairs takes longer than a slice; with places for all."""
+    """Ellipsoids in each other, so that one update of their pairs takes longer than a slice; with places for all."""
     rng = np.random.default_rng(0)
     shape = asm.shapes.ellipsoid(1.0, 0.9, 0.8)
     scene = asm.Assembly(asm.Body(f"{k}", shape, rng.uniform(-1.0, 1.0, 3)) for k in range(count))
@@ -206,7 +206,7 @@ def crowded() -> asm.Assembly:
 
 
 def seen(packed: Packed, state: np.ndarray) -> int:
-    """How many pairs the contact manager of a state has looked at."""
+    """How many pairs the contact manager of a state has updated."""
     pairs = state[packed.memory_at + manager_records.MEMORY_HEADER :]
     pairs = pairs[: manager_records.PAIR_MEMORY * len(packed.clearance_pairs[0])].reshape(
         -1, manager_records.PAIR_MEMORY
@@ -214,8 +214,8 @@ def seen(packed: Packed, state: np.ndarray) -> int:
     return int((~np.isnan(pairs[:, manager_records.TURN])).sum())
 
 
-def test_one_look_at_many_pairs_asks(crowded):
-    # With no iteration at all nobody but the look at the start can ask.
+def test_one_update_of_many_pairs_asks(crowded):
+    # With no iteration at all nobody but the update at the start can ask.
     other = crowded.solve(max_iterations=0)
     assert other.seconds > SLICE / 1e9, "too short for what is tested here"
     asked: list[tuple[int, float, float]] = []
@@ -228,10 +228,10 @@ def test_one_look_at_many_pairs_asks(crowded):
 
 
 @pytest.mark.parametrize("options", [{"time_limit": 1e-6}, {"callback": lambda *_: True}], ids=["time", "callback"])
-def test_a_look_that_is_not_to_go_on_is_whole(crowded, options):
+def test_an_update_that_is_not_to_go_on_is_whole(crowded, options):
     solution = crowded.solve(**options)
     assert solution.status in (asm.Status.TIME_LIMIT, asm.Status.STOPPED) and not solution.success
-    # What crosses is told, and not left out with pairs that nobody looked at.
+    # What crosses is told, and not left out with pairs that were not updated.
     assert seen(solution._packed, solution._state) == PAIRS and solution.feasibility > 0.1
 
 
@@ -242,7 +242,7 @@ def test_scenes_of_many_pairs_look_at_the_clock_from_the_first_step():
     assert pauses.is_large(long_arm(40).packed().table)
 
 
-def test_a_look_that_is_thrown_away_ends_at_once(crowded):
+def test_an_update_that_is_thrown_away_ends_at_once(crowded):
     whole = crowded.solve(max_iterations=0)
     packed = crowded.packed()
     states: list[np.ndarray] = []

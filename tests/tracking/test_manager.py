@@ -176,7 +176,7 @@ def test_what_is_listed_is_what_the_oracle_finds(pace, cases):
             if k % 10:
                 continue
             everything = oracle.minima(q, 40.0)
-            # Of wires that cross, some pairs are deeper in each other than looks see, or born there.
+            # Of wires that cross, some pairs are deeper in each other than updates see, or born there.
             sound = (0.0 < everything.gap) & (everything.gap <= reach)
             contacts = manager.contacts
             missed += matched(contacts, everything.take(sound), "abc").count(None)
@@ -186,7 +186,7 @@ def test_what_is_listed_is_what_the_oracle_finds(pace, cases):
             assert sum(c is not None for c in found) == len(listed), (seed, k)
             compared += int(sound.sum())
         assert compared > 20
-        # A minimum that is born in the valley of one that is listed, and deeper, is found by the next look.
+        # A minimum that is born in the valley of one that is listed, and deeper, is found by the next update.
         assert missed <= (1 if (pace, seed) == (0.03, 5) else 0)
 
 

@@ -22,7 +22,7 @@ from assembly.proximity.manager.records import (
     memory_header_at,
 )
 from assembly.solve.loop.deadline import begin_tick
-from assembly.solve.loop.parameters import EXTRA_TIME, HALF, LOOKS_ALONE
+from assembly.solve.loop.parameters import EXTRA_TIME, HALF, UPDATES_ALONE
 from assembly.solve.loop.settings import CARRIED, CARRIES, SETTINGS
 from assembly.tracking.tick import TrackStatus
 from benchmarks.hands import WIRE, paper_clips
@@ -63,7 +63,7 @@ def ball_on_ball(**options):
 
 
 def doubts(tracker):
-    """How far pairs are beyond where contacts may have been born beside others since they were looked at."""
+    """How far pairs are beyond where contacts may have been born beside others since their last update."""
     packed = tracker._packed
     at = packed.memory_at + MEMORY_HEADER
     return tracker._state[at : at + PAIR_MEMORY * packed.table[packed.table[MANAGER_RECORD] + PAIRS]][
@@ -117,14 +117,14 @@ def test_a_chain_comes_to_where_it_does_with_time(chain, clips, way, cases):
 
 
 def test_time_is_spent_at_every_place(chain, clips):
-    """With little time ticks end after looks, after steps and on the way back, and the next ones go on from there."""
+    """With little time ticks end after updates, after steps and on the way back, and the next ones go on from there."""
     tracker, begin = dragged(chain, clips, budget=NO_TIME)
     steps = Counter()
     for k in range(400):
         tracker.step(begin + 6.0 * np.array([np.sin(0.02 * k), 1.0 - np.cos(0.02 * k), -np.sin(0.03 * k)]))
         carried = int(tracker._state[tracker._packed.results_at + CARRIED])
         steps[carried] += 1
-    # None, only looks, one, two, and more than the two after which a tick ends where its pose holds.
+    # None, only updates, one, two, and more than the two after which a tick ends where its pose holds.
     assert {0, 1, 2, 3, 4} <= set(steps), steps
 
 
@@ -229,21 +229,21 @@ def begun(table, settings, results, memory):
     return begin_tick(table, settings, results, memory)
 
 
-def test_looks_alone_do_not_go_on_for_ever():
-    """However many pairs are due time and again: after four looks at each a step comes first."""
+def test_updates_alone_do_not_go_on_for_ever():
+    """However many pairs are due time and again: after four updates of each a step comes first."""
     watch, pairs = 100, 3
     table, settings, results = np.zeros(200, np.int64), np.zeros(SETTINGS), np.zeros(RESULTS)
     table[MANAGER_RECORD], table[watch + PAIRS], settings[CARRIES] = watch, pairs, 1.0
     memory = np.zeros(MEMORY_HEADER)
     known = memory_header_at(memory, 0)
-    known.looks = 7.0
+    known.updates = 7.0
     assert begun(table, settings, results, memory) == (0, 0, 7.0) and known.earlier == 7.0
-    for looks, steps in ((4 * pairs - 1, 0), (4 * pairs, 0), (4 * pairs + 5, 2)):
-        results[CARRIED], known.looks = 1.0 + steps, 7.0 + looks
+    for updates, steps in ((4 * pairs - 1, 0), (4 * pairs, 0), (4 * pairs + 5, 2)):
+        results[CARRIED], known.updates = 1.0 + steps, 7.0 + updates
         _, done, before = begun(table, settings, results, memory)
         assert done == steps and known.earlier == 7.0 and results[CARRIED] == 0.0
-        assert before == (7.0 + looks if looks < LOOKS_ALONE * pairs else np.inf)
-        assert (memory[DEADLINE] < np.inf) == (looks < LOOKS_ALONE * pairs)
+        assert before == (7.0 + updates if updates < UPDATES_ALONE * pairs else np.inf)
+        assert (memory[DEADLINE] < np.inf) == (updates < UPDATES_ALONE * pairs)
 
 
 def test_driven_values_that_change_end_what_is_not_done():

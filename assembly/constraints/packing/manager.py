@@ -35,7 +35,7 @@ Side = Body | BodyFace
 # A contact of the scene, its sides, and whether it is one of their whole surfaces, without edges.
 GivenContact = tuple[Contact, tuple[Side, Side], bool]
 
-# How far bodies may go between looks where contacts may be born, in parts of the smallest radius of curvature of the
+# How far bodies may go between updates where contacts may be born, in parts of the smallest radius of curvature of the
 # two; in parts of the scene's size, it is no less than this.
 FLANK, LEAST_FLANK = 0.5, 1e-4
 # Faces leave edges that they share, and Newton's method leaves roots beside their surfaces, by less than so many times

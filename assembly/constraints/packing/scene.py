@@ -139,7 +139,7 @@ class Packed:
         self.memory_at = self.results_at + layout.RESULTS
         self._memory = np.empty(0)
         if self.clearance_rows:
-            # The first look sees what crosses at the start as well, if it is no deeper than this.
+            # The first update sees what crosses at the start as well, if it is no deeper than this.
             self._memory = fresh_memory(sum(map(len, self.clearance_pairs)), self.clearance_rows, LARGEST_MARGIN)
 
     def _write(

@@ -235,8 +235,8 @@ def lost_clearance_row(store, r, start, point, past, goes):
     """Row r of a clearance whose pair was lost: idle, if its gap would be open, or it is a corner `past` its face.
 
     Solids need only touch. Or if it `goes`, though it is not open: one that ends where bodies are in each other would
-    hold every step. One that is lost already stays as it is. What the neighborhood holds now is for the next look to
-    find.
+    hold every step. One that is lost already stays as it is. What the neighborhood holds now is for the next update
+    to find.
     """
     least = least_gap(store, r, start)
     gap = tracked_at(start, r).gap - least

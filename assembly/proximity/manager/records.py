@@ -82,7 +82,7 @@ IN_PLACE = size_of(PAIR_LENGTHS)
 MEMORY_DTYPE = record_dtype(
     "f8",
     event_count=1,  # events so far
-    looks=1,  # updates of a pair so far
+    updates=1,  # updates of a pair so far
     born=1,  # contacts so far: the number of the last one
     time=1,  # that of the caller
     crowded=1,  # 1: a near extremum once found no slot

@@ -212,7 +212,7 @@ def update_pair(manager, p, q, tracked, workspace, extrema, asks):
     record, header = record_of(manager), header_of(manager)
     pair, known = pair_of(manager, p), pair_state_of(manager, p)
     posed = posed_pair(manager, p, q)
-    header.looks += 1.0
+    header.updates += 1.0
     least = pair_lengths_of(manager, p).least
     moving = mover(pair, q)
     margin = margin_now(manager, p, moving)

@@ -61,8 +61,8 @@ def cut_to_motion_bounds(task, current, trial, system):
     most_of_it = loop.cut
     loop.cut, loop.may_go = allowed_share(store, memory, current, trial, step, most_of_it)
     if task.tick and not loop.may_go and loop.asked_at != loop.iteration:
-        # A tick looks where a step would go farther than is known to be free: at pairs that would use much.
-        if may_end(store.table, task.settings, memory, (loop.begin, loop.looks), loop.iteration, HALF):
+        # Where a step would go farther than is known to be free, a tick updates the pairs that would use much.
+        if may_end(store.table, task.settings, memory, (loop.begin, loop.updates), loop.iteration, HALF):
             loop.status, loop.over = OUT_OF_TIME, 1
             loop.violation = loop.violation if loop.iteration > 0 else math.inf
             return False

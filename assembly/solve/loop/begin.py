@@ -197,7 +197,7 @@ def rearrange(program, count, rows, current):
 def begin_loop(task, current):
     """The record of the loop before its first step."""
     store, limits, loop = task.program.store, task.limits, task.loop
-    loop.begin, loop.done, loop.looks = begin_tick(store.table, task.settings, task.results, task.program.lifted.memory)
+    loop.begin, loop.done, loop.updates = begin_tick(store.table, task.settings, task.results, task.program.lifted.memory)
     loop.feasible = rounding_at(store, task.settings, current)
     loop.farthest = FAR * (1.0 + reach_of(store, current.q)) if limits.strays == 1.0 else math.inf
     loop.limit = int(limits.iterations) - loop.done
@@ -218,7 +218,7 @@ def begin_loop(task, current):
     loop.measured = loop.may_go = 1
     loop.restoring = loop.restorations = loop.kicks = loop.holds = loop.sunk = loop.begun = 0
     loop.lingers = loop.settled_by = 0
-    loop.lost = loop.back_at = loop.asked_at = loop.looked_at = -1
+    loop.lost = loop.back_at = loop.asked_at = loop.final_update_at = -1
     loop.check_at = PATIENCE
     restoration_at(task.way, 0).softness = 1e-2
     begin_way(task.way)

@@ -42,7 +42,7 @@ def clear_clearance_rows(table):
 
 @kernel(inner=True)
 def forget_clearance_rows(table, memory):
-    """Begin again: nothing has been looked at, and no contact has a place."""
+    """Begin again: no pair has been updated, and no contact has a place."""
     header = header_at(table, 0)
     record = header.manager_record
     pairs, places, _events = memory_places(table, record)
@@ -97,7 +97,7 @@ def place_clearance_rows(table, lifted, current, rows, begins):
 
 @kernel(inner=True)
 def update_around(store, memory, point, how):
-    """The contact manager's look at a point; whether rows changed.
+    """Update the contact manager at a point; whether rows changed.
 
     In a long one the caller is asked every 50 ms (SLICE) whether to go on. If not, this update and all later ones of
     the solve end at once, as with a spent budget (`is_cut` in `solve/loop/deadline.py`), and return True: which
@@ -123,7 +123,7 @@ def update_around(store, memory, point, how):
 
 @kernel(inner=True)
 def update_again(store, lifted, point, how):
-    """The contact manager's look at a point that is evaluated; whether rows changed.
+    """Update the contact manager at a point that is evaluated; whether rows changed.
 
     An update moves every contact onto its extremum. The coordinates of lifted pairs are unknowns of the solve, and
     their rows have been evaluated: their old values are put back. But where the extremum is farther away than the merge
@@ -164,7 +164,7 @@ def numbers_of(table, out):
 
 @kernel(inner=True)
 def go_back(table, memory, numbers):
-    """Keep the contacts that rows had with these numbers; where others came or went, everything is looked at again."""
+    """Keep the contacts that rows had with these numbers; where others came or went, every pair is updated again."""
     header = header_at(table, 0)
     record = header.manager_record
     pairs, places, _events = memory_places(table, record)
@@ -194,7 +194,7 @@ def allowed_share(store, memory, current, trial, step, share):
 
     The poses at the end of the share go into the trial iterate. Every pair is left with the part of its motion bound
     that this step would use, so that an update (MEASURED) can begin with the largest; except where the pair was updated
-    at these poses as far out as another update would look: then with the part used here.
+    at these poses as far out as another update would search: then with the part used here.
     """
     move(store.table, current.q, step, share, trial.q)
     record = header_at(store.table, 0).manager_record
@@ -218,7 +218,7 @@ def allowed_share(store, memory, current, trial, step, share):
         flank = pair_at(store.table, manager.pair_table + PAIR_RECORD * p).minimum + 1
         most = min(store.pool[flank], lengths_at(store.pool, manager.lengths).largest_margin)
         if begin <= STILL and o.margin >= min(o.cut_short, most):
-            # It was looked at right here, as far as another look would.
+            # It was updated right here, as far out as another update would search.
             o.part = begin
     return share * allowed, False
 

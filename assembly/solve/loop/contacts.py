@@ -53,7 +53,7 @@ def start_contacts(store, q, contacts, free, lengths):
     header = header_at(store.table, 0)
     for k in range(header.contacts):
         pair = tracked_at(contacts, k)
-        # What a clearance has lost its contact manager looks for.
+        # What a clearance has lost its contact manager finds.
         idle = contact_of(store.table, k).body_f < 0 or is_clearance_row(store.table, k)
         if not math.isnan(contacts[k, 0]) or idle:
             continue

@@ -13,7 +13,7 @@ from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.program.records import header_at
 from assembly.proximity.manager.records import manager_at, memory_header_at
-from assembly.solve.loop.parameters import HALF, LOOKS_ALONE
+from assembly.solve.loop.parameters import HALF, UPDATES_ALONE
 from assembly.solve.loop.settings import results_at, settings_at
 
 
@@ -26,15 +26,15 @@ def is_spent(table, settings, begin, part):
 
 @kernel(inline=True)
 def is_cut(table, memory):
-    """Whether a look left out pairs that were due: then this call ends."""
+    """Whether an update left out pairs that were due: then this call ends."""
     return header_at(table, 0).manager_record >= 0 and memory_header_at(memory, 0).deadline < 0.0
 
 
 @kernel(inner=True)
 def begin_tick(table, settings, results, memory):
-    """When this call began; how many steps it goes on from; how many looks there were before it.
+    """When this call began; how many steps it goes on from; how many updates there were before it.
 
-    These are infinitely many where there is no budget, or a tick has to make a step: then looks take their time. Those
+    These are infinitely many where there is no budget, or a tick has to make a step: then updates take their time. Those
     of solves ask whether they are to go on (`solve/loop/clearances.py`).
     """
     header = header_at(table, 0)
@@ -46,39 +46,39 @@ def begin_tick(table, settings, results, memory):
     is_new = result.carried == 0.0
     done = 0 if is_new else int(result.carried) - 1
     result.carried = 0.0
-    looks = math.inf
+    updates = math.inf
     if header.manager_record >= 0:
         state.deadline = math.inf
-        # Looks of ticks are short, and with a budget end by it.
+        # Updates of ticks are short, and with a budget end by it.
         asks = limits.tick == 0.0
         manager.go_on_address = int(limits.ask_address) if asks else 0
         if asks:
             manager.clock = header.clock_address
         if is_new:
-            state.earlier = state.looks
-        if limits.carries == 1.0 and state.looks - state.earlier < LOOKS_ALONE * manager.pairs:
-            looks = state.looks
+            state.earlier = state.updates
+        if limits.carries == 1.0 and state.updates - state.earlier < UPDATES_ALONE * manager.pairs:
+            updates = state.updates
             state.deadline = begin + HALF * limits.budget
-    return begin, done, looks
+    return begin, done, updates
 
 
 @kernel(inner=True)
 def may_end(table, settings, memory, clock, iteration, part):
     """Whether a tick may leave the rest to the next one, and so much of its budget is spent.
 
-    What it is to go on from after a step is as good as at its begin; without one, there has to be a look.
+    What it is to go on from after a step is as good as at its begin; without one, there has to be an update.
     """
-    begin, looks = clock
+    begin, updates = clock
     if settings_at(settings, 0).carries == 0.0:
         return False
-    if iteration == 0 and not (looks < math.inf and memory_header_at(memory, 0).looks > looks):
+    if iteration == 0 and not (updates < math.inf and memory_header_at(memory, 0).updates > updates):
         return False
     return is_cut(table, memory) or is_spent(table, settings, begin, part)
 
 
 @kernel(inline=True)
 def set_deadline(table, settings, memory, begin):
-    """After a step looks may end early."""
+    """After a step updates may end early."""
     limits = settings_at(settings, 0)
     if limits.carries == 1.0 and header_at(table, 0).manager_record >= 0 and not is_cut(table, memory):
         memory_header_at(memory, 0).deadline = begin + HALF * limits.budget

@@ -54,7 +54,7 @@ DEXTERITY_WEIGHTS = record_dtype(
     arm=3,  # the tip, in the axes of its body
     linear=1,  # factor of velocities
     angular=1,  # factor of angular velocities
-    direction=6,  # along which some measures look
+    direction=6,  # along which some measures are taken
 )
 dexterity_weights_at = record_view(DEXTERITY_WEIGHTS)
 ARM = place_of(DEXTERITY_WEIGHTS, "arm")

@@ -37,7 +37,7 @@ End = namedtuple("End", "status value violation dual feasible holds")
 
 @kernel(inner=True)
 def tells_crossing(program, current, rows):
-    """Look at everything where a solve failed; whether bodies are in each other, with or without a row that says so."""
+    """Update all pairs where a solve failed; whether bodies are in each other, with or without a row that says so."""
     table, lifted = program.store.table, program.lifted
     update_around(program.store, lifted.memory, current, EVERYTHING)
     place_clearance_rows(table, lifted, current, rows, False)
@@ -51,7 +51,7 @@ def tells_crossing(program, current, rows):
 
 @kernel(inner=True)
 def return_to(program, held, rows, current, tick):
-    """Back to the last pose that held; what is near there is looked for again."""
+    """Back to the last pose that held; what is near there is found again."""
     store, lifted = program.store, program.lifted
     bring_back(held, rows, current)
     if header_at(store.table, 0).manager_record >= 0:

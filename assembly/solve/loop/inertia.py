@@ -87,7 +87,7 @@ def test_end(program, settings, results, status, current, rows, system):
     """The status of a solve that is SOLVED: UNSURE where no factorization tells that no curvature is negative.
 
     Of a tick that is asked for it the result says whether its end is a minimum. A first solve that ends where it began
-    is looked at: what it is may be decided by higher orders. Scenes without an objective are left as they are.
+    is UNSURE: what its end is may be decided by higher orders. Scenes without an objective are left as they are.
     """
     result = results_at(results, 0)
     limits = settings_at(settings, 0)

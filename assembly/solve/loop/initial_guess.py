@@ -91,7 +91,7 @@ def body_rows(store, placed, joint, point):
 
 @kernel(inner=True)
 def follow_drives(store, placed, tracked):
-    """Driven angles of a body's rows are looked for near their values again."""
+    """Let driven angles of a body's rows be near their values again."""
     for l in range(placed.first, placed.first + placed.count):
         row = header_at(store.table, 0).row_table + ROW * store.table[l]
         joint = joint_row_at(store.table, row)

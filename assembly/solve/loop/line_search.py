@@ -150,7 +150,7 @@ def search_line(program, current, trial, rows, system, line, value, restoring):
             and lost < 0
             and ends_unseen(store, lifted.memory, current, trial)
         ):
-            # A tick has no last look, which would tell of what it led through.
+            # A tick has no final update, which would tell of what it led through.
             bends = BENT
             alpha *= 0.5
             continue

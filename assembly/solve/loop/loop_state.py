@@ -38,7 +38,7 @@ NUMBERS = record_dtype(
     restored=1,  # violation at the last step that restored rows; infinite after any other
     feasible=1,  # largest violation that counts as none
     farthest=1,  # bodies this far out may have gone away without bound
-    looks=1,  # updates of the manager before this tick; infinitely many where they take their time (`deadline.py`)
+    updates=1,  # updates of the manager before this tick; infinitely many where they take their time (`deadline.py`)
 )
 # Counts and flags of the loop (1 or 0).
 COUNTS = record_dtype(
@@ -51,7 +51,7 @@ COUNTS = record_dtype(
     done=1,  # iterations of the tick that this one goes on with
     begin=1,  # when this call began [ns]
     asked=1,  # when the caller was last asked whether to go on [ns]
-    late=1,  # 1: time is over before all that is near was looked at
+    late=1,  # 1: time is over before every pair that is near was updated
     changed=1,  # 1: contacts of clearances are others than rows are placed for
     measured=1,  # 1: it is known which parts of their motion bounds bodies have used here
     rows=1,  # constraint residuals, with those of lifted pairs
@@ -76,7 +76,7 @@ COUNTS = record_dtype(
     ended=1,  # how a solve ended whose rows are only led back any more, or RUNNING
     settled_by=1,  # the iteration at which that ends at the latest
     asked_at=1,  # iteration at which a tick updated the manager because of its step
-    looked_at=1,  # iteration after a last look that found other contacts
+    final_update_at=1,  # iteration after a final update that found other contacts
 )
 LOOP_STATE = np.dtype(NUMBERS.descr + COUNTS.descr)
 loop_at = record_view(LOOP_STATE)

@@ -276,7 +276,7 @@ def choose_multipliers(shape, point, rows, system, shortened, vectors, holds, go
     with vector trims (`vectors`), they are refined. Returns the dual residual.
     """
     dual = dual_residual(shape, point, rows, system, rows.better_y)
-    # Where they are as good as they should be, the old ones need no look.
+    # Where they are as good as they should be, the old ones are not compared.
     other = dual_residual(shape, point, rows, system, rows.y) if dual > good else math.inf
     if dual <= other:
         take_better(rows)

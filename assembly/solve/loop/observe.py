@@ -34,7 +34,7 @@ def observe(task, current, rows):
     if task.watched and not loop.changed:
         enough = loop.feasible if task.tick else TOUCHING
         holds = off_rows(table, lifted, one_sided, current, task.tick) <= enough
-        clock = (loop.begin, loop.looks)
+        clock = (loop.begin, loop.updates)
         loop.late = not holds and may_end(table, task.settings, lifted.memory, clock, loop.iteration, 1.0)
         if not loop.late:
             how = (CAREFUL if holds else AS_NEEDED) | (SPARING if task.tick else IN_TURNS | DOUBTFUL)
@@ -103,7 +103,7 @@ def evaluate_iterate(task, history, current, rows, system):
     if stops and loop.status == RUNNING:
         loop.status = OUT_OF_TIME
     if loop.status == RUNNING and loop.late:
-        # Not all that is near has been looked at.
+        # Not every pair of bodies that is near has been updated.
         loop.status, loop.violation = OUT_OF_TIME, math.inf
     if loop.status != RUNNING:
         loop.over = 1

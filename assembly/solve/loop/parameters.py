@@ -81,7 +81,7 @@ KICKS = 3
 # [force] Multipliers below this count for nothing against the objective's curvature, which is of order one. Doubled:
 # small forces bend nothing, and their contacts converge slowly, as in `benchmarks/first_order.py`. Chosen.
 WEAK = 1e-3
-# Multipliers this many times stronger than the objective's slope are looked at once more. Doubled: stronger ones are
+# Multipliers this many times stronger than the objective's slope are computed once more. Doubled: stronger ones are
 # reported of rows that depend on each other. Chosen.
 EXCESS = 10.0
 # [length] One-sided rows that hold by less than this may push. Doubled: more rows to choose from. From: `TOUCHING`.
@@ -160,7 +160,7 @@ IDLE = 1e-7
 # [steps] Without a user's objective: at most so many after the violation was first at most 1e-9 (`contact.TOUCHING`).
 # Doubled: a least move that oscillates at a kink ends later. Chosen.
 LINGERS = 40
-# Where a solve may stray, and its bodies are FAR times farther out, or sizes, after STRAYING steps, it is looked at
+# Where a solve may stray, and its bodies are FAR times farther out, or sizes, after STRAYING steps, it is checked
 # whether that goes on. Doubled: unbounded scenes are told later. Chosen.
 FAR, STRAYING = 1e3, 60
 
@@ -203,9 +203,9 @@ EXTRA_TIME = 4
 # After this part of a tick's budget no update of the manager begins, and no step from a feasible iterate: either may
 # take as long as the rest. Doubled: ticks overrun their budgets. Chosen.
 HALF = 0.5
-# [looks a pair] A tick may end with a look until there were so many of every pair; then a step has to come first.
+# [updates a pair] A tick may end with an update until there were so many of every pair; then a step has to come first.
 # Doubled: ticks of crowded scenes stand twice as long. Chosen.
-LOOKS_ALONE = 4
+UPDATES_ALONE = 4
 # [steps, pairs of bodies] In its first SHORT steps a solve does not ask whether to go on, except in a large scene: one
 # with a sparse Hessian, or of more than MANY_PAIRS. Doubled: an interruption waits longer. Chosen.
 SHORT, MANY_PAIRS = 4, 256

@@ -13,7 +13,7 @@ from assembly.solve.loop.settings import results_at, settings_at
 
 @kernel(inline=True)
 def is_large(table):
-    """Whether a step may take long: of many bodies, or of a look at many pairs of them."""
+    """Whether a step may take long: of many bodies, or with an update of many pairs of them."""
     header = header_at(table, 0)
     return header.block_record != 0 or (
         header.manager_record >= 0 and manager_at(table, header.manager_record).pairs > MANY_PAIRS
@@ -22,7 +22,7 @@ def is_large(table):
 
 @kernel(inline=True)
 def pause(store, settings, results, asked, iteration, value, violation):
-    """The time of the last question, or of the first look at the clock [ns]; and whether the solve is to end."""
+    """The time of the last question, or when the clock was first read [ns]; and whether the solve is to end."""
     header = header_at(store.table, 0)
     result = results_at(results, 0)
     limits = settings_at(settings, 0)

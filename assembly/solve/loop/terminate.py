@@ -29,10 +29,10 @@ def terminate(task, held, current, rows, system):
         loop.holds, loop.leash = 0, math.inf
     goes_back = retreats(task)
     arrived = is_solution(task, current, rows, system)
-    looks_last = task.watched and task.limits.last_look == 1.0
-    # Where every last look finds other contacts, the limit ends it.
-    if arrived and not goes_back and not (looks_last and loop.iteration > loop.limit):
-        arrive(task, looks_last, current, rows, system)
+    final_update = task.watched and task.limits.final_update == 1.0
+    # Where every final update finds other contacts, the limit ends it.
+    if arrived and not goes_back and not (final_update and loop.iteration > loop.limit):
+        arrive(task, final_update, current, rows, system)
         return False
     keep_what_holds(task, held, current, rows)
     if is_over(task, current):
@@ -58,19 +58,19 @@ def is_solution(task, current, rows, system):
 
 
 @kernel(inline=True)
-def arrive(task, looks_last, current, rows, system):
-    """End at a solution, unless a last look at all that is near finds other contacts."""
+def arrive(task, final_update, current, rows, system):
+    """End at a solution, unless a final update of all pairs finds other contacts."""
     loop, program = task.loop, task.program
-    # A contact that ends right here is lost and found again, however often it is looked for.
-    if looks_last and loop.iteration != loop.looked_at:
+    # A contact that ends right here is lost and found again by every update.
+    if final_update and loop.iteration != loop.final_update_at:
         loop.changed = update_again(program.store, program.lifted, current, EVERYTHING)
         if loop.changed:
             loop.iteration += 1
-            loop.looked_at = loop.iteration
+            loop.final_update_at = loop.iteration
             return
     table = program.store.table
-    # Deeper than looks reach no row tells of a crossing.
-    crosses = looks_last and any_crossed(table, header_at(table, 0).manager_record, program.lifted.memory)
+    # Deeper than updates reach no row tells of a crossing.
+    crosses = final_update and any_crossed(table, header_at(table, 0).manager_record, program.lifted.memory)
     loop.status = STALLED if crosses else SOLVED
     loop.over = 1
     if not crosses:
