@@ -1,9 +1,8 @@
 """What ends a solve before it is done: a time limit, a callback of the user's, Ctrl-C.
 
 The compiled loop runs without the interpreter. Every 50 ms at most (`solve/loop/pauses.py`) it calls an address in its
-settings:
-there the interpreter runs again, so that handlers of signals do, and an answer other than 0 ends the loop. An update of
-very many pairs of bodies asks as often; what it returns is whole, but where an exception throws it away.
+settings: there the interpreter runs again, so that handlers of signals do, and an answer other than 0 ends the loop. An
+update of very many pairs of bodies asks as often; what it returns is whole, but where an exception throws it away.
 
 Decompositions of large matrices run in a thread of their own, as they let nobody ask (`wait_for`).
 """
@@ -42,8 +41,8 @@ class Interruption:
     time_limit : float, optional
         Seconds from now.
     callback : callable, optional
-        Called with the iteration, the objective and the feasibility [the scene's unit]; True ends the solve. In an update
-        before the first iteration they are not known: nan and inf.
+        Called with the iteration, the objective and the feasibility [the scene's unit]; True ends the solve. In an
+        update before the first iteration they are not known: nan and inf.
 
     Attributes
     ----------

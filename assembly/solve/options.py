@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from assembly.errors import InputError, integer, number
 from assembly.solve.loop.settings import (
     FEASIBILITY,
+    FINAL_UPDATE,
     FIT,
     ITERATIONS,
-    FINAL_UPDATE,
     PENALTY,
     PENALTY_FLOOR,
     RADIUS,

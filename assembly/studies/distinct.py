@@ -43,7 +43,7 @@ def are_one(solution: Solution, other: Solution) -> bool:
     # as good by chance.
     if (
         (packed.clearance_rows and packed.contacts)
-        or packed.tips is not None
+        or packed.end_effectors is not None
         or not _alike(value, other.objective, unit)
     ):
         return False
@@ -81,7 +81,7 @@ def _objective_at(packed: Packed, solution: Solution, q: Array) -> float:
     if not off.max(initial=0.0) <= HELD:
         return np.inf
     free, gradient = np.empty(packed.pair_rows, dtype=np.int64), np.empty(6 * packed.count)
-    return float(gradient_at(packed.table, packed.pool, rows.state, free, gradient, packed.tips)) * packed.unit
+    return float(gradient_at(packed.table, packed.pool, rows.state, free, gradient, packed.end_effectors)) * packed.unit
 
 
 def _crosses(packed: Packed, state: Array, q: Array) -> bool:

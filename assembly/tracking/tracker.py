@@ -37,10 +37,10 @@ from assembly.solve.loop.settings import (
     CARRIES,
     CONTACT_LOST,
     FEASIBILITY,
+    FINAL_UPDATE,
     HISTORY,
     ITERATIONS,
     LAST_FEASIBLE,
-    FINAL_UPDATE,
     OUT_OF_TIME,
     RADIUS,
     SECOND_ORDER,
@@ -240,7 +240,7 @@ class Tracker(InOneProcess):
         self._view: Any = self._state.data
         self._before = self._pose.copy()
         self._knobs: Any = self._settings.data
-        self._arguments = (packed.table, packed.pool, self._settings, self._state, self._history, packed.tips)
+        self._arguments = (packed.table, packed.pool, self._settings, self._state, self._history, packed.end_effectors)
         self._radius = float(self._settings[RADIUS])
         self._seen = float(self._state[packed.memory_at + EVENT_COUNT]) if packed.clearance_rows else 0.0
         self._pool = packed.pool.data

@@ -51,7 +51,9 @@ class LoopPoint:
         at = table[layout.TAPE_WORKSPACE]
         self.workspace = layout.TapeWorkspace(*(np.empty(size) for size in table[at : at + 3]))
         arrange(table, free, self.shape, self.rows, self.n)
-        self.program = layout.Program(Store(table, self.pool), self.shape, self.loose, self.workspace, packed.tips)
+        self.program = layout.Program(
+            Store(table, self.pool), self.shape, self.loose, self.workspace, packed.end_effectors
+        )
         if tracked is None:
             state = np.zeros(packed.results_at)
             state[packed.contacts_at : packed.angles_at] = np.nan

@@ -1,4 +1,4 @@
-"""The tip's Jacobian and measures of it: against differences, columns by hand, poses solved again, a sweep."""
+"""An end effector's Jacobian and measures of it: against differences, columns by hand, poses solved again, a sweep."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_gradients_through_a_contact_at_a_fold():
             there = state.copy()
             q = there[: packed.contacts_at].reshape(-1, 7)
             q[:] = moved(scene, q, t * along[1:].ravel())
-            value = evaluate(packed.table, packed.pool, there, free, gradient, packed.tips)
+            value = evaluate(packed.table, packed.pool, there, free, gradient, packed.end_effectors)
             assert free[0] == 0
             return value, gradient
 

@@ -50,9 +50,9 @@ def test_boxes_that_are_drawn_together_come_to_rest(sides, seed, part, cases):
 
 
 def test_a_contact_that_ends_where_it_touches_is_not_updated_forever(cases):
-    # A corner just over the border of a face, to the last bit: there these solves had arrived, and each update found the
-    # contact that evaluating its row had lost, until their steps were used up. Rounding decides which solves get there:
-    # a tenth of these may, as any of them. The first four are known ones, the others any.
+    # A corner just over the border of a face, to the last bit: there these solves had arrived, and each update found
+    # the contact that evaluating its row had lost, until their steps were used up. Rounding decides which solves get
+    # there: a tenth of these may, as any of them. The first four are known ones, the others any.
     scenes = [([BOX] * 4, 5, 15), ([BOX] * 3, 5, 7), ([BOX, PLATE, BOX], 5, 8), ([BOX, PLATE, BOX], 6, 6)]
     numbers = range(10, cases(10, 17))
     scenes += [(sides, seed, k) for sides in ([BOX] * 3, [BOX, PLATE, BOX]) for seed in (5, 6) for k in numbers]

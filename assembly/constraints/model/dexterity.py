@@ -1,4 +1,4 @@
-"""Dexterity: how well a mechanism moves its tip, as an objective."""
+"""Dexterity: how well a mechanism moves its end effector, as an objective."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TASKS = ("position", "rotation", "pose")
 
 
 class TipTask:
-    """A tip, the inputs that move it, and which of its velocities count: what a tip's Jacobian is of.
+    """An end effector, the inputs that move it, and which of its velocities count: what its Jacobian is of.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ class TipTask:
     inputs : sequence of Joint or Freedom
         Joints with one freedom, or freedoms, `joint.freedom(name)`; rates of angles [rad] and of slides.
     task : "position", "rotation" or "pose", optional
-        Linear velocity of the tip, angular velocity, or both (linear first), world axes. Position for a point, pose
-        for a frame or a body by default.
+        Its linear velocity, angular velocity, or both (linear first), world axes. Position for a point, pose for a
+        frame or a body by default.
     length : float, optional
         In a pose task, angular velocities count as those of points this far off. Half the body's size by default, 1
         for a body without shape.
@@ -77,7 +77,7 @@ class TipTask:
 
     @property
     def origin(self) -> Array:
-        """The tip in body coordinates."""
+        """The end effector in body coordinates."""
         return self.tip.coordinates if isinstance(self.tip, Point) else self.tip.origin
 
     @property
@@ -87,13 +87,13 @@ class TipTask:
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """The bodies of the tip and of the inputs."""
+        """The bodies of the end effector and of the inputs."""
         bodies = [self.tip.body, *(body for freedom in self.inputs for body in freedom.joint.bodies)]
         return tuple(dict.fromkeys(bodies))
 
 
 class Dexterity(Objective):
-    """A measure of the Jacobian of a tip, to be maximized: what unit rates of the inputs do to the tip.
+    """A measure of the Jacobian of an end effector, to be maximized: what unit rates of the inputs do to it.
 
     The Jacobian is taken through closed loops and contacts by the rows of the scene's bilateral constraints; driven
     values and limits do not count as such. The gradient is exact.
@@ -122,7 +122,7 @@ class Dexterity(Objective):
 
     Notes
     -----
-    Where the inputs do not determine the tip, or depend on each other, the objective is infinite and a solve that
+    Where the inputs do not determine its motion, or depend on each other, the objective is infinite and a solve that
     starts there ends STALLED.
     """
 
@@ -157,7 +157,7 @@ class Dexterity(Objective):
 
     @property
     def tip_task(self) -> TipTask:
-        """Tip, inputs and task."""
+        """End effector, inputs and task."""
         return self._tip_task
 
     @property

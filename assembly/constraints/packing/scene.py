@@ -175,7 +175,7 @@ class Packed:
             header[layout.BLOCK_RECORD], header[layout.BLOCK_LENGTH] = writer.add(record)[0], record.size
         self.table, self.pool = writer.arrays()
         # What the loop is compiled for: None without a dexterity.
-        self.tips = 1 if header[layout.DEXTERITIES] else None
+        self.end_effectors = 1 if header[layout.DEXTERITIES] else None
         self.tracked = self.pair_rows + len(writer.angles)
         self.shells, self._angles = writer.shells, writer.angles
         self._places, self._frames = writer.places, writer.frames

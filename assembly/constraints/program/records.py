@@ -254,8 +254,8 @@ Iterate = namedtuple("Iterate", "q tracked records residual jacobian")
 # expects, `memory` is what the contact manager remembers.
 LiftedPairs = namedtuple("LiftedPairs", "free lengths vectors variables guess memory")
 # What stays as it is for a whole solve. `structure`: where rows and unknowns stand (`solve/loop/residuals.py`; None:
-# that is not known yet); `tips`: None where no term of the objective is a dexterity.
-Program = namedtuple("Program", "store structure lifted tapes tips")
+# that is not known yet); `end_effectors`: None where no term of the objective is a dexterity.
+Program = namedtuple("Program", "store structure lifted tapes end_effectors")
 # What the instructions of tapes work in.
 TapeWorkspace = namedtuple("TapeWorkspace", "inputs outputs work")
 # Where the Hessian of the Lagrangian and its factor have entries (`envelope.py`).

@@ -45,9 +45,9 @@ _loaded: set[int | None] = set()
 
 def load(packed: Packed, start: Callable[[], Array]) -> None:
     """Have the loop for such a scene in this process: loading it, or compiling it, is no part of a solve's time."""
-    if packed.tips not in _loaded:
-        solve_program(packed.table.copy(), packed.pool, _LOADING, start(), np.empty((1, HISTORY)), packed.tips)
-        _loaded.add(packed.tips)
+    if packed.end_effectors not in _loaded:
+        solve_program(packed.table.copy(), packed.pool, _LOADING, start(), np.empty((1, HISTORY)), packed.end_effectors)
+        _loaded.add(packed.end_effectors)
 
 
 def attempt(
@@ -135,7 +135,7 @@ def _run(packed: Packed, interruption: Interruption, table: Table, settings: Arr
     if interruption.callback is not None:
         state[packed.results_at + OBJECTIVE], state[packed.results_at + VIOLATION] = np.nan, np.inf
         interruption.watched = (state, packed.results_at)
-    return Outcome(solve_program(table, packed.pool, settings, state, history, packed.tips), state, history)
+    return Outcome(solve_program(table, packed.pool, settings, state, history, packed.end_effectors), state, history)
 
 
 def go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:

@@ -157,9 +157,9 @@ def point_at(store, state, free):
 
 
 @kernel(inline=True, allocates=True)
-def arranged(found, structure, tips):
+def arranged(found, structure, end_effectors):
     """The program of a point that is found, with places of rows and unknowns."""
-    return Program(found.program.store, structure, found.program.lifted, found.program.tapes, tips)
+    return Program(found.program.store, structure, found.program.lifted, found.program.tapes, end_effectors)
 
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], f8[:, ::1])")
@@ -183,21 +183,21 @@ def rows_at(table, pool, state, free, residual, jacobian):
 
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], none)", allocates=True)
-def gradient_at(table, pool, state, free, gradient, tips):
+def gradient_at(table, pool, state, free, gradient, end_effectors):
     """The objective's gradient in the twists of all bodies (6 bodies), zero for fixed ones. Returns its value.
 
-    `tips` is None where no term is a dexterity. Dexterities are left out where a contact has no pair.
+    `end_effectors` is None where no term is a dexterity. Dexterities are left out where a contact has no pair.
     """
     store = Store(table, pool)
     header = header_at(table, 0)
     found = point_at(store, state, free)
     integers, doubles = size_of_shape(table, header.rows + 4 * found.count, 6 * header.moving + 4 * found.count)
     # The blocks outlive what is carved from them: they are arguments of the kernel that carves.
-    return slopes_at(store, free, found, tips, gradient, np.empty(integers, np.int64), np.empty(doubles))
+    return slopes_at(store, free, found, end_effectors, gradient, np.empty(integers, np.int64), np.empty(doubles))
 
 
 @kernel(inner=True, allocates=True)
-def slopes_at(store, free, found, tips, gradient, integers, doubles):
+def slopes_at(store, free, found, end_effectors, gradient, integers, doubles):
     """The same at a point that `point_at` found, with what it works in."""
     header = header_at(store.table, 0)
     lost, count, point = found.lost, found.count, found.iterate
@@ -205,7 +205,7 @@ def slopes_at(store, free, found, tips, gradient, integers, doubles):
     n = 6 * header.moving + 4 * count
     shape = shape_of(store.table, rows, n, store.table[:0], integers, doubles)
     arrange(store.table, free, shape, rows, n)
-    program = arranged(found, shape, tips)
+    program = arranged(found, shape, end_effectors)
     slopes = np.empty(n)
     curves = np.empty((n, n))
     if lost < 0:

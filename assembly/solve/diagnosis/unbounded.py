@@ -320,7 +320,7 @@ def _falls(asked: Asked, motion: Motion) -> bool:
         off = np.where(rows.one_sided, np.maximum(-rows.residual, 0.0), np.abs(rows.residual))
         if not off.max(initial=0.0) * alone.scale <= HELD * max(part, 1.0) * motion.way:
             return np.nan
-        return float(gradient_at(alone.table, alone.pool, state, free, gradient, alone.tips))
+        return float(gradient_at(alone.table, alone.pool, state, free, gradient, alone.end_effectors))
 
     last, fall = np.inf, 0.0
     for power in motion.powers:

@@ -1,7 +1,7 @@
-"""Why a tip has no Jacobian: inputs that depend on each other, or that leave the tip free to move.
+"""Why an end effector has no Jacobian: inputs that depend on each other, or leave it free to move.
 
-With N the free motions of the two-sided rows, B the rates of the inputs and T that of the tip: a combination of inputs
-that vanishes on N, or a motion of N that turns no input and moves the tip.
+With N the free motions of the two-sided rows, B the rates of the inputs and T that of the end effector: a combination
+of inputs that vanishes on N, or a motion of N that turns no input and moves the end effector.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ def complaint(scene: Assembly, packed: Packed, state: Array, task: TipTask) -> s
             f"inputs is [{listed}]; expected inputs with rates of their own, but here constraints tie "
             f"{_listed(dependent)} together"
         )
-    # Of the motions that turn no input, those that move the tip.
+    # Of the motions that turn no input, those that move the end effector.
     idle = motions @ right[rank:].T
-    _, moved, within = np.linalg.svd(_tip_rows(packed, task, poses)[:, columns] @ idle)
+    _, moved, within = np.linalg.svd(_end_effector_rows(packed, task, poses)[:, columns] @ idle)
     open_ = idle @ within[: int(np.count_nonzero(moved > STILL))].T
     others = [freedom for item in scene.constraints if isinstance(item, Joint) for freedom in item.freedoms.values()]
     turned = [
@@ -90,8 +90,8 @@ def _gradient(packed: Packed, item: Coordinate, poses: Array) -> Array:
     return out.ravel()
 
 
-def _tip_rows(packed: Packed, task: TipTask, poses: Array) -> Array:
-    """The tip's velocity by the twists of all bodies, lengths over the scene's size, (3 or 6, 6 n)."""
+def _end_effector_rows(packed: Packed, task: TipTask, poses: Array) -> Array:
+    """The end effector's velocity by the twists of all bodies, lengths over the scene's size, (3 or 6, 6 n)."""
     body = packed._places[task.tip.body]
     arm = rotation_matrix(poses[body, 3:]) @ task.origin / packed.scale
     out = np.zeros((6, 6 * len(poses)))

@@ -1,7 +1,8 @@
-"""What a mechanism's tip can do with its inputs at a pose: Jacobian, ellipsoid and measures, by the loop's own code.
+"""What an end effector can do with its inputs at a pose: Jacobian, ellipsoid and measures, by the loop's own code.
 
-With rates v of all bodies that keep the two-sided rows, A v = 0, and turn the inputs at rates e, B v = e, the tip's
-velocity is J e (`solve/loop/dexterity.py`). Closed loops and contacts are rows like others, so the same J serves them.
+With rates v of all bodies that keep the two-sided rows, A v = 0, and turn the inputs at rates e, B v = e, the end
+effector's velocity is J e (`solve/loop/dexterity.py`). Closed loops and contacts are rows like others, so the same J
+serves them.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.kinematics.pose import pose_rows, rotation_matrix
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.diagnosis.undetermined import complaint
-from assembly.solve.forces.end_effector_rates import tip_at
+from assembly.solve.forces.end_effector_rates import end_effector_at
 from assembly.solve.loop.dexterity import DETERMINED
 from assembly.solve.result import Result
 
@@ -47,7 +48,7 @@ def tip_jacobian(
     task: Task | None = None,
     length: float = 1.0,
 ) -> Array:
-    """Velocities of a tip for unit rates of the inputs, through closed loops and contacts.
+    """Velocities of an end effector for unit rates of the inputs, through closed loops and contacts.
 
     Two-sided constraints hold; driven values, limits and one-sided contacts do not count. Where the pose violates
     constraints, it is the Jacobian of rates that do not change the violations.
@@ -62,7 +63,7 @@ def tip_jacobian(
     q : (n, 7) or Solution, optional
         A row a body, or a solution for these bodies; the bodies' own poses by default.
     task : "position", "rotation" or "pose", optional
-        Which rows: the tip's linear velocity, its body's angular velocity, or both, linear first. Position for a point,
+        Which rows: its linear velocity, its body's angular velocity, or both, linear first. Position for a point,
         pose for a frame or a body by default.
     length : float
         Angular velocities of a pose task are multiplied by it, to compare them with linear ones.
@@ -75,8 +76,8 @@ def tip_jacobian(
     Raises
     ------
     InputError
-        The inputs depend on each other at this pose or leave the tip's motion open (the message names those that do,
-        and freedoms to add), or q does not fit.
+        The inputs depend on each other at this pose or leave the end effector's motion open (the message
+        names those that do, and freedoms to add), or q does not fit.
 
     Notes
     -----
@@ -117,7 +118,7 @@ def dexterity_ellipsoid(
     *,
     scale: float = 1.0,
 ) -> Ellipsoid:
-    """The velocities of a tip for all rates of the inputs of norm one, as an ellipsoid around the tip.
+    """The velocities of an end effector for all rates of the inputs of norm one, as an ellipsoid around it.
 
     Its axes and half their lengths are the left singular vectors and the singular values of the position Jacobian
     (paper 001, section 3.1: the eigenvectors of J J^T and the roots of its eigenvalues), longest first. With fewer than
@@ -165,7 +166,7 @@ def _evaluated(scene: Assembly, objective: Dexterity, q: ArrayLike | Solution | 
     table, pool, term = _with_term(packed, objective)
     jacobian = np.empty((task.rows, len(task.inputs)))
     free = np.empty(packed.pair_rows, dtype=np.int64)
-    lost, outcome, value = tip_at(table, pool, term, state, free, jacobian)
+    lost, outcome, value = end_effector_at(table, pool, term, state, free, jacobian)
     if lost >= 0:
         name = packed.contacts[lost].name
         raise InputError(f"q leaves contact {name!r} without an extremal pair; expected a pose where it has one")

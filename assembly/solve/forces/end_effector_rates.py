@@ -1,4 +1,4 @@
-"""The tip's Jacobian at a state, outside the loop: what `solve/forces/end_effector.py` calls."""
+"""An end effector's Jacobian at a state, outside the loop: what `solve/forces/end_effector.py` calls."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from assembly.constraints.program.objective_terms import term_at
 from assembly.constraints.program.records import header_at
 from assembly.solve.dense.row_table import point_at
 from assembly.solve.linear_algebra.singular_values import measure_jacobian
-from assembly.solve.loop.dexterity import DEPENDENT, DIRECTION, dexterity_at, tip_map
+from assembly.solve.loop.dexterity import DEPENDENT, DIRECTION, dexterity_at, end_effector_map
 from assembly.solve.loop.residuals import place_rows
 
 
 @kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], i8[::1], f8[:, ::1])", allocates=True)
-def tip_at(table, pool, term, state, free, jacobian):
+def end_effector_at(table, pool, term, state, free, jacobian):
     """The Jacobian of a term of dexterity at a state, in the user's units.
 
-    Returns a contact that has no pair there or -1, an outcome of `dexterity.tip_map`, and the measure.
+    Returns a contact that has no pair there or -1, an outcome of `dexterity.end_effector_map`, and the measure.
     """
     store = Store(table, pool)
     header = header_at(table, 0)
@@ -30,9 +30,9 @@ def tip_at(table, pool, term, state, free, jacobian):
     rows = header.rows + 4 * count
     bases = np.empty((rows, 3 + header.extra), np.int64)
     place_rows(table, free, bases, np.empty(rows, np.int64))
-    tip = tip_map(store, term, bases, rows, 6 * header.moving + 4 * count, at.iterate, 1)
-    found = tip.jacobian
+    effector = end_effector_map(store, term, bases, rows, 6 * header.moving + 4 * count, at.iterate, 1)
+    found = effector.jacobian
     jacobian[:] = found
     measure = dexterity_at(table, term_record.tape).measure
     value = measure_jacobian(measure, pool, term_record.parameters + DIRECTION, found, np.empty(found.shape))
-    return lost, tip.outcome, value
+    return lost, effector.outcome, value

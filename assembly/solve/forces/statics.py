@@ -169,7 +169,9 @@ def _balancing(
         directions = np.vstack([directions, across])
     gradient = np.empty(jacobian.shape[1])
     free = np.empty(packed.pair_rows, dtype=np.int64)
-    gradient_at(packed.table_at(solution._state), solution._wished_pool(), solution._state, free, gradient, packed.tips)
+    gradient_at(
+        packed.table_at(solution._state), solution._wished_pool(), solution._state, free, gradient, packed.end_effectors
+    )
     moving = np.repeat([not body.fixed for body in solution._scene.bodies], 6)
     lacking = -(gradient + z @ jacobian)[moving]
     amounts = np.linalg.lstsq((directions @ jacobian[:, moving]).T, lacking, rcond=1e-12)[0]
@@ -191,9 +193,9 @@ def tool_wrench(force: ArrayLike, arm: ArrayLike) -> Array:
 
 
 def geometric_jacobian(at: Solution | Assembly, inputs: Sequence[Joint | Freedom], tip: Point | Frame | Body) -> Array:
-    """Velocity of a tip for unit rates of the joints of an open chain, (6, k): paper 001, eq. 7.
+    """Velocity of an end effector for unit rates of the joints of an open chain, (6, k): paper 001, eq. 7.
 
-    A column is [z x b, z] for a joint that turns about the axis z, b the vector from the axis to the tip, and [z, 0]
+    A column is [z x b, z] for a joint that turns about the axis z, b the vector from the axis to it, and [z, 0]
     for one that slides along z. Freedoms of the chain that are no inputs are held still.
 
     Parameters
@@ -216,7 +218,7 @@ def geometric_jacobian(at: Solution | Assembly, inputs: Sequence[Joint | Freedom
 def joint_torques(
     at: Solution | Assembly, inputs: Sequence[Joint | Freedom], tip: Point | Frame | Body, wrench: Wrench | ArrayLike
 ) -> Array:
-    """J^T W: torques and forces of the joints of an open chain that do the work of a wrench at its tip, (k,).
+    """J^T W: torques and forces of the joints of an open chain that do the work of a wrench at its end effector, (k,).
 
     An arm that holds still pushes with the wrench W; against a load it takes the negative of the load's. Paper 001,
     eqs. 6 to 8.
@@ -226,7 +228,7 @@ def joint_torques(
     at, inputs, tip
         As in `geometric_jacobian`.
     wrench : Wrench or (6,)
-        Force, then torque about the tip, world axes; `tool_wrench` makes one of a force beside the tip.
+        Force, then torque about the end effector, world axes; `tool_wrench` makes one of a force beside it.
     """
     jacobian, point = _chain(at, inputs, tip)
     pushed = wrench.at(point) if isinstance(wrench, Wrench) else vector("wrench", wrench, 6)
@@ -237,7 +239,7 @@ def joint_torques(
 def _chain(
     at: Solution | Assembly, inputs: Sequence[Joint | Freedom], tip: Point | Frame | Body
 ) -> tuple[Array, Array]:
-    """The Jacobian of a tip and where it is."""
+    """The Jacobian of an end effector and where it is."""
     scene = at._scene if isinstance(at, Result) else at
     bodies = scene.bodies
     rows = {id(body): row for body, row in zip(bodies, at.q, strict=True)}
@@ -267,7 +269,7 @@ def _chain(
 
 
 def _place(tip: Point | Frame | Body) -> tuple[Body, Array]:
-    """The body of a tip, and the tip in its coordinates."""
+    """The body of an end effector, and its place in the body's coordinates."""
     if isinstance(tip, Body):
         return tip, np.zeros(3)
     return tip.body, tip.coordinates if isinstance(tip, Point) else tip.origin
@@ -292,7 +294,7 @@ def _input(name: str, given: Joint | Freedom) -> Freedom:
 
 
 def _carried(name: str, joint: Joint, tip: Body, constraints: Sequence[Constraint]) -> float:
-    """1 where the joint moves the tip on its side b, -1 on its side a, 0 where it does not move the tip at all."""
+    """1 where the joint moves the end effector on its side b, -1 on its side a, 0 where it does not move it."""
     if tip.fixed:
         return 0.0
     # All that is fixed is one body.

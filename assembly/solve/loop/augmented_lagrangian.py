@@ -48,22 +48,22 @@ from assembly.solve.loop.workspace import Iterates, carve_all, memory_of, result
     ),
     allocates=True,
 )
-def solve_program(table, pool, settings, state, history, tips):
+def solve_program(table, pool, settings, state, history, end_effectors):
     """Solve in place. State: q (n, 7) | tracked (k, TRACK) | multipliers (m) | residuals (m) | results | memory.
 
-    `tips` is None where no term of the objective is a dexterity.
+    `end_effectors` is None where no term of the objective is a dexterity.
     """
     doubles, integers = workspace_needed(table)
     # Carved arrays do not keep their block alive: it is an argument of who carves.
     blocks = np.empty(doubles), np.empty(integers, np.int64)
-    return solve_in(Store(table, pool), settings, state, history, tips, blocks[0], blocks[1])
+    return solve_in(Store(table, pool), settings, state, history, end_effectors, blocks[0], blocks[1])
 
 
 @kernel(inner=True, allocates=True)
-def solve_in(store, settings, state, history, tips, doubles, integers):
+def solve_in(store, settings, state, history, end_effectors, doubles, integers):
     """The same, in two blocks of memory."""
     table = store.table
-    workspace = carve_all(store, memory_of(table, state), tips, doubles, integers)
+    workspace = carve_all(store, memory_of(table, state), end_effectors, doubles, integers)
     results, limits = results_of(table, state), settings_at(settings, 0)
     tick, any_pose, watched = limits.tick == 1.0, limits.any_pose == 1.0, header_at(table, 0).manager_record >= 0
     task = Task(

@@ -197,7 +197,8 @@ def rearrange(program, count, rows, current):
 def begin_loop(task, current):
     """The record of the loop before its first step."""
     store, limits, loop = task.program.store, task.limits, task.loop
-    loop.begin, loop.done, loop.updates = begin_tick(store.table, task.settings, task.results, task.program.lifted.memory)
+    memory = task.program.lifted.memory
+    loop.begin, loop.done, loop.updates = begin_tick(store.table, task.settings, task.results, memory)
     loop.feasible = rounding_at(store, task.settings, current)
     loop.farthest = FAR * (1.0 + reach_of(store, current.q)) if limits.strays == 1.0 else math.inf
     loop.limit = int(limits.iterations) - loop.done

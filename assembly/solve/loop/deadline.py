@@ -34,8 +34,8 @@ def is_cut(table, memory):
 def begin_tick(table, settings, results, memory):
     """When this call began; how many steps it goes on from; how many updates there were before it.
 
-    These are infinitely many where there is no budget, or a tick has to make a step: then updates take their time. Those
-    of solves ask whether they are to go on (`solve/loop/clearances.py`).
+    These are infinitely many where there is no budget, or a tick has to make a step: then updates take their time.
+    Those of solves ask whether they are to go on (`solve/loop/clearances.py`).
     """
     header = header_at(table, 0)
     state = memory_header_at(memory, 0)

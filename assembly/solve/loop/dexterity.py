@@ -1,9 +1,9 @@
-"""Dexterity: what the tip of a mechanism can do with its inputs, as a term of the objective with an exact gradient.
+"""Dexterity: what an end effector can do with its inputs, as a term of the objective with an exact gradient.
 
 Rows A of joints and contacts (drives and limits left out) and rows B of the inputs: rates V of all unknowns, a column
 an input, make B V = 1 and change the rows as little as can be (`solve/loop/rates.py`). J = T V is the Jacobian of the
-tip, whose
-velocity T v is. Of J a measure w is taken (`solve/linear_algebra/singular_values.py`), with W = dw / dJ. With
+end effector, whose velocity T v is. Of J a measure w is taken (`solve/linear_algebra/singular_values.py`), with
+W = dw / dJ. With
 
     A^T A V + B^T Z = 0,   B V = 1,   A^T A P + B^T Y = T^T,   B P = 0,
 
@@ -51,7 +51,7 @@ POSITION, ROTATION, POSE = 0, 1, 2
 DEXTERITY_WEIGHTS = record_dtype(
     "f8",
     weight=1,  # of the term
-    arm=3,  # the tip, in the axes of its body
+    arm=3,  # the end effector, in the axes of its body
     linear=1,  # factor of velocities
     angular=1,  # factor of angular velocities
     direction=6,  # along which some measures are taken
@@ -60,11 +60,11 @@ dexterity_weights_at = record_view(DEXTERITY_WEIGHTS)
 ARM = place_of(DEXTERITY_WEIGHTS, "arm")
 DIRECTION = place_of(DEXTERITY_WEIGHTS, "direction")
 FACTORS = size_of(DEXTERITY_WEIGHTS)
-# Outcomes of `tip_map`.
+# Outcomes of `end_effector_map`.
 DETERMINED, DEPENDENT, OPEN = 0, 1, 2
-# The outcome, the tip's Jacobian, the rows that hold the mechanism, rates of inputs and what the tip needs (vectors in
-# rows): the heading's V, Z and A V; P, Y and A P.
-TipMap = namedtuple("TipMap", "outcome jacobian used inputs adjoint")
+# The outcome, the end effector's Jacobian, the rows that hold the mechanism, rates of inputs and what the end effector
+# needs (vectors in rows): the heading's V, Z and A V; P, Y and A P.
+EndEffectorMap = namedtuple("EndEffectorMap", "outcome jacobian used inputs adjoint")
 InputRates = namedtuple("InputRates", "v z changes")
 Adjoint = namedtuple("Adjoint", "p y loads")
 # The end effector of a term: its task, the arm from its body's origin, where that body's twist stands among the
@@ -105,55 +105,55 @@ def end_effector(store, term, q):
 
 
 @kernel(inner=True)
-def tip_velocity(tip, v, out, column):
-    """Column of out: the tip's velocity for rates v."""
-    s = tip.place
-    for i in range(task_rows(tip.task)):
+def end_effector_velocity(effector, v, out, column):
+    """Column of out: the end effector's velocity for rates v."""
+    s = effector.place
+    for i in range(task_rows(effector.task)):
         out[i, column] = 0.0
     if s < 0:
         return
     w = (v[s + 3], v[s + 4], v[s + 5])
-    swept = cross(w, tip.arm)
-    if tip.task != ROTATION:
+    swept = cross(w, effector.arm)
+    if effector.task != ROTATION:
         for i in range(3):
-            out[i, column] = tip.linear * (v[s + i] + swept[i])
-    if tip.task != POSITION:
-        first = 0 if tip.task == ROTATION else 3
+            out[i, column] = effector.linear * (v[s + i] + swept[i])
+    if effector.task != POSITION:
+        first = 0 if effector.task == ROTATION else 3
         for i in range(3):
-            out[first + i, column] = tip.angular * w[i]
+            out[first + i, column] = effector.angular * w[i]
 
 
 @kernel(inner=True)
-def add_tip_force(tip, w, column, out):
+def add_end_effector_force(effector, w, column, out):
     """out += T^T w, with w a column over the task."""
-    s = tip.place
+    s = effector.place
     if s < 0:
         return
-    if tip.task != ROTATION:
-        f = (tip.linear * w[0, column], tip.linear * w[1, column], tip.linear * w[2, column])
-        turn = cross(tip.arm, f)
+    if effector.task != ROTATION:
+        f = (effector.linear * w[0, column], effector.linear * w[1, column], effector.linear * w[2, column])
+        turn = cross(effector.arm, f)
         for i in range(3):
             out[s + i] += f[i]
             out[s + 3 + i] += turn[i]
-    if tip.task != POSITION:
-        first = 0 if tip.task == ROTATION else 3
+    if effector.task != POSITION:
+        first = 0 if effector.task == ROTATION else 3
         for i in range(3):
-            out[s + 3 + i] += tip.angular * w[first + i, column]
+            out[s + 3 + i] += effector.angular * w[first + i, column]
 
 
 @kernel(inner=True)
-def add_tip_bend(tip, w, column, v, gradient):
+def add_end_effector_bend(effector, w, column, v, gradient):
     """gradient += w . (dT v), less half of what turns do not commute by."""
-    s, p = tip.place, tip.arm
+    s, p = effector.place, effector.arm
     if s < 0:
         return
     f = (0.0, 0.0, 0.0)
     moment = (0.0, 0.0, 0.0)
-    if tip.task != ROTATION:
-        f = scale(tip.linear, (w[0, column], w[1, column], w[2, column]))
-    if tip.task != POSITION:
-        first = 0 if tip.task == ROTATION else 3
-        moment = scale(tip.angular, (w[first, column], w[first + 1, column], w[first + 2, column]))
+    if effector.task != ROTATION:
+        f = scale(effector.linear, (w[0, column], w[1, column], w[2, column]))
+    if effector.task != POSITION:
+        first = 0 if effector.task == ROTATION else 3
+        moment = scale(effector.angular, (w[first, column], w[first + 1, column], w[first + 2, column]))
     spin = (v[s + 3], v[s + 4], v[s + 5])
     bent = cross(p, cross(f, spin))
     turn = cross(add(moment, cross(p, f)), spin)
@@ -196,10 +196,10 @@ def largest_value(values):
 
 
 @kernel(inner=True, allocates=True)
-def tip_map(store, term, bases, rows, n, point, order):
-    """The tip's Jacobian in the user's units, at a point whose rows are evaluated.
+def end_effector_map(store, term, bases, rows, n, point, order):
+    """The end effector's Jacobian in the user's units, at a point whose rows are evaluated.
 
-    What the tip needs, and so whether its motion is open, is found from order 1 on.
+    What the end effector needs, and so whether its motion is open, is found from order 1 on.
     """
     term_record = term_at(store.table, term)
     residual = point.residual
@@ -211,7 +211,7 @@ def tip_map(store, term, bases, rows, n, point, order):
     b = np.zeros((k, n))
     for i in range(k):
         input_row(store.table, record + INPUT_LIST + INPUT * i, point.records, point.tracked, b, i)
-    tip = np.zeros((m, k))
+    jacobian = np.zeros((m, k))
     v = np.zeros((k, n))
     z = np.zeros((k, k))
     p = np.zeros((m, n))
@@ -220,8 +220,8 @@ def tip_map(store, term, bases, rows, n, point, order):
     exists, system = rate_system(bases, point.jacobian, used, b)
     outcome = DETERMINED if exists else DEPENDENT
     if exists:
-        # Where rows do not hold, redundant ones contradict each other and idle motions move the tip a little: singular
-        # values are off by up to the root of the residuals.
+        # Where rows do not hold, redundant ones contradict each other and idle motions move the end effector a
+        # little: singular values are off by up to the root of the residuals.
         leeway = UNDETERMINED
         for l in range(used.size):
             leeway = max(leeway, 10.0 * math.sqrt(abs(residual[used[l]])))
@@ -232,15 +232,15 @@ def tip_map(store, term, bases, rows, n, point, order):
             h[i] = 1.0
             missed = max(missed, settle(system, g, h, v[i], z[i]))
             h[i] = 0.0
-            tip_velocity(effector, v[i], tip, i)
+            end_effector_velocity(effector, v[i], jacobian, i)
             for r in range(m):
-                tip[r, i] *= store.pool[factors + i]
+                jacobian[r, i] *= store.pool[factors + i]
         unit = np.zeros((m, 1))
         for r in range(m if order > 0 else 0):
             for i in range(n):
                 g[i] = 0.0
             unit[r, 0] = 1.0
-            add_tip_force(effector, unit, 0, g)
+            add_end_effector_force(effector, unit, 0, g)
             unit[r, 0] = 0.0
             left = settle(system, g, h, p[r], y[r])
             if not left <= leeway * largest_value(g):
@@ -249,7 +249,7 @@ def tip_map(store, term, bases, rows, n, point, order):
         if not max(missed, largest_value(changes)) <= leeway:
             outcome = DEPENDENT
     loads = row_rates(bases, point.jacobian, used, p)
-    return TipMap(outcome, tip, used, InputRates(v, z, changes), Adjoint(p, y, loads))
+    return EndEffectorMap(outcome, jacobian, used, InputRates(v, z, changes), Adjoint(p, y, loads))
 
 
 @kernel(inner=True, allocates=True)
@@ -287,11 +287,11 @@ def dexterity(program, term, count, point, order, gradient):
     term_record = term_at(store.table, term)
     record, o = term_record.tape, term_record.parameters
     factors, weight = o + FACTORS, dexterity_weights_at(store.pool, o).weight
-    tip = tip_map(store, term, program.structure.bases, count, n, point, order)
-    jacobian, used = tip.jacobian, tip.used
-    v, z, changes = tip.inputs
-    p, y, loads = tip.adjoint
-    if tip.outcome != DETERMINED:
+    found = end_effector_map(store, term, program.structure.bases, count, n, point, order)
+    jacobian, used = found.jacobian, found.used
+    v, z, changes = found.inputs
+    p, y, loads = found.adjoint
+    if found.outcome != DETERMINED:
         return math.inf
     slopes = np.empty(jacobian.shape)
     value = measure_jacobian(dexterity_at(store.table, record).measure, store.pool, o + DIRECTION, jacobian, slopes)
@@ -327,7 +327,7 @@ def dexterity(program, term, count, point, order, gradient):
             for l in range(used.size):
                 forces[used[l]] = changes[i, l]
             bend(program, record, point, forces, z[i], pull, hessian, gradient)
-        add_tip_bend(effector, slopes, i, v[i], gradient)
+        add_end_effector_bend(effector, slopes, i, v[i], gradient)
     return weight * value
 
 

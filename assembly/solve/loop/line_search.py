@@ -71,9 +71,9 @@ def damped_step(program, system, trust):
 
 
 @kernel(inline=True)
-def dexterities_at(tips, program, count, point, order, gradient, hessian):
-    """Their terms of the objective. Where `tips` is None there are none: what they need is not even compiled."""
-    return 0.0 if tips is None else add_dexterities(program, count, point, order, gradient, hessian)
+def dexterities_at(end_effectors, program, count, point, order, gradient, hessian):
+    """Their terms of the objective. Where `end_effectors` is None there are none: what they need is not compiled."""
+    return 0.0 if end_effectors is None else add_dexterities(program, count, point, order, gradient, hessian)
 
 
 @kernel(inner=True)
@@ -81,7 +81,7 @@ def goal(program, count, point, order, gradient, hessian):
     """The objective where `count` rows are evaluated; from order 1 on its gradient and the Hessian's upper half."""
     shape = program.structure
     value = objective(program.store, point.q, order, program.tapes, shape.sparsity, gradient, hessian)
-    return value + dexterities_at(program.tips, program, count, point, order, gradient, hessian)
+    return value + dexterities_at(program.end_effectors, program, count, point, order, gradient, hessian)
 
 
 @kernel(inline=True)

@@ -184,7 +184,7 @@ def carve_unknowns(n, order, doubles, at):
 
 
 @kernel(inline=True, allocates=True)
-def carve_all(store, memory, tips, doubles, integers):
+def carve_all(store, memory, end_effectors, doubles, integers):
     """All that a solve works in, as `workspace_needed` counts it; rows and unknowns are those without lifted pairs."""
     table = store.table
     header = header_at(table, 0)
@@ -197,7 +197,7 @@ def carve_all(store, memory, tips, doubles, integers):
     tapes, at = carve_tapes(table, doubles, at)
     way, loop = carve(doubles, at, (WAY,)), carve(doubles, at + WAY, (LOOP,))
     system = carve_unknowns(n, shape.sparsity, doubles, at + WAY + LOOP)
-    return Workspace(Program(store, shape, lifted, tapes, tips), iterates, rows, way, loop, system)
+    return Workspace(Program(store, shape, lifted, tapes, end_effectors), iterates, rows, way, loop, system)
 
 
 @kernel(inline=True, allocates=True)

@@ -99,7 +99,7 @@ def judge_look(look: Look, sample: bool) -> Verdict:
         return Verdict(SecondOrder.MINIMUM)
     form = _symmetric(basis.T @ look.hessian @ basis)
     values, vectors = np.linalg.eigh(form)
-    flat = (DIFFERENCED if look.packed.tips else FLAT) * max(1.0, float(np.abs(look.hessian).max()))
+    flat = (DIFFERENCED if look.packed.end_effectors else FLAT) * max(1.0, float(np.abs(look.hessian).max()))
     # Rows without a force that no such motion changes to first order say by their curvature which ones exist.
     closed = look.touching & ~pushing
     closed[closed] = np.linalg.norm(look.jacobian[closed] @ basis, axis=1) <= DEPENDENT

@@ -38,7 +38,7 @@ MU, SOFTNESS, GAIN = 1e-6, 1e-2, 0.1
 
 
 @kernel(inner=True, allocates=True)
-def write_curvature(store, state, forces, out, tips, integers, doubles):
+def write_curvature(store, state, forces, out, end_effectors, integers, doubles):
     """The same as `curvature_at`, with what it works in."""
     header = header_at(store.table, 0)
     pairs = header.contacts
@@ -58,7 +58,7 @@ def write_curvature(store, state, forces, out, tips, integers, doubles):
     slopes = np.zeros(n)
     for i in range(out.size):
         out[i] = 0.0
-    program = arranged(found, shape, tips)
+    program = arranged(found, shape, end_effectors)
     out[0] = goal(program, rows, point, 1, slopes, hessian)
     add_row_terms(program, point, forces, np.zeros(rows), hessian)
     for r in range(rows):
@@ -78,18 +78,18 @@ def write_curvature(store, state, forces, out, tips, integers, doubles):
     ),
     allocates=True,
 )
-def curvature_at(table, pool, state, forces, out, tips):
+def curvature_at(table, pool, state, forces, out, end_effectors):
     """Evaluate a state; tracked values found are written into it. Returns how many folds there are, or -1: no pair.
 
     With m rows and n unknowns, these included: out gets the objective's value, residuals (m), the objective's gradient
-    (n), the rows' Jacobian (m, n), and the Hessian of objective + forces . rows (n, n). `tips` is None where no term
-    of the objective is a dexterity.
+    (n), the rows' Jacobian (m, n), and the Hessian of objective + forces . rows (n, n). `end_effectors` is None where
+    no term of the objective is a dexterity.
     """
     header = header_at(table, 0)
     pairs = header.contacts
     integers, doubles = size_of_shape(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs)
     return write_curvature(
-        Store(table, pool), state, forces, out, tips, np.empty(integers, np.int64), np.empty(doubles)
+        Store(table, pool), state, forces, out, end_effectors, np.empty(integers, np.int64), np.empty(doubles)
     )
 
 
@@ -103,7 +103,7 @@ def is_at_most(values, limit):
 
 
 @kernel(inner=True, allocates=True)
-def walk_within(store, state, step, share, kept, residual, tips, memory):
+def walk_within(store, state, step, share, kept, residual, end_effectors, memory):
     """The same as `walk`, with what it works in."""
     header = header_at(store.table, 0)
     pairs = header.contacts
@@ -117,7 +117,7 @@ def walk_within(store, state, step, share, kept, residual, tips, memory):
     blocks = record_of_blocks(store.table)
     shape = shape_of(store.table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs, blocks, integers, doubles)
     arrange(store.table, free, shape, count, n)
-    program = arranged(found, shape, tips)
+    program = arranged(found, shape, end_effectors)
     lifted = program.lifted
     for r in range(header.rows):
         if kept[r] > 0.0:
@@ -158,7 +158,7 @@ def walk_within(store, state, step, share, kept, residual, tips, memory):
     ),
     allocates=True,
 )
-def walk(table, pool, state, step, share, kept, residual, tips):
+def walk(table, pool, state, step, share, kept, residual, end_effectors):
     """Move a state by a share of a step, and by least steps back onto the rows. Returns the objective's value there.
 
     One-sided rows that are `kept` (not zero) stay at their bound. Infinite, with the state as it was, where no pose
@@ -169,11 +169,11 @@ def walk(table, pool, state, step, share, kept, residual, tips):
     integers, doubles = size_of_shape(table, header.rows + 4 * pairs, 6 * header.moving + 4 * pairs)
     # The blocks outlive what is carved from them: they are an argument of the kernel that carves.
     memory = (np.empty(integers, np.int64), np.empty(doubles))
-    return walk_within(Store(table, pool), state, step, share, kept, residual, tips, memory)
+    return walk_within(Store(table, pool), state, step, share, kept, residual, end_effectors, memory)
 
 
 @kernel(inner=True, allocates=True)
-def least_within(store, state, forces, active, direction, tips, integers, doubles):
+def least_within(store, state, forces, active, direction, end_effectors, integers, doubles):
     """The same as `least_curvature`, with what it works in."""
     header = header_at(store.table, 0)
     found = point_at(store, state, np.empty(header.contacts, np.int64))
@@ -183,7 +183,7 @@ def least_within(store, state, forces, active, direction, tips, integers, double
         return math.nan
     shape = shape_of(store.table, rows, n, record_of_blocks(store.table), integers, doubles)
     arrange(store.table, found.program.lifted.free, shape, rows, n)
-    program = arranged(found, shape, tips)
+    program = arranged(found, shape, end_effectors)
     system = unknowns(n, 0, shape.sparsity)
     gradient, lines, lagrangian, matrix = system.gradient, system.directions, system.hessian, system.factor
     goal(program, rows, point, 1, gradient, lagrangian)
@@ -222,7 +222,7 @@ def least_within(store, state, forces, active, direction, tips, integers, double
     ),
     allocates=True,
 )
-def least_curvature(table, pool, state, forces, active, direction, tips):
+def least_curvature(table, pool, state, forces, active, direction, end_effectors):
     """The least curvature of objective + forces . rows along motions that keep the rows; its direction is written.
 
     `active` has the weight of every row that is to be kept, zero for others. No number where a contact is at a fold.
@@ -230,5 +230,12 @@ def least_curvature(table, pool, state, forces, active, direction, tips):
     header = header_at(table, 0)
     integers, doubles = size_of_shape(table, header.rows, 6 * header.moving)
     return least_within(
-        Store(table, pool), state, forces, active, direction, tips, np.empty(integers, np.int64), np.empty(doubles)
+        Store(table, pool),
+        state,
+        forces,
+        active,
+        direction,
+        end_effectors,
+        np.empty(integers, np.int64),
+        np.empty(doubles),
     )

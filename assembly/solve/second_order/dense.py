@@ -99,7 +99,7 @@ class Look:
         table, n = packed.table_at(state), 6 * int(packed.table[layout.MOVING])
         state, residual = state.copy(), np.zeros(packed.rows + 4 * packed.pair_rows)
         kept = np.zeros(packed.rows)
-        value = float(walk(table, packed.pool, state, np.zeros(n), 0.0, kept, residual, packed.tips))
+        value = float(walk(table, packed.pool, state, np.zeros(n), 0.0, kept, residual, packed.end_effectors))
         if not np.isfinite(value):
             return None
         m = packed.rows
@@ -111,7 +111,7 @@ class Look:
         """The least curvature along motions that keep the rows which push, and its direction, by inverse iteration."""
         direction = np.zeros(len(self.gradient))
         active = np.where(self.pushing, STIFFNESS, 0.0)
-        arguments = (self.state, self.forces, active, direction, self.packed.tips)
+        arguments = (self.state, self.forces, active, direction, self.packed.end_effectors)
         return float(least_curvature(self.table, self.packed.pool, *arguments)), direction
 
     @classmethod
@@ -121,7 +121,7 @@ class Look:
         out = np.empty(1 + most + columns + most * columns + columns * columns)
         forces, state = np.zeros(most), state.copy()
         forces[: len(given)] = given
-        folds = int(curvature_at(table, packed.pool, state, forces, out, packed.tips))
+        folds = int(curvature_at(table, packed.pool, state, forces, out, packed.end_effectors))
         if folds < 0:
             return None
         m, n = packed.rows + 4 * folds, 6 * int(table[layout.MOVING]) + 4 * folds
@@ -179,7 +179,7 @@ class Look:
         state, residual = self.state.copy(), np.zeros(len(self.residual))
         kept = np.where(self.one_sided & self.pushing, 1.0, 0.0)
         way = np.ascontiguousarray(way)
-        value = walk(self.table, self.packed.pool, state, way, share, kept, residual, self.packed.tips)
+        value = walk(self.table, self.packed.pool, state, way, share, kept, residual, self.packed.end_effectors)
         if not np.isfinite(value):
             return None
         # What rows are off, within rounding, changes the objective by their forces.

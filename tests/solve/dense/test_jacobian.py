@@ -112,7 +112,7 @@ def test_gradient_is_the_derivative_of_the_objective(seed):
     q = retract(scene.q, rng.normal(size=(7, 6)))
     state[: packed.contacts_at] = q.ravel()
     gradient, scratch, free = np.empty(42), np.empty(42), np.empty(2, dtype=np.int64)
-    gradient_at(packed.table, packed.pool, state, free, gradient, packed.tips)
+    gradient_at(packed.table, packed.pool, state, free, gradient, packed.end_effectors)
     differences = np.zeros(42)
     for column in range(42):
         for sign in (1.0, -1.0):
@@ -120,7 +120,7 @@ def test_gradient_is_the_derivative_of_the_objective(seed):
             step.ravel()[column] = sign * STEP
             step[:, :3] *= packed.scale
             state[: packed.contacts_at] = retract(q, step).ravel()
-            value = gradient_at(packed.table, packed.pool, state, free, scratch, packed.tips)
+            value = gradient_at(packed.table, packed.pool, state, free, scratch, packed.end_effectors)
             differences[column] += sign * value / (2.0 * STEP)
     fixed = np.repeat([body.fixed for body in scene.bodies], 6)
     np.testing.assert_allclose(gradient, np.where(fixed, 0.0, differences), rtol=0, atol=1e-8)

@@ -1,4 +1,4 @@
-"""What scripts see of a tip: shapes and units, how a pose is given, agreement with statics, words of errors."""
+"""What scripts see of an end effector: shapes and units, how a pose is given, agreement with statics, errors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import assembly as asm
 from assembly.errors import InputError
 from assembly.kinematics.pose import retract, rotation_matrix
 from assembly.solve.dense.jacobian import moving_columns, rows_of
-from assembly.solve.diagnosis.undetermined import _gradient, _scaled, _tip_rows
+from assembly.solve.diagnosis.undetermined import _end_effector_rows, _gradient, _scaled
 from tests.laws.tip_scenes import MECHANISMS, arm, cam, five_bar, four_bar, spatial_four_bar
 
 statics = asm.statics
@@ -102,7 +102,7 @@ def test_the_same_by_dense_linear_algebra(name):
     system = np.vstack([rows.jacobian, inputs])[:, moving]
     right = np.vstack([np.zeros((len(rows.jacobian), len(inputs))), np.eye(len(inputs))])
     rates = np.linalg.lstsq(system, right, rcond=1e-9)[0]
-    velocities = _tip_rows(packed, task, poses)[:, moving] @ rates
+    velocities = _end_effector_rows(packed, task, poses)[:, moving] @ rates
     found = asm.tip_jacobian(scene, mechanism.tip, mechanism.inputs, solution, task=mechanism.tasks[-1])
     # Compared in the scene's lengths, as rows are. A small arm is a thousandth of the user's: what rounding makes of
     # how its slide turns the tip, 1e-15 instead of 0, would be 1e-12.

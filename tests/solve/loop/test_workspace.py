@@ -60,7 +60,7 @@ def test_nothing_stands_in_one_place(scene):
     table = packed.table
     sizes = workspace_needed(table)
     doubles, integers = np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
-    space = carve_all(Store(table, packed.pool), np.empty(0), packed.tips, doubles, integers)
+    space = carve_all(Store(table, packed.pool), np.empty(0), packed.end_effectors, doubles, integers)
     lifted, shape, system = space.program.lifted, space.program.structure, space.system
     current, trial, held = space.iterates
     doubles[:], integers[:] = 0.0, 0
