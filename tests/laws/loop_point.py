@@ -116,15 +116,15 @@ class LoopPoint:
 
 
 def moved(scene, q, step):
-    """Poses retracted by a step (n,) of the loop's unknowns: lengths over the scene's size, bodies by their slots."""
+    """Poses retracted by a step (n,) of the loop's unknowns: lengths over the scene's size, bodies by their blocks."""
     from assembly.kinematics.pose import retract
 
     packed = scene.packed()
-    slots = packed.table[packed.table[layout.SLOTS] :][: len(q)]
+    blocks = packed.table[packed.table[layout.UNKNOWN_BLOCKS] :][: len(q)]
     out = np.array(q, dtype=float)
-    for k, slot in enumerate(slots):
-        if slot >= 0:
-            twist = np.array(step[6 * slot : 6 * slot + 6])
+    for k, block in enumerate(blocks):
+        if block >= 0:
+            twist = np.array(step[6 * block : 6 * block + 6])
             twist[:3] *= packed.scale
             out[k] = retract(out[k], twist)
     return out

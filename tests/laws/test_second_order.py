@@ -44,9 +44,9 @@ def moved(look, step):
     """A look where a step in the unknowns leads, with the same multipliers."""
     packed, state = look.packed, look.state.copy()
     q = state[: packed.contacts_at].reshape(-1, 7)
-    slots = look.table[look.table[layout.SLOTS] :][: packed.count]
-    bodies = np.flatnonzero(slots >= 0)
-    q[bodies] = retract(q[bodies], step.reshape(-1, 6)[slots[bodies]] * np.repeat([packed.scale, 1.0], 3))
+    blocks = look.table[look.table[layout.UNKNOWN_BLOCKS] :][: packed.count]
+    bodies = np.flatnonzero(blocks >= 0)
+    q[bodies] = retract(q[bodies], step.reshape(-1, 6)[blocks[bodies]] * np.repeat([packed.scale, 1.0], 3))
     return Look._with(packed, look.table, state, look.forces)
 
 

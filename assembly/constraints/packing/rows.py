@@ -121,11 +121,11 @@ class RowPacking:
         ]
         return self._writer.add(np.concatenate(edges))[0]
 
-    def add_joints(self, slots: Table) -> None:
-        """Rows of joints and couplings, whose bodies have these places among the unknowns."""
+    def add_joints(self, unknown_blocks: Table) -> None:
+        """Rows of joints and couplings, whose bodies have these blocks of unknowns."""
         # In the order of their bodies: then the envelope of J J^T is narrow, too.
         joints = [item for item in self._constraints if isinstance(item, (Joint, Coupling))]
-        joints.sort(key=lambda item: max(slots[self._writer.places_of(item.bodies)]))
+        joints.sort(key=lambda item: max(unknown_blocks[self._writer.places_of(item.bodies)]))
         for joint in joints:
             for equation in joint.equations:
                 self._add_equation(joint, equation)

@@ -157,12 +157,12 @@ class Packed:
         header = writer.header
         writer.add(header, self._pool_header())
         groups = [writer.places_of(item.bodies) for item in constraints]
-        slots = number_bodies([body.fixed for body in bodies], groups)
-        header[layout.SLOTS], _ = writer.add(slots)
-        header[layout.BODIES], header[layout.MOVING] = self.count, slots.max() + 1
+        unknown_blocks = number_bodies([body.fixed for body in bodies], groups)
+        header[layout.UNKNOWN_BLOCKS], _ = writer.add(unknown_blocks)
+        header[layout.BODIES], header[layout.MOVING] = self.count, unknown_blocks.max() + 1
         header[layout.CONTACTS] = self.pair_rows
         header[layout.IMPLICIT] = not objectives
-        self._write_rows(writer, bodies, constraints, slots)
+        self._write_rows(writer, bodies, constraints, unknown_blocks)
         terms = TermPacking(writer, bodies, self.reference, self.unit)
         for sign, term in goals:
             terms.add(sign, term)
@@ -171,7 +171,7 @@ class Packed:
         # Rows of clearances are of any bodies, those of trims and dexterities are not by blocks.
         if header[layout.MOVING] > FEW and not (self.clearance_rows or self.trims or header[layout.DEXTERITIES]):
             groups += [writer.places_of(term.bodies) for _, term in goals if isinstance(term, Expression)]
-            record = block_record(int(header[layout.MOVING]), [slots[group].tolist() for group in groups])
+            record = block_record(int(header[layout.MOVING]), [unknown_blocks[group].tolist() for group in groups])
             header[layout.BLOCK_RECORD], header[layout.BLOCK_LENGTH] = writer.add(record)[0], record.size
         self.table, self.pool = writer.arrays()
         # What the loop is compiled for: None without a dexterity.
@@ -196,7 +196,7 @@ class Packed:
         return pool
 
     def _write_rows(
-        self, writer: SceneWriter, bodies: Sequence[Body], constraints: Sequence[Constraint], slots: Table
+        self, writer: SceneWriter, bodies: Sequence[Body], constraints: Sequence[Constraint], unknown_blocks: Table
     ) -> None:
         """Write rows, and keep what tells of them."""
         rows = RowPacking(writer, constraints)
@@ -209,7 +209,7 @@ class Packed:
                 writer, self.clearances, self.clearance_pairs, self.places, given
             )
         rows.add_trims(self.contacts)
-        rows.add_joints(slots)
+        rows.add_joints(unknown_blocks)
         rows.add_expressions()
         table = rows.write(bodies)
         self._values = rows.values

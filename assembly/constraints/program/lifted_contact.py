@@ -66,8 +66,8 @@ def free_terms(scene, r, lifted, point, y, weights, hessian):
     q, tracked, _records, _residual, jacobian = point
     header = header_at(table, 0)
     contact = contact_of(table, r)
-    f = 6 * table[header.slots + contact.body_f]
-    g = 6 * table[header.slots + contact.body_g]
+    f = 6 * table[header.unknown_blocks + contact.body_f]
+    g = 6 * table[header.unknown_blocks + contact.body_g]
     e = header.rows + 4 * free[r]
     u = 6 * header.moving + 4 * free[r]
     pair = lifted_pair(table, tracked, lengths, r)

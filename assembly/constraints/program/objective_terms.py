@@ -130,7 +130,7 @@ def tape_term(store, term, q, order, workspace, entries, gradient, hessian):
     if order == 0 or not math.isfinite(value):
         return value if math.isfinite(value) else math.inf
     for b in range(count):
-        s = 6 * store.table[header.slots + store.table[bodies + b]]
+        s = 6 * store.table[header.unknown_blocks + store.table[bodies + b]]
         if s >= 0:
             for i in range(3):
                 gradient[s + i] += weight * size * outputs[1 + 6 * b + i]
@@ -138,9 +138,9 @@ def tape_term(store, term, q, order, workspace, entries, gradient, hessian):
     inputs[end] = weight
     call_address(header.run_tape_address, (store.table, store.pool, expression.second_order, inputs, work, outputs))
     for b in range(count):
-        at = 6 * store.table[header.slots + store.table[bodies + b]]
+        at = 6 * store.table[header.unknown_blocks + store.table[bodies + b]]
         for c in range(count):
-            other = 6 * store.table[header.slots + store.table[bodies + c]]
+            other = 6 * store.table[header.unknown_blocks + store.table[bodies + c]]
             if at < 0 or other < at:
                 continue
             row, column = spot(entries, at, other)
@@ -190,7 +190,7 @@ def objective(store, q, order, workspace, entries, gradient, hessian):
         at = header.term_table + TERM * t
         term = term_at(store.table, at)
         if term.kind == POINT_DISTANCE or term.kind == POSTURE:
-            s = 6 * store.table[header.slots + term.body]
+            s = 6 * store.table[header.unknown_blocks + term.body]
             if blocked and s >= 0:
                 block = block_row(entries.blocks, s, s)
                 slopes, curvature = gradient[s : s + 6], hessian[block : block + 6]

@@ -1,8 +1,8 @@
 """Where everything stands in a packed scene: the one table of integers and the one pool of doubles.
 
-All lengths in a program are divided by the scene's length scale. Table: a header, the slot of every body (-1: fixed),
-then a record a row (contacts first, then trims), a joint, a tape and an objective term. The loop works on iterates
-(`Iterate`), of
+All lengths in a program are divided by the scene's length scale. Table: a header, the block of unknowns of every body
+(-1: fixed), then a record a row (contacts first, then trims), a joint, a tape and an objective term. The loop works on
+iterates (`Iterate`), of
 
     q              (n, 7)       poses, scaled, positions relative to a reference
     tracked        (k, TRACK)   a `TRACKED_PAIR` of every contact (`proximity/features/solid_contact.py`), then angles
@@ -32,7 +32,7 @@ HEADER_RECORD = record_dtype(
     tapes=1,  # users' expressions that are constraints
     terms=1,  # terms of the objective
     extra=1,  # twists beyond two that a row of the Jacobian has place for
-    slots=1,  # where the list of the bodies' slots begins: the number among moving ones; negative: fixed
+    unknown_blocks=1,  # where a list begins: of every body the number of its block of six unknowns; negative: fixed
     row_table=1,
     joint_table=1,
     tape_table=1,
@@ -77,7 +77,7 @@ ROWS = place_of(HEADER_RECORD, "rows")
 TAPES = place_of(HEADER_RECORD, "tapes")
 TERMS = place_of(HEADER_RECORD, "terms")
 EXTRA = place_of(HEADER_RECORD, "extra")
-SLOTS = place_of(HEADER_RECORD, "slots")
+UNKNOWN_BLOCKS = place_of(HEADER_RECORD, "unknown_blocks")
 ROW_TABLE = place_of(HEADER_RECORD, "row_table")
 JOINT_TABLE = place_of(HEADER_RECORD, "joint_table")
 TAPE_TABLE = place_of(HEADER_RECORD, "tape_table")

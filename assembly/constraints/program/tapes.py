@@ -80,9 +80,9 @@ def add_tape_hessian(store, tape, q, workspace, order, y, hessian):
         inputs[end + v] = y[expression.first_row + v] * each
     call_address(header.run_tape_address, (store.table, store.pool, expression.second_order, inputs, work, outputs))
     for b in range(count):
-        at = 6 * store.table[header.slots + store.table[expression.body_list + b]]
+        at = 6 * store.table[header.unknown_blocks + store.table[expression.body_list + b]]
         for c in range(count):
-            other = 6 * store.table[header.slots + store.table[expression.body_list + c]]
+            other = 6 * store.table[header.unknown_blocks + store.table[expression.body_list + c]]
             if at < 0 or other < at:
                 continue
             row, column = spot(order, at, other)

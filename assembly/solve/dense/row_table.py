@@ -213,7 +213,7 @@ def slopes_at(store, free, found, end_effectors, gradient, integers, doubles):
     else:
         value = objective(store, point.q, 1, program.tapes, shape.sparsity, slopes, curves)
     for b in range(header.bodies):
-        s = store.table[header.slots + b]
+        s = store.table[header.unknown_blocks + b]
         for k in range(6):
             gradient[6 * b + k] = slopes[6 * s + k] if s >= 0 else 0.0
     return value

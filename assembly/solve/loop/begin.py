@@ -125,7 +125,7 @@ def put_together(program, current, rows):
     header = header_at(store.table, 0)
     free, lengths, memory = lifted.free, lifted.lengths, lifted.memory
     watched = header.manager_record >= 0
-    assemble(store, program.structure.bases, header.slots, current)
+    assemble(store, program.structure.bases, header.unknown_blocks, current)
     for k in range(header.contacts):
         current.tracked[k, 0] = math.nan
     if watched:

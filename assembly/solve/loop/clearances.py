@@ -63,12 +63,12 @@ def place_clearance_rows(table, lifted, current, rows, begins):
     memory, free = lifted.memory, lifted.free
     places = memory_places(table, record)[1]
     for k in range(header.clearance_rows):
-        slot = place_at(memory, places + PLACE_MEMORY * k)
+        place = place_at(memory, places + PLACE_MEMORY * k)
         r = header.first_clearance_row + k
         contact_record = contact_record_at(current.records, r)
         contact = contact_of(table, r)
-        p = np.int64(slot.pair)
-        number = np.int64(slot.number) if p >= 0 else 0
+        p = np.int64(place.pair)
+        number = np.int64(place.number) if p >= 0 else 0
         if number == contact.clearance_number:
             continue
         contact.clearance_number = number
@@ -87,7 +87,7 @@ def place_clearance_rows(table, lifted, current, rows, begins):
         pair_record = pair_at(table, manager_at(table, record).pair_table + PAIR_RECORD * p)
         contact.body_f = pair_record.body_f
         contact.body_g = pair_record.body_g
-        in_place = slot.given == 1.0
+        in_place = place.given == 1.0
         contact.minimum = pair_record.minimum + (IN_PLACE if in_place else 0)
         contact.surface_f = pair_record.surface_f
         contact.surface_g = pair_record.surface_g

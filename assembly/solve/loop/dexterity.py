@@ -35,7 +35,7 @@ from assembly.solve.linear_algebra.singular_values import measure_jacobian
 from assembly.solve.loop.parameters import DIFFERENCE, KEPT, UNDETERMINED
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.rates import rate_system, settle
-from assembly.solve.loop.residuals import move, slot, times
+from assembly.solve.loop.residuals import first_unknown, move, times
 
 # A term in the table; behind it a `BODY_COORDINATE` an input.
 DEXTERITY_TERM = record_dtype(
@@ -80,7 +80,7 @@ def input_row(table, at, records, tracked, b, r):
     found = coordinate(asked.kind, asked.component, records, header_at(table, 0).contacts + asked.joint, near)
     n, h = found.n, found.h
     for side in range(2):
-        s = slot(table, asked.body_f if side == 0 else asked.body_g)
+        s = first_unknown(table, asked.body_f if side == 0 else asked.body_g)
         if s < 0:
             continue
         sign = -1.0 if side == 0 else 1.0
@@ -101,7 +101,7 @@ def end_effector(store, term, q):
     weights = dexterity_weights_at(store.pool, term.parameters)
     arm = matvec(rotation(q, term.body), three_at(store.pool, term.parameters + ARM))
     task = dexterity_at(store.table, term.tape).task
-    return EndEffector(task, arm, slot(store.table, term.body), weights.linear, weights.angular)
+    return EndEffector(task, arm, first_unknown(store.table, term.body), weights.linear, weights.angular)
 
 
 @kernel(inner=True)
@@ -270,8 +270,8 @@ def bend(program, record, point, forces, inputs, rates, hessian, gradient):
             header_at(table, 0).contacts + asked.joint,
             inputs[j],
             hessian,
-            slot(table, asked.body_f),
-            slot(table, asked.body_g),
+            first_unknown(table, asked.body_f),
+            first_unknown(table, asked.body_g),
         )
     for r in range(n):
         for c in range(r, n):

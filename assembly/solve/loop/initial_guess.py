@@ -35,10 +35,10 @@ from assembly.solve.loop.parameters import DAMPING, FIT_STEPS, FITTED, LOWER, MO
 
 # What the fit of one body works in: J^T J, the same with damping, how far its rows reach, a row, J^T c, the step; its
 # poses at the start, at best, and before a step.
-FitRoom = namedtuple("FitRoom", "matrix damped last row slope step poses")
+FitWorkspace = namedtuple("FitWorkspace", "matrix damped last row slope step poses")
 START, BEST, BEFORE = 0, 1, 2
-# A body to be placed: its number, where its twist stands, where its `count` rows are listed in the table.
-Placed = namedtuple("Placed", "body slot first count")
+# A body to be placed: its number, where its twist begins, where its `count` rows are listed in the table.
+Placed = namedtuple("Placed", "body first_unknown first count")
 
 
 @kernel(inner=True)
@@ -138,7 +138,7 @@ def normal_equations(table, bases, placed, joint, point, workspace):
         at = header_at(table, 0).row_table + ROW * r
         if not is_of(table, at, joint) or (row_at(table, at).one_sided == 1 and residual[r] >= 0.0):
             continue
-        body_row(bases, jacobian, r, placed.slot, row)
+        body_row(bases, jacobian, r, placed.first_unknown, row)
         for i in range(6):
             slope[i] += row[i] * residual[r]
             for j in range(i, 6):
@@ -191,16 +191,16 @@ def copy_pose(poses, k, out, l):
 
 
 @kernel(inner=True, allocates=True)
-def assemble(store, bases, slots, point):
+def assemble(store, bases, unknown_blocks, point):
     """Move the bodies of the point one by one."""
     header = header_at(store.table, 0)
     q, tracked, residual = point.q, point.tracked, point.residual
     matrices, vectors, poses = np.empty((2, 6, 6)), np.empty((3, 6)), np.empty((3, 7))
-    workspace = FitRoom(matrices[0], matrices[1], np.full(6, 5), vectors[0], vectors[1], vectors[2], poses)
+    workspace = FitWorkspace(matrices[0], matrices[1], np.full(6, 5), vectors[0], vectors[1], vectors[2], poses)
     o = header.gather_table + 1
     for _entry in range(store.table[header.gather_table]):
         body = store.table[o]
-        placed = Placed(body, 6 * store.table[slots + body], o + 2, store.table[o + 1])
+        placed = Placed(body, 6 * store.table[unknown_blocks + body], o + 2, store.table[o + 1])
         o = placed.first + placed.count
         copy_pose(q, body, poses, START)
         cost = fit_body(store, bases, placed, -1, point, workspace)

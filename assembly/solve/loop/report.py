@@ -41,7 +41,7 @@ def write_pose(store, q, state):
     units = pool_header_at(store.pool, 0)
     header = header_at(store.table, 0)
     for b in range(header.bodies):
-        if store.table[header.slots + b] >= 0:
+        if store.table[header.unknown_blocks + b] >= 0:
             for k in range(3):
                 if q[b, k] != (state[7 * b + k] - units.reference[k]) / units.scale:
                     state[7 * b + k] = q[b, k] * units.scale + units.reference[k]

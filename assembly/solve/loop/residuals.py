@@ -35,9 +35,9 @@ Structure = namedtuple("Structure", "bases one_sided sparsity row_order")
 
 
 @kernel(inline=True)
-def slot(table, body):
-    """Where a body's twist stands among the unknowns; negative for a fixed one, and for none."""
-    return 6 * table[header_at(table, 0).slots + body] if body >= 0 else -1
+def first_unknown(table, body):
+    """Where a body's twist begins among the unknowns; negative for a fixed one, and for none."""
+    return 6 * table[header_at(table, 0).unknown_blocks + body] if body >= 0 else -1
 
 
 @kernel(inner=True)
@@ -50,12 +50,12 @@ def place_rows(table, free, bases, one_sided):
         one_sided[r] = fields.one_sided
         for b in range(bases.shape[1]):
             bases[r, b] = -1
-        bases[r, 0] = slot(table, fields.body_f)
-        bases[r, 1] = slot(table, fields.body_g)
+        bases[r, 0] = first_unknown(table, fields.body_f)
+        bases[r, 1] = first_unknown(table, fields.body_g)
         second = joint_row_at(table, row).second
         if fields.kind == JOINT_ROW and second >= 0:
-            bases[r, 3] = slot(table, body_coordinate_at(table, second).body_f)
-            bases[r, 4] = slot(table, body_coordinate_at(table, second).body_g)
+            bases[r, 3] = first_unknown(table, body_coordinate_at(table, second).body_f)
+            bases[r, 4] = first_unknown(table, body_coordinate_at(table, second).body_g)
     for r in range(header.contacts):
         if free[r] >= 0:
             bases[r, 2] = 6 * header.moving + 4 * free[r]
@@ -71,7 +71,7 @@ def place_rows(table, free, bases, one_sided):
         tape = tape_at(table, header.tape_table + TAPE_RECORD * t)
         for v in range(tape.values):
             for b in range(2, tape.bodies):
-                bases[tape.first_row + v, b + 1] = slot(table, table[tape.body_list + b])
+                bases[tape.first_row + v, b + 1] = first_unknown(table, table[tape.body_list + b])
 
 
 @kernel(inline=True, allocates=True)
@@ -115,7 +115,7 @@ def place_unknowns(table, bases, rows, n, order):
             low = n
             high = -1
             for b in range(tape.bodies):
-                at = slot(table, table[tape.body_list + b])
+                at = first_unknown(table, table[tape.body_list + b])
                 if at >= 0:
                     low = min(low, at)
                     high = max(high, at + 5)
@@ -293,7 +293,7 @@ def move(table, q, d, alpha, out):
     """Every moving body retracted by alpha d."""
     header = header_at(table, 0)
     for b in range(header.bodies):
-        s = 6 * table[header.slots + b]
+        s = 6 * table[header.unknown_blocks + b]
         if s >= 0:
             retract(
                 q,

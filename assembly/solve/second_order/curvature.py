@@ -1,6 +1,6 @@
 """The second derivatives of a scene at a state, and poses beside it that hold: what ends are judged by.
 
-Unknowns are those of the loop: twists of the moving bodies in the order of the table's slots, lengths over the scene's
+Unknowns are those of the loop: twists of the moving bodies in the order of their blocks, lengths over the scene's
 size, then four coordinates of every contact whose pair is at a fold. Rows are those of the program, then four of
 tangency a fold. All else that is asked of second order is done with these, outside
 (`solve/second_order/classification.py`).
