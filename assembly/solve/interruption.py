@@ -22,7 +22,7 @@ from assembly._address import callback_address
 from assembly.errors import InputError, number
 from assembly.proximity.manager.parameters import SLICE
 from assembly.proximity.manager.records import ABORTED, ENDS, GOES_ON
-from assembly.solve.loop.settings import ASK_AT, COUNT, OBJECTIVE, OUT_OF_TIME, VIOLATION
+from assembly.solve.loop.settings import ASK_ADDRESS, COUNT, OBJECTIVE, OUT_OF_TIME, VIOLATION
 from assembly.solve.scene import Status
 
 __all__ = ["CTRL_C", "Interruption"]
@@ -80,7 +80,7 @@ class Interruption:
 
     def fill(self, settings: Array) -> Array:
         """The settings themselves, with the address to ask at."""
-        settings[ASK_AT] = self._address
+        settings[ASK_ADDRESS] = self._address
         return settings
 
     @property
@@ -167,7 +167,7 @@ class _CtrlC(Interruption):
         if threading.get_ident() == threading.main_thread().ident:
             return settings
         settings = settings.copy()
-        settings[ASK_AT] = 0.0
+        settings[ASK_ADDRESS] = 0.0
         return settings
 
 

@@ -10,7 +10,7 @@ from assembly.solve.linear_algebra.factorize import factorize_shifted
 from assembly.solve.loop.ends import hold_ends, solve_within
 from assembly.solve.loop.line_search import bend_step
 from assembly.solve.loop.residuals import Structure
-from assembly.solve.loop.workspace import new_rows, unknowns
+from assembly.solve.loop.workspace import new_rows, new_system
 from tests.laws.test_sparsity import random_system
 
 
@@ -18,7 +18,7 @@ def held_system(rng, bodies, pairs):
     """A system with some coordinates held, factorized; its order, the dense matrix, which unknowns are free."""
     order, dense = random_system(rng, bodies, pairs)
     n = len(dense)
-    system = unknowns(n, pairs, order)
+    system = new_system(n, pairs, order)
     ends = system.directions.ends
     ends[:] = rng.integers(0, 2, ends.size)
     ends[0] = 1.0

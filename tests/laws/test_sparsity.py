@@ -10,9 +10,9 @@ from assembly._record import Store
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.envelope import clear_upper, place_folds
 from assembly.solve.linear_algebra.factorize import factorize_shifted, forward_step, solve_step
-from assembly.solve.loop.multipliers import curve_rows, toward_rows
+from assembly.solve.loop.multipliers import curvature_multipliers, toward_rows
 from assembly.solve.loop.residuals import Structure, arrange
-from assembly.solve.loop.workspace import new_rows, unknowns
+from assembly.solve.loop.workspace import new_rows, new_system
 from tests.laws.loop_point import room_of_shape
 
 
@@ -125,7 +125,7 @@ def test_the_way_back_onto_rows_breaks_no_idle_ones():
     places = np.array([np.full(6, 5), np.arange(6), np.full(6, 5)])
     order = layout.Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
     shape = Structure(bases, np.ones(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
-    given, system = new_rows(rows, 1e-6), unknowns(6, 0, order)
+    given, system = new_rows(rows, 1e-6), new_system(6, 0, order)
     toward_rows(program_of(shape, rows), point_of([-1e-3, 0.0], jacobian), given, system, 1e-6, 0.0)
     out, active = system.directions.step, given.active
     # The square of the step, weighed with 1e-6 against a million times that of the rows, leaves 1e-12 of them.
@@ -155,7 +155,7 @@ def way_back(sides, residual, jacobian, softness=1.0, enough=0.0):
     shape = Structure(bases, np.array(sides), order, (np.arange(rows), np.full(rows, rows - 1)))
     whole = np.zeros((rows, layout.EXTRA_COLUMN))
     whole[:, :6] = jacobian
-    given, system = new_rows(rows, 1e-6), unknowns(6, 0, order)
+    given, system = new_rows(rows, 1e-6), new_system(6, 0, order)
     toward_rows(program_of(shape, rows), point_of(residual, whole), given, system, softness, enough)
     return system.directions.step, given.active > 0.0
 
@@ -204,7 +204,7 @@ def test_the_way_back_onto_rows_is_soft_only_where_it_must_be(angle):
     order = layout.Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.empty(0, np.int64))
     shape = Structure(bases, np.zeros(rows, np.int64), order, (np.arange(rows), np.full(rows, rows - 1)))
     residual, mu = np.array([1e-10, -1e-10]), 1e-6
-    given, system = new_rows(rows, mu), unknowns(6, 0, order)
+    given, system = new_rows(rows, mu), new_system(6, 0, order)
     back = (program_of(shape, rows), point_of(residual, jacobian), given, system, 1.0)
     softness = toward_rows(*back, 0.0)
     assert np.abs(residual + jacobian[:, :6] @ system.directions.step).max() <= 0.1 * 1e-10
@@ -217,8 +217,8 @@ def test_the_way_back_onto_rows_is_soft_only_where_it_must_be(angle):
 def test_restorations_keep_the_curvature_of_small_violations():
     residual, rows = np.array([3e-4, -2e-5]), new_rows(2, 1.0)
     rows.y[0], rows.active[0] = 1e-5, 1.0
-    curve_rows(rows, residual, True)
+    curvature_multipliers(rows, residual, True)
     assert rows.forces.tolist() == [3e-4, 0.0]
     # Multipliers that small are on their way to zero.
-    curve_rows(rows, residual, False)
+    curvature_multipliers(rows, residual, False)
     assert rows.forces.tolist() == [0.0, 0.0]

@@ -18,7 +18,7 @@ from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.parameters import SLICE
 from assembly.solve import interruption
 from assembly.solve.loop import pauses
-from assembly.solve.loop.settings import ASK_AT
+from assembly.solve.loop.settings import ASK_ADDRESS
 
 
 def long_arm(links: int = 250) -> asm.Assembly:
@@ -175,13 +175,13 @@ def test_limits_that_are_none(scene, option, error, message):
 
 
 def test_an_interruption_leaves_shared_settings_as_they_are():
-    shared = interruption.CTRL_C.fill(np.zeros(ASK_AT + 1))
+    shared = interruption.CTRL_C.fill(np.zeros(ASK_ADDRESS + 1))
     before = shared.copy()
     own = interruption.Interruption(time_limit=1.0).settings(shared)
-    assert own[ASK_AT] != shared[ASK_AT] != 0.0
+    assert own[ASK_ADDRESS] != shared[ASK_ADDRESS] != 0.0
     np.testing.assert_array_equal(shared, before)
     found: list[float] = []
-    thread = threading.Thread(target=lambda: found.append(interruption.CTRL_C.settings(shared)[ASK_AT]))
+    thread = threading.Thread(target=lambda: found.append(interruption.CTRL_C.settings(shared)[ASK_ADDRESS]))
     thread.start()
     thread.join()
     assert found == [0.0]

@@ -99,8 +99,8 @@ def forget(table, workspace, first, last):
 
 
 @kernel(inline=True)
-def settle(store, workspace, told, orders):
-    """What a run tells forgets of its derivatives, below `orders`; C with its error, about the center."""
+def finish_bounds(store, workspace, told, orders):
+    """Widen bounds of a run: of derivatives that do not exist, below `orders`; of C by its error, about the center."""
     head = formula_head_at(store.pool, 0)
     formula = formula_at(store.table, 0)
     if told >= KINK:
@@ -125,7 +125,7 @@ def point_bounds(store, t, workspace):
     workspace[0] = t
     workspace[1] = t
     told = bound(store, formula_at(store.table, 0).point_tape, workspace)
-    settle(store, workspace, told, 3)
+    finish_bounds(store, workspace, told, 3)
 
 
 @kernel(inner=True, exact=True)
@@ -137,7 +137,7 @@ def range_bounds(store, lo, hi, workspace):
     told = bound(store, formula.range_tape, workspace)
     if formula.has_range == 0:
         forget(store.table, workspace, 0, 1)
-    settle(store, workspace, told, 4)
+    finish_bounds(store, workspace, told, 4)
     return told
 
 

@@ -19,10 +19,10 @@ from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.settings import (
     CONTACT_LOST,
     FIT,
-    FREE_TRIMS,
     GATHER,
     HISTORY,
     ITERATIONS,
+    LIFT_TRIMS,
     OBJECTIVE,
     SCATTER,
     SOLVED,
@@ -31,7 +31,7 @@ from assembly.solve.loop.settings import (
     VIOLATION,
 )
 from assembly.solve.options import Options
-from assembly.solve.second_order.leave import Fit, Outcome, settle
+from assembly.solve.second_order.leave import Fit, Outcome, leave_saddles
 
 __all__ = ["attempt", "begin", "go_on_once", "load"]
 
@@ -87,7 +87,7 @@ def attempt(
     if packed.trims and not _holds(outcome) and not interruption.is_over():
         # With the coordinates of contacts as unknowns trims have exact second derivatives, except at poles.
         settings = settings.copy()
-        settings[FREE_TRIMS] = 1.0
+        settings[LIFT_TRIMS] = 1.0
         other = again(settings)
         outcome = other if _holds(other) else outcome
     is_scattered = settings[GATHER] == 0.0 and outcome.state[packed.results_at + SCATTER] == 1.0
@@ -98,7 +98,7 @@ def attempt(
         other = again(settings)
         outcome = other if _holds(other) else outcome
     if not interruption.is_over():
-        outcome = settle(packed, settings, outcome, partial(go_on_once, interruption, packed))
+        outcome = leave_saddles(packed, settings, outcome, partial(go_on_once, interruption, packed))
     return outcome._replace(fit=outcome.fit or Fit(float(settings[FIT])))
 
 
@@ -112,15 +112,15 @@ def begin(
 
 
 def _loop(interruption: Interruption, turns: Array | None) -> Loop:
-    """The loop from the start of a solve and from a state that a solve has led to, its end settled."""
+    """The loop from the start of a solve and from a state that a solve has led to; saddles are left."""
 
     def first(packed: Packed, settings: Array, state: Array) -> Outcome:
         outcome = begin(packed, interruption, packed.table.copy(), settings, state, turns)
-        return settle(packed, settings, outcome, partial(go_on_once, interruption, packed))
+        return leave_saddles(packed, settings, outcome, partial(go_on_once, interruption, packed))
 
     def go_on(packed: Packed, settings: Array, state: Array) -> Outcome:
         outcome = go_on_once(interruption, packed, settings, state)
-        return settle(packed, settings, outcome, partial(go_on_once, interruption, packed))
+        return leave_saddles(packed, settings, outcome, partial(go_on_once, interruption, packed))
 
     return Loop(first, go_on)
 

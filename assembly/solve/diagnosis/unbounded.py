@@ -52,7 +52,7 @@ OPEN = (Status.ITERATION_LIMIT, Status.STALLED, Status.INFEASIBLE)
 LEAST_WAY = 1.0
 # A motion goes on by ten to the powers up to this; where bodies turn, only as far as doubles count whole turns. On a
 # helix what it does as long as going around matters more than going away is not looked at.
-POWERS, TURNING_POWERS, SETTLED = 40, 12, 4
+POWERS, TURNING_POWERS, FIRST_POWER = 40, 12, 4
 # Violations that count as held, and moves of bodies of a contact against each other, in parts of the way.
 HELD = 1e-6
 # The least part of the last fall, over a power of ten, that the next one must be.
@@ -197,7 +197,7 @@ class Helix:
     @property
     def powers(self) -> range:
         """As of `Motion`."""
-        return range(SETTLED, TURNING_POWERS + 1)
+        return range(FIRST_POWER, TURNING_POWERS + 1)
 
     def at(self, part: float) -> Place:
         """After so many displacements more, a whole number."""

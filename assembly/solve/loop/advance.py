@@ -17,9 +17,9 @@ from assembly.solve.loop.line_search import Line, Trust, search_line
 from assembly.solve.loop.loop_state import lead_back
 from assembly.solve.loop.parameters import HALF, LIFT_BELOW_AT_LAST, OFTEN, RESTORATIONS, SHORTEST
 from assembly.solve.loop.residuals import violation_of
-from assembly.solve.loop.restore import begin_restoring
+from assembly.solve.loop.restore import begin_restoration
 from assembly.solve.loop.settings import OUT_OF_TIME, RUNNING, STALLED
-from assembly.solve.loop.standstill import bound_nearby, next_floor
+from assembly.solve.loop.standstill import bound_nearby, update_floor
 
 
 @kernel(inline=True)
@@ -111,8 +111,8 @@ def refuse(task, current):
         return
     loop.lost = -1
     if not loop.restoring and loop.violation > loop.feasible and loop.restorations < RESTORATIONS:
-        begin_restoring(loop)
-    elif task.settles and loop.ended == RUNNING and loop.violation > loop.feasible:
+        begin_restoration(loop)
+    elif task.leads_back and loop.ended == RUNNING and loop.violation > loop.feasible:
         lead_back(loop, STALLED)
     else:
         loop.status = STALLED
@@ -133,6 +133,6 @@ def accept(task, current, trial, rows, system):
     if is_whole:
         off = violation_of(trial.residual, task.program.structure.one_sided, rows.count)
         slow = loop.mu == loop.floor and off > max(0.5 * loop.violation, loop.feasible)
-        loop.floor = next_floor(task.way, loop.floor, slow and not task.tick)
+        loop.floor = update_floor(task.way, loop.floor, slow and not task.tick)
         loop.mu = max(0.1 * loop.mu, loop.floor)
     loop.radius = min(2.0 * loop.radius, 1e6)

@@ -15,7 +15,8 @@ multipliers), terminate (`terminate.py`), direction (`advance.py`, `direction.py
 (`line_search.py`, which evaluates the rows at the next iterate) and accept (`advance.py`). Special cases have files of
 their own: lifted pairs at folds (`contacts.py`) and at ends of patches (`ends.py`), the contact manager
 (`clearances.py`), ticks and budgets (`deadline.py`), a return to the last feasible iterate (`rollback.py`), rows that
-are restored alone or led back (`restore.py`), scattered bodies (`initial_guess.py`), second order (`inertia.py`).
+are restored alone (`restore.py`), the way back onto the rows (`way_back.py`), scattered bodies (`initial_guess.py`),
+second order (`inertia.py`).
 """
 
 from __future__ import annotations
@@ -34,10 +35,11 @@ from assembly.solve.loop.direction import cut_step
 from assembly.solve.loop.finish import End, finish
 from assembly.solve.loop.loop_state import Task, loop_at
 from assembly.solve.loop.observe import evaluate_iterate, observe, rearrange_rows
-from assembly.solve.loop.restore import choose_aim, lead_to_rows, restores
-from assembly.solve.loop.rollback import goes_on
+from assembly.solve.loop.restore import choose_restoration, judge_restoring_step
+from assembly.solve.loop.rollback import restart
 from assembly.solve.loop.settings import CONTACT_LOST, OUT_OF_TIME, RUNNING, results_at, settings_at
 from assembly.solve.loop.terminate import terminate
+from assembly.solve.loop.way_back import lead_to_rows
 from assembly.solve.loop.workspace import Iterates, carve_all, memory_of, results_of, rows_in, workspace_needed
 
 
@@ -77,7 +79,7 @@ def solve_in(store, settings, state, history, end_effectors, doubles, integers):
         tick=tick,
         watched=watched,
         any_pose=any_pose,
-        settles=not tick and (watched or any_pose),
+        leads_back=not tick and (watched or any_pose),
     )
     return run(task, workspace, state, history)
 
@@ -90,7 +92,7 @@ def run(task, workspace, state, history):
     current, trial, held = workspace.iterates
     rows = begin(task, workspace, state, current, trial)
     header = header_at(program.store.table, 0)
-    while goes_on(task, held, current, rows):
+    while loop.status == RUNNING or restart(task, held, current, rows):
         # Observe.
         rows = rows_in(loop, rows)
         observe(task, current, rows)
@@ -101,21 +103,21 @@ def run(task, workspace, state, history):
         # Evaluate, terminate.
         if not evaluate_iterate(task, history, current, rows, system):
             continue
-        if not terminate(task, held, current, rows, system):
+        if terminate(task, held, current, rows, system):
             continue
         if loop.ended != RUNNING or (task.tick and loop.iteration >= loop.limit):
             if lead_to_rows(task, Iterates(current, trial, held), rows, system):
                 current, trial = trial, current
             continue
         # Direction.
-        if not choose_aim(task, rows, system):
+        if not choose_restoration(task, rows, system):
             continue
         rows = rows_in(loop, rows)
         if not find_step(task, current, trial, rows, system):
             continue
         loop.slope, steepest = cut_step(program.structure, current, rows, system, loop.cut)
         if loop.restoring:
-            is_taken, is_next = restores(task, Iterates(current, trial, held), system, steepest)
+            is_taken, is_next = judge_restoring_step(task, Iterates(current, trial, held), system, steepest)
             if is_next:
                 current, trial = trial, current
             if not is_taken:

@@ -22,10 +22,10 @@ from assembly.solve.loop.initial_guess import assemble, scattered
 from assembly.solve.loop.parameters import EXTRA_TIME, FAR, LIFT_BELOW, PATIENCE
 from assembly.solve.loop.report import read_tracked
 from assembly.solve.loop.residuals import arrange
-from assembly.solve.loop.restoration import begin_way, restoration_at
 from assembly.solve.loop.settings import ASSEMBLES, CONTACT_LOST, GATHERED, RUNNING, results_at, settings_at
 from assembly.solve.loop.warm_start import warm_start
-from assembly.solve.loop.workspace import resized, results_of, unknowns
+from assembly.solve.loop.way_back import begin_way, way_at
+from assembly.solve.loop.workspace import new_system, resized, results_of
 
 
 @kernel(inline=True)
@@ -189,7 +189,7 @@ def rearrange(program, count, rows, current):
     rows = resized(rows, header.rows + 4 * count)
     n = 6 * header.moving + 4 * count
     arrange(store.table, program.lifted.free, shape, rows.count, n)
-    system = unknowns(n, count, shape.sparsity)
+    system = new_system(n, count, shape.sparsity)
     return rows, system, evaluate(program, current.tracked, math.inf, current)
 
 
@@ -218,8 +218,8 @@ def begin_loop(task, current):
     loop.lifted = loop.lifts = loop.folded = loop.first = loop.kept = loop.cuts = loop.stood = 0
     loop.measured = loop.may_go = 1
     loop.restoring = loop.restorations = loop.kicks = loop.holds = loop.sunk = loop.begun = 0
-    loop.lingers = loop.settled_by = 0
+    loop.lingers = loop.led_back_by = 0
     loop.lost = loop.back_at = loop.asked_at = loop.final_update_at = -1
     loop.check_at = PATIENCE
-    restoration_at(task.way, 0).softness = 1e-2
+    way_at(task.way, 0).softness = 1e-2
     begin_way(task.way)

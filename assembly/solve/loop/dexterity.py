@@ -34,7 +34,7 @@ from assembly.kinematics.motion import rotation
 from assembly.solve.linear_algebra.singular_values import measure_jacobian
 from assembly.solve.loop.parameters import DIFFERENCE, KEPT, UNDETERMINED
 from assembly.solve.loop.predict import predict_pairs
-from assembly.solve.loop.rates import rate_system, settle
+from assembly.solve.loop.rates import rate_system, solve_rates
 from assembly.solve.loop.residuals import first_unknown, move, times
 
 # A term in the table; behind it a `BODY_COORDINATE` an input.
@@ -230,7 +230,7 @@ def end_effector_map(store, term, bases, rows, n, point, order):
         missed = 0.0
         for i in range(k):
             h[i] = 1.0
-            missed = max(missed, settle(system, g, h, v[i], z[i]))
+            missed = max(missed, solve_rates(system, g, h, v[i], z[i]))
             h[i] = 0.0
             end_effector_velocity(effector, v[i], jacobian, i)
             for r in range(m):
@@ -242,7 +242,7 @@ def end_effector_map(store, term, bases, rows, n, point, order):
             unit[r, 0] = 1.0
             add_end_effector_force(effector, unit, 0, g)
             unit[r, 0] = 0.0
-            left = settle(system, g, h, p[r], y[r])
+            left = solve_rates(system, g, h, p[r], y[r])
             if not left <= leeway * largest_value(g):
                 outcome = OPEN
         changes = row_rates(bases, point.jacobian, used, v)

@@ -11,7 +11,7 @@ from assembly.constraints.program.row_terms import add_row_terms
 from assembly.solve.linear_algebra.factorize import factorize_shifted
 from assembly.solve.loop.ends import find_ends, hold_ends
 from assembly.solve.loop.line_search import Trust, damped_step
-from assembly.solve.loop.multipliers import curve_rows, leave_out, predict_active_set, weigh_rows
+from assembly.solve.loop.multipliers import curvature_multipliers, leave_out, predict_active_set, weigh_rows
 from assembly.solve.loop.parameters import CLOSE, FORESEEN, KICK, LEAST_SHIFT, SADDLE, SHIFT, TINIEST_SHIFT
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import add_transposed, move, times
@@ -51,7 +51,7 @@ def find_direction(program, current, rows, system, trust, restoring, is_fresh):
         rows.foreseen[r] = 0.0
     if is_fresh:
         find_ends(program, current, system.directions)
-        curve_rows(rows, current.residual, restoring)
+        curvature_multipliers(rows, current.residual, restoring)
         add_row_terms(program, current, rows.forces, rows.active, lagrangian)
         hold_ends(system)
         shift = factorize_shifted(lagrangian, n, order, shift, matrix)
@@ -67,7 +67,7 @@ def find_direction(program, current, rows, system, trust, restoring, is_fresh):
             leave_out(shape, current, rows, system, is_fresh)
         if not is_fresh:
             is_fresh = True
-            curve_rows(rows, current.residual, restoring)
+            curvature_multipliers(rows, current.residual, restoring)
             add_row_terms(program, current, rows.forces, rows.active, lagrangian)
         hold_ends(system)
         shift = factorize_shifted(lagrangian, n, order, max(shift, LEAST_SHIFT), matrix)

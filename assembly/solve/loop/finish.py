@@ -36,7 +36,7 @@ End = namedtuple("End", "status value violation dual feasible holds")
 
 
 @kernel(inner=True)
-def tells_crossing(program, current, rows):
+def find_crossing(program, current, rows):
     """Update all pairs where a solve failed; whether bodies are in each other, with or without a row that says so."""
     table, lifted = program.store.table, program.lifted
     update_around(program.store, lifted.memory, current, EVERYTHING)
@@ -76,7 +76,7 @@ def finish(program, settings, state, iterates, rows, system, at_end):
     tick = limits.tick == 1.0
     watched = header.manager_record >= 0
     tells = watched and not tick and status != SOLVED and status != CONTACT_LOST
-    crosses = tells and tells_crossing(program, current, rows)
+    crosses = tells and find_crossing(program, current, rows)
     fails = status == STALLED or status == ITERATION_LIMIT or status == INFEASIBLE
     is_wish = limits.any_pose == 1.0 and (fails or status == SOLVED) and not crosses
     if holds and ((tick and not violation <= feasible and result.carried == 0.0) or crosses):

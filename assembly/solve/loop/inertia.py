@@ -50,7 +50,7 @@ def note_factor(results, rows, one_sided, shift, dual, restoring):
     """
     result = results_at(results, 0)
     force = strongest(rows.y, rows.count)
-    # Weak multipliers are left out of the matrix (`multipliers.curve_rows`).
+    # Weak multipliers are left out of the matrix (`multipliers.curvature_multipliers`).
     bends = force >= WEAK or force <= IDLE
     if shift <= SMALL_SHIFT and dual <= NEAR_END and bends and not restoring:
         result.curved = 1.0 + checksum_of_rows(rows.count, one_sided, rows.active, 0.0)
@@ -72,7 +72,7 @@ def told_convex(results, rows, one_sided, residual):
 
 
 @kernel(inner=True)
-def is_convex(program, current, rows, system, shift):
+def test_convexity(program, current, rows, system, shift):
     """Whether the matrix of the rows that push, shifted by so much, has a factor at this point."""
     shape, lagrangian = program.structure, system.hessian
     goal(program, rows.count, current, 1, system.gradient, lagrangian)
@@ -102,6 +102,6 @@ def test_end(program, settings, results, status, current, rows, system):
         if told_convex(results, rows, shape.one_sided, current.residual):
             return status
     shift = 0.0 if tick else LEAST_SHIFT
-    convex = is_convex(program, current, penalized(rows, mu), system, shift)
+    convex = test_convexity(program, current, penalized(rows, mu), system, shift)
     result.curved = 1.0 if convex else -1.0
     return status if tick or convex else UNSURE

@@ -11,7 +11,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
-from assembly.solve.loop.parameters import SETTLING
+from assembly.solve.loop.parameters import BACK_STEPS
 
 # Numbers of the loop; lengths are over the scene's size.
 NUMBERS = record_dtype(
@@ -74,7 +74,7 @@ COUNTS = record_dtype(
     begun=1,  # how often a solve that got no further began again
     lingers=1,  # iterations since the violation was first at most 1e-9, without a user's objective
     ended=1,  # how a solve ended whose rows are only led back any more, or RUNNING
-    settled_by=1,  # the iteration at which that ends at the latest
+    led_back_by=1,  # the iteration at which that ends at the latest
     asked_at=1,  # iteration at which a tick updated the manager because of its step
     final_update_at=1,  # iteration after a final update that found other contacts
 )
@@ -83,13 +83,13 @@ loop_at = record_view(LOOP_STATE)
 LOOP = size_of(LOOP_STATE)
 
 # What stays as it is: the program, arrays and records of settings and results, what is known of the way back
-# (`restoration.py`), the record of the loop; whether it is a tick, has a contact manager, is content with any pose that
+# (`way_back.py`), the record of the loop; whether it is a tick, has a contact manager, is content with any pose that
 # holds, and leads what fails back onto its rows.
-Task = namedtuple("Task", "program settings limits results result way loop tick watched any_pose settles")
+Task = namedtuple("Task", "program settings limits results result way loop tick watched any_pose leads_back")
 
 
 @kernel(inline=True)
 def lead_back(loop, status):
     """The solve ends with this status; what steps follow only lead back onto the rows."""
     loop.ended = status
-    loop.settled_by = loop.iteration + SETTLING
+    loop.led_back_by = loop.iteration + BACK_STEPS

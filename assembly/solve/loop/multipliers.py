@@ -135,7 +135,7 @@ def toward_rows(program, point, rows, system, softness, enough):
 
 
 @kernel(inner=True)
-def curve_rows(rows, residual, restoring):
+def curvature_multipliers(rows, residual, restoring):
     """Into `forces` the multipliers whose rows' curvature goes into the matrix."""
     forces = rows.forces
     most = 0.0

@@ -17,9 +17,9 @@ from assembly.solve.loop.multipliers import choose_multipliers, weigh_rows
 from assembly.solve.loop.parameters import LIFT_BELOW
 from assembly.solve.loop.pauses import pause
 from assembly.solve.loop.report import log
-from assembly.solve.loop.restoration import begin_way
 from assembly.solve.loop.settings import CONTACT_LOST, OUT_OF_TIME, RUNNING, STALLED
 from assembly.solve.loop.violation import off_rows
+from assembly.solve.loop.way_back import begin_way
 from assembly.solve.loop.workspace import rows_in
 
 

@@ -108,7 +108,7 @@ LEFT_OVER, SOFTER, SOFTEST = 0.1, 1e-3, 1e-9
 SHORTENED, ASTRAY, LEAST_SHARE = 0.25, 10.0, 1e-4
 # [steps] Where a solve with clearances ends at a pose that does not hold, so many more lead back onto the rows.
 # Doubled: failed solves take longer. Chosen.
-SETTLING = 30
+BACK_STEPS = 30
 
 # Whether rows can hold at all. ---------------------------------------------------------------------------------------
 # [steps] Every so many the largest violation must have halved, or rows alone are restored to see whether they can
@@ -127,7 +127,7 @@ NEIGHBORHOOD = 0.02
 MUCH = 2.0
 # [steps] So many in a row, however long, that leave as much begin to restore, in steps no longer than a neighborhood;
 # so many of these tell that it is mended far away, if at all. Doubled: as many steps more. Chosen.
-DRAGGED, SETTLED = 4.0, 2.0
+DRAGGED, NOT_NEARBY = 4.0, 2.0
 # Where SLOW whole steps in a row do not halve the violation, the floor of the penalty gives way, down to HARDEST:
 # rounding, times its inverse, must stay small against the objective's curvature. Doubled: rows of vanishing slopes
 # (a dead center) hold later. From: a double's digits, 2e-16 / 1e-10.

@@ -24,8 +24,8 @@ def longest_way(d, at, alpha, far):
 
 
 @kernel(inner=True)
-def stays_open(store, bases, k, current, trial, d, alpha):
-    """Whether row k, of a clearance, is open all along alpha d for certain; if so, what is known of it goes on.
+def keep_open_row(store, bases, k, current, trial, d, alpha):
+    """Keep what is known of row k, of a clearance, if it is open all along alpha d for certain. Whether it is.
 
     No gap changes by more than points of the two bodies go, those of each seen from where they were.
     """
@@ -83,7 +83,7 @@ def predict_pairs(store, bases, lifted, current, trial, d, alpha):
                 for i in range(4):
                     out[k, i] += derivatives_at(records, k).rates[i, j] * s
             predict_pair(store, k, tracked, out)
-        if is_clearance_row(store.table, k) and stays_open(store, bases, k, current, trial, d, alpha):
+        if is_clearance_row(store.table, k) and keep_open_row(store, bases, k, current, trial, d, alpha):
             tracked_at(out, k).idle = 1.0
             tracked_at(out, k).gap = max(
                 tracked_at(out, k).gap, store.pool[contact.minimum] + contact_record_at(trial.records, k).slack

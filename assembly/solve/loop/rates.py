@@ -102,7 +102,7 @@ def rate_system(bases, jacobian, used, b):
 
 
 @kernel(inner=True, allocates=True)
-def settle(system, g, h, v, z):
+def solve_rates(system, g, h, v, z):
     """Solve for v (n,) and z (k,). Returns the largest part of g and h that is left.
 
     What no pass takes off g pushes motions that nothing determines; their part of v is left out.

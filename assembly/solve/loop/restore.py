@@ -14,34 +14,14 @@ from assembly.solve.loop.clearances import update_again
 from assembly.solve.loop.direction import leave_saddle
 from assembly.solve.loop.loop_state import lead_back
 from assembly.solve.loop.multipliers import forget_objective, strongest
-from assembly.solve.loop.parameters import CLOSE, KICKS, LEAST_SHARE, PATIENCE, RESTORATIONS
-from assembly.solve.loop.restoration import restoration_at, step_back
-from assembly.solve.loop.settings import INFEASIBLE, RUNNING, STALLED
-from assembly.solve.loop.standstill import contradicts, drags, is_stuck, stands_still, stays_off
+from assembly.solve.loop.parameters import CLOSE, KICKS, PATIENCE, RESTORATIONS
+from assembly.solve.loop.settings import INFEASIBLE, STALLED
+from assembly.solve.loop.standstill import contradicts, count_drag, count_standstill, is_stuck, stays_off
 from assembly.solve.loop.workspace import rows_in
 
 
 @kernel(inline=True)
-def lead_to_rows(task, iterates, rows, system):
-    """A step the shortest way back onto the rows, as the time is over. Whether the trial iterate is the next one."""
-    loop, way = task.loop, task.way
-    enough = 0.1 * loop.feasible
-    taken = step_back(task.program, iterates, rows, system, way, loop.violation, enough, task.tick)
-    loop.measured = taken
-    if taken:
-        for r in range(rows.count):
-            rows.better_y[r] = rows.y[r]
-    elif restoration_at(way, 0).share < LEAST_SHARE:
-        loop.status = STALLED if loop.ended == RUNNING else loop.ended
-        return False
-    loop.kept = 0
-    loop.alpha = 1.0
-    loop.iteration += 1
-    return taken
-
-
-@kernel(inline=True)
-def choose_aim(task, rows, system):
+def choose_restoration(task, rows, system):
     """Begin or end to restore rows. Whether the step goes on."""
     loop = task.loop
     # At a pose where rows depend on each other a soft objective only leads away: rows are restored until they hold.
@@ -53,13 +33,13 @@ def choose_aim(task, rows, system):
         loop.restoring = 0
         loop.mu = 1e-4
         check_later(loop)
-    if gains_nothing(task, rows):
+    if detect_standstill(task, rows):
         loop.check_at, loop.check_violation = loop.iteration, loop.violation
     if not loop.restoring and loop.iteration >= loop.check_at:
         # The rows gain nothing: see whether they can hold at all. One that has just closed has had no time to.
         least = TOUCHING if loop.check_violation <= loop.feasible else loop.feasible
         if loop.violation > max(least, 0.5 * loop.check_violation) and loop.restorations < RESTORATIONS:
-            begin_restoring(loop)
+            begin_restoration(loop)
             # What the penalty's matrix needed says nothing of this one.
             loop.shift = 0.0
         check_later(loop)
@@ -70,22 +50,24 @@ def choose_aim(task, rows, system):
 
 
 @kernel(inline=True)
-def gains_nothing(task, rows):
-    """Whether steps in a row left what rows are off."""
+def detect_standstill(task, rows):
+    """Count steps that leave what rows are off; whether there were enough in a row."""
     loop, way = task.loop, task.way
     is_open = loop.violation > loop.feasible and not (loop.restoring or task.watched or task.tick)
     by_floor = is_open and loop.mu <= loop.floor
     force = strongest(rows.y, rows.count) if by_floor else 0.0
     left = loop.violation / max(loop.last_violation, loop.feasible) if loop.alpha * loop.cut == 1.0 else 0.0
-    if by_floor and stands_still(way, task.settings, loop.feasible, loop.violation, left, loop.dual, force, loop.mu):
+    if by_floor and count_standstill(
+        way, task.settings, loop.feasible, loop.violation, left, loop.dual, force, loop.mu
+    ):
         return True
     # Contacts bend as much as a step is long, and may gain little for a while.
     any_step = is_open and task.any_pose and header_at(task.program.store.table, 0).contacts == 0
-    return any_step and drags(way, loop.violation, loop.last_violation)
+    return any_step and count_drag(way, loop.violation, loop.last_violation)
 
 
 @kernel(inline=True)
-def begin_restoring(loop):
+def begin_restoration(loop):
     """Leave the objective alone until rows hold, or it is known that they do not."""
     loop.restoring = 1
     loop.restorations += 1
@@ -99,7 +81,7 @@ def check_later(loop):
 
 
 @kernel(inline=True)
-def restores(task, iterates, system, steepest):
+def judge_restoring_step(task, iterates, system, steepest):
     """Of a step that restores rows: whether it is taken, and if not, whether the trial iterate is the next one.
 
     Where it is stationary, or gains next to nothing, rows contradict each other, or the solve is led back.
@@ -124,7 +106,7 @@ def restores(task, iterates, system, steepest):
             loop.over = 1
             return False, False
     if ends or slows:
-        if task.settles and not task.watched:
+        if task.leads_back and not task.watched:
             lead_back(loop, STALLED)
         else:
             loop.status = STALLED

@@ -58,14 +58,14 @@ def begin_again(store, held, lifted, current, rows):
 
 
 @kernel(inline=True)
-def retreats(task):
+def must_roll_back(task):
     """Whether bodies have sunk into each other, and there is a pose to go back to."""
     loop = task.loop
     return loop.sunk and loop.holds and loop.ended == RUNNING and loop.iteration < loop.limit
 
 
 @kernel(inline=True)
-def retreat(task, held, current, rows):
+def roll_back(task, held, current, rows):
     """Back to the last feasible iterate, and on from there with shorter steps."""
     loop = task.loop
     loop.leash = SHORTER * min(loop.leash, loop.alpha * loop.longest)
@@ -81,20 +81,21 @@ def retreat(task, held, current, rows):
 
 
 @kernel(inline=True)
-def goes_on(task, held, current, rows):
-    """Whether there is another step. A solve that gets no further begins again where it last held."""
+def restart(task, held, current, rows):
+    """Let a solve that gets no further begin again where it last held. Whether it does."""
     loop, limits = task.loop, task.limits
     may_begin = task.watched and not task.tick and loop.holds and loop.begun < BEGINNINGS
-    if loop.status == STALLED and not loop.over and may_begin and loop.iteration + LEFT <= loop.limit:
-        loop.rows, loop.mu = header_at(task.program.store.table, 0).rows, limits.penalty
-        begin_again(task.program.store, held, task.program.lifted, current, rows_in(loop, rows))
-        loop.measured, loop.changed = 0, 1
-        loop.begun += 1
-        loop.iteration += 1
-        loop.status = loop.ended = RUNNING
-        loop.radius, loop.leash, loop.shift, loop.last_dual = limits.radius, math.inf, 0.0, math.inf
-        loop.restoring = loop.restorations = loop.cuts = 0
-        loop.cut_length = loop.check_violation = math.inf
-        loop.check_at = loop.iteration + PATIENCE
-        loop.lost, loop.below = -1, LIFT_BELOW
-    return loop.status == RUNNING
+    if loop.status != STALLED or loop.over or not may_begin or loop.iteration + LEFT > loop.limit:
+        return False
+    loop.rows, loop.mu = header_at(task.program.store.table, 0).rows, limits.penalty
+    begin_again(task.program.store, held, task.program.lifted, current, rows_in(loop, rows))
+    loop.measured, loop.changed = 0, 1
+    loop.begun += 1
+    loop.iteration += 1
+    loop.status = loop.ended = RUNNING
+    loop.radius, loop.leash, loop.shift, loop.last_dual = limits.radius, math.inf, 0.0, math.inf
+    loop.restoring = loop.restorations = loop.cuts = 0
+    loop.cut_length = loop.check_violation = math.inf
+    loop.check_at = loop.iteration + PATIENCE
+    loop.lost, loop.below = -1, LIFT_BELOW
+    return True

@@ -13,14 +13,14 @@ from assembly.solve.loop.parameters import (
     MOST_TILTED,
     MUCH,
     NEIGHBORHOOD,
+    NOT_NEARBY,
     ROUNDED,
-    SETTLED,
     SLOW,
     STILL,
     STUCK,
 )
-from assembly.solve.loop.restoration import restoration_at
 from assembly.solve.loop.settings import settings_at
+from assembly.solve.loop.way_back import way_at
 
 
 @kernel(inline=True)
@@ -34,13 +34,13 @@ def out_of_reach(violation):
 
 
 @kernel(inline=True)
-def stands_still(way, settings, feasible, violation, left, dual, force, mu):
-    """Whether whole steps in a row, at a stationary point, left what rows are off: it is what no motion changes.
+def count_standstill(way, settings, feasible, violation, left, dual, force, mu):
+    """Count whole steps in a row, at a stationary point, that left what rows are off. Whether no motion changes it.
 
     The multipliers y + c / mu of the next step leave the Lagrangian as stationary as y only where J^T c = 0. `force` is
     the strongest one, which grows by every step, `left` the part of the violation that the last whole step left.
     """
-    progress = restoration_at(way, 0)
+    progress = way_at(way, 0)
     nearly = (
         settings_at(settings, 0).stationarity * max(1.0, force) + (out_of_reach(violation) + ROUNDED * feasible) / mu
     )
@@ -50,13 +50,13 @@ def stands_still(way, settings, feasible, violation, left, dual, force, mu):
 
 
 @kernel(inline=True)
-def drags(way, violation, before):
-    """Whether steps in a row, long or short, left what rows are off by a little; `before` is what it was a step ago.
+def count_drag(way, violation, before):
+    """Count steps in a row, long or short, that left what rows are off by a little. Whether there were enough.
 
     A linkage with a freedom may be off by less and less along it, for as long as it moves: each step goes as far as
-    the rows' curvature lets it, and gains nothing.
+    the rows' curvature lets it, and gains nothing. `before` is what rows were off a step ago.
     """
-    progress = restoration_at(way, 0)
+    progress = way_at(way, 0)
     by_little = TOUCHING < violation <= LITTLE
     progress.drags = progress.drags + 1.0 if by_little and violation > STILL * before else 0.0
     if progress.drags < DRAGGED:
@@ -68,8 +68,8 @@ def drags(way, violation, before):
 
 @kernel(inline=True)
 def bound_nearby(way, violation, before):
-    """How long steps may be that restore rows, of which `drags` told; as long as steps gain nothing."""
-    progress = restoration_at(way, 0)
+    """How long steps may be that restore rows, of which `count_drag` told; as long as steps gain nothing."""
+    progress = way_at(way, 0)
     if progress.nearby == 0.0:
         return math.inf
     if violation <= STILL * before < math.inf:
@@ -86,8 +86,8 @@ def stays_off(way, feasible, steepest, violation, before):
 
     Near a dead center |J^T c| falls faster than |c|, below its rounding in the end, but every step still gains.
     """
-    progress = restoration_at(way, 0)
-    if progress.nearby == 1.0 and progress.drags >= SETTLED:
+    progress = way_at(way, 0)
+    if progress.nearby == 1.0 and progress.drags >= NOT_NEARBY:
         return True
     gains = violation <= STILL * before
     return steepest <= out_of_reach(violation) + (0.0 if gains else ROUNDED * feasible)
@@ -96,7 +96,7 @@ def stays_off(way, feasible, steepest, violation, before):
 @kernel(inline=True)
 def is_stuck(way):
     """Whether the loop was found to stand still, and has not moved since but by restoring rows."""
-    return restoration_at(way, 0).stills == STUCK
+    return way_at(way, 0).stills == STUCK
 
 
 @kernel(inline=True)
@@ -106,11 +106,11 @@ def contradicts(way, feasible, violation):
 
 
 @kernel(inline=True)
-def next_floor(way, floor, is_slow):
-    """The floor of the penalty after a whole step by it, which gives way where such steps do not halve the violation.
+def update_floor(way, floor, is_slow):
+    """Count slow steps by the floor of the penalty; the next floor, lower where they do not halve the violation.
 
     Rows whose slopes all but vanish, at a dead center say: only a harder penalty holds them.
     """
-    progress = restoration_at(way, 0)
+    progress = way_at(way, 0)
     progress.slow_steps = progress.slow_steps + 1.0 if is_slow else 0.0
     return max(0.1 * floor, HARDEST) if progress.slow_steps >= SLOW else floor

@@ -15,42 +15,47 @@ from assembly.solve.loop.loop_state import lead_back
 from assembly.solve.loop.multipliers import least_multipliers
 from assembly.solve.loop.parameters import GAIN, HALF, LINGERS, LONGER, SHORT, STANDS, STRAYING
 from assembly.solve.loop.report import is_clear, keep_point
-from assembly.solve.loop.rollback import has_sunk, retreat, retreats
+from assembly.solve.loop.rollback import has_sunk, must_roll_back, roll_back
 from assembly.solve.loop.settings import ITERATION_LIMIT, OUT_OF_TIME, RUNNING, SOLVED, STALLED
 
 
 @kernel(inline=True)
 def terminate(task, held, current, rows, system):
-    """Whether the step goes on from this iterate; else the loop ends, or begins its next step elsewhere."""
+    """Whether the loop ends at this iterate, or begins its next step elsewhere; else the step goes on from it."""
     loop, program = task.loop, task.program
     loop.sunk = task.watched and not task.tick and has_sunk(program.store, program.lifted.memory, current.residual)
     if loop.sunk and loop.iteration == loop.back_at:
         # Bodies were in each other there too, and nothing had asked: that is no place to return to.
         loop.holds, loop.leash = 0, math.inf
-    goes_back = retreats(task)
+    goes_back = must_roll_back(task)
+    count_rounded_steps(loop, task.limits)
     arrived = is_solution(task, current, rows, system)
     final_update = task.watched and task.limits.final_update == 1.0
     # Where every final update finds other contacts, the limit ends it.
     if arrived and not goes_back and not (final_update and loop.iteration > loop.limit):
         arrive(task, final_update, current, rows, system)
-        return False
+        return True
     keep_what_holds(task, held, current, rows)
-    if is_over(task, current):
-        return False
+    if stop_at_limits(task, current):
+        return True
     if goes_back:
-        retreat(task, held, current, rows)
-        return False
-    return True
+        roll_back(task, held, current, rows)
+        return True
+    return False
+
+
+@kernel(inline=True)
+def count_rounded_steps(loop, limits):
+    """Count whole steps in a row at feasible iterates that gain nothing of the slope: what is left may be rounding."""
+    most = max(GAIN * loop.last_dual, limits.stationarity)
+    stands = loop.alpha * loop.cut == 1.0 and loop.dual > most and loop.violation <= loop.feasible
+    loop.stood = loop.stood + 1 if stands else 0
 
 
 @kernel(inline=True)
 def is_solution(task, current, rows, system):
     """Whether the iterate holds and its dual residual is none, or rounding."""
-    loop, limits = task.loop, task.limits
-    # What whole steps gain nothing of, several in a row, may be rounding.
-    most = max(GAIN * loop.last_dual, limits.stationarity)
-    stands = loop.alpha * loop.cut == 1.0 and loop.dual > most and loop.violation <= loop.feasible
-    loop.stood = loop.stood + 1 if stands else 0
+    loop = task.loop
     rounded = loop.stood >= STANDS and is_rounding(task.program, current, rows, system, loop.longest, loop.dual)
     dual = 0.0 if rounded else loop.dual
     before = loop.last_violation
@@ -93,8 +98,11 @@ def keep_what_holds(task, held, current, rows):
 
 
 @kernel(inline=True)
-def is_over(task, current):
-    """Whether the steps or the time are over, or bodies go away. Some ends only lead back onto the rows from here."""
+def stop_at_limits(task, current):
+    """End where the steps or the time are over, or bodies go away; whether the loop ends so.
+
+    Some ends only lead back onto the rows from here.
+    """
     loop, limits = task.loop, task.limits
     store = task.program.store
     feasible = loop.violation <= loop.feasible
@@ -110,9 +118,9 @@ def is_over(task, current):
     # A least move may be at a kink, where steps go to and fro.
     touches = loop.lingers > 0 or loop.violation <= TOUCHING
     loop.lingers += 1 if task.any_pose and not (loop.restoring and not task.watched) and touches else 0
-    if task.settles and loop.ended == RUNNING and loop.lingers > LINGERS:
+    if task.leads_back and loop.ended == RUNNING and loop.lingers > LINGERS:
         lead_back(loop, STALLED)
-    if loop.ended != RUNNING and (feasible or loop.iteration >= loop.settled_by):
+    if loop.ended != RUNNING and (feasible or loop.iteration >= loop.led_back_by):
         loop.status = loop.ended
         return True
     # What holds is not left for what there is hardly time to end, and ends what an earlier call began.

@@ -22,7 +22,7 @@ from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
 from assembly.solve.loop.loop_state import LOOP
 from assembly.solve.loop.residuals import arrange, record_of_blocks, shape_of, size_of_shape
-from assembly.solve.loop.restoration import WAY
+from assembly.solve.loop.way_back import WAY
 
 # What a row has a number of: residuals at the current and the trial iterate, five fields of `Rows`, one of `Held`.
 BY_ROW = 8
@@ -38,7 +38,7 @@ System = namedtuple("System", "gradient directions hessian factor")
 # Of all unknowns: right side of the system, or scratch; the step; the step before its second-order correction. Of the
 # coordinates of lifted pairs, the last unknowns: 1 where one is held at the end of its patch (`ends.py`), else 0.
 Directions = namedtuple("Directions", "descent step straight ends")
-# All that a solve works in. `way`: what is known of a way back (`restoration.py`).
+# All that a solve works in. `way`: what is known of a way back (`way_back.py`).
 Workspace = namedtuple("Workspace", "program iterates rows way loop system")
 
 
@@ -201,7 +201,7 @@ def carve_all(store, memory, end_effectors, doubles, integers):
 
 
 @kernel(inline=True, allocates=True)
-def unknowns(n, lifted, order):
+def new_system(n, lifted, order):
     """A newly allocated system of n unknowns, of which the last 4 `lifted` are coordinates of lifted pairs."""
     hessian, factor = sides_of(n, order)
     vectors = np.empty((4, n))

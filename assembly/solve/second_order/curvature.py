@@ -27,7 +27,7 @@ from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.report import write_pose, write_tracked
 from assembly.solve.loop.residuals import add_row, arrange, move, record_of_blocks, shape_of, size_of_shape
 from assembly.solve.loop.violation import off_rows
-from assembly.solve.loop.workspace import new_rows, unknowns
+from assembly.solve.loop.workspace import new_rows, new_system
 
 # Rows that hold; so many steps lead back onto them, none longer than this.
 HOLDS, EXACT, STEPS, LONGEST = 1e-11, 1e-14, 12, 1.0
@@ -124,7 +124,7 @@ def walk_within(store, state, step, share, kept, residual, end_effectors, memory
             shape.one_sided[r] = 0
     trial = new_point(store.table)
     trial.q[:] = here.q
-    system = unknowns(n, (n - 6 * header.moving) // 4, shape.sparsity)
+    system = new_system(n, (n - 6 * header.moving) // 4, shape.sparsity)
     rows, way = new_rows(count, MU), system.directions.step
     way[:] = step
     before = math.inf
@@ -184,7 +184,7 @@ def least_within(store, state, forces, active, direction, end_effectors, integer
     shape = shape_of(store.table, rows, n, record_of_blocks(store.table), integers, doubles)
     arrange(store.table, found.program.lifted.free, shape, rows, n)
     program = arranged(found, shape, end_effectors)
-    system = unknowns(n, 0, shape.sparsity)
+    system = new_system(n, 0, shape.sparsity)
     gradient, lines, lagrangian, matrix = system.gradient, system.directions, system.hessian, system.factor
     goal(program, rows, point, 1, gradient, lagrangian)
     add_row_terms(program, point, forces, active, lagrangian)

@@ -30,7 +30,7 @@ from assembly.solve.loop.settings import (
 from assembly.solve.second_order.classification import SecondOrder, Way, judge, judge_kink
 from assembly.solve.second_order.dense import Look, Neighbor
 
-__all__ = ["Fit", "Outcome", "settle"]
+__all__ = ["Fit", "Outcome", "leave_saddles"]
 
 Array = NDArray[np.float64]
 # The first step along a way in a scene with clearances; by what steps grow while poses become lower; the longest.
@@ -89,7 +89,7 @@ def lower_neighbor(look: Look, way: Way) -> Neighbor | None:
     return best
 
 
-def settle(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outcome:
+def leave_saddles(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outcome:
     """An outcome whose end is no saddle that can be left, from one of which no factorization told.
 
     `run` is the loop with settings from a state. A saddle left counts as a step; where steps are spent, or no lower

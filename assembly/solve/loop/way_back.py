@@ -11,13 +11,14 @@ from assembly.constraints.program.records import header_at
 from assembly.proximity.extrema.face_face import BEND
 from assembly.solve.loop.clearances import is_too_far
 from assembly.solve.loop.multipliers import toward_rows
-from assembly.solve.loop.parameters import ASTRAY, SHORTENED
+from assembly.solve.loop.parameters import ASTRAY, LEAST_SHARE, SHORTENED
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import move
+from assembly.solve.loop.settings import RUNNING, STALLED
 from assembly.solve.loop.violation import off_rows
 
 # What is known of the way back, and of a loop that stands still (`standstill.py`).
-RESTORATION = record_dtype(
+WAY_RECORD = record_dtype(
     "f8",
     softness=1,  # of the last step back
     share=1,  # of the next step back that is taken
@@ -28,8 +29,8 @@ RESTORATION = record_dtype(
     drags=1,  # steps of any length in a row that left what rows are off
     nearby=1,  # 1: steps that restore rows are no longer than a neighborhood
 )
-restoration_at = record_view(RESTORATION)
-WAY = size_of(RESTORATION)
+way_at = record_view(WAY_RECORD)
+WAY = size_of(WAY_RECORD)
 
 
 @kernel(inline=True)
@@ -52,7 +53,7 @@ def way_back(program, current, trial, rows, system, progress, enough, tick):
 @kernel(inner=True)
 def begin_way(way):
     """Rows have changed: what was found of steps and violations counts no more."""
-    progress = restoration_at(way, 0)
+    progress = way_at(way, 0)
     progress.share = 1.0
     progress.lowest = math.inf
     progress.led_off = 0.0
@@ -65,7 +66,7 @@ def begin_way(way):
 @kernel(inline=True)
 def step_back(program, iterates, rows, system, way, violation, enough, tick):
     """A step on the way back, into the trial point; whether it is to be taken. If not, the next one is shorter."""
-    progress = restoration_at(way, 0)
+    progress = way_at(way, 0)
     if violation < progress.lowest:
         progress.lowest = violation
         progress.led_off = 0.0
@@ -77,3 +78,22 @@ def step_back(program, iterates, rows, system, way, violation, enough, tick):
     progress.led_off = 0.0 if nearer else 1.0
     progress.share = min(progress.share / SHORTENED, 1.0)
     return True
+
+
+@kernel(inline=True)
+def lead_to_rows(task, iterates, rows, system):
+    """A step the shortest way back onto the rows, as the time is over. Whether the trial iterate is the next one."""
+    loop, way = task.loop, task.way
+    enough = 0.1 * loop.feasible
+    taken = step_back(task.program, iterates, rows, system, way, loop.violation, enough, task.tick)
+    loop.measured = taken
+    if taken:
+        for r in range(rows.count):
+            rows.better_y[r] = rows.y[r]
+    elif way_at(way, 0).share < LEAST_SHARE:
+        loop.status = STALLED if loop.ended == RUNNING else loop.ended
+        return False
+    loop.kept = 0
+    loop.alpha = 1.0
+    loop.iteration += 1
+    return taken
