@@ -24,7 +24,7 @@ from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.attempts.attempts import attempt, load
 from assembly.solve.attempts.postures import postures_from
 from assembly.solve.interruption import CTRL_C, Interruption
-from assembly.solve.loop.settings import ANY_POSE, GATHER, ITERATIONS, STRAYS, TOUCHING
+from assembly.solve.loop.settings import ALLOWED_OVERLAP, ANY_POSE, GATHER, ITERATIONS, STRAYS
 from assembly.solve.options import Options
 from assembly.solve.scene import Scene, Status
 from assembly.solve.solution import Solution
@@ -234,7 +234,7 @@ class Assembly(Contents):
                         settings[STRAYS] = 0.0
                         continue
                 solution = Solution(self._scene, packed, state, status, spent, history, order, fit)
-                solution._touching = float(settings[TOUCHING])
+                solution._touching = float(settings[ALLOWED_OVERLAP])
                 return solution
             self._crowding *= 2
             self._packed = None

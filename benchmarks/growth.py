@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import assembly as asm
 from assembly.geometry.faces.face import Face
 from assembly.proximity.bvh.facet_tree import FacetTree
-from assembly.proximity.extrema.face_face import CLOSE
+from assembly.proximity.extrema.face_face import LAST_TURN
 from benchmarks import linkages
 from benchmarks.facets import CLIP_RADIUS, CLIPS, Descents, walk
 from benchmarks.figures import figure
@@ -109,8 +109,8 @@ def nudged(scene: asm.Assembly) -> Callable[[], asm.Solution]:
 def _nets(quick: bool) -> tuple[list[dict[str, Any]], dict[str, Any]]:
     sizes = (4, 8, 32) if quick else (4, 8, 16, 32, 64, 128, 200)
     few, many = sizes[0], sizes[-1]
-    solvers = {n: Solver(dome_pairs(16, net=n, of=few), 0.01, CLOSE) for n in sizes}
-    solvers |= {-n: Solver(dome_pairs(16, net=n), 0.01, CLOSE) for n in (few, many)}
+    solvers = {n: Solver(dome_pairs(16, net=n, of=few), 0.01, LAST_TURN) for n in sizes}
+    solvers |= {-n: Solver(dome_pairs(16, net=n), 0.01, LAST_TURN) for n in (few, many)}
     rows = compare({str(n): solver for n, solver in solvers.items()}, repeats=5 if quick else 25)
     seconds = {n: row["seconds"] / solvers[n].count for n, row in zip(solvers, rows, strict=True)}
     steps = {n: solver(1) / len(solver.sizes) for n, solver in solvers.items()}

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import assembly as asm
-from assembly.proximity.extrema.face_face import CLOSE, CONVERGED
+from assembly.proximity.extrema.face_face import CONVERGED, LAST_TURN
 from assembly.proximity.extrema.rates import RECORD
 from benchmarks.figures import figure
 from benchmarks.kernels import all_derivatives, contact_jacobians, evaluate_pairs, solve_pairs
@@ -91,7 +91,7 @@ def _occt(solver: Solver) -> tuple[float | None, int | None]:
 def _warm(quick: bool) -> list[dict[str, Any]]:
     count = 16 if quick else 64
     pairs = dome_pairs(count)
-    exact, carried = Solver(pairs, 0.01, 0.0), Solver(pairs, 0.01, CLOSE)
+    exact, carried = Solver(pairs, 0.01, 0.0), Solver(pairs, 0.01, LAST_TURN)
     surface_f, surface_g = pairs.surfaces[0]
     q_f, q_g = pairs.q[0]
     occt = {"OCCT GenLocateExtSS": _occt(exact)[0]}
@@ -116,9 +116,9 @@ def _warm(quick: bool) -> list[dict[str, Any]]:
         figure("warm, to the last bit: error in parameters", "error", errors[0.0], reach=1e-13),
         figure("warm, to the last bit: Newton steps", "ratio", iterations[0.0]),
         figure("warm, as in a solve, inside a kernel", "seconds", each["carried"], reach=0.5e-6, peers=occt),
-        figure("warm, as in a solve: error in parameters", "error", errors[CLOSE], reach=1e-13),
+        figure("warm, as in a solve: error in parameters", "error", errors[LAST_TURN], reach=1e-13),
         figure("warm, as in a solve: error in the gap", "error", gaps, reach=1e-13),
-        figure("warm, as in a solve: Newton steps", "ratio", iterations[CLOSE]),
+        figure("warm, as in a solve: Newton steps", "ratio", iterations[LAST_TURN]),
         figure("warm, one call from Python", "seconds", seconds["python"], peers=occt),
     ]
 

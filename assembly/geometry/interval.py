@@ -16,9 +16,10 @@ import math
 
 from assembly._kernel import kernel
 
-UNIT = 2.0**-52
+# The distance from one to the next double above it.
+EPSILON = 2.0**-52
 TINY = 1e-300
-LIBRARY = 8.0 * UNIT
+LIBRARY = 8.0 * EPSILON
 # Beyond this a sine is not traced to its period.
 FAR = 1e8
 
@@ -26,13 +27,13 @@ FAR = 1e8
 @kernel(inline=True)
 def down(x):
     """A double below x, and below what was rounded to x."""
-    return x - (abs(x) * UNIT + TINY)
+    return x - (abs(x) * EPSILON + TINY)
 
 
 @kernel(inline=True)
 def up(x):
     """A double above x, and above what was rounded to x."""
-    return x + (abs(x) * UNIT + TINY)
+    return x + (abs(x) * EPSILON + TINY)
 
 
 @kernel(inline=True)
@@ -47,12 +48,12 @@ def widened(lo, hi, part):
 
 @kernel(inline=True)
 def isum(a, b):
-    return widened(a[0] + b[0], a[1] + b[1], UNIT)
+    return widened(a[0] + b[0], a[1] + b[1], EPSILON)
 
 
 @kernel(inline=True)
 def idifference(a, b):
-    return widened(a[0] - b[1], a[1] - b[0], UNIT)
+    return widened(a[0] - b[1], a[1] - b[0], EPSILON)
 
 
 @kernel(inline=True)
@@ -63,7 +64,7 @@ def iproduct(a, b):
     s = a[1] * b[1]
     if not (p + q + r + s == p + q + r + s):  # zero times infinity, or both infinities: the whole line either way
         return -math.inf, math.inf
-    return widened(min(min(p, q), min(r, s)), max(max(p, q), max(r, s)), UNIT)
+    return widened(min(min(p, q), min(r, s)), max(max(p, q), max(r, s)), EPSILON)
 
 
 @kernel(inline=True)
@@ -71,7 +72,7 @@ def isquare(a):
     p = a[0] * a[0]
     q = a[1] * a[1]
     lo = 0.0 if a[0] <= 0.0 <= a[1] else min(p, q)
-    return max(lo * (1.0 - UNIT) - TINY, 0.0), up(max(p, q))
+    return max(lo * (1.0 - EPSILON) - TINY, 0.0), up(max(p, q))
 
 
 @kernel(inline=True)
@@ -84,7 +85,7 @@ def iquotient(a, b):
     s = a[1] / b[1]
     if not (p + q + r + s == p + q + r + s):
         return -math.inf, math.inf
-    return widened(min(min(p, q), min(r, s)), max(max(p, q), max(r, s)), UNIT)
+    return widened(min(min(p, q), min(r, s)), max(max(p, q), max(r, s)), EPSILON)
 
 
 @kernel(inline=True)
@@ -195,7 +196,7 @@ def iarctangent2(a, b):
     return lo, hi, False
 
 
-_GROW = 1.0 + 16.0 * UNIT
+_GROW = 1.0 + 16.0 * EPSILON
 
 
 @kernel(inline=True)
@@ -212,7 +213,7 @@ def off_of(x, o):
     c = x[o + 5] - x[o + 4]
     # Half the width, and the rounding of the middle itself.
     size = abs(x[o]) + abs(x[o + 2]) + abs(x[o + 4])
-    return _GROW * (0.5 * math.sqrt(a * a + b * b + c * c) + UNIT * size)
+    return _GROW * (0.5 * math.sqrt(a * a + b * b + c * c) + EPSILON * size)
 
 
 @kernel(inner=True, exact=True)

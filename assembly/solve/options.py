@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from assembly.errors import InputError, integer, number
 from assembly.solve.loop.settings import (
+    ALLOWED_OVERLAP,
     FEASIBILITY,
     FINAL_UPDATE,
     FIT,
@@ -20,7 +21,6 @@ from assembly.solve.loop.settings import (
     SECOND_ORDER,
     SETTINGS,
     STATIONARITY,
-    TOUCHING,
 )
 
 __all__ = ["Options", "touching_part"]
@@ -110,6 +110,6 @@ class Options:
         out[RADIUS] = self.radius
         out[FIT] = self.fit
         out[FINAL_UPDATE] = 1.0
-        out[TOUCHING] = self.touching
+        out[ALLOWED_OVERLAP] = self.touching
         out[SECOND_ORDER] = 1.0
         return out

@@ -49,7 +49,7 @@ from assembly.solve.loop.workspace import Rows
 # root as near as this to a fold (det H over |H|^2), where others are born.
 ASTRAY, SLACK, NEAR_FOLD = 0.5, 1e-3, 1e-3
 # How far the length of a quaternion may be from one.
-UNIT = 1e-2
+QUATERNION_SLACK = 1e-2
 
 
 @kernel(inner=True)
@@ -64,7 +64,7 @@ def place_bodies(store, q, poses):
             if k >= 3:
                 square += q[b, k] * q[b, k]
         length = math.sqrt(square)
-        if not abs(length - 1.0) <= UNIT:
+        if not abs(length - 1.0) <= QUATERNION_SLACK:
             return False
         for k in range(3):
             poses[b, k] = (q[b, k] - units.reference[k]) / units.scale

@@ -178,7 +178,7 @@ class Manager(OwnState):
         new_places[len(places) :, manager_records.PLACE_PAIR] = -1.0
         new_events[:] = events
         # Every pair is updated once more.
-        new_pairs[:, manager_records.TURN] = nan
+        new_pairs[:, manager_records.PAIR_TURN] = nan
         self._poses[:] = old[2]
         self._tracked[: len(places)] = old[3]
 
@@ -319,7 +319,7 @@ class Manager(OwnState):
         """
         pairs = self._parts(self._packed, self._memory)[0]
         left = np.where(
-            np.isnan(pairs[:, manager_records.TURN]),
+            np.isnan(pairs[:, manager_records.PAIR_TURN]),
             -inf,
             pairs[:, manager_records.MOTION_BOUND] * (1.0 - pairs[:, manager_records.PART]),
         )

@@ -25,13 +25,14 @@ from assembly.proximity.manager.records import (
     MARK_AT,
     MEMORY_HEADER,
     PAIR_MEMORY,
+    PAIR_TURN,
     PAIRS,
-    TURN,
     VERTEX_CONTACTS,
 )
 from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.parameters import ROUNDING
 from assembly.solve.loop.settings import (
+    ALLOWED_OVERLAP,
     BUDGET,
     CARRIED,
     CARRIES,
@@ -47,7 +48,6 @@ from assembly.solve.loop.settings import (
     SOLVED,
     STATIONARITY,
     TICK,
-    TOUCHING,
     VIOLATION,
     WARM_START,
 )
@@ -84,7 +84,7 @@ def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
     state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, STAYS] = 0.0
     if packed.table[record + MARK_AT]:
         pairs = state[packed.memory_at + MEMORY_HEADER :][: PAIR_MEMORY * int(packed.table[record + PAIRS])]
-        pairs.reshape(-1, PAIR_MEMORY)[:, TURN] = np.nan
+        pairs.reshape(-1, PAIR_MEMORY)[:, PAIR_TURN] = np.nan
 
 
 def _held_to(begin: Solution) -> Solution:
@@ -129,7 +129,7 @@ def _tick_settings(limit: float, iterations: int, second_order: bool) -> Array:
     settings[ITERATIONS] = integer("iterations", iterations, 1, 1000)
     settings[TICK] = 1.0
     # A tick begins where the last one ended: what bodies may be in each other there was told at the start.
-    settings[TOUCHING] = 0.0
+    settings[ALLOWED_OVERLAP] = 0.0
     settings[FINAL_UPDATE] = 0.0
     settings[SECOND_ORDER] = float(second_order)
     return settings

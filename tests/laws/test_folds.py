@@ -315,6 +315,6 @@ def test_pairs_are_looked_at_that_need_it(by_spines, part, as_needed, in_turns, 
             manager = manager_records.ContactManager(Store(table, clips.pool), watch_at, clips.memory)
             place = mover(manager_records.pair_of(manager, p), clips.q).shift
             ball = MotionBall((0.0, 0.0, 0.0), place, 0.0)
-            allow_ball(manager_records.pair_state_of(manager, p), ball, np.inf, motion_bounds.STILL * 1e-3)
+            allow_ball(manager_records.pair_state_of(manager, p), ball, np.inf, motion_bounds.UNMOVED * 1e-3)
         clips.q[1, 2] += 1e-3 * part
         assert clips.looked(how) == count

@@ -211,7 +211,7 @@ def seen(packed: Packed, state: np.ndarray) -> int:
     pairs = pairs[: manager_records.PAIR_MEMORY * len(packed.clearance_pairs[0])].reshape(
         -1, manager_records.PAIR_MEMORY
     )
-    return int((~np.isnan(pairs[:, manager_records.TURN])).sum())
+    return int((~np.isnan(pairs[:, manager_records.PAIR_TURN])).sum())
 
 
 def test_one_update_of_many_pairs_asks(crowded):

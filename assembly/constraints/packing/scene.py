@@ -192,7 +192,7 @@ class Packed:
         pool = np.zeros(layout.POOL_HEADER)
         pool[layout.SCALE] = self.scale
         pool[layout.REFERENCE : layout.REFERENCE + 3] = self.reference
-        pool[layout.UNIT] = self.unit
+        pool[layout.OBJECTIVE_UNIT] = self.unit
         return pool
 
     def _write_rows(

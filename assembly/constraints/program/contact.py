@@ -19,7 +19,7 @@ from assembly.geometry.splines.evaluate import surface_at, surface_point
 from assembly.geometry.splines.pole import limits, nearest_pole, polar_step
 from assembly.geometry.vec import blend, dot, matvec, scale, sub
 from assembly.kinematics.motion import relative_pose, rotation
-from assembly.proximity.extrema.face_face import CLOSE, CONVERGED, LEFT_PATCH, SINGULAR, own_frame, solve_pair
+from assembly.proximity.extrema.face_face import CONVERGED, LAST_TURN, LEFT_PATCH, SINGULAR, own_frame, solve_pair
 from assembly.proximity.extrema.feature_pair import two_face_frame
 from assembly.proximity.extrema.rates import RATES, RECORD, derivatives_at, gradient_row
 from assembly.proximity.features.solid_contact import (
@@ -115,7 +115,7 @@ def track_contact(store, q, start, patience, records, k):
     pose = relative_pose(q, i, turn, j, rotation(q, j))
     surfaces = (contact.surface_f, contact.surface_g)
     x = (start[k, 0], start[k, 1], start[k, 2], start[k, 3])
-    found = solve_pair(store, surfaces, pose, x, 1.0, patience, CLOSE, False)
+    found = solve_pair(store, surfaces, pose, x, 1.0, patience, LAST_TURN, False)
     status, frame, x = found.status, found.frame, found.parameters
     apart = sub(frame.point_g, frame.point_f)
     distance = math.sqrt(dot(apart, apart))

@@ -55,7 +55,7 @@ RECORD = size_of(JOINT_FRAMES)
 # A vector shorter than this is rounding, and so is its direction.
 UNDEFINED = 1e-12
 # The least distance, and sine of an angle, by which the curvatures of DISTANCE and ANGLE are divided.
-CLOSE = 1e-6
+LEAST_DIVISOR = 1e-6
 # The same for SWING where the axes are opposed: its gradient grows there, too.
 OPPOSED = 1e-3
 # The slope of TURN is no steeper than where |z_a + z_b| is this, that of AZIMUTH than where the sine of v to z_a is.
@@ -294,7 +294,7 @@ def add_point_terms(kind, component, records, k, y, hessian, f, g):
             n = world_axis(component, y)
         else:
             length, direction = distance_direction(records, k)
-            w = y / max(length, CLOSE)
+            w = y / max(length, LEAST_DIVISOR)
             n = scale(y, direction)
             if f >= 0:
                 add_stretch(hessian, f, f, arm_f, arm_f, direction, w)
@@ -353,7 +353,7 @@ def turning_form(kind, component, records, k):
     else:
         # K = (c (I - h h^T) - sym(z_a z_b^T)) / s.
         cosine, s, h = tilt(records, k)
-        steep = 1.0 / max(s, CLOSE)
+        steep = 1.0 / max(s, LEAST_DIVISOR)
         a = scale(-steep, z)
         b = load_row(records, k, AXES_B + 6)
         t = -steep * cosine

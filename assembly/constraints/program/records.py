@@ -241,7 +241,7 @@ POOL_HEADER_RECORD = record_dtype(
 pool_header_at = record_view(POOL_HEADER_RECORD)
 SCALE = place_of(POOL_HEADER_RECORD, "scale")
 REFERENCE = place_of(POOL_HEADER_RECORD, "reference")
-UNIT = place_of(POOL_HEADER_RECORD, "unit")
+OBJECTIVE_UNIT = place_of(POOL_HEADER_RECORD, "unit")
 ZERO = place_of(POOL_HEADER_RECORD, "zero")
 POOL_HEADER = size_of(POOL_HEADER_RECORD)
 # Figures that a solve leaves in its state, behind poses, tracked values, multipliers and residuals.

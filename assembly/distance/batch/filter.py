@@ -26,7 +26,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.distance.enclosures.enclosure import hull_support
 from assembly.distance.enclosures.gjk import INSIDE, OVERLAP, POINT, ROOM, ConvexSet, gjk, simplex_at, support_point
-from assembly.geometry.interval import UNIT, down, up
+from assembly.geometry.interval import EPSILON, down, up
 from assembly.geometry.vec import dot
 
 # Of a pair: proven apart, a point within the clearance, open at the tolerance.
@@ -56,7 +56,7 @@ def boxes_apart(points, o, count, boxes, j, reach):
         d = max(boxes[j, k] - hi, lo - boxes[j, 3 + k])
         if d > 0.0:
             gap += d * d
-    return math.sqrt(gap) * (1.0 - 8.0 * UNIT) > reach
+    return math.sqrt(gap) * (1.0 - 8.0 * EPSILON) > reach
 
 
 @kernel(inline=True)
@@ -84,7 +84,7 @@ def in_polygon(x, y, obstacles, polygons, j, off):
         d = obstacles[p + 1] - y
         m = abs(a) + abs(b)
         n = abs(c) + abs(d)
-        if not (a * d - b * c > 2.0 * off * (m + n) + 16.0 * UNIT * m * n):
+        if not (a * d - b * c > 2.0 * off * (m + n) + 16.0 * EPSILON * m * n):
             return False
         a = c
         b = d
@@ -179,7 +179,7 @@ def end_is_near(full, points, o, hulls, j, clearance, off, g):
     how, v, _kept = gjk(full, ConvexSet(g, POINT, 1, -1.0), hull_of(hulls, j), first, clearance, 1e-12, g)
     if how == INSIDE:
         return True
-    return up(math.sqrt(dot(v, v)) * (1.0 + 8.0 * UNIT)) + off <= clearance
+    return up(math.sqrt(dot(v, v)) * (1.0 + 8.0 * EPSILON)) + off <= clearance
 
 
 @kernel(inner=True, exact=True)
@@ -206,7 +206,7 @@ def is_apart(full, curve, hulls, j, clearance, g):
     c = (points[0], points[1], points[2])
     high = hull_support(points, 0, degree + 1, n, c)
     high += hull_support(hull.points, hull.at, hull.count, (-n[0], -n[1], -n[2]), c)
-    return down(-high - off) * (1.0 - 8.0 * UNIT) > clearance
+    return down(-high - off) * (1.0 - 8.0 * EPSILON) > clearance
 
 
 @kernel(inline=True, exact=True)
@@ -290,7 +290,7 @@ def parted(points, o, count, directions, supports, j, reach):
     for i in range(o, o + 3 * count):
         most = max(most, abs(points[i]))
     # Three products, two sums and a difference of numbers below the first, and the rounding of the support.
-    least = up(reach + 16.0 * UNIT * most) * (1.0 + 8.0 * UNIT)
+    least = up(reach + 16.0 * EPSILON * most) * (1.0 + 8.0 * EPSILON)
     for k in range(directions.shape[0]):
         x, y, z = directions[k, 0], directions[k, 1], directions[k, 2]
         edge = supports[j, k] + least
@@ -346,7 +346,7 @@ def near_pairs(full, pieces, obstacles, clearance, tolerance, out):
             for k in range(3):
                 points[3 * m + k] = f * pool[place + 4 * m + k]
                 most = max(most, abs(points[3 * m + k]))
-        off = (64.0 * degree + 64.0) * UNIT * most
+        off = (64.0 * degree + 64.0) * EPSILON * most
         looked = full == 3 and not rational
         if looked:
             if filled != degree:

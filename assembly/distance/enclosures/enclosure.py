@@ -33,7 +33,7 @@ from assembly.geometry.expression.formula import (
     range_bounds,
     refine,
 )
-from assembly.geometry.interval import _GROW, UNIT, down, middle_of, most, off_of, up
+from assembly.geometry.interval import _GROW, EPSILON, down, middle_of, most, off_of, up
 from assembly.geometry.splines import bezier_ranges
 from assembly.geometry.splines.bezier_ranges import (
     bezier_point_bounds,
@@ -159,7 +159,7 @@ def fill_piece(kind, table, pool, workspace, x, o):
         root = _GROW * step * step * root
         width = _GROW * root * root
         arc = min(arc, _GROW * step * most(x, o + SPEED))
-        least = max(0.0, chord * (1.0 - 8.0 * UNIT) - 2.0 * piece.off)
+        least = max(0.0, chord * (1.0 - 8.0 * EPSILON) - 2.0 * piece.off)
         across = arc - least if arc > least else 0.0
         # u^2 - |chi|^2 as a product: sums of squares would cancel once more.
         other = _GROW * across * (arc + least) if arc < math.inf else math.inf
@@ -234,7 +234,7 @@ def along(x, o, n, c):
     a = n[0] * (x[o] - c[0])
     b = n[1] * (x[o + 1] - c[1])
     d = n[2] * (x[o + 2] - c[2])
-    return a + b + d, 4.0 * UNIT * (abs(a) + abs(b) + abs(d))
+    return a + b + d, 4.0 * EPSILON * (abs(a) + abs(b) + abs(d))
 
 
 @kernel(inner=True, exact=True)
@@ -270,7 +270,7 @@ def piece_support(x, o, n, c, bound):
                 continue
             p = n[k] * piece.bend[2 * k]
             q = n[k] * piece.bend[2 * k + 1]
-            least += min(p, q) - UNIT * 4.0 * max(abs(p), abs(q)) - 1e-300
+            least += min(p, q) - EPSILON * 4.0 * max(abs(p), abs(q)) - 1e-300
         step = up(piece.t1 - piece.t0)
         # q / 2 of the heading.
         bulge = _GROW * 0.5 * step * step * max(0.0, -least)
@@ -287,13 +287,13 @@ def piece_support(x, o, n, c, bound):
                 continue
             p = n[k] * (piece.box[2 * k] - c[k])
             q = n[k] * (piece.box[2 * k + 1] - c[k])
-            high += max(p, q) + UNIT * 4.0 * max(abs(p), abs(q))
+            high += max(p, q) + EPSILON * 4.0 * max(abs(p), abs(q))
         if high == high:
             boxed = high
     best = min(best + slack, boxed)
     if not (best < math.inf):
         return math.inf
-    return up(best + 4.0 * UNIT * abs(best))
+    return up(best + 4.0 * EPSILON * abs(best))
 
 
 @kernel(inner=True, exact=True)
@@ -312,7 +312,7 @@ def separation_along(xa, oa, xb, ob, count_b, n, bound):
     else:
         high_b = piece_support(xb, ob, back, c, bound)
     # The direction is a unit one up to two units.
-    lower = down(-high_a - high_b) * (1.0 - 8.0 * UNIT)
+    lower = down(-high_a - high_b) * (1.0 - 8.0 * EPSILON)
     return lower if lower > 0.0 else 0.0
 
 
@@ -335,4 +335,4 @@ def supports(x, directions, bound, out):
         c = (piece.pm[0], piece.pm[1], piece.pm[2])
         shift = n[0] * c[0] + n[1] * c[1] + n[2] * c[2]
         size = abs(n[0] * c[0]) + abs(n[1] * c[1]) + abs(n[2] * c[2])
-        out[i] = up(piece_support(x, 0, n, c, bound) + shift + 8.0 * UNIT * size)
+        out[i] = up(piece_support(x, 0, n, c, bound) + shift + 8.0 * EPSILON * size)

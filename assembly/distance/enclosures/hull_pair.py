@@ -26,7 +26,7 @@ from assembly.distance.enclosures.node import (
     search_state_at,
 )
 from assembly.distance.enclosures.search import about_center
-from assembly.geometry.interval import UNIT, down, up
+from assembly.geometry.interval import EPSILON, down, up
 from assembly.geometry.vec import dot, sub
 
 
@@ -62,7 +62,7 @@ def overlap_proven(full, a, count_a, b, count_b, slack, g):
                 break
             differences(g, kept)
             # Differences are rounded once more, by their size at most.
-            if not inside_proven(full, g, origin, off + slack + 16.0 * UNIT * farthest):
+            if not inside_proven(full, g, origin, off + slack + 16.0 * EPSILON * farthest):
                 break
             proven += 1
         if proven == full:
@@ -91,7 +91,7 @@ def hull_distance(full, a, count_a, b, count_b, state):
         x, y = witnesses(g, kept)
         differences(g, kept)
         first = vertex(g, 0)
-        off = 4.0 * UNIT * (abs(first[0]) + abs(first[1]) + abs(first[2])) + slack
+        off = 4.0 * EPSILON * (abs(first[0]) + abs(first[1]) + abs(first[2])) + slack
         if inside_proven(full, g, (0.0, 0.0, 0.0), off):
             best.met = 1.0
     else:
@@ -100,17 +100,17 @@ def hull_distance(full, a, count_a, b, count_b, state):
         if size > 0.0:
             n = (-v[0] / size, -v[1] / size, -v[2] / size)
             high = hull_support(a, 0, count_a, n, x) + hull_support(b, 0, count_b, (-n[0], -n[1], -n[2]), x)
-            lower = max(0.0, down(-high) * (1.0 - 8.0 * UNIT) - slack)
+            lower = max(0.0, down(-high) * (1.0 - 8.0 * EPSILON) - slack)
     d = sub(x, y)
     off = slack
     for c in range(3):
         best.point_a[c] = x[c] + center[c]
         best.point_b[c] = y[c] + center[c]
-        off += 16.0 * UNIT * (abs(x[c]) + abs(y[c]))
+        off += 16.0 * EPSILON * (abs(x[c]) + abs(y[c]))
     if best.met == 0.0 and lower == 0.0:
         if overlap_proven(full, a, count_a, b, count_b, slack, g):
             best.met = 1.0
-    best.upper = up(math.sqrt(dot(d, d)) * (1.0 + 8.0 * UNIT) + off)
+    best.upper = up(math.sqrt(dot(d, d)) * (1.0 + 8.0 * EPSILON) + off)
     best.lower = min(lower, best.upper)
     best.count = 1.0
     return how == INSIDE

@@ -11,7 +11,7 @@ from assembly._record import Store
 from assembly.distance.enclosures.enclosure import FORMULA, HULL
 from assembly.distance.enclosures.gjk import INSIDE, POINT, ConvexSet, gjk, inside_weights, on_b, simplex_at
 from assembly.geometry.expression.formula import formula_point, formula_workspace_at
-from assembly.geometry.interval import UNIT
+from assembly.geometry.interval import EPSILON
 from assembly.geometry.splines.bezier_ranges import BEZIER_AT, piece_points, ranged_curve_at, value, weighted_point_at
 from assembly.geometry.vec import blend, dot, sub
 
@@ -74,7 +74,7 @@ def hull_point(full, points, count, x, g):
         d = sub(on_b(g, k), last)
         b = blend(1.0, b, simplex.weights[k], d)
         off += 8.0 * (abs(d[0]) + abs(d[1]) + abs(d[2]))
-    return b, kept, how == INSIDE, UNIT * (off + abs(b[0]) + abs(b[1]) + abs(b[2]))
+    return b, kept, how == INSIDE, EPSILON * (off + abs(b[0]) + abs(b[1]) + abs(b[2]))
 
 
 @kernel(inline=True)

@@ -35,7 +35,7 @@ from assembly.distance.enclosures.taylor import (
     turn_values,
 )
 from assembly.geometry.expression.formula import formula_head_at
-from assembly.geometry.interval import UNIT, middle_of, off_of, up
+from assembly.geometry.interval import EPSILON, middle_of, off_of, up
 from assembly.geometry.vec import add, cross, dot, scale, sub
 
 # What a search knows of the distance, and the best points.
@@ -112,7 +112,7 @@ def inside_proven(full, g, x, off):
         u = cross(p, q)[2]
         v = cross(q, r)[2]
         w = cross(r, p)[2]
-        least = 2.0 * off * (a + b + c) + 16.0 * UNIT * (a * b + b * c + c * a)
+        least = 2.0 * off * (a + b + c) + 16.0 * EPSILON * (a * b + b * c + c * a)
         return min(u, v, w) > least or max(u, v, w) < -least
     s = sub(on_b(g, 3), x)
     d = math.sqrt(dot(s, s))
@@ -121,7 +121,7 @@ def inside_proven(full, g, x, off):
     w = dot(p, cross(q, s))
     z = -dot(p, cross(q, r))
     farthest = max(max(a, b), max(c, d))
-    least = (8.0 * off + 64.0 * UNIT * farthest) * farthest * farthest
+    least = (8.0 * off + 64.0 * EPSILON * farthest) * farthest * farthest
     return min(min(u, v), min(w, z)) > least or max(max(u, v), max(w, z)) < -least
 
 
@@ -146,7 +146,7 @@ def surrounded(full, points, count, x, off, g):
         farthest = max(farthest, dot(d, d))
     farthest = math.sqrt(farthest)
     # What the sums below are rounded by.
-    off += 4.0 * UNIT * (abs(x[0]) + abs(x[1]) + abs(x[2]) + farthest)
+    off += 4.0 * EPSILON * (abs(x[0]) + abs(x[1]) + abs(x[2]) + farthest)
     for part in NEAR_BY:
         proven = 0
         for k in range(full):
@@ -183,7 +183,7 @@ def meet_points(search, a, off_a, b, off_b):
             return 0.0, a, full
         # For what carries the point.
         b, kept, _inside, off_b = hull_point(full, points, count, a, g)
-    return up(distance * (1.0 + 8.0 * UNIT) + off_a + off_b), b, kept
+    return up(distance * (1.0 + 8.0 * EPSILON) + off_a + off_b), b, kept
 
 
 @kernel(inner=True, exact=True)
@@ -258,7 +258,7 @@ def hull_taylor(search, oa, kept, new, s):
     hessian = box_hessian(y, 0, zero, 0)
     piece, still = enclosed_piece_at(y, 0), enclosed_piece_at(zero, 0)
     lower, convex = taylor_bound(piece, still, hessian, ValuesAt(y, MID, s), ValuesAt(zero, MID, 0.0))
-    lower = lower * (1.0 - 32.0 * UNIT) - worst
+    lower = lower * (1.0 - 32.0 * EPSILON) - worst
     # Across a vertex the distance itself is seen; across others a lower bound of it, whose slope tells nothing.
     return max(lower, 0.0), convex, hessian.empty and worst == 0.0 and kept == 1
 

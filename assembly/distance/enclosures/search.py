@@ -36,7 +36,7 @@ from assembly.distance.enclosures.gjk import ROOM
 from assembly.distance.enclosures.node import EnclosedShape, EnclosureSearch, bound_node, domain_of, search_state_at
 from assembly.distance.enclosures.taylor import crossing_proven, point_piece
 from assembly.distance.piece_search import Question
-from assembly.geometry.interval import UNIT
+from assembly.geometry.interval import EPSILON
 from assembly.geometry.splines.bezier_ranges import ranged_curve_at
 
 # Why a search ended.
@@ -100,7 +100,7 @@ def about_center(points, count, center):
         moved[k] = points[k] - center[k % 3]
         most = max(most, abs(moved[k]))
     # Half a unit of each coordinate, of which there are three.
-    return moved, UNIT * most
+    return moved, EPSILON * most
 
 
 @kernel(inline=True)

@@ -26,7 +26,7 @@ from assembly.distance.enclosures.enclosure import (
     SPEED,
     enclosed_piece_at,
 )
-from assembly.geometry.interval import UNIT, down, idifference, iproduct, isquare, isum, magnitude, up
+from assembly.geometry.interval import EPSILON, down, idifference, iproduct, isquare, isum, magnitude, up
 from assembly.geometry.vec import cross, dot, sub
 
 # What second derivatives tell of a box: nothing, that F is convex, that no minimum is inside.
@@ -50,9 +50,9 @@ def slope_minimum(g, h, reach):
         return 0.0
     linear = g * reach
     square = 0.5 * h * reach * reach
-    best = min(0.0, linear + square - 4.0 * UNIT * (abs(linear) + abs(square)) - 1e-300)
-    if h > 0.0 and g < 0.0 and -g < h * reach * (1.0 + 4.0 * UNIT):
-        best = min(best, -0.5 * g * g / h * (1.0 + 8.0 * UNIT))
+    best = min(0.0, linear + square - 4.0 * EPSILON * (abs(linear) + abs(square)) - 1e-300)
+    if h > 0.0 and g < 0.0 and -g < h * reach * (1.0 + 4.0 * EPSILON):
+        best = min(best, -0.5 * g * g / h * (1.0 + 8.0 * EPSILON))
     return best
 
 
@@ -108,14 +108,14 @@ def taylor_bound(piece_a, piece_b, hessian, a, b):
         gt = idifference(gt, iproduct(r, pair(b.block, b.at + 6, k)))
     if not (gs[1] - gs[0] < math.inf and gt[1] - gt[0] < math.inf):
         return 0.0, False
-    low = 0.5 * total * (1.0 - 4.0 * UNIT)
+    low = 0.5 * total * (1.0 - 4.0 * EPSILON)
     low += min(slope_minimum(gs[0], p, up(piece_a.t1 - s)), slope_minimum(-gs[1], p, up(s - piece_a.t0)))
     low += min(slope_minimum(gt[0], q, up(piece_b.t1 - t)), slope_minimum(-gt[1], q, up(t - piece_b.t0)))
-    low -= 4.0 * UNIT * total
+    low -= 4.0 * EPSILON * total
     convex = (p > 0.0 or reach_s == 0.0) and (q > 0.0 or reach_t == 0.0)
     if not (low > 0.0):
         return 0.0, convex
-    return down(math.sqrt(2.0 * low)) * (1.0 - 4.0 * UNIT), convex
+    return down(math.sqrt(2.0 * low)) * (1.0 - 4.0 * EPSILON), convex
 
 
 @kernel(inner=True, exact=True)
@@ -198,7 +198,7 @@ def across_feature(xa, oa, points, count, feature, n, y):
         seen.speed[2 * row], seen.speed[2 * row + 1] = turned(xa, oa + SPEED, n, row, none)
         seen.bend[2 * row], seen.bend[2 * row + 1] = turned(xa, oa + BEND, n, row, none)
         turn_values(xa, oa + MID, n, row, v, y, MID)
-    near = math.sqrt(near) * (1.0 - 8.0 * UNIT)
+    near = math.sqrt(near) * (1.0 - 8.0 * EPSILON)
     worst = 0.0
     for z in range(count):
         d = sub((points[3 * z], points[3 * z + 1], points[3 * z + 2]), v)
@@ -208,14 +208,14 @@ def across_feature(xa, oa, points, count, feature, n, y):
         for row in range(3):
             o = 3 * row
             c = n[o] * d[0] + n[o + 1] * d[1] + n[o + 2] * d[2]
-            slack = 8.0 * UNIT * size if n[o] != 0.0 or n[o + 1] != 0.0 or n[o + 2] != 0.0 else 0.0
+            slack = 8.0 * EPSILON * size if n[o] != 0.0 or n[o + 1] != 0.0 or n[o + 2] != 0.0 else 0.0
             inner = isum(inner, iproduct((c - slack, c + slack), (seen.box[2 * row], seen.box[2 * row + 1])))
             small += (abs(c) + slack) * (abs(c) + slack)
         # By the angle to the direction, or by the length across alone, which is a rounding for the feature's own.
         if inner[1] > 0.0:
-            excess = math.sqrt(small) * (1.0 + 8.0 * UNIT)
+            excess = math.sqrt(small) * (1.0 + 8.0 * EPSILON)
             if near > 0.0:
-                excess = min(excess, inner[1] / near * (1.0 + 8.0 * UNIT))
+                excess = min(excess, inner[1] / near * (1.0 + 8.0 * EPSILON))
             worst = max(worst, excess)
     return worst
 
@@ -283,5 +283,5 @@ def crossing_proven(xa, oa, xb, ob):
         left = idifference(one, isum(iproduct(c0, a0), iproduct(c1, a1)))
         right = idifference(two, isum(iproduct(c0, b0), iproduct(c1, b1)))
         total = up(magnitude(newton) + up(magnitude(left) * h) + up(magnitude(right) * k))
-        inside = inside and total * (1.0 + 8.0 * UNIT) < (h if row == 0 else k)
+        inside = inside and total * (1.0 + 8.0 * EPSILON) < (h if row == 0 else k)
     return inside

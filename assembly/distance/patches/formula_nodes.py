@@ -45,7 +45,7 @@ from assembly.geometry.expression.formula import (
     range_bounds,
     refine,
 )
-from assembly.geometry.interval import UNIT, idifference, magnitude, middle_of, most, off_of, up
+from assembly.geometry.interval import EPSILON, idifference, magnitude, middle_of, most, off_of, up
 from assembly.geometry.splines.bezier_ranges import WEIGHTED, weighted_point_at
 
 NONE = 1e100
@@ -115,7 +115,7 @@ def spread(x, o, m):
         c = known_middle(x, m, k)
         d = magnitude(idifference((x[o + 2 * k], x[o + 2 * k + 1]), (c, c)))
         total += d * d
-    return math.sqrt(total) * (1.0 + 8.0 * UNIT)
+    return math.sqrt(total) * (1.0 + 8.0 * EPSILON)
 
 
 @kernel(inline=True)
@@ -154,7 +154,7 @@ def describe_formula(curve, short, nodes, o, x):
         node.box_center[k] = c
         node.box_half[k] = r
     speed = h * most(x, _SPEED)
-    grow = 1.0 + 64.0 * UNIT
+    grow = 1.0 + 64.0 * EPSILON
     off = off_of(x, _MIDDLE)
     off_j = h * off_of(x, _MIDDLE + _SPEED)
     off_k = h * h * off_of(x, _MIDDLE + _BEND)
@@ -206,9 +206,9 @@ def describe_formula(curve, short, nodes, o, x):
     begin.weight = 1.0
     inner.weight = 1.0
     end.weight = 1.0
-    node.e0 = bounded(e0 * grow + 8.0 * UNIT * size)
-    node.e1 = bounded(e1 * grow + 8.0 * UNIT * size)
-    node.e2 = bounded(e2 * grow + 8.0 * UNIT * size)
+    node.e0 = bounded(e0 * grow + 8.0 * EPSILON * size)
+    node.e1 = bounded(e1 * grow + 8.0 * EPSILON * size)
+    node.e2 = bounded(e2 * grow + 8.0 * EPSILON * size)
 
 
 @kernel(inner=True, exact=True)
@@ -232,7 +232,7 @@ def formula_derivatives(curve, nodes, o, x, w):
         work.patch_k[k] = h * h * known_middle(workspace, at + _BEND, k)
         size += abs(work.patch_j[k])
     work.off[0] = bounded(off_of(workspace, at))
-    work.off[1] = bounded(h * off_of(workspace, at + _SPEED) + 2.0 * UNIT * size)
+    work.off[1] = bounded(h * off_of(workspace, at + _SPEED) + 2.0 * EPSILON * size)
     work.off[2] = up(up(t - t0) / h)
     work.off[3] = up(up(t1 - t) / h)
     return known_middle(workspace, at, 0), known_middle(workspace, at, 1), known_middle(workspace, at, 2)

@@ -22,7 +22,7 @@ from assembly._record import Store
 from assembly.geometry.expression.instructions import Tape, compact, instructions, packed
 from assembly.geometry.expression.tape import ADD, CONST, COUNT, DIV, HEAD, INPUT, INSTRUCTION, MUL, OUTPUT, SUB, WORK
 from assembly.geometry.expression.tape_bounds import run_bounds
-from assembly.geometry.interval import LIBRARY, TINY, UNIT
+from assembly.geometry.interval import EPSILON, LIBRARY, TINY
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -69,7 +69,7 @@ def _error_of(name: str, known: list[tuple[float, float, float]], most: float) -
     lo, hi, error = known[0]
     large = max(abs(lo), abs(hi))
     least = 0.0 if lo <= 0.0 <= hi else min(abs(lo), abs(hi))
-    own = UNIT * most + TINY
+    own = EPSILON * most + TINY
     if name in ("ADD", "SUB"):
         return error + known[1][2] + own
     if name in ("MUL", "DIV"):
@@ -120,7 +120,7 @@ def upper_expression(ends: ca.SX, expression: ca.SX, domain: tuple[float, float]
         return e + rounding_error(ends, e, domain), 1
 
     bound, count = above(expression)
-    upper = bound * (1.0 + (count + 4) * UNIT)
+    upper = bound * (1.0 + (count + 4) * EPSILON)
     names = set()
     for name, _out, arguments in instructions(compact("upper", ends, upper)):
         names.add(name)

@@ -77,9 +77,9 @@ from assembly.geometry.expression.tape import (
     tape_at,
 )
 from assembly.geometry.interval import (
+    EPSILON,
     FAR,
     LIBRARY,
-    UNIT,
     iarctangent2,
     icosine,
     idifference,
@@ -359,7 +359,7 @@ def run_bounds(store, o, x, work, y):
             b = iquotient(a, (work[j], work[j + np.uint64(1)]))
         elif code == SQRT:
             if a[1] >= 0.0:
-                lo, hi = widened(math.sqrt(max(a[0], 0.0)), math.sqrt(a[1]), UNIT)
+                lo, hi = widened(math.sqrt(max(a[0], 0.0)), math.sqrt(a[1]), EPSILON)
                 b = (max(lo, 0.0), hi)
             else:
                 b = (-math.inf, math.inf)

@@ -21,7 +21,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, size_of
-from assembly.geometry.interval import UNIT, idifference, iproduct, iquotient, up, widened
+from assembly.geometry.interval import EPSILON, idifference, iproduct, iquotient, up, widened
 
 # A curve of pieces in the table.
 RANGED_CURVE = record_dtype(
@@ -127,7 +127,7 @@ def error_of(store, order):
 @kernel(inline=True)
 def units(table):
     """Roundings of a value, as a part of the largest."""
-    return (16.0 * ranged_curve_at(table, 0).degree + 32.0) * UNIT
+    return (16.0 * ranged_curve_at(table, 0).degree + 32.0) * EPSILON
 
 
 @kernel(inner=True, exact=True)
@@ -144,7 +144,7 @@ def project(store, free, count, workspace, at):
             lo = min(lo, x)
             hi = max(hi, x)
         if k < 3:
-            workspace[at + 2 * k], workspace[at + 2 * k + 1] = widened(lo - off, hi + off, 2.0 * UNIT)
+            workspace[at + 2 * k], workspace[at + 2 * k + 1] = widened(lo - off, hi + off, 2.0 * EPSILON)
         else:
             workspace[at + 6], workspace[at + 7] = lo * (1.0 - 2.0 * part), hi * (1.0 + 2.0 * part)
 
@@ -196,7 +196,7 @@ def bezier_point_bounds(store, span, s, workspace, at):
             continue
         for k in range(4):
             lo, hi = workspace[free + k] - error, workspace[free + k] + error
-            workspace[at + 8 * order + 2 * k], workspace[at + 8 * order + 2 * k + 1] = widened(lo, hi, UNIT)
+            workspace[at + 8 * order + 2 * k], workspace[at + 8 * order + 2 * k + 1] = widened(lo, hi, EPSILON)
     if curve.rational == 0:
         for order in range(1, 3):
             for k in range(6):
@@ -217,8 +217,8 @@ def bezier_range_bounds(store, span, s0, s1, workspace):
     work.width = math.inf
     free = BEZIER_AT
     if not polynomial:
-        s0 *= 1.0 - 4.0 * UNIT
-        s1 = min(s1 * (1.0 + 4.0 * UNIT), 1.0)
+        s0 *= 1.0 - 4.0 * EPSILON
+        s1 = min(s1 * (1.0 + 4.0 * EPSILON), 1.0)
     for order in range(4):
         o, n = piece_points(store.table, span, order)
         error = error_of(store, order)
@@ -238,7 +238,7 @@ def bezier_range_bounds(store, span, s0, s1, workspace):
                 lo = min(lo, x)
                 hi = max(hi, x)
             place = RANGES + 8 * order + 2 * k
-            workspace[place], workspace[place + 1] = widened(lo - error, hi + error, UNIT)
+            workspace[place], workspace[place + 1] = widened(lo - error, hi + error, EPSILON)
         if polynomial and order == 1:
             work.width = gram_width(store, n, s1 - s0, workspace, free, error)
     if polynomial:
@@ -274,6 +274,6 @@ def gram_width(store, n, step, workspace, at, error):
             off += store.pool[g + (n + 1) * i + j] * abs(scalar)
     # Points are off by `error` each, and a mean by as much: in the norm of the variance, which is at most the largest
     # of them. Sums of (n + 1)^2 positive and negative terms are off by that many units of their absolute sum.
-    root = math.sqrt(max(total, 0.0) + UNIT * (n + 2.0) * (n + 2.0) * off) * (1.0 + 8.0 * UNIT)
-    root += 2.0 * math.sqrt(3.0) * (error + UNIT * (n + 2.0) * largest_at(store.pool, curve.largest).orders[1])
+    root = math.sqrt(max(total, 0.0) + EPSILON * (n + 2.0) * (n + 2.0) * off) * (1.0 + 8.0 * EPSILON)
+    root += 2.0 * math.sqrt(3.0) * (error + EPSILON * (n + 2.0) * largest_at(store.pool, curve.largest).orders[1])
     return up(up(step * root) * up(step * root))

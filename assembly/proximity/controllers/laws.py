@@ -31,7 +31,7 @@ from assembly.proximity.extrema.feedback import descent_step, end_of
 # The record of the surface that is controlled.
 F = 0
 # Forms of the projections.
-UNIT, COVARIANT, CONTRAVARIANT = 0, 1, 2
+UNIT_FORM, COVARIANT_FORM, CONTRAVARIANT_FORM = 0, 1, 2
 # Statuses of a run.
 CLOSEST, ON_ITS_WAY, MEETING, IRREGULAR = 0, 1, 2, 3
 # What is written of a step.
@@ -55,7 +55,7 @@ GAIN = place_of(STEP_ROW, "gain")
 ControlLaw = namedtuple(
     "ControlLaw",
     [
-        "form",  # of the projections: UNIT, COVARIANT or CONTRAVARIANT
+        "form",  # of the projections: UNIT_FORM, COVARIANT_FORM or CONTRAVARIANT_FORM
         "gain",  # 0: as large as the step allows
         "rate",  # exponential rate of the distance [1 / time]; 0: none
         "nearest",  # the distance that the rate leads to [length]
@@ -95,10 +95,10 @@ def law_weights(form, su, sv):
     e = dot(su, su)
     f = dot(su, sv)
     g = dot(sv, sv)
-    if form == COVARIANT:
+    if form == COVARIANT_FORM:
         return (1.0, 0.0, 1.0)
     det = e * g - f * f
-    if form == UNIT or not det > 1e-18 * e * g:
+    if form == UNIT_FORM or not det > 1e-18 * e * g:
         return (1.0 / math.sqrt(e) if e > 0.0 else 0.0, 0.0, 1.0 / math.sqrt(g) if g > 0.0 else 0.0)
     return (g / det, -f / det, e / det)
 
@@ -118,10 +118,10 @@ def saturate(end_u, end_v, psi, b, su, sv, form):
         held_u = end_u * psi[0] < 0.0
         held_v = end_v * psi[1] < 0.0
     if held_u and not held_v:
-        rv = -psi[1] * (1.0 / dot(sv, sv) if form == CONTRAVARIANT else b[2])
+        rv = -psi[1] * (1.0 / dot(sv, sv) if form == CONTRAVARIANT_FORM else b[2])
         held_v = end_v * rv > 0.0
     elif held_v and not held_u:
-        ru = -psi[0] * (1.0 / dot(su, su) if form == CONTRAVARIANT else b[0])
+        ru = -psi[0] * (1.0 / dot(su, su) if form == CONTRAVARIANT_FORM else b[0])
         held_u = end_u * ru > 0.0
     return 0.0 if held_u else ru, 0.0 if held_v else rv, held_u, held_v
 
@@ -373,7 +373,7 @@ def newton_change(s, d, form):
     psi = (dot(d, s[1]), dot(d, s[2]))
     h = second_form(s, d)
     m11, m12, m21, m22 = h[0], h[1], h[1], h[2]
-    if form == UNIT:
+    if form == UNIT_FORM:
         # Rows of the derivative of psi_i / |f_i|, times |f_i|.
         e = psi[0] / dot(s[1], s[1])
         g = psi[1] / dot(s[2], s[2])

@@ -40,7 +40,7 @@ from assembly.proximity.extrema.pair_matrix import (
 )
 
 # A step that turns about a pole by more than this part of the domain is taken in the pole's plane.
-TURN = 0.08
+POLE_TURN = 0.08
 # What became of a pair.
 CONVERGED, SINGULAR, LEFT_PATCH, NOT_CONVERGED = 0, 1, 2, 3
 # A parameterization counts as regular where |Su x Sv| is above this times |Su| |Sv|.
@@ -57,7 +57,7 @@ BEND = 0.5
 # below the second, and some roundings of coordinates.
 STAGNANT, HELD_STILL, HELD_ROUNDING = 1e-7, 1e-12, 4e-15
 # A step that turns the normals by less leaves an error below rounding when a solve carries the frame along it.
-CLOSE = 2e-7
+LAST_TURN = 2e-7
 
 # A surface seen in the tangent frame of another one: [S_u S_v] = [x y] T along it.
 SeenFrame = namedtuple(
@@ -226,7 +226,7 @@ def advance(store, r, u, v, du, dv, step):
             beyond = u + du < ulo if edge == 1 else u + du > uhi
         else:
             beyond = v + dv < vlo if edge == 4 else v + dv > vhi
-        if distance < CHART or turn > TURN or beyond:
+        if distance < CHART or turn > POLE_TURN or beyond:
             u, v = polar_step(store, r, edge, u, v, step)
             return u, v, False
     return into_domain(store, r, u + du, v + dv)

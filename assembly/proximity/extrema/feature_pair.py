@@ -14,7 +14,7 @@ from assembly.kinematics.motion import inverse_pose
 from assembly.proximity.brep.records import FACE
 from assembly.proximity.extrema.edge_edge import solve_off_face
 from assembly.proximity.extrema.face_edge import face_frame, solve_on_face, turned_frame
-from assembly.proximity.extrema.face_face import CLOSE, LIMIT, pair_frame, solve_pair
+from assembly.proximity.extrema.face_face import LAST_TURN, LIMIT, pair_frame, solve_pair
 from assembly.proximity.extrema.feature_jets import FeatureFrame, NewtonLimits, face_side
 from assembly.proximity.extrema.pair_matrix import FLAT, fold_of, is_no_saddle, pair_matrix
 
@@ -105,7 +105,7 @@ def solve_features(store, f, g, pose, x, n, size, turn):
         Where it is (`proximity/extrema/feature_jets.py`).
     """
     if f.kind == FACE and g.kind == FACE:
-        found = solve_pair(store, (f.record, g.record), pose, x, size, turn, CLOSE, False)
+        found = solve_pair(store, (f.record, g.record), pose, x, size, turn, LAST_TURN, False)
         return found.status, found.parameters, two_face_frame(found.frame, found.matrix)
     return newton_on_features(store, f, g, pose, x, n, NewtonLimits(size, turn, LIMIT))
 

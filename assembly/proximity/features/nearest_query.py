@@ -17,7 +17,7 @@ from assembly.proximity.extrema.feature_pair import solve_features
 from assembly.proximity.extrema.feature_query import pose_of_second, write_pair
 from assembly.proximity.features.conforming import NEARLY, conforming_pair
 from assembly.proximity.features.global_search import APART, CROSSING, UNPROVEN, FoundPair, nearest_of_shells
-from assembly.proximity.features.penetration import PENETRATING, TOUCHING, deepest
+from assembly.proximity.features.penetration import PENETRATING, SEEMING_OVERLAP, deepest
 from assembly.proximity.features.separating_normals import WAYS, overlap_at
 from assembly.proximity.features.switching import track_features
 
@@ -93,7 +93,7 @@ def find_nearest(table, pool, shells, q, size, codes, out):
             found = FoundPair(True, beside.codes, beside.x, none, off)
         if abs(found.gap) - nearest.lower <= PROVEN * size:
             status = APART
-    if status == APART and abs(found.gap) <= TOUCHING * size:
+    if status == APART and abs(found.gap) <= SEEMING_OVERLAP * size:
         # Solids whose faces are flush have points in common before a search comes to where they cross.
         if overlap_at(store, shells, pose.rotation, found.codes, found.x, size, np.empty((WAYS, 3))):
             status = CROSSING

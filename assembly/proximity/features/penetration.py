@@ -41,7 +41,7 @@ STEPS, HALVINGS = 12, 8
 # On the way out the nearest points are good to this part of their distance: of parallel faces all are nearest.
 ROUGH = 0.01
 # Shells that are apart by this part of the size may seem to cross: rounding says so of those that touch.
-TOUCHING = 1e-12
+SEEMING_OVERLAP = 1e-12
 # A move by this part of the size parts what only touches.
 PARTED = 1e-6
 
@@ -104,7 +104,7 @@ def deepest(store, shells, pose, codes, x, size):
         b = feature_at(store.table, shell_g, 0)
         status, y, gap = global_start(store, a, b, pose, size)
         # The far side of a thin body may be nearer than where it is in the other one.
-        if (status == CONVERGED or status == SINGULAR) and gap <= TOUCHING * size:
+        if (status == CONVERGED or status == SINGULAR) and gap <= SEEMING_OVERLAP * size:
             return FoundPair(True, (0, 0), y, none, gap)
     ways = np.empty((WAYS, 3))
     count = ways_out(store, shells, pose, codes, x, size, ways)
@@ -127,14 +127,14 @@ def deepest(store, shells, pose, codes, x, size):
                     continue
                 back = walk_back(store, shells, pose, away, out.codes, out.x, size)
                 gap = back.gap
-                if not back.found or not TOUCHING * size >= gap > best.gap:
+                if not back.found or not SEEMING_OVERLAP * size >= gap > best.gap:
                     continue
                 if gap < -reach:
                     # The way back went off to another pair: it is not so far as that.
                     if gap > other.gap:
                         other = back
                     continue
-                if gap >= -TOUCHING * size:
+                if gap >= -SEEMING_OVERLAP * size:
                     # They touch here. If that is all, the least move parts them. Where they touch along a line or
                     # all over a face a search so near may not come to its proof: that none is found has to do.
                     place = add(pose.shift, scale(PARTED / reach * size, away))

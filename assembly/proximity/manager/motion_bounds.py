@@ -16,7 +16,7 @@ from assembly._record import Store
 from assembly.geometry.vec import add, dot, matvec, matvec_t, quaternion_matrix, quaternion_product, scale, sub
 from assembly.kinematics.motion import rotation
 from assembly.proximity.bvh.tree import node_at, three_of, tree_at
-from assembly.proximity.manager.parameters import MOVES, MOVES_OF_WIRES, STILL
+from assembly.proximity.manager.parameters import MOVES, MOVES_OF_WIRES, UNMOVED
 from assembly.proximity.manager.records import (
     ContactManager,
     header_of,
@@ -166,7 +166,7 @@ def part_used(manager, p, q):
         if known.sure > 0.0:
             known.doubt = moved / known.sure
     if known.sure == 0.0:
-        known.doubt = part / STILL
+        known.doubt = part / UNMOVED
     return part
 
 

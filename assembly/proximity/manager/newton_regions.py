@@ -22,7 +22,7 @@ from assembly.proximity.manager.extrema import extremum_at, is_alone
 from assembly.proximity.manager.overlap import patch_at
 
 # Steps; and below so many radians, that a step turns a normal, it is as good as there.
-STEPS, CLOSE = 6, 0.02
+STEPS, LAST_BEND = 6, 0.02
 # What became of it.
 LEFT, STAYED = -1, -2
 # Sequences whose first steps lead as close together as this part of a patch go the same way.
@@ -102,7 +102,7 @@ def stays(posed, start, half, passed, count):
         matrix = pair_matrix(a, c, frame.gap, FLAT)
         inverse, _level = across_first(a, c, r, matrix.k, matrix.h, matrix.inverse, FLAT)
         step_f, step_g, bend_f, bend_g = pair_step(a, c, r, matrix.k, inverse, 1.0)
-        if not max(bend_f, bend_g) > CLOSE:
+        if not max(bend_f, bend_g) > LAST_BEND:
             return STAYED, x, count
         # Each surface by its own measure, as in `solve_pair`.
         factor_f = bent_at_most(bend_f)

@@ -31,7 +31,7 @@ MOVES, MOVES_OF_WIRES = 12.0, 6.0
 LEAST_MOTION_BOUND = 1e-12
 # What moved by less than this part of its motion bound is where it was. Doubled: nothing. From: 1e-9 of the scene's
 # size, at the largest bounds.
-STILL = 1e-8
+UNMOVED = 1e-8
 # Folds nearer than this part of the least query margin are looked at after every move. Doubled: more updates where
 # contacts may be born. Chosen.
 NEAR_FOLD = 0.2
@@ -62,6 +62,6 @@ THIN, REFINED, FINE = 0.025, 16, 0.05
 # Motions in a box are no longer than this part of its smallest radius of curvature, and no separate motion ball is kept
 # above that part of the query margin. Doubled: bounds of turns grow faster than motions; balls that save no update.
 # Chosen.
-TURNS, MUCH = 0.5, 0.6
+TURNS, LARGEST_BALL = 0.5, 0.6
 # [radii] Points of a level valley that are listed are so far apart. Doubled: half as many rows along it. Chosen.
 SPARSE = 0.5

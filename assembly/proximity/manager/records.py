@@ -118,7 +118,7 @@ PAIR_STATE = record_dtype(
     doubt=1,  # which part of what accepted poses may go is used
 )
 pair_state_at = record_view(PAIR_STATE)
-TURN = place_of(PAIR_STATE, "turn")
+PAIR_TURN = place_of(PAIR_STATE, "turn")
 MOTION_BOUND = place_of(PAIR_STATE, "motion_bound")
 QUERY_MARGIN = place_of(PAIR_STATE, "margin")
 STATE = place_of(PAIR_STATE, "state")

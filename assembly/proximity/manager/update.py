@@ -58,8 +58,8 @@ from assembly.proximity.manager.parameters import (
     NEAR_FOLD,
     SLICE,
     SPENT,
-    STILL,
     TAKE,
+    UNMOVED,
     USED,
 )
 from assembly.proximity.manager.posed_pair import posed_pair
@@ -255,7 +255,7 @@ def keep_bounds(manager, p, search, rest, extrema):
     known.doubt = 0.0
     birth_bound, sure = search.ball_bound, search.accepted_bound
     if not is_by_patches(manager, p):
-        sure = max(sure, STILL * known.motion_bound)
+        sure = max(sure, UNMOVED * known.motion_bound)
     elif birth_bound < math.inf:
         low = nearest_fold(extrema, pair_lengths_of(manager, p).least, known.margin)
         sure = 0.0 if low <= NEAR_FOLD * lengths_of(manager).least_margin else math.inf

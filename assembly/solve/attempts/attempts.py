@@ -17,6 +17,7 @@ from assembly.solve.attempts.postures import following_none
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.settings import (
+    ALLOWED_OVERLAP,
     CONTACT_LOST,
     FIT,
     GATHER,
@@ -26,7 +27,6 @@ from assembly.solve.loop.settings import (
     OBJECTIVE,
     SCATTER,
     SOLVED,
-    TOUCHING,
     UNSURE,
     VIOLATION,
 )
@@ -144,5 +144,5 @@ def go_on_once(interruption: Interruption, packed: Packed, settings: Array, stat
     Bodies may stay in each other only by what they were where the solve began: the state has that.
     """
     settings = settings.copy()
-    settings[TOUCHING] = 0.0
+    settings[ALLOWED_OVERLAP] = 0.0
     return _run(packed, interruption, following_none(packed), settings, state)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.packing.scene import Packed
+from assembly.constraints.program.contact import TOUCHING
 from assembly.constraints.program.primitives import AZIMUTH, TURN
 from assembly.constraints.program.records import IMPLICIT, UNKNOWN_BLOCKS
 from assembly.errors import InputError
@@ -59,8 +60,6 @@ class Loop(NamedTuple):
 
 # So often values are moved, until what rows disagree by, which depends on the pose, changes by no more than this part.
 ROUNDS, SAME = 5, 1e-6
-# A one-sided row that holds by less touches.
-TOUCHING = 1e-9
 # A slope of the violation that is rounding; where the step to mend it is longer than this.
 LEVEL, NEGLIGIBLE = 1e-14, 1e-4
 # What combinations of rows may miss of what they are to balance, in parts.

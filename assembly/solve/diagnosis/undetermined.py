@@ -27,7 +27,7 @@ __all__ = ["complaint"]
 
 Array = NDArray[np.float64]
 # Rates of motions of length one that count as none, and a part of a combination of inputs that does.
-STILL, NO_PART = 1e-6, 1e-4
+NO_MOTION, NO_PART = 1e-6, 1e-4
 
 
 def complaint(scene: Assembly, packed: Packed, state: Array, task: TipTask) -> str:
@@ -41,7 +41,7 @@ def complaint(scene: Assembly, packed: Packed, state: Array, task: TipTask) -> s
     poses = _scaled(packed, rows.state)
     rates = np.array([_gradient(packed, freedom.coordinate, poses)[columns] for freedom in task.inputs]) @ motions
     left, sizes, right = np.linalg.svd(rates)
-    rank = int(np.count_nonzero(sizes > STILL))
+    rank = int(np.count_nonzero(sizes > NO_MOTION))
     listed = _listed(task.inputs)
     parts = np.linalg.norm(left[:, rank:], axis=1)
     dependent = [freedom for freedom, part in zip(task.inputs, parts, strict=True) if part > NO_PART]
@@ -55,12 +55,12 @@ def complaint(scene: Assembly, packed: Packed, state: Array, task: TipTask) -> s
     # Of the motions that turn no input, those that move the end effector.
     idle = motions @ right[rank:].T
     _, moved, within = np.linalg.svd(_end_effector_rows(packed, task, poses)[:, columns] @ idle)
-    open_ = idle @ within[: int(np.count_nonzero(moved > STILL))].T
+    open_ = idle @ within[: int(np.count_nonzero(moved > NO_MOTION))].T
     others = [freedom for item in scene.constraints if isinstance(item, Joint) for freedom in item.freedoms.values()]
     turned = [
         freedom
         for freedom in others
-        if np.abs(_gradient(packed, freedom.coordinate, poses)[columns] @ open_).max(initial=0.0) > STILL
+        if np.abs(_gradient(packed, freedom.coordinate, poses)[columns] @ open_).max(initial=0.0) > NO_MOTION
     ]
     missing = f"; {_listed(turned)} may still change" if turned else ""
     return f"inputs is [{listed}]; expected inputs that determine how the tip on {task.tip.body.name!r} moves{missing}"

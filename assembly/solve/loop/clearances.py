@@ -11,7 +11,7 @@ from assembly._kernel import kernel
 from assembly.constraints.program.contact import contact_of, copy_tracked, is_of_solids
 from assembly.constraints.program.records import header_at
 from assembly.proximity.features.solid_contact import contact_record_at
-from assembly.proximity.manager.parameters import SLICE, STILL, USED
+from assembly.proximity.manager.parameters import SLICE, UNMOVED, USED
 from assembly.proximity.manager.records import (
     IN_PLACE,
     PAIR_MEMORY,
@@ -217,7 +217,7 @@ def allowed_share(store, memory, current, trial, step, share):
             allowed = min(allowed, max(0.95 - begin, 0.05) / (end - begin))
         flank = pair_at(store.table, manager.pair_table + PAIR_RECORD * p).minimum + 1
         most = min(store.pool[flank], lengths_at(store.pool, manager.lengths).largest_margin)
-        if begin <= STILL and o.margin >= min(o.cut_short, most):
+        if begin <= UNMOVED and o.margin >= min(o.cut_short, most):
             # It was updated right here, as far out as another update would search.
             o.part = begin
     return share * allowed, False

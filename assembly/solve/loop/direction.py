@@ -12,7 +12,7 @@ from assembly.solve.linear_algebra.factorize import factorize_shifted
 from assembly.solve.loop.ends import find_ends, hold_ends
 from assembly.solve.loop.line_search import Trust, damped_step
 from assembly.solve.loop.multipliers import curvature_multipliers, leave_out, predict_active_set, weigh_rows
-from assembly.solve.loop.parameters import CLOSE, FORESEEN, KICK, LEAST_SHIFT, SADDLE, SHIFT, TINIEST_SHIFT
+from assembly.solve.loop.parameters import FORESEEN, KICK, LEAST_SHIFT, NEARLY_HELD, SADDLE, SHIFT, TINIEST_SHIFT
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import add_transposed, move, times
 
@@ -25,7 +25,7 @@ def first_shift(program, restoring, shift, violation, dual):
     slopes do, too; contacts of a clearance come and go instead.
     """
     least, off = LEAST_SHIFT, dual
-    if restoring and violation < CLOSE and header_at(program.store.table, 0).manager_record < 0:
+    if restoring and violation < NEARLY_HELD and header_at(program.store.table, 0).manager_record < 0:
         least, off = max(min(SHIFT * violation, least), TINIEST_SHIFT), violation
     return max(min(0.25 * shift, off), least)
 

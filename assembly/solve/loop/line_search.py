@@ -19,7 +19,7 @@ from assembly.solve.linear_algebra.factorize import factorize_shifted, forward_s
 from assembly.solve.loop.clearances import ends_unseen, is_too_far
 from assembly.solve.loop.dexterity import add_dexterities
 from assembly.solve.loop.ends import solve_within
-from assembly.solve.loop.parameters import BENT, HALVED, LETS_GO, SHORTENINGS, SHORTEST, TO_ROWS, TURN
+from assembly.solve.loop.parameters import BENT, HALVED, LARGEST_TURN, LETS_GO, SHORTENINGS, SHORTEST, TO_ROWS
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import add_transposed, merit, move, times
 
@@ -52,7 +52,7 @@ def damped_step(program, system, trust):
             longest = max(longest, abs(step[i]))
             if i % 6 >= 3 and i < turning:
                 turn = max(turn, abs(step[i]))
-        excess = max(turn / TURN, longest / trust.radius)
+        excess = max(turn / LARGEST_TURN, longest / trust.radius)
         if excess <= 1.5 or attempt == SHORTENINGS or not trust.damps:
             break
         # Newton's method on 1 / |step|, whose slope is |U^-T step|^2.

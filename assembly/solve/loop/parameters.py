@@ -50,7 +50,7 @@ LEAST_SHIFT = 1e-8
 SHIFT, TINIEST_SHIFT = 1e-2, 1e-13
 # [length] Rows are close to holding where they are off by less: there the shift above counts, and rows that depend on
 # each other gain nothing any more. Doubled: the shift falls sooner. From: `LEAST_SHIFT` over `SHIFT`.
-CLOSE = 1e-6
+NEARLY_HELD = 1e-6
 # [rounds] A step is computed so often for one-sided rows that it would break. Where they change places for ever, it is
 # the one without them: half of an exchange may lead uphill. Doubled: a little time where rows change places.
 # From: random rows, of which some take more than four rounds and a few in a hundred never agree.
@@ -61,7 +61,7 @@ FORESEEN = 12
 OFTEN = 25
 # [radian] The largest component of a body's rotation vector in a straight step; its angle may be sqrt(3) times as much.
 # Doubled: predictions of angles and contacts fail. From: half a turn, within which an angle is identified; a margin.
-TURN = 1.0
+LARGEST_TURN = 1.0
 # So often a step is shortened by a larger shift. Doubled: more factorizations a step. Chosen.
 SHORTENINGS = 4
 # [trials] Of a refused step: up to TO_ROWS are bent to where rows hold, then the straight one is tried anew, and up to
@@ -114,9 +114,9 @@ BACK_STEPS = 30
 # [steps] Every so many the largest violation must have halved, or rows alone are restored to see whether they can
 # hold; so many times. Doubled: contradictions are told after twice as many steps. Chosen.
 PATIENCE, RESTORATIONS = 25, 3
-# [whole steps] So many in a row that leave more than STILL of the largest violation tell that rows contradict each
+# [whole steps] So many in a row that leave more than UNCHANGED of the largest violation tell that rows contradict each
 # other; one may be by an old factor. Doubled: as many steps more. Chosen.
-STUCK, STILL = 2.0, 0.99
+STUCK, UNCHANGED = 2.0, 0.99
 # [length] Rows that are off by at most LITTLE may repeat each other, tilted by MOST_TILTED [radian]; ROUNDED is
 # rounding, in parts of what counts as held. Doubled: larger contradictions pass for tilted rows. Chosen.
 LITTLE, MOST_TILTED, ROUNDED = 1e-2, 1e-3, 0.01
@@ -124,7 +124,7 @@ LITTLE, MOST_TILTED, ROUNDED = 1e-2, 1e-3, 0.01
 # much are taken for contradictions. Chosen.
 NEIGHBORHOOD = 0.02
 # What is off by so many times what counts as held is not so by rounding. Doubled: fewer verdicts INFEASIBLE. Chosen.
-MUCH = 2.0
+BEYOND_ROUNDING = 2.0
 # [steps] So many in a row, however long, that leave as much begin to restore, in steps no longer than a neighborhood;
 # so many of these tell that it is mended far away, if at all. Doubled: as many steps more. Chosen.
 DRAGGED, NOT_NEARBY = 4.0, 2.0

@@ -14,7 +14,7 @@ from assembly.solve.loop.clearances import update_again
 from assembly.solve.loop.direction import leave_saddle
 from assembly.solve.loop.loop_state import lead_back
 from assembly.solve.loop.multipliers import forget_objective, strongest
-from assembly.solve.loop.parameters import CLOSE, KICKS, PATIENCE, RESTORATIONS
+from assembly.solve.loop.parameters import KICKS, NEARLY_HELD, PATIENCE, RESTORATIONS
 from assembly.solve.loop.settings import INFEASIBLE, STALLED
 from assembly.solve.loop.standstill import contradicts, count_drag, count_standstill, is_stuck, stays_off
 from assembly.solve.loop.workspace import rows_in
@@ -25,7 +25,7 @@ def choose_restoration(task, rows, system):
     """Begin or end to restore rows. Whether the step goes on."""
     loop = task.loop
     # At a pose where rows depend on each other a soft objective only leads away: rows are restored until they hold.
-    is_singular = task.any_pose and not task.watched and loop.entered < CLOSE
+    is_singular = task.any_pose and not task.watched and loop.entered < NEARLY_HELD
     if loop.restoring and loop.violation <= (loop.feasible if is_singular else max(0.1 * loop.entered, loop.feasible)):
         if is_singular:
             loop.status = STALLED

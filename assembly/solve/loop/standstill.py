@@ -7,17 +7,17 @@ import math
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import TOUCHING
 from assembly.solve.loop.parameters import (
+    BEYOND_ROUNDING,
     DRAGGED,
     HARDEST,
     LITTLE,
     MOST_TILTED,
-    MUCH,
     NEIGHBORHOOD,
     NOT_NEARBY,
     ROUNDED,
     SLOW,
-    STILL,
     STUCK,
+    UNCHANGED,
 )
 from assembly.solve.loop.settings import settings_at
 from assembly.solve.loop.way_back import way_at
@@ -44,7 +44,7 @@ def count_standstill(way, settings, feasible, violation, left, dual, force, mu):
     nearly = (
         settings_at(settings, 0).stationarity * max(1.0, force) + (out_of_reach(violation) + ROUNDED * feasible) / mu
     )
-    still = left > STILL and dual <= nearly
+    still = left > UNCHANGED and dual <= nearly
     progress.stills = progress.stills + 1.0 if still else 0.0
     return progress.stills == STUCK
 
@@ -58,7 +58,7 @@ def count_drag(way, violation, before):
     """
     progress = way_at(way, 0)
     by_little = TOUCHING < violation <= LITTLE
-    progress.drags = progress.drags + 1.0 if by_little and violation > STILL * before else 0.0
+    progress.drags = progress.drags + 1.0 if by_little and violation > UNCHANGED * before else 0.0
     if progress.drags < DRAGGED:
         return False
     progress.drags = 0.0
@@ -72,7 +72,7 @@ def bound_nearby(way, violation, before):
     progress = way_at(way, 0)
     if progress.nearby == 0.0:
         return math.inf
-    if violation <= STILL * before < math.inf:
+    if violation <= UNCHANGED * before < math.inf:
         progress.nearby = 0.0
         progress.drags = 0.0
         return math.inf
@@ -89,7 +89,7 @@ def stays_off(way, feasible, steepest, violation, before):
     progress = way_at(way, 0)
     if progress.nearby == 1.0 and progress.drags >= NOT_NEARBY:
         return True
-    gains = violation <= STILL * before
+    gains = violation <= UNCHANGED * before
     return steepest <= out_of_reach(violation) + (0.0 if gains else ROUNDED * feasible)
 
 
@@ -102,7 +102,7 @@ def is_stuck(way):
 @kernel(inline=True)
 def contradicts(way, feasible, violation):
     """Whether what restored rows are off tells of a contradiction; less does where the loop stood still."""
-    return violation > (MUCH * feasible if is_stuck(way) else TOUCHING)
+    return violation > (BEYOND_ROUNDING * feasible if is_stuck(way) else TOUCHING)
 
 
 @kernel(inline=True)

@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program import records as layout
+from assembly.constraints.program.contact import TOUCHING
 from assembly.solve.second_order.curvature import curvature_at, least_curvature, walk
 
 __all__ = ["Look", "Neighbor", "null_space"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-# A one-sided row that holds by less touches; a multiplier that is stronger pushes.
-TOUCHING, PUSHING = 1e-9, 1e-7
+# A multiplier that is stronger pushes.
+PUSHING = 1e-7
 # Multipliers that leave more of the objective's slope are balanced anew.
 UNBALANCED = 1e-9
 # What they may leave at a stationary point.

@@ -315,7 +315,7 @@ def test_a_distance_of_zero():
         assert value(P.DISTANCE, 0, records, 0) == pytest.approx(away, abs=1e-160)
         np.testing.assert_array_equal(gradient(P.DISTANCE, 0, records, 0)[6:9], [0.0, 0.0, 1.0])
         second = hessian(P.DISTANCE, 0, records, 0)
-        np.testing.assert_allclose(second[6:9, 6:9], np.diag([1.0, 1.0, 0.0]) / P.CLOSE, rtol=1e-15)
+        np.testing.assert_allclose(second[6:9, 6:9], np.diag([1.0, 1.0, 0.0]) / P.LEAST_DIVISOR, rtol=1e-15)
 
 
 def test_a_small_distance_has_its_own_direction_and_a_bounded_curvature():
@@ -325,7 +325,9 @@ def test_a_small_distance_has_its_own_direction_and_a_bounded_curvature():
         np.testing.assert_allclose(gradient(P.DISTANCE, 0, records, 0)[6:9], n, rtol=0, atol=4e-16)
         second = hessian(P.DISTANCE, 0, records, 0)[6:9, 6:9]
         # One rounding of 1 is 1e-16 of the curvature.
-        np.testing.assert_allclose(second * max(length, P.CLOSE), np.eye(3) - np.outer(n, n), rtol=0, atol=1e-15)
+        np.testing.assert_allclose(
+            second * max(length, P.LEAST_DIVISOR), np.eye(3) - np.outer(n, n), rtol=0, atol=1e-15
+        )
 
 
 @pytest.mark.parametrize("opposed", [False, True])
@@ -336,8 +338,8 @@ def test_an_angle_between_parallel_axes(opposed):
     np.testing.assert_array_equal(gradient(P.ANGLE, 0, records, 0)[9:], [0.0, 1.0, 0.0])
     second = hessian(P.ANGLE, 0, records, 0)[9:, 9:]
     sign = -1.0 if opposed else 1.0
-    # (c (I - n n^T) - c z z^T) / CLOSE: sideways about x, and nothing about the axis itself.
-    np.testing.assert_allclose(second * P.CLOSE, np.diag([sign, 0.0, 0.0]), rtol=0, atol=1e-15)
+    # (c (I - n n^T) - c z z^T) / LEAST_DIVISOR: sideways about x, and nothing about the axis itself.
+    np.testing.assert_allclose(second * P.LEAST_DIVISOR, np.diag([sign, 0.0, 0.0]), rtol=0, atol=1e-15)
     for away in (1e-9, 1e-7):
         records = record(turn((0.6, -0.8, 0.0), away) @ flip)
         assert value(P.ANGLE, 0, records, 0) == pytest.approx(math.pi - away if opposed else away, rel=1e-15)

@@ -23,7 +23,7 @@ from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, differ
 STEPS, PROJECTIONS = 30, 13
 # Slopes of the distance below this count as zero at the borders of a box: the next box has the same point. Those of F
 # below the second are rounding.
-LEVEL, STILL = 1e-10, 1e-16
+LEVEL, ROUNDED_SLOPE = 1e-10, 1e-16
 # A valley with no more slope than this at both ends is level: rounding tells where it has minima.
 NOISE = 1e-14
 # A foot is one where a step toward it would be shorter than this; one that lowers F by less of it is rounding.
@@ -51,13 +51,13 @@ def is_least(slope, far, at_ends):
 
     F is the square of the distance, which is `far`: its own slope is as many times less.
     """
-    return abs(slope) <= max(LEVEL * far, STILL) or (at_ends[0] and slope > 0.0) or (at_ends[1] and slope < 0.0)
+    return abs(slope) <= max(LEVEL * far, ROUNDED_SLOPE) or (at_ends[0] and slope > 0.0) or (at_ends[1] and slope < 0.0)
 
 
 @kernel(inline=True)
 def is_held(slope, x, low, high, far):
     """Whether a slope of F leads nowhere: it is zero, or leads out of an interval."""
-    return abs(slope) <= max(LEVEL * far, STILL) or (x <= low and slope > 0.0) or (x >= high and slope < 0.0)
+    return abs(slope) <= max(LEVEL * far, ROUNDED_SLOPE) or (x <= low and slope > 0.0) or (x >= high and slope < 0.0)
 
 
 @kernel(inline=True)

@@ -43,7 +43,7 @@ from assembly.proximity.manager.extrema import (
     write_frame,
 )
 from assembly.proximity.manager.motion_bounds import PairSearch, ball_about, no_ball
-from assembly.proximity.manager.parameters import FINE, MUCH, REFINED, SPARSE, THIN
+from assembly.proximity.manager.parameters import FINE, LARGEST_BALL, REFINED, SPARSE, THIN
 from assembly.proximity.manager.wires import (
     PART,
     both_radii,
@@ -287,7 +287,7 @@ def search_centerlines(posed, moving, limits, boxes, waiting, workspaces, extrem
                 # There may be one that is not known.
                 allowed = low
         waiting = b
-        if allowed >= MUCH * reach and allowed >= curved_bound:
+        if allowed >= LARGEST_BALL * reach and allowed >= curved_bound:
             rest = min(rest, allowed)
             continue
         if allowed < curved_bound:
