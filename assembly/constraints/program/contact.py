@@ -31,7 +31,8 @@ from assembly.proximity.features.solid_contact import (
 )
 
 # A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
-# stands for what it holds on to, k. One that ends where they touch, which rounding decides, is as good as open.
+# stands for what it holds on to, k. One that ends where they touch, which rounding decides, is as good as open. What is
+# within TOUCHING of the least gap touches.
 MAY_GO, HARDLY, TOUCHING = -1.0, 1e-3, 1e-9
 # A clearance's row that is open by more than the last needs its pair again after motions of this part of its gap, or of
 # this part of how far bodies may go where contacts may be born: from farther away Newton's method may find another one.

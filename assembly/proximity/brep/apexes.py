@@ -1,6 +1,6 @@
-"""Tips of cones: vertices without edges, poles of a face where it has no tangent plane.
+"""Apexes of cones: vertices without edges, poles of a face where it has no tangent plane.
 
-A pair of a tip has n.e <= 0 for all directions e in which its face leaves it, as one of another vertex has along its
+A pair of an apex has n.e <= 0 for all directions e in which its face leaves it, as one of another vertex has along its
 edges (`proximity/features/switching.py`).
 """
 
@@ -22,7 +22,7 @@ from assembly.proximity.brep.records import (
 
 # Sine of the angle by which a normal must lean over a face or along an edge before that takes over.
 LEAN = 1e-9
-# Of tips: how near a pole is to one, how many spokes are looked at, how far from it a face begins, and how near to it
+# Of apexes: how near a pole is to one, how many spokes are looked at, how far from it a face begins, and how near to it
 # Newton's method gives up (parts of the domain).
 APEX, SPOKES, BESIDE, NEAR_APEX = 1e-9, 16, 1e-3, 0.02
 
@@ -51,9 +51,9 @@ def is_at(store, vertex, p):
 
 @kernel(inner=True)
 def from_apex(store, shell, vertex, code, n):
-    """The face that takes over from the tip of a cone: code and (u, v) on the spoke along which the normal leans most.
+    """The face that takes over from the apex of a cone: code and (u, v) on the spoke along which the normal leans most.
 
-    Where it leans along none, the tip itself, `code`.
+    Where it leans along none, the apex itself, `code`.
     """
     vertex_record = vertex_at(store.table, vertex)
     best = LEAN
@@ -82,7 +82,7 @@ def from_apex(store, shell, vertex, code, n):
 
 @kernel(inner=True)
 def apex_near(store, shell, code, u, v):
-    """The tip of a cone next to a point of a face where Newton's method gave up; else the face itself."""
+    """The apex of a cone next to a point of a face where Newton's method gave up; else the face itself."""
     solid = shell_at(store.table, shell)
     if code >= solid.faces:
         return code

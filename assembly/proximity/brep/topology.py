@@ -250,7 +250,7 @@ def _characteristic(face: Face, loops: list[list[Rim]], ends: dict[Rim, tuple[in
 
 
 def _apexes(face: Face, points: Array, tolerance: float) -> list[Array]:
-    """Poles inside a face where it has no tangent plane, as the tip of a cone, but for those among given points."""
+    """Poles inside a face where it has no tangent plane, as the apex of a cone, but for those among given points."""
     surface = face.surface
     found = []
     for k in range(4):

@@ -42,7 +42,7 @@ LOWER = place_of(FEATURE_ANSWER, "lower")
 SWITCHES = place_of(FEATURE_ANSWER, "switches")
 PAIR = size_of(FEATURE_ANSWER)
 # Where no pair is nearer than the one found by more than this part of the size, it counts as the nearest one: in a
-# continuum, or beside a tip, a search has no room to prove more.
+# continuum, or beside an apex, a search has no room to prove more.
 PROVEN = 1e-9
 # Statuses of a tracked pair, beside those of a search.
 TRACKED, LOST = 4, 5

@@ -165,7 +165,7 @@ def overlap_at(store, shells, turn, codes, x, size, ways):
         return False
     f, g = points_of(codes, x)
     if add_ways(store, shells[1], g, turn, 1.0, size, ways, 0) == 0:
-        # A tip has no normal.
+        # An apex has no normal.
         return False
     count = add_ways(store, shells[0], f, IDENTITY.rotation, 1.0, size, ways, 0)
     if count == 0:
