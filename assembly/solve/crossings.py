@@ -1,6 +1,6 @@
 """Bodies that cross at the pose of a solution.
 
-Of all pairs of bodies those are looked at whose boxes meet: bodies are within the hulls of their control points. Looks
+Of all pairs of bodies those are searched whose boxes meet: bodies are within the hulls of their control points. Updates
 go on in slices, between which the interpreter runs, so that Ctrl-C and a time limit are answered.
 """
 
@@ -40,11 +40,11 @@ Array = NDArray[np.float64]
 Pair = tuple[Body, Body]
 # What is in each other by less, in parts of the scene's size, may be so by rounding.
 ROUNDED = 1e-10
-# How deep looks see, in parts of that size. A deep look of wires that cross often finds so much that it lacks room for
-# the rest, so that there are several.
+# How deep updates see, in parts of that size. A deep update of wires that cross often finds so much that it lacks
+# room for the rest, so that there are several.
 DEPTHS = (0.005, 0.015, 0.05)
 # Contacts of a pair, or of a body in many, that may be near at a time. What is beyond is known where bodies cross by
-# more than looks take for nothing.
+# more than updates take for nothing.
 PLACES = 8
 # What rounding may make of boxes, in parts of where they end.
 END_ROUNDING = 1e-12
@@ -52,7 +52,7 @@ END_ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class Crossings:
-    """Which bodies cross at a pose, as far as it was looked at.
+    """Which bodies cross at a pose, as far as they were searched.
 
     Attributes
     ----------
@@ -67,12 +67,12 @@ class Crossings:
 
     @property
     def is_complete(self) -> bool:
-        """Whether all pairs were looked at."""
+        """Whether all pairs were searched."""
         return not self.unseen
 
     @property
     def is_clear(self) -> bool:
-        """Whether all pairs were looked at and none crosses."""
+        """Whether all pairs were searched and none crosses."""
         return not self.pairs and not self.unseen
 
 
@@ -197,7 +197,7 @@ def _box(body: Body, row: Array) -> tuple[Array, Array]:
 
 
 def _known_shapes(pairs: Iterable[Pair], interruption: Interruption) -> bool:
-    """Make what a look has to know of shapes, which takes longer than the look; whether there was time to.
+    """Make what an update has to know of shapes, which takes longer than the update; whether there was time to.
 
     Where there is no limit it is made as the scene is packed: of very many shapes it is not kept until then.
     """
@@ -211,13 +211,13 @@ def _known_shapes(pairs: Iterable[Pair], interruption: Interruption) -> bool:
 
 
 def _seen(packed: Packed, posed: PosedBodies, interruption: Interruption) -> tuple[set[int], bool]:
-    """Places of pairs that looks of several depths find to cross, and whether all were looked at."""
+    """Places of pairs that updates of several depths find to cross, and whether all were searched."""
     q, contacts = posed.q.copy(), len(posed.contacts)
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     count = manager_records.PAIR_MEMORY * len(packed.clearance_pairs[0])
     deep = max(ROUNDED, posed.touching)
     record = packed.table[layout.MANAGER_RECORD]
-    # Where there is no clock looks are not cut.
+    # Where there is no clock updates are not cut.
     packed.table[record + manager_records.CLOCK] = packed.table[layout.CLOCK_AT]
     found: set[int] = set()
     for depth in DEPTHS:

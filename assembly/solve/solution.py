@@ -110,15 +110,15 @@ class Solution(Result):
 
     @property
     def second_order(self) -> SecondOrder | None:
-        """What the end of a solve is; looked at when it is read, unless the solve had to."""
+        """What the end of a solve is; judged when it is read, unless the solve had to."""
         if self._order is None and self.success:
             from assembly.solve.second_order.classification import SecondOrder, judge
 
             self._order = SecondOrder.NO_OBJECTIVE
             if self._packed.table[IMPLICIT] == 0:
-                verdict, look = judge(self._packed, self._state, sample=False)
+                verdict, model = judge(self._packed, self._state, sample=False)
                 # Targets may be others by now.
-                judged = look is not None and look.is_stationary
+                judged = model is not None and model.is_stationary
                 self._order = verdict.kind if judged else SecondOrder.UNDECIDED
         return self._order
 
@@ -171,7 +171,7 @@ class Solution(Result):
 
     @cached_property
     def crossings(self) -> tuple[tuple[str, str], ...]:
-        """Names of bodies that cross at `q` elsewhere than at their contacts, by a look at all pairs when it is read.
+        """Names of bodies that cross at `q` elsewhere than at their contacts; all pairs are searched when it is read.
 
         Pairs that a joint or a coupling ties directly, one in the other as a rule, are in `crossings_of_joined`; those
         which a clearance excludes may overlap. A body in the material of another one crosses it, too.
@@ -184,19 +184,19 @@ class Solution(Result):
         return self.find_crossings(joined=True).pairs
 
     def find_crossings(self, *, joined: bool = False, time_limit: float | None = None) -> Crossings:
-        """Bodies that cross at `q`, as far as a look of limited time tells: `crossings` has no limit.
+        """Bodies that cross at `q`, as far as a search of limited time tells: `crossings` has no limit.
 
         Parameters
         ----------
         joined : bool
             Whether it is the pairs that a joint or a coupling ties directly, as in `crossings_of_joined`, or others.
         time_limit : float, optional
-            Seconds after which the pairs that were not looked at to the end are `unseen`.
+            Seconds after which the pairs that were not searched to the end are `unseen`.
 
         Returns
         -------
         Crossings
-            `pairs` that cross and those that are `unseen`; `is_clear` where all were looked at and none crosses.
+            `pairs` that cross and those that are `unseen`; `is_clear` where all were searched and none crosses.
         """
         from assembly.solve.crossings import crossings_of, free_pairs, joined_pairs
         from assembly.solve.interruption import CTRL_C, Interruption

@@ -16,8 +16,9 @@ __all__ = ["iteration_table", "message", "table"]
 
 # Moving bodies whose freedoms are printed: counting takes a second for some 300, and grows with the cube.
 MOST_COUNTED = 200
-# Bodies with shapes all pairs of which are looked at when a solution is printed; their number grows with the square.
-MOST_LOOKED = 40
+# Bodies with shapes all pairs of which are searched for crossings when a solution is printed; their number grows with
+# the square.
+MOST_SEARCHED = 40
 
 
 def message(solution: Solution) -> str:
@@ -56,8 +57,8 @@ def iteration_table(solution: Solution) -> str:
 def _crossing_lines(solution: Solution) -> list[str]:
     """What it says of bodies that cross."""
     shaped = sum(bool(body.faces) for body in solution._scene.bodies)
-    if shaped > MOST_LOOKED and not {"crossings", "crossings_of_joined"} <= solution.__dict__.keys():
-        return [f"  {shaped} bodies were not looked at for crossings; read `crossings` and `crossings_of_joined`"]
+    if shaped > MOST_SEARCHED and not {"crossings", "crossings_of_joined"} <= solution.__dict__.keys():
+        return [f"  {shaped} bodies were not searched for crossings; read `crossings` and `crossings_of_joined`"]
     try:
         apart, joined = solution.crossings, solution.crossings_of_joined
     except InputError as error:

@@ -166,7 +166,7 @@ def test_bodies_that_cross_are_named(x):
     gaps = WireOracle([torus_wire(1.0, 0.1)] * 3).gaps(solution.q)
     expected = tuple(pair for pair, gap in zip((("a", "b"), ("a", "c"), ("b", "c")), gaps, strict=True) if gap < -1e-6)
     assert (x > -2.2) == (("a", "c") in expected) or x == -1.3
-    assert "crossings" not in solution.__dict__  # nobody looked yet
+    assert "crossings" not in solution.__dict__  # nobody asked yet
     assert solution.crossings == expected
     said = [line for line in str(solution).splitlines() if " cross" in line]
     assert said == [f"  {a} and {b} cross; asm.Clearance() keeps them apart" for a, b in expected]

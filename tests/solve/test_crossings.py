@@ -77,7 +77,7 @@ def test_a_name_that_is_taken_hides_nothing():
     assert solution.success and ("a", "c") in solution.crossings
 
 
-def test_what_cannot_be_looked_at_says_so():
+def test_what_cannot_be_searched_says_so():
     a, b = (asm.Body(name, asm.shapes.sphere(1e80)) for name in "ab")
     solution = asm.Assembly([a, b]).solve()
     with pytest.raises(InputError, match=r"bodies\[0\], 'a', has a face whose u"):
@@ -85,10 +85,10 @@ def test_what_cannot_be_looked_at_says_so():
     assert "crossings are not known: bodies[0], 'a'," in str(solution)
 
 
-def test_many_bodies_are_looked_at_when_it_is_read():
+def test_many_bodies_are_searched_when_it_is_read():
     bodies = [asm.Body(f"{k}", asm.shapes.sphere(0.6), (float(k), 0, 0)) for k in range(42)]
     solution = asm.Assembly(bodies).solve()
-    assert "42 bodies were not looked at" in str(solution)
+    assert "42 bodies were not searched" in str(solution)
     assert len(solution.crossings) == 41 and solution.crossings_of_joined == ()
     assert str(solution).count(" cross;") == 41
 
@@ -159,33 +159,33 @@ def test_bad_input(options, message):
         row_of_blocks(2)[0].find_crossings(**options)
 
 
-def test_looks_in_slices_find_the_same(monkeypatch):
+def test_updates_in_slices_find_the_same(monkeypatch):
     solution, expected = row_of_blocks(6)
-    looks = []
-    look = crossings.manager.update
-    # A slice that is over when it begins: every look is at one pair.
+    updates = []
+    update = crossings.manager.update
+    # A slice that is over when it begins: every update is of one pair.
     monkeypatch.setattr(crossings, "SLICE", -1)
-    monkeypatch.setattr(crossings.manager, "update", lambda *arguments: looks.append(arguments) or look(*arguments))
+    monkeypatch.setattr(crossings.manager, "update", lambda *arguments: updates.append(arguments) or update(*arguments))
     assert solution.find_crossings().pairs == expected
-    assert len(looks) == len(crossings.DEPTHS) * len(expected)
+    assert len(updates) == len(crossings.DEPTHS) * len(expected)
 
     def later(*arguments):
-        looks.append(arguments)
-        if len(looks) == 4:
+        updates.append(arguments)
+        if len(updates) == 4:
             monkeypatch.setattr(limit, "_deadline", 0.0)
-        return look(*arguments)
+        return update(*arguments)
 
     limit = Interruption(time_limit=1e6)
-    looks.clear()
+    updates.clear()
     monkeypatch.setattr(crossings.manager, "update", later)
     pairs = crossings.free_pairs(solution._scene.bodies, ())
     partly = crossings.crossings_of(solution, pairs, limit)
     # What was found by then crosses for certain, and the rest is not known.
-    assert len(looks) == 4 and partly.pairs == expected[:4] and partly.unseen == expected[4:]
+    assert len(updates) == 4 and partly.pairs == expected[:4] and partly.unseen == expected[4:]
 
 
 def test_bodies_are_where_their_boxes_are(cases):
-    # Turned and far from the origin: looked at only where hulls meet, and where bodies meet hulls do.
+    # Turned and far from the origin: searched only where hulls meet, and where bodies meet hulls do.
     rng = np.random.default_rng(3)
     for _ in range(cases(20, 400)):
         turns = rng.normal(size=(2, 4))

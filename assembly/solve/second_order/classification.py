@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program.records import MOVING
 from assembly.solve.dense.rank import orthonormal
-from assembly.solve.second_order.dense import CUT, DEPENDENT, Look, null_space
+from assembly.solve.second_order.dense import CUT, DEPENDENT, LocalModel, null_space
 
 __all__ = ["SecondOrder", "Verdict", "Way", "judge", "judge_kink"]
 
@@ -33,9 +33,9 @@ SAMPLES, MIXTURES = (1e-2, 3e-2, 1e-1), 4
 # By how much more than in proportion to the way it falls, from sample to sample: what rows that all but depend on each
 # other leave of it is in proportion.
 FASTER = 4.0
-# Of so many one-sided rows without a force all faces of their cone are looked at. A way breaks none by more.
+# Of so many one-sided rows without a force all faces of their cone are judged. A way breaks none by more.
 FACES, WITHIN = 8, 1e-9
-# Ways of negative curvature that are followed; what it is capped at, because kinks look steeper than anything.
+# Ways of negative curvature that are followed; what it is capped at, because kinks seem steeper than anything.
 WAYS, STEEPEST = 3, 10.0
 # Curvatures that are the same: of their directions a basis is taken that rounding does not choose. Digits of these.
 ALIKE, DIGITS = 1e-6, 6
@@ -82,43 +82,43 @@ class Verdict:
     forces: Array | None = None
 
 
-def judge(packed: Packed, state: Array, sample: bool) -> tuple[Verdict, Look | None]:
+def judge(packed: Packed, state: Array, sample: bool) -> tuple[Verdict, LocalModel | None]:
     """What the stationary point of a state, or one near it, is; with `sample` motions of no curvature are followed."""
     if 6 * packed.table[MOVING] + 4 * packed.pair_rows > MOST_UNKNOWNS:
-        look = Look.coarse(packed, state)
-        return (Verdict(SecondOrder.UNDECIDED) if look is None else judge_coarse(look)), look
-    look = Look.at(packed, state)
-    return (Verdict(SecondOrder.UNDECIDED) if look is None else judge_look(look, sample)), look
+        model = LocalModel.coarse(packed, state)
+        return (Verdict(SecondOrder.UNDECIDED) if model is None else judge_coarse(model)), model
+    model = LocalModel.at(packed, state)
+    return (Verdict(SecondOrder.UNDECIDED) if model is None else judge_model(model, sample)), model
 
 
-def judge_look(look: Look, sample: bool) -> Verdict:
-    """The same of a look."""
-    pushing = look.pushing
-    basis = null_space(look.jacobian[pushing], len(look.gradient))
+def judge_model(model: LocalModel, sample: bool) -> Verdict:
+    """The same of a model."""
+    pushing = model.pushing
+    basis = null_space(model.jacobian[pushing], len(model.gradient))
     if not basis.shape[1]:
         return Verdict(SecondOrder.MINIMUM)
-    form = _symmetric(basis.T @ look.hessian @ basis)
+    form = _symmetric(basis.T @ model.hessian @ basis)
     values, vectors = np.linalg.eigh(form)
-    flat = (DIFFERENCED if look.packed.end_effectors else FLAT) * max(1.0, float(np.abs(look.hessian).max()))
+    flat = (DIFFERENCED if model.packed.end_effectors else FLAT) * max(1.0, float(np.abs(model.hessian).max()))
     # Rows without a force that no such motion changes to first order say by their curvature which ones exist.
-    closed = look.touching & ~pushing
-    closed[closed] = np.linalg.norm(look.jacobian[closed] @ basis, axis=1) <= DEPENDENT
+    closed = model.touching & ~pushing
+    closed[closed] = np.linalg.norm(model.jacobian[closed] @ basis, axis=1) <= DEPENDENT
     forces: Array | None = None
     if values[0] < -flat:
-        bends = _bends(look, pushing | closed, basis)
+        bends = _bends(model, pushing | closed, basis)
         if bends:
-            form, forces = _least_negative(look, form, bends)
+            form, forces = _least_negative(model, form, bends)
             values, vectors = np.linalg.eigh(form)
     depends = forces is not None
     if values[0] > flat:
         return Verdict(SecondOrder.MINIMUM, forces=forces)
-    cone = look.jacobian[look.touching & ~pushing & ~closed]
+    cone = model.jacobian[model.touching & ~pushing & ~closed]
     ways = list(_downward(form, basis, cone, flat)) if values[0] < -flat else []
     if ways and depends:
         # A way may exist to first order only, and lead nowhere; motions that exist are found by trying.
-        ways = ways[:WAYS] + _sampled(look, _canonical(basis), cone, MIXTURES * basis.shape[1], FASTER).ways
+        ways = ways[:WAYS] + _sampled(model, _canonical(basis), cone, MIXTURES * basis.shape[1], FASTER).ways
     if ways:
-        is_certain = not depends and ways[0].curvature < -CLEAR * max(1.0, float(np.abs(look.hessian).max()))
+        is_certain = not depends and ways[0].curvature < -CLEAR * max(1.0, float(np.abs(model.hessian).max()))
         return Verdict(SecondOrder.SADDLE if is_certain else SecondOrder.UNDECIDED, ways)
     if values[0] < -flat and len(cone) > FACES:
         return Verdict(SecondOrder.UNDECIDED)
@@ -127,27 +127,27 @@ def judge_look(look: Look, sample: bool) -> Verdict:
         return Verdict(SecondOrder.MINIMUM, forces=forces)
     if not sample:
         return Verdict(SecondOrder.NOT_ISOLATED, forces=forces)
-    return _sampled(look, _canonical(basis @ zeros), cone, MIXTURES, FASTER)
+    return _sampled(model, _canonical(basis @ zeros), cone, MIXTURES, FASTER)
 
 
-def judge_coarse(look: Look) -> Verdict:
+def judge_coarse(model: LocalModel) -> Verdict:
     """Of a large scene: whether its least curvature is negative."""
-    curvature, direction = look.least_curvature()
+    curvature, direction = model.least_curvature()
     if not curvature < -FLAT:
         return Verdict(SecondOrder.UNDECIDED)
     ways = [Way(np.round(d, DIGITS), curvature) for d in (direction, -direction)]
-    is_certain = curvature < -CLEAR and not (look.touching & ~look.pushing).any()
+    is_certain = curvature < -CLEAR and not (model.touching & ~model.pushing).any()
     return Verdict(SecondOrder.SADDLE if is_certain else SecondOrder.UNDECIDED, ways)
 
 
-def judge_kink(packed: Packed, state: Array) -> tuple[Verdict, Look | None]:
+def judge_kink(packed: Packed, state: Array) -> tuple[Verdict, LocalModel | None]:
     """Ways down from a pose that holds and at which the objective has no derivatives: all motions are sampled."""
-    look = Look.at_kink(packed, state)
-    if look is None:
+    model = LocalModel.at_kink(packed, state)
+    if model is None:
         return Verdict(SecondOrder.UNDECIDED), None
-    basis = null_space(look.jacobian[~look.one_sided], len(look.gradient))
-    cone = look.jacobian[look.one_sided & look.touching]
-    return _sampled(look, _canonical(basis), cone, MIXTURES, 0.0), look
+    basis = null_space(model.jacobian[~model.one_sided], len(model.gradient))
+    cone = model.jacobian[model.one_sided & model.touching]
+    return _sampled(model, _canonical(basis), cone, MIXTURES, 0.0), model
 
 
 def _symmetric(matrix: Array) -> Array:
@@ -164,38 +164,38 @@ class _Bend:
     forces: Array
     form: Array
 
-    def share_left(self, look: Look, forces: Array, sign: float = 1.0) -> float:
+    def share_left(self, model: LocalModel, forces: Array, sign: float = 1.0) -> float:
         """How much of the combination multipliers may get before one of a one-sided row pulls."""
-        change = sign * self.forces[look.one_sided]
+        change = sign * self.forces[model.one_sided]
         grows = change > BENDS
-        return float((np.maximum(-forces[look.one_sided][grows], 0.0) / change[grows]).min(initial=RANGE))
+        return float((np.maximum(-forces[model.one_sided][grows], 0.0) / change[grows]).min(initial=RANGE))
 
 
-def _bends(look: Look, pushing: NDArray[np.bool_], basis: Array) -> list[_Bend]:
+def _bends(model: LocalModel, pushing: NDArray[np.bool_], basis: Array) -> list[_Bend]:
     """What open multipliers of the rows that push may change of the form."""
     rows = np.flatnonzero(pushing)
-    lengths = np.linalg.norm(look.jacobian[rows], axis=1)
+    lengths = np.linalg.norm(model.jacobian[rows], axis=1)
     scales = np.where(lengths > DEPENDENT, 1.0 / np.maximum(lengths, DEPENDENT), 1.0)
-    scaled = np.where((lengths > DEPENDENT)[:, None], look.jacobian[rows] * scales[:, None], 0.0)
+    scaled = np.where((lengths > DEPENDENT)[:, None], model.jacobian[rows] * scales[:, None], 0.0)
     left, values, _ = np.linalg.svd(scaled, full_matrices=True)
     bends: list[_Bend] = []
     for z in left[:, int(np.count_nonzero(values > DEPENDENT)) :].T:
-        forces = np.zeros(len(look.forces))
+        forces = np.zeros(len(model.forces))
         forces[rows] = z * scales
-        other = look.under(look.forces + forces)
+        other = model.under(model.forces + forces)
         if other is not None:
-            form = _symmetric(basis.T @ (other.hessian - look.hessian) @ basis)
+            form = _symmetric(basis.T @ (other.hessian - model.hessian) @ basis)
             if np.abs(form).max() > BENDS:
                 bends.append(_Bend(forces, form))
     return bends
 
 
-def _least_negative(look: Look, form: Array, bends: list[_Bend]) -> tuple[Array, Array]:
+def _least_negative(model: LocalModel, form: Array, bends: list[_Bend]) -> tuple[Array, Array]:
     """The form with those multipliers of which its least eigenvalue, concave in them, is greatest; and these."""
     if len(bends) == 1:
-        share = _along(look, form, bends[0])
-        return form + share * bends[0].form, look.forces + share * bends[0].forces
-    forces = look.forces
+        share = _along(model, form, bends[0])
+        return form + share * bends[0].form, model.forces + share * bends[0].forces
+    forces = model.forces
     best, highest = (form, forces), -np.inf
     for _ in range(CLIMBS):
         values, vectors = np.linalg.eigh(form)
@@ -208,19 +208,19 @@ def _least_negative(look: Look, form: Array, bends: list[_Bend]) -> tuple[Array,
             break
         # As far as makes this direction positive by as much as it was negative.
         wanted = (0.1 - 2.0 * least) / square
-        whole = _upward(look, forces, slopes, bends)
-        share = min(wanted, whole.share_left(look, forces))
+        whole = _upward(model, forces, slopes, bends)
+        share = min(wanted, whole.share_left(model, forces))
         form = form + share * whole.form
         forces = forces + share * whole.forces
     return best
 
 
-def _upward(look: Look, forces: Array, slopes: Array, bends: list[_Bend]) -> _Bend:
+def _upward(model: LocalModel, forces: Array, slopes: Array, bends: list[_Bend]) -> _Bend:
     """The combination along slopes, without what would make a one-sided row pull that has no force to lose."""
     all_forces = [bend.forces for bend in bends]
     mixed = _mixed(slopes, all_forces)
     for _ in bends:
-        held = look.one_sided & (forces >= 0.0) & (mixed > BENDS)
+        held = model.one_sided & (forces >= 0.0) & (mixed > BENDS)
         if not held.any():
             break
         grows = np.array(all_forces)[:, held].T
@@ -234,9 +234,9 @@ def _mixed(shares: Array, parts: list[Array]) -> Array:
     return mixed
 
 
-def _along(look: Look, form: Array, bend: _Bend) -> float:
+def _along(model: LocalModel, form: Array, bend: _Bend) -> float:
     """How much of one combination does so, by bisection on the slope of the least eigenvalue."""
-    low, high = -bend.share_left(look, look.forces, -1.0), bend.share_left(look, look.forces)
+    low, high = -bend.share_left(model, model.forces, -1.0), bend.share_left(model, model.forces)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         vector = np.linalg.eigh(form + middle * bend.form)[1][:, 0]
@@ -278,7 +278,7 @@ def _canonical(directions: Array) -> Array:
     return orthonormal(directions.T).T
 
 
-def _sampled(look: Look, motions: Array, cone: Array, mixtures: int, growth: float) -> Verdict:
+def _sampled(model: LocalModel, motions: Array, cone: Array, mixtures: int, growth: float) -> Verdict:
     """What the objective does along motions (columns), on both sides, and along random mixtures of them.
 
     It falls along one where it does so by more than `growth` times as much at one sample as at the one before.
@@ -294,7 +294,7 @@ def _sampled(look: Look, motions: Array, cone: Array, mixtures: int, growth: flo
             continue
         falls = [0.0]
         for share in SAMPLES:
-            there = look.neighbor(line, share)
+            there = model.neighbor(line, share)
             if there is None or there.rise > 0.0:
                 level = False
                 break

@@ -12,7 +12,7 @@ from assembly.constraints.program import records as layout
 from assembly.constraints.program.contact import TOUCHING
 from assembly.solve.second_order.curvature import curvature_at, least_curvature, walk
 
-__all__ = ["Look", "Neighbor", "null_space"]
+__all__ = ["LocalModel", "Neighbor", "null_space"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -32,7 +32,7 @@ NOISE, NONLINEAR = 2e-12, 0.3
 
 @dataclass(frozen=True, eq=False)
 class Neighbor:
-    """A pose beside a look at which all rows hold.
+    """A pose beside that of a model at which all rows hold.
 
     Attributes
     ----------
@@ -46,8 +46,8 @@ class Neighbor:
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
-    """A packed scene at a state, in the unknowns of the loop (`solve/second_order/curvature.py`).
+class LocalModel:
+    """A packed scene to second order at a state, in the unknowns of the loop (`solve/second_order/curvature.py`).
 
     Attributes
     ----------
@@ -76,27 +76,27 @@ class Look:
     one_sided: Flags
 
     @classmethod
-    def at(cls, packed: Packed, state: Array) -> Look | None:
-        """A look with the multipliers of the state; None where a contact has no pair or anything is not finite."""
+    def at(cls, packed: Packed, state: Array) -> LocalModel | None:
+        """The model with the multipliers of the state; None where a contact has no pair or anything is not finite."""
         given = state[packed.multipliers_at : packed.residuals_at]
-        look = cls._with(packed, packed.table_at(state), state, given)
-        if look is None or not look._is_finite:
+        model = cls._with(packed, packed.table_at(state), state, given)
+        if model is None or not model._is_finite:
             return None
-        forces = look._balanced()
-        return look if np.array_equal(forces, look.forces) else look.under(forces)
+        forces = model._balanced()
+        return model if np.array_equal(forces, model.forces) else model.under(forces)
 
     @classmethod
-    def at_kink(cls, packed: Packed, state: Array) -> Look | None:
-        """A look where the objective has a value but perhaps no derivatives; they count as zero."""
-        look = cls._with(packed, packed.table_at(state), state, np.zeros(packed.rows))
-        if look is None:
+    def at_kink(cls, packed: Packed, state: Array) -> LocalModel | None:
+        """The model where the objective has a value but perhaps no derivatives; they count as zero."""
+        model = cls._with(packed, packed.table_at(state), state, np.zeros(packed.rows))
+        if model is None:
             return None
-        look = replace(look, gradient=np.zeros_like(look.gradient), hessian=np.zeros_like(look.hessian))
-        return look if look._is_finite else None
+        model = replace(model, gradient=np.zeros_like(model.gradient), hessian=np.zeros_like(model.hessian))
+        return model if model._is_finite else None
 
     @classmethod
-    def coarse(cls, packed: Packed, state: Array) -> Look | None:
-        """A look without derivatives, of a large scene, at the pose next to the state at which all rows hold."""
+    def coarse(cls, packed: Packed, state: Array) -> LocalModel | None:
+        """The model without derivatives, of a large scene, at the pose next to the state at which all rows hold."""
         table, n = packed.table_at(state), 6 * int(packed.table[layout.MOVING])
         state, residual = state.copy(), np.zeros(packed.rows + 4 * packed.pair_rows)
         kept = np.zeros(packed.rows)
@@ -116,7 +116,7 @@ class Look:
         return float(least_curvature(self.table, self.packed.pool, *arguments)), direction
 
     @classmethod
-    def _with(cls, packed: Packed, table: NDArray[np.int64], state: Array, given: Array) -> Look | None:
+    def _with(cls, packed: Packed, table: NDArray[np.int64], state: Array, given: Array) -> LocalModel | None:
         most = packed.rows + 4 * packed.pair_rows
         columns = 6 * int(table[layout.MOVING]) + 4 * packed.pair_rows
         out = np.empty(1 + most + columns + most * columns + columns * columns)
@@ -136,10 +136,10 @@ class Look:
         arrays = (self.value, self.residual, self.gradient, self.jacobian, self.hessian)
         return all(bool(np.isfinite(array).all()) for array in arrays)
 
-    def under(self, forces: Array) -> Look | None:
+    def under(self, forces: Array) -> LocalModel | None:
         """The same with other multipliers."""
-        look = self._with(self.packed, self.table, self.state, forces)
-        return look if look is not None and look._is_finite else None
+        model = self._with(self.packed, self.table, self.state, forces)
+        return model if model is not None and model._is_finite else None
 
     @property
     def touching(self) -> Flags:

@@ -28,7 +28,7 @@ from assembly.solve.loop.settings import (
     VIOLATION,
 )
 from assembly.solve.second_order.classification import SecondOrder, Way, judge, judge_kink
-from assembly.solve.second_order.dense import Look, Neighbor
+from assembly.solve.second_order.dense import LocalModel, Neighbor
 
 __all__ = ["Fit", "Outcome", "leave_saddles"]
 
@@ -56,7 +56,7 @@ class Fit(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """How the loop ended, the state and the history it left; of what was looked at, what the end is."""
+    """How the loop ended, the state and the history it left; of what was judged, what the end is."""
 
     code: int
     state: Array
@@ -68,13 +68,13 @@ class Outcome(NamedTuple):
 Run = Callable[[Array, Array], Outcome]
 
 
-def lower_neighbor(look: Look, way: Way) -> Neighbor | None:
+def lower_neighbor(model: LocalModel, way: Way) -> Neighbor | None:
     """A pose that holds and is lower, as far along a way as they become lower; None where there is none."""
-    shy = look.packed.clearance_rows > 0
+    shy = model.packed.clearance_rows > 0
     share = min(SHY, way.share) if shy else way.share
     best: Neighbor | None = None
     while SHORTEST <= share <= LONGEST:
-        there = look.neighbor(way.direction, share)
+        there = model.neighbor(way.direction, share)
         rise = there.rise if there is not None else np.inf
         promised = 0.5 * PROMISE * way.curvature * share**2 if best is None else best.rise
         if not rise < min(promised, 0.0):
@@ -103,12 +103,12 @@ def leave_saddles(packed: Packed, settings: Array, outcome: Outcome, run: Run) -
         spent = int(outcome.state[at + COUNT])
         stands = outcome.code == UNSURE
         sample = first and spent == 0
-        verdict, look = judge(packed, outcome.state, sample) if stands else judge_kink(packed, outcome.state)
+        verdict, model = judge(packed, outcome.state, sample) if stands else judge_kink(packed, outcome.state)
         left: Outcome | None = None
-        if look is not None and verdict.ways:
+        if model is not None and verdict.ways:
             onward[ITERATIONS] = settings[ITERATIONS] - spent - 1
             if onward[ITERATIONS] >= 0.0:
-                left = _left(look, verdict.ways, onward, run)
+                left = _left(model, verdict.ways, onward, run)
             elif verdict.kind is SecondOrder.SADDLE:
                 return outcome._replace(code=ITERATION_LIMIT, order=verdict.kind)
         if left is None and stands and onward[SECOND_ORDER] != REACHED and not _is_at_end(packed, settings, outcome):
@@ -152,7 +152,7 @@ def _is_at_kink(packed: Packed, outcome: Outcome) -> bool:
     return bool(begins and np.isfinite(results[OBJECTIVE]) and not np.isfinite(results[DUAL]))
 
 
-def _left(look: Look, ways: list[Way], settings: Array, run: Run) -> Outcome | None:
+def _left(model: LocalModel, ways: list[Way], settings: Array, run: Run) -> Outcome | None:
     """Where the loop ends from lower poses along one of several ways; None where none is found.
 
     A soft penalty takes fewer steps, and a hard one does not fall back to where it was.
@@ -161,13 +161,13 @@ def _left(look: Look, ways: list[Way], settings: Array, run: Run) -> Outcome | N
     settings = settings.copy()
     penalties = sorted({settings[PENALTY], settings[PENALTY_FLOOR]}, reverse=True)
     for way in ways[:MOST_WAYS]:
-        lower = lower_neighbor(look, way)
+        lower = lower_neighbor(model, way)
         for settings[PENALTY] in penalties if lower is not None else ():
             assert lower is not None
             outcome = run(settings, lower.state.copy())
             if outcome.code not in (SOLVED, UNSURE):
                 left = left or outcome
                 break
-            if outcome.state[look.packed.results_at + OBJECTIVE] < look.value + KEPT * lower.rise:
+            if outcome.state[model.packed.results_at + OBJECTIVE] < model.value + KEPT * lower.rise:
                 return outcome
     return left

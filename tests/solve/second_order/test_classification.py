@@ -8,7 +8,7 @@ import pytest
 
 import assembly as asm
 from assembly.solve.second_order import leave
-from assembly.solve.second_order.dense import Look
+from assembly.solve.second_order.dense import LocalModel
 from tests.solve.lower_poses import Joint, lowest_neighbor, random_scene
 
 MINIMUM, NOT_ISOLATED, UNDECIDED = asm.SecondOrder.MINIMUM, asm.SecondOrder.NOT_ISOLATED, asm.SecondOrder.UNDECIDED
@@ -47,8 +47,8 @@ def crank(term, limits=None, sign=1.0):
 
 
 @pytest.fixture
-def looks(monkeypatch):
-    """How many ends were looked at, in a list of one number."""
+def judged(monkeypatch):
+    """How many ends were judged, in a list of one number."""
     count = [0]
 
     def counting(*arguments):
@@ -246,8 +246,8 @@ def test_contacts_bend_what_they_hold():
         assert solution.second_order in (NOT_ISOLATED, UNDECIDED)
 
 
-def test_a_factorization_tells_in_warm_solves(looks):
-    # None of these ends is looked at: free motions, stops that push, a stop at its bound without a force.
+def test_a_factorization_tells_in_warm_solves(judged):
+    # None of these ends is judged: free motions, stops that push, a stop at its bound without a force.
     scene, goal = drawn(3, (1.0, 1.5, 0.0))
     solution = scene.solve()
     for k in range(30):
@@ -256,12 +256,12 @@ def test_a_factorization_tells_in_warm_solves(looks):
         assert solution.success
     scene, goal = drawn(2, (2.0, 0.0, 0.0), limits=(0.0, 1.0))
     solution = scene.solve()
-    looks[0] = 0
+    judged[0] = 0
     for k in range(30):
         goal.target = (2.0 + 0.1 * k, 0.0, 0.0)
         solution = scene.solve(solution)
         assert solution.success and solution.objective == pytest.approx((0.1 * k) ** 2, abs=1e-9)
-    assert looks[0] == 0
+    assert judged[0] == 0
     assert solution.second_order is MINIMUM
 
 
@@ -319,7 +319,7 @@ def test_a_posture_that_follows_the_start_does_not_follow_a_saddle():
 
 def test_large_scenes_leave_saddles_by_a_sparse_factor(monkeypatch):
     # Each of 70 cranks points away from its target; dense decompositions would be of 420 unknowns.
-    monkeypatch.setattr(Look, "at", None)
+    monkeypatch.setattr(LocalModel, "at", None)
     ground = asm.Body("ground", fixed=True)
     cranks = [asm.Body(f"crank {k}", position=(0.0, 0.0, k)) for k in range(70)]
     scene = asm.Assembly([ground, *cranks])
