@@ -49,9 +49,7 @@ from assembly.solve.loop.settings import (
     STATIONARITY,
     TICK,
     VIOLATION,
-    WARM_START,
 )
-from assembly.solve.loop.warm_start import warm_start_size
 from assembly.solve.options import Options
 from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution
@@ -228,13 +226,11 @@ class Tracker(InOneProcess):
         self._history = np.zeros((1, HISTORY))
         names = [(a.name, b.name) for pairs in packed.clearance_pairs for a, b in pairs]
         self._followed = Followed(self._scene, packed, names, self._hand, self._place, first.status)
-        # Behind the state of a solve are the rows of the last tick; steps have no copy of those.
-        self._size = first._state.size
-        warm = warm_start_size(packed.count, packed.pair_rows)
-        self._state = np.concatenate([first._state, np.zeros(warm)])
+        # At its end are the rows of the last tick; steps have no copy of those.
+        self._size = packed.kept_at
+        self._state = first._state.copy()
         if packed.clearance_rows:
             _follow_extrema(packed, self._state, budget is not None)
-        self._settings[WARM_START] = self._size
         self._pose = self._state[: self._size]
         # Numbers are read from a view in half the time it takes to read them from the array.
         self._view: Any = self._state.data

@@ -31,6 +31,7 @@ from assembly.constraints.packing.terms import TermPacking, natural_unit
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.coordinates_at import coordinates_at
 from assembly.constraints.program.hessian_blocks import FACTORIZE_AT, SOLVE_AT
+from assembly.constraints.program.kept import kept_size
 from assembly.constraints.program.primitives import RECORD as JOINT_FRAMES
 from assembly.errors import FARTHEST, InputError
 from assembly.kinematics.body import Body
@@ -141,6 +142,9 @@ class Packed:
         if self.clearance_rows:
             # The first update sees what crosses at the start as well, if it is no deeper than this.
             self._memory = fresh_memory(sum(map(len, self.clearance_pairs)), self.clearance_rows, LARGEST_MARGIN)
+        self.kept_at = self.memory_at + self._memory.size
+        self.table[layout.KEPT] = self.kept_at
+        self._state_size = self.kept_at + int(kept_size(self.table))
 
     def _write(
         self, bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
@@ -239,8 +243,8 @@ class Packed:
 
     def new_state(self) -> Array:
         """The state of a solve that knows nothing yet."""
-        state = np.zeros(self.memory_at + self._memory.size)
-        state[self.memory_at :] = self._memory
+        state = np.zeros(self._state_size)
+        state[self.memory_at : self.kept_at] = self._memory
         return state
 
     def pair_name(self, k: int) -> str:
@@ -271,6 +275,7 @@ class Packed:
         """A state of the scene as it was before it had this size, with multipliers in the units of this one."""
         assert self.outgrown is not None
         taken = state.copy()
+        taken[self.kept_at :] = 0.0
         multipliers = taken[self.multipliers_at : self.residuals_at]
         multipliers *= self.outgrown.unit / self.unit
         multipliers[self.lengths] *= self.scale / self.outgrown.scale

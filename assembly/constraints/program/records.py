@@ -66,6 +66,7 @@ HEADER_RECORD = record_dtype(
     parts_address=1,  # parts of motion bounds that bodies have used
     went_address=1,  # whether bodies went farther than a contact was open
     run_tape_address=1,  # runs a tape
+    kept=1,  # where in a state stands what a solve leaves for the next one (`kept.py`)
 )
 header_at = record_view(HEADER_RECORD)
 BODIES = place_of(HEADER_RECORD, "bodies")
@@ -108,6 +109,7 @@ STAYED_AT = place_of(HEADER_RECORD, "stayed_address")
 PARTS_AT = place_of(HEADER_RECORD, "parts_address")
 WENT_AT = place_of(HEADER_RECORD, "went_address")
 RUN_TAPE_AT = place_of(HEADER_RECORD, "run_tape_address")
+KEPT = place_of(HEADER_RECORD, "kept")
 HEADER = size_of(HEADER_RECORD)
 # A row, of any kind. Row k is that of contact k. Fields of its kind stand behind these.
 ROW = 14

@@ -31,6 +31,7 @@ from assembly.constraints.program.objective_terms import objective
 from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.solve.loop.advance import accept, find_step, take_step
 from assembly.solve.loop.begin import begin_loop, read_state, set_out
+from assembly.solve.loop.chord import go_on_by_chords
 from assembly.solve.loop.direction import cut_step
 from assembly.solve.loop.finish import End, finish
 from assembly.solve.loop.loop_state import Task, loop_at
@@ -91,6 +92,8 @@ def run(task, workspace, state, history):
     system = workspace.system
     current, trial, held = workspace.iterates
     rows = begin(task, workspace, state, current, trial)
+    if go_on_by_chords(task, history, state, current, trial, rows, system):
+        current, trial = trial, current
     header = header_at(program.store.table, 0)
     while loop.status == RUNNING or restart(task, held, current, rows):
         # Observe.

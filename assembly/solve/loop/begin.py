@@ -19,16 +19,16 @@ from assembly.solve.loop.clearances import forget_clearance_rows, place_clearanc
 from assembly.solve.loop.contacts import lift_folds, start_contacts
 from assembly.solve.loop.deadline import begin_tick
 from assembly.solve.loop.initial_guess import assemble, scattered
+from assembly.constraints.program.kept import NO_FACTOR, kept_header_at, kept_in, take_rows
 from assembly.solve.loop.parameters import EXTRA_TIME, FAR, LIFT_BELOW, PATIENCE
 from assembly.solve.loop.report import read_tracked
 from assembly.solve.loop.residuals import arrange
 from assembly.solve.loop.settings import ASSEMBLES, CONTACT_LOST, GATHERED, RUNNING, results_at, settings_at
-from assembly.solve.loop.warm_start import warm_start
 from assembly.solve.loop.way_back import begin_way, way_at
 from assembly.solve.loop.workspace import new_system, resized, results_of
 
 
-@kernel(inline=True)
+@kernel(inner=True, allocates=True)
 def read_state(store, state, current, trial, rows):
     """Poses, tracked values and multipliers of a state, scaled."""
     units = pool_header_at(store.pool, 0)
@@ -82,9 +82,9 @@ def overlap_allowed(settings):
     return 0.0 if goes_on_from_last(settings) else settings_at(settings, 0).touching
 
 
-@kernel(inline=True)
+@kernel(inline=True, allocates=True)
 def find_contacts(program, settings, state, current, rows, n):
-    """Find the contacts of the start and evaluate its rows, unless the last tick left them in its state.
+    """Find the contacts of the start and evaluate its rows, unless the last solve or tick left them in the state.
 
     Bodies of a contact or a clearance that are in each other by no more than touching there may stay so.
     Returns the contact that has no pair, or -1, and whether the rows were evaluated. They are not where a contact has
@@ -95,7 +95,8 @@ def find_contacts(program, settings, state, current, rows, n):
     header = header_at(store.table, 0)
     free, lengths, memory = lifted.free, lifted.lengths, lifted.memory
     memory_header = memory_header_at(memory, 0)
-    warm, tick = int(limits.warm_start), limits.tick == 1.0
+    tick = limits.tick == 1.0
+    kept = kept_in(store.table, state)
     watched = header.manager_record >= 0
     came = False
     if watched:
@@ -111,7 +112,8 @@ def find_contacts(program, settings, state, current, rows, n):
         return lost, False
     if watched:
         arrange(store.table, free, program.structure, header.rows, n)
-    if warm == 0 or came or not warm_start(store.table, state, warm, current):
+    if came or not take_rows(store, state, kept, current):
+        kept_header_at(state, kept.header).factor = NO_FACTOR
         lost = evaluate(program, current.tracked, math.inf, current)
         if lost < 0:
             let_touch(store.table, current, overlap_allowed(settings))

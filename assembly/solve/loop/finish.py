@@ -13,9 +13,18 @@ from assembly.proximity.manager.update import EVERYTHING, any_crossed
 from assembly.solve.loop.arrival import is_near_saddle
 from assembly.solve.loop.clearances import clear_clearance_rows, go_back, place_clearance_rows, update_around
 from assembly.solve.loop.inertia import test_end
+from assembly.solve.loop.chord import leave
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import multipliers_at
-from assembly.solve.loop.report import bring_back, is_clear, judge, scaled_poses, write_pose, write_rows
+from assembly.solve.loop.report import (
+    bring_back,
+    is_as_returned,
+    is_clear,
+    judge,
+    scaled_poses,
+    write_pose,
+    write_rows,
+)
 from assembly.solve.loop.settings import (
     CONTACT_LOST,
     INFEASIBLE,
@@ -27,7 +36,6 @@ from assembly.solve.loop.settings import (
     results_at,
     settings_at,
 )
-from assembly.solve.loop.warm_start import leave
 from assembly.solve.loop.workspace import results_of
 
 # How the loop ended: status, and objective, violation, dual residual of its last iterate; the violation that counts as
@@ -88,8 +96,10 @@ def finish(program, settings, state, iterates, rows, system, at_end):
         scaled_poses(store, state, trial.q)
         recenter(store, trial.q)
     write_pose(store, current.q, state)
-    if status != CONTACT_LOST and not (tick and result.last_feasible == 0.0):
-        # A tick that went well ends at a pose that was just evaluated.
+    # A tick that went well ends at a pose that was just evaluated, and so do steps to poses as they are returned.
+    is_as_told = status == SOLVED and not gathered and rows.count == header.rows and is_as_returned(store, current.q, state)
+    is_judged = status != CONTACT_LOST and not (tick and result.last_feasible == 0.0) and not is_as_told
+    if is_judged:
         bound = 1.25 * feasible
         good, violation = judge(program, state, rows.count, current, trial, bound, tick)
         is_cut_short = status == OUT_OF_TIME and not tick
@@ -109,16 +119,10 @@ def finish(program, settings, state, iterates, rows, system, at_end):
     result.improper = write_rows(store.table, current, rows.y, lifted, tick, pool_header_at(store.pool, 0).scale, state)
     if limits.second_order > 0.0 and result.last_feasible + result.carried == 0.0 and status != CONTACT_LOST:
         status = test_end(program, settings, results, status, current, rows, system)
-    if limits.warm_start > 0.0:
-        # With clearances what a tick ends with depends on rounding where wires wedge: there, rows are evaluated afresh.
-        good = status == SOLVED if watched else status != CONTACT_LOST
-        leave(
-            store.table,
-            state,
-            int(limits.warm_start),
-            current,
-            good and result.last_feasible == 0.0 and rows.count == header.rows,
-        )
+    # With clearances what a tick ends with depends on rounding where wires wedge: there, rows are evaluated afresh.
+    lasts = status == SOLVED if watched else status != CONTACT_LOST
+    is_kept = lasts and result.last_feasible == 0.0 and rows.count == header.rows
+    leave(program, limits, state, trial if is_judged else current, rows, system, is_kept, status == SOLVED)
     if watched:
         clear_clearance_rows(store.table)
     return status, value, violation, dual

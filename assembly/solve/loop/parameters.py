@@ -77,6 +77,16 @@ SADDLE, KICK = 1e-5, 1e-3
 # So often at most a solve leaves a saddle of its violations. Doubled: later verdicts INFEASIBLE. Chosen.
 KICKS = 3
 
+# Steps by the factor that the last solve left (`chord.py`). -----------------------------------------------------------
+# [steps] So many at most, each of which leaves at most CHORD_GAIN of the violation and of the dual residual; else the
+# loop begins from where the solve began. Doubled: bad starts are given up later, slow ones are followed. Chosen.
+CHORD_STEPS, CHORD_GAIN = 6, 0.25
+# [length, radian] The largest component of such a step. Doubled: longer moves are tried, in vain. Chosen.
+CHORD_LONGEST = 0.2
+# The shift of the Hessian in such a factor. Doubled: what is left after a step doubles. From: halves of what a step
+# leaves anyway, for moves of a hundredth.
+CHORD_SHIFT = 1e-5
+
 # Multipliers. --------------------------------------------------------------------------------------------------------
 # [force] Multipliers below this count for nothing against the objective's curvature, which is of order one. Doubled:
 # small forces bend nothing, and their contacts converge slowly, as in `benchmarks/first_order.py`. Chosen.

@@ -49,6 +49,20 @@ def write_pose(store, q, state):
                 state[7 * b + k] = q[b, k]
 
 
+@kernel(inner=True)
+def is_as_returned(store, q, state):
+    """Whether poses are those of a state to the last bit."""
+    units = pool_header_at(store.pool, 0)
+    for b in range(header_at(store.table, 0).bodies):
+        for k in range(7):
+            told = state[7 * b + k]
+            if k < 3:
+                told = (told - units.reference[k]) / units.scale
+            if q[b, k] != told:
+                return False
+    return True
+
+
 @kernel(inner=True, allocates=True)
 def read_tracked(table, state, tracked):
     """Tracked values of a state, which stand behind its poses, into those of a point."""

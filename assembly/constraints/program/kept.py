@@ -1,0 +1,171 @@
+"""What a solve or a tick leaves for the next one, which begins at the same poses: rows, derivatives, a factor.
+
+It stands at the end of a state, in the order of `Kept`, and is no part of what a solution means: it is used where the
+poses are the same to the last bit, and without it the next solve evaluates its rows anew. Of what rows are made only
+the values of joints may be others by then.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+from assembly._carve import carve
+from assembly._kernel import kernel
+from assembly._record import record_dtype, record_view, size_of
+from assembly.constraints.program.contact import contact_of, idle_row
+from assembly.constraints.program.records import (
+    EXTRA_COLUMN,
+    JOINT_ROW,
+    ROW,
+    header_at,
+    joint_row_at,
+    row_at,
+)
+from assembly.proximity.features.solid_contact import CONTACT_RECORD
+
+KEPT_HEADER = record_dtype(
+    "f8",
+    has_rows=1,  # 1: rows and their derivatives
+    factor=1,  # NO_FACTOR, or which solve made it
+)
+kept_header_at = record_view(KEPT_HEADER)
+HEADER = size_of(KEPT_HEADER)
+# [unknowns] Of scenes with more than these no factor is kept: it takes longer to copy than to make, and solutions are
+# large. Doubled: solutions of larger scenes take four times the memory. Chosen.
+MOST_KEPT = 60
+NO_FACTOR, EARLIER_FACTOR, NEW_FACTOR = 0.0, 1.0, 2.0
+# Where the header is; of every body its pose, as in the state; of every tracked angle its value; of every row the value
+# it has subtracted, its residual, and its weight in the factor (0: it did not count); of every contact of a clearance
+# its number. Records and Jacobian at these poses. The Cholesky factor of a step's matrix and the Jacobian that is in it,
+# both of the same poses or of others close by.
+Kept = namedtuple("Kept", "header poses angles values residual weights numbers records jacobian factor_jacobian factor")
+
+
+@kernel(inline=True)
+def kept_size(table):
+    """How many doubles a state has for it."""
+    header = header_at(table, 0)
+    records = header.contacts + header.joints + header.vector_trims
+    columns = EXTRA_COLUMN + 6 * header.extra
+    n = kept_unknowns(table)
+    by_row = header.rows * (3 + 2 * columns) + header.contacts
+    return HEADER + 7 * header.bodies + header.tracked - header.contacts + by_row + records * CONTACT_RECORD + n * n
+
+
+@kernel(inline=True)
+def kept_unknowns(table):
+    """The number of unknowns whose factor is kept: all, or in a large scene none."""
+    header = header_at(table, 0)
+    n = 6 * header.moving
+    return 0 if n > MOST_KEPT or header.block_record > 0 else n
+
+
+@kernel(inline=True, allocates=True)
+def kept_in(table, state):
+    """What is kept in a state, as arrays in it."""
+    header = header_at(table, 0)
+    rows, n = header.rows, kept_unknowns(table)
+    records = header.contacts + header.joints + header.vector_trims
+    columns = EXTRA_COLUMN + 6 * header.extra
+    at = header.kept + HEADER
+    poses = carve(state, at, (header.bodies, 7))
+    at += 7 * header.bodies
+    angles = carve(state, at, (header.tracked - header.contacts,))
+    at += header.tracked - header.contacts
+    by_row = carve(state, at, (3, rows))
+    at += 3 * rows
+    numbers = carve(state, at, (header.contacts,))
+    at += header.contacts
+    of_records = carve(state, at, (records, CONTACT_RECORD))
+    at += records * CONTACT_RECORD
+    jacobians = carve(state, at, (2, rows, columns))
+    at += 2 * rows * columns
+    factor = carve(state, at, (n, n))
+    return Kept(
+        header.kept,
+        poses,
+        angles,
+        by_row[0],
+        by_row[1],
+        by_row[2],
+        numbers,
+        of_records,
+        jacobians[0],
+        jacobians[1],
+        factor,
+    )
+
+
+@kernel(inline=True)
+def value_of(store, r):
+    """What row r has subtracted and may be given anew between solves."""
+    row = header_at(store.table, 0).row_table + ROW * r
+    return store.pool[joint_row_at(store.table, row).parameters + 2] if row_at(store.table, row).kind == JOINT_ROW else 0.0
+
+
+@kernel(inner=True)
+def is_of(store, state, kept, tracked):
+    """Whether the rows that are kept are those of the poses, the contacts and the turns of angles in a state."""
+    header = header_at(store.table, 0)
+    if kept_header_at(state, kept.header).has_rows != 1.0:
+        return False
+    for b in range(header.bodies):
+        for k in range(7):
+            if kept.poses[b, k] != state[7 * b + k]:
+                return False
+    for k in range(header.contacts):
+        if kept.numbers[k] != float(contact_of(store.table, k).clearance_number):
+            return False
+    for k in range(header.contacts, header.tracked):
+        # An angle is the one next to its value in the state.
+        if not abs(kept.angles[k - header.contacts] - tracked[k, 0]) < math.pi:
+            return False
+    return True
+
+
+@kernel(inner=True)
+def copy_rows(source, out):
+    """As many rows of an array of two axes as the other one has."""
+    for r in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            out[r, i] = source[r, i]
+
+
+@kernel(inner=True)
+def take_rows(store, state, kept, point):
+    """The rows that are kept, with their derivatives, into a point whose poses these are. Whether there are any."""
+    if not is_of(store, state, kept, point.tracked):
+        return False
+    header = header_at(store.table, 0)
+    copy_rows(kept.records, point.records)
+    for k in range(header.contacts, header.tracked):
+        point.tracked[k, 0] = kept.angles[k - header.contacts]
+    for r in range(header.rows):
+        # The same bits, if the value is the same.
+        point.residual[r] = kept.residual[r] + (kept.values[r] - value_of(store, r))
+        for i in range(kept.jacobian.shape[1]):
+            point.jacobian[r, i] = kept.jacobian[r, i]
+    for r in range(header.contacts):
+        if contact_of(store.table, r).body_f < 0:
+            idle_row(r, 1.0, point)
+    return True
+
+
+@kernel(inner=True)
+def keep_rows(store, state, kept, point):
+    """Keep the rows of a point whose poses are in the state."""
+    header = header_at(store.table, 0)
+    for b in range(header.bodies):
+        for k in range(7):
+            kept.poses[b, k] = state[7 * b + k]
+    for k in range(header.contacts, header.tracked):
+        kept.angles[k - header.contacts] = point.tracked[k, 0]
+    for r in range(header.rows):
+        kept.residual[r] = point.residual[r]
+        kept.values[r] = value_of(store, r)
+    for r in range(header.contacts):
+        kept.numbers[r] = float(contact_of(store.table, r).clearance_number)
+    copy_rows(point.records, kept.records)
+    copy_rows(point.jacobian, kept.jacobian)
+    kept_header_at(state, kept.header).has_rows = 1.0

@@ -1,0 +1,202 @@
+"""The first steps of a solve that goes on from another one: Newton's method by the factor that one left.
+
+With A and W the Jacobian and the weights (1 / mu) of the rows that count where the factor was made,
+
+    (H + d I + A^T W A) dx = -(grad f + J^T y + A^T W c),        dy = W (A dx + c)
+
+is a step of the whole system of `augmented_lagrangian.py`, by an older matrix (the chord method): the first one is the
+tangent predictor of what values and targets have changed. Where the next one would not arrive, a factor is made anew,
+once. The iterate at which all holds is handed to the loop, which judges it as any other. Where steps gain too little,
+rows begin or cease to count, or a pair is next to a fold, nothing has happened, and the loop begins where the solve
+does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+from assembly._kernel import kernel
+from assembly.constraints.program.evaluate import evaluate
+from assembly.constraints.program.records import header_at, pool_header_at
+from assembly.constraints.program.row_terms import add_row_terms
+from assembly.proximity.extrema.face_face import BEND
+from assembly.solve.linear_algebra.factorize import factorize_shifted, solve_step
+from assembly.solve.loop.begin import read_state
+from assembly.solve.loop.contacts import is_near_fold
+from assembly.constraints.program.kept import (
+    EARLIER_FACTOR,
+    NEW_FACTOR,
+    NO_FACTOR,
+    copy_rows,
+    keep_rows,
+    kept_header_at,
+    kept_in,
+    take_rows,
+)
+from assembly.solve.loop.line_search import goal
+from assembly.solve.loop.multipliers import curve_rows, dual_residual, weigh_rows
+from assembly.solve.loop.parameters import CHORD_GAIN, CHORD_LONGEST, CHORD_SHIFT, CHORD_STEPS, LIFT_BELOW
+from assembly.solve.loop.predict import predict_pairs
+from assembly.solve.loop.report import log
+from assembly.solve.loop.residuals import add_transposed, move, times, violation_of
+from assembly.solve.loop.settings import RUNNING
+from assembly.solve.loop.workspace import penalized
+
+# How such steps ended: how many there were, or -1 where the loop is to begin from the start; whether the iterates have
+# changed places; the violation and the dual residual at the last iterate, and at the one before.
+Chord = namedtuple("Chord", "steps swapped violation dual last_violation last_dual")
+
+
+@kernel(inner=True)
+def keep_factor(program, state, kept, point, rows, system):
+    """Make the factor of a step at a point where the objective's Hessian is in the system, and keep it."""
+    shape, header = program.structure, kept_header_at(state, kept.header)
+    header.factor = NO_FACTOR
+    curve_rows(rows, point.residual, False)
+    add_row_terms(program, point, rows.forces, rows.active, system.hessian)
+    n = system.gradient.size
+    if factorize_shifted(system.hessian, n, shape.sparsity, CHORD_SHIFT, kept.factor) != CHORD_SHIFT:
+        return False
+    copy_rows(point.jacobian, kept.factor_jacobian)
+    for r in range(rows.count):
+        kept.weights[r] = rows.active[r]
+    header.factor = NEW_FACTOR
+    return True
+
+
+@kernel(inner=True)
+def chord_step(shape, kept, point, rows, system):
+    """The step by the kept factor, from the slope of the Lagrangian that `dual_residual` left. Its largest component."""
+    slope, step = system.directions.descent, system.directions.step
+    for i in range(step.size):
+        step[i] = -slope[i]
+    for r in range(rows.count):
+        rows.forces[r] = -point.residual[r] * kept.weights[r]
+    add_transposed(shape.bases, kept.factor_jacobian, rows.count, rows.forces, step)
+    solve_step(kept.factor, step.size, shape.sparsity, step)
+    longest = 0.0
+    for i in range(step.size):
+        if not abs(step[i]) <= longest:
+            longest = abs(step[i])
+    return longest
+
+
+@kernel(inner=True)
+def round_poses(store, q):
+    """Positions of moving bodies as the user's coordinates have them."""
+    units, header = pool_header_at(store.pool, 0), header_at(store.table, 0)
+    for b in range(header.bodies):
+        if store.table[header.slots + b] >= 0:
+            for k in range(3):
+                told = q[b, k] * units.scale + units.reference[k]
+                q[b, k] = (told - units.reference[k]) / units.scale
+
+
+@kernel(inner=True)
+def count_as_kept(kept, one_sided, rows):
+    """Whether the one-sided rows that count are those of the kept factor."""
+    for r in range(rows.count):
+        if one_sided[r] == 1 and (rows.active[r] > 0.0) != (kept.weights[r] > 0.0):
+            return False
+    return True
+
+
+@kernel(inner=True)
+def go_along(program, kept, current, trial, rows, system):
+    """The iterate at the end of the step, with its rows and multipliers, into the trial one. Whether all is regular."""
+    store, shape, step = program.store, program.structure, system.directions.step
+    move(store.table, current.q, step, 1.0, trial.q)
+    round_poses(store, trial.q)
+    predict_pairs(store, shape.bases, program.lifted, current, trial, step, 1.0)
+    if evaluate(program, program.lifted.guess, BEND, trial) >= 0:
+        return False
+    for k in range(header_at(store.table, 0).contacts):
+        if is_near_fold(trial.records, k, LIFT_BELOW):
+            return False
+    for r in range(rows.count):
+        rows.y[r] += (times(shape.bases, kept.factor_jacobian, r, step) + current.residual[r]) * kept.weights[r]
+    return True
+
+
+@kernel(inner=True)
+def chord_steps(task, history, state, kept, current, trial, rows, system):
+    """Steps by the kept factor from the current iterate, whose rows are evaluated; a `Chord`."""
+    program, limits, feasible = task.program, task.limits, task.loop.feasible
+    shape, stationarity = program.structure, limits.stationarity
+    last_violation = last_dual = math.inf
+    swapped = False
+    failed = Chord(-1, False, math.inf, math.inf, math.inf, math.inf)
+    limit = min(CHORD_STEPS, task.loop.limit)
+    for count in range(limit + 1):
+        value = goal(program, rows.count, current, 1, system.gradient, system.hessian)
+        violation = violation_of(current.residual, shape.one_sided, rows.count)
+        dual = dual_residual(shape, current, rows, system, rows.y)
+        log(history, count, (value, violation, dual, rows.mu, CHORD_SHIFT, 1.0, limits.radius))
+        weigh_rows(rows, shape.one_sided, current.residual)
+        if not count_as_kept(kept, shape.one_sided, rows):
+            return failed
+        arrived = violation <= feasible and dual <= stationarity
+        off, last = max(violation, dual), max(last_violation, last_dual)
+        if not (arrived or off <= CHORD_GAIN * last):
+            return failed
+        # By the same factor a step leaves twice the part of what the last one did: e' = L e^2 / 2, and then L e e'.
+        rate = 2.0 * off / last
+        slow = not (rate * violation <= feasible and rate * dual <= stationarity)
+        is_new = kept_header_at(state, kept.header).factor == NEW_FACTOR
+        if (arrived or slow) and not is_new and count > 0:
+            if not keep_factor(program, state, kept, current, rows, system):
+                return failed
+        if arrived:
+            return Chord(count, swapped, violation, dual, last_violation, last_dual)
+        if count == limit or not chord_step(shape, kept, current, rows, system) <= CHORD_LONGEST:
+            return failed
+        if not go_along(program, kept, current, trial, rows, system):
+            return failed
+        current, trial = trial, current
+        swapped = not swapped
+        last_violation, last_dual = violation, dual
+    return failed
+
+
+@kernel(inline=True, allocates=True)
+def go_on_by_chords(task, history, state, current, trial, rows, system):
+    """Steps by the factor that the last solve left, if it did. Whether the iterates have changed places."""
+    loop, limits, store = task.loop, task.limits, task.program.store
+    kept = kept_in(store.table, state)
+    may = loop.status == RUNNING and not task.watched and limits.lift_trims == 0.0
+    if not may or kept_header_at(state, kept.header).factor != EARLIER_FACTOR:
+        return False
+    chord = chord_steps(task, history, state, kept, current, trial, rows, system)
+    if chord.steps < 0:
+        kept_header_at(state, kept.header).factor = NO_FACTOR
+        read_state(store, state, current, trial, rows)
+        take_rows(store, state, kept, current)
+        return False
+    loop.iteration, loop.alpha = chord.steps, 1.0
+    loop.last_violation, loop.last_dual = chord.last_violation, chord.last_dual
+    for r in range(rows.count):
+        rows.better_y[r] = rows.y[r]
+    return chord.swapped
+
+
+@kernel(inline=True, allocates=True)
+def leave(program, limits, state, point, rows, system, is_kept, is_solved):
+    """Leave the rows of a point whose poses are in the state, if they are to be kept, and a factor of a solution."""
+    store = program.store
+    kept = kept_in(store.table, state)
+    header = kept_header_at(state, kept.header)
+    header.has_rows = 0.0
+    if not is_kept:
+        header.factor = NO_FACTOR
+        return
+    keep_rows(store, state, kept, point)
+    if not is_solved or kept.factor.shape[0] == 0:
+        header.factor = NO_FACTOR
+    elif header.factor == NO_FACTOR:
+        rows = penalized(rows, limits.penalty_floor)
+        goal(program, rows.count, point, 1, system.gradient, system.hessian)
+        weigh_rows(rows, program.structure.one_sided, point.residual)
+        keep_factor(program, state, kept, point, rows, system)
+    if header.factor == NEW_FACTOR:
+        header.factor = EARLIER_FACTOR
