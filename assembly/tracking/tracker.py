@@ -50,6 +50,7 @@ from assembly.solve.loop.settings import (
     TICK,
     VIOLATION,
 )
+from assembly.solve.loop.workspace import new_workspace
 from assembly.solve.options import Options
 from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution
@@ -236,7 +237,8 @@ class Tracker(InOneProcess):
         self._view: Any = self._state.data
         self._before = self._pose.copy()
         self._knobs: Any = self._settings.data
-        self._arguments = (packed.table, packed.pool, self._settings, self._state, self._history, packed.end_effectors)
+        blocks = new_workspace(packed)
+        self._arguments = (packed.table, packed.pool, self._settings, self._state, self._history, *blocks, packed.end_effectors)
         self._radius = float(self._settings[RADIUS])
         self._seen = float(self._state[packed.memory_at + EVENT_COUNT]) if packed.clearance_rows else 0.0
         self._pool = packed.pool.data

@@ -67,6 +67,8 @@ class Packed:
         See `constraints/program/records.py`. Lengths in the pool are divided by `scale`.
     scale : float
         The scene's size (`scene_size`), 1 where it has none.
+    workspaces : list of two arrays
+        What solves that are over worked in, for the next ones (`solve/loop/workspace.py`).
     has_size : bool
         Whether the scene has a size.
     outgrown : Packed or None
@@ -142,6 +144,7 @@ class Packed:
         if self.clearance_rows:
             # The first update sees what crosses at the start as well, if it is no deeper than this.
             self._memory = fresh_memory(sum(map(len, self.clearance_pairs)), self.clearance_rows, LARGEST_MARGIN)
+        self.workspaces: list[tuple[Array, Table]] = []
         self.kept_at = self.memory_at + self._memory.size
         self.table[layout.KEPT] = self.kept_at
         self._state_size = self.kept_at + int(kept_size(self.table))
@@ -313,6 +316,9 @@ class Packed:
             manager.mark_address = addresses.places() if manager.mark_address else 0
         if table[table[layout.TAPE_WORKSPACE]] > 0:
             table[layout.RUN_TAPE_AT] = addresses.tapes()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "workspaces": []}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # Addresses are those of one process; a copy, or what another process wrote, takes its own.

@@ -30,6 +30,7 @@ from assembly.solve.loop.settings import (
     UNSURE,
     VIOLATION,
 )
+from assembly.solve.loop.workspace import new_workspace
 from assembly.solve.options import Options
 from assembly.solve.second_order.leave import Fit, Outcome, leave_saddles
 
@@ -46,7 +47,8 @@ _loaded: set[int | None] = set()
 def load(packed: Packed, start: Callable[[], Array]) -> None:
     """Have the loop for such a scene in this process: loading it, or compiling it, is no part of a solve's time."""
     if packed.end_effectors not in _loaded:
-        solve_program(packed.table.copy(), packed.pool, _LOADING, start(), np.empty((1, HISTORY)), packed.end_effectors)
+        blocks = new_workspace(packed)
+        solve_program(packed.table.copy(), packed.pool, _LOADING, start(), np.empty((1, HISTORY)), *blocks, packed.end_effectors)
         _loaded.add(packed.end_effectors)
 
 
@@ -135,7 +137,14 @@ def _run(packed: Packed, interruption: Interruption, table: Table, settings: Arr
     if interruption.callback is not None:
         state[packed.results_at + OBJECTIVE], state[packed.results_at + VIOLATION] = np.nan, np.inf
         interruption.watched = (state, packed.results_at)
-    return Outcome(solve_program(table, packed.pool, settings, state, history, packed.end_effectors), state, history)
+    # Threads have workspaces of their own.
+    spare = packed.workspaces
+    blocks = spare.pop() if spare else new_workspace(packed)
+    try:
+        code = solve_program(table, packed.pool, settings, state, history, blocks[0], blocks[1], packed.end_effectors)
+    finally:
+        spare.append(blocks)
+    return Outcome(code, state, history)
 
 
 def go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:

@@ -80,10 +80,17 @@ def substitute(m, n, last, b):
     """Solve U^T U x = b in place."""
     forward(m, n, last, b)
     for k in range(n - 1, -1, -1):
+        # Two sums, each of which waits for its own additions only.
         s = b[k]
-        for i in range(k + 1, last[k] + 1):
+        t = 0.0
+        i = k + 1
+        while i < last[k]:
             s -= m[k, i] * b[i]
-        b[k] = s * m[k, k]
+            t -= m[k, i + 1] * b[i + 1]
+            i += 2
+        if i == last[k]:
+            s -= m[k, i] * b[i]
+        b[k] = (s + t) * m[k, k]
 
 
 @kernel(inner=True)

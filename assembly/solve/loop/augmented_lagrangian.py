@@ -23,8 +23,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.constraints.program.objective_terms import objective
@@ -41,31 +39,23 @@ from assembly.solve.loop.rollback import restart
 from assembly.solve.loop.settings import CONTACT_LOST, OUT_OF_TIME, RUNNING, results_at, settings_at
 from assembly.solve.loop.terminate import terminate
 from assembly.solve.loop.way_back import lead_to_rows
-from assembly.solve.loop.workspace import Iterates, carve_all, memory_of, results_of, rows_in, workspace_needed
+from assembly.solve.loop.workspace import Iterates, carve_all, memory_of, results_of, rows_in
 
 
 @kernel(
     signatures=(
-        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], i8)",
-        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], none)",
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], i8[::1], i8)",
+        "(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], i8[::1], none)",
     ),
     allocates=True,
 )
-def solve_program(table, pool, settings, state, history, end_effectors):
-    """Solve in place. State: q (n, 7) | tracked (k, TRACK) | multipliers (m) | residuals (m) | results | memory.
+def solve_program(table, pool, settings, state, history, doubles, integers, end_effectors):
+    """Solve in place. State: q (n, 7) | tracked (k, TRACK) | multipliers (m) | residuals (m) | results | memory | kept.
 
-    `end_effectors` is None where no term of the objective is a dexterity.
+    `doubles` and `integers` are two blocks to work in (`workspace.new_workspace`). `end_effectors` is None where no term of the
+    objective is a dexterity.
     """
-    doubles, integers = workspace_needed(table)
-    # Carved arrays do not keep their block alive: it is an argument of who carves.
-    blocks = np.empty(doubles), np.empty(integers, np.int64)
-    return solve_in(Store(table, pool), settings, state, history, end_effectors, blocks[0], blocks[1])
-
-
-@kernel(inner=True, allocates=True)
-def solve_in(store, settings, state, history, end_effectors, doubles, integers):
-    """The same, in two blocks of memory."""
-    table = store.table
+    store = Store(table, pool)
     workspace = carve_all(store, memory_of(table, state), end_effectors, doubles, integers)
     results, limits = results_of(table, state), settings_at(settings, 0)
     tick, any_pose, watched = limits.tick == 1.0, limits.any_pose == 1.0, header_at(table, 0).manager_record >= 0

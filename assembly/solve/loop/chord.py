@@ -34,9 +34,17 @@ from assembly.constraints.program.kept import (
     kept_in,
     take_rows,
 )
+from assembly.solve.loop.inertia import note_factor
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import curve_rows, dual_residual, weigh_rows
-from assembly.solve.loop.parameters import CHORD_GAIN, CHORD_LONGEST, CHORD_SHIFT, CHORD_STEPS, LIFT_BELOW
+from assembly.solve.loop.parameters import (
+    CHORD_GAIN,
+    CHORD_LONGEST,
+    CHORD_SHIFT,
+    CHORD_STEPS,
+    LEAST_SHIFT,
+    LIFT_BELOW,
+)
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.report import log
 from assembly.solve.loop.residuals import add_transposed, move, times, violation_of
@@ -50,7 +58,10 @@ Chord = namedtuple("Chord", "steps swapped violation dual last_violation last_du
 
 @kernel(inner=True)
 def keep_factor(program, state, kept, point, rows, system):
-    """Make the factor of a step at a point where the objective's Hessian is in the system, and keep it."""
+    """Make the factor of a step at a point, and keep it; whether there is one.
+
+    The objective's Hessian is in the system, and the Lagrangian's afterwards.
+    """
     shape, header = program.structure, kept_header_at(state, kept.header)
     header.factor = NO_FACTOR
     curve_rows(rows, point.residual, False)
@@ -63,6 +74,14 @@ def keep_factor(program, state, kept, point, rows, system):
         kept.weights[r] = rows.active[r]
     header.factor = NEW_FACTOR
     return True
+
+
+@kernel(inner=True)
+def test_convexity(task, rows, system, dual):
+    """Whether no curvature is negative where the Hessian of the Lagrangian was just made, into the results."""
+    n, shape = system.gradient.size, task.program.structure
+    shift = factorize_shifted(system.hessian, n, shape.sparsity, LEAST_SHIFT, system.factor)
+    note_factor(task.results, rows, shape.one_sided, shift, dual, False)
 
 
 @kernel(inner=True)
@@ -83,14 +102,24 @@ def chord_step(shape, kept, point, rows, system):
 
 
 @kernel(inner=True)
-def round_poses(store, q):
-    """Positions of moving bodies as the user's coordinates have them."""
+def round_poses(store, q, told):
+    """Poses as the user's coordinates have them, which go into `told`."""
     units, header = pool_header_at(store.pool, 0), header_at(store.table, 0)
     for b in range(header.bodies):
         if store.table[header.slots + b] >= 0:
             for k in range(3):
-                told = q[b, k] * units.scale + units.reference[k]
-                q[b, k] = (told - units.reference[k]) / units.scale
+                told[b, k] = q[b, k] * units.scale + units.reference[k]
+                q[b, k] = (told[b, k] - units.reference[k]) / units.scale
+            for k in range(3, 7):
+                told[b, k] = q[b, k]
+
+
+@kernel(inner=True)
+def copy_poses(source, state):
+    """Poses into a state."""
+    for b in range(source.shape[0]):
+        for k in range(7):
+            state[7 * b + k] = source[b, k]
 
 
 @kernel(inner=True)
@@ -107,7 +136,7 @@ def go_along(program, kept, current, trial, rows, system):
     """The iterate at the end of the step, with its rows and multipliers, into the trial one. Whether all is regular."""
     store, shape, step = program.store, program.structure, system.directions.step
     move(store.table, current.q, step, 1.0, trial.q)
-    round_poses(store, trial.q)
+    round_poses(store, trial.q, kept.poses)
     predict_pairs(store, shape.bases, program.lifted, current, trial, step, 1.0)
     if evaluate(program, program.lifted.guess, BEND, trial) >= 0:
         return False
@@ -115,7 +144,8 @@ def go_along(program, kept, current, trial, rows, system):
         if is_near_fold(trial.records, k, LIFT_BELOW):
             return False
     for r in range(rows.count):
-        rows.y[r] += (times(shape.bases, kept.factor_jacobian, r, step) + current.residual[r]) * kept.weights[r]
+        left = times(shape.bases, kept.factor_jacobian, r, step) + current.residual[r]
+        rows.y[r] += left * kept.weights[r]
     return True
 
 
@@ -128,6 +158,7 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
     swapped = False
     failed = Chord(-1, False, math.inf, math.inf, math.inf, math.inf)
     limit = min(CHORD_STEPS, task.loop.limit)
+    tests = not task.tick and header_at(program.store.table, 0).implicit == 0
     for count in range(limit + 1):
         value = goal(program, rows.count, current, 1, system.gradient, system.hessian)
         violation = violation_of(current.residual, shape.one_sided, rows.count)
@@ -143,10 +174,12 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
         # By the same factor a step leaves twice the part of what the last one did: e' = L e^2 / 2, and then L e e'.
         rate = 2.0 * off / last
         slow = not (rate * violation <= feasible and rate * dual <= stationarity)
-        is_new = kept_header_at(state, kept.header).factor == NEW_FACTOR
-        if (arrived or slow) and not is_new and count > 0:
+        is_old = kept_header_at(state, kept.header).factor == EARLIER_FACTOR
+        if (arrived or slow) and count > 0 and is_old:
             if not keep_factor(program, state, kept, current, rows, system):
                 return failed
+            if tests:
+                test_convexity(task, rows, system, dual)
         if arrived:
             return Chord(count, swapped, violation, dual, last_violation, last_dual)
         if count == limit or not chord_step(shape, kept, current, rows, system) <= CHORD_LONGEST:
@@ -170,9 +203,13 @@ def go_on_by_chords(task, history, state, current, trial, rows, system):
     chord = chord_steps(task, history, state, kept, current, trial, rows, system)
     if chord.steps < 0:
         kept_header_at(state, kept.header).factor = NO_FACTOR
+        for b in range(kept.poses.shape[0]):
+            for k in range(7):
+                kept.poses[b, k] = state[7 * b + k]
         read_state(store, state, current, trial, rows)
         take_rows(store, state, kept, current)
         return False
+    copy_poses(kept.poses, state)
     loop.iteration, loop.alpha = chord.steps, 1.0
     loop.last_violation, loop.last_dual = chord.last_violation, chord.last_dual
     for r in range(rows.count):

@@ -23,7 +23,7 @@ from assembly.solve.loop.parameters import (
     WANTED,
     WEAK,
 )
-from assembly.solve.loop.residuals import add_row, add_transposed, clear_row, times
+from assembly.solve.loop.residuals import NOT_ORDERED, add_row, add_transposed, clear_row, order_rows, times
 
 
 @kernel(inner=True)
@@ -185,6 +185,8 @@ def least_squares_multipliers(shape, point, rows, system, rounds, y):
     bases, jacobian, active = shape.bases, point.jacobian, rows.active
     gram, count, scratch = rows.gram, rows.count, system.directions.descent
     sequence, last_row = shape.row_order
+    if count > 0 and sequence[0] == NOT_ORDERED:
+        order_rows(shape, count, system.gradient.size)
     side = gram[gram.shape[0] - 1]
     for i in range(scratch.size):
         scratch[i] = 0.0

@@ -32,6 +32,8 @@ from assembly.kinematics.motion import retract
 # Where rows and unknowns stand. `bases`: see the heading; `one_sided`: 1 for rows residual >= 0; where the Hessian has
 # entries (`constraints/program/envelope.py`); rows in the order of their bodies, and how far those of J J^T reach.
 Structure = namedtuple("Structure", "bases one_sided sparsity row_order")
+# The first row in an order that is not known yet.
+NOT_ORDERED = -1
 
 
 @kernel(inline=True)
@@ -140,11 +142,9 @@ def place_unknowns(table, bases, rows, n, order):
 
 
 @kernel(inner=True)
-def order_rows(bases, rows, n, sequence, last_row, latest):
-    """Rows in the order of their first bodies, and how far those of J J^T reach then (see `factorize`).
-
-    `latest` is room for n + 1 numbers.
-    """
+def order_rows(shape, rows, n):
+    """Rows in the order of their first bodies, and how far those of J J^T reach then (see `factorize`)."""
+    bases, (sequence, last_row), latest = shape.bases, shape.row_order, shape.sparsity.places[3]
     # Rows meet in J J^T where they share a variable. First how many begin at each, then where the next one goes.
     for i in range(n + 1):
         latest[i] = 0
@@ -172,10 +172,11 @@ def order_rows(bases, rows, n, sequence, last_row, latest):
 @kernel(inner=True)
 def arrange(table, free, shape, rows, n):
     """Where rows and unknowns stand, now that the pairs in `free` are at folds."""
-    bases, one_sided, order, (sequence, last_row) = shape.bases, shape.one_sided, shape.sparsity, shape.row_order
-    place_rows(table, free, bases, one_sided)
-    place_unknowns(table, bases, rows, n, order)
-    order_rows(bases, rows, n, sequence, last_row, order.places[3])
+    place_rows(table, free, shape.bases, shape.one_sided)
+    place_unknowns(table, shape.bases, rows, n, shape.sparsity)
+    if rows > 0:
+        # Few solves ask for their order (`multipliers.least_squares_multipliers`).
+        shape.row_order[0][0] = NOT_ORDERED
 
 
 @kernel(inline=True)

@@ -103,6 +103,12 @@ def workspace_needed(table):
     return doubles, integers + pairs + header.clearance_rows
 
 
+def new_workspace(packed):
+    """Two blocks of memory for a solve of a packed scene, whatever is in them."""
+    doubles, integers = workspace_needed(packed.table)
+    return np.empty(int(doubles)), np.empty(int(integers), dtype=np.int64)
+
+
 @kernel(inline=True)
 def record_count(table):
     """How many records a point has."""
