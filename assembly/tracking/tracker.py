@@ -238,7 +238,15 @@ class Tracker(InOneProcess):
         self._before = self._pose.copy()
         self._knobs: Any = self._settings.data
         blocks = new_workspace(packed)
-        self._arguments = (packed.table, packed.pool, self._settings, self._state, self._history, *blocks, packed.end_effectors)
+        self._arguments = (
+            packed.table,
+            packed.pool,
+            self._settings,
+            self._state,
+            self._history,
+            *blocks,
+            packed.end_effectors,
+        )
         self._radius = float(self._settings[RADIUS])
         self._seen = float(self._state[packed.memory_at + EVENT_COUNT]) if packed.clearance_rows else 0.0
         self._pool = packed.pool.data

@@ -37,8 +37,8 @@ MOST_KEPT = 60
 NO_FACTOR, EARLIER_FACTOR, NEW_FACTOR = 0.0, 1.0, 2.0
 # Where the header is; of every body its pose, as in the state; of every tracked angle its value; of every row the value
 # it has subtracted, its residual, and its weight in the factor (0: it did not count); of every contact of a clearance
-# its number. Records and Jacobian at these poses. The Cholesky factor of a step's matrix and the Jacobian that is in it,
-# both of the same poses or of others close by.
+# its number. Records and Jacobian at these poses. The Cholesky factor of a step's matrix, and the Jacobian that is in
+# it, both of the same poses or of others close by.
 Kept = namedtuple("Kept", "header poses angles values residual weights numbers records jacobian factor_jacobian factor")
 
 
@@ -101,7 +101,9 @@ def kept_in(table, state):
 def value_of(store, r):
     """What row r has subtracted and may be given anew between solves."""
     row = header_at(store.table, 0).row_table + ROW * r
-    return store.pool[joint_row_at(store.table, row).parameters + 2] if row_at(store.table, row).kind == JOINT_ROW else 0.0
+    return (
+        store.pool[joint_row_at(store.table, row).parameters + 2] if row_at(store.table, row).kind == JOINT_ROW else 0.0
+    )
 
 
 @kernel(inner=True)

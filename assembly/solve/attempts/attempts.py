@@ -48,7 +48,9 @@ def load(packed: Packed, start: Callable[[], Array]) -> None:
     """Have the loop for such a scene in this process: loading it, or compiling it, is no part of a solve's time."""
     if packed.end_effectors not in _loaded:
         blocks = new_workspace(packed)
-        solve_program(packed.table.copy(), packed.pool, _LOADING, start(), np.empty((1, HISTORY)), *blocks, packed.end_effectors)
+        solve_program(
+            packed.table.copy(), packed.pool, _LOADING, start(), np.empty((1, HISTORY)), *blocks, packed.end_effectors
+        )
         _loaded.add(packed.end_effectors)
 
 

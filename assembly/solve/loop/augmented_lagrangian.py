@@ -52,8 +52,8 @@ from assembly.solve.loop.workspace import Iterates, carve_all, memory_of, result
 def solve_program(table, pool, settings, state, history, doubles, integers, end_effectors):
     """Solve in place. State: q (n, 7) | tracked (k, TRACK) | multipliers (m) | residuals (m) | results | memory | kept.
 
-    `doubles` and `integers` are two blocks to work in (`workspace.new_workspace`). `end_effectors` is None where no term of the
-    objective is a dexterity.
+    `doubles` and `integers` are two blocks to work in (`workspace.new_workspace`). `end_effectors` is None where no
+    term of the objective is a dexterity.
     """
     store = Store(table, pool)
     workspace = carve_all(store, memory_of(table, state), end_effectors, doubles, integers)
@@ -82,7 +82,7 @@ def run(task, workspace, state, history):
     system = workspace.system
     current, trial, held = workspace.iterates
     rows = begin(task, workspace, state, current, trial)
-    if go_on_by_chords(task, history, state, current, trial, rows, system):
+    if go_on_by_chords(task, history, state, workspace.iterates, rows, system):
         current, trial = trial, current
     header = header_at(program.store.table, 0)
     while loop.status == RUNNING or restart(task, held, current, rows):

@@ -9,6 +9,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import is_clearance_row, is_of_solids
 from assembly.constraints.program.evaluate import evaluate
+from assembly.constraints.program.kept import NO_FACTOR, kept_header_at, kept_in, take_rows
 from assembly.constraints.program.objective_terms import recenter
 from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.proximity.features.solid_contact import TRACK, contact_record_at, tracked_at
@@ -19,7 +20,6 @@ from assembly.solve.loop.clearances import forget_clearance_rows, place_clearanc
 from assembly.solve.loop.contacts import lift_folds, start_contacts
 from assembly.solve.loop.deadline import begin_tick
 from assembly.solve.loop.initial_guess import assemble, scattered
-from assembly.constraints.program.kept import NO_FACTOR, kept_header_at, kept_in, take_rows
 from assembly.solve.loop.parameters import EXTRA_TIME, FAR, LIFT_BELOW, PATIENCE
 from assembly.solve.loop.report import read_tracked
 from assembly.solve.loop.residuals import arrange

@@ -18,38 +18,23 @@ from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.constraints.program.evaluate import evaluate
+from assembly.constraints.program.kept import EARLIER_FACTOR, NO_FACTOR, kept_header_at, kept_in, take_rows
 from assembly.constraints.program.records import header_at, pool_header_at
-from assembly.constraints.program.row_terms import add_row_terms
 from assembly.proximity.extrema.face_face import BEND
-from assembly.solve.linear_algebra.factorize import factorize_shifted, solve_step
+from assembly.solve.linear_algebra.factorize import solve_step
 from assembly.solve.loop.begin import read_state
+from assembly.solve.loop.clearances import allowed_share, ends_unseen
 from assembly.solve.loop.contacts import is_near_fold
-from assembly.constraints.program.kept import (
-    EARLIER_FACTOR,
-    NEW_FACTOR,
-    NO_FACTOR,
-    copy_rows,
-    keep_rows,
-    kept_header_at,
-    kept_in,
-    take_rows,
-)
-from assembly.solve.loop.inertia import note_factor
+from assembly.solve.loop.deadline import is_cut
+from assembly.solve.loop.keep import keep_factor, test_convexity
 from assembly.solve.loop.line_search import goal
-from assembly.solve.loop.multipliers import curve_rows, dual_residual, weigh_rows
-from assembly.solve.loop.parameters import (
-    CHORD_GAIN,
-    CHORD_LONGEST,
-    CHORD_SHIFT,
-    CHORD_STEPS,
-    LEAST_SHIFT,
-    LIFT_BELOW,
-)
+from assembly.solve.loop.multipliers import dual_residual, weigh_rows
+from assembly.solve.loop.parameters import CHORD_GAIN, CHORD_LONGEST, CHORD_SHIFT, CHORD_STEPS, FEW, LIFT_BELOW
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.report import log
 from assembly.solve.loop.residuals import add_transposed, move, times, violation_of
 from assembly.solve.loop.settings import RUNNING
-from assembly.solve.loop.workspace import penalized
+from assembly.solve.loop.terminate import keep_what_holds
 
 # How such steps ended: how many there were, or -1 where the loop is to begin from the start; whether the iterates have
 # changed places; the violation and the dual residual at the last iterate, and at the one before.
@@ -57,36 +42,8 @@ Chord = namedtuple("Chord", "steps swapped violation dual last_violation last_du
 
 
 @kernel(inner=True)
-def keep_factor(program, state, kept, point, rows, system):
-    """Make the factor of a step at a point, and keep it; whether there is one.
-
-    The objective's Hessian is in the system, and the Lagrangian's afterwards.
-    """
-    shape, header = program.structure, kept_header_at(state, kept.header)
-    header.factor = NO_FACTOR
-    curve_rows(rows, point.residual, False)
-    add_row_terms(program, point, rows.forces, rows.active, system.hessian)
-    n = system.gradient.size
-    if factorize_shifted(system.hessian, n, shape.sparsity, CHORD_SHIFT, kept.factor) != CHORD_SHIFT:
-        return False
-    copy_rows(point.jacobian, kept.factor_jacobian)
-    for r in range(rows.count):
-        kept.weights[r] = rows.active[r]
-    header.factor = NEW_FACTOR
-    return True
-
-
-@kernel(inner=True)
-def test_convexity(task, rows, system, dual):
-    """Whether no curvature is negative where the Hessian of the Lagrangian was just made, into the results."""
-    n, shape = system.gradient.size, task.program.structure
-    shift = factorize_shifted(system.hessian, n, shape.sparsity, LEAST_SHIFT, system.factor)
-    note_factor(task.results, rows, shape.one_sided, shift, dual, False)
-
-
-@kernel(inner=True)
 def chord_step(shape, kept, point, rows, system):
-    """The step by the kept factor, from the slope of the Lagrangian that `dual_residual` left. Its largest component."""
+    """The step by the kept factor, from the Lagrangian's slope, which `dual_residual` left. Its largest component."""
     slope, step = system.directions.descent, system.directions.step
     for i in range(step.size):
         step[i] = -slope[i]
@@ -106,7 +63,7 @@ def round_poses(store, q, told):
     """Poses as the user's coordinates have them, which go into `told`."""
     units, header = pool_header_at(store.pool, 0), header_at(store.table, 0)
     for b in range(header.bodies):
-        if store.table[header.slots + b] >= 0:
+        if store.table[header.unknown_blocks + b] >= 0:
             for k in range(3):
                 told[b, k] = q[b, k] * units.scale + units.reference[k]
                 q[b, k] = (told[b, k] - units.reference[k]) / units.scale
@@ -134,11 +91,16 @@ def count_as_kept(kept, one_sided, rows):
 @kernel(inner=True)
 def go_along(program, kept, current, trial, rows, system):
     """The iterate at the end of the step, with its rows and multipliers, into the trial one. Whether all is regular."""
-    store, shape, step = program.store, program.structure, system.directions.step
+    store, shape, step, memory = program.store, program.structure, system.directions.step, program.lifted.memory
+    watched = header_at(store.table, 0).manager_record >= 0
+    if watched and not allowed_share(store, memory, current, trial, step, 1.0)[1]:
+        return False
     move(store.table, current.q, step, 1.0, trial.q)
     round_poses(store, trial.q, kept.poses)
     predict_pairs(store, shape.bases, program.lifted, current, trial, step, 1.0)
     if evaluate(program, program.lifted.guess, BEND, trial) >= 0:
+        return False
+    if watched and ends_unseen(store, memory, current, trial):
         return False
     for k in range(header_at(store.table, 0).contacts):
         if is_near_fold(trial.records, k, LIFT_BELOW):
@@ -157,7 +119,7 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
     last_violation = last_dual = math.inf
     swapped = False
     failed = Chord(-1, False, math.inf, math.inf, math.inf, math.inf)
-    limit = min(CHORD_STEPS, task.loop.limit)
+    limit = min(CHORD_STEPS, task.loop.longest_tick if task.tick else task.loop.limit)
     tests = not task.tick and header_at(program.store.table, 0).implicit == 0
     for count in range(limit + 1):
         value = goal(program, rows.count, current, 1, system.gradient, system.hessian)
@@ -167,15 +129,17 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
         weigh_rows(rows, shape.one_sided, current.residual)
         if not count_as_kept(kept, shape.one_sided, rows):
             return failed
-        arrived = violation <= feasible and dual <= stationarity
+        # A tick ends after its steps at any pose that holds.
+        arrived = violation <= feasible and (dual <= stationarity or (task.tick and count >= task.loop.limit))
         off, last = max(violation, dual), max(last_violation, last_dual)
-        if not (arrived or off <= CHORD_GAIN * last):
+        if not (math.isfinite(value) and (arrived or off <= CHORD_GAIN * last)):
             return failed
         # By the same factor a step leaves twice the part of what the last one did: e' = L e^2 / 2, and then L e e'.
         rate = 2.0 * off / last
         slow = not (rate * violation <= feasible and rate * dual <= stationarity)
-        is_old = kept_header_at(state, kept.header).factor == EARLIER_FACTOR
-        if (arrived or slow) and count > 0 and is_old:
+        # A tick that arrived soon leaves the factor that it had.
+        ages = (arrived and not (task.tick and count <= FEW)) or (slow and not arrived)
+        if ages and count > 0 and kept_header_at(state, kept.header).factor == EARLIER_FACTOR:
             if not keep_factor(program, state, kept, current, rows, system):
                 return failed
             if tests:
@@ -193,13 +157,17 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
 
 
 @kernel(inline=True, allocates=True)
-def go_on_by_chords(task, history, state, current, trial, rows, system):
+def go_on_by_chords(task, history, state, iterates, rows, system):
     """Steps by the factor that the last solve left, if it did. Whether the iterates have changed places."""
     loop, limits, store = task.loop, task.limits, task.program.store
+    current, trial, held = iterates
     kept = kept_in(store.table, state)
-    may = loop.status == RUNNING and not task.watched and limits.lift_trims == 0.0
+    may = loop.status == RUNNING and not is_cut(store.table, task.program.lifted.memory) and limits.lift_trims == 0.0
     if not may or kept_header_at(state, kept.header).factor != EARLIER_FACTOR:
         return False
+    loop.violation = violation_of(current.residual, task.program.structure.one_sided, rows.count)
+    if task.tick or task.watched:
+        keep_what_holds(task, held, current, rows)
     chord = chord_steps(task, history, state, kept, current, trial, rows, system)
     if chord.steps < 0:
         kept_header_at(state, kept.header).factor = NO_FACTOR
@@ -208,6 +176,8 @@ def go_on_by_chords(task, history, state, current, trial, rows, system):
                 kept.poses[b, k] = state[7 * b + k]
         read_state(store, state, current, trial, rows)
         take_rows(store, state, kept, current)
+        # Of motion bounds it is known what bodies would have used elsewhere.
+        loop.measured = 0
         return False
     copy_poses(kept.poses, state)
     loop.iteration, loop.alpha = chord.steps, 1.0
@@ -215,25 +185,3 @@ def go_on_by_chords(task, history, state, current, trial, rows, system):
     for r in range(rows.count):
         rows.better_y[r] = rows.y[r]
     return chord.swapped
-
-
-@kernel(inline=True, allocates=True)
-def leave(program, limits, state, point, rows, system, is_kept, is_solved):
-    """Leave the rows of a point whose poses are in the state, if they are to be kept, and a factor of a solution."""
-    store = program.store
-    kept = kept_in(store.table, state)
-    header = kept_header_at(state, kept.header)
-    header.has_rows = 0.0
-    if not is_kept:
-        header.factor = NO_FACTOR
-        return
-    keep_rows(store, state, kept, point)
-    if not is_solved or kept.factor.shape[0] == 0:
-        header.factor = NO_FACTOR
-    elif header.factor == NO_FACTOR:
-        rows = penalized(rows, limits.penalty_floor)
-        goal(program, rows.count, point, 1, system.gradient, system.hessian)
-        weigh_rows(rows, program.structure.one_sided, point.residual)
-        keep_factor(program, state, kept, point, rows, system)
-    if header.factor == NEW_FACTOR:
-        header.factor = EARLIER_FACTOR

@@ -13,7 +13,7 @@ from assembly.proximity.manager.update import EVERYTHING, any_crossed
 from assembly.solve.loop.arrival import is_near_saddle
 from assembly.solve.loop.clearances import clear_clearance_rows, go_back, place_clearance_rows, update_around
 from assembly.solve.loop.inertia import test_end
-from assembly.solve.loop.chord import leave
+from assembly.solve.loop.keep import leave
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import multipliers_at
 from assembly.solve.loop.report import (
@@ -97,7 +97,9 @@ def finish(program, settings, state, iterates, rows, system, at_end):
         recenter(store, trial.q)
     write_pose(store, current.q, state)
     # A tick that went well ends at a pose that was just evaluated, and so do steps to poses as they are returned.
-    is_as_told = status == SOLVED and not gathered and rows.count == header.rows and is_as_returned(store, current.q, state)
+    is_as_told = (
+        status == SOLVED and not gathered and rows.count == header.rows and is_as_returned(store, current.q, state)
+    )
     is_judged = status != CONTACT_LOST and not (tick and result.last_feasible == 0.0) and not is_as_told
     if is_judged:
         bound = 1.25 * feasible

@@ -1,0 +1,71 @@
+"""What a solve leaves for the next one, beside its rows: the factor of a step's matrix at its end, or close by."""
+
+from __future__ import annotations
+
+from assembly._kernel import kernel
+from assembly.constraints.program.kept import (
+    EARLIER_FACTOR,
+    NEW_FACTOR,
+    NO_FACTOR,
+    copy_rows,
+    keep_rows,
+    kept_header_at,
+    kept_in,
+)
+from assembly.constraints.program.row_terms import add_row_terms
+from assembly.solve.linear_algebra.factorize import factorize_shifted
+from assembly.solve.loop.inertia import note_factor
+from assembly.solve.loop.line_search import goal
+from assembly.solve.loop.multipliers import curvature_multipliers, weigh_rows
+from assembly.solve.loop.parameters import CHORD_SHIFT, LEAST_SHIFT
+from assembly.solve.loop.workspace import penalized
+
+
+@kernel(inner=True)
+def keep_factor(program, state, kept, point, rows, system):
+    """Make the factor of a step at a point, and keep it; whether there is one.
+
+    The objective's Hessian is in the system, and the Lagrangian's afterwards.
+    """
+    shape, header = program.structure, kept_header_at(state, kept.header)
+    header.factor = NO_FACTOR
+    curvature_multipliers(rows, point.residual, False)
+    add_row_terms(program, point, rows.forces, rows.active, system.hessian)
+    n = system.gradient.size
+    if factorize_shifted(system.hessian, n, shape.sparsity, CHORD_SHIFT, kept.factor) != CHORD_SHIFT:
+        return False
+    copy_rows(point.jacobian, kept.factor_jacobian)
+    for r in range(rows.count):
+        kept.weights[r] = rows.active[r]
+    header.factor = NEW_FACTOR
+    return True
+
+
+@kernel(inner=True)
+def test_convexity(task, rows, system, dual):
+    """Whether no curvature is negative where the Hessian of the Lagrangian was just made, into the results."""
+    n, shape = system.gradient.size, task.program.structure
+    shift = factorize_shifted(system.hessian, n, shape.sparsity, LEAST_SHIFT, system.factor)
+    note_factor(task.results, rows, shape.one_sided, shift, dual, False)
+
+
+@kernel(inline=True, allocates=True)
+def leave(program, limits, state, point, rows, system, is_kept, is_solved):
+    """Leave the rows of a point whose poses are in the state, if they are to be kept, and a factor of a solution."""
+    store = program.store
+    kept = kept_in(store.table, state)
+    header = kept_header_at(state, kept.header)
+    header.has_rows = 0.0
+    if not is_kept:
+        header.factor = NO_FACTOR
+        return
+    keep_rows(store, state, kept, point)
+    if not is_solved or kept.factor.shape[0] == 0:
+        header.factor = NO_FACTOR
+    elif header.factor == NO_FACTOR:
+        rows = penalized(rows, limits.penalty_floor)
+        goal(program, rows.count, point, 1, system.gradient, system.hessian)
+        weigh_rows(rows, program.structure.one_sided, point.residual)
+        keep_factor(program, state, kept, point, rows, system)
+    if header.factor == NEW_FACTOR:
+        header.factor = EARLIER_FACTOR
