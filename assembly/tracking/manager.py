@@ -149,7 +149,7 @@ class Manager(OwnState):
         everything = _Everything(self._bodies, self._reach, merge_radius=self._merge_radius, slots=slots)
         packed = self._packed = Packed(self._bodies, [everything], ())
         count, rows = packed.count, packed.clearance_rows
-        self._memory = packed.new_state()[packed.memory_at :]
+        self._memory = packed.new_state()[packed.memory_at : packed.kept_at]
         self._poses = np.full((count, 7), np.nan)
         self._poses[:, 3:] = [1.0, 0.0, 0.0, 0.0]
         self._tracked = np.full((rows, TRACK), np.nan)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,9 @@ Table = NDArray[np.int64]
 LEAST_UNIT = 1e-305
 # A size that rests on values alone is another one where they have grown or shrunk by this factor.
 OUTGROWN = 1e4
+
+# Numbers of pools that are not as they were packed (0).
+_versions = count(1)
 
 
 class Packed:
@@ -363,9 +366,10 @@ class Packed:
         self._turned.start(self.pool, near, warm, measure)
 
     def twin(self) -> Packed:
-        """The same with a table and values of its own."""
+        """The same with a pool of its own, of which anything may be changed."""
         other = copy(self)
         other.pool = self.pool.copy()
+        other.pool[layout.VERSION] = float(next(_versions))
         return other
 
     @property

@@ -20,6 +20,7 @@ from assembly.constraints.program.records import (
     ROW,
     header_at,
     joint_row_at,
+    pool_header_at,
     row_at,
 )
 from assembly.proximity.features.solid_contact import CONTACT_RECORD
@@ -27,6 +28,7 @@ from assembly.proximity.features.solid_contact import CONTACT_RECORD
 KEPT_HEADER = record_dtype(
     "f8",
     has_rows=1,  # 1: rows and their derivatives
+    version=1,  # of the pool
     factor=1,  # NO_FACTOR, or which solve made it
 )
 kept_header_at = record_view(KEPT_HEADER)
@@ -59,6 +61,12 @@ def kept_unknowns(table):
     header = header_at(table, 0)
     n = 6 * header.moving
     return 0 if n > MOST_KEPT or header.block_record > 0 else n
+
+
+@kernel(inline=True)
+def has_place(table, state):
+    """Whether a state has a place for it; that of a tick's result has not."""
+    return state.size >= header_at(table, 0).kept + kept_size(table)
 
 
 @kernel(inline=True, allocates=True)
@@ -110,7 +118,8 @@ def value_of(store, r):
 def is_of(store, state, kept, tracked):
     """Whether the rows that are kept are those of the poses, the contacts and the turns of angles in a state."""
     header = header_at(store.table, 0)
-    if kept_header_at(state, kept.header).has_rows != 1.0:
+    left = kept_header_at(state, kept.header)
+    if left.has_rows != 1.0 or left.version != pool_header_at(store.pool, 0).version:
         return False
     for b in range(header.bodies):
         for k in range(7):
@@ -170,4 +179,5 @@ def keep_rows(store, state, kept, point):
         kept.numbers[r] = float(contact_of(store.table, r).clearance_number)
     copy_rows(point.records, kept.records)
     copy_rows(point.jacobian, kept.jacobian)
-    kept_header_at(state, kept.header).has_rows = 1.0
+    left = kept_header_at(state, kept.header)
+    left.has_rows, left.version = 1.0, pool_header_at(store.pool, 0).version

@@ -238,13 +238,15 @@ POOL_HEADER_RECORD = record_dtype(
     reference=3,  # point that scaled positions are relative to [length]
     unit=1,  # what the objective's scaled value of one counts [its unit]
     zero=1,  # always zero: a least gap that is none
-    spare=2,
+    version=1,  # the same number: all in the pool is the same but values, targets and references of postures
+    spare=1,
 )
 pool_header_at = record_view(POOL_HEADER_RECORD)
 SCALE = place_of(POOL_HEADER_RECORD, "scale")
 REFERENCE = place_of(POOL_HEADER_RECORD, "reference")
 OBJECTIVE_UNIT = place_of(POOL_HEADER_RECORD, "unit")
 ZERO = place_of(POOL_HEADER_RECORD, "zero")
+VERSION = place_of(POOL_HEADER_RECORD, "version")
 POOL_HEADER = size_of(POOL_HEADER_RECORD)
 # Figures that a solve leaves in its state, behind poses, tracked values, multipliers and residuals.
 RESULTS = 12

@@ -9,7 +9,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import is_clearance_row, is_of_solids
 from assembly.constraints.program.evaluate import evaluate
-from assembly.constraints.program.kept import NO_FACTOR, kept_header_at, kept_in, take_rows
+from assembly.constraints.program.kept import NO_FACTOR, has_place, kept_header_at, kept_in, take_rows
 from assembly.constraints.program.objective_terms import recenter
 from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.proximity.features.solid_contact import TRACK, contact_record_at, tracked_at
@@ -112,8 +112,10 @@ def find_contacts(program, settings, state, current, rows, n):
         return lost, False
     if watched:
         arrange(store.table, free, program.structure, header.rows, n)
-    if came or not take_rows(store, state, kept, current):
-        kept_header_at(state, kept.header).factor = NO_FACTOR
+    knows = has_place(store.table, state)
+    if came or not (knows and take_rows(store, state, kept, current)):
+        if knows:
+            kept_header_at(state, kept.header).factor = NO_FACTOR
         lost = evaluate(program, current.tracked, math.inf, current)
         if lost < 0:
             let_touch(store.table, current, overlap_allowed(settings))

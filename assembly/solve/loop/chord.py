@@ -18,7 +18,7 @@ from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.constraints.program.evaluate import evaluate
-from assembly.constraints.program.kept import EARLIER_FACTOR, NO_FACTOR, kept_header_at, kept_in, take_rows
+from assembly.constraints.program.kept import EARLIER_FACTOR, NO_FACTOR, has_place, kept_header_at, kept_in, take_rows
 from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.proximity.extrema.face_face import BEND
 from assembly.solve.linear_algebra.factorize import solve_step
@@ -162,10 +162,15 @@ def go_on_by_chords(task, history, state, iterates, rows, system):
     loop, limits, store = task.loop, task.limits, task.program.store
     current, trial, held = iterates
     kept = kept_in(store.table, state)
-    may = loop.status == RUNNING and not is_cut(store.table, task.program.lifted.memory) and limits.lift_trims == 0.0
-    if not may or kept_header_at(state, kept.header).factor != EARLIER_FACTOR:
+    may = loop.status == RUNNING and has_place(store.table, state) and limits.lift_trims == 0.0
+    if not may or is_cut(store.table, task.program.lifted.memory):
+        return False
+    if kept_header_at(state, kept.header).factor != EARLIER_FACTOR:
         return False
     loop.violation = violation_of(current.residual, task.program.structure.one_sided, rows.count)
+    if task.any_pose and loop.violation <= loop.feasible:
+        # What holds is not moved, whatever the least move of the last solve was.
+        return False
     if task.tick or task.watched:
         keep_what_holds(task, held, current, rows)
     chord = chord_steps(task, history, state, kept, current, trial, rows, system)

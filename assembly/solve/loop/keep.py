@@ -8,6 +8,7 @@ from assembly.constraints.program.kept import (
     NEW_FACTOR,
     NO_FACTOR,
     copy_rows,
+    has_place,
     keep_rows,
     kept_header_at,
     kept_in,
@@ -53,6 +54,8 @@ def test_convexity(task, rows, system, dual):
 def leave(program, limits, state, point, rows, system, is_kept, is_solved):
     """Leave the rows of a point whose poses are in the state, if they are to be kept, and a factor of a solution."""
     store = program.store
+    if not has_place(store.table, state):
+        return
     kept = kept_in(store.table, state)
     header = kept_header_at(state, kept.header)
     header.has_rows = 0.0

@@ -104,9 +104,12 @@ def workspace_needed(table):
 
 
 def new_workspace(packed):
-    """Two blocks of memory for a solve of a packed scene, whatever is in them."""
+    """Two blocks of memory for a solve of a packed scene.
+
+    Zeros, because a solve leaves whole records in its state, also what their kind has no use for.
+    """
     doubles, integers = workspace_needed(packed.table)
-    return np.empty(int(doubles)), np.empty(int(integers), dtype=np.int64)
+    return np.zeros(int(doubles)), np.zeros(int(integers), dtype=np.int64)
 
 
 @kernel(inline=True)
