@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from copy import copy
-from itertools import count, pairwise
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ LEAST_UNIT = 1e-305
 OUTGROWN = 1e4
 
 # Numbers of pools that are not as they were packed (0).
-_versions = count(1)
+_versions = itertools.count(1)
 
 
 class Packed:

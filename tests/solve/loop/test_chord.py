@@ -1,0 +1,264 @@
+"""Solves and ticks that go on by the factor the last one left: `solve/loop/chord.py`, `constraints/program/kept.py`."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
+from functools import partial
+from typing import NamedTuple
+
+import casadi
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.constraints.program.kept import EARLIER_FACTOR, NO_FACTOR, kept_header_at
+from assembly.solve.loop.parameters import CHORD_SHIFT
+from benchmarks import linkages, scenes
+from benchmarks.running import example
+
+
+class Case(NamedTuple):
+    """A scene, and what changes one of its values or targets; how far a change by one goes."""
+
+    scene: asm.Assembly
+    change: Callable[[float], None]
+    small: float
+
+
+def _drive(joint, start, value):
+    joint.angle = start + value
+
+
+def _draw(grip, start, way, value):
+    grip.target = np.asarray(start) + value * np.asarray(way)
+
+
+def four_bar():
+    scene, hinge = linkages.four_bar()
+    return Case(scene, partial(_drive, hinge, 0.0), 0.01)
+
+
+def wires():
+    scene = example("paper_clips").paper_clips()
+    ((_, grip),) = scene.objectives
+    return Case(scene, partial(_draw, grip, grip.target, (1.0, -0.7, 0.4)), 0.05)
+
+
+def gears():
+    scene, crank, _ = example("gear_train").gear_train()
+    return Case(scene, partial(_drive, crank, 0.0), 0.01)
+
+
+def limited_arm():
+    scene, tip, hinges = linkages.arm(4, seed=3)
+    for hinge in hinges:
+        hinge.angle = None
+    # The first one ends at its limit, and stays there.
+    hinges[0].limits = (-0.1, 0.1)
+    grip = asm.PointDistance(tip, (1.0, 9.0, 0.4))
+    scene.minimize(grip)
+    return Case(scene, partial(_draw, grip, grip.target, (0.3, 0.1, -0.2)), 0.05)
+
+
+def expression():
+    x = casadi.SX.sym("q", 7)
+    ball = asm.Body("ball", position=(0.3, 0.2, 2.0))
+    round_ = casadi.Function("round", [x], [casadi.sumsqr(x[:3]) - 4.0 + 0.3 * casadi.sin(x[0])])
+    scene = asm.Assembly([ball])
+    scene.constrain(asm.Expression(round_, [ball], name="egg"))
+    grip = asm.PointDistance(ball.point(0.0, 0.0, 0.0), (0.5, 0.4, 3.0))
+    scene.minimize(grip, asm.Posture(weight=0.1))
+    return Case(scene, partial(_draw, grip, grip.target, (0.3, 0.1, 0.2)), 0.02)
+
+
+CASES = [four_bar, wires, gears, limited_arm, expression]
+
+
+def _without(solution):
+    """The same solution without what is kept with it."""
+    other = deepcopy(solution)
+    # The copy has a packed scene of its own: it is put beside the one of the scene again.
+    other._packed, other._scene = solution._packed, solution._scene
+    other._state = solution._state.copy()
+    other._state[solution._packed.kept_at :] = 0.0
+    return other
+
+
+def _by_chords(solution):
+    """Whether the steps of a solution were by a factor that was kept."""
+    return solution.iterations > 0 and solution.history[0, 4] == CHORD_SHIFT
+
+
+def _factor(solution):
+    """Which factor is kept with a solution."""
+    return kept_header_at(solution._state, solution._packed.kept_at).factor
+
+
+@pytest.mark.parametrize("make", CASES)
+@pytest.mark.parametrize("far", [1.0, 10.0, 100.0])
+def test_what_is_kept_changes_no_pose(make, far, cases):
+    case = make()
+    solution = case.scene.solve()
+    rng = np.random.default_rng(3)
+    value = 0.0
+    for _ in range(cases(8, 100)):
+        value += far * case.small * rng.uniform(-1.0, 1.0)
+        case.change(value)
+        plain = case.scene.solve(_without(solution))
+        quick = case.scene.solve(solution)
+        if make is not wires:
+            # Wires may slide along themselves, and whichever end of that is as good; far ones are out of reach.
+            assert quick.status is plain.status
+            size = case.scene.packed().scale
+            # Both are off by the root of what an objective may be off, which is its stationarity here: 1e-10.
+            np.testing.assert_allclose(quick.q[:, :3], plain.q[:, :3], rtol=0, atol=1e-9 * size)
+            turned = np.abs(np.sum(quick.q[:, 3:] * plain.q[:, 3:], axis=1))
+            np.testing.assert_allclose(turned, 1.0, rtol=0, atol=1e-12)
+        if make is wires and not (plain.success and quick.success):
+            assert far == 100.0
+            break
+        assert quick.success
+        assert quick.objective == pytest.approx(plain.objective, rel=1e-9, abs=1e-12)
+        solution = quick
+
+
+@pytest.mark.parametrize("make", CASES)
+def test_small_changes_are_followed_by_chords(make):
+    case = make()
+    solution = case.scene.solve()
+    taken = 0
+    for k in range(1, 21):
+        assert _factor(solution) == EARLIER_FACTOR
+        case.change(0.2 * case.small * k)
+        solution = case.scene.solve(solution)
+        assert solution.success
+        taken += _by_chords(solution)
+    assert taken >= 18
+
+
+@pytest.mark.parametrize("make", CASES)
+def test_what_is_returned_holds_to_what_it_says(make):
+    # By rows that are evaluated anew, at the poses as they are told.
+    case = make()
+    solution = case.scene.solve()
+    for k in range(1, 6):
+        case.change(case.small * k)
+        solution = case.scene.solve(solution)
+        again = case.scene.solve(_without(solution), max_iterations=0)
+        np.testing.assert_array_equal(again.q, solution.q)
+        # Pairs of contacts are found anew from where they are, to rounding.
+        assert abs(again.feasibility - solution.feasibility) <= 1e-14 * case.scene.packed().scale
+
+
+def test_a_row_that_begins_to_count_is_left_to_the_loop():
+    ground, slide = asm.Body("ground", fixed=True), asm.Body("slide")
+    guide = asm.Prismatic(ground.frame(), slide.frame(), "guide", limits=(-1.0, 1.0))
+    scene = asm.Assembly([ground, slide])
+    scene.constrain(guide)
+    grip = asm.PointDistance(slide.point(0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    scene.minimize(grip)
+    grip.target = (0.2, 0.0, 0.75)
+    solution = scene.solve()
+    by_chords = []
+    for z in np.arange(0.85, 1.2, 0.1):
+        grip.target = (0.2, 0.0, z)
+        solution = scene.solve(solution)
+        assert solution.success
+        assert solution.values["guide.slide"] == pytest.approx(min(z, 1.0), abs=1e-10)
+        by_chords.append(_by_chords(solution))
+    # Free, at its limit for the first time, and held there.
+    assert by_chords == [True, True, False, True]
+
+
+@pytest.mark.parametrize("turns", [1, 3, -2])
+def test_angles_on_other_turns(turns):
+    case = four_bar()
+    solution = case.scene.solve()
+    (hinge,) = [item for item in case.scene.constraints if isinstance(item, asm.Revolute) and item.angle is not None]
+    hinge.angle = hinge.angle + 2.0 * np.pi * turns + 0.01
+    after = case.scene.solve(solution)
+    assert after.success
+    assert after.values[f"{hinge.name}.angle"] == pytest.approx(hinge.angle, abs=1e-11)
+
+
+def test_a_scene_whose_fixed_body_was_moved_is_evaluated_anew():
+    case = wires()
+    solution = case.scene.solve(case.scene.solve())
+    fixed = next(body for body in case.scene.bodies if body.fixed)
+    q = solution.q.copy()
+    q[case.scene.bodies.index(fixed), 0] += 0.1
+    after = case.scene.solve(q)
+    assert after.success and after.q[case.scene.bodies.index(fixed), 0] == q[case.scene.bodies.index(fixed), 0]
+
+
+def test_without_what_is_kept_the_same_pose_comes_to_the_tolerance():
+    case = four_bar()
+    solution = case.scene.solve()
+    case.change(0.02)
+    expected = case.scene.solve(solution)
+    scene, copied = pickle.loads(pickle.dumps((case.scene, solution)))
+    np.testing.assert_allclose(scene.solve(copied).q, expected.q, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(case.scene.solve(_without(solution)).q, expected.q, rtol=0, atol=1e-11)
+
+
+def test_the_same_solution_gives_the_same_bits_whatever_was_solved_meanwhile():
+    case = wires()
+    solution = case.scene.solve()
+    case.change(0.3)
+    first = case.scene.solve(solution)
+    case.change(5.0)
+    case.scene.solve(first)
+    case.change(0.3)
+    again = case.scene.solve(solution)
+    assert again.q.tobytes() == first.q.tobytes() and again.history.tobytes() == first.history.tobytes()
+
+
+def test_threads_have_workspaces_of_their_own():
+    cases = [four_bar() for _ in range(4)]
+    expected = []
+
+    def sweep(case):
+        solution, poses = case.scene.solve(), []
+        for k in range(40):
+            case.change(0.01 * k)
+            solution = case.scene.solve(solution)
+            poses.append(solution.q)
+        return np.array(poses)
+
+    expected = sweep(four_bar())
+    with ThreadPoolExecutor(4) as threads:
+        for found in threads.map(sweep, cases):
+            assert found.tobytes() == expected.tobytes()
+
+
+def test_the_state_of_a_tick_has_no_place_for_it():
+    scene = example("paper_clips").paper_clips()
+    ((_, grip),) = scene.objectives
+    follower = scene.tracker(grip.point, stiffness=2.0)
+    step = follower.step(np.asarray(grip.target) + 0.01)
+    packed = step.solution._packed
+    assert step.solution._state.size == packed.kept_at
+    assert step.solution.mobility.dof >= 0
+
+
+def test_large_scenes_keep_no_factor():
+    scene = linkages.parallelograms(12)
+    solution = scene.solve()
+    assert solution.success and 6 * (len(scene.bodies) - 1) > 60
+    assert _factor(solution) == NO_FACTOR
+
+
+def test_a_tick_goes_on_by_chords():
+    wired = scenes.linked_wires(1).scene
+    blue = wired.bodies[-1]
+    start = wired.solve().pose(blue).position
+    plain, quick = (wired.tracker(blue.point(0.0, 0.0, 0.0), iterations=8) for _ in range(2))
+    for k in range(30):
+        target = start + 0.004 * k * np.array([1.0, 0.5, -0.3])
+        plain._state[plain._packed.kept_at :] = 0.0
+        slow, fast = plain.step(target), quick.step(target)
+        assert fast.status is asm.TrackStatus.FOLLOWED
+        assert fast.objective == pytest.approx(slow.objective, rel=1e-6, abs=1e-12)
