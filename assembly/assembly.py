@@ -278,7 +278,6 @@ class Assembly(Contents):
         """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
         if isinstance(q0, Solution):
             state = self._state_of("q0", packed, q0).copy()
-            q = state[: packed.contacts_at].reshape(-1, 7)
         else:
             state = packed.new_state()
             q = state[: packed.contacts_at].reshape(-1, 7)
@@ -290,7 +289,7 @@ class Assembly(Contents):
         if starts is not None:
             self._place_starts(packed, state, starts)
         packed.refresh()
-        packed.start_angles(q, state, isinstance(q0, Solution))
+        packed.start_angles(state, isinstance(q0, Solution))
         return state
 
     @staticmethod

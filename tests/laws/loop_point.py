@@ -57,7 +57,8 @@ class LoopPoint:
         if tracked is None:
             state = np.zeros(packed.results_at)
             state[packed.contacts_at : packed.angles_at] = np.nan
-            packed.start_angles(np.array(q, dtype=float), state, False)
+            state[: packed.contacts_at] = np.ravel(q)
+            packed.start_angles(state, False)
             tracked = state[packed.contacts_at : packed.multipliers_at].reshape(-1, TRACK)
             start = (self.program.store, scaled, tracked, free, self.loose.lengths)
             # Solids that cross are looked for where a scene asks for it.

@@ -120,6 +120,7 @@ class Packed:
         self.scale = size if self.has_size else 1.0
         self.outgrown: Packed | None = None
         self.reference = bodies[0].pose.position.copy()
+        self._reference = self.reference.tolist()
         self.contacts = [constraint for constraint in constraints if isinstance(constraint, Contact)]
         # Of a contact with trims the surfaces take part without their own boundaries.
         trimmed = {item.contact.name for item in constraints if isinstance(item, TrimContact)}
@@ -346,8 +347,8 @@ class Packed:
         """Whether nobody asked for the objective, which is the least move then."""
         return bool(self.table[layout.IMPLICIT] == 1)
 
-    def start_angles(self, q: Array, state: Array, warm: bool) -> None:
-        """Write the turns that angles start on into a state."""
+    def start_angles(self, state: Array, warm: bool) -> None:
+        """Write the turns that angles start on at the poses of a state into it."""
         if not self._angles:
             return
         near = state[self.angles_at : self.multipliers_at : TRACK]
@@ -358,6 +359,7 @@ class Packed:
         def measure() -> Array:
             values = np.empty(len(self._standing))
             if values.size:
+                q = state[: self.contacts_at].reshape(-1, 7)
                 scaled = q.copy()
                 scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
                 coordinates_at(self.table, self.pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values)
@@ -385,8 +387,8 @@ class Packed:
 
     def refresh(self) -> None:
         """Write what may have changed since the last solve: values and targets."""
-        pool, scale = self.pool, self.scale
-        x, y, z = self.reference.tolist()
+        pool, scale, far = self.pool, self.scale, FARTHEST * self.scale
+        x, y, z = self._reference
         for equation, at, unit in self._sources:
             value = equation.current() / unit
             if not -FARTHEST <= value <= FARTHEST and not equation.terms[0][1].is_angle:
@@ -394,12 +396,12 @@ class Packed:
                 check_reach(f"a value of {equation.source[0]!r}", abs(equation.current()), scale)
             pool[at] = value
         for distance, at in self._targets:
-            target = distance._target.tolist()
-            if not max(map(abs, target)) <= FARTHEST * scale:
-                check_reach(f"a target of body {distance.bodies[0].name!r}", max(map(abs, target)), scale)
-            pool[at] = (target[0] - x) / scale
-            pool[at + 1] = (target[1] - y) / scale
-            pool[at + 2] = (target[2] - z) / scale
+            a, b, c = distance._target.tolist()
+            if not (-far <= a <= far and -far <= b <= far and -far <= c <= far):
+                check_reach(f"a target of body {distance.bodies[0].name!r}", max(abs(a), abs(b), abs(c)), scale)
+            pool[at] = (a - x) / scale
+            pool[at + 1] = (b - y) / scale
+            pool[at + 2] = (c - z) / scale
         for frame_distance, at in self._turns:
             pool[at : at + 4] = frame_distance.body_quaternion
 

@@ -52,7 +52,7 @@ def _has_turns_of_its_pose(packed: Packed, state: Array, turns: Array | None) ->
 
 def _choose_turns(packed: Packed, state: Array, turns: Array | None) -> None:
     state[packed.angles_at : packed.multipliers_at : TRACK] = 0.0 if turns is None else turns
-    packed.start_angles(state[: packed.contacts_at].reshape(-1, 7), state, warm=False)
+    packed.start_angles(state, warm=False)
 
 
 def _assembled(packed: Packed, table: Table, settings: Array, given: Array, turns: Array | None, run: Run) -> Outcome:

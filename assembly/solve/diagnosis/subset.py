@@ -102,7 +102,7 @@ class Problem:
                 tracked[k] = self._near[contact.name]
             for k, angle in enumerate(packed._angles):
                 tracked[packed.pair_rows + k] = self._near[id(angle)]
-            packed.start_angles(q, state, warm=False)
+            packed.start_angles(state, warm=False)
         return state
 
     def solve(self, q: Array, interruption: Interruption, after: Result | None = None, gathers: bool = False) -> Result:
