@@ -29,6 +29,7 @@ from assembly.proximity.manager.records import (
     PAIRS,
     VERTEX_CONTACTS,
 )
+from assembly.solve.attempts.attempts import new_workspace
 from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.parameters import ROUNDING
 from assembly.solve.loop.settings import (
@@ -50,7 +51,6 @@ from assembly.solve.loop.settings import (
     TICK,
     VIOLATION,
 )
-from assembly.solve.loop.workspace import new_workspace
 from assembly.solve.options import Options
 from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution

@@ -30,11 +30,11 @@ from assembly.solve.loop.settings import (
     UNSURE,
     VIOLATION,
 )
-from assembly.solve.loop.workspace import new_workspace
+from assembly.solve.loop.workspace import workspace_needed
 from assembly.solve.options import Options
 from assembly.solve.second_order.leave import Fit, Outcome, leave_saddles
 
-__all__ = ["attempt", "begin", "go_on_once", "load"]
+__all__ = ["attempt", "begin", "go_on_once", "load", "new_workspace"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -42,6 +42,15 @@ Table = NDArray[np.int64]
 MOST_HISTORY = 1000
 _LOADING = Options(max_iterations=0).settings()
 _loaded: set[int | None] = set()
+
+
+def new_workspace(packed: Packed) -> tuple[Array, Table]:
+    """Two blocks of memory for a solve of a packed scene.
+
+    Zeros, because a solve leaves whole records in its state, also what their kind has no use for.
+    """
+    doubles, integers = workspace_needed(packed.table)
+    return np.zeros(int(doubles)), np.zeros(int(integers), dtype=np.int64)
 
 
 def load(packed: Packed, start: Callable[[], Array]) -> None:

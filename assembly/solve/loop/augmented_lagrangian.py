@@ -52,7 +52,7 @@ from assembly.solve.loop.workspace import Iterates, carve_all, memory_of, result
 def solve_program(table, pool, settings, state, history, doubles, integers, end_effectors):
     """Solve in place. State: q (n, 7) | tracked (k, TRACK) | multipliers (m) | residuals (m) | results | memory | kept.
 
-    `doubles` and `integers` are two blocks to work in (`workspace.new_workspace`). `end_effectors` is None where no
+    `doubles` and `integers` are two blocks to work in (`workspace_needed`). `end_effectors` is None where no
     term of the objective is a dexterity.
     """
     store = Store(table, pool)

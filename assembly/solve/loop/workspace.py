@@ -103,15 +103,6 @@ def workspace_needed(table):
     return doubles, integers + pairs + header.clearance_rows
 
 
-def new_workspace(packed):
-    """Two blocks of memory for a solve of a packed scene.
-
-    Zeros, because a solve leaves whole records in its state, also what their kind has no use for.
-    """
-    doubles, integers = workspace_needed(packed.table)
-    return np.zeros(int(doubles)), np.zeros(int(integers), dtype=np.int64)
-
-
 @kernel(inline=True)
 def record_count(table):
     """How many records a point has."""
