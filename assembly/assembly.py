@@ -316,6 +316,8 @@ class Assembly(Contents):
                 raise InputError(f"{what} is of solids with several faces; expected a contact of two faces")
             state[at : at + 4] = inside(what, vector(what, value, 4), surfaces)
             state[at + 4 : at + TRACK] = 0.0
+            # Rows that the last solve left are of other pairs.
+            state[packed.kept_at :] = 0.0
 
     def tracker(self, follow: Point | Frame | Body, **options: Any) -> Tracker:
         """What follows a hand that holds a point or a frame of a body.

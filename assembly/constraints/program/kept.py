@@ -14,10 +14,13 @@ from assembly._carve import carve
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.constraints.program.contact import contact_of, idle_row
+from assembly.constraints.program.primitives import coordinate
 from assembly.constraints.program.records import (
+    COORDINATE,
     EXTRA_COLUMN,
     JOINT_ROW,
     ROW,
+    coordinate_at,
     header_at,
     joint_row_at,
     pool_header_at,
@@ -115,6 +118,17 @@ def value_of(store, r):
 
 
 @kernel(inner=True)
+def has_followed(table, kept, at, tracked):
+    """Whether a coordinate is an angle at its pole, where it is what the state has, and that is another one now."""
+    asked, contacts = coordinate_at(table, at), header_at(table, 0).contacts
+    if asked.angle < 0 or kept.angles[asked.angle - contacts] == tracked[asked.angle, 0]:
+        return False
+    near = tracked[asked.angle, 0]
+    found = coordinate(asked.kind, asked.component, kept.records, contacts + asked.joint, near)
+    return found.value != kept.angles[asked.angle - contacts]
+
+
+@kernel(inner=True)
 def is_of(store, state, kept, tracked):
     """Whether the rows that are kept are those of the poses, the contacts and the turns of angles in a state."""
     header = header_at(store.table, 0)
@@ -132,6 +146,14 @@ def is_of(store, state, kept, tracked):
         # An angle is the one next to its value in the state.
         if not abs(kept.angles[k - header.contacts] - tracked[k, 0]) < math.pi:
             return False
+    for r in range(header.rows):
+        row = header.row_table + ROW * r
+        if row_at(store.table, row).kind == JOINT_ROW:
+            second = joint_row_at(store.table, row).second
+            if has_followed(store.table, kept, row + COORDINATE, tracked):
+                return False
+            if second >= 0 and has_followed(store.table, kept, second, tracked):
+                return False
     return True
 
 

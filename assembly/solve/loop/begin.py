@@ -169,6 +169,9 @@ def set_out(program, settings, state, current, rows, n):
     result.scatter = 1.0 if status == RUNNING and scattered(store.table, current.residual, shape.one_sided) else 0.0
     if limits.gather > 0.0 and result.scatter == 1.0:
         lost = put_together(program, current, rows)
+        if has_place(store.table, state):
+            # It is of where the last solve ended, and bodies are no more there.
+            kept_header_at(state, header_at(store.table, 0).kept).factor = NO_FACTOR
         folded = False
         status = GATHERED if limits.gather == ASSEMBLES else RUNNING
         status = CONTACT_LOST if lost >= 0 else status

@@ -15,7 +15,9 @@ import pytest
 
 import assembly as asm
 from assembly.constraints.program.kept import EARLIER_FACTOR, NO_FACTOR, kept_header_at
+from assembly.solve.interruption import CTRL_C
 from assembly.solve.loop.parameters import CHORD_SHIFT
+from assembly.solve.loop.settings import GATHER, GATHERS, SCATTER
 from benchmarks import linkages, scenes
 from benchmarks.running import example
 
@@ -262,3 +264,42 @@ def test_a_tick_goes_on_by_chords():
         slow, fast = plain.step(target), quick.step(target)
         assert fast.status is asm.TrackStatus.FOLLOWED
         assert fast.objective == pytest.approx(slow.objective, rel=1e-6, abs=1e-12)
+
+
+def test_an_angle_at_its_pole_follows_its_drive():
+    # Where the axes lie on each other an azimuth is what it is driven to, and no motion changes it.
+    ground, body = asm.Body("ground", fixed=True), asm.Body("body")
+    ball = asm.Spherical(ground.frame(), body.frame(), "ball", azimuth=0.3)
+    scene = asm.Assembly([ground, body])
+    scene.constrain(ball)
+    solution = scene.solve()
+    ball.azimuth = 0.35
+    after = scene.solve(solution)
+    assert after.success and after.iterations == 0 and not after.restarted
+    np.testing.assert_array_equal(after.q, solution.q)
+    assert after.values["ball.azimuth"] == ball.azimuth
+
+
+def test_a_pair_that_is_started_elsewhere_is_evaluated_anew():
+    ground = asm.Body("ground", asm.shapes.ellipsoid(1.0, 0.8, 0.7), fixed=True)
+    body = asm.Body("body", asm.shapes.ellipsoid(2.0, 0.5, 0.4), position=(0.5, 0.2, 1.6))
+    scene = asm.Assembly([ground, body])
+    scene.constrain(asm.Contact(ground, body, name="touch"))
+    solution = scene.solve()
+    # Of the two ellipsoids another pair of parallel planes, which does not touch where the nearest one does.
+    after = scene.solve(solution, starts={"touch": (5.4, 1.6, 1.9, 1.4)})
+    assert after.success
+    assert abs(after.contacts["touch"].gap) <= 2e-13 * scene.packed().scale
+
+
+def test_bodies_that_are_gathered_stay_so():
+    # The kept factor is of where the last solve ended: steps by it lead nowhere from here, and must not lead back.
+    scene, hinge = linkages.four_bar()
+    solution = scene.solve()
+    hinge.angle = 2.0
+    settings = scene._settings({}, CTRL_C, warm=True).copy()
+    settings[GATHER] = GATHERS
+    plain, quick = (scene._solved(settings, start, None, CTRL_C) for start in (_without(solution), solution))
+    assert plain._state[scene.packed().results_at + SCATTER] == 1.0
+    assert plain.success and quick.success
+    np.testing.assert_array_equal(quick.history, plain.history)
