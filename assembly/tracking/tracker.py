@@ -237,14 +237,15 @@ class Tracker(InOneProcess):
         self._view: Any = self._state.data
         self._before = self._pose.copy()
         self._knobs: Any = self._settings.data
-        blocks = new_workspace(packed)
+        _, doubles, integers = new_workspace(packed)
         self._arguments = (
             packed.table,
             packed.pool,
             self._settings,
             self._state,
             self._history,
-            *blocks,
+            doubles,
+            integers,
             packed.end_effectors,
         )
         self._radius = float(self._settings[RADIUS])

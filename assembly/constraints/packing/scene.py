@@ -71,8 +71,8 @@ class Packed:
         See `constraints/program/records.py`. Lengths in the pool are divided by `scale`.
     scale : float
         The scene's size (`scene_size`), 1 where it has none.
-    workspaces : list of two arrays
-        What solves that are over worked in, for the next ones (`solve/loop/workspace.py`).
+    workspaces : list of three arrays
+        What solves that are over worked in, for the next ones (`solve/attempts/attempts.py`).
     has_size : bool
         Whether the scene has a size.
     outgrown : Packed or None
@@ -149,7 +149,7 @@ class Packed:
         if self.clearance_rows:
             # The first update sees what crosses at the start as well, if it is no deeper than this.
             self._memory = fresh_memory(sum(map(len, self.clearance_pairs)), self.clearance_rows, LARGEST_MARGIN)
-        self.workspaces: list[tuple[Array, Table]] = []
+        self.workspaces: list[tuple[Array, Array, Table]] = []
         self.kept_at = self.memory_at + self._memory.size
         self.table[layout.KEPT] = self.kept_at
         self._state_size = self.kept_at + int(kept_size(self.table))

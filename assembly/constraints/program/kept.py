@@ -14,10 +14,12 @@ from assembly._carve import carve
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.constraints.program.contact import contact_of, idle_row
+from assembly.constraints.program.primitives import RECORD as JOINT_FRAMES
 from assembly.constraints.program.primitives import coordinate
 from assembly.constraints.program.records import (
     COORDINATE,
     EXTRA_COLUMN,
+    FREE_COLUMN,
     JOINT_ROW,
     ROW,
     coordinate_at,
@@ -42,20 +44,23 @@ MOST_KEPT = 60
 NO_FACTOR, EARLIER_FACTOR, NEW_FACTOR = 0.0, 1.0, 2.0
 # Where the header is; of every body its pose, as in the state; of every tracked angle its value; of every row the value
 # it has subtracted, its residual, and its weight in the factor (0: it did not count); of every contact of a clearance
-# its number. Records and Jacobian at these poses. The Cholesky factor of a step's matrix, and the Jacobian that is in
-# it, both of the same poses or of others close by.
-Kept = namedtuple("Kept", "header poses angles values residual weights numbers records jacobian factor_jacobian factor")
+# its number. Of these poses the records of contacts, joints and vector trims, and the Jacobian; of these or others close
+# by the Cholesky factor of a step's matrix, its upper triangle row by row, and the Jacobian that is in it. That of
+# these poses is without the columns of lifted pairs.
+Kept = namedtuple(
+    "Kept",
+    "header poses angles values residual weights numbers contacts joints trims jacobian factor_jacobian factor",
+)
 
 
 @kernel(inline=True)
 def kept_size(table):
     """How many doubles a state has for it."""
     header = header_at(table, 0)
-    records = header.contacts + header.joints + header.vector_trims
-    columns = EXTRA_COLUMN + 6 * header.extra
-    n = kept_unknowns(table)
-    by_row = header.rows * (3 + 2 * columns) + header.contacts
-    return HEADER + 7 * header.bodies + header.tracked - header.contacts + by_row + records * CONTACT_RECORD + n * n
+    n, columns = kept_unknowns(table), FREE_COLUMN + 6 * header.extra
+    records = (header.contacts + header.vector_trims) * CONTACT_RECORD + header.joints * JOINT_FRAMES
+    by_row = header.rows * (3 + columns + EXTRA_COLUMN + 6 * header.extra)
+    return HEADER + 7 * header.bodies + header.tracked + by_row + records + n * (n + 1) // 2
 
 
 @kernel(inline=True)
@@ -77,8 +82,7 @@ def kept_in(table, state):
     """What is kept in a state, as arrays in it."""
     header = header_at(table, 0)
     rows, n = header.rows, kept_unknowns(table)
-    records = header.contacts + header.joints + header.vector_trims
-    columns = EXTRA_COLUMN + 6 * header.extra
+    columns = FREE_COLUMN + 6 * header.extra
     at = header.kept + HEADER
     poses = carve(state, at, (header.bodies, 7))
     at += 7 * header.bodies
@@ -88,11 +92,17 @@ def kept_in(table, state):
     at += 3 * rows
     numbers = carve(state, at, (header.contacts,))
     at += header.contacts
-    of_records = carve(state, at, (records, CONTACT_RECORD))
-    at += records * CONTACT_RECORD
-    jacobians = carve(state, at, (2, rows, columns))
-    at += 2 * rows * columns
-    factor = carve(state, at, (n, n))
+    contacts = carve(state, at, (header.contacts, CONTACT_RECORD))
+    at += header.contacts * CONTACT_RECORD
+    joints = carve(state, at, (header.joints, JOINT_FRAMES))
+    at += header.joints * JOINT_FRAMES
+    trims = carve(state, at, (header.vector_trims, CONTACT_RECORD))
+    at += header.vector_trims * CONTACT_RECORD
+    jacobian = carve(state, at, (rows, columns))
+    at += rows * columns
+    factor_jacobian = carve(state, at, (rows, EXTRA_COLUMN + 6 * header.extra))
+    at += rows * (EXTRA_COLUMN + 6 * header.extra)
+    factor = carve(state, at, (n * (n + 1) // 2,))
     return Kept(
         header.kept,
         poses,
@@ -101,9 +111,11 @@ def kept_in(table, state):
         by_row[1],
         by_row[2],
         numbers,
-        of_records,
-        jacobians[0],
-        jacobians[1],
+        contacts,
+        joints,
+        trims,
+        jacobian,
+        factor_jacobian,
         factor,
     )
 
@@ -124,7 +136,7 @@ def has_followed(table, kept, at, tracked):
     if asked.angle < 0 or kept.angles[asked.angle - contacts] == tracked[asked.angle, 0]:
         return False
     near = tracked[asked.angle, 0]
-    found = coordinate(asked.kind, asked.component, kept.records, contacts + asked.joint, near)
+    found = coordinate(asked.kind, asked.component, kept.joints, asked.joint, near)
     return found.value != kept.angles[asked.angle - contacts]
 
 
@@ -158,11 +170,60 @@ def is_of(store, state, kept, tracked):
 
 
 @kernel(inner=True)
-def copy_rows(source, out):
-    """As many rows of an array of two axes as the other one has."""
+def take_array(first, source, records):
+    """Rows that are kept, into an iterate's array from the first one on."""
+    for r in range(source.shape[0]):
+        for i in range(source.shape[1]):
+            records[first + r, i] = source[r, i]
+
+
+@kernel(inner=True)
+def keep_array(first, records, out):
+    """Rows of an iterate's array from the first one on, as many and as much of each as is kept."""
     for r in range(out.shape[0]):
         for i in range(out.shape[1]):
-            out[r, i] = source[r, i]
+            out[r, i] = records[first + r, i]
+
+
+@kernel(inner=True)
+def take_jacobian(source, jacobian):
+    """A Jacobian that is kept, into one that has columns of lifted pairs as well."""
+    for r in range(source.shape[0]):
+        for i in range(FREE_COLUMN):
+            jacobian[r, i] = source[r, i]
+        for i in range(FREE_COLUMN, source.shape[1]):
+            jacobian[r, i + EXTRA_COLUMN - FREE_COLUMN] = source[r, i]
+
+
+@kernel(inner=True)
+def keep_jacobian(jacobian, out):
+    """The way back."""
+    for r in range(out.shape[0]):
+        for i in range(FREE_COLUMN):
+            out[r, i] = jacobian[r, i]
+        for i in range(FREE_COLUMN, out.shape[1]):
+            out[r, i] = jacobian[r, i + EXTRA_COLUMN - FREE_COLUMN]
+
+
+@kernel(inner=True)
+def take_factor(kept, factor):
+    """The factor that is kept, as the steps of a solve have it."""
+    at = 0
+    for i in range(factor.shape[0]):
+        for j in range(i, factor.shape[0]):
+            factor[i, j] = kept.factor[at]
+            at += 1
+
+
+@kernel(inner=True)
+def put_factor(factor, jacobian, kept):
+    """Keep the factor of a step, and the Jacobian that is in it."""
+    at = 0
+    for i in range(factor.shape[0]):
+        for j in range(i, factor.shape[0]):
+            kept.factor[at] = factor[i, j]
+            at += 1
+    keep_array(0, jacobian, kept.factor_jacobian)
 
 
 @kernel(inner=True)
@@ -171,14 +232,15 @@ def take_rows(store, state, kept, point):
     if not is_of(store, state, kept, point.tracked):
         return False
     header = header_at(store.table, 0)
-    copy_rows(kept.records, point.records)
+    take_array(0, kept.contacts, point.records)
+    take_array(header.contacts, kept.joints, point.records)
+    take_array(header.contacts + header.joints, kept.trims, point.records)
     for k in range(header.contacts, header.tracked):
         point.tracked[k, 0] = kept.angles[k - header.contacts]
     for r in range(header.rows):
         # The same bits, if the value is the same.
         point.residual[r] = kept.residual[r] + (kept.values[r] - value_of(store, r))
-        for i in range(kept.jacobian.shape[1]):
-            point.jacobian[r, i] = kept.jacobian[r, i]
+    take_jacobian(kept.jacobian, point.jacobian)
     for r in range(header.contacts):
         if contact_of(store.table, r).body_f < 0:
             idle_row(r, 1.0, point)
@@ -199,7 +261,9 @@ def keep_rows(store, state, kept, point):
         kept.values[r] = value_of(store, r)
     for r in range(header.contacts):
         kept.numbers[r] = float(contact_of(store.table, r).clearance_number)
-    copy_rows(point.records, kept.records)
-    copy_rows(point.jacobian, kept.jacobian)
+    keep_array(0, point.records, kept.contacts)
+    keep_array(header.contacts, point.records, kept.joints)
+    keep_array(header.contacts + header.joints, point.records, kept.trims)
+    keep_jacobian(point.jacobian, kept.jacobian)
     left = kept_header_at(state, kept.header)
     left.has_rows, left.version = 1.0, pool_header_at(store.pool, 0).version

@@ -19,10 +19,10 @@ from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.settings import (
     ALLOWED_OVERLAP,
     CONTACT_LOST,
+    COUNT,
     FIT,
     GATHER,
     HISTORY,
-    ITERATIONS,
     LIFT_TRIMS,
     OBJECTIVE,
     SCATTER,
@@ -38,28 +38,26 @@ __all__ = ["attempt", "begin", "go_on_once", "load", "new_workspace"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-# Rows of history that are kept.
+# Rows of history that are kept, beside the first.
 MOST_HISTORY = 1000
 _LOADING = Options(max_iterations=0).settings()
 _loaded: set[int | None] = set()
 
 
-def new_workspace(packed: Packed) -> tuple[Array, Table]:
-    """Two blocks of memory for a solve of a packed scene.
+def new_workspace(packed: Packed) -> tuple[Array, Array, Table]:
+    """Where a solve of a packed scene works: its history, and two blocks of memory.
 
     Zeros, because a solve leaves whole records in its state, also what their kind has no use for.
     """
     doubles, integers = workspace_needed(packed.table)
-    return np.zeros(int(doubles)), np.zeros(int(integers), dtype=np.int64)
+    return np.zeros((MOST_HISTORY + 1, HISTORY)), np.zeros(int(doubles)), np.zeros(int(integers), dtype=np.int64)
 
 
 def load(packed: Packed, start: Callable[[], Array]) -> None:
     """Have the loop for such a scene in this process: loading it, or compiling it, is no part of a solve's time."""
     if packed.end_effectors not in _loaded:
-        blocks = new_workspace(packed)
-        solve_program(
-            packed.table.copy(), packed.pool, _LOADING, start(), np.empty((1, HISTORY)), *blocks, packed.end_effectors
-        )
+        table, workspace = packed.table.copy(), new_workspace(packed)
+        solve_program(table, packed.pool, _LOADING, start(), *workspace, packed.end_effectors)
         _loaded.add(packed.end_effectors)
 
 
@@ -144,17 +142,18 @@ def _holds(outcome: Outcome) -> bool:
 
 
 def _run(packed: Packed, interruption: Interruption, table: Table, settings: Array, state: Array) -> Outcome:
-    history = np.empty((min(int(settings[ITERATIONS]), MOST_HISTORY) + 1, HISTORY))
     if interruption.callback is not None:
         state[packed.results_at + OBJECTIVE], state[packed.results_at + VIOLATION] = np.nan, np.inf
         interruption.watched = (state, packed.results_at)
     # Threads have workspaces of their own.
     spare = packed.workspaces
-    blocks = spare.pop() if spare else new_workspace(packed)
+    workspace = spare.pop() if spare else new_workspace(packed)
     try:
-        code = solve_program(table, packed.pool, settings, state, history, blocks[0], blocks[1], packed.end_effectors)
+        code = solve_program(table, packed.pool, settings, state, *workspace, packed.end_effectors)
+        # A solution keeps the rows that there are: memory that nobody wrote to yet is slow to come by.
+        history = workspace[0][: int(state[packed.results_at + COUNT]) + 1].copy()
     finally:
-        spare.append(blocks)
+        spare.append(workspace)
     return Outcome(code, state, history)
 
 

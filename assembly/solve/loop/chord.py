@@ -18,7 +18,15 @@ from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.constraints.program.evaluate import evaluate
-from assembly.constraints.program.kept import EARLIER_FACTOR, NO_FACTOR, has_place, kept_header_at, kept_in, take_rows
+from assembly.constraints.program.kept import (
+    EARLIER_FACTOR,
+    NO_FACTOR,
+    has_place,
+    kept_header_at,
+    kept_in,
+    take_factor,
+    take_rows,
+)
 from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.proximity.extrema.face_face import BEND
 from assembly.solve.linear_algebra.factorize import solve_step
@@ -50,7 +58,7 @@ def chord_step(shape, kept, point, rows, system):
     for r in range(rows.count):
         rows.forces[r] = -point.residual[r] * kept.weights[r]
     add_transposed(shape.bases, kept.factor_jacobian, rows.count, rows.forces, step)
-    solve_step(kept.factor, step.size, shape.sparsity, step)
+    solve_step(system.factor, step.size, shape.sparsity, step)
     longest = 0.0
     for i in range(step.size):
         if not abs(step[i]) <= longest:
@@ -144,6 +152,7 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
                 return failed
             if tests:
                 test_convexity(task, rows, system, dual)
+                take_factor(kept, system.factor)
         if arrived:
             return Chord(count, swapped, violation, dual, last_violation, last_dual)
         if count == limit or not chord_step(shape, kept, current, rows, system) <= CHORD_LONGEST:
@@ -173,6 +182,7 @@ def go_on_by_chords(task, history, state, iterates, rows, system):
         return False
     if task.tick or task.watched:
         keep_what_holds(task, held, current, rows)
+    take_factor(kept, system.factor)
     chord = chord_steps(task, history, state, kept, current, trial, rows, system)
     if chord.steps < 0:
         kept_header_at(state, kept.header).factor = NO_FACTOR

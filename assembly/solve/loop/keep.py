@@ -7,11 +7,11 @@ from assembly.constraints.program.kept import (
     EARLIER_FACTOR,
     NEW_FACTOR,
     NO_FACTOR,
-    copy_rows,
     has_place,
     keep_rows,
     kept_header_at,
     kept_in,
+    put_factor,
 )
 from assembly.constraints.program.row_terms import add_row_terms
 from assembly.solve.linear_algebra.factorize import factorize_shifted
@@ -24,7 +24,7 @@ from assembly.solve.loop.workspace import penalized
 
 @kernel(inner=True)
 def keep_factor(program, state, kept, point, rows, system):
-    """Make the factor of a step at a point, and keep it; whether there is one.
+    """Make the factor of a step at a point, into the system, and keep it; whether there is one.
 
     The objective's Hessian is in the system, and the Lagrangian's afterwards.
     """
@@ -33,9 +33,9 @@ def keep_factor(program, state, kept, point, rows, system):
     curvature_multipliers(rows, point.residual, False)
     add_row_terms(program, point, rows.forces, rows.active, system.hessian)
     n = system.gradient.size
-    if factorize_shifted(system.hessian, n, shape.sparsity, CHORD_SHIFT, kept.factor) != CHORD_SHIFT:
+    if factorize_shifted(system.hessian, n, shape.sparsity, CHORD_SHIFT, system.factor) != CHORD_SHIFT:
         return False
-    copy_rows(point.jacobian, kept.factor_jacobian)
+    put_factor(system.factor, point.jacobian, kept)
     for r in range(rows.count):
         kept.weights[r] = rows.active[r]
     header.factor = NEW_FACTOR
