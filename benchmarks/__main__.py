@@ -22,7 +22,7 @@ from benchmarks import report as pages
 from benchmarks.gate import regressions
 from benchmarks.pictures import draw
 from benchmarks.running import run_apart
-from benchmarks.timing import calibration
+from benchmarks.timing import Busy, calibration
 
 # Modules with `run(quick: bool) -> dict`. The dict goes to the JSON as it is; its "rows", a list of
 # flat dicts, are printed as a table, and so are its "figures" (`figures.figure`), which go to the page as well.
@@ -52,7 +52,7 @@ BENCHMARKS = (
 )
 LIBRARIES = (
     *("assembly", "casadi", "meshcat", "numba", "numpy", "scipy"),
-    *("cadquery", "cadquery-ocp", "coal", "drake", "pin-pink", "splinepy"),
+    *("cadquery", "cadquery-ocp", "coal", "drake"),
 )
 RESULTS = Path(__file__).resolve().parent / "results"
 
@@ -68,8 +68,6 @@ def machine() -> dict[str, Any]:
     return {
         "processor": processor_name(),
         "cores": os.cpu_count(),
-        # Before this run adds its own.
-        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
         "python": platform.python_version(),
         "versions": versions,
         "calibration_seconds": calibration(),
@@ -152,14 +150,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     before = json.loads(stored.read_text()) if options.gate else {}
     options.output.mkdir(parents=True, exist_ok=True)
     for name in [options.only] if options.only else BENCHMARKS:
+        watch = Busy()
         result = run_apart(f"benchmarks.{name}", options.quick)
+        took, others = watch.read()
         circumstances = {
             "date": f"{datetime.now(UTC):%Y-%m-%d}",
-            "load": report["machine"]["load"],
+            "took_seconds": took,
+            "others": others,
             "versions": report["machine"]["versions"],
         }
         report["benchmarks"][name] = {**result, **circumstances}
-        print("\n".join(["", name, table(result), *pages.lines(result)]), flush=True)
+        lines = ["", f"{name}, {took:.0f} s", table(result), *pages.lines(result)]
+        print("\n".join(lines), flush=True)
         # After each, for a whole run takes its time, and may be ended.
         path = write(report, options.output, options.only)
     print(f"\nwritten to {path}")

@@ -18,15 +18,15 @@ __all__ = ["PAGE", "PICTURES", "lines", "page"]
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "performance.md"
 PICTURES = PAGE.parent / "images" / "performance"
 RESULTS = Path(__file__).resolve().parent / "results" / "all.json"
-# Load of a machine on which nothing else runs.
-IDLE = 0.3
+# Cores that programs of the system keep busy on a machine on which nothing else runs.
+IDLE = 0.1
 HEADING = """\
 # Performance
 
 Written by `python -m benchmarks`; do not edit. Every section is from one run on one core of the machine below, with
 these versions where it names no others. Times are medians, and peers were measured in the same run. "Reach" is the
-figure we set out to reach. A load above that of an idle machine means that other programs ran: times there are too long
-and unsteady."""
+figure we set out to reach. Where other programs kept cores busy meanwhile, times are too long and unsteady, by a little
+where there was a core left for them."""
 
 
 def _cells(row: Mapping[str, Any]) -> list[str]:
@@ -58,10 +58,11 @@ def _circumstances(result: Mapping[str, Any], machine: Mapping[str, Any]) -> str
     found = {name: version for name, version in result.get("versions", {}).items() if name != "assembly"}
     others = [f"{name} {version}" for name, version in found.items() if version not in ("absent", known.get(name))]
     beside = f"; other versions: {', '.join(others)}" if others else ""
-    load = result.get("load")
-    busy = "" if load is None else f", load {load:.1f} on {machine['cores']} cores when the run began"
-    provisional = "**Provisional:** " if load is None or load > IDLE else ""
-    return f"{provisional}measured {result.get('date', 'with an earlier version')}{busy}{beside}."
+    others = result.get("others")
+    busy = "" if others is None else f"; other programs used {others:.2f} of {machine['cores']} cores meanwhile"
+    provisional = "**Provisional:** " if others is None or others > IDLE else ""
+    took = f" in {result['took_seconds']:.0f} s" if "took_seconds" in result else ""
+    return f"{provisional}measured {result.get('date', 'with an earlier version')}{took}{busy}{beside}."
 
 
 def page(report: Mapping[str, Any]) -> str:
@@ -74,6 +75,8 @@ def page(report: Mapping[str, Any]) -> str:
     parts = [HEADING, f"Machine: {machine['processor']}. Python {machine['python']}, {versions}."]
     if absent:
         parts.append(f"Not installed, and so absent from the tables: {absent}.")
+    took = [result["took_seconds"] for result in report["benchmarks"].values() if "took_seconds" in result]
+    parts.append(f"All sections together take {sum(took) / 60.0:.0f} minutes.")
     for name, result in report["benchmarks"].items():
         parts.append(f"## {name.capitalize()}")
         parts.append(_circumstances(result, machine))

@@ -7,13 +7,15 @@ machine that slows down does so for all. The first call is kept apart: it may co
 
 from __future__ import annotations
 
+import os
 import statistics
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-__all__ = ["Timing", "calibration", "compare", "measure"]
+__all__ = ["Busy", "Timing", "calibration", "compare", "measure"]
 
 Clock = Callable[[], float]
 
@@ -149,3 +151,35 @@ def calibration() -> float:
             total += k * k
 
     return measure(loop).seconds
+
+
+class Busy:
+    """How long something took, and how busy other programs kept the machine meanwhile."""
+
+    def __init__(self) -> None:
+        self._begin = time.perf_counter(), *_processor_seconds()
+
+    def read(self) -> tuple[float, float | None]:
+        """Seconds since this was made, and how many cores other programs used of them; None where it is not told.
+
+        Children count as this program's own from when they end.
+        """
+        seconds, everyone, own = self._begin
+        now = time.perf_counter() - seconds
+        everyone_now, own_now = _processor_seconds()
+        if everyone is None or everyone_now is None:
+            return now, None
+        return now, max(0.0, (everyone_now - everyone - (own_now - own)) / now)
+
+
+def _processor_seconds() -> tuple[float | None, float]:
+    """Seconds of processors that all programs have used since the machine began, and this one and its children."""
+    times = os.times()
+    own = times.user + times.system + times.children_user + times.children_system
+    try:
+        # "cpu", then user, nice, system, idle, waiting, interrupts twice, and what the host took.
+        spent = Path("/proc/stat").read_text().split(maxsplit=9)[1:9]
+    except OSError:
+        return None, own
+    user, nice, system, _, _, hard, soft, stolen = map(int, spent)
+    return (user + nice + system + hard + soft + stolen) / os.sysconf("SC_CLK_TCK"), own

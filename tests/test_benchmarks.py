@@ -8,8 +8,9 @@ import math
 import pytest
 
 from benchmarks import __main__ as benchmarks
+from benchmarks import timing
 from benchmarks.running import run_apart
-from benchmarks.timing import compare, measure
+from benchmarks.timing import Busy, compare, measure
 
 
 class Clock:
@@ -62,6 +63,19 @@ def test_absent_peers_are_rows():
     assert rows[0] == {"who": "peer", "absent": True}
     assert (rows[1]["who"], rows[1]["ratio"]) == ("ours", 1.0)
     assert compare({"peer": None}) == [{"who": "peer", "absent": True}]
+
+
+def test_what_this_program_does_is_not_what_others_do(monkeypatch):
+    # Seconds of processors: all programs, this one. Others use two of the three between the two readings.
+    readings = iter([(10.0, 1.0), (13.0, 2.0)])
+    monkeypatch.setattr(timing, "_processor_seconds", lambda: next(readings))
+    monkeypatch.setattr(timing.time, "perf_counter", iter([100.0, 104.0]).__next__)
+    assert Busy().read() == (4.0, 0.5)
+
+
+def test_processors_are_read_where_the_system_tells():
+    everyone, own = timing._processor_seconds()
+    assert own > 0.0 and (everyone is None or everyone > own)
 
 
 @pytest.mark.parametrize(("name", "value"), [("repeats", 1), ("duration", 0.0), ("duration", math.nan)])

@@ -73,7 +73,7 @@ def test_a_failure_is_said():
 
 def test_the_page_is_written_from_the_json(tmp_path, monkeypatch, capsys):
     versions = {"numpy": "2.4.6", "coal": "absent"}
-    machine = {"processor": "Abacus 3", "python": "3.11.1", "versions": versions, "cores": 2, "load": 0.1}
+    machine = {"processor": "Abacus 3", "python": "3.11.1", "versions": versions, "cores": 2}
     results = {"start": {"about": "Whole processes.", "figures": [figure("import", "seconds", 1e-2)]}}
     (tmp_path / "all.json").write_text(json.dumps({"machine": machine, "benchmarks": results}))
     monkeypatch.setattr(report, "RESULTS", tmp_path / "all.json")
@@ -85,23 +85,24 @@ def test_the_page_is_written_from_the_json(tmp_path, monkeypatch, capsys):
     assert str(tmp_path) in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("load", "said"), [(0.1, False), (1.7, True), (None, True)])
-def test_a_busy_machine_is_said(load, said):
+@pytest.mark.parametrize(("others", "said"), [(0.02, False), (0.97, True), (None, True)])
+def test_a_busy_machine_is_said(others, said):
     machine = {"processor": "Abacus 3", "python": "3.11.1", "versions": {}, "cores": 2}
-    section = {"date": "2026-01-02", "load": load}
-    text = report.page({"machine": machine, "benchmarks": {"start": section}})
+    section = {"date": "2026-01-02", "others": others, "took_seconds": 90.0}
+    text = report.page({"machine": machine, "benchmarks": {"start": section, "pairs": {"took_seconds": 30.0}}})
     assert ("**Provisional:** measured 2026-01-02" in text) is said
-    assert ("load" in text.split("## Start")[1]) is (load is not None)
+    assert ("other programs used" in text.split("## Start")[1]) is (others is not None)
+    assert "measured 2026-01-02 in 90 s" in text and "All sections together take 2 minutes." in text
 
 
 def test_a_section_names_versions_that_are_not_those_of_the_heading():
     versions = {"assembly": "absent", "numpy": "2.4.6", "coal": "3.0.3"}
     machine = {"processor": "Abacus 3", "python": "3.11.1", "versions": versions, "cores": 2}
     sections = {
-        "start": {"date": "2026-01-02", "load": 0.1, "versions": versions},
+        "start": {"date": "2026-01-02", "others": 0.02, "versions": versions},
         "pairs": {
             "date": "2026-01-03",
-            "load": 0.1,
+            "others": 0.02,
             "versions": {"assembly": "0.1", "numpy": "2.5.0", "coal": "absent"},
         },
     }
@@ -112,7 +113,7 @@ def test_a_section_names_versions_that_are_not_those_of_the_heading():
 def test_a_section_measured_anew_takes_the_place_of_the_stored_one(tmp_path):
     first = {"quick": False, "machine": {}, "benchmarks": {"start": {"date": "then"}, "pairs": {"date": "then"}}}
     write(first, tmp_path, None)
-    path = write({**first, "machine": {"load": 9.0}, "benchmarks": {"start": {"date": "now"}}}, tmp_path, "start")
+    path = write({**first, "machine": {"cores": 9}, "benchmarks": {"start": {"date": "now"}}}, tmp_path, "start")
     assert json.loads(path.read_text())["machine"] == {}
     stored = json.loads(path.read_text())["benchmarks"]
     # In the order of the page.
