@@ -19,6 +19,8 @@ from assembly.geometry.splines.surface import NurbsSurface
 __all__ = ["Sampled", "circle_distance", "least_distance"]
 
 Array = NDArray[np.float64]
+# One of so many samples tells how far two bodies are apart around it.
+COARSE = 100
 
 
 class Sampled:
@@ -102,9 +104,16 @@ def polished(a: Sampled, row_a: Array, b: Sampled, row_b: Array, turn: Array, sh
 def least_distance(a: Sampled, b: Sampled, turn: Array, shift: Array, candidates: int = 16) -> float:
     """The distance of two sampled bodies, the second one turned and shifted."""
     points = b.points @ turn.T + shift
-    distance, nearest = a.tree.query(points)
+    slack = a.spacing + b.spacing
+    # From far away a tree's nearest point takes long: it is looked for where a few samples tell that it may count.
+    few = points[::COARSE]
+    known = a.tree.query(few)[0]
+    apart, beside = cKDTree(few).query(points)
+    may = known[beside] - apart <= known.min() + slack
+    distance, nearest = np.full(len(points), np.inf), np.zeros(len(points), dtype=np.int64)
+    distance[may], nearest[may] = a.tree.query(points[may])
     best = float(distance.min())
-    left, slack = distance.copy(), a.spacing + b.spacing
+    left = distance.copy()
     kinds = np.column_stack([b.rows[:, :2], a.rows[nearest, :2]])
     for _ in range(candidates):
         j = int(np.argmin(left))
