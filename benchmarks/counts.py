@@ -1,0 +1,170 @@
+"""The work of fixed solves, ticks and queries, counted: no clock, so that a change which makes more of it is found.
+
+Kernels run as plain Python, where the calls of a function can be counted, and then compiled for any processor of this
+kind, under Callgrind where it is installed. ``python -m benchmarks.counts HOW FILE`` is a process that counts.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from cProfile import Profile
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module, metadata
+from pathlib import Path
+from typing import Any
+
+from assembly._kernel.targets import PORTABLE_VARIABLES
+from benchmarks import callgrind
+
+__all__ = ["COMPILED", "INSTRUCTIONS", "PLAIN", "STORED", "lines", "run"]
+
+Work = dict[str, dict[str, int]]
+ROOT = Path(__file__).resolve().parent.parent
+STORED = ROOT / "benchmarks" / "results" / "counts.json"
+# Functions whose calls are counted, by what a call of them is.
+PLAIN: dict[str, tuple[str, ...]] = {
+    "row evaluations": ("constraints.program.evaluate.evaluate",),
+    "factorizations": ("solve.linear_algebra.factorize.factorize",),
+    "surface points": ("geometry.splines.evaluate.surface_lanes",),
+    # Of the distance, or the gap, of two pieces or two nodes of trees.
+    "bounds": (
+        "distance.curves.search.pair_bound",
+        "distance.curves.squared_distance.least_quotient",
+        "distance.enclosures.search.pair_bound",
+        "distance.patches.search.pair_bound",
+        "distance.batch.filter.is_apart",
+        "proximity.features.global_search.node_bound",
+        "proximity.bvh.tree.admits",
+        "proximity.bvh.tree.box_distance",
+    ),
+}
+COMPILED = ("iterations", "evaluations")
+INSTRUCTIONS = "instructions"
+ABOUT = """\
+Calls of functions, counted in kernels that run as plain Python; iterations, and evaluations of queries, as compiled
+code tells them; instructions of one call from Python, in kernels for any processor, by Callgrind, made a second time so
+that nothing is prepared in it. `python -m benchmarks --only counts --gate` fails where one of them became more."""
+
+
+def run() -> dict[str, Any]:
+    """All counts, with what they depend on; a line under "missing" where instructions cannot be counted."""
+    missing = callgrind.why_not()
+    with tempfile.TemporaryDirectory() as folder:
+        parts = [_count_apart(how, Path(folder)) for how in ("plain", "compiled")]
+        if not missing:
+            parts.append(_count_apart("instructions", Path(folder)))
+    work: Work = {case: {} for case in parts[0]}
+    for part in parts:
+        for case, counts in part.items():
+            work[case] |= counts
+    return {"stamp": stamp(), "missing": missing, "work": work}
+
+
+def stamp() -> dict[str, str]:
+    """What counts depend on beside the code: they can be compared exactly where this is the same."""
+    versions = {name: metadata.version(name) for name in ("casadi", "llvmlite", "numba", "numpy", "scipy")}
+    system = {"python": platform.python_version(), "machine": f"{sys.platform} {platform.machine()}"}
+    return {**system, "libc": " ".join(platform.libc_ver()), **versions}
+
+
+def _count_apart(how: str, folder: Path) -> Work:
+    """The counts of a process of its own."""
+    file = folder / f"{how}.json"
+    # Sets of strings have an order of their own in every process, unless they are told to have the same.
+    variables = {**os.environ, **PORTABLE_VARIABLES, "PYTHONHASHSEED": "0", "PYTHONPATH": str(ROOT)}
+    if how == "plain":
+        variables["NUMBA_DISABLE_JIT"] = "1"
+    tool = callgrind.command(folder / "callgrind") if how == "instructions" else []
+    command = [*tool, sys.executable, "-m", "benchmarks.counts", how, str(file)]
+    subprocess.run(command, cwd=ROOT, env=variables, check=True)
+    work: Work = json.loads(file.read_text())
+    if how == "instructions":
+        counted = callgrind.read_counts(folder / "callgrind")
+        return {case: {INSTRUCTIONS: counted[case]} for case in work}
+    return work
+
+
+def _in_plain_python() -> tuple[Work, Callable[[str, Callable[[], Any]], Any]]:
+    """Where counts go, and who counts the calls of functions."""
+    kinds = {}
+    for kind, names in PLAIN.items():
+        for name in names:
+            module, _, function = name.rpartition(".")
+            kinds[getattr(import_module(f"assembly.{module}"), function).__code__] = kind
+    work: Work = {}
+
+    def count(case: str, call: Callable[[], Any]) -> Any:
+        profile = Profile(subcalls=False, builtins=False)
+        profile.enable()
+        result = call()
+        profile.disable()
+        work[case] = dict.fromkeys(PLAIN, 0)
+        for entry in profile.getstats():
+            if entry.code in kinds:
+                work[case][kinds[entry.code]] += entry.callcount
+        return result
+
+    return work, count
+
+
+def _in_compiled_code() -> tuple[Work, Callable[[str, Callable[[], Any]], Any]]:
+    """Where counts go, and who notes what results tell of them."""
+    work: Work = {}
+
+    def count(case: str, call: Callable[[], Any]) -> Any:
+        result = call()
+        told = result if isinstance(result, list) else [result]
+        values = {name: [getattr(one, name) for one in told if hasattr(one, name)] for name in COMPILED}
+        work[case] = {name: sum(found) for name, found in values.items() if found}
+        return result
+
+    return work, count
+
+
+def _under_callgrind() -> tuple[Work, Callable[[str, Callable[[], Any]], Any]]:
+    """Names of cases, and who has their second calls counted."""
+    counter, chosen = callgrind.Counter(), import_module("benchmarks.work_cases").BY_INSTRUCTION
+    work: Work = {}
+    gc.disable()
+
+    def count(case: str, call: Callable[[], Any]) -> Any:
+        result = call()
+        if case in chosen:
+            counter.count(case, call)
+            work[case] = {}
+        return result
+
+    return work, count
+
+
+WAYS = {"plain": _in_plain_python, "compiled": _in_compiled_code, "instructions": _under_callgrind}
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Count in this process, in one of `WAYS`, into a file; of some families of cases where they are named."""
+    how, file, *families = arguments
+    work, count = WAYS[how]()
+    for family in import_module("benchmarks.work_cases").FAMILIES:
+        if not families or family.__name__ in families:
+            family(count)
+    Path(file).write_text(json.dumps(work))
+    return 0
+
+
+def lines(result: Mapping[str, Any]) -> list[str]:
+    """All counts as lines of a Markdown table."""
+    kinds = [*PLAIN, *COMPILED, INSTRUCTIONS]
+    table = [["what", *kinds], ["---"] * (len(kinds) + 1)]
+    for case, counts in result["work"].items():
+        table.append([case, *(f"{counts[kind]:,}" if counts.get(kind) else "" for kind in kinds)])
+    return ["| " + " | ".join(row) + " |" for row in table]
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
