@@ -2,7 +2,7 @@
 
 A run that is not quick, with its JSON where it belongs, writes ``docs/performance.md`` and its pictures too, of one
 benchmark that one's section. `--gate` compares a run with the stored one of its kind (``benchmarks/results``) and fails
-where something became worse.
+where something became worse. ``--only counts`` counts work and takes no times; a run of all does without it.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from benchmarks import counts
 from benchmarks import report as pages
-from benchmarks.gate import regressions
+from benchmarks.gate import Regression, more_work, regressions
 from benchmarks.pictures import draw
 from benchmarks.running import run_apart
 from benchmarks.timing import Busy, calibration
@@ -50,6 +51,7 @@ BENCHMARKS = (
     "skip",
     "start",
 )
+COUNTS = "counts"
 LIBRARIES = (
     *("assembly", "casadi", "meshcat", "numba", "numpy", "scipy"),
     *("cadquery", "cadquery-ocp", "coal", "drake"),
@@ -135,20 +137,47 @@ def write(report: dict[str, Any], output: Path, only: str | None) -> Path:
     return path
 
 
+def tell(worse: list[Regression]) -> None:
+    """Print what became worse."""
+    for name, what, then, now in worse:
+        print(f"worse: {name}: {what}: {then:,.7g} became {now:,.7g}")
+
+
+def count_work(output: Path, gate: bool) -> int:
+    """Count work, print and write it; how many counts of the stored ones became more."""
+    before = json.loads(counts.STORED.read_text()) if gate else None
+    result = counts.count_all()
+    path = output / counts.STORED.name
+    path.write_text(json.dumps(result, indent=1) + "\n")
+    print("\n".join([*counts.section(result), f"\nwritten to {path}"]))
+    if path == counts.STORED:
+        pages.main()
+    if before is None:
+        return 0
+    if before["stamp"] != result["stamp"]:
+        print("versions are not those of the stored counts: some more is let pass, and instructions are not compared")
+    worse = more_work(result, before)
+    tell(worse)
+    return len(worse)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run, print and write; the number of benchmarks that failed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer repeats and cases: does everything still run?")
-    parser.add_argument("--only", choices=BENCHMARKS, metavar="NAME", help=f"one of {', '.join(BENCHMARKS)}")
+    names = (*BENCHMARKS, COUNTS)
+    parser.add_argument("--only", choices=names, metavar="NAME", help=f"one of {', '.join(names)}")
     parser.add_argument("--output", type=Path, default=RESULTS, metavar="FOLDER", help="where the JSON goes")
     parser.add_argument("--gate", action="store_true", help="compare with the stored run, fail where it is worse")
     options = parser.parse_args(arguments)
 
     pin_to_one_core()
+    options.output.mkdir(parents=True, exist_ok=True)
+    if options.only == COUNTS:
+        return count_work(options.output, options.gate)
     report: dict[str, Any] = {"quick": options.quick, "machine": machine(), "benchmarks": {}}
     stored = RESULTS / ("all-quick.json" if options.quick else "all.json")
     before = json.loads(stored.read_text()) if options.gate else {}
-    options.output.mkdir(parents=True, exist_ok=True)
     for name in [options.only] if options.only else BENCHMARKS:
         watch = Busy()
         result = run_apart(f"benchmarks.{name}", options.quick)
@@ -166,8 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         path = write(report, options.output, options.only)
     print(f"\nwritten to {path}")
     worse = regressions(report, before) if options.gate else []
-    for name, what, then, now in worse:
-        print(f"worse: {name}: {what}: {then:.4g} became {now:.4g}")
+    tell(worse)
     if not options.quick and options.output == RESULTS:
         for name, result in report["benchmarks"].items():
             draw(name, result.get("curves", []), pages.PICTURES)

@@ -13,16 +13,15 @@ import platform
 import subprocess
 import sys
 import tempfile
-from cProfile import Profile
 from collections.abc import Callable, Mapping, Sequence
+from cProfile import Profile
 from importlib import import_module, metadata
 from pathlib import Path
 from typing import Any
 
-from assembly._kernel.targets import PORTABLE_VARIABLES
 from benchmarks import callgrind
 
-__all__ = ["COMPILED", "INSTRUCTIONS", "PLAIN", "STORED", "lines", "run"]
+__all__ = ["COUNTS", "INSTRUCTIONS", "STORED", "count_all", "lines", "section"]
 
 Work = dict[str, dict[str, int]]
 ROOT = Path(__file__).resolve().parent.parent
@@ -44,7 +43,8 @@ PLAIN: dict[str, tuple[str, ...]] = {
         "proximity.bvh.tree.box_distance",
     ),
 }
-COMPILED = ("iterations", "evaluations")
+TOLD = ("iterations", "evaluations")
+COUNTS = (*PLAIN, *TOLD)
 INSTRUCTIONS = "instructions"
 ABOUT = """\
 Calls of functions, counted in kernels that run as plain Python; iterations, and evaluations of queries, as compiled
@@ -52,8 +52,8 @@ code tells them; instructions of one call from Python, in kernels for any proces
 that nothing is prepared in it. `python -m benchmarks --only counts --gate` fails where one of them became more."""
 
 
-def run() -> dict[str, Any]:
-    """All counts, with what they depend on; a line under "missing" where instructions cannot be counted."""
+def count_all() -> dict[str, Any]:
+    """All counts, with what they depend on; under "missing" why instructions are not counted here."""
     missing = callgrind.why_not()
     with tempfile.TemporaryDirectory() as folder:
         parts = [_count_apart(how, Path(folder)) for how in ("plain", "compiled")]
@@ -77,7 +77,8 @@ def _count_apart(how: str, folder: Path) -> Work:
     """The counts of a process of its own."""
     file = folder / f"{how}.json"
     # Sets of strings have an order of their own in every process, unless they are told to have the same.
-    variables = {**os.environ, **PORTABLE_VARIABLES, "PYTHONHASHSEED": "0", "PYTHONPATH": str(ROOT)}
+    portable = import_module("assembly._kernel.targets").PORTABLE_VARIABLES
+    variables = {**os.environ, **portable, "PYTHONHASHSEED": "0"}
     if how == "plain":
         variables["NUMBA_DISABLE_JIT"] = "1"
     tool = callgrind.command(folder / "callgrind") if how == "instructions" else []
@@ -120,7 +121,7 @@ def _in_compiled_code() -> tuple[Work, Callable[[str, Callable[[], Any]], Any]]:
     def count(case: str, call: Callable[[], Any]) -> Any:
         result = call()
         told = result if isinstance(result, list) else [result]
-        values = {name: [getattr(one, name) for one in told if hasattr(one, name)] for name in COMPILED}
+        values = {name: [getattr(one, name) for one in told if hasattr(one, name)] for name in TOLD}
         work[case] = {name: sum(found) for name, found in values.items() if found}
         return result
 
@@ -159,11 +160,18 @@ def main(arguments: Sequence[str]) -> int:
 
 def lines(result: Mapping[str, Any]) -> list[str]:
     """All counts as lines of a Markdown table."""
-    kinds = [*PLAIN, *COMPILED, INSTRUCTIONS]
+    kinds = (*COUNTS, INSTRUCTIONS)
     table = [["what", *kinds], ["---"] * (len(kinds) + 1)]
     for case, counts in result["work"].items():
         table.append([case, *(f"{counts[kind]:,}" if counts.get(kind) else "" for kind in kinds)])
     return ["| " + " | ".join(row) + " |" for row in table]
+
+
+def section(result: Mapping[str, Any]) -> list[str]:
+    """Paragraphs of the page."""
+    versions = ", ".join(f"{name} {version}" for name, version in result["stamp"].items())
+    parts = ["## Counts", f"Counted with {versions}.", ABOUT, "\n".join(lines(result))]
+    return [*parts, f"{result['missing'].capitalize()}."] if result["missing"] else parts
 
 
 if __name__ == "__main__":

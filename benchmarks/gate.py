@@ -1,4 +1,4 @@
-"""Whether a run is worse than the stored one: times by their ratio to a calibration loop, counts, errors."""
+"""Whether a run is worse than the stored one: times by their ratio to a calibration loop, errors, cases, counts."""
 
 from __future__ import annotations
 
@@ -6,13 +6,18 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["Regression", "regressions"]
+from benchmarks.counts import COUNTS, INSTRUCTIONS
+
+__all__ = ["Regression", "more_work", "regressions"]
 
 # A time may be so many times the stored one, both over the calibration loop of their runs: what medians of shared
 # machines differ by. A time that short is mostly the clock's.
 SLOWER, SHORT = 1.6, 1e-7
 # An error may be so many times the stored one; below this it is rounding.
 WORSE, ROUNDING = 10.0, 1e-13
+# A count may be so many times the stored one, and so many more, where other versions or another machine rounds in other
+# ways; where they are the same, none. Of the instructions of one program, 1.6 percent depend on the lengths of paths.
+ROUNDS, MORE, LONGER = 1.02, 1, 1.03
 
 Regression = tuple[str, str, float, float]
 
@@ -62,4 +67,26 @@ def regressions(report: Mapping[str, Any], baseline: Mapping[str, Any]) -> list[
             worse = row["reach"] is not None and then <= row["reach"] * 1.1 < now
         if worse:
             found.append((*key, then, now))
+    return found
+
+
+def more_work(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[Regression]:
+    """What takes more work than it did: (case, what is counted, before, now).
+
+    Instructions are compared where all versions are the same, and both runs have them. A case that is no longer there
+    is a regression; one that only the new run has is not compared.
+    """
+    is_same = now["stamp"] == then["stamp"]
+    found: list[Regression] = []
+    for case, old in then["work"].items():
+        new = now["work"].get(case)
+        if new is None:
+            found.append((case, "is gone", 0.0, math.inf))
+            continue
+        for kind in COUNTS:
+            count, before = new.get(kind, 0), old.get(kind, 0)
+            if count > (before if is_same else ROUNDS * before + MORE):
+                found.append((case, kind, before, count))
+        if is_same and INSTRUCTIONS in new and new[INSTRUCTIONS] > LONGER * old.get(INSTRUCTIONS, math.inf):
+            found.append((case, INSTRUCTIONS, old[INSTRUCTIONS], new[INSTRUCTIONS]))
     return found

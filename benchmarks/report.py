@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from benchmarks import counts
 from benchmarks.figures import met, quantity
 
 __all__ = ["PAGE", "PICTURES", "lines", "page"]
@@ -58,15 +59,15 @@ def _circumstances(result: Mapping[str, Any], machine: Mapping[str, Any]) -> str
     found = {name: version for name, version in result.get("versions", {}).items() if name != "assembly"}
     others = [f"{name} {version}" for name, version in found.items() if version not in ("absent", known.get(name))]
     beside = f"; other versions: {', '.join(others)}" if others else ""
-    others = result.get("others")
-    busy = "" if others is None else f"; other programs used {others:.2f} of {machine['cores']} cores meanwhile"
-    provisional = "**Provisional:** " if others is None or others > IDLE else ""
+    used = result.get("others")
+    busy = "" if used is None else f"; other programs used {used:.2f} of {machine['cores']} cores meanwhile"
+    provisional = "**Provisional:** " if used is None or used > IDLE else ""
     took = f" in {result['took_seconds']:.0f} s" if "took_seconds" in result else ""
     return f"{provisional}measured {result.get('date', 'with an earlier version')}{took}{busy}{beside}."
 
 
-def page(report: Mapping[str, Any]) -> str:
-    """The whole page."""
+def page(report: Mapping[str, Any], work: Mapping[str, Any] | None = None) -> str:
+    """The whole page, with counts of work where there are any."""
     machine = report["machine"]
     versions = ", ".join(f"{name} {version}" for name, version in machine["versions"].items() if version != "absent")
     # The library itself may be run from its folder.
@@ -88,11 +89,14 @@ def page(report: Mapping[str, Any]) -> str:
             picture = PICTURES / f"{name}-{k + 1}.png"
             if picture.exists():
                 parts.append(f"![{diagram['title']}]({picture.relative_to(PAGE.parent).as_posix()})")
+    if work is not None:
+        parts += counts.section(work)
     return "\n\n".join(parts) + "\n"
 
 
 def main() -> int:
-    PAGE.write_text(page(json.loads(RESULTS.read_text())))
+    work = json.loads(counts.STORED.read_text()) if counts.STORED.exists() else None
+    PAGE.write_text(page(json.loads(RESULTS.read_text()), work))
     print(f"written to {PAGE}")
     return 0
 

@@ -67,7 +67,7 @@ def clips(count: Count) -> None:
     count("paper clips, a warm step", partial(scene.solve, first))
     tracker = asm.Tracker(scene, grip.point, q0=first)
 
-    def ticks() -> list[asm.TrackStep]:
+    def ticks() -> list[Any]:
         return [tracker.step(begin + np.array([0.06, -0.04, 0.05]) * (k + 1.0)) for k in range(10)]
 
     count("paper clips, 10 ticks", ticks)
@@ -90,7 +90,7 @@ def rings(count: Count) -> None:
     first = count("two rings kept apart, drawn taut", apart.scene.solve)
     tracker = asm.Tracker(apart.scene, apart.grip.point, q0=first)
 
-    def ticks() -> list[asm.TrackStep]:
+    def ticks() -> list[Any]:
         return [tracker.step(apart.hold + (1.0, 0.2 + 0.02 * k, 0.1)) for k in range(5)]
 
     count("two rings kept apart, 5 ticks", ticks)
