@@ -1,6 +1,6 @@
-"""The figures as a Markdown page, ``docs/performance.md``: ``python -m benchmarks.report`` writes it from the JSON.
+"""The figures as a Markdown page, ``docs/performance.md``, and some of them in README.
 
-``python -m benchmarks`` writes it too.
+``python -m benchmarks.report`` writes both from the JSON, and so does ``python -m benchmarks``.
 """
 
 from __future__ import annotations
@@ -14,9 +14,32 @@ from typing import Any
 from benchmarks import counts
 from benchmarks.figures import met, quantity
 
-__all__ = ["PAGE", "PICTURES", "lines", "page"]
+__all__ = ["PAGE", "PICTURES", "README", "block", "lines", "page", "with_block"]
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "performance.md"
+README = PAGE.parent.parent / "README.md"
+BEGIN, END = "<!-- figures -->\n", "<!-- /figures -->"
+# What README tells: words for it, the section, and the figure there.
+TOLD = (
+    (
+        "a point and all second derivatives of a bicubic surface, in a kernel",
+        "evaluation",
+        "inside a kernel, as 3-tuples",
+    ),
+    ("the extremal pair of two surfaces, from near, in a kernel", "pairs", "warm, as in a solve, inside a kernel"),
+    ("certified distance of two Bezier curves of degree 5", "curves", "two Bezier curves of degree 5, median"),
+    ("closest features of two solids, from anywhere", "features", "solids: a search"),
+    ("spatial four-bar, a warm step of 1 degree", "mechanisms", "four-bar, a warm step of 1 degree: a call"),
+    ("eight cubes on one another, from near", "joint_errors", "eight cubes, pulled, at 1e-14: a call"),
+    ("64 cubes on one another, from scattered poses", "mechanisms", "64 boxes: a call"),
+    ("three linked wires that touch, contacts given", "wires", "wires, near, contacts given: a call"),
+    ("the same from nothing but poses", "wires", "wires, near, global start: a call"),
+    ("the same, a warm step", "wires", "wires, near, warm update: a call"),
+    ("three paper clips with a clearance follow a hand, a tick", "tracking", "three clips, 100,000 ticks, median"),
+    ("contacts of twelve rings that move, an update", "tracking", "manager of twelve rings, an update"),
+    ("`import assembly`", "start", "`import assembly`"),
+    ("a process that solves one scene, kernels installed", "start", "three wires solved, kernels installed"),
+)
 PICTURES = PAGE.parent / "images" / "performance"
 RESULTS = Path(__file__).resolve().parent / "results" / "all.json"
 # Cores that programs of the system keep busy on a machine on which nothing else runs.
@@ -94,10 +117,48 @@ def page(report: Mapping[str, Any], work: Mapping[str, Any] | None = None) -> st
     return "\n\n".join(parts) + "\n"
 
 
+def block(report: Mapping[str, Any]) -> str:
+    """The lines of README between its two marks."""
+    machine = report["machine"]
+    rows = [["what", "takes", "others"], ["---"] * 3]
+    for words, section, what in TOLD:
+        found = {row["what"]: row for row in report["benchmarks"].get(section, {}).get("figures", [])}
+        if what in found:
+            _, _, measured, peers = _cells({**found[what], "reach": None})
+            rows.append([words, measured, peers])
+    table = "\n".join("| " + " | ".join(row) + " |" for row in rows)
+    every = [met(row) for result in report["benchmarks"].values() for row in result.get("figures", [])]
+    goals = [reached for reached in every if reached is not None]
+    return f"""\
+Medians on one core of an {machine["processor"]}, a call from Python unless it says otherwise, others in the same run.
+
+{table}
+
+`python -m benchmarks` measures these and many more, and writes `docs/performance.md`: {sum(goals)} of its {len(goals)}
+goals are reached.
+"""
+
+
+def with_block(text: str, lines: str) -> str:
+    """README with other lines between its two marks.
+
+    Raises
+    ------
+    ValueError
+        It has not one of each.
+    """
+    if text.count(BEGIN) != 1 or text.count(END) != 1:
+        raise ValueError(f"README has {text.count(BEGIN)} and {text.count(END)} marks of figures, expected one of each")
+    before, _, rest = text.partition(BEGIN)
+    return f"{before}{BEGIN}{lines}{END}{rest.partition(END)[2]}"
+
+
 def main() -> int:
+    report = json.loads(RESULTS.read_text())
     work = json.loads(counts.STORED.read_text()) if counts.STORED.exists() else None
-    PAGE.write_text(page(json.loads(RESULTS.read_text()), work))
-    print(f"written to {PAGE}")
+    PAGE.write_text(page(report, work))
+    README.write_text(with_block(README.read_text(), block(report)))
+    print(f"written to {PAGE} and {README}")
     return 0
 
 

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from benchmarks import report
+from benchmarks import counts, report
 from benchmarks.__main__ import write
 from benchmarks.figures import figure, met, quantity
 
@@ -78,11 +78,39 @@ def test_the_page_is_written_from_the_json(tmp_path, monkeypatch, capsys):
     (tmp_path / "all.json").write_text(json.dumps({"machine": machine, "benchmarks": results}))
     monkeypatch.setattr(report, "RESULTS", tmp_path / "all.json")
     monkeypatch.setattr(report, "PAGE", tmp_path / "performance.md")
+    monkeypatch.setattr(report, "README", tmp_path / "README.md")
+    monkeypatch.setattr(counts, "STORED", tmp_path / "counts.json")
+    monkeypatch.setattr(report, "TOLD", (("an import", "start", "import"), ("another", "start", "not measured")))
+    (tmp_path / "README.md").write_text("before\n<!-- figures -->\nold\n<!-- /figures -->\nafter\n")
     assert report.main() == 0
     text = (tmp_path / "performance.md").read_text()
     assert "Machine: Abacus 3. Python 3.11.1, numpy 2.4.6." in text
     assert text.index("## Start") < text.index("Whole processes.") < text.index("| import |  | 10 ms |  |")
     assert str(tmp_path) in capsys.readouterr().out
+    readme = (tmp_path / "README.md").read_text()
+    assert readme.startswith("before\n<!-- figures -->\nMedians on one core of an Abacus 3, ")
+    assert "| an import | 10 ms |  |\n\n" in readme and "another" not in readme and "old" not in readme
+    assert readme.endswith(": 0 of its 0\ngoals are reached.\n<!-- /figures -->\nafter\n")
+
+
+@pytest.mark.parametrize("text", ["", "<!-- figures -->\n", "<!-- figures -->\n<!-- /figures --><!-- /figures -->"])
+def test_a_readme_without_its_marks_is_refused(text):
+    with pytest.raises(ValueError, match="marks of figures, expected one of each"):
+        report.with_block(text, "figures")
+
+
+def test_goals_that_are_reached_are_counted():
+    machine = {"processor": "Abacus 3"}
+    rows = [figure("a", "seconds", 1.0, reach=2.0), figure("b", "seconds", 3.0, reach=2.0), figure("c", "seconds", 1.0)]
+    assert ": 1 of its 2\ngoals" in report.block({"machine": machine, "benchmarks": {"start": {"figures": rows}}})
+
+
+def test_counts_are_a_section_of_the_page():
+    machine = {"processor": "Abacus 3", "python": "3.11.1", "versions": {}, "cores": 2}
+    work = {"stamp": {"numpy": "2.4.6"}, "missing": "no instructions", "work": {"a call": {"bounds": 12_345}}}
+    text = report.page({"machine": machine, "benchmarks": {}}, work)
+    assert "## Counts\n\nCounted with numpy 2.4.6." in text
+    assert "| a call |  |  |  | 12,345 |  |  |  |\n\nNo instructions.\n" in text
 
 
 @pytest.mark.parametrize(("others", "said"), [(0.02, False), (0.97, True), (None, True)])
