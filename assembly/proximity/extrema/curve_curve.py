@@ -25,8 +25,8 @@ from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.pose import pose_row
 from assembly.proximity.brep.records import EDGE, EDGE_RECORD, FACE
 from assembly.proximity.brep.writer import edge_over
-from assembly.proximity.extrema.feature_query import PAIR, feature_derivatives, feature_pair_at, find_features
-from assembly.proximity.extrema.pairs import EXTREMAL, STATUSES, PairStatus, Side, as_face
+from assembly.proximity.extrema.feature_query import PAIR, feature_derivatives, find_features
+from assembly.proximity.extrema.pairs import EXTREMAL, STATUSES, PairStatus, Side, as_face, placed_pair
 
 __all__ = ["CurvePair", "curve_contact_jacobian", "curve_gap_gradient", "curve_gap_hessian", "extremal_curve_pair"]
 
@@ -204,9 +204,8 @@ def extremal_curve_pair(
     nothing = (0.0, 0.0, 0.0)
     store = packed.table, packed.pool
     status = find_features(store, query.features, query.q, query.x, nothing, packed.size, np.inf, out)
-    pair = feature_pair_at(out, 0)
-    points = np.array([pair.point_f, pair.point_g])
-    return CurvePair(pair.parameters[:3], points, pair.normal, float(pair.gap), STATUSES[status])
+    parameters, points, normal, gap = placed_pair(out)
+    return CurvePair(parameters[:3], points, normal, gap, STATUSES[status])
 
 
 def _derivatives(

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import ReadOnlyArrays
+from assembly._record import place_of
 from assembly.errors import InputError, integer, real_array, vector
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import OFFSETS, SURFACE_RECORD
@@ -21,13 +22,7 @@ from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace
 from assembly.kinematics.pose import pose_row
 from assembly.proximity.brep.records import FACE
-from assembly.proximity.extrema.feature_query import (
-    PLACED,
-    feature_derivatives,
-    find_descent,
-    find_pair,
-    placed_pair_at,
-)
+from assembly.proximity.extrema.feature_query import PLACED, PLACED_PAIR, feature_derivatives, find_descent, find_pair
 from assembly.proximity.extrema.feedback import CROSSED
 
 __all__ = ["ContactPair", "PairStatus", "contact_jacobian", "descend", "extremal_pair", "gap_gradient", "gap_hessian"]
@@ -49,6 +44,10 @@ class PairStatus(Enum):
 
 
 STATUSES = tuple(PairStatus)
+# Fields of a pair that a query writes. A call takes as long as what reads them by name from a record.
+_PARAMETERS, _POINTS, _NORMAL, _GAP = (
+    place_of(PLACED_PAIR, name) for name in ("parameters", "point_f", "normal", "gap")
+)
 # Where the records of the two surfaces are in the table of a query.
 _SURFACES = 0, SURFACE_RECORD
 
@@ -209,8 +208,12 @@ def descend(
 
 
 def _contact_pair(out: Array, status: PairStatus) -> ContactPair:
-    pair = placed_pair_at(out, 0)
-    return ContactPair(pair.parameters, np.array([pair.point_f, pair.point_g]), pair.normal, float(pair.gap), status)
+    return ContactPair(*placed_pair(out), status)
+
+
+def placed_pair(out: Array) -> tuple[Array, Array, Array, float]:
+    """Parameters, points (2, 3), normal and gap of a pair that a query wrote."""
+    return out[_PARAMETERS:_POINTS], out[_POINTS:_NORMAL].reshape(2, 3), out[_NORMAL:_GAP], float(out[_GAP])
 
 
 def _derivatives(
