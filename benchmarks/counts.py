@@ -31,7 +31,7 @@ PLAIN: dict[str, tuple[str, ...]] = {
     "row evaluations": ("constraints.program.evaluate.evaluate",),
     "factorizations": ("solve.linear_algebra.factorize.factorize",),
     "surface points": ("geometry.splines.evaluate.surface_lanes",),
-    # Of the distance, or the gap, of two pieces or two nodes of trees.
+    # Of the distance, or the gap, of two pieces, two nodes of trees, or two parts of centerlines.
     "bounds": (
         "distance.curves.search.pair_bound",
         "distance.curves.squared_distance.least_quotient",
@@ -41,6 +41,8 @@ PLAIN: dict[str, tuple[str, ...]] = {
         "proximity.features.global_search.node_bound",
         "proximity.bvh.tree.admits",
         "proximity.bvh.tree.box_distance",
+        "proximity.manager.centerlines.box.box_of",
+        "proximity.manager.centerlines.parts.parts_apart",
     ),
 }
 TOLD = ("iterations", "evaluations")
