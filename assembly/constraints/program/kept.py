@@ -44,9 +44,9 @@ MOST_KEPT = 60
 NO_FACTOR, EARLIER_FACTOR, NEW_FACTOR = 0.0, 1.0, 2.0
 # Where the header is; of every body its pose, as in the state; of every tracked angle its value; of every row the value
 # it has subtracted, its residual, and its weight in the factor (0: it did not count); of every contact of a clearance
-# its number. Of these poses the records of contacts, joints and vector trims, and the Jacobian; of these or others close
-# by the Cholesky factor of a step's matrix, its upper triangle row by row, and the Jacobian that is in it. That of
-# these poses is without the columns of lifted pairs.
+# its number. Of these poses the records of contacts, joints and vector trims, and the Jacobian without the columns of
+# lifted pairs. Of these poses or others close by the Cholesky factor of a step's matrix, its upper triangle row by row,
+# and the Jacobian that is in it.
 Kept = namedtuple(
     "Kept",
     "header poses angles values residual weights numbers contacts joints trims jacobian factor_jacobian factor",
