@@ -373,6 +373,8 @@ class Packed:
         other = copy(self)
         other.pool = self.pool.copy()
         other.pool[layout.VERSION] = float(next(_versions))
+        # Solves of the one and of the other work in the same memory, one after another.
+        other.workspaces = self.workspaces
         return other
 
     @property

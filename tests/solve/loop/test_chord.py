@@ -303,3 +303,9 @@ def test_bodies_that_are_gathered_stay_so():
     assert plain._state[scene.packed().results_at + SCATTER] == 1.0
     assert plain.success and quick.success
     np.testing.assert_array_equal(quick.history, plain.history)
+
+
+def test_twins_work_in_the_memory_of_their_scene():
+    # A fit makes a twin a solve; what twins work in is as large, and it takes long to tell how large that is.
+    packed = four_bar().scene.packed()
+    assert packed.twin().workspaces is packed.workspaces
