@@ -14,7 +14,10 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly._record import place_of
 from assembly.constraints.program.kept import EARLIER_FACTOR, NO_FACTOR, kept_header_at
+from assembly.constraints.program.records import TAPE_FIELDS, TAPE_TABLE
+from assembly.solve.attempts.attempts import go_on_once
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.loop.parameters import CHORD_SHIFT
 from assembly.solve.loop.settings import GATHER, GATHERS, SCATTER
@@ -309,3 +312,17 @@ def test_twins_work_in_the_memory_of_their_scene():
     # A fit makes a twin a solve; what twins work in is as large, and it takes long to tell how large that is.
     packed = four_bar().scene.packed()
     assert packed.twin().workspaces is packed.workspaces
+
+
+def test_rows_of_another_pool_are_evaluated_anew():
+    # In a twin expressions may have other weights, and what is off by them is another number.
+    case = expression()
+    packed = case.scene.packed()
+    start = case.scene.solve(max_iterations=0)
+    assert start.feasibility > 0.1
+    twin = packed.twin()
+    twin.pool[packed.table[packed.table[TAPE_TABLE] + place_of(TAPE_FIELDS, "unit")]] *= 2.0
+    settings = case.scene._settings({"max_iterations": 0}, CTRL_C, warm=True)
+    states = [solution._state.copy() for solution in (start, _without(start))]
+    kept, anew = (go_on_once(CTRL_C, twin, settings, state).history[0, 1] for state in states)
+    assert kept == anew != pytest.approx(start.history[0, 1])
