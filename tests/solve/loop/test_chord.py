@@ -326,3 +326,15 @@ def test_rows_of_another_pool_are_evaluated_anew():
     states = [solution._state.copy() for solution in (start, _without(start))]
     kept, anew = (go_on_once(CTRL_C, twin, settings, state).history[0, 1] for state in states)
     assert kept == anew != pytest.approx(start.history[0, 1])
+
+
+def test_what_holds_is_not_moved_by_a_bit():
+    # The multipliers are those of the last least move, and ask for more of it.
+    case = four_bar()
+    solution = case.scene.solve()
+    case.change(0.1)
+    solution = case.scene.solve(solution)
+    assert solution.iterations > 0
+    after = case.scene.solve(solution)
+    assert after.success and after.iterations == 0
+    assert after.q.tobytes() == solution.q.tobytes()
