@@ -338,3 +338,21 @@ def test_what_holds_is_not_moved_by_a_bit():
     after = case.scene.solve(solution)
     assert after.success and after.iterations == 0
     assert after.q.tobytes() == solution.q.tobytes()
+
+
+def test_no_chord_step_leads_through_a_wire():
+    # Rings that are linked stay so, although a step over the wire would be at the target at once.
+    ground = asm.Body("ground", asm.shapes.torus(1.0, 0.02), fixed=True)
+    turn = asm.Pose.from_axis_angle((1, 0, 0), 1.5).quaternion
+    ring = asm.Body("ring", asm.shapes.torus(1.0, 0.02), (1.9, 0.0, 0.0), turn)
+    scene = asm.Assembly([ground, ring])
+    scene.constrain(asm.Clearance())
+    grip = asm.PointDistance(ring.point(0.0, 0.0, 0.0), (1.92, 0.0, 0.0))
+    scene.minimize(grip, asm.Posture(scene.q, weight=0.1))
+    solution = scene.solve()
+    assert solution.success and _factor(solution) == EARLIER_FACTOR
+    grip.target = (2.2, 0.0, 0.0)
+    after = scene.solve(solution)
+    assert after.success
+    # The wires touch, two of their radii before 2.
+    assert after.pose(ring).position[0] == pytest.approx(1.96, abs=1e-9)
