@@ -77,6 +77,12 @@ def has_place(table, state):
     return state.size >= header_at(table, 0).kept + kept_size(table)
 
 
+@kernel(inline=True)
+def forget_factor(table, state):
+    """No factor is kept in a state any more, which has a place for one."""
+    kept_header_at(state, header_at(table, 0).kept).factor = NO_FACTOR
+
+
 @kernel(inline=True, allocates=True)
 def kept_in(table, state):
     """What is kept in a state, as arrays in it."""

@@ -65,6 +65,7 @@ def solve_program(table, pool, settings, state, history, doubles, integers, end_
         limits=limits,
         results=results,
         result=results_at(results, 0),
+        told=workspace.told,
         way=workspace.way,
         loop=loop_at(workspace.loop, 0),
         tick=tick,

@@ -9,7 +9,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import is_clearance_row, is_of_solids
 from assembly.constraints.program.evaluate import evaluate
-from assembly.constraints.program.kept import NO_FACTOR, has_place, kept_header_at, kept_in, take_rows
+from assembly.constraints.program.kept import forget_factor, has_place, kept_in, take_rows
 from assembly.constraints.program.objective_terms import recenter
 from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.proximity.features.solid_contact import TRACK, contact_record_at, tracked_at
@@ -115,7 +115,7 @@ def find_contacts(program, settings, state, current, rows, n):
     knows = has_place(store.table, state)
     if came or not (knows and take_rows(store, state, kept, current)):
         if knows:
-            kept_header_at(state, kept.header).factor = NO_FACTOR
+            forget_factor(store.table, state)
         lost = evaluate(program, current.tracked, math.inf, current)
         if lost < 0:
             let_touch(store.table, current, overlap_allowed(settings))
@@ -171,7 +171,7 @@ def set_out(program, settings, state, current, rows, n):
         lost = put_together(program, current, rows)
         if has_place(store.table, state):
             # It is of where the last solve ended, and bodies are no more there.
-            kept_header_at(state, header_at(store.table, 0).kept).factor = NO_FACTOR
+            forget_factor(store.table, state)
         folded = False
         status = GATHERED if limits.gather == ASSEMBLES else RUNNING
         status = CONTACT_LOST if lost >= 0 else status

@@ -20,7 +20,7 @@ from assembly._kernel import kernel
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.kept import (
     EARLIER_FACTOR,
-    NO_FACTOR,
+    forget_factor,
     has_place,
     kept_header_at,
     kept_in,
@@ -37,7 +37,7 @@ from assembly.solve.loop.deadline import is_cut
 from assembly.solve.loop.keep import keep_factor, test_convexity
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import dual_residual, weigh_rows
-from assembly.solve.loop.parameters import CHORD_GAIN, CHORD_LONGEST, CHORD_SHIFT, CHORD_STEPS, FEW, LIFT_BELOW
+from assembly.solve.loop.parameters import CHORD_GAIN, CHORD_LONGEST, CHORD_SHIFT, CHORD_STEPS, FEW_STEPS, LIFT_BELOW
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.report import log
 from assembly.solve.loop.residuals import add_transposed, move, times, violation_of
@@ -80,11 +80,12 @@ def round_poses(store, q, told):
 
 
 @kernel(inner=True)
-def copy_poses(source, state):
-    """Poses into a state."""
-    for b in range(source.shape[0]):
-        for k in range(7):
-            state[7 * b + k] = source[b, k]
+def write_told(table, told, state):
+    """Poses of moving bodies, as the user's coordinates have them, into a state."""
+    for b in range(told.shape[0]):
+        if table[header_at(table, 0).unknown_blocks + b] >= 0:
+            for k in range(7):
+                state[7 * b + k] = told[b, k]
 
 
 @kernel(inner=True)
@@ -97,14 +98,15 @@ def count_as_kept(kept, one_sided, rows):
 
 
 @kernel(inner=True)
-def go_along(program, kept, current, trial, rows, system):
+def go_along(task, kept, iterates, rows, system):
     """The iterate at the end of the step, with its rows and multipliers, into the trial one. Whether all is regular."""
+    program, (current, trial) = task.program, iterates
     store, shape, step, memory = program.store, program.structure, system.directions.step, program.lifted.memory
     watched = header_at(store.table, 0).manager_record >= 0
     if watched and not allowed_share(store, memory, current, trial, step, 1.0)[1]:
         return False
     move(store.table, current.q, step, 1.0, trial.q)
-    round_poses(store, trial.q, kept.poses)
+    round_poses(store, trial.q, task.told)
     predict_pairs(store, shape.bases, program.lifted, current, trial, step, 1.0)
     if evaluate(program, program.lifted.guess, BEND, trial) >= 0:
         return False
@@ -117,6 +119,20 @@ def go_along(program, kept, current, trial, rows, system):
         left = times(shape.bases, kept.factor_jacobian, r, step) + current.residual[r]
         rows.y[r] += left * kept.weights[r]
     return True
+
+
+@kernel(inline=True)
+def wants_factor(task, count, arrived, violation, dual, last):
+    """Whether a factor is to be made at an iterate, in place of an earlier solve's.
+
+    Where the steps arrived it is for the next solve; a tick that arrived soon leaves the one it had. On the way it is
+    made where one more step by the old one would not arrive. Newton's step leaves L e^2 / 2 of a distance e, a chord
+    step by the same matrix L e of what is off then: twice the part that the step before has left.
+    """
+    if arrived:
+        return not (task.tick and count <= FEW_STEPS)
+    rate = 2.0 * max(violation, dual) / last
+    return not (rate * violation <= task.loop.feasible and rate * dual <= task.limits.stationarity)
 
 
 @kernel(inner=True)
@@ -135,19 +151,15 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
         dual = dual_residual(shape, current, rows, system, rows.y)
         log(history, count, (value, violation, dual, rows.mu, CHORD_SHIFT, 1.0, limits.radius))
         weigh_rows(rows, shape.one_sided, current.residual)
-        if not count_as_kept(kept, shape.one_sided, rows):
+        if not (math.isfinite(value) and count_as_kept(kept, shape.one_sided, rows)):
             return failed
         # A tick ends after its steps at any pose that holds.
         arrived = violation <= feasible and (dual <= stationarity or (task.tick and count >= task.loop.limit))
-        off, last = max(violation, dual), max(last_violation, last_dual)
-        if not (math.isfinite(value) and (arrived or off <= CHORD_GAIN * last)):
+        last = max(last_violation, last_dual)
+        if not (arrived or max(violation, dual) <= CHORD_GAIN * last):
             return failed
-        # By the same factor a step leaves twice the part of what the last one did: e' = L e^2 / 2, and then L e e'.
-        rate = 2.0 * off / last
-        slow = not (rate * violation <= feasible and rate * dual <= stationarity)
-        # A tick that arrived soon leaves the factor that it had.
-        ages = (arrived and not (task.tick and count <= FEW)) or (slow and not arrived)
-        if ages and count > 0 and kept_header_at(state, kept.header).factor == EARLIER_FACTOR:
+        is_old = count > 0 and kept_header_at(state, kept.header).factor == EARLIER_FACTOR
+        if is_old and wants_factor(task, count, arrived, violation, dual, last):
             if not keep_factor(program, state, kept, current, rows, system):
                 return failed
             if tests:
@@ -157,7 +169,7 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
             return Chord(count, swapped, violation, dual, last_violation, last_dual)
         if count == limit or not chord_step(shape, kept, current, rows, system) <= CHORD_LONGEST:
             return failed
-        if not go_along(program, kept, current, trial, rows, system):
+        if not go_along(task, kept, (current, trial), rows, system):
             return failed
         current, trial = trial, current
         swapped = not swapped
@@ -185,16 +197,14 @@ def go_on_by_chords(task, history, state, iterates, rows, system):
     take_factor(kept, system.factor)
     chord = chord_steps(task, history, state, kept, current, trial, rows, system)
     if chord.steps < 0:
-        kept_header_at(state, kept.header).factor = NO_FACTOR
-        for b in range(kept.poses.shape[0]):
-            for k in range(7):
-                kept.poses[b, k] = state[7 * b + k]
+        forget_factor(store.table, state)
         read_state(store, state, current, trial, rows)
         take_rows(store, state, kept, current)
         # Of motion bounds it is known what bodies would have used elsewhere.
         loop.measured = 0
         return False
-    copy_poses(kept.poses, state)
+    # From here on the state has the poses that were found, not those of the start.
+    write_told(store.table, task.told, state)
     loop.iteration, loop.alpha = chord.steps, 1.0
     loop.last_violation, loop.last_dual = chord.last_violation, chord.last_dual
     for r in range(rows.count):

@@ -82,10 +82,10 @@ LOOP_STATE = np.dtype(NUMBERS.descr + COUNTS.descr)
 loop_at = record_view(LOOP_STATE)
 LOOP = size_of(LOOP_STATE)
 
-# What stays as it is: the program, arrays and records of settings and results, what is known of the way back
-# (`way_back.py`), the record of the loop; whether it is a tick, has a contact manager, is content with any pose that
-# holds, and leads what fails back onto its rows.
-Task = namedtuple("Task", "program settings limits results result way loop tick watched any_pose leads_back")
+# What stays as it is: the program, arrays and records of settings and results, workspace for poses in the user's
+# coordinates, what is known of the way back (`way_back.py`), the record of the loop; whether it is a tick, has a
+# contact manager, is content with any pose that holds, and leads what fails back onto its rows.
+Task = namedtuple("Task", "program settings limits results result told way loop tick watched any_pose leads_back")
 
 
 @kernel(inline=True)

@@ -83,7 +83,7 @@ KICKS = 3
 CHORD_STEPS, CHORD_GAIN = 6, 0.25
 # [steps] A tick that took at most so many leaves the factor that it began with. Doubled: ticks take more steps, and
 # more of them make a factor. Chosen.
-FEW = 2
+FEW_STEPS = 2
 # [length, radian] The largest component of such a step. Doubled: longer moves are tried, in vain. Chosen.
 CHORD_LONGEST = 0.2
 # The shift of the Hessian in such a factor. Doubled: what is left after a step doubles. From: halves of what a step

@@ -38,8 +38,9 @@ System = namedtuple("System", "gradient directions hessian factor")
 # Of all unknowns: right side of the system, or scratch; the step; the step before its second-order correction. Of the
 # coordinates of lifted pairs, the last unknowns: 1 where one is held at the end of its patch (`ends.py`), else 0.
 Directions = namedtuple("Directions", "descent step straight ends")
-# All that a solve works in. `way`: what is known of a way back (`way_back.py`).
-Workspace = namedtuple("Workspace", "program iterates rows way loop system")
+# All that a solve works in. `told`: workspace for poses in the user's coordinates (`chord.py`); `way`: what is known of
+# a way back (`way_back.py`).
+Workspace = namedtuple("Workspace", "program iterates rows told way loop system")
 
 
 @kernel(inline=True, allocates=True)
@@ -91,7 +92,7 @@ def workspace_needed(table):
     most, n = header.rows + 4 * pairs, 6 * header.moving
     integers, doubles = size_of_shape(table, most, n + 4 * pairs)
     # Poses, tracked values, records, Jacobians, what a row has one of.
-    doubles += 21 * bodies + 4 * TRACK * tracks + 2 * record_count(table) * CONTACT_RECORD
+    doubles += 28 * bodies + 4 * TRACK * tracks + 2 * record_count(table) * CONTACT_RECORD
     doubles += 2 * most * (EXTRA_COLUMN + 6 * header.extra) + BY_ROW * most
     # Of pairs; of tapes; multipliers of least squares; the way back.
     doubles += 4 * pairs + (3 * VECTORS + VARIABLES) * VARIABLES
@@ -195,9 +196,11 @@ def carve_all(store, memory, end_effectors, doubles, integers):
     lifted, at = carve_pairs(table, guess, memory, doubles, at, integers)
     arrange(table, lifted.free, shape, header.rows, n)
     tapes, at = carve_tapes(table, doubles, at)
+    told = carve(doubles, at, (header.bodies, 7))
+    at += 7 * header.bodies
     way, loop = carve(doubles, at, (WAY,)), carve(doubles, at + WAY, (LOOP,))
     system = carve_unknowns(n, shape.sparsity, doubles, at + WAY + LOOP)
-    return Workspace(Program(store, shape, lifted, tapes, end_effectors), iterates, rows, way, loop, system)
+    return Workspace(Program(store, shape, lifted, tapes, end_effectors), iterates, rows, told, way, loop, system)
 
 
 @kernel(inline=True, allocates=True)
