@@ -194,21 +194,23 @@ def keep_array(first, records, out):
 @kernel(inner=True)
 def take_jacobian(source, jacobian):
     """A Jacobian that is kept, into one that has columns of lifted pairs as well."""
+    lifted = EXTRA_COLUMN - FREE_COLUMN
     for r in range(source.shape[0]):
         for i in range(FREE_COLUMN):
             jacobian[r, i] = source[r, i]
         for i in range(FREE_COLUMN, source.shape[1]):
-            jacobian[r, i + EXTRA_COLUMN - FREE_COLUMN] = source[r, i]
+            jacobian[r, lifted + i] = source[r, i]
 
 
 @kernel(inner=True)
 def keep_jacobian(jacobian, out):
     """The way back."""
+    lifted = EXTRA_COLUMN - FREE_COLUMN
     for r in range(out.shape[0]):
         for i in range(FREE_COLUMN):
             out[r, i] = jacobian[r, i]
         for i in range(FREE_COLUMN, out.shape[1]):
-            out[r, i] = jacobian[r, i + EXTRA_COLUMN - FREE_COLUMN]
+            out[r, i] = jacobian[r, lifted + i]
 
 
 @kernel(inner=True)
