@@ -11,7 +11,6 @@ from assembly.constraints.program.row_terms import add_square
 from assembly.solve.linear_algebra.factorize import factorize, factorize_shifted, solve_step, substitute
 from assembly.solve.loop.parameters import (
     BLOCKED,
-    EXCESS,
     EXCHANGES,
     LEFT_OVER,
     NEAR,
@@ -312,22 +311,6 @@ def strongest(values, count):
     for i in range(count):
         most = max(most, abs(values[i]))
     return most
-
-
-@kernel(inner=True)
-def least_multipliers(shape, point, rows, system, dual):
-    """The shortest multipliers that balance the objective, if they do so as well as y; into y. The dual residual.
-
-    They are for y much stronger than the objective's slope: of rows that depend on each other.
-    """
-    if not strongest(rows.y, rows.count) > EXCESS * strongest(system.gradient, system.gradient.size):
-        return dual
-    pushing_multipliers(shape, point, rows, system, 0, 1, rows.better_y)
-    other = dual_residual(shape, point, rows, system, rows.better_y)
-    if other > max(10.0 * dual, 1e-11):
-        return dual
-    take_better(rows)
-    return max(dual, other)
 
 
 @kernel(inner=True)

@@ -94,9 +94,6 @@ CHORD_SHIFT = 1e-5
 # [force] Multipliers below this count for nothing against the objective's curvature, which is of order one. Doubled:
 # small forces bend nothing, and their contacts converge slowly, as in `benchmarks/first_order.py`. Chosen.
 WEAK = 1e-3
-# Multipliers this many times stronger than the objective's slope are computed once more. Doubled: stronger ones are
-# reported of rows that depend on each other. Chosen.
-EXCESS = 10.0
 # [length] One-sided rows that hold by less than this may push. Doubled: more rows to choose from. From: `TOUCHING`.
 NEAR = 1e-9
 # [rounds] One-sided rows are exchanged so often for those that would pull; after BLOCKED rounds that gain nothing one

@@ -12,7 +12,6 @@ from assembly.solve.loop.arrival import has_arrived, is_rounding, reach_of
 from assembly.solve.loop.clearances import numbers_of, update_again
 from assembly.solve.loop.deadline import is_spent
 from assembly.solve.loop.loop_state import lead_back
-from assembly.solve.loop.multipliers import least_multipliers
 from assembly.solve.loop.parameters import GAIN, HALF, LINGERS, LONGER, SHORT, STANDS, STRAYING
 from assembly.solve.loop.report import is_clear, keep_point
 from assembly.solve.loop.rollback import has_sunk, must_roll_back, roll_back
@@ -33,7 +32,7 @@ def terminate(task, held, current, rows, system):
     final_update = task.watched and task.limits.final_update == 1.0
     # Where every final update finds other contacts, the limit ends it.
     if arrived and not goes_back and not (final_update and loop.iteration > loop.limit):
-        arrive(task, final_update, current, rows, system)
+        arrive(task, final_update, current)
         return True
     keep_what_holds(task, held, current, rows)
     if stop_at_limits(task, current):
@@ -63,7 +62,7 @@ def is_solution(task, current, rows, system):
 
 
 @kernel(inline=True)
-def arrive(task, final_update, current, rows, system):
+def arrive(task, final_update, current):
     """End at a solution, unless a final update of all pairs finds other contacts."""
     loop, program = task.loop, task.program
     # A contact that ends right here is lost and found again by every update.
@@ -78,8 +77,6 @@ def arrive(task, final_update, current, rows, system):
     crosses = final_update and any_crossed(table, header_at(table, 0).manager_record, program.lifted.memory)
     loop.status = STALLED if crosses else SOLVED
     loop.over = 1
-    if not crosses:
-        loop.dual = least_multipliers(program.structure, current, rows, system, loop.dual)
 
 
 @kernel(inline=True)
