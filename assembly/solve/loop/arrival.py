@@ -7,7 +7,7 @@ from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.solve.linear_algebra.factorize import greatest_on_diagonal
 from assembly.solve.loop.inertia import DOWNWARD
 from assembly.solve.loop.multipliers import strongest
-from assembly.solve.loop.parameters import GAIN, MOST_ROUNDING, NEAR_SADDLE, OFF_SADDLE, ROUNDING, STEPS_OF_ROUNDING
+from assembly.solve.loop.parameters import MOST_ROUNDING, NEAR_SADDLE, OFF_SADDLE, ROUNDING, STEPS_OF_ROUNDING
 from assembly.solve.loop.residuals import largest_turn
 from assembly.solve.loop.settings import TESTED, results_at, settings_at
 
@@ -52,17 +52,9 @@ def is_near_saddle(table, settings, results, violation, dual):
 
 
 @kernel(inner=True)
-def has_arrived(program, settings, results, current, violation, last_violation, feasible, dual):
-    """Whether rows hold and the Lagrangian is stationary, or all but so at a saddle that is to be left.
-
-    `feasible` includes rounding at the start, which is large if bodies began far from the origin. Where they are now it
-    may be less, and rows are to hold to that, unless the last step did not halve the violation.
-    """
+def has_arrived(table, settings, results, violation, feasible, dual):
+    """Whether rows hold and the Lagrangian is stationary, or all but so at a saddle that is to be left."""
     limits = settings_at(settings, 0)
-    store = program.store
-    if is_near_saddle(store.table, settings, results, violation, dual):
+    if is_near_saddle(table, settings, results, violation, dual):
         return True
-    if not (violation <= feasible and dual <= limits.stationarity):
-        return False
-    gains = violation > limits.feasibility and not violation > GAIN * last_violation
-    return not gains or violation <= rounding_at(store, settings, current)
+    return violation <= feasible and dual <= limits.stationarity

@@ -20,8 +20,8 @@ STEPS_OF_ROUNDING = 8.0
 # [steps] After so many whole steps in a row that gain nothing of the slope, rounding may explain what is left of it.
 # Doubled: such solves take 20 steps more. Chosen.
 STANDS = 20
-# What a step must gain of violations that rounding of far coordinates may explain, or of a dual residual: the part that
-# may be left. Doubled every step gains: solves go on until steps lead away. Chosen.
+# What a step must gain of a dual residual: the part that may be left. Doubled every step gains: solves go on until steps
+# lead away. Chosen.
 GAIN = 0.5
 
 # Contacts. -----------------------------------------------------------------------------------------------------------

@@ -57,8 +57,8 @@ def is_solution(task, current, rows, system):
     loop = task.loop
     rounded = loop.stood >= STANDS and is_rounding(task.program, current, rows, system, loop.longest, loop.dual)
     dual = 0.0 if rounded else loop.dual
-    before = loop.last_violation
-    return has_arrived(task.program, task.settings, task.results, current, loop.violation, before, loop.feasible, dual)
+    table = task.program.store.table
+    return has_arrived(table, task.settings, task.results, loop.violation, loop.feasible, dual)
 
 
 @kernel(inline=True)
