@@ -7,11 +7,14 @@ import pytest
 from scipy.optimize import nnls
 
 from assembly._record import Store
-from assembly.constraints.program.records import Iterate, Program
+from assembly.constraints.program.records import Iterate, Program, Sparsity
 from assembly.solve.loop.multipliers import leave_out, predict_active_set, pushing_multipliers
 from assembly.solve.loop.parameters import EXCHANGES, NEAR, ROUNDS
 from assembly.solve.loop.residuals import Structure
 from assembly.solve.loop.workspace import Directions, System, new_rows
+
+# A Hessian that is kept whole.
+DENSE = Sparsity(None, np.zeros((1, 2), np.int64), None, None)
 
 
 def pushing(jacobian, one_sided, residual, active, gradient, exchanges=EXCHANGES):
@@ -77,13 +80,14 @@ def test_rows_are_foreseen_until_they_agree_and_left_out_again():
         rows = 8
         wide = np.zeros((rows, 18))
         wide[:, :6] = rng.normal(size=(rows, 6))
-        shape = Structure(np.tile([0, -1, -1], (rows, 1)), np.ones(rows, dtype=np.int64), None, None)
+        shape = Structure(np.tile([0, -1, -1], (rows, 1)), np.ones(rows, dtype=np.int64), DENSE, None)
         residual, gradient = rng.uniform(0.01, 1.0, rows), rng.normal(size=6)
         given, descent, step = new_rows(rows, mu), -gradient, -gradient
         program, point = Program(Store(table, None), shape, None, None, None), Iterate(None, None, None, residual, wide)
-        system = System(gradient, Directions(descent, step, None, None), None, None)
+        hessian = np.zeros((6, 6))
+        system = System(gradient, Directions(descent, step, None, None), hessian, None)
         for count in range(100):
-            if predict_active_set(program, point, given, system, False) == 0:
+            if predict_active_set(program, point, given, system) == 0:
                 rounds.append(count)
                 # The least of |d|^2 / 2 + g.d + sum min(c + J d, 0)^2 / 2 mu, and so downhill all the way.
                 below = np.minimum(residual + wide[:, :6] @ step, 0.0)
@@ -91,11 +95,13 @@ def test_rows_are_foreseen_until_they_agree_and_left_out_again():
                 assert abs(slope).max() < 1e-12 / mu
                 assert gradient @ step < 0.0
                 break
-            pushing = wide[given.foreseen == 1.0, :6]
-            step[:] = np.linalg.solve(np.eye(6) + pushing.T @ pushing / mu, descent)
-        leave_out(shape, point, given, system, False)
+            # Rows are added to the upper half.
+            whole = np.triu(hessian) + np.triu(hessian, 1).T
+            step[:] = np.linalg.solve(np.eye(6) + whole, descent)
+        leave_out(shape, point, given, system)
         assert not given.foreseen.any() and not given.active.any()
         # Added and taken off again: rounding of c / mu.
         assert abs(descent + gradient).max() < 1e-15 * 1e2 / mu
+        assert abs(hessian).max() < 1e-15 * 1e2 / mu
     # Some take more rounds than the loop once allowed, and some change places for ever.
     assert max(rounds) > 4 and 180 < len(rounds) < 200

@@ -26,26 +26,20 @@ from assembly.solve.loop.standstill import bound_nearby, update_floor
 def find_step(task, current, trial, rows, system):
     """The step, and the part of it that is tried. Whether there is one."""
     loop, program, restoring = task.loop, task.program, task.loop.restoring == 1
-    # Where the last step gained so much that a second one by its factor will do, that is cheaper.
-    stationarity = task.limits.stationarity
-    of_rows, of_slope = loop.violation / max(loop.last_violation, loop.feasible), max(loop.last_dual, stationarity)
-    gain = 2.0 * max(of_rows, loop.dual / of_slope)
-    is_fresh = not (loop.kept and gain * loop.violation <= loop.feasible and gain * loop.dual <= stationarity)
     reach = min(loop.radius, loop.leash)
     if restoring:
         reach = min(reach, bound_nearby(task.way, loop.violation, loop.restored))
-    if is_fresh:
-        loop.shift = first_shift(program, restoring, loop.shift, loop.violation, loop.dual)
+    loop.shift = first_shift(program, restoring, loop.shift, loop.violation, loop.dual)
     damps = header_at(program.store.table, 0).contacts == 0 or loop.cuts >= OFTEN
     trust = Trust(loop.shift, min(reach, loop.cut_length), damps)
-    shift, used, longest, turn = find_direction(program, current, rows, system, trust, restoring, is_fresh)
+    shift, used, longest, turn = find_direction(program, current, rows, system, trust, restoring)
     loop.shift, loop.used_shift, loop.longest = shift, used, longest
     if used < 0.0:
         loop.status = STALLED
         return False
     if loop.iteration == 0:
         task.result.first_shift = shift
-    if is_fresh and not task.tick:
+    if not task.tick:
         note_factor(task.results, rows, program.structure.one_sided, shift, loop.dual, restoring)
     loop.last_violation, loop.last_dual = loop.violation, loop.dual
     loop.measured = 0
@@ -125,11 +119,9 @@ def accept(task, current, trial, rows, system):
     propose(task.program.structure, current, rows, system.directions.straight, loop.alpha)
     loop.iteration += 1
     if loop.alpha < 1.0:
-        loop.kept = 0
         loop.radius = max(2.0 * loop.alpha * loop.longest, SHORTEST)
         return
     is_whole = loop.cut == 1.0 and loop.used_shift == loop.shift
-    loop.kept = is_whole and loop.mu == loop.floor and not loop.restoring
     if is_whole:
         off = violation_of(trial.residual, task.program.structure.one_sided, rows.count)
         slow = loop.mu == loop.floor and off > max(0.5 * loop.violation, loop.feasible)

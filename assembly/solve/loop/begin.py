@@ -222,7 +222,7 @@ def begin_loop(task, current):
     loop.check_violation = loop.entered = loop.restored = math.inf
     loop.rows = header_at(store.table, 0).rows
     loop.over = loop.iteration = loop.asked = loop.late = loop.changed = 0
-    loop.lifted = loop.lifts = loop.folded = loop.first = loop.kept = loop.cuts = loop.stood = 0
+    loop.lifted = loop.lifts = loop.folded = loop.first = loop.cuts = loop.stood = 0
     loop.measured = loop.may_go = 1
     loop.restoring = loop.restorations = loop.kicks = loop.holds = loop.sunk = loop.begun = 0
     loop.lingers = loop.led_back_by = 0

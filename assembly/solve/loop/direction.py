@@ -31,8 +31,8 @@ def first_shift(program, restoring, shift, violation, dual):
 
 
 @kernel(inline=True)
-def find_direction(program, current, rows, system, trust, restoring, is_fresh):
-    """The step of the augmented Lagrangian at a point, into the system; by the last factor unless `is_fresh`.
+def find_direction(program, current, rows, system, trust, restoring):
+    """The step of the augmented Lagrangian at a point, into the system.
 
     The rows get which of them count, what they push with, and which do because the step would break them. Returns the
     shift of the matrix and that of the factor the step is by, negative where there is none; the step's largest
@@ -49,26 +49,21 @@ def find_direction(program, current, rows, system, trust, restoring, is_fresh):
     add_transposed(shape.bases, current.jacobian, rows.count, rows.forces, descent)
     for r in range(rows.count):
         rows.foreseen[r] = 0.0
-    if is_fresh:
-        find_ends(program, current, system.directions)
-        curvature_multipliers(rows, current.residual, restoring)
-        add_row_terms(program, current, rows.forces, rows.active, lagrangian)
-        hold_ends(system)
-        shift = factorize_shifted(lagrangian, n, order, shift, matrix)
-        if shift < 0.0:
-            return shift, shift, 0.0, 0.0
+    find_ends(program, current, system.directions)
+    curvature_multipliers(rows, current.residual, restoring)
+    add_row_terms(program, current, rows.forces, rows.active, lagrangian)
+    hold_ends(system)
+    shift = factorize_shifted(lagrangian, n, order, shift, matrix)
+    if shift < 0.0:
+        return shift, shift, 0.0, 0.0
     used, longest, turn = damped_step(program, system, Trust(shift, trust.radius, trust.damps))
     for attempt in range(FORESEEN + 1):
         if used < 0.0 or restoring:
             break
-        if predict_active_set(program, current, rows, system, is_fresh) == 0:
+        if predict_active_set(program, current, rows, system) == 0:
             break
         if attempt == FORESEEN:
-            leave_out(shape, current, rows, system, is_fresh)
-        if not is_fresh:
-            is_fresh = True
-            curvature_multipliers(rows, current.residual, restoring)
-            add_row_terms(program, current, rows.forces, rows.active, lagrangian)
+            leave_out(shape, current, rows, system)
         hold_ends(system)
         shift = factorize_shifted(lagrangian, n, order, max(shift, LEAST_SHIFT), matrix)
         used = shift

@@ -60,7 +60,6 @@ COUNTS = record_dtype(
     lost=1,  # the contact that was lost, or -1
     folded=1,  # 1: it was lost before anything is known of its row
     first=1,  # 1: the first iterate holds, and which rows push there is not known
-    kept=1,  # 1: the last step's factor may serve again
     may_go=1,  # 1: bodies may go all of the step for certain
     cuts=1,  # steps in a row that were cut by what bodies may go
     stood=1,  # whole steps in a row that gained nothing of the slope

@@ -36,22 +36,18 @@ def weigh_rows(rows, one_sided, residual):
 
 
 @kernel(inline=True)
-def let_count(shape, r, counts, point, rows, system, in_matrix):
-    """Let row r, which is idle here, count in the step, or no more.
-
-    Descent changes with it, and so does the Lagrangian, if it holds the rows' terms (`in_matrix`).
-    """
+def let_count(shape, r, counts, point, rows, system):
+    """Let row r, which is idle here, count in the step, or no more: in the descent and in the Lagrangian."""
     mu, jacobian = rows.mu, point.jacobian
     sign = 1.0 if counts else -1.0
     rows.foreseen[r] = 1.0 if counts else 0.0
     rows.active[r] = 1.0 / mu if counts else 0.0
     add_row(shape.bases, jacobian, r, -sign * (rows.y[r] + point.residual[r] / mu), system.directions.descent)
-    if in_matrix:
-        add_square(shape.sparsity, shape.bases, jacobian, r, sign / mu, system.hessian)
+    add_square(shape.sparsity, shape.bases, jacobian, r, sign / mu, system.hessian)
 
 
 @kernel(inner=True)
-def predict_active_set(program, point, rows, system, in_matrix):
+def predict_active_set(program, point, rows, system):
     """Let one-sided rows count that are idle here and would push at the end of the step; those that would not, no more.
 
     Their sign is that of y + (c + J step) / mu. Returns how many rows changed.
@@ -68,16 +64,16 @@ def predict_active_set(program, point, rows, system, in_matrix):
         pushes = rows.y[r] + (point.residual[r] + times(shape.bases, point.jacobian, r, step)) / rows.mu < 0.0
         if pushes != (foreseen[r] == 1.0):
             changed += 1
-            let_count(shape, r, pushes, point, rows, system, in_matrix)
+            let_count(shape, r, pushes, point, rows, system)
     return changed
 
 
 @kernel(inner=True)
-def leave_out(shape, point, rows, system, in_matrix):
+def leave_out(shape, point, rows, system):
     """No row that is idle here counts in the step."""
     for r in range(rows.count):
         if rows.foreseen[r] == 1.0:
-            let_count(shape, r, False, point, rows, system, in_matrix)
+            let_count(shape, r, False, point, rows, system)
 
 
 @kernel(inner=True)

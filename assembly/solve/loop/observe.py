@@ -58,7 +58,7 @@ def rearrange_rows(task, current, rows):
     loop = task.loop
     rows, system, lost = rearrange(task.program, loop.lifted, rows, current)
     loop.rows, loop.lost = rows.count, lost
-    loop.changed = loop.kept = 0
+    loop.changed = 0
     if loop.iteration == 0 and lost < 0:
         let_touch(task.program.store.table, current, overlap_allowed(task.settings))
     # What was hard for other rows need not be for these.

@@ -125,7 +125,7 @@ BACK_STEPS = 30
 # hold; so many times. Doubled: contradictions are told after twice as many steps. Chosen.
 PATIENCE, RESTORATIONS = 25, 3
 # [whole steps] So many in a row that leave more than UNCHANGED of the largest violation tell that rows contradict each
-# other; one may be by an old factor. Doubled: as many steps more. Chosen.
+# other. Doubled: as many steps more. Chosen.
 STUCK, UNCHANGED = 2.0, 0.99
 # [length] Rows that are off by at most LITTLE may repeat each other, tilted by MOST_TILTED [radian]; ROUNDED is
 # rounding, in parts of what counts as held. Doubled: larger contradictions pass for tilted rows. Chosen.

@@ -93,7 +93,6 @@ def lead_to_rows(task, iterates, rows, system):
     elif way_at(way, 0).share < LEAST_SHARE:
         loop.status = STALLED if loop.ended == RUNNING else loop.ended
         return False
-    loop.kept = 0
     loop.alpha = 1.0
     loop.iteration += 1
     return taken
