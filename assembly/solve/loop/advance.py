@@ -9,13 +9,12 @@ from assembly.constraints.program.contact import TOUCHING, is_of_solids
 from assembly.constraints.program.records import header_at
 from assembly.proximity.manager.update import AS_NEEDED, MEASURED
 from assembly.solve.loop.clearances import allowed_share, update_again
-from assembly.solve.loop.contacts import is_near_fold
 from assembly.solve.loop.deadline import is_cut, may_end
 from assembly.solve.loop.direction import find_direction, first_shift, propose, short_share
 from assembly.solve.loop.inertia import note_factor
 from assembly.solve.loop.line_search import Line, Trust, search_line
 from assembly.solve.loop.loop_state import lead_back
-from assembly.solve.loop.parameters import HALF, LIFT_BELOW_AT_LAST, OFTEN, RESTORATIONS, SHORTEST
+from assembly.solve.loop.parameters import HALF, OFTEN, RESTORATIONS, SHORTEST
 from assembly.solve.loop.residuals import violation_of
 from assembly.solve.loop.restore import begin_restoration
 from assembly.solve.loop.settings import OUT_OF_TIME, RUNNING, STALLED
@@ -81,23 +80,16 @@ def take_step(task, current, trial, rows, system):
     accepted, alpha, lost = search_line(task.program, current, trial, rows, system, line, loop.value, restoring)
     loop.measured, loop.alpha, loop.lost = accepted, alpha, lost
     if not accepted:
-        refuse(task, current)
+        refuse(task)
     return accepted
 
 
 @kernel(inline=True)
-def refuse(task, current):
+def refuse(task):
     """What to do where no part of a step was accepted: lift a pair, restore rows, lead back, or end."""
     loop, free = task.loop, task.program.lifted.free
     table = task.program.store.table
     pairs = header_at(table, 0).contacts
-    if loop.lost < 0:
-        # Perhaps a fold is near enough to matter; else nothing moves any more.
-        loop.below = LIFT_BELOW_AT_LAST
-        for k in range(pairs):
-            near = free[k] < 0 and is_near_fold(current.records, k, loop.below)
-            if near and not is_of_solids(table, k):
-                loop.lost = k
     if loop.lost >= 0 and free[loop.lost] < 0 and not is_of_solids(table, loop.lost):
         # An update may put another contact in its place, time and again.
         loop.lifts += 1

@@ -20,7 +20,7 @@ from assembly.solve.loop.clearances import forget_clearance_rows, place_clearanc
 from assembly.solve.loop.contacts import lift_folds, start_contacts
 from assembly.solve.loop.deadline import begin_tick
 from assembly.solve.loop.initial_guess import assemble, scattered
-from assembly.solve.loop.parameters import EXTRA_TIME, FAR, LIFT_BELOW, PATIENCE
+from assembly.solve.loop.parameters import EXTRA_TIME, FAR, PATIENCE
 from assembly.solve.loop.report import read_tracked
 from assembly.solve.loop.residuals import arrange
 from assembly.solve.loop.settings import ASSEMBLES, CONTACT_LOST, GATHERED, RUNNING, results_at, settings_at
@@ -218,7 +218,6 @@ def begin_loop(task, current):
     loop.shift = 2.0 * task.result.first_shift if task.tick else 0.0
     loop.used_shift, loop.radius, loop.leash, loop.cut_length = 0.0, limits.radius, math.inf, math.inf
     loop.longest, loop.slope, loop.cut, loop.alpha = 0.0, 0.0, 1.0, 0.0
-    loop.below = LIFT_BELOW
     loop.check_violation = loop.entered = loop.restored = math.inf
     loop.rows = header_at(store.table, 0).rows
     loop.over = loop.iteration = loop.asked = loop.late = loop.changed = 0

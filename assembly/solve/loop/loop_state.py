@@ -32,7 +32,6 @@ NUMBERS = record_dtype(
     slope=1,  # of the augmented Lagrangian along it
     cut=1,  # part of the step that is tried
     alpha=1,  # part of that which was taken
-    below=1,  # pairs this near to a fold (det H over |H|^2) are lifted
     check_violation=1,  # violation at the last check whether rows gain anything
     entered=1,  # violation where restoring began
     restored=1,  # violation at the last step that restored rows; infinite after any other

@@ -49,7 +49,7 @@ def observe(task, current, rows):
         rows.active[loop.lost] = 1.0 / rows.mu
     if header_at(table, 0).contacts > 0:
         lift_trims = limits.lift_trims == 1.0
-        loop.lifted = lift_folds(task.program.store, lifted, current, rows.active, loop.below, loop.lost, lift_trims)
+        loop.lifted = lift_folds(task.program.store, lifted, current, rows.active, LIFT_BELOW, loop.lost, lift_trims)
 
 
 @kernel(inline=True, allocates=True)
@@ -79,7 +79,6 @@ def evaluate_iterate(task, history, current, rows, system):
     program = task.program
     table = program.store.table
     header = header_at(table, 0)
-    loop.below = LIFT_BELOW
     if loop.lost >= 0 and program.lifted.free[loop.lost] < 0:
         # A pair that is lost and cannot be lifted (an idle row, a pole): nothing moves any more.
         task.result.culprit = float(loop.lost)

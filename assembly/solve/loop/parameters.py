@@ -20,17 +20,14 @@ STEPS_OF_ROUNDING = 8.0
 # [steps] After so many whole steps in a row that gain nothing of the slope, rounding may explain what is left of it.
 # Doubled: such solves take 20 steps more. Chosen.
 STANDS = 20
-# What a step must gain of a dual residual: the part that may be left. Doubled every step gains: solves go on until steps
-# lead away. Chosen.
+# What a step must gain of a dual residual: the part that may be left. Doubled every step gains: solves go on until
+# steps lead away. Chosen.
 GAIN = 0.5
 
 # Contacts. -----------------------------------------------------------------------------------------------------------
 # [det H over |H|^2] A pair this near to a fold gets its coordinates as unknowns. Doubled: more unknowns, steps of more
 # contacts have rows of tangency. Chosen.
 LIFT_BELOW = 0.02
-# [det H over |H|^2] The same where no part of a step is accepted. Doubled: pairs that have nothing to do with it are
-# lifted. Chosen.
-LIFT_BELOW_AT_LAST = 0.3
 # [length] A clearance's contact that no longer step, nor one halved so far (a share of the step), finds again is given
 # up. Doubled, or HALVED halved: contacts that only switch are given up, or are waited for longer. Chosen.
 LETS_GO, HALVED = 1e-5, 0.0625

@@ -20,7 +20,7 @@ from assembly.constraints.program.records import header_at
 from assembly.proximity.manager.update import AS_NEEDED, any_crossed
 from assembly.solve.loop.clearances import forget_clearance_rows, place_clearance_rows, update_around
 from assembly.solve.loop.finish import return_to
-from assembly.solve.loop.parameters import BEGINNINGS, DEEP, LEFT, LIFT_BELOW, PATIENCE, SHORTER, SHORTEST
+from assembly.solve.loop.parameters import BEGINNINGS, DEEP, LEFT, PATIENCE, SHORTER, SHORTEST
 from assembly.solve.loop.report import bring_back
 from assembly.solve.loop.settings import RUNNING, STALLED
 from assembly.solve.loop.workspace import rows_in
@@ -97,5 +97,5 @@ def restart(task, held, current, rows):
     loop.restoring = loop.restorations = loop.cuts = 0
     loop.cut_length = loop.check_violation = math.inf
     loop.check_at = loop.iteration + PATIENCE
-    loop.lost, loop.below = -1, LIFT_BELOW
+    loop.lost = -1
     return True
