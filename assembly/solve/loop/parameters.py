@@ -110,9 +110,9 @@ RELEASES, PULLS = 4, 1e-12
 # largest violation, as where rows nearly depend on each other, it is multiplied by SOFTER, down to SOFTEST. Doubled:
 # shorter steps that leave more. Chosen.
 LEFT_OVER, SOFTER, SOFTEST = 0.1, 1e-3, 1e-9
-# A step back is shortened by the first where it leads farther off; below the second, of a whole step, nothing is found.
-# Doubled: slower, and sooner given up. Chosen.
-SHORTENED, LEAST_SHARE = 0.25, 1e-4
+# A step back is shortened by the first where it leads farther off; a tick's may lead off by ASTRAY times once, if the
+# next one leads back; below LEAST_SHARE of a step nothing is found. Doubled: slower, and sooner given up. Chosen.
+SHORTENED, ASTRAY, LEAST_SHARE = 0.25, 10.0, 1e-4
 # [steps] Where a solve with clearances ends at a pose that does not hold, so many more lead back onto the rows.
 # Doubled: failed solves take longer. Chosen.
 BACK_STEPS = 30

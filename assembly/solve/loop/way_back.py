@@ -11,7 +11,7 @@ from assembly.constraints.program.records import header_at
 from assembly.proximity.extrema.face_face import BEND
 from assembly.solve.loop.clearances import is_too_far
 from assembly.solve.loop.multipliers import toward_rows
-from assembly.solve.loop.parameters import LEAST_SHARE, SHORTENED
+from assembly.solve.loop.parameters import ASTRAY, LEAST_SHARE, SHORTENED
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import move
 from assembly.solve.loop.settings import RUNNING, STALLED
@@ -23,6 +23,7 @@ WAY_RECORD = record_dtype(
     softness=1,  # of the last step back
     share=1,  # of the next step back that is taken
     lowest=1,  # least violation so far
+    led_off=1,  # 1: the last step led farther off
     stills=1,  # whole steps in a row that changed nothing
     slow_steps=1,  # whole steps in a row that gained little
     drags=1,  # steps of any length in a row that left what rows are off
@@ -55,6 +56,7 @@ def begin_way(way):
     progress = way_at(way, 0)
     progress.share = 1.0
     progress.lowest = math.inf
+    progress.led_off = 0.0
     progress.stills = 0.0
     progress.slow_steps = 0.0
     progress.drags = 0.0
@@ -65,11 +67,15 @@ def begin_way(way):
 def step_back(program, iterates, rows, system, way, violation, enough, tick):
     """A step on the way back, into the trial point; whether it is to be taken. If not, the next one is shorter."""
     progress = way_at(way, 0)
-    progress.lowest = min(progress.lowest, violation)
+    if violation < progress.lowest:
+        progress.lowest = violation
+        progress.led_off = 0.0
     there = way_back(program, iterates.current, iterates.trial, rows, system, progress, enough, tick)
-    if not there < progress.lowest:
+    nearer = there < progress.lowest
+    if not nearer and not (tick and there < ASTRAY * progress.lowest and progress.led_off == 0.0):
         progress.share *= SHORTENED
         return False
+    progress.led_off = 0.0 if nearer else 1.0
     progress.share = min(progress.share / SHORTENED, 1.0)
     return True
 
