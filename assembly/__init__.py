@@ -66,6 +66,9 @@ if TYPE_CHECKING:
     from assembly.solve.solution import Solution as Solution
     from assembly.step import read_step as read_step
     from assembly.step import write_step as write_step
+    from assembly.studies.interference.clash import Clash as Clash
+    from assembly.studies.interference.clash import Interference as Interference
+    from assembly.studies.interference.report import interference as interference
     from assembly.tracking.log import TrackLog as TrackLog
     from assembly.tracking.manager import Manager as Manager
     from assembly.tracking.tick import Step as Step
@@ -79,6 +82,7 @@ else:
             "Angle": "assembly.constraints.model.placements",
             "Assembly": "assembly.assembly",
             "Body": "assembly.kinematics.body",
+            "Clash": "assembly.studies.interference.clash",
             "Clearance": "assembly.constraints.model.clearance",
             "Contact": "assembly.constraints.model.contact",
             "ContactPair": "assembly.proximity.extrema.pairs",
@@ -94,6 +98,7 @@ else:
             "FormulaCurve": "assembly.geometry.splines.formula_curve",
             "FrameDistance": "assembly.constraints.model.objectives",
             "Gear": "assembly.constraints.model.couplings",
+            "Interference": "assembly.studies.interference.clash",
             "Loop": "assembly.geometry.faces.loop",
             "Manager": "assembly.tracking.manager",
             "Mobility": "assembly.solve.diagnosis.mobility",
@@ -127,6 +132,7 @@ else:
             "dexterity_ellipsoid": "assembly.solve.forces.end_effector",
             "dexterity_value": "assembly.solve.forces.end_effector",
             "errors": "assembly.errors",
+            "interference": "assembly.studies.interference.report",
             "load": "assembly.scene_file",
             "proximity": "assembly.proximity",
             "read_step": "assembly.step",

@@ -38,7 +38,7 @@ from assembly.proximity.features.nearest_query import (
 )
 from assembly.proximity.features.touching import flush_ways
 
-__all__ = ["Feature", "FeaturePair", "FeatureStatus", "FeatureTracker", "closest_features"]
+__all__ = ["Feature", "FeaturePair", "FeatureStatus", "FeatureTracker", "closest_features", "nearest_features"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -256,6 +256,24 @@ def closest_features(
     if pair.status is FeatureStatus.PENETRATING and pair.gap >= -reach:
         return replace(pair, status=FeatureStatus.APART)
     return _parted(faces, q, reach) or pair
+
+
+def nearest_features(a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: ArrayLike | None = None) -> FeaturePair:
+    """The nearest points of two bodies, or CROSSING and a point that their surfaces have in common.
+
+    `closest_features` begins with it, and goes on where they have one: bodies that touch have one, too.
+
+    Raises
+    ------
+    InputError, TypeError
+        As those of `closest_features`.
+    """
+    faces = _faces("a", a), _faces("b", b)
+    q = np.stack([_pose("q_a", a, q_a), _pose("q_b", b, q_b)])
+    codes, out = np.zeros(2, dtype=np.int64), np.empty(PAIR)
+    table, pool, shells, size = _packed(*faces)
+    status = _STATUSES[find_nearest(table, pool, shells, q, size, codes, out)]
+    return _pair((features_of(faces[0]), features_of(faces[1])), codes, out, status)
 
 
 def _closest(faces: tuple[Faces, Faces], q: Array) -> FeaturePair:

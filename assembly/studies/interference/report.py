@@ -1,0 +1,156 @@
+"""The search: pairs that boxes do not tell to be far apart, their nearest points, and one search for crossings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.assembly import Assembly
+from assembly.constraints.model.contact import Contact
+from assembly.errors import InputError, bounded
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import pose_rows
+from assembly.solve.crossings import PosedBodies, find_crossings, free_pairs, joined_pairs
+from assembly.solve.interruption import CTRL_C, Interruption
+from assembly.solve.options import touching_part
+from assembly.solve.solution import Solution
+from assembly.studies.interference.bounds import Posed
+from assembly.studies.interference.clash import Clash, Interference, Relation
+from assembly.studies.interference.judge import Pair
+
+__all__ = ["interference"]
+
+Array = NDArray[np.float64]
+# What parts of CAD files are in each other by rounding, in parts of the scene's size.
+TOUCHING = 1e-6
+
+
+def interference(
+    scene: Assembly | Iterable[Body],
+    poses: Solution | ArrayLike | None = None,
+    *,
+    margin: float = 0.0,
+    touching: float = TOUCHING,
+    time_limit: float | None = None,
+) -> Interference:
+    """Which bodies cross, touch, or are nearer to each other than a margin, and what of it is proven.
+
+    Parameters
+    ----------
+    scene : Assembly or iterable of Body
+        Bodies as a STEP file has them are a scene without constraints.
+    poses : Solution or (n, 7), optional
+        Where the bodies stand; by default where they were made.
+    margin : float
+        Not negative, in the unit of the scene. Every pair has a row that is not proven to be farther apart.
+    touching : float
+        What bodies may be in each other and still touch, from 0 to 0.001 parts of the scene's size.
+    time_limit : float, optional
+        Seconds after which pairs that were not searched are rows of the kind "undecided".
+
+    Returns
+    -------
+    Interference
+        Print it for a table; `to_csv` writes one, `plot` draws it.
+
+    Raises
+    ------
+    InputError, TypeError
+        A margin, a limit or poses that cannot be; a solution of another scene.
+
+    Notes
+    -----
+    Boxes around faces tell which pairs may be near; of those the nearest points are searched for by branch and bound
+    (`assembly.proximity.closest_features`). Of bodies that have points in common a plane between them proves that they
+    touch, and a ball inside of both that they cross. Where neither is found, one search of a contact manager for all
+    such pairs tells, as in `Solution.crossings`, and the row is not proved.
+    """
+    interruption = CTRL_C if time_limit is None else Interruption(time_limit)
+    margin = bounded("margin", margin)
+    if margin < 0.0:
+        raise InputError(f"margin is {margin:g}; expected a length of at least 0")
+    touching = touching_part(touching)
+    if not isinstance(scene, Assembly):
+        scene = Assembly(scene)
+    q = _rows(scene, poses)
+    shaped = {body.name: Posed(body, row) for body, row in zip(scene.bodies, q, strict=True) if body.faces}
+    within = touching * max((posed.body.size for posed in shaped.values()), default=0.0)
+    relations = _relations(scene)
+    pairs = [Pair(a, b, relations[_key(a, b)], within) for a, b in combinations(shaped.values(), 2)]
+    near = [pair for pair in pairs if pair.apart <= margin or pair.may_nest]
+    rows, searched = _rows_of(near, PosedBodies(scene.bodies, q, touching), interruption)
+    kept = [row for row in rows if row.bound <= margin or row.kind in ("crossing", "enclosed", "undecided")]
+    return Interference(
+        rows=tuple(sorted(kept, key=lambda row: row.order)),
+        margin=margin,
+        pairs=len(pairs),
+        searched=searched,
+        without_shape=tuple(body.name for body in scene.bodies if not body.faces),
+        scene=scene,
+        q=q,
+    )
+
+
+def _rows(scene: Assembly, poses: Solution | ArrayLike | None) -> Array:
+    """Where the bodies of a scene stand, (n, 7)."""
+    if poses is None:
+        return np.array(scene.q)
+    if not isinstance(poses, Solution):
+        return pose_rows("poses", poses, len(scene.bodies))
+    if tuple(poses._scene.bodies) != scene.bodies:
+        raise InputError("poses is a solution of another scene, or of this one with other bodies; expected its own")
+    return np.array(poses.q)
+
+
+def _key(a: Posed, b: Posed) -> frozenset[str]:
+    return frozenset((a.body.name, b.body.name))
+
+
+def _relations(scene: Assembly) -> dict[frozenset[str], Relation]:
+    """What the constraints of a scene say of its pairs of bodies, by their names."""
+    relations: dict[frozenset[str], Relation] = {}
+    for a, b in combinations(scene.bodies, 2):
+        relations[frozenset((a.name, b.name))] = "excluded"
+    known: Sequence[tuple[Relation, list[tuple[Body, Body]]]] = (
+        ("free", free_pairs(scene.bodies, scene.constraints)),
+        ("joined", joined_pairs(scene.bodies, scene.constraints)),
+    )
+    for relation, pairs in known:
+        for a, b in pairs:
+            relations[frozenset((a.name, b.name))] = relation
+    for contact in scene.constraints:
+        if isinstance(contact, Contact):
+            names = frozenset(body.name for body in contact.bodies)
+            if relations[names] == "free":
+                relations[names] = "contact"
+    return relations
+
+
+def _rows_of(near: Sequence[Pair], posed: PosedBodies, interruption: Interruption) -> tuple[list[Clash], int]:
+    """The rows of pairs, and how many were searched for their nearest points."""
+    rows: list[Clash] = []
+    doubtful: list[Pair] = []
+    searched = 0
+    for pair in near:
+        if interruption.is_over():
+            rows.append(pair.unsearched())
+            continue
+        searched += 1
+        row = pair.judged()
+        if row is None:
+            doubtful.append(pair)
+        else:
+            rows.append(row)
+    if not doubtful:
+        return rows, searched
+    found = find_crossings(posed, [(pair.a.body, pair.b.body) for pair in doubtful], interruption)
+    for pair in doubtful:
+        names = pair.a.body.name, pair.b.body.name
+        if names in found.unseen or interruption.is_over():
+            rows.append(pair.unsearched())
+        else:
+            rows.append(pair.searched(names in found.pairs))
+    return rows, searched
