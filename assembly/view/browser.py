@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from assembly.assembly import Assembly
 from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.solve.solution import Solution
+from assembly.studies.interference.clash import Interference
 from assembly.view.commands import commands, motion, stillness
 from assembly.view.item import Picture
 from assembly.view.picture import DIRECTION, draw
@@ -77,6 +78,7 @@ def show(
     open: bool = False,
     *,
     ellipsoids: Ellipsoid | Iterable[Ellipsoid] = (),
+    interference: Interference | None = None,
     direction: ArrayLike = DIRECTION,
     visualizer: Visualizer | None = None,
 ) -> Visualizer:
@@ -91,6 +93,9 @@ def show(
         Whether to open a browser window. Without it nothing is opened; `visualizer.url()` is the address.
     ellipsoids : Ellipsoid or several
         Drawn beside the bodies, half transparent, with their axes.
+    interference : Interference, optional
+        A report of this scene, instead of a solution: bodies that cross are red, all others faint, and the places of
+        its rows are marked: dark red where bodies cross, amber where they touch, green where they are apart.
     direction : (3,)
         From the scene to the eye; z is upward.
     visualizer : meshcat.Visualizer, optional
@@ -106,4 +111,4 @@ def show(
     InputError, TypeError
         See the message; nothing is started then.
     """
-    return display(draw(scene, solution, direction, ellipsoids), open, visualizer)
+    return display(draw(scene, solution, direction, ellipsoids, interference), open, visualizer)

@@ -18,6 +18,7 @@ from assembly.assembly import Assembly
 from assembly.errors import InputError, check_encodable
 from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.solve.solution import Solution
+from assembly.studies.interference.clash import Interference
 from assembly.view.commands import Command, commands, packed
 from assembly.view.picture import DIRECTION, draw
 
@@ -120,6 +121,7 @@ def save_html(
     solution: Solution | None = None,
     *,
     ellipsoids: Ellipsoid | Iterable[Ellipsoid] = (),
+    interference: Interference | None = None,
     direction: ArrayLike = DIRECTION,
     title: str | None = None,
 ) -> None:
@@ -138,6 +140,9 @@ def save_html(
         Bodies stand where it says, and its contacts are shown; else they stand where they were made.
     ellipsoids : Ellipsoid or several
         Drawn beside the bodies, half transparent, with their axes.
+    interference : Interference, optional
+        A report of this scene, instead of a solution: bodies that cross are red, all others faint, and the places of
+        its rows are marked: dark red where bodies cross, amber where they touch, green where they are apart.
     direction : (3,)
         From the scene to the eye; z is upward.
     title : str, optional
@@ -148,4 +153,4 @@ def save_html(
     InputError, TypeError
         See the message; also a scene without bodies, or a solution of other bodies.
     """
-    write_page(path, title, commands(draw(scene, solution, direction, ellipsoids)))
+    write_page(path, title, commands(draw(scene, solution, direction, ellipsoids, interference)))

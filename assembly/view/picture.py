@@ -7,6 +7,7 @@ in micrometres, looks the same in a browser that computes with single precision.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import cycle
 
 import numpy as np
@@ -18,6 +19,8 @@ from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
 from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.solve.solution import Solution
+from assembly.studies.interference.clash import Interference
+from assembly.view.clashes import clash_items, shown_as
 from assembly.view.item import Color, Item, Picture, Place, Stations, framed
 from assembly.view.marks import arrow, ball, cross
 from assembly.view.mesh import Mesh, body_mesh
@@ -105,9 +108,12 @@ def _bodies(
     stations: Stations,
     place: Place,
     size: float,
+    interference: Interference | None,
 ) -> Iterator[Item]:
-    for (body, mesh), color in zip(meshes.items(), _colors(scene.bodies), strict=True):
+    styles = {} if interference is None else shown_as(interference)
+    for (body, mesh), own in zip(meshes.items(), _colors(scene.bodies), strict=True):
         path, rotation = ("bodies", body.name), stations.rotation(body)
+        color, opacity = styles.get(body.name, (own, 1.0))
         if mesh is None and not len(held[body]):
             yield Item(path, ball(), color, place(stations.points(body, np.zeros(3))), rotation, np.full(3, MARK))
             continue
@@ -120,7 +126,11 @@ def _bodies(
         lines = body_lines(body)
         if lines is not None:
             lines = lines.about(middle)
-        yield Item(path, mesh.about(middle), color, position, rotation, scale, lines=lines)
+        shown = mesh.about(middle)
+        if styles:
+            # Colors that faces have of their own would hide which bodies cross.
+            shown = replace(shown, colors=None)
+        yield Item(path, shown, color, position, rotation, scale, opacity=opacity, lines=lines)
 
 
 def _contact(pair: Pairs, place: Place) -> Iterator[Item]:
@@ -187,6 +197,7 @@ def _picture(
     pairs: Sequence[Pairs],
     ellipsoids: Sequence[Ellipsoids],
     toward: Array,
+    interference: Interference | None = None,
 ) -> Picture:
     meshes = {body: body_mesh(body) for body in scene.bodies}
     held = held_points(scene)
@@ -200,7 +211,7 @@ def _picture(
     size = fineness(scene, held, radius)
     place, distance = framed(np.concatenate([outline, *tips, joint_tips(scene, stations, size * radius)]), toward)
 
-    items = list(_bodies(scene, meshes, held, stations, place, size))
+    items = list(_bodies(scene, meshes, held, stations, place, size, interference))
     items.extend(joint_items(scene, stations, place, size))
     for pair in pairs:
         items.extend(_contact(pair, place))
@@ -209,6 +220,8 @@ def _picture(
         items.extend(_wish(f"target {k + 1}", place(wish.target), place(point), thick))
     for k, shape in enumerate(ellipsoids):
         items.extend(_ellipsoid(f"ellipsoid {k + 1}", shape, place))
+    if interference is not None:
+        items.extend(clash_items(interference, place))
     if stations.count > 1:
         distance *= _ROOM
     return Picture(tuple(items), distance * toward / np.linalg.norm(toward), times)
@@ -231,6 +244,7 @@ def draw(
     solution: Solution | None = None,
     direction: ArrayLike = DIRECTION,
     ellipsoids: Ellipsoid | Iterable[Ellipsoid] = (),
+    interference: Interference | None = None,
 ) -> Picture:
     """Place everything there is to see.
 
@@ -243,19 +257,35 @@ def draw(
     direction : (3,)
         From the scene to the eye.
     ellipsoids : Ellipsoid or several
+    interference : Interference, optional
+        One of this scene, instead of a solution: bodies stand where it was made, and its places are shown.
 
     Raises
     ------
     InputError, TypeError
-        A scene without bodies, a solution of other bodies, or something that is neither.
+        A scene without bodies, a solution or a report of other bodies, or something that is neither.
     """
     toward = _checked(scene, direction)
+    if interference is not None:
+        _check_report(scene, solution, interference)
     if solution is not None and not isinstance(solution, Solution):
         raise TypeError(f"solution is {solution!r}; expected a Solution, or None")
     q = scene.q if solution is None else solution_rows(scene, solution)
+    if interference is not None:
+        q = interference.q
     times = np.zeros(1)
     pairs = [] if solution is None else contact_series([solution], times)
-    return _picture(scene, Stations(scene.bodies, q[None]), times, pairs, stills(ellipsoids), toward)
+    return _picture(scene, Stations(scene.bodies, q[None]), times, pairs, stills(ellipsoids), toward, interference)
+
+
+def _check_report(scene: Assembly, solution: Solution | None, report: Interference) -> None:
+    """Raise where a report is none of the scene, or is not alone."""
+    if not isinstance(report, Interference):
+        raise TypeError(f"interference is {report!r}; expected an Interference, or None")
+    if report.scene.bodies != scene.bodies:
+        raise InputError("interference is a report of another scene; expected one of the bodies of this scene")
+    if solution is not None:
+        raise InputError("solution and interference are both given; expected one of them: a report has its own poses")
 
 
 def film(

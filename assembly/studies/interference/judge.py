@@ -1,4 +1,4 @@
-"""What a pair of bodies is, from its nearest points: clear, touching, crossing, enclosed, and whether that is proven."""
+"""What a pair of bodies is by its nearest points: clear, touching, crossing or enclosed, and whether that is proven."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 AGREED = 1e-9
 # The most that may be called touching in parts of the larger body's size.
 MOST_TOUCHING = 1e-3
+# Parts of the way from the deepest place to the middle of what both bodies may have in common.
+INWARD = (0.0, 0.01, 0.1, 0.5, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +108,7 @@ class Pair:
 
     @cached_property
     def nested(self) -> int:
-        """Of bodies whose surfaces are apart: -1 where one is inside the other one, 1 where not, 0 where nobody knows."""
+        """Of bodies whose surfaces are apart: -1 where one is in the other one, 1 where not, 0 where nobody knows."""
         sides = []
         for outer, inner, place in self._outer_first():
             side = side_of_nearest(outer, self.nearest, place)
@@ -141,7 +143,7 @@ class Pair:
         if self.bound > 0.0:
             return self._row("enclosed", -self.distance, False) if crosses else self._row("clear", self.distance, False)
         depth = self._deepest() if crosses else None
-        others = None if depth is None else _between(depth.points)
+        others = None if depth is None else self._inner_points(depth.points)
         if self.nearest.status is FeatureStatus.CROSSING:
             inside = common_point(self.a, self.b, self.nearest, others, self.probe)
             if inside is not None:
@@ -193,11 +195,17 @@ class Pair:
         faces = self._face_at(a, found.points[0]), self._face_at(b, found.points[1])
         return _Depth(found.gap, found.points, faces)
 
+    def _inner_points(self, points: Array) -> list[Array]:
+        """Points that may be inside of both bodies, by where they are deepest and by where their boxes overlap."""
+        low = np.maximum(self.a.box[0], self.b.box[0])
+        high = np.minimum(self.a.box[1], self.b.box[1])
+        middle, way = points.mean(axis=0), points[1] - points[0]
+        inward = 0.5 * (low + high) - middle
+        if float(way @ way) > 0.0:
+            inward = inward - float(inward @ way) / float(way @ way) * way
+        # Deepest points may be at the border of both faces, and what is between them beside the bodies.
+        return [middle + part * inward for part in INWARD] + [0.75 * points[k] + 0.25 * points[1 - k] for k in (0, 1)]
+
     def _face_at(self, body: Posed, point: Array) -> str:
         """What of a body a point of its surface is on."""
         return self.probe.found(body, point).features[0].name
-
-
-def _between(points: Array) -> list[Array]:
-    """Points between two, the middle first."""
-    return [(1.0 - part) * points[0] + part * points[1] for part in (0.5, 0.25, 0.75)]

@@ -115,9 +115,7 @@ def _ways(a: Posed, b: Posed, pair: FeaturePair, all_around: bool) -> Iterator[A
             yield way
 
 
-def common_point(
-    a: Posed, b: Posed, pair: FeaturePair, others: Iterable[Array] | None, probe: Probe
-) -> Array | None:
+def common_point(a: Posed, b: Posed, pair: FeaturePair, others: Iterable[Array] | None, probe: Probe) -> Array | None:
     """A point around which a ball is inside of two closed bodies, or None where none is found.
 
     Parameters
