@@ -34,6 +34,7 @@ def _parser() -> argparse.ArgumentParser:
     about = f"what parts may be in each other and still touch, in parts of the assembly's size; {TOUCHING:g}"
     parser.add_argument("--touching", type=float, default=TOUCHING, help=about)
     parser.add_argument("--time-limit", type=float, help="seconds for the search")
+    parser.add_argument("--lenient", action="store_true", help="leave out faces that cannot be read, with a warning")
     parser.add_argument("--csv", metavar="FILE", help="write the rows there, too")
     parser.add_argument("--html", metavar="FILE", help="write a picture there, to turn around in a browser")
     return parser
@@ -43,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print the report of a file; 0 where no parts cross, 1 where some do or may, 2 where there is no report."""
     wanted = _parser().parse_args(arguments)
     try:
-        bodies = read_step(wanted.file, unit=wanted.unit)
+        bodies = read_step(wanted.file, unit=wanted.unit, strict=not wanted.lenient)
         report = interference(bodies, margin=wanted.margin, touching=wanted.touching, time_limit=wanted.time_limit)
         print(report)
         if wanted.csv is not None:

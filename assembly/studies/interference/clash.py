@@ -56,6 +56,8 @@ class Clash(ReadOnlyArrays):
         both bodies. Enclosed: the surfaces are apart, and the one is on the inner side of the other one's nearest face.
     relation : str
         ``"joined"`` by a joint, a gear or a rack, ``"excluded"`` by a clearance, in ``"contact"``, or ``"free"``.
+    witness : (3,) or None
+        Of a proved crossing the middle of that ball.
     """
 
     bodies: tuple[str, str]
@@ -66,6 +68,7 @@ class Clash(ReadOnlyArrays):
     faces: tuple[str, str] | None
     proved: bool
     relation: Relation
+    witness: Array | None = field(default=None, repr=False)
 
     @property
     def order(self) -> tuple[float, tuple[str, str]]:

@@ -147,9 +147,9 @@ class Pair:
         if self.nearest.status is FeatureStatus.CROSSING:
             inside = common_point(self.a, self.b, self.nearest, others, self.probe)
             if inside is not None:
-                return self._crossing(self._deepest() if depth is None else depth, True)
+                return self._crossing(self._deepest() if depth is None else depth, inside)
         if depth is not None:
-            return self._crossing(depth, False)
+            return self._crossing(depth, None)
         return self._row("touching", 0.0, False) if self.meets else self._row("clear", self.distance, False)
 
     def unsearched(self) -> Clash:
@@ -164,8 +164,10 @@ class Pair:
         faces = near.features[0].name, near.features[1].name
         return Clash(self._names, kind, gap, bound, near.points, faces, proved, self.relation)
 
-    def _crossing(self, depth: _Depth, proved: bool) -> Clash:
-        return Clash(self._names, "crossing", depth.gap, 0.0, depth.points, depth.faces, proved, self.relation)
+    def _crossing(self, depth: _Depth, inside: Array | None) -> Clash:
+        """A row of where they are deepest in each other, and of a point that is inside of both, if one was found."""
+        known = depth.gap, 0.0, depth.points, depth.faces, inside is not None, self.relation, inside
+        return Clash(self._names, "crossing", *known)
 
     @property
     def _names(self) -> tuple[str, str]:

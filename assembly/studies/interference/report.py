@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from itertools import combinations
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,17 +75,16 @@ def interference(
     if not isinstance(scene, Assembly):
         scene = Assembly(scene)
     q = _rows(scene, poses)
-    shaped = {body.name: Posed(body, row) for body, row in zip(scene.bodies, q, strict=True) if body.faces}
-    within = touching * max((posed.body.size for posed in shaped.values()), default=0.0)
-    relations = _relations(scene)
-    pairs = [Pair(a, b, relations[_key(a, b)], within) for a, b in combinations(shaped.values(), 2)]
+    shaped = [Posed(body, row) for body, row in zip(scene.bodies, q, strict=True) if body.faces]
+    within = touching * max((posed.body.size for posed in shaped), default=0.0)
+    pairs = [Pair(a, b, _relation(scene, a.body, b.body), within) for a, b in _near(shaped, margin)]
     near = [pair for pair in pairs if pair.apart <= margin or pair.may_nest]
     rows, searched = _rows_of(near, PosedBodies(scene.bodies, q, touching), interruption)
     kept = [row for row in rows if row.bound <= margin or row.kind in ("crossing", "enclosed", "undecided")]
     return Interference(
         rows=tuple(sorted(kept, key=lambda row: row.order)),
         margin=margin,
-        pairs=len(pairs),
+        pairs=len(shaped) * (len(shaped) - 1) // 2,
         searched=searched,
         without_shape=tuple(body.name for body in scene.bodies if not body.faces),
         scene=scene,
@@ -105,28 +103,23 @@ def _rows(scene: Assembly, poses: Solution | ArrayLike | None) -> Array:
     return np.array(poses.q)
 
 
-def _key(a: Posed, b: Posed) -> frozenset[str]:
-    return frozenset((a.body.name, b.body.name))
+def _near(shaped: Sequence[Posed], margin: float) -> Iterator[tuple[Posed, Posed]]:
+    """Pairs of bodies that are within a margin of each other by the boxes around them."""
+    boxes = np.array([posed.box for posed in shaped]).reshape(-1, 2, 3)
+    for k, one in enumerate(shaped):
+        between = np.maximum(boxes[k + 1 :, 0] - one.box[1], one.box[0] - boxes[k + 1 :, 1])
+        for other in np.flatnonzero(np.linalg.norm(np.maximum(between, 0.0), axis=1) <= margin).tolist():
+            yield one, shaped[k + 1 + other]
 
 
-def _relations(scene: Assembly) -> dict[frozenset[str], Relation]:
-    """What the constraints of a scene say of its pairs of bodies, by their names."""
-    relations: dict[frozenset[str], Relation] = {}
-    for a, b in combinations(scene.bodies, 2):
-        relations[frozenset((a.name, b.name))] = "excluded"
-    known: Sequence[tuple[Relation, list[tuple[Body, Body]]]] = (
-        ("free", free_pairs(scene.bodies, scene.constraints)),
-        ("joined", joined_pairs(scene.bodies, scene.constraints)),
-    )
-    for relation, pairs in known:
-        for a, b in pairs:
-            relations[frozenset((a.name, b.name))] = relation
-    for contact in scene.constraints:
-        if isinstance(contact, Contact):
-            names = frozenset(body.name for body in contact.bodies)
-            if relations[names] == "free":
-                relations[names] = "contact"
-    return relations
+def _relation(scene: Assembly, a: Body, b: Body) -> Relation:
+    """What the constraints of a scene say of two of its bodies."""
+    if joined_pairs((a, b), scene.constraints):
+        return "joined"
+    if not free_pairs((a, b), scene.constraints):
+        return "excluded"
+    contacts = (item for item in scene.constraints if isinstance(item, Contact))
+    return "contact" if any({*item.bodies} == {a, b} for item in contacts) else "free"
 
 
 def _rows_of(near: Sequence[Pair], posed: PosedBodies, interruption: Interruption) -> tuple[list[Clash], int]:
