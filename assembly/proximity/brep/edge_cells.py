@@ -8,11 +8,13 @@ NURBS Book, P1.10 and P4.9), and so the edge.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import read_only
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
@@ -214,16 +216,22 @@ def _touching(low: Array, high: Array, other_low: Array, other_high: Array, peri
     return np.asarray(other_low + lift <= high[:, None])
 
 
+@lru_cache(maxsize=64)
+def _boundary_boxes(face: Face) -> Array:
+    """Boxes (n, 4) in (u, v) around the parts of a face's boundary; they are asked for whenever patches are halved."""
+    curves = [curve_boxes(curve, first_cells(curve)) for curve in face.boundary]
+    return read_only(np.concatenate([np.empty((0, 4)), *curves]))
+
+
 def box_sides(face: Face, boxes: Array) -> Indices:
     """Where boxes (n, 4) of u from and to, v from and to, are: all inside a face's trim, all outside, or neither.
 
     A box that no boundary curve enters is on one side: that of its middle.
     """
     surface = face.surface
-    curves = [curve_boxes(curve, first_cells(curve)) for curve in face.boundary]
-    if not curves:
+    edges = _boundary_boxes(face)
+    if not len(edges):
         return np.full(len(boxes), CLEAR)
-    edges = np.concatenate(curves)
     sides = np.full(len(boxes), ENTERED)
     for start in range(0, len(boxes), _ROWS):
         rows = boxes[start : start + _ROWS]
