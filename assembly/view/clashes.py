@@ -13,7 +13,7 @@ from assembly.view.skeleton import MARK, line
 
 __all__ = ["clash_items", "crossing_bodies", "shown_as"]
 
-_CROSSING: Color = (0.88, 0.08, 0.10)
+_CROSSING: Color = (0.90, 0.10, 0.10)
 _BESIDE: Color = (0.72, 0.74, 0.78)
 _MARKS: Mapping[Kind, Color] = {
     "crossing": (0.55, 0.00, 0.12),
@@ -22,7 +22,7 @@ _MARKS: Mapping[Kind, Color] = {
     "clear": (0.10, 0.60, 0.32),
 }
 # What is in bodies is to be seen.
-_SOLID, _FAINT = 0.75, 0.30
+_SOLID, _FAINT = 0.45, 0.25
 
 
 def crossing_bodies(report: Interference) -> set[str]:
