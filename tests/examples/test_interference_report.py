@@ -30,8 +30,8 @@ def test_what_is_drawn_wrong_is_found(run):
     assert found["board", "handle"][0] == "touching"
     assert found["housing", "cover"] == ("touching", True, pytest.approx(0.0, abs=1e-12))
     assert found["cover", "board"] == ("clear", True, pytest.approx(0.3, abs=1e-12))
-    # Nearest all around: no search proves the last digits.
-    assert found["cover", "left screw"] == ("clear", False, pytest.approx(0.4, abs=1e-9))
+    # Nearest all around, which radii about the axis prove.
+    assert found["cover", "left screw"] == ("clear", True, pytest.approx(0.4, abs=1e-9))
     assert len(found) == 8
 
 

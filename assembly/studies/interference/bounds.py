@@ -27,20 +27,27 @@ ROUNDING = 1e-14
 ALONG = 4
 
 
-def hull_of(face: Face) -> Array:
-    """Points (n, 3) in whose hull a face is."""
+def flat_map(face: Face) -> tuple[Array, Array] | None:
+    """Of a face whose surface is an affine map of (u, v): where (0, 0) is (3,), and its derivatives (2, 3)."""
     surface = face.surface
     net = surface.control_points
     if net.shape != (2, 2, 3) or not face.boundary or np.ptp(surface.weights) != 0.0:
-        return net.reshape(-1, 3)
+        return None
     (low_u, high_u), (low_v, high_v) = surface.domain
     across, along = net[1, 0] - net[0, 0], net[0, 1] - net[0, 0]
     if np.abs(net[1, 1] - net[0, 0] - across - along).max() > ROUNDING * np.abs(net).max():
-        return net.reshape(-1, 3)
-    # The surface is an affine map of its parameters.
-    at = np.concatenate([curve.control_points for curve in face.boundary])
-    parts = (at - (low_u, low_v)) / (high_u - low_u, high_v - low_v)
-    hull: Array = net[0, 0] + parts @ np.stack([across, along])
+        return None
+    rates = np.stack([across / (high_u - low_u), along / (high_v - low_v)])
+    return net[0, 0] - np.array([low_u, low_v]) @ rates, rates
+
+
+def hull_of(face: Face) -> Array:
+    """Points (n, 3) in whose hull a face is."""
+    affine = flat_map(face)
+    if affine is None:
+        return face.surface.control_points.reshape(-1, 3)
+    origin, rates = affine
+    hull: Array = origin + np.concatenate([curve.control_points for curve in face.boundary]) @ rates
     return hull
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from assembly.proximity.features.features import FeaturePair, FeatureStatus, closest_features, nearest_features
 from assembly.proximity.features.touching import flush_ways
+from assembly.studies.interference.axes import revolved_between
 from assembly.studies.interference.bounds import Posed, boxes_apart, plane_between
 from assembly.studies.interference.clash import Clash, Kind, Relation
 from assembly.studies.interference.witness import Probe, common_point, is_inside, side_of_nearest
@@ -22,6 +23,8 @@ Array = NDArray[np.float64]
 AGREED = 1e-9
 # The most that may be called touching in parts of the larger body's size.
 MOST_TOUCHING = 1e-3
+# A ball larger than what is called touching has no room in a skin of this part of that about an axis.
+SKIN = 1.0 / 3.0
 # Parts of the way from the deepest place to the middle of what both bodies may have in common.
 INWARD = (0.0, 0.01, 0.1, 0.5, 1.0)
 
@@ -87,14 +90,29 @@ class Pair:
         return max(plane_between(a, b, way) for way in ways)
 
     @cached_property
-    def beside_plane(self) -> float:
-        """The same, whatever rounding makes of it."""
-        return self.plane - 4.0 * (self.a.rounding + self.b.rounding)
+    def revolved(self) -> float:
+        """How far apart the bodies are about an axis that they share, so far as it matters."""
+        return revolved_between(self.a, self.b, -SKIN * self.touching if self.meets else self.distance)
 
     @cached_property
     def bound(self) -> float:
         """No points of the two are nearer than this."""
-        return max(self.apart, self.nearest.lower, self.beside_plane, 0.0)
+        known = max(self.apart, self.nearest.lower, self.plane - self._rounding, 0.0)
+        if self.meets or self.distance - known <= AGREED * self.size:
+            return known
+        return max(known, self.revolved)
+
+    @property
+    def _rounding(self) -> float:
+        """By how much rounding may have a plane off."""
+        return 4.0 * (self.a.rounding + self.b.rounding)
+
+    @cached_property
+    def only_touches(self) -> bool:
+        """Whether a plane between the two, or a surface of revolution, proves that no more than a skin is in both."""
+        if self.plane - self._rounding >= -self.touching:
+            return True
+        return self.revolved >= -SKIN * self.touching
 
     @property
     def meets(self) -> bool:
@@ -123,7 +141,7 @@ class Pair:
     def judged(self) -> Clash | None:
         """The row of the pair, or None where it takes a search for crossings to tell."""
         if self.meets:
-            return self._row("touching", self._touching_gap, True) if self.beside_plane >= -self.touching else None
+            return self._row("touching", self._touching_gap, True) if self.only_touches else None
         if not self.bound > 0.0:
             return None
         if self.nested == 0:

@@ -64,8 +64,8 @@ def interference(
     -----
     Boxes around faces tell which pairs may be near; of those the nearest points are searched for by branch and bound
     (`assembly.proximity.closest_features`). Of bodies that have points in common a plane between them proves that they
-    touch, and a ball inside of both that they cross. Where neither is found, one search of a contact manager for all
-    such pairs tells, as in `Solution.crossings`, and the row is not proved.
+    touch, or a surface of revolution, and a ball inside of both that they cross. Where none is found, one search of a
+    contact manager for all such pairs tells, as in `Solution.crossings`, and the row is not proved.
     """
     interruption = CTRL_C if time_limit is None else Interruption(time_limit)
     margin = bounded("margin", margin)
