@@ -122,10 +122,16 @@ class Posed:
                 found.append(face.surface.evaluate(u.ravel(), v.ravel()))
         return self.placed(np.concatenate(found))
 
+    @cached_property
+    def own_box(self) -> Array:
+        """The box around the body along its own axes, (2, 3)."""
+        points = np.concatenate([hull_of(face) for face in self.faces])
+        return np.stack([points.min(axis=0) - self.rounding, points.max(axis=0) + self.rounding])
+
     def may_enclose(self, other: Posed) -> bool:
-        """Whether the other body may be inside of this one, by their boxes."""
-        points = other.samples
-        return bool(((self.box[0] <= points) & (points <= self.box[1])).all())
+        """Whether the other body may be inside of this one, by the box along this one's axes."""
+        points = (other.samples - self.row[:3]) @ self.rotation
+        return bool(((self.own_box[0] <= points) & (points <= self.own_box[1])).all())
 
 
 def boxes_apart(a: Posed, b: Posed) -> float:

@@ -54,7 +54,7 @@ class Clash(ReadOnlyArrays):
         Whether `kind` is certified. Clear: `bound` is the gap but for 1e-9 of the bodies' size. Touching: a plane
         between the two that neither passes by more than what is called touching, or a surface of revolution, as between
         a pin and its bore. Crossing: a ball that is inside of both bodies. Enclosed: the surfaces are apart, and the
-        one is on the inner side of the other one's nearest face.
+        one is on the inner side of the other one's nearest face or edge.
     relation : str
         ``"joined"`` by a joint, a gear or a rack, ``"excluded"`` by a clearance, in ``"contact"``, or ``"free"``.
     witness : (3,) or None

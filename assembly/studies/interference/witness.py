@@ -1,7 +1,9 @@
 """Points that are certainly inside of bodies: a small ball around them meets no face, and its nearest one faces away.
 
 A ball that meets no face of a closed body is inside of it or outside, as a whole. The nearest point of the body tells:
-where it is within a face, the ball is on the side of that face on which the segment between the two is.
+where it is within a face, the ball is on the side of that face on which the segment between the two is. Where it is on
+an edge that segment is between the outward normals of its two faces, or between these turned back: the ball is outside
+of an edge that stands out, and inside at one that leads in.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.curve import NurbsCurve
 from assembly.kinematics.pose import IDENTITY_ROW, rotate
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.features.features import FeaturePair, FeatureStatus, nearest_features
@@ -30,6 +33,8 @@ DEPTHS = (0.03, 0.003, 0.0003)
 OPPOSED = 0.05
 # Points of a body that are asked whether they are inside another one.
 ASKED = 6
+# How often, and at how many points of a curve, the one at a point is looked for.
+ROUNDS, SAMPLES = 3, 65
 # Directions from a common point in which both bodies may go on.
 AROUND = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
 
@@ -44,17 +49,48 @@ def outward_normal(body: Posed, pair: FeaturePair, side: int) -> Array | None:
     return normal
 
 
+def _between_faces(body: Posed, pair: FeaturePair, side: int) -> Array | None:
+    """The direction between the outward normals of the two faces of an edge, where a point of a pair is on one."""
+    feature = pair.features[side]
+    topology = solid_of(body.faces)
+    edge = topology.edges[feature.index] if feature.kind == "edge" else None
+    if edge is None or edge.face_b is None or edge.curve_b is None:
+        return None
+    point = (pair.points[side] - body.row[:3]) @ body.rotation
+    total = np.zeros(3)
+    for number, curve in ((edge.face_a, edge.curve_a), (edge.face_b, edge.curve_b)):
+        face = topology.faces[number]
+        total += face.normal(*_parameters_at(face, face.boundary[curve], point))
+    length = float(np.linalg.norm(total))
+    return body.rotation @ total / length if length > OPPOSED else None
+
+
+def _parameters_at(face: Face, curve: NurbsCurve, point: Array) -> tuple[float, float]:
+    """(u, v) of the point of a boundary curve that is nearest to a point of it, to some digits."""
+    low, high = curve.domain
+    for _ in range(ROUNDS):
+        t = np.linspace(low, high, SAMPLES)
+        at = curve.evaluate(t)
+        nearest = int(np.linalg.norm(face.surface.evaluate(at[:, 0], at[:, 1]) - point, axis=1).argmin())
+        low, high = t[max(nearest - 1, 0)], t[min(nearest + 1, SAMPLES - 1)]
+    return float(at[nearest, 0]), float(at[nearest, 1])
+
+
 def side_of_nearest(body: Posed, pair: FeaturePair, side: int) -> int:
     """On which side of a body the point of the other one is: 1 outside, -1 inside, 0 where the pair does not tell.
 
     The pair's points are the nearest ones and apart.
     """
-    normal = outward_normal(body, pair, side)
-    if normal is None or pair.status is not FeatureStatus.APART or not pair.lower > 0.0:
+    if pair.status is not FeatureStatus.APART or not pair.lower > 0.0:
         return 0
-    off = float(normal @ (pair.points[1 - side] - pair.points[side]))
-    # Of nearest points the normal is along what is between them.
-    return int(np.sign(off)) if abs(off) > 0.5 * pair.lower else 0
+    way = outward_normal(body, pair, side)
+    if way is None:
+        way = _between_faces(body, pair, side)
+    if way is None:
+        return 0
+    between = pair.points[1 - side] - pair.points[side]
+    off = float(way @ between)
+    return int(np.sign(off)) if abs(off) > OPPOSED * float(np.linalg.norm(between)) else 0
 
 
 @dataclass(frozen=True, eq=False)
