@@ -116,6 +116,12 @@ def _hull_distance(points: Array) -> float:
     return float(along.min(axis=0).max(initial=0.0))
 
 
+@lru_cache(maxsize=1024)
+def _boundary_pieces(face: Face) -> tuple[Array, ...]:
+    """The Bezier pieces of every boundary curve of a face, which are asked for about every axis."""
+    return tuple(curve.bezier_pieces() for curve in face.boundary)
+
+
 def _reach_of(face: Face, to_axis: Array, shift: Array) -> tuple[float, float]:
     """The least and the largest distance of a face from the z axis, to which (p - shift) @ to_axis takes its points."""
     across = to_axis[:, :2]
@@ -129,8 +135,7 @@ def _reach_of(face: Face, to_axis: Array, shift: Array) -> tuple[float, float]:
     origin, edges = affine
     start, sides = (origin - shift) @ across, edges @ across
     ranges = []
-    for curve in face.boundary:
-        points = curve.bezier_pieces()
+    for points in _boundary_pieces(face):
         flat = points[..., :2] @ sides + points[..., 2:] * start
         ranges.append(_range(np.concatenate([flat, points[..., 2:]], axis=-1)[:, :, None]))
     low, high = min(one[0] for one in ranges), max(one[1] for one in ranges)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
+from itertools import chain, islice, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,8 @@ OPPOSED = 0.05
 ASKED = 6
 # How often, and at how many points of a curve, the one at a point is looked for.
 ROUNDS, SAMPLES = 3, 65
+# Along either parameter of a face: points below which one is looked for, and how many of all are asked.
+GRID, MOST = 5, 400
 # Directions from a common point in which both bodies may go on.
 AROUND = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
 
@@ -151,6 +153,20 @@ def _ways(a: Posed, b: Posed, pair: FeaturePair, all_around: bool) -> Iterator[A
             yield way
 
 
+def _below_faces(one: Posed, other: Posed) -> Iterator[Array]:
+    """Points below faces of a body, within the box around the other one."""
+    size = min(one.body.size, other.body.size)
+    part = (np.arange(GRID) + 0.5) / GRID
+    for face in one.faces:
+        (low_u, high_u), (low_v, high_v) = face.surface.domain
+        u, v = np.meshgrid(low_u + (high_u - low_u) * part, low_v + (high_v - low_v) * part)
+        within = face.contains(u, v)
+        points, normals = one.placed(face.surface.evaluate(u, v)[within]), face.normal(u, v)[within] @ one.rotation.T
+        near = ((other.box[0] <= points) & (points <= other.box[1])).all(axis=1)
+        for depth in DEPTHS:
+            yield from (points - depth * size * normals)[near]
+
+
 def common_point(a: Posed, b: Posed, pair: FeaturePair, others: Iterable[Array] | None, probe: Probe) -> Array | None:
     """A point around which a ball is inside of two closed bodies, or None where none is found.
 
@@ -168,8 +184,9 @@ def common_point(a: Posed, b: Posed, pair: FeaturePair, others: Iterable[Array] 
         return None
     size = min(a.body.size, b.body.size)
     beside = (pair.points[0] + depth * size * way for way in _ways(a, b, pair, others is not None) for depth in DEPTHS)
-    for candidates in (others or (), beside):
-        for point in candidates:
-            if probe.side(a, point) == -1 and probe.side(b, point) == -1:
-                return point
+    below: Iterable[Array] = () if others is None else islice(chain(_below_faces(a, b), _below_faces(b, a)), MOST)
+    points: Iterable[Array] = chain(others or (), beside, below)
+    for point in points:
+        if probe.side(a, point) == -1 and probe.side(b, point) == -1:
+            return point
     return None
