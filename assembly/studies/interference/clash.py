@@ -42,8 +42,8 @@ class Clash(ReadOnlyArrays):
     gap : float or None
         The distance of the nearest points found. Of bodies that cross, minus how deep: of the places where their
         surfaces face each other from inside that are known the deepest, or, if that is less, how far the bodies are to
-        be moved apart along the normal at `points`; 0 where it is not known. Of an enclosed one, minus its distance from
-        the walls. None where it is undecided.
+        be moved apart along the normal at `points`; 0 where it is not known. Of an enclosed one, minus its distance
+        from the walls. None where it is undecided.
     bound : float
         No points of the two surfaces are nearer than this; 0 where none is proven apart.
     points : (2, 3) or None
