@@ -142,7 +142,8 @@ def test_a_plug_in_a_blind_hole_crosses_where_that_ends():
     # The pin's end is at its middle less 1.
     assert row(blind, PIN, at(0.0, 0.0, 1.1)).kind == "touching"
     for radius in (0.15, 0.2):
-        deep = row(blind, SHAPES.solid_cylinder(radius, 2.0), at(0.0, 0.0, 1.05))
+        pin = body("pin", SHAPES.solid_cylinder(radius, 2.0), at(0.0, 0.0, 1.05))
+        (deep,) = interference([body("block", blind), pin])
         assert deep.kind == "crossing" and deep.proved
         # Where it fits tightly the places around fill the list: it is known how it comes out.
         assert deep.gap == pytest.approx(-0.05 if radius < 0.2 else -0.45, abs=1e-9)
