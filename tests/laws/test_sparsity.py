@@ -11,7 +11,7 @@ from assembly.constraints.program import records as layout
 from assembly.constraints.program.envelope import clear_upper, place_folds
 from assembly.solve.linear_algebra.factorize import factorize_shifted, forward_step, solve_step
 from assembly.solve.loop.multipliers import curvature_multipliers, toward_rows
-from assembly.solve.loop.residuals import Structure, arrange
+from assembly.solve.loop.residuals import Structure, arrange, order_rows
 from assembly.solve.loop.workspace import new_rows, new_system
 from tests.laws.loop_point import room_of_shape
 
@@ -104,6 +104,7 @@ def test_rows_of_a_chain_meet_only_their_neighbors():
     rows, n = int(table[layout.ROWS]) + 4 * count, 6 * int(table[layout.MOVING]) + 4 * count
     shape = room_of_shape(table, rows, n, table[:0])
     arrange(table, np.arange(count), shape, rows, n)
+    order_rows(shape, rows, n)
     bases, _sides, order, (sequence, last_row) = shape
     assert sorted(sequence) == list(range(rows))
     for k, r in enumerate(sequence):

@@ -224,12 +224,12 @@ def take_factor(kept, factor):
 
 
 @kernel(inner=True)
-def put_factor(factor, jacobian, kept):
-    """Keep the factor of a step, and the Jacobian that is in it."""
+def put_factor(factor, ends, jacobian, kept):
+    """Keep the factor of a step, of which row i goes to column ends[i], and the Jacobian that is in it."""
     at = 0
     for i in range(factor.shape[0]):
         for j in range(i, factor.shape[0]):
-            kept.factor[at] = factor[i, j]
+            kept.factor[at] = factor[i, j] if j <= ends[i] else 0.0
             at += 1
     keep_array(0, jacobian, kept.factor_jacobian)
 

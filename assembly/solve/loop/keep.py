@@ -35,7 +35,7 @@ def keep_factor(program, state, kept, point, rows, system):
     n = system.gradient.size
     if factorize_shifted(system.hessian, n, shape.sparsity, CHORD_SHIFT, system.factor) != CHORD_SHIFT:
         return False
-    put_factor(system.factor, point.jacobian, kept)
+    put_factor(system.factor, shape.sparsity.places[2], point.jacobian, kept)
     for r in range(rows.count):
         kept.weights[r] = rows.active[r]
     header.factor = NEW_FACTOR
