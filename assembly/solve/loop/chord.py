@@ -6,8 +6,8 @@ With A and W the Jacobian and the weights (1 / mu) of the rows that count where 
 
 is a step of the whole system of `augmented_lagrangian.py`, by an older matrix (the chord method): the first one is the
 tangent predictor of what values and targets have changed. Where the next one would not arrive, a factor is made anew,
-once. The iterate at which all holds is handed to the loop, which judges it as any other. Where steps gain too little,
-rows begin or cease to count, or a pair is next to a fold, nothing has happened, and the loop begins where the solve
+once. The iterate at which all holds is handed to the loop, which judges it as any other. Where steps gain too little, a
+row that counts begins to pull, or a pair is next to a fold, nothing has happened, and the loop begins where the solve
 does.
 """
 
@@ -29,14 +29,15 @@ from assembly.constraints.program.kept import (
 )
 from assembly.constraints.program.records import header_at, pool_header_at
 from assembly.proximity.extrema.face_face import BEND
+from assembly.proximity.manager.update import AS_NEEDED, MEASURED
 from assembly.solve.linear_algebra.factorize import solve_step
 from assembly.solve.loop.begin import read_state
-from assembly.solve.loop.clearances import allowed_share, ends_unseen
+from assembly.solve.loop.clearances import allowed_share, ends_unseen, update_again
 from assembly.solve.loop.contacts import is_near_fold
 from assembly.solve.loop.deadline import is_cut
 from assembly.solve.loop.keep import keep_factor, test_convexity
 from assembly.solve.loop.line_search import goal
-from assembly.solve.loop.multipliers import dual_residual, weigh_rows
+from assembly.solve.loop.multipliers import dual_residual
 from assembly.solve.loop.parameters import CHORD_GAIN, CHORD_LONGEST, CHORD_SHIFT, CHORD_STEPS, FEW_STEPS, LIFT_BELOW
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.report import log
@@ -89,28 +90,47 @@ def write_told(table, told, state):
 
 
 @kernel(inner=True)
-def count_as_kept(kept, one_sided, rows):
-    """Whether the one-sided rows that count are those of the kept factor."""
+def weigh_as_kept(kept, one_sided, rows):
+    """Let the rows count that do in the kept factor. Whether none of these pulls.
+
+    One that does not count may be broken on the way: it is part of the violation, and holds at the end.
+    """
     for r in range(rows.count):
-        if one_sided[r] == 1 and (rows.active[r] > 0.0) != (kept.weights[r] > 0.0):
+        counts = one_sided[r] == 0 or kept.weights[r] > 0.0
+        rows.active[r] = 1.0 / rows.mu if counts else 0.0
+        if counts and one_sided[r] == 1 and rows.y[r] > 0.0:
             return False
     return True
 
 
 @kernel(inner=True)
-def go_along(task, kept, iterates, rows, system):
+def may_go(task, current, trial, step, is_first):
+    """Whether motion bounds cover a step. A tick updates the pairs that its first one would use up, and asks again."""
+    program, loop = task.program, task.loop
+    store, memory = program.store, program.lifted.memory
+    if not task.watched or allowed_share(store, memory, current, trial, step, 1.0)[1]:
+        return True
+    if not (task.tick and is_first):
+        return False
+    loop.changed = update_again(store, program.lifted, current, AS_NEEDED | MEASURED)
+    if loop.changed or is_cut(store.table, memory):
+        return False
+    return allowed_share(store, memory, current, trial, step, 1.0)[1]
+
+
+@kernel(inner=True)
+def go_along(task, kept, iterates, rows, system, is_first):
     """The iterate at the end of the step, with its rows and multipliers, into the trial one. Whether all is regular."""
     program, (current, trial) = task.program, iterates
     store, shape, step, memory = program.store, program.structure, system.directions.step, program.lifted.memory
-    watched = header_at(store.table, 0).manager_record >= 0
-    if watched and not allowed_share(store, memory, current, trial, step, 1.0)[1]:
+    if not may_go(task, current, trial, step, is_first):
         return False
     move(store.table, current.q, step, 1.0, trial.q)
     round_poses(store, trial.q, task.told)
     predict_pairs(store, shape.bases, program.lifted, current, trial, step, 1.0)
     if evaluate(program, program.lifted.guess, BEND, trial) >= 0:
         return False
-    if watched and ends_unseen(store, memory, current, trial):
+    if task.watched and ends_unseen(store, memory, current, trial):
         return False
     for k in range(header_at(store.table, 0).contacts):
         if is_near_fold(trial.records, k, LIFT_BELOW):
@@ -150,8 +170,7 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
         violation = violation_of(current.residual, shape.one_sided, rows.count)
         dual = dual_residual(shape, current, rows, system, rows.y)
         log(history, count, (value, violation, dual, rows.mu, CHORD_SHIFT, 1.0, limits.radius))
-        weigh_rows(rows, shape.one_sided, current.residual)
-        if not (math.isfinite(value) and count_as_kept(kept, shape.one_sided, rows)):
+        if not (math.isfinite(value) and weigh_as_kept(kept, shape.one_sided, rows)):
             return failed
         # A tick ends after its steps at any pose that holds.
         arrived = violation <= feasible and (dual <= stationarity or (task.tick and count >= task.loop.limit))
@@ -169,7 +188,7 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
             return Chord(count, swapped, violation, dual, last_violation, last_dual)
         if count == limit or not chord_step(shape, kept, current, rows, system) <= CHORD_LONGEST:
             return failed
-        if not go_along(task, kept, (current, trial), rows, system):
+        if not go_along(task, kept, (current, trial), rows, system, count == 0):
             return failed
         current, trial = trial, current
         swapped = not swapped
@@ -198,10 +217,13 @@ def go_on_by_chords(task, history, state, iterates, rows, system):
     chord = chord_steps(task, history, state, kept, current, trial, rows, system)
     if chord.steps < 0:
         forget_factor(store.table, state)
-        read_state(store, state, current, trial, rows)
-        take_rows(store, state, kept, current)
         # Of motion bounds it is known what bodies would have used elsewhere.
         loop.measured = 0
+        if loop.changed:
+            # Other contacts are listed at the start: no step was taken yet.
+            return False
+        read_state(store, state, current, trial, rows)
+        take_rows(store, state, kept, current)
         return False
     # From here on the state has the poses that were found, not those of the start.
     write_told(store.table, task.told, state)
