@@ -229,7 +229,8 @@ class Tracker(InOneProcess):
         self._followed = Followed(self._scene, packed, names, self._hand, self._place, first.status)
         # At its end are the rows of the last tick; steps have no copy of those.
         self._size = packed.kept_at
-        self._state = first._state.copy()
+        self._state = np.zeros(packed.kept_at + packed.kept_size)
+        self._state[: first._state.size] = first._state
         if packed.clearance_rows:
             _follow_extrema(packed, self._state, budget is not None)
         self._pose = self._state[: self._size]

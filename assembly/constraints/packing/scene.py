@@ -32,7 +32,7 @@ from assembly.constraints.packing.terms import TermPacking, natural_unit
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.coordinates_at import coordinates_at
 from assembly.constraints.program.hessian_blocks import FACTORIZE_AT, SOLVE_AT
-from assembly.constraints.program.kept import kept_size
+from assembly.constraints.program.kept import kept_size, kept_unknowns
 from assembly.constraints.program.primitives import RECORD as JOINT_FRAMES
 from assembly.errors import FARTHEST, InputError
 from assembly.kinematics.body import Body
@@ -71,6 +71,8 @@ class Packed:
         See `constraints/program/records.py`. Lengths in the pool are divided by `scale`.
     scale : float
         The scene's size (`scene_size`), 1 where it has none.
+    kept_at, kept_size : int
+        Where in a state, and how long, what a solve leaves for the next one is (`program/kept.py`).
     workspaces : list of three arrays
         What solves that are over worked in, for the next ones (`solve/attempts/attempts.py`).
     has_size : bool
@@ -152,7 +154,9 @@ class Packed:
         self.workspaces: list[tuple[Array, Array, Table]] = []
         self.kept_at = self.memory_at + self._memory.size
         self.table[layout.KEPT] = self.kept_at
-        self._state_size = self.kept_at + int(kept_size(self.table))
+        self.kept_size = int(kept_size(self.table))
+        # Without a factor, to copy what a solution keeps takes longer than to evaluate it anew.
+        self._state_size = self.kept_at + (self.kept_size if kept_unknowns(self.table) > 0 else 0)
 
     def _write(
         self, bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
