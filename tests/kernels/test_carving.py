@@ -28,7 +28,9 @@ def is_inlined(function: ast.FunctionDef) -> bool:
 
 
 def functions_of(trees: list[ast.Module]) -> list[ast.FunctionDef]:
-    return [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    """All kernels; functions of Python may have their names."""
+    functions = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    return [node for node in functions if any(ast.unparse(way).startswith("kernel") for way in node.decorator_list)]
 
 
 def carving(functions: list[ast.FunctionDef]) -> set[str]:

@@ -137,7 +137,8 @@ def test_a_warm_start_follows_the_target():
         case.wish.target = np.array([*(0.4 * way), 1.0])
         solution = case.scene.solve(solution)
         assert solution.success, solution.message
-        np.testing.assert_allclose(case.place(solution), [*(RADIUS * way), 1.0], rtol=0, atol=HELD)
+        # Along the rim the objective is flat: a slope of 1e-10, which is none, is a place 4e-9 off at the most.
+        np.testing.assert_allclose(case.place(solution), [*(RADIUS * way), 1.0], rtol=0, atol=4e-9)
         # The first one leaves a start whose penalty is spent; the others are near.
         assert solution.iterations <= (80 if k == 1 else 12)
     # Away from the hole, and back: the row goes idle and comes back.
