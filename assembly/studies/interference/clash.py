@@ -136,7 +136,7 @@ class Interference(ReadOnlyArrays):
             ).rstrip()
             for line in lines
         ]
-        counts = {kind: sum(row.kind == kind for row in self.rows) for kind in Kind.__args__}  # type: ignore[attr-defined]
+        counts = {kind: sum(row.kind == kind for row in self.rows) for kind in Kind.__args__}  # type: ignore[attr-defined]  # a Literal
         found = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count) or "none"
         return "\n".join([f"{self.pairs} pairs, within {self.margin:g}: {found}", *(text if self.rows else [])])
 
