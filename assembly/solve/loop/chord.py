@@ -225,8 +225,9 @@ def go_on_by_chords(task, history, state, iterates, rows, system):
         read_state(store, state, current, trial, rows)
         take_rows(store, state, kept, current)
         return False
-    # From here on the state has the poses that were found, not those of the start.
-    write_told(store.table, task.told, state)
+    if chord.steps > 0:
+        # From here on the state has the poses that were found, not those of the start.
+        write_told(store.table, task.told, state)
     loop.iteration, loop.alpha = chord.steps, 1.0
     loop.last_violation, loop.last_dual = chord.last_violation, chord.last_dual
     for r in range(rows.count):

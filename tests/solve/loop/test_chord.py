@@ -357,3 +357,19 @@ def test_no_chord_step_leads_through_a_wire():
     assert after.success
     # The wires touch, two of their radii before 2.
     assert after.pose(ring).position[0] == pytest.approx(1.96, abs=1e-9)
+
+
+@pytest.mark.parametrize("make", [wires, limited_arm])
+def test_a_solve_without_a_step_returns_the_poses_it_began_with(make):
+    case = make()
+    solution = case.scene.solve()
+    for k in range(1, 9):
+        case.change(case.small * k)
+        solution = case.scene.solve(solution)
+        # Another solve in the same workspace.
+        case.change(-case.small * k)
+        case.scene.solve(solution)
+        case.change(case.small * k)
+        again = case.scene.solve(solution)
+        assert again.iterations == 0
+        assert again.q.tobytes() == solution.q.tobytes()
