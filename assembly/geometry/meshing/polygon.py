@@ -25,7 +25,7 @@ from assembly.geometry.meshing.facet_gaps import Apart, measured
 from assembly.geometry.meshing.steps import Axis, axes
 from assembly.geometry.meshing.unroll import Sheet, crossed, unrolled
 
-__all__ = ["Facets", "facets"]
+__all__ = ["BoundaryCells", "Facets", "facets", "trimmed_cells"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -64,6 +64,54 @@ class Facets:
         """Of all triangles."""
         a, b, c = np.moveaxis(self.points[self.triangles], 1, 0)
         return float(0.5 * np.linalg.norm(cross(b - a, c - a), axis=1).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryCells:
+    """Triangles of a trimmed face in (u, v), and which of their edges are chords of its boundary.
+
+    Attributes
+    ----------
+    parameters : (m, 3, 2)
+        Of the corners; beyond the domain of a closed direction where the face goes over a seam.
+    segments : (m, 3)
+        The segment of the border that an edge (corner k to k + 1) is, or -1.
+    border : Border
+    """
+
+    parameters: Array
+    segments: Indices
+    border: Border
+
+
+def trimmed_cells(face: Face, tolerance: float, angle: float) -> BoundaryCells:
+    """Triangles of a face that has a boundary, and their chords of it; see `facets`.
+
+    Raises
+    ------
+    InputError
+        Chords of the boundary that are edges of no triangle: loops that cross or touch each other.
+    """
+    made = _Trimmed(face, positive("tolerance", tolerance), min(positive("angle", angle), 0.25 * pi))
+    found = made.facets()
+    border = made.rim
+    corners = found.triangles[:, :: face.sign]
+    place = {tuple(p): k for k, p in enumerate(found.parameters.tolist())}
+    # Corners at one place of (u, v) may be several: of each the first stands for all.
+    same = np.array([place[tuple(p)] for p in found.parameters.tolist()])
+    edges = {}
+    for k, (start, end) in enumerate(border.ends.tolist()):
+        a, b = place.get(tuple(start)), place.get(tuple(end))
+        if a is not None and b is not None and a != b and border.curve[k] >= 0:
+            edges[same[a], same[b]] = k
+    segments = np.full((len(corners), 3), -1)
+    for row, triangle in enumerate(same[corners].tolist()):
+        for k in range(3):
+            segments[row, k] = edges.get((triangle[k], triangle[(k + 1) % 3]), -1)
+    missing = len(set(edges.values()) - set(segments.ravel().tolist()))
+    if missing:
+        raise InputError(f"{missing} chords of the boundary of {face!r} are edges of no facet; expected loops apart")
+    return BoundaryCells(found.parameters[corners], segments, border)
 
 
 def facets(face: Face, tolerance: float, *, angle: float = 0.25 * pi) -> Facets:

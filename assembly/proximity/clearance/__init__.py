@@ -1,0 +1,1 @@
+"""Proofs that two bodies are clear of each other, touch, cross, or that one is within the other."""

@@ -1,0 +1,258 @@
+"""The tree of cells of a body, made once for its faces: boxes or exact round hulls above cells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._record import rows_of
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.evaluate import spline_curve_at, surface_at
+from assembly.proximity.brep.solid import solid_of
+from assembly.proximity.brep.topology import Topology
+from assembly.proximity.clearance.cells import CellTable, cells_of
+from assembly.proximity.clearance.halve import place_cells
+from assembly.proximity.clearance.records import (
+    CELL_FACE,
+    CELL_FACE_SIZE,
+    LINKS,
+    LINKS_SIZE,
+    NODE,
+    NODE_SIZE,
+    NONE,
+)
+from assembly.proximity.clearance.round_faces import Round, round_of
+
+__all__ = ["BodyCells", "cells_of_body"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+# How near first cells are to faces, in parts of the body's size, and how much a boundary turns along a chord [rad].
+TOLERANCE, ANGLE = 8e-3, 0.5
+ROUNDED_UP = 1.0 + 1e-14
+
+
+@dataclass(frozen=True, eq=False)
+class BodyCells:
+    """Trees and surfaces of a body, in its coordinates. Places and numbers count from the beginnings of the arrays.
+
+    Attributes
+    ----------
+    table, pool : arrays
+        Records of surfaces and boundary curves, and what they point to.
+    curves : (c,) of int
+        The places of boundary curves in the table; those of surfaces are in `faces`.
+    faces : (f, CELL_FACE_SIZE) of int
+    links, nodes : (n, LINKS_SIZE) of int, (n, NODE_SIZE)
+        The root is the first row.
+    first : (m,) of int
+        The rows of the first cells.
+    component : (m,) of int
+        The connected part of the boundary that each of these belongs to.
+    is_closed : bool
+        Whether there is an inside.
+    size, far : float
+        The diagonal of a box around the body, and its largest coordinate.
+    topology : Topology
+    """
+
+    table: Table
+    pool: Array
+    curves: Table
+    faces: Table
+    links: Table
+    nodes: Array
+    first: Table
+    component: Table
+    is_closed: bool
+    size: float
+    far: float
+    topology: Topology
+
+
+@lru_cache(maxsize=128)
+def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
+    """The tree of a body's faces."""
+    topology = solid_of(faces)
+    boxes = np.array([face.surface.bounding_box() for face in topology.faces])
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    size = float(np.linalg.norm(high - low))
+    tables = [cells_of(face, TOLERANCE * size, ANGLE) for face in topology.faces]
+    packed = _packed_surfaces(topology.faces)
+    links, nodes = _first_cells(tables, packed.curves)
+    place_cells(packed.table, packed.pool, packed.faces, links, nodes)
+    builder = _Builder(links, nodes, [round_of(face) for face in topology.faces])
+    builder.build()
+    label = _components(topology)
+    owner = rows_of(LINKS, links).face
+    return BodyCells(
+        packed.table, packed.pool, np.concatenate(packed.curves), packed.faces, builder.links, builder.nodes, builder.first, label[owner],
+        topology.is_closed, size, float(max(np.abs(low).max(), np.abs(high).max())), topology,
+    )
+
+
+def _components(topology: Topology) -> Table:
+    """Of every face the number of the connected part of the boundary that it belongs to."""
+    label = np.arange(len(topology.faces))
+    for edge in topology.edges:
+        if edge.face_b is not None:
+            a, b = label[edge.face_a], label[edge.face_b]
+            label[label == max(a, b)] = min(a, b)
+    return label
+
+
+@dataclass(frozen=True, eq=False)
+class _Surfaces:
+    """Records of surfaces and boundary curves; `curves`: of every face the places of its boundary curves' records."""
+
+    table: Table
+    pool: Array
+    faces: Table
+    curves: list[Table]
+
+
+def _packed_surfaces(faces: tuple[Face, ...]) -> _Surfaces:
+    table: list[Table] = []
+    pool: list[Array] = []
+    curves, surfaces = [], []
+    at = used = 0
+
+    def append(record: Table, numbers: Array) -> int:
+        nonlocal at, used
+        table.append(record)
+        pool.append(numbers)
+        place, at, used = at, at + len(record), used + len(numbers)
+        return place
+
+    for face in faces:
+        record, numbers = face.surface.packed()
+        record = record.copy()
+        patch = surface_at(record, 0)
+        for field in ("breaks_u", "breaks_v", "coefficients", "cells"):
+            patch[field] += used
+        surfaces.append(append(record, numbers))
+        places = []
+        for curve in face.boundary:
+            record, numbers = curve.packed()
+            record = record.copy()
+            spline_curve_at(record, 0).breaks += used
+            spline_curve_at(record, 0).coefficients += used
+            places.append(append(record, numbers))
+        curves.append(np.array(places, dtype=np.int64))
+    rows = np.zeros((len(faces), CELL_FACE_SIZE), dtype=np.int64)
+    records = rows_of(CELL_FACE, rows)
+    records.surface, records.sign = surfaces, [face.sign for face in faces]
+    return _Surfaces(np.concatenate(table), np.concatenate(pool), rows, curves)
+
+
+def _first_cells(tables: list[CellTable], curves: list[Table]) -> tuple[Table, Array]:
+    """Rows of all cells; corners and radii are not written yet."""
+    count = sum(len(table.uv) for table in tables)
+    links, nodes = np.zeros((count, LINKS_SIZE), dtype=np.int64), np.zeros((count, NODE_SIZE))
+    at = 0
+    for number, (table, places) in enumerate(zip(tables, curves, strict=True)):
+        rows = slice(at, at + len(table.uv))
+        at = rows.stop
+        link, node = rows_of(LINKS, links[rows]), rows_of(NODE, nodes[rows])
+        link.child, link.face, link.shape, link.hollow = NONE, number, table.shape, table.hollow
+        link.rim = np.where(table.rim < 0, NONE, np.append(places, NONE)[table.rim])
+        node.uv, node.second, node.first, node.pad = table.uv, table.second, table.first, table.pad
+        node.rim_t, node.rim_second, node.ruling = table.rim_t, table.rim_second, table.ruling
+    return links, nodes
+
+
+def _box(points: Array, thick: Array) -> tuple[Array, Array, Array, float]:
+    """Center, axes, half widths and radius of a box around balls."""
+    middle = points.mean(axis=0)
+    principal = np.linalg.eigh(np.cov((points - middle).T))[1].T[::-1]
+    if np.linalg.det(principal) < 0.0:
+        principal = principal * np.array([[1.0], [1.0], [-1.0]])
+    boxes = []
+    for axes in (principal, np.eye(3)):
+        heights = points @ axes.T
+        low, high = (heights - thick[:, None]).min(axis=0), (heights + thick[:, None]).max(axis=0)
+        half = 0.5 * (high - low)
+        boxes.append((float((half + 0.05 * half.max()).prod()), 0.5 * (low + high) @ axes, axes, half))
+    _, center, axes, half = boxes[1] if boxes[1][0] < 1.02 * boxes[0][0] else boxes[0]
+    radius = min(float((np.linalg.norm(points - center, axis=1) + thick).max()), float(np.linalg.norm(half)))
+    return center, axes, half * ROUNDED_UP, radius * ROUNDED_UP
+
+
+class _Builder:
+    """Makes the nodes above cells: first halves of a body's faces, then halves of a face's cells."""
+
+    def __init__(self, cell_links: Table, cell_nodes: Array, rounds: list[Round | None]) -> None:
+        self.cell_links, self.cell_nodes = cell_links, cell_nodes
+        self.face = rows_of(LINKS, cell_links).face
+        self.cells = rows_of(NODE, cell_nodes)
+        self.rounds = rounds
+        count = len(cell_links)
+        self.whole = np.bincount(self.face, minlength=len(rounds))
+        self.links = np.zeros((2 * count - 1, LINKS_SIZE), dtype=np.int64)
+        self.nodes = np.zeros((2 * count - 1, NODE_SIZE))
+        self.first = np.full(count, NONE)
+        self.used = 1
+
+    def build(self) -> None:
+        """All nodes, the root first."""
+        groups = [np.flatnonzero(self.face == k) for k in range(len(self.rounds))]
+        waiting = [(groups, 0)]
+        while waiting:
+            groups, k = waiting.pop()
+            items = np.concatenate(groups)
+            if len(items) == 1:
+                self.first[items[0]] = k
+                self.links[k], self.nodes[k] = self.cell_links[items[0]], self.cell_nodes[items[0]]
+                continue
+            self._write(items, k)
+            child, self.used = self.used, self.used + 2
+            rows_of(LINKS, self.links[k : k + 1]).child = child
+            one, other = self._halves(groups, k)
+            waiting += [(other, child + 1), (one, child)]
+
+    def _halves(self, groups: list[Table], k: int) -> tuple[list[Table], list[Table]]:
+        if len(groups) > 1:
+            middles = np.array([self.cells.center[g].mean(axis=0) for g in groups])
+            order = np.argsort(middles[:, np.ptp(middles, axis=0).argmax()], kind="stable")
+            half = len(order) // 2
+            return [groups[i] for i in order[:half]], [groups[i] for i in order[half:]]
+        (items,) = groups
+        centers = self.cells.center[items]
+        along = np.linalg.svd(centers - centers.mean(axis=0), full_matrices=True)[2][0]
+        order = items[np.argsort(centers @ along, kind="stable")]
+        return [order[: len(order) // 2]], [order[len(order) // 2 :]]
+
+    def _write(self, items: Table, k: int) -> None:
+        """Box around cells, or what is round."""
+        link, node = rows_of(LINKS, self.links[k : k + 1])[0], rows_of(NODE, self.nodes[k : k + 1])[0]
+        link.face = NONE
+        face = self.face[items[0]]
+        is_face = (self.face[items] == face).all() and len(items) == self.whole[face]
+        found = self.rounds[face] if is_face else None
+        if found is not None and found.outward:
+            _write_round(node, found)
+            return
+        points = self.cells.corner[items].reshape(-1, 3)
+        thick = np.repeat(self.cells.rho[items] + self.cells.disc[items], 4)
+        node.center, node.axes, node.half, node.radius = _box(points, thick)
+        if found is not None:
+            node.bore, node.ruling, node.spine = found.radius, found.axis, found.center
+
+
+def _write_round(node: np.record, found: Round) -> None:
+    """The exact hull of a cylinder, a ball or a torus."""
+    axis = found.axis if found.axis.any() else np.array([0.0, 0.0, 1.0])
+    across = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    across /= np.linalg.norm(across)
+    node.center, node.ruling = found.center, axis
+    node.axes = axis, across, np.cross(axis, across)
+    if found.ring > 0.0:
+        node.disc, node.rho, node.radius = found.ring, found.radius, found.ring + found.radius
+    elif found.axis.any():
+        node.half = found.half, 0.0, 0.0
+        node.disc, node.radius = found.radius, np.hypot(found.half, found.radius) * ROUNDED_UP
+    else:
+        node.rho = node.radius = found.radius

@@ -1,0 +1,194 @@
+"""A face as cells: parts of (u, v) with corners on the surface, and how far the face may be from the hull of these.
+
+A cell is a rectangle or a triangle of (u, v). Linear interpolation L of the corners over a triangle with the box
+l_u x l_v differs from the surface by no more than
+
+    |S - L| <= (M_uu l_u^2 + 2 M_uv l_u l_v + M_vv l_v^2) / 8,          M: bounds of |S_uu|, |S_uv|, |S_vv| over the box,
+
+because each component of S - L is sum_i w_i (x_i - x)' H_i (x_i - x) / 2 with the weights w_i of the corners, and the
+variance of u under these is l_u^2 / 4 at most. The M hold for every part of the cell as well: a cell that is halved
+needs new points alone.
+
+Where an edge of a triangle is a chord of a boundary curve c, the face may go on beyond it, by no more than (d_u, d_v) =
+(dt^2 / 8) (max |c_u''|, max |c_v''|) in (u, v), which is M_u d_u + M_v d_v in space.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.geometry.faces.face import Face
+from assembly.geometry.meshing.polygon import trimmed_cells
+from assembly.geometry.splines.surface import NurbsSurface
+from assembly.proximity.clearance.derivative_nets import bends_away, curve_bounds, surface_bounds
+from assembly.proximity.clearance.records import FLAT, ROUNDED, RULED
+
+__all__ = ["CellTable", "cells_of"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+# What evaluation may be off, in parts of the largest coordinate: Horner's rule in two directions and a quotient, about
+# 4 (p + q) roundings; held against samples of doubled precision.
+ROUNDING = 4e-15
+# How far a face that counts as flat, or as swept by a curve across straight lines, may be from that, in parts of its
+# largest coordinate; it is added to the radius.
+EXACT = 1e-13
+# Rounds in which a grid of rectangles becomes finer.
+ROUNDS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class CellTable:
+    """Cells of one face, n rows.
+
+    Attributes
+    ----------
+    uv : (n, 4, 2)
+        Parameters of the corners; of a triangle the last two are the same.
+    second, first : (n, 3), (n, 2)
+        Bounds of |S_uu|, |S_uv|, |S_vv| and of |S_u|, |S_v|.
+    rim : (n, 3)
+        The boundary curve that edge k (corner k to k + 1) is a chord of, or -1.
+    rim_t, rim_second : (n, 3, 2)
+        Its parameters there, and bounds of |c_u''|, |c_v''|.
+    hollow : (n, 3)
+        Whether that curve bends away from the material.
+    pad : (n,)
+        What a radius is in any case.
+    shape : int
+        FLAT, RULED or ROUNDED.
+    ruling : (3,)
+        The normal of a flat face, the direction of a ruled one's lines; else zero.
+    """
+
+    uv: Array
+    second: Array
+    first: Array
+    rim: Indices
+    rim_t: Array
+    rim_second: Array
+    hollow: NDArray[np.bool_]
+    pad: Array
+    shape: int
+    ruling: Array
+
+
+def _sweep(surface: NurbsSurface) -> tuple[int, Array, float]:
+    """Whether a surface is flat or swept along straight lines by a curve across them; its direction; by how much not."""
+    points = surface.control_points.reshape(-1, 3)
+    far = float(np.abs(points).max())
+    middle = points.mean(axis=0)
+    normal = np.linalg.svd(points - middle, full_matrices=True)[2][2]
+    off = float(np.abs((points - middle) @ normal).max())
+    if off <= EXACT * far:
+        return FLAT, normal, 2.0 * off
+    for d in range(2):
+        net = surface.control_points if d == 1 else surface.control_points.swapaxes(0, 1)
+        weights = surface.weights if d == 1 else surface.weights.T
+        if surface.degree[d] != 1 or net.shape[1] != 2 or np.ptp(weights, axis=1).max() > 0.0:
+            continue
+        way = net[:, 1] - net[:, 0]
+        length = np.linalg.norm(way[0])
+        if length == 0.0 or np.abs(way - way[0]).max() > EXACT * far:
+            continue
+        ruling = way[0] / length
+        heights = net[:, 0] @ ruling
+        off = float(np.abs(way - way[0]).max() + np.ptp(heights))
+        if off <= EXACT * far:
+            return RULED, ruling, 2.0 * off
+    return ROUNDED, np.zeros(3), 0.0
+
+
+def _grid(surface: NurbsSurface, tolerance: float) -> Array:
+    """Rectangles of an untrimmed face: lines are added in the direction that costs more until all keep the tolerance."""
+    breaks = surface.breaks()
+    count = [np.ones(len(at) - 1, dtype=int) for at in breaks]
+    for _ in range(ROUNDS):
+        u, v = (_divided(at, many) for at, many in zip(breaks, count, strict=True))
+        a, b = (g.ravel() for g in np.meshgrid(np.arange(len(u) - 1), np.arange(len(v) - 1), indexing="ij"))
+        low, high = np.column_stack([u[a], v[b]]), np.column_stack([u[a + 1], v[b + 1]])
+        m = surface_bounds(surface, low, high)[1]
+        lu, lv = (high - low).T
+        in_u, twist, in_v = 0.125 * m[:, 0] * lu**2, 0.25 * m[:, 1] * lu * lv, 0.125 * m[:, 2] * lv**2
+        bad = in_u + twist + in_v > tolerance
+        if not bad.any():
+            break
+        for d, (mine, other, index) in enumerate(((in_u, in_v, a), (in_v, in_u, b))):
+            span = np.repeat(np.arange(len(count[d])), count[d])[index]
+            short = bad & ((mine + 0.5 * twist > 0.45 * tolerance) | (mine >= other))
+            for k in np.unique(span[short]):
+                factor = np.sqrt(((mine + 0.5 * twist) / (0.5 * tolerance))[short & (span == k)].max())
+                count[d][k] = int(np.ceil(count[d][k] * min(max(factor, 1.05), 4.0)))
+    corners = [low, np.column_stack([high[:, 0], low[:, 1]]), high, np.column_stack([low[:, 0], high[:, 1]])]
+    return np.stack(corners, axis=1)
+
+
+def _divided(at: Array, many: Indices) -> Array:
+    """The ends of spans, each of which is divided into so many parts."""
+    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(at[:-1], at[1:], many, strict=True)]
+    return np.concatenate([*parts, at[-1:]])
+
+
+def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
+    """The first cells of a face.
+
+    Parameters
+    ----------
+    face : Face
+    tolerance : float
+        About how near to the face they are. Whatever comes out, its radii are bounds.
+    angle : float
+        About the most that the boundary turns from corner to corner [rad].
+    """
+    surface = face.surface
+    shape, ruling, off = _sweep(surface)
+    if face.boundary:
+        cells = trimmed_cells(face, tolerance, angle)
+        uv, number = cells.parameters, cells.segments
+        uv = np.concatenate([uv, uv[:, 2:]], axis=1)
+    else:
+        uv = _grid(surface, tolerance)
+        number = np.full((len(uv), 3), -1)
+    n = len(uv)
+    rim, hollow = np.full((n, 3), -1), np.zeros((n, 3), dtype=bool)
+    rim_t, rim_second, beside = np.zeros((n, 3, 2)), np.zeros((n, 3, 2)), np.zeros((n, 2))
+    if face.boundary:
+        border = cells.border
+        for c in np.unique(border.curve[border.curve >= 0]):
+            curve = face.boundary[c]
+            row, k = np.nonzero((number >= 0) & (border.curve[np.maximum(number, 0)] == c))
+            t = border.t[number[row, k]]
+            rim[row, k], rim_t[row, k] = c, t
+            rim_second[row, k], hollow[row, k] = curve_bounds(curve, t), bends_away(curve, t)
+            np.maximum.at(beside, row, _displaced(surface, border.ends[number[row, k]], curve.evaluate(t.ravel())))
+    reach = (0.125 * np.diff(rim_t, axis=2) ** 2 * rim_second).max(axis=1) + beside
+    low, high = uv.min(axis=1) - reach, uv.max(axis=1) + reach
+    for d in range(2):
+        if not surface.closed[d]:
+            low[:, d], high[:, d] = np.maximum(low[:, d], surface.domain[d][0]), np.minimum(high[:, d], surface.domain[d][1])
+    first, second = surface_bounds(surface, low, high)
+    if shape == FLAT and np.ptp(surface.weights) == 0.0 and max(surface.degree) == 1 and surface.control_points.shape[:2] == (2, 2):
+        net = surface.control_points
+        if np.abs(net[0, 0] - net[1, 0] - net[0, 1] + net[1, 1]).max() <= EXACT * np.abs(net).max():
+            second = np.zeros_like(second)
+    far = float(np.abs(surface.control_points).max())
+    return CellTable(
+        uv, second, first, rim, rim_t, rim_second, hollow, ROUNDING * far + off + (first * beside).sum(axis=1), shape, ruling
+    )
+
+
+def _displaced(surface: NurbsSurface, ends: Array, true: Array) -> Array:
+    """How far ends of chords (n, 2, 2) are from the points (2 n, 2) of their curves, modulo periods: the larger, (n, 2).
+
+    Ends may have been moved onto a line of the triangulation's grid.
+    """
+    apart = ends - true.reshape(ends.shape)
+    for d in range(2):
+        if surface.closed[d]:
+            period = float(np.ptp(surface.domain[d]))
+            apart[..., d] -= period * np.round(apart[..., d] / period)
+    largest: Array = np.abs(apart).max(axis=1)
+    return largest

@@ -1,0 +1,186 @@
+"""Trees of cells of several bodies in one block of memory, which grows, and the fronts of their pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._record import place_of, rows_of
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.evaluate import spline_curve_at, surface_at
+from assembly.proximity.clearance.body_cells import BodyCells, cells_of_body
+from assembly.proximity.clearance.records import (
+    CELL_FACE,
+    COUNTS,
+    COUNTS_SIZE,
+    LINKS,
+    LINKS_SIZE,
+    NODE,
+    NODE_SIZE,
+    NODES_SIZE,
+    NONE,
+    PAIR,
+    PAIR_SIZE,
+    PARTED_SIZE,
+)
+
+__all__ = ["Fronts", "PackedForest"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+# Rows that there is room for at first, beside those of the first cells, and at most.
+SPARE, MOST = 1024, 1 << 20
+ROOM = 512
+WORK = (3, 64)
+_CORNER = place_of(NODE, "corner")
+
+
+class PackedForest:
+    """The trees of several bodies.
+
+    Parameters
+    ----------
+    shapes : sequence of tuple of Face
+        Of every body its faces; equal ones share a tree.
+
+    Attributes
+    ----------
+    arrays : tuple
+        As kernels take them (`Forest`).
+    roots : list of int
+        The row of every body's root.
+    cells : list of BodyCells
+        Of every body what was made once for its faces.
+    """
+
+    def __init__(self, shapes: Sequence[tuple[Face, ...]]) -> None:
+        distinct = list(dict.fromkeys(shapes))
+        self.made = [cells_of_body(faces) for faces in distinct]
+        table, pool, faces, links, nodes = [], [], [], [], []
+        at = used = face_at = row_at = 0
+        first: dict[tuple[Face, ...], int] = {}
+        for shape, cells in zip(distinct, self.made, strict=True):
+            records = cells.faces.copy()
+            rows = rows_of(CELL_FACE, records)
+            rows.surface += at
+            moved = _moved(cells, at, used, rows.surface - at)
+            link = cells.links.copy()
+            view = rows_of(LINKS, link)
+            for field, by in (("child", row_at), ("face", face_at), ("rim", at)):
+                column = view[field]
+                column[column != NONE] += by
+            first[shape] = row_at
+            table.append(moved)
+            pool.append(cells.pool)
+            faces.append(records)
+            links.append(link)
+            nodes.append(cells.nodes)
+            at, used = at + len(moved), used + len(cells.pool)
+            face_at, row_at = face_at + len(records), row_at + len(link)
+        self._fixed = np.concatenate(table), np.concatenate(pool), np.concatenate(faces)
+        self._links = np.zeros((row_at + SPARE, LINKS_SIZE), dtype=np.int64)
+        self._nodes = np.zeros((row_at + SPARE, NODE_SIZE))
+        self._links[:row_at], self._nodes[:row_at] = np.concatenate(links), np.concatenate(nodes)
+        self._used = np.array([row_at])
+        self.roots = [first[shape] for shape in shapes]
+        self.cells = [self.made[distinct.index(shape)] for shape in shapes]
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.generic], ...]:
+        """As kernels take them."""
+        return (*self._fixed, self._links, self._nodes, self._used)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether a cell found no room for its children."""
+        return bool(self._used[0] + 2 > len(self._links))
+
+    def grow(self) -> bool:
+        """Twice the room; False where that is more than a tree may have."""
+        if 2 * len(self._links) > MOST:
+            return False
+        self._links = np.concatenate([self._links, np.zeros_like(self._links)])
+        self._nodes = np.concatenate([self._nodes, np.zeros_like(self._nodes)])
+        return True
+
+    def corners(self, body: int, component: int) -> Array:
+        """Points of a connected part of a body's boundary, (n, 3): a corner of each of its first cells."""
+        cells = self.cells[body]
+        rows = cells.first[cells.component == component]
+        return cells.nodes[rows, _CORNER : _CORNER + 3]
+
+
+def _moved(cells: BodyCells, at: int, used: int, surfaces: Table) -> Table:
+    """A body's table with places in the pool as they are behind others."""
+    table = cells.table.copy()
+    for place in surfaces.tolist():
+        patch = surface_at(table, place)
+        for field in ("breaks_u", "breaks_v", "coefficients", "cells"):
+            patch[field] += used
+    for place in cells.curves.tolist():
+        curve = spline_curve_at(table, place)
+        curve.breaks += used
+        curve.coefficients += used
+    return table
+
+
+class Fronts:
+    """The fronts of pairs of bodies; see `Front`.
+
+    Parameters
+    ----------
+    forest : PackedForest
+    pairs : sequence of (int, int)
+        Numbers of bodies.
+    needed, touch : sequence of float
+        Of every pair what gaps have to be larger than, and by how much cells may cross that are not said to.
+    resolution : float
+        The size of pairs of cells that stay open, in parts of the larger body's size.
+    budget : int
+        After so many pairs of nodes in a look pairs of cells stay open.
+    """
+
+    def __init__(
+        self,
+        forest: PackedForest,
+        pairs: Sequence[tuple[int, int]],
+        needed: Sequence[float],
+        touch: Sequence[float],
+        resolution: float = 1e-7,
+        budget: int = 20_000,
+    ) -> None:
+        n = len(pairs)
+        self._pair, self._counts = np.zeros((n, PAIR_SIZE)), np.zeros((n, COUNTS_SIZE), dtype=np.int64)
+        self.pair, self.counts = rows_of(PAIR, self._pair), rows_of(COUNTS, self._counts)
+        both = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        self.counts.body_a, self.counts.body_b = both.T
+        roots = np.array(forest.roots)
+        self.counts.root_a, self.counts.root_b = roots[both].T
+        self.counts.budget = budget
+        size, far = np.array([[cells.size, cells.far] for cells in forest.cells]).T
+        self.pair.needed, self.pair.touch = needed, touch
+        self.pair.resolution = resolution * size[both].max(axis=1)
+        self.pair.far = far[both].sum(axis=1)
+        self._room(ROOM)
+
+    def _room(self, room: int) -> None:
+        n = len(self._pair)
+        self.parted, self.nodes = np.zeros((n, room, PARTED_SIZE)), np.zeros((n, room, NODES_SIZE), dtype=np.int64)
+        self._waiting = np.zeros((room, PARTED_SIZE)), np.zeros((room, NODES_SIZE), dtype=np.int64), np.zeros(WORK)
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.generic], ...]:
+        """As kernels take them."""
+        return (self._pair, self._counts, self.parted, self.nodes, *self._waiting)
+
+    def grow(self) -> bool:
+        """Twice the room for every front; False where that is more than one may have."""
+        room = self.parted.shape[1]
+        if 2 * room > MOST:
+            return False
+        parted, nodes = self.parted, self.nodes
+        self._room(2 * room)
+        self.parted[:, :room], self.nodes[:, :room] = parted, nodes
+        return True

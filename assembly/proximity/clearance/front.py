@@ -1,0 +1,129 @@
+"""The front of a pair of bodies: pairs of nodes that together stand for all pairs of points, each with what parts it.
+
+As long as points of body b have gone less than a gap, its pair need not be asked again; the least of these lengths tells
+of all pairs at once. After that the gap along the same direction is asked, some nanoseconds; where it does not hold,
+another direction is sought, and then the larger node is replaced by its children.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+from assembly._kernel import kernel
+from assembly.kinematics.motion import RelativePose
+from assembly.proximity.clearance.halve import put, vector
+from assembly.proximity.clearance.records import (
+    BY_BORE_B,
+    BY_PLANE,
+    counts_at,
+    nodes_at,
+    pair_proof_at,
+    parted_at,
+)
+from assembly.proximity.clearance.separation import gap_of
+from assembly.proximity.clearance.way import stays_apart
+
+# What is kept of a pair of bodies. pair: a PAIR; counts: COUNTS; parted, nodes: rows of PARTED and NODES, the front;
+# waiting, waiting_nodes: the same of the queue of a look, a ring; work: (3, 64) to work in.
+Front = namedtuple("Front", "pair counts parted nodes waiting waiting_nodes work")
+# What a look asks for. needed: every gap has to be larger; touch: cells that cross by no more are no crossing;
+# resolution: pairs of cells that are smaller stay open; budget: so do those after so many pairs.
+Limits = namedtuple("Limits", "needed touch resolution budget")
+# Two nodes, and what parts them.
+Parted = namedtuple("Parted", "a b how")
+
+
+@kernel(inner=True)
+def begin_front(front):
+    """A front of one pair, the roots, of which nothing is known."""
+    counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
+    counts.count = 0
+    pair.travelled = 0.0
+    pair.soonest = math.inf
+    keep(front, Parted(counts.root_a, counts.root_b, BY_PLANE), (0.0, 0.0, 0.0), -math.inf)
+
+
+@kernel(inline=True)
+def last_pose(front):
+    """The pose of the last look."""
+    r, x = pair_proof_at(front.pair, 0).turn, pair_proof_at(front.pair, 0).shift
+    return RelativePose((r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]), (x[0], x[1], x[2]))
+
+
+@kernel(inner=True)
+def remember(front, pose):
+    """Make a pose the last one."""
+    pair = pair_proof_at(front.pair, 0)
+    for k in range(9):
+        pair.turn[k] = pose.rotation[k]
+    put(pair.shift, pose.shift)
+
+
+@kernel(inner=True)
+def keep(front, nodes, n, expiry):
+    """Put a pair of nodes into the front."""
+    counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
+    i = counts.count
+    counts.count = i + 1
+    row, parted = nodes_at(front.nodes, i), parted_at(front.parted, i)
+    row.a, row.b, row.how = nodes
+    put(parted.normal, n)
+    parted.expiry = expiry
+    pair.soonest = min(pair.soonest, expiry)
+
+
+@kernel(inline=True)
+def expiry_of(nodes, travelled, gap):
+    """Until points of b have gone so far in all, two nodes are parted for certain.
+
+    Points of a are seen from b in a bore of which the root's radius tells nothing: they are asked every time.
+    """
+    return -math.inf if nodes.how == BY_BORE_B else travelled + gap
+
+
+@kernel(inner=True)
+def put_waiting(front, at, nodes, n):
+    """Write a pair of nodes into place `at` of the queue."""
+    k = at % len(front.waiting)
+    row = nodes_at(front.waiting_nodes, k)
+    row.a, row.b, row.how = nodes
+    put(parted_at(front.waiting, k).normal, n)
+
+
+@kernel(inner=True)
+def put_back(front, head, tail):
+    """Pairs that were not decided go to the front, as such of which nothing is known."""
+    for at in range(head, tail):
+        k = at % len(front.waiting)
+        row = nodes_at(front.waiting_nodes, k)
+        keep(front, Parted(row.a, row.b, row.how), vector(parted_at(front.waiting, k).normal), -math.inf)
+
+
+@kernel(inner=True)
+def ask_again(forest, front, way, needed):
+    """Ask the front at a new pose along its directions. Pairs that fail go to the queue; returns how many."""
+    counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
+    travelled = pair.travelled
+    count = counts.count
+    counts.count = 0
+    pair.soonest = math.inf
+    tail = 0
+    for i in range(count):
+        row, parted = nodes_at(front.nodes, i), parted_at(front.parted, i)
+        nodes, n, expiry = Parted(row.a, row.b, row.how), vector(parted.normal), parted.expiry
+        if expiry <= travelled:
+            counts.asked += 1
+            gap = gap_of(forest, nodes, way.after, n) - needed
+            # At the last pose the gap was this at least.
+            fine = stays_apart(forest, nodes, way, n, (expiry - (travelled - way.moved), gap))
+            if gap > 0.0 and not fine:
+                before = gap_of(forest, nodes, way.before, n) - needed
+                fine = stays_apart(forest, nodes, way, n, (before, gap))
+            expiry = expiry_of(nodes, travelled, gap)
+            if not fine:
+                put_waiting(front, tail, nodes, n)
+                tail += 1
+                continue
+        keep(front, nodes, n, expiry)
+    return tail

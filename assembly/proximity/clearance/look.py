@@ -1,0 +1,279 @@
+"""A look at a pair of bodies: proof that they are clear at a pose, and on the way to it, or that they cross."""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly._record import Store
+from assembly.geometry.vec import dot, matmul_t, matvec_t, quaternion_matrix, quaternion_product
+from assembly.kinematics.motion import RelativePose, exponential, rotation
+from assembly.proximity.clearance.front import (
+    Front,
+    Limits,
+    Parted,
+    ask_again,
+    begin_front,
+    expiry_of,
+    keep,
+    last_pose,
+    put_back,
+    put_waiting,
+    remember,
+)
+from assembly.proximity.clearance.halve import halve, put, vector
+from assembly.proximity.clearance.inside import FOREST
+from assembly.proximity.clearance.records import (
+    BY_PLANE,
+    CLEAR,
+    CROSSING,
+    NO_ROOM,
+    NONE,
+    OPEN,
+    UNSWEPT,
+    Forest,
+    counts_at,
+    links_at,
+    node_at,
+    nodes_at,
+    pair_proof_at,
+    parted_at,
+)
+from assembly.proximity.clearance.separation import best_bore, best_direction, gap_of, is_cell, is_round, separation
+from assembly.proximity.clearance.stab import crossing_of
+from assembly.proximity.clearance.way import pose_at, sag_of, stays_apart, way_of
+
+# The most pairs that directions are sought for over a way at once: halving it is cheaper than more. The shortest part
+# of a way.
+SWEPT_BUDGET, SHORTEST = 4000, 1.0 / 256.0
+# How a pair of nodes was left: parted, to be replaced by children, open, or with it the look ends.
+DONE, DIVIDED, ENDED = 0, 1, 2
+
+
+@kernel(inner=True)
+def part_nodes(forest, front, way, nodes, hint, needed):
+    """Seek what parts two nodes. Whether it does, the direction, the gaps before and after, and whether hulls overlap."""
+    a, b = nodes.a, nodes.b
+    n, gap, overlap = best_direction(forest, a, b, way.after, hint, needed + way.sag, front.work)
+    gap -= needed
+    before = math.inf
+    if gap > 0.0 and way.swept:
+        before = separation(forest, a, b, way.before, n) - needed
+    travelled = pair_proof_at(front.pair, 0).travelled
+    if stays_apart(forest, nodes, way, n, (before, gap)):
+        keep(front, nodes, n, travelled + gap)
+        return True, n, (before, gap), overlap
+    how, room = best_bore(forest, a, b, way.after)
+    if how != BY_PLANE and room > needed:
+        inside = Parted(a, b, how)
+        at_start = gap_of(forest, inside, way.before, n) - needed if way.swept else math.inf
+        if stays_apart(forest, inside, way, n, (at_start, room - needed)):
+            keep(front, inside, n, expiry_of(inside, travelled, room - needed))
+            return True, n, (before, gap), overlap
+    return False, n, (before, gap), overlap
+
+
+@kernel(inner=True)
+def is_halved_first(forest, a, b, short):
+    """Of two nodes whose gap is short by so much: whether a is halved, and whether by length or by chord error.
+
+    The larger one is. Of two cells that only their radii keep from being parted, the thicker; and what is round, and
+    exact, not as long as what is beside it could be finer.
+    """
+    round_a, round_b = is_round(forest, a), is_round(forest, b)
+    cell_a, cell_b = is_cell(forest, a), is_cell(forest, b)
+    one, other = node_at(forest.nodes, a), node_at(forest.nodes, b)
+    if cell_a and cell_b:
+        if one.reach + other.reach >= 0.5 * short:
+            return one.reach > other.reach, False
+        return one.radius > other.radius, True
+    if round_b and not round_a and (not cell_a or one.reach >= 0.25 * short + 2.0 * one.pad):
+        return True, False
+    if round_a and not round_b and (not cell_b or other.reach >= 0.25 * short + 2.0 * other.pad):
+        return False, False
+    # A cell is not halved for a box that is not yet taken apart.
+    if cell_a or cell_b:
+        return cell_b, True
+    return one.radius > other.radius, True
+
+
+@kernel(inline=True)
+def fineness(forest, k):
+    """How much smaller nodes than node k could still be."""
+    node = node_at(forest.nodes, k)
+    return node.reach if is_cell(forest, k) else node.radius
+
+
+@kernel(inner=True)
+def is_too_long(forest, way, nodes, gaps):
+    """Whether nodes that are clear at the end of a way need a shorter one, rather than to be halved."""
+    before, after = gaps
+    if not way.swept or not after > 0.0:
+        return False
+    small = node_at(forest.nodes, nodes.a).radius + node_at(forest.nodes, nodes.b).radius < way.moved
+    finer = fineness(forest, nodes.a) + (0.0 if is_round(forest, nodes.b) else fineness(forest, nodes.b))
+    return small or (before > 0.0 and finer < sag_of(way, forest, nodes.b) - min(after, before))
+
+
+@kernel(inner=True)
+def divide(forest, front, nodes, n, tail, short):
+    """Put the children of one of two nodes into the queue, beside the other one; False where there is no room."""
+    a, b = nodes.a, nodes.b
+    first, by_length = is_halved_first(forest, a, b, short)
+    k = a if first else b
+    if links_at(forest.links, k).child == NONE:
+        counts_at(front.counts, 0).halved += 1
+        if not halve(forest, k, by_length):
+            return False
+    child = links_at(forest.links, k).child
+    for i in range(2):
+        pair = Parted(child + i, b, BY_PLANE) if first else Parted(a, child + i, BY_PLANE)
+        put_waiting(front, tail + i, pair, n)
+    return True
+
+
+@kernel(inner=True)
+def crosses(forest, front, nodes, pose, touch):
+    """Whether two cells are proven to cross by more than `touch`; where is written."""
+    pair = pair_proof_at(front.pair, 0)
+    counts_at(front.counts, 0).stabbed += 1
+    depth, place = crossing_of(forest, nodes.a, nodes.b, pose, front.work)
+    if depth <= touch:
+        return False
+    pair.depth = depth
+    put(pair.place, place)
+    return True
+
+
+@kernel(inner=True)
+def seek(forest, front, way, limits, tail):
+    """Seek what parts the pairs of the queue, of which there are `tail`."""
+    counts = counts_at(front.counts, 0)
+    room = min(len(front.waiting), len(front.nodes))
+    head = 0
+    while head < tail:
+        if counts.count + tail - head + 2 >= room:
+            put_back(front, head, tail)
+            return NO_ROOM
+        row = nodes_at(front.waiting_nodes, head % len(front.waiting))
+        nodes = Parted(row.a, row.b, BY_PLANE)
+        hint = vector(parted_at(front.waiting, head % len(front.waiting)).normal)
+        head += 1
+        counts.sought += 1
+        if way.swept and head > SWEPT_BUDGET:
+            put_back(front, head - 1, tail)
+            return UNSWEPT
+        parted, n, gaps, overlap = part_nodes(forest, front, way, nodes, hint, limits.needed)
+        if parted:
+            continue
+        cells = is_cell(forest, nodes.a) and is_cell(forest, nodes.b)
+        if cells and overlap and crosses(forest, front, nodes, way.after, limits.touch):
+            put_back(front, head - 1, tail)
+            return CROSSING
+        if is_too_long(forest, way, nodes, gaps):
+            put_back(front, head - 1, tail)
+            return UNSWEPT
+        small = node_at(forest.nodes, nodes.a).radius + node_at(forest.nodes, nodes.b).radius < limits.resolution
+        if cells and (small or head > limits.budget):
+            counts.opened += 1
+            keep(front, nodes, n, -math.inf)
+            continue
+        if not divide(forest, front, nodes, n, tail, max(way.sag - gaps[1], 0.0)):
+            put_back(front, head - 1, tail)
+            return NO_ROOM
+        tail += 2
+    return OPEN if counts.opened > 0 else CLEAR
+
+
+@kernel(inner=True)
+def look(forest, front, pose, limits, swept):
+    """Prove that all pairs of the front are clear by more than `needed` at a pose and, swept, from the last one on."""
+    counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
+    root = node_at(forest.nodes, counts.root_b)
+    way = way_of(last_pose(front), pose, vector(root.center), root.radius, swept)
+    counts.opened = 0
+    pair.travelled += way.moved
+    code = CLEAR
+    if not pair.travelled < pair.soonest:
+        tail = ask_again(forest, front, way, limits.needed)
+        if tail > 0:
+            code = seek(forest, front, way, limits, tail)
+    if code != NO_ROOM and code != UNSWEPT:
+        remember(front, pose)
+    else:
+        # Gaps were measured at the end of the way, and b stays where it was: as if it had gone there and back.
+        pair.travelled += way.moved
+    return code
+
+
+@kernel(inner=True)
+def go_to(forest, front, pose, limits):
+    """A look at a pose and at the way to it, which is taken in parts where it is too long for one look.
+
+    `part` of the pair's record tells how much of the way was looked at.
+    """
+    pair = pair_proof_at(front.pair, 0)
+    root = node_at(forest.nodes, counts_at(front.counts, 0).root_b)
+    whole = way_of(last_pose(front), pose, vector(root.center), root.radius, True)
+    code = look(forest, front, pose, limits, True)
+    pair.part = 1.0 if code == CLEAR else 0.0
+    done, step = 0.0, 0.5
+    while code == UNSWEPT or (code == CLEAR and pair.part < 1.0):
+        to = min(done + step, 1.0)
+        code = look(forest, front, pose if to == 1.0 else pose_at(whole, to), limits, True)
+        if code == UNSWEPT:
+            step *= 0.5
+            if step < SHORTEST:
+                break
+        elif code == CLEAR:
+            done = to
+            pair.part = to
+            step *= 2.0
+    return code
+
+
+# What is to be done with a pair.
+PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY = 0, 1, 2, 3
+# What rounding of poses and of sums of coordinates may do to a gap, in parts of these: some thirty roundings.
+ROUNDING = 4e-15
+
+
+@kernel(inner=True)
+def posed_with_move(q, a, b, move):
+    """The pose of body b, moved by a translation and a small rotation about its origin in world axes, seen from a."""
+    turn = quaternion_product(exponential((move[3], move[4], move[5])), (q[b, 3], q[b, 4], q[b, 5], q[b, 6]))
+    rotation_a, rotation_b = rotation(q, a), quaternion_matrix(turn[0], turn[1], turn[2], turn[3])
+    d = (q[b, 0] - q[a, 0] + move[0], q[b, 1] - q[a, 1] + move[1], q[b, 2] - q[a, 2] + move[2])
+    return RelativePose(matmul_t(rotation_a, rotation_b), matvec_t(rotation_a, d))
+
+
+FRONTS = (
+    "Tuple((f8[:, ::1], i8[:, ::1], f8[:, :, ::1], i8[:, :, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1]))"
+)
+
+
+@kernel(signatures=f"({FOREST}, {FRONTS}, f8[:, ::1], f8[:, ::1], i8[::1], i8[::1])", allocates=True)
+def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes):
+    """Look at pairs of bodies at poses q (n, 7), each after a move (6) of its second body; how each look ended."""
+    table, pool, faces, links, tree_nodes, used = forest_arrays
+    forest = Forest(Store(table, pool), faces, links, tree_nodes, used)
+    pairs, counts, parted, nodes, waiting, waiting_nodes, work = front_arrays
+    for k in range(len(tasks)):
+        if tasks[k] == PASSED_BY:
+            continue
+        front = Front(pairs[k], counts[k], parted[k], nodes[k], waiting, waiting_nodes, work)
+        pair, count = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
+        count.asked = 0
+        count.sought = 0
+        count.halved = 0
+        count.stabbed = 0
+        pose = posed_with_move(q, count.body_a, count.body_b, moves[k])
+        far = pair.far + math.sqrt(dot(pose.shift, pose.shift))
+        limits = Limits(pair.needed + ROUNDING * far, pair.touch, pair.resolution, count.budget)
+        if tasks[k] == BEGUN_ANEW:
+            begin_front(front)
+        if tasks[k] == ON_WAY:
+            codes[k] = go_to(forest, front, pose, limits)
+        else:
+            codes[k] = look(forest, front, pose, limits, False)
+            pair.part = 1.0

@@ -1,0 +1,203 @@
+"""What is known of pairs of bodies at poses: clear, touching, crossing, one within the other, or undecided; proven."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._read_only import ReadOnlyArrays
+from assembly.geometry.faces.face import Face
+from assembly.kinematics.pose import rotation_matrix
+from assembly.proximity.clearance.forest import Fronts, PackedForest
+from assembly.proximity.clearance.inside import UNCLEAR, winding_of
+from assembly.proximity.clearance.look import AT_POSE, BEGUN_ANEW, ON_WAY, PASSED_BY, look_at_pairs
+from assembly.proximity.clearance.records import CLEAR, CROSSING, NO_ROOM, OPEN
+
+__all__ = ["Answer", "ClearanceProof", "Verdict"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+# A front that has grown by more than this factor and number is begun anew.
+GROWN, MANY = 2, 200
+# Places in the stack of a ray, and points of which rays start, at most, of each part of a body.
+STACK, POINTS = 4096, 12
+
+
+class Verdict(Enum):
+    """What two bodies are to each other; the value says it in a sentence."""
+
+    CLEAR = "apart by at least the bound, and neither is within the other"
+    TOUCHING = "clear once one of them is moved by no more than the depth"
+    CROSSING = "their boundaries cross, and no translation by less than the depth undoes it"
+    ENCLOSED = "one is wholly within the other, their boundaries apart by at least the bound"
+    UNDECIDED = "none of this is proven within the budget"
+
+
+@dataclass(frozen=True, eq=False)
+class Answer(ReadOnlyArrays):
+    """What is proven of a pair of bodies.
+
+    Attributes
+    ----------
+    verdict : Verdict
+    bound : float
+        A lower bound of the distance of their boundaries; -inf where none is known.
+    depth : float
+        See `Verdict`.
+    place : (3,)
+        Of a crossing, where it was found, in the world; else NaN.
+    swept : bool
+        Whether the way from the last look is proven as well.
+    part : float
+        Of that way, up to where it was looked at.
+    """
+
+    verdict: Verdict
+    bound: float = -np.inf
+    depth: float = 0.0
+    place: Array = field(default_factory=lambda: np.full(3, np.nan))
+    swept: bool = False
+    part: float = 1.0
+
+
+class ClearanceProof:
+    """The proofs of pairs of bodies, kept from look to look.
+
+    Parameters
+    ----------
+    shapes : sequence of tuple of Face
+        Of every body its faces; bodies without any are of no pair.
+    pairs : sequence of (int, int)
+        Numbers of bodies.
+    minimum : sequence of float
+        Of every pair, what its gap is to be at least.
+    touching : sequence of float
+        How deep its bodies may be in each other where they touch.
+    """
+
+    def __init__(
+        self,
+        shapes: Sequence[tuple[Face, ...]],
+        pairs: Sequence[tuple[int, int]],
+        minimum: Sequence[float],
+        touching: Sequence[float],
+    ) -> None:
+        self.pairs = list(pairs)
+        used = sorted({body for pair in pairs for body in pair})
+        self._number = {body: k for k, body in enumerate(used)}
+        self.forest = PackedForest([shapes[body] for body in used])
+        local = [(self._number[a], self._number[b]) for a, b in pairs]
+        self.fronts = Fronts(self.forest, local, minimum, touching)
+        self.fronts.counts.body_a, self.fronts.counts.body_b = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+        self.minimum, self.touching = np.array(minimum, dtype=float), np.array(touching, dtype=float)
+        self._codes, self._stack = np.zeros(len(self.pairs), dtype=np.int64), np.zeros(STACK, dtype=np.int64)
+        self._begun = np.zeros(len(self.pairs), dtype=bool)
+
+    def look(self, q: Array, moves: Array | None = None, which: Sequence[int] | None = None, swept: bool = False) -> list[Answer]:
+        """What is proven at poses.
+
+        Parameters
+        ----------
+        q : (n, 7)
+            A row a body.
+        moves : (pairs, 6), optional
+            Of every pair, a move of its second body before it is looked at: a translation, and a small rotation about
+            its origin, in world axes.
+        which : sequence of int, optional
+            The pairs that are looked at; all by default.
+        swept : bool
+            Whether the way from the last look is to be proven as well, of pairs that were clear there.
+        """
+        rows = list(range(len(self.pairs)) if which is None else which)
+        moved = np.zeros((len(self.pairs), 6)) if moves is None else np.ascontiguousarray(moves, dtype=float)
+        tasks = np.zeros(len(self.pairs), dtype=np.int64)
+        counts, pair = self.fronts.counts, self.fronts.pair
+        grown = counts.count > GROWN * counts.fresh + MANY
+        tasks[rows] = np.where(~self._begun | grown, BEGUN_ANEW, np.where(swept & (pair.known == 1.0), ON_WAY, AT_POSE))[rows]
+        anew = tasks == BEGUN_ANEW
+        self._run(np.ascontiguousarray(q, dtype=float), moved, tasks)
+        counts.fresh[anew] = counts.count[anew]
+        self._begun[rows] = True
+        return [self._answer(k, q, moved[k], bool(swept and tasks[k] != AT_POSE and not anew[k])) for k in rows]
+
+    def _run(self, q: Array, moves: Array, tasks: Table) -> None:
+        waiting = tasks.copy()
+        while waiting.any():
+            look_at_pairs(self.forest.arrays, self.fronts.arrays, q, moves, waiting, self._codes)
+            short = (waiting != PASSED_BY) & (self._codes == NO_ROOM)
+            if not short.any():
+                return
+            if not (self.forest.grow() if self.forest.is_full else self.fronts.grow()):
+                self._codes[short] = OPEN
+                return
+            waiting = np.where(short & (waiting == BEGUN_ANEW), AT_POSE, np.where(short, waiting, PASSED_BY))
+
+    def bound(self, k: int) -> float:
+        """A lower bound of the distance of pair k at its last look, where that ended clear."""
+        pair = self.fronts.pair[k]
+        return float(pair.soonest - pair.travelled) + float(pair.needed)
+
+    def _answer(self, k: int, q: Array, move: Array, swept: bool) -> Answer:
+        pair, code = self.fronts.pair[k], int(self._codes[k])
+        known = bool(pair.known == 1.0)
+        pair.known = 0.0
+        part = float(pair.part)
+        if code == CROSSING:
+            place = rotation_matrix(q[self.pairs[k][0], 3:]) @ pair.place + q[self.pairs[k][0], :3]
+            return Answer(Verdict.CROSSING, depth=float(pair.depth), place=place, part=part)
+        if code != CLEAR:
+            return Answer(Verdict.UNDECIDED, part=part)
+        nested = False if swept and known else self.nested(k, q, move)
+        if nested is None:
+            return Answer(Verdict.UNDECIDED, part=part)
+        bound = self.bound(k)
+        if nested:
+            return Answer(Verdict.ENCLOSED, bound, bound)
+        pair.known = 1.0
+        far = float(np.linalg.norm(move[:3]))
+        if far > 0.0 or move[3:].any():
+            return Answer(Verdict.TOUCHING, bound - far, far, swept=swept)
+        return Answer(Verdict.CLEAR, bound, swept=swept)
+
+    def nested(self, k: int, q: Array, move: Array) -> bool | None:
+        """Whether a body of pair k, whose boundaries are apart, is within the other one; None where no ray tells.
+
+        One point of every connected part of a boundary is enough.
+        """
+        a, b = self.pairs[k]
+        turn_a, turn_b = rotation_matrix(q[a, 3:]), _turned(move[3:]) @ rotation_matrix(q[b, 3:])
+        at_a, at_b = q[a, :3], q[b, :3] + move[:3]
+        for outer, inner, turns, places in ((a, b, (turn_a, turn_b), (at_a, at_b)), (b, a, (turn_b, turn_a), (at_b, at_a))):
+            number = self._number[outer]
+            if not self.forest.cells[number].is_closed:
+                continue
+            inside = self.forest.cells[self._number[inner]]
+            for component in np.unique(inside.component):
+                points = self.forest.corners(self._number[inner], component)
+                points = (points @ turns[1].T + places[1] - places[0]) @ turns[0]
+                side = self._winding(number, points)
+                if side != 0:
+                    return None if side == UNCLEAR else True
+        return False
+
+    def _winding(self, body: int, points: Array) -> int:
+        """Whether points of a boundary that does not cross a body's are within that: 1, 0, or UNCLEAR."""
+        some = np.ascontiguousarray(points[np.linspace(0, len(points) - 1, min(len(points), POINTS)).astype(int)])
+        found = np.full(len(some), UNCLEAR)
+        while True:
+            asked = winding_of(self.forest.arrays, self.forest.roots[body], some, self._stack, found)
+            if found[asked - 1] != UNCLEAR or not self.forest.is_full or not self.forest.grow():
+                return int(found[asked - 1])
+
+
+def _turned(vector: Array) -> Array:
+    """The matrix of a rotation vector."""
+    angle = float(np.linalg.norm(vector))
+    if angle == 0.0:
+        return np.eye(3)
+    axis = vector / angle
+    return rotation_matrix(np.concatenate([[np.cos(0.5 * angle)], np.sin(0.5 * angle) * axis]))

@@ -1,0 +1,223 @@
+"""What parts two nodes: a plane between them, or the bore of a wall of one in which the other one is.
+
+Everything is seen from body a: a point y of body b is at R y + t. A unit direction n points from a to b, and
+
+    gap(n) = min over b of n.y - max over a of n.x
+
+is a lower bound of the distance of what the nodes stand for, whatever n is. What is within a distance d of the axis of a
+bore is farther than (bore - d) from its wall. So whatever finds directions needs no proof: only gaps have to be right.
+
+Both keep apart along a way as well: half spaces and solid cylinders are convex.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.distance.enclosures.gjk import APART, ConvexSet, gjk
+from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, scale, sub
+from assembly.kinematics.motion import IDENTITY, inverse_pose
+from assembly.proximity.clearance.halve import corner_of, vector
+from assembly.proximity.clearance.records import (
+    BY_BORE_A,
+    BY_BORE_B,
+    BY_PLANE,
+    NONE,
+    links_at,
+    node_at,
+)
+
+# The part of a distance to which directions between hulls are sought.
+ROUGHLY = 1e-3
+
+
+@kernel(inline=True)
+def placed(pose, x):
+    """A point of b, seen from a."""
+    return add(matvec(pose.rotation, x), pose.shift)
+
+
+@kernel(inline=True)
+def across(n, axis):
+    """The length of the part of n across a unit axis, by components: sqrt(1 - x^2) would lose half of the digits."""
+    p = sub(n, scale(dot(n, axis), axis))
+    return math.sqrt(dot(p, p))
+
+
+@kernel(inline=True)
+def highest(forest, k, n):
+    """The most that n.x is over node k."""
+    node = node_at(forest.nodes, k)
+    if links_at(forest.links, k).face != NONE:
+        top = dot(corner_of(node, 0), n)
+        for i in range(1, 4):
+            top = max(top, dot(corner_of(node, i), n))
+    else:
+        top = dot(vector(node.center), n)
+        for i in range(3):
+            top += node.half[i] * abs(dot(vector(node.axes[i]), n))
+    if node.disc > 0.0:
+        top += node.disc * across(n, vector(node.ruling))
+    return top + node.rho
+
+
+@kernel(inline=True)
+def separation(forest, a, b, pose, n):
+    """gap(n)."""
+    return dot(n, pose.shift) - highest(forest, b, neg(matvec_t(pose.rotation, n))) - highest(forest, a, n)
+
+
+@kernel(inner=True)
+def room_in_bore(forest, wall, k, pose):
+    """How far node k, at a pose seen from the wall's body, is from the wall of a bore in which it is; else negative."""
+    bore, node = node_at(forest.nodes, wall), node_at(forest.nodes, k)
+    axis, spine = vector(bore.ruling), vector(bore.spine)
+    most = 0.0
+    if links_at(forest.links, k).face != NONE:
+        for i in range(4):
+            d = sub(placed(pose, corner_of(node, i)), spine)
+            most = max(most, across(d, axis))
+    else:
+        center = sub(placed(pose, vector(node.center)), spine)
+        u = scale(node.half[0], matvec(pose.rotation, vector(node.axes[0])))
+        v = scale(node.half[1], matvec(pose.rotation, vector(node.axes[1])))
+        w = scale(node.half[2], matvec(pose.rotation, vector(node.axes[2])))
+        for i in range(8):
+            d = add(center, u) if i & 1 else sub(center, u)
+            d = add(d, v) if i & 2 else sub(d, v)
+            d = add(d, w) if i & 4 else sub(d, w)
+            most = max(most, across(d, axis))
+    return bore.bore - most - node.disc - node.rho
+
+
+@kernel(inner=True)
+def gap_of(forest, nodes, pose, n):
+    """The gap of two nodes, kept apart by a plane of direction n, or by a bore."""
+    if nodes.how == BY_PLANE:
+        return separation(forest, nodes.a, nodes.b, pose, n)
+    if nodes.how == BY_BORE_A:
+        return room_in_bore(forest, nodes.a, nodes.b, pose)
+    return room_in_bore(forest, nodes.b, nodes.a, inverse_pose(pose))
+
+
+@kernel(inner=True)
+def write_corners(forest, k, pose, out):
+    """Corners of a cell, of a box, or of the segment within what is round, seen from a; returns how many."""
+    node = node_at(forest.nodes, k)
+    if links_at(forest.links, k).face != NONE:
+        for i in range(4):
+            out[3 * i], out[3 * i + 1], out[3 * i + 2] = placed(pose, corner_of(node, i))
+        return 4
+    center = placed(pose, vector(node.center))
+    u = scale(node.half[0], matvec(pose.rotation, vector(node.axes[0])))
+    if is_round(forest, k):
+        out[0], out[1], out[2] = add(center, u)
+        out[3], out[4], out[5] = sub(center, u)
+        return 2
+    v = scale(node.half[1], matvec(pose.rotation, vector(node.axes[1])))
+    w = scale(node.half[2], matvec(pose.rotation, vector(node.axes[2])))
+    for i in range(8):
+        d = add(center, u) if i & 1 else sub(center, u)
+        d = add(d, v) if i & 2 else sub(d, v)
+        d = add(d, w) if i & 4 else sub(d, w)
+        out[3 * i], out[3 * i + 1], out[3 * i + 2] = d
+    return 8
+
+
+@kernel(inline=True)
+def is_round(forest, k):
+    """Whether node k is the exact hull of what is round."""
+    node = node_at(forest.nodes, k)
+    return links_at(forest.links, k).face == NONE and (node.disc > 0.0 or node.rho > 0.0)
+
+
+@kernel(inline=True)
+def is_cell(forest, k):
+    """Whether node k is a cell."""
+    return links_at(forest.links, k).face != NONE
+
+
+@kernel(inner=True)
+def try_planes_of_boxes(forest, a, b, pose, middle, enough):
+    """The best of the axes of two boxes, as directions toward the middle of b; stops at the first above `enough`."""
+    n, best = (0.0, 0.0, 0.0), -math.inf
+    for i in range(6):
+        if i < 3:
+            m = vector(node_at(forest.nodes, a).axes[i])
+        else:
+            m = matvec(pose.rotation, vector(node_at(forest.nodes, b).axes[i - 3]))
+        if dot(m, middle) < 0.0:
+            m = neg(m)
+        gap = separation(forest, a, b, pose, m)
+        if gap > best:
+            n, best = m, gap
+            if best > enough:
+                break
+    return n, best
+
+
+@kernel(inner=True)
+def try_normals(forest, a, b, pose, found):
+    """The best of a direction and its gap, and of both cells' normals either way."""
+    n, best = found
+    for i in range(2):
+        m = vector(node_at(forest.nodes, a).axes[2])
+        if i == 1:
+            m = matvec(pose.rotation, vector(node_at(forest.nodes, b).axes[2]))
+        for _side in range(2):
+            gap = separation(forest, a, b, pose, m)
+            if gap > best:
+                n, best = m, gap
+            m = neg(m)
+    return n, best
+
+
+@kernel(inner=True)
+def best_direction(forest, a, b, pose, hint, enough, work):
+    """A direction with a large gap, that gap, and whether the hulls overlap. Stops at the first above `enough`."""
+    best = -math.inf
+    n = hint
+    if dot(hint, hint) > 0.5:
+        best = separation(forest, a, b, pose, hint)
+        if best > enough:
+            return n, best, False
+    middle = sub(placed(pose, vector(node_at(forest.nodes, b).center)), vector(node_at(forest.nodes, a).center))
+    length = math.sqrt(dot(middle, middle))
+    if length > 0.0:
+        m = scale(1.0 / length, middle)
+        gap = separation(forest, a, b, pose, m)
+        if gap > best:
+            n, best = m, gap
+            if best > enough:
+                return n, best, False
+    cells = is_cell(forest, a) and is_cell(forest, b)
+    if not cells and not is_round(forest, a) and not is_round(forest, b):
+        m, gap = try_planes_of_boxes(forest, a, b, pose, middle, enough)
+        return (m, gap, False) if gap > best else (n, best, False)
+    count_a = write_corners(forest, a, IDENTITY, work[0])
+    count_b = write_corners(forest, b, pose, work[1])
+    hull_a, hull_b = ConvexSet(work[0], 0, count_a, -1.0), ConvexSet(work[1], 0, count_b, -1.0)
+    how, v, _count = gjk(4, hull_a, hull_b, neg(n), math.inf, ROUGHLY, work[2])
+    length = math.sqrt(dot(v, v))
+    if how == APART and length > 0.0:
+        m = scale(-1.0 / length, v)
+        gap = separation(forest, a, b, pose, m)
+        return (m, gap, False) if gap > best else (n, best, False)
+    if not cells:
+        return n, best, False
+    n, best = try_normals(forest, a, b, pose, (n, best))
+    return n, best, True
+
+
+@kernel(inner=True)
+def best_bore(forest, a, b, pose):
+    """Which of two nodes is the wall of a bore that the other one is in, and by how much it is clear of that."""
+    how, best = BY_PLANE, -math.inf
+    if node_at(forest.nodes, a).bore > 0.0:
+        how, best = BY_BORE_A, room_in_bore(forest, a, b, pose)
+    if node_at(forest.nodes, b).bore > 0.0:
+        gap = room_in_bore(forest, b, a, inverse_pose(pose))
+        if gap > best:
+            how, best = BY_BORE_B, gap
+    return how, best

@@ -1,0 +1,142 @@
+"""The way between two poses of body b, seen from a: a straight line and a rotation about one axis.
+
+The middle of b's root goes along a straight line, and b turns about it, with constant rates. A point then leaves the
+straight line between its two places by no more than its distance from the axis of rotation times 1 - cos(angle / 2): the
+height of the arc over its chord, here called its sag. What is convex and holds two points holds their chord: nodes that
+one plane, or one bore, keeps apart at both poses by more than the sag are apart all the way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, blend, dot, matmul_t, matvec, scale, sub
+from assembly.kinematics.motion import RelativePose
+from assembly.proximity.clearance.halve import vector
+from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, node_at
+from assembly.proximity.clearance.separation import across, is_round, placed
+
+# swept: whether the way is looked at, or its end alone. moved: the longest way of a point of b. sag: of any point;
+# factor: of a point at distance 1 from the axis of rotation. axis, middle: of that, in axes of b (zero: it is not known).
+# before, after: the poses.
+Way = namedtuple("Way", "swept moved sag factor axis middle before after")
+ROUNDED_UP = 1.0 + 1e-12
+# Below so small a sine of the angle its axis is lost in rounding, above so large an angle as well.
+LEAST_SINE, LARGEST_ANGLE = 1e-9, 3.0
+# What the axis may be off, as a part of distances; the sag of so small angles is far below that.
+AXIS_OFF = 1e-6
+
+
+@kernel(inner=True)
+def way_of(before, after, center, radius, swept):
+    """The way of a ball of b, its middle and its radius in axes of b, from pose to pose."""
+    square = 0.0
+    for k in range(9):
+        square += (after.rotation[k] - before.rotation[k]) ** 2
+    angle = 2.0 * math.asin(min(math.sqrt(square / 8.0), 1.0))
+    d = sub(placed(after, center), placed(before, center))
+    moved = (math.sqrt(dot(d, d)) + angle * radius) * ROUNDED_UP
+    # 1 - cos(angle / 2) = 2 sin^2(angle / 4)
+    half = math.sin(0.25 * angle)
+    factor = 2.0 * half * half * ROUNDED_UP
+    # The rotation seen from b, and its axis by its skew part.
+    m = matmul_t(before.rotation, after.rotation)
+    axis = (m[7] - m[5], m[2] - m[6], m[3] - m[1])
+    length = math.sqrt(dot(axis, axis))
+    if length > LEAST_SINE and angle < LARGEST_ANGLE:
+        axis = scale(1.0 / length, axis)
+    else:
+        axis = (0.0, 0.0, 0.0)
+    return Way(swept, moved, factor * radius if swept else 0.0, factor, axis, center, before, after)
+
+
+@kernel(inline=True)
+def off_axis(way, x):
+    """How far a point of b is from the axis of its rotation, at most."""
+    d = sub(x, way.middle)
+    along = dot(d, way.axis)
+    return across(d, way.axis) + AXIS_OFF * (abs(along) + math.sqrt(dot(d, d)))
+
+
+@kernel(inner=True)
+def sag_of(way, forest, b):
+    """The largest sag in node b; of what is round, of points of its axis."""
+    node = node_at(forest.nodes, b)
+    center = vector(node.center)
+    if is_round(forest, b):
+        u = scale(node.half[0], vector(node.axes[0]))
+        return way.factor * max(off_axis(way, add(center, u)), off_axis(way, sub(center, u)))
+    return way.factor * (off_axis(way, center) + node.radius)
+
+
+@kernel(inline=True)
+def as_ball(forest, b, pose, n, gap):
+    """The gap along n if the disc of what is round were a ball: what it is at least, however its axis turns."""
+    node = node_at(forest.nodes, b)
+    if node.disc == 0.0 or not is_round(forest, b):
+        return gap
+    flat = across(n, matvec(pose.rotation, vector(node.ruling)))
+    return gap - node.disc * (1.0 - flat + 1e-15)
+
+
+@kernel(inner=True)
+def sag_backward(way, forest, a):
+    """The largest sag in node a, at rest, seen from b, whose middle c goes straight and about which it turns.
+
+    Its points are at R' (x - c), whose second derivative over the way is no longer than w^2 |x - c| + 2 w |c'|, w the
+    angle; a curve is off its chord by an eighth of that at most.
+    """
+    node = node_at(forest.nodes, a)
+    start, end = placed(way.before, way.middle), placed(way.after, way.middle)
+    d, e, f = sub(end, start), sub(vector(node.center), start), sub(vector(node.center), end)
+    far = math.sqrt(max(dot(e, e), dot(f, f))) + node.radius
+    angle = 4.0 * math.asin(min(math.sqrt(0.5 * way.factor), 1.0))
+    return 0.125 * angle * (angle * far + 2.0 * math.sqrt(dot(d, d))) * ROUNDED_UP
+
+
+@kernel(inner=True)
+def stays_apart(forest, nodes, way, n, gaps):
+    """Whether two nodes are kept apart all the way by what keeps them apart at both poses, by gaps before and after.
+
+    n is the direction of a plane.
+    """
+    before, after = gaps
+    if not after > 0.0:
+        return False
+    if not way.swept:
+        return True
+    if nodes.how == BY_BORE_B:
+        sag = sag_backward(way, forest, nodes.a)
+        return after > sag and before > sag
+    if after > way.sag and before > way.sag:
+        return True
+    sag = sag_of(way, forest, nodes.b)
+    if nodes.how == BY_BORE_A:
+        # The room in a bore is that of a ball instead of a disc already.
+        return after > sag and before > sag
+    after, before = as_ball(forest, nodes.b, way.after, n, after), as_ball(forest, nodes.b, way.before, n, before)
+    return after > sag and before > sag
+
+
+@kernel(inner=True)
+def pose_at(way, s):
+    """The pose at part s of a way."""
+    start, end = placed(way.before, way.middle), placed(way.after, way.middle)
+    m = matmul_t(way.before.rotation, way.after.rotation)
+    axis = (m[7] - m[5], m[2] - m[6], m[3] - m[1])
+    sine = 0.5 * math.sqrt(dot(axis, axis))
+    cosine = 0.5 * (m[0] + m[4] + m[8] - 1.0)
+    turn = way.before.rotation
+    if sine > 0.0:
+        x, y, z = scale(0.5 / sine, axis)
+        angle = s * math.atan2(sine, cosine)
+        c, t = math.cos(angle), math.sin(angle)
+        d = 1.0 - c
+        u = matvec(turn, (c + d * x * x, d * x * y + t * z, d * x * z - t * y))
+        v = matvec(turn, (d * x * y - t * z, c + d * y * y, d * y * z + t * x))
+        w = matvec(turn, (d * x * z + t * y, d * y * z - t * x, c + d * z * z))
+        turn = (u[0], v[0], w[0], u[1], v[1], w[1], u[2], v[2], w[2])
+    center = blend(1.0 - s, start, s, end)
+    return RelativePose(turn, sub(center, matvec(turn, way.middle)))
