@@ -89,8 +89,18 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
     label = _components(topology)
     owner = rows_of(LINKS, links).face
     return BodyCells(
-        packed.table, packed.pool, np.concatenate(packed.curves), packed.faces, builder.links, builder.nodes, builder.first, label[owner],
-        topology.is_closed, size, float(max(np.abs(low).max(), np.abs(high).max())), topology,
+        packed.table,
+        packed.pool,
+        np.concatenate(packed.curves),
+        packed.faces,
+        builder.links,
+        builder.nodes,
+        builder.first,
+        label[owner],
+        topology.is_closed,
+        size,
+        float(max(np.abs(low).max(), np.abs(high).max())),
+        topology,
     )
 
 

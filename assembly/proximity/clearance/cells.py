@@ -168,15 +168,32 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
     low, high = uv.min(axis=1) - reach, uv.max(axis=1) + reach
     for d in range(2):
         if not surface.closed[d]:
-            low[:, d], high[:, d] = np.maximum(low[:, d], surface.domain[d][0]), np.minimum(high[:, d], surface.domain[d][1])
+            low[:, d], high[:, d] = (
+                np.maximum(low[:, d], surface.domain[d][0]),
+                np.minimum(high[:, d], surface.domain[d][1]),
+            )
     first, second = surface_bounds(surface, low, high)
-    if shape == FLAT and np.ptp(surface.weights) == 0.0 and max(surface.degree) == 1 and surface.control_points.shape[:2] == (2, 2):
+    if (
+        shape == FLAT
+        and np.ptp(surface.weights) == 0.0
+        and max(surface.degree) == 1
+        and surface.control_points.shape[:2] == (2, 2)
+    ):
         net = surface.control_points
         if np.abs(net[0, 0] - net[1, 0] - net[0, 1] + net[1, 1]).max() <= EXACT * np.abs(net).max():
             second = np.zeros_like(second)
     far = float(np.abs(surface.control_points).max())
     return CellTable(
-        uv, second, first, rim, rim_t, rim_second, hollow, ROUNDING * far + off + (first * beside).sum(axis=1), shape, ruling
+        uv,
+        second,
+        first,
+        rim,
+        rim_t,
+        rim_second,
+        hollow,
+        ROUNDING * far + off + (first * beside).sum(axis=1),
+        shape,
+        ruling,
     )
 
 

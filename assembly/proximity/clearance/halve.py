@@ -20,6 +20,7 @@ from assembly.proximity.clearance.records import (
     node_at,
 )
 
+
 @kernel(inline=True)
 def corner_of(node, i):
     """Corner i of a cell."""
@@ -240,9 +241,7 @@ def halve(forest, k, by_length):
     return True
 
 
-@kernel(
-    signatures="(i8[::1], f8[::1], i8[:, ::1], i8[:, ::1], f8[:, ::1])"
-)
+@kernel(signatures="(i8[::1], f8[::1], i8[:, ::1], i8[:, ::1], f8[:, ::1])")
 def place_cells(table, pool, faces, links, nodes):
     """Corners, radii, boxes and balls of cells from their parameters and bounds."""
     forest = Forest(Store(table, pool), faces, links, nodes, None)
@@ -254,9 +253,7 @@ def place_cells(table, pool, faces, links, nodes):
         measure(links_at(links, k), node)
 
 
-@kernel(
-    signatures="(i8[::1], f8[::1], i8[:, ::1], i8[:, ::1], f8[:, ::1], i8[::1], i8, b1)"
-)
+@kernel(signatures="(i8[::1], f8[::1], i8[:, ::1], i8[:, ::1], f8[:, ::1], i8[::1], i8, b1)")
 def halve_cell(table, pool, faces, links, nodes, used, k, by_length):
     """`halve`, from Python."""
     return halve(Forest(Store(table, pool), faces, links, nodes, used), k, by_length)

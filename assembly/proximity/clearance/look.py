@@ -247,9 +247,7 @@ def posed_with_move(q, a, b, move):
     return RelativePose(matmul_t(rotation_a, rotation_b), matvec_t(rotation_a, d))
 
 
-FRONTS = (
-    "Tuple((f8[:, ::1], i8[:, ::1], f8[:, :, ::1], i8[:, :, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1]))"
-)
+FRONTS = "Tuple((f8[:, ::1], i8[:, ::1], f8[:, :, ::1], i8[:, :, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1]))"
 
 
 @kernel(signatures=f"({FOREST}, {FRONTS}, f8[:, ::1], f8[:, ::1], i8[::1], i8[::1])", allocates=True)

@@ -97,7 +97,9 @@ class ClearanceProof:
         self._codes, self._stack = np.zeros(len(self.pairs), dtype=np.int64), np.zeros(STACK, dtype=np.int64)
         self._begun = np.zeros(len(self.pairs), dtype=bool)
 
-    def look(self, q: Array, moves: Array | None = None, which: Sequence[int] | None = None, swept: bool = False) -> list[Answer]:
+    def look(
+        self, q: Array, moves: Array | None = None, which: Sequence[int] | None = None, swept: bool = False
+    ) -> list[Answer]:
         """What is proven at poses.
 
         Parameters
@@ -117,7 +119,9 @@ class ClearanceProof:
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         counts, pair = self.fronts.counts, self.fronts.pair
         grown = counts.count > GROWN * counts.fresh + MANY
-        tasks[rows] = np.where(~self._begun | grown, BEGUN_ANEW, np.where(swept & (pair.known == 1.0), ON_WAY, AT_POSE))[rows]
+        tasks[rows] = np.where(
+            ~self._begun | grown, BEGUN_ANEW, np.where(swept & (pair.known == 1.0), ON_WAY, AT_POSE)
+        )[rows]
         anew = tasks == BEGUN_ANEW
         self._run(np.ascontiguousarray(q, dtype=float), moved, tasks)
         counts.fresh[anew] = counts.count[anew]
@@ -171,7 +175,10 @@ class ClearanceProof:
         a, b = self.pairs[k]
         turn_a, turn_b = rotation_matrix(q[a, 3:]), _turned(move[3:]) @ rotation_matrix(q[b, 3:])
         at_a, at_b = q[a, :3], q[b, :3] + move[:3]
-        for outer, inner, turns, places in ((a, b, (turn_a, turn_b), (at_a, at_b)), (b, a, (turn_b, turn_a), (at_b, at_a))):
+        for outer, inner, turns, places in (
+            (a, b, (turn_a, turn_b), (at_a, at_b)),
+            (b, a, (turn_b, turn_a), (at_b, at_a)),
+        ):
             number = self._number[outer]
             if not self.forest.cells[number].is_closed:
                 continue
