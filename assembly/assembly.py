@@ -235,9 +235,23 @@ class Assembly(Contents):
                         continue
                 solution = Solution(self._scene, packed, state, status, spent, history, order, fit)
                 solution._touching = float(settings[ALLOWED_OVERLAP])
-                return solution
+                return self._proven(solution, interruption) if packed.clearance_rows else solution
             self._crowding *= 2
             self._packed = None
+
+    @staticmethod
+    def _proven(solution: Solution, interruption: Interruption) -> Solution:
+        """A solution under clearances, STALLED where it is not known that its bodies are clear."""
+        from assembly.solve.clearance_proof import prove_end
+
+        if interruption.is_over() or solution._is_lost:
+            return solution
+        begin = perf_counter()
+        solution._clear = prove_end(solution)
+        if solution.success and not all(pair.holds for pair in solution._clear):
+            solution.status = Status.STALLED
+        solution.seconds += perf_counter() - begin
+        return solution
 
     def solve_all(
         self, *, starts: int = 16, seed: int = 0, time_limit: float | None = None, **options: Any

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import side_faces
 from assembly.constraints.program.records import DEEPEST_AT, NEAREST_AT, ROW, ROW_TABLE, SHELL_F, SHELL_G
 from assembly.kinematics.body import Body, BodyFace
@@ -17,7 +19,7 @@ from assembly.proximity.features.solid_contact import CONTACT_RECORD, FEATURE_F,
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
 
-__all__ = ["contact_pairs"]
+__all__ = ["contact_pairs", "listed_contacts"]
 
 
 def contact_pairs(solution: Solution) -> dict[str, ContactPair]:
@@ -37,13 +39,12 @@ def contact_pairs(solution: Solution) -> dict[str, ContactPair]:
     return pairs | _listed(solution)
 
 
-def _listed(solution: Solution) -> dict[str, ContactPair]:
-    """The pairs that clearances have listed, the oldest first: "clearance: a-b", "clearance: a-b 2", ..."""
+def listed_contacts(solution: Solution) -> Iterator[tuple[int, Clearance, ContactPair]]:
+    """The contacts that clearances have listed, the oldest first: the number of the pair of bodies, and the contact."""
     packed, scene = solution._packed, solution._scene
     owners = [(item, pair) for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True) for pair in own]
-    found: dict[str, ContactPair] = {}
     if solution._state.size <= packed.memory_at:
-        return found
+        return
     places = [(number, k, pair) for k, (pair, number) in enumerate(packed.listed(solution._state)) if pair >= 0]
     for _, k, pair in sorted(places):
         clearance, bodies = owners[pair]
@@ -56,6 +57,16 @@ def _listed(solution: Solution) -> dict[str, ContactPair]:
         else:
             q_f, q_g = solution.q[[scene.index(f), scene.index(g)]]
             contact = extremal_pair(f.faces[0], q_f, g.faces[0], q_g, solution._parameters[r, :4])
+        yield pair, clearance, contact
+
+
+def _listed(solution: Solution) -> dict[str, ContactPair]:
+    """The same by their names: "clearance: a-b", "clearance: a-b 2", ..."""
+    packed = solution._packed
+    pairs = [pair for own in packed.clearance_pairs for pair in own]
+    found: dict[str, ContactPair] = {}
+    for number, clearance, contact in listed_contacts(solution):
+        f, g = pairs[number]
         base = f"{clearance.name}: {f.name}-{g.name}"
         same = sum(name == base or name.startswith(f"{base} ") for name in found)
         found[base if same == 0 else f"{base} {same + 1}"] = contact

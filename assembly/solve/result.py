@@ -14,12 +14,14 @@ from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.proximity.features.solid_contact import TRACK
+from assembly.proximity.clearance.proof import is_proven
 from assembly.solve.loop.settings import COUNT, VIOLATION
 from assembly.solve.measure import measure, standing
 from assembly.solve.options import Options
 from assembly.solve.scene import Scene, Status
 
 if TYPE_CHECKING:
+    from assembly.solve.clearance_proof import PairAnswer
     from assembly.solve.second_order.classification import SecondOrder
     from assembly.solve.second_order.leave import Fit
 
@@ -59,6 +61,7 @@ class Result(ReadOnlyArrays):
         self._order = order
         self.restarted = False
         self._fit = fit
+        self._clear: list[PairAnswer] = []
         # What bodies may be in each other and still touch, in parts of the scene's size.
         self._touching = Options.touching
         # Flat contacts alone need it again, for the center of their pressure.
@@ -68,6 +71,14 @@ class Result(ReadOnlyArrays):
     def q(self) -> Array:
         """Configuration, (n, 7)."""
         return read_only(self._state[: self._packed.contacts_at].reshape(-1, 7).copy())
+
+    @property
+    def proved(self) -> bool:
+        """Whether it is proven that all pairs of bodies which clearances keep apart are clear, or only touch.
+
+        False at an end that is not SOLVED, and where faces lie on each other and samples stand for the proof.
+        """
+        return self.success and all(is_proven(pair.answer) for pair in self._clear)
 
     @property
     def _parameters(self) -> Array:
@@ -104,7 +115,11 @@ class Result(ReadOnlyArrays):
         """The largest violation of every constraint's rows, lengths in a unit."""
         packed = self._packed
         each = np.where(packed.one_sided, np.maximum(-self._residuals, 0.0), np.abs(self._residuals))
-        return self._by_constraint(np.where(packed.lengths, each / unit, each))
+        largest = self._by_constraint(np.where(packed.lengths, each / unit, each))
+        for pair in self._clear:
+            if not pair.holds:
+                largest[pair.clearance] = max(largest[pair.clearance], pair.answer.depth / unit)
+        return largest
 
     def _by_constraint(self, each: Array) -> dict[str, float]:
         """The largest of what every constraint's rows have."""

@@ -37,6 +37,10 @@ def message(solution: Solution) -> str:
     if held_off and not solution.success and solution.status is not Status.UNBOUNDED:
         named = ", ".join(f"{name!r} ({solution.violations[name]:.3g})" for name in held_off)
         text += f"; violated: {named}"
+    doubtful = [pair for pair in solution._clear if not pair.holds]
+    if doubtful:
+        named = ", ".join(f"{a} and {b} ({pair.answer.verdict.name})" for pair in doubtful for a, b in [pair.bodies])
+        text += f"; not clear: {named}"
     if solution.status is Status.FITTED:
         text += "; disagreeing: " + ", ".join(f"{name!r} ({off:.3g})" for name, off in solution.disagreeing.items())
     if solution.status is Status.INFEASIBLE:

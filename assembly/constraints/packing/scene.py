@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from copy import copy
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,9 @@ from assembly.proximity.features.solid_contact import TRACK
 from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.events import fresh_memory, listed_places
 from assembly.proximity.manager.parameters import LARGEST_MARGIN
+
+if TYPE_CHECKING:
+    from assembly.proximity.clearance.proof import ClearanceProof
 
 __all__ = ["Packed", "structure_of"]
 
@@ -75,6 +78,8 @@ class Packed:
         Where in a state, and how long, what a solve leaves for the next one is (`program/kept.py`).
     workspaces : list of three arrays
         What solves that are over worked in, for the next ones (`solve/attempts/attempts.py`).
+    proofs : list of ClearanceProof
+        Of the pairs that clearances keep apart, of solves that have ended.
     has_size : bool
         Whether the scene has a size.
     outgrown : Packed or None
@@ -152,6 +157,7 @@ class Packed:
             # The first update sees what crosses at the start as well, if it is no deeper than this.
             self._memory = fresh_memory(sum(map(len, self.clearance_pairs)), self.clearance_rows, LARGEST_MARGIN)
         self.workspaces: list[tuple[Array, Array, Table]] = []
+        self.proofs: list[ClearanceProof] = []
         self.kept_at = self.memory_at + self._memory.size
         self.table[layout.KEPT] = self.kept_at
         self.kept_size = int(kept_size(self.table))
@@ -327,7 +333,7 @@ class Packed:
             table[layout.RUN_TAPE_AT] = addresses.tapes()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "workspaces": []}
+        return {**self.__dict__, "workspaces": [], "proofs": []}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # Addresses are those of one process; a copy, or what another process wrote, takes its own.
@@ -378,7 +384,7 @@ class Packed:
         other.pool = self.pool.copy()
         other.pool[layout.VERSION] = float(next(_versions))
         # Solves of the one and of the other work in the same memory, one after another.
-        other.workspaces = self.workspaces
+        other.workspaces, other.proofs = self.workspaces, self.proofs
         return other
 
     @property

@@ -134,8 +134,8 @@ class Fronts:
     forest : PackedForest
     pairs : sequence of (int, int)
         Numbers of bodies.
-    needed, touch : sequence of float
-        Of every pair what gaps have to be larger than, and by how much cells may cross that are not said to.
+    needed : sequence of float
+        Of every pair what gaps have to be larger than.
     resolution : float
         The size of pairs of cells that stay open, in parts of the larger body's size.
     budget : int
@@ -147,7 +147,6 @@ class Fronts:
         forest: PackedForest,
         pairs: Sequence[tuple[int, int]],
         needed: Sequence[float],
-        touch: Sequence[float],
         resolution: float = 1e-7,
         budget: int = 20_000,
     ) -> None:
@@ -160,7 +159,7 @@ class Fronts:
         self.counts.root_a, self.counts.root_b = roots[both].T
         self.counts.budget = budget
         size, far = np.array([[cells.size, cells.far] for cells in forest.cells]).T
-        self.pair.needed, self.pair.touch = needed, touch
+        self.pair.needed = needed
         self.pair.resolution = resolution * size[both].max(axis=1)
         self.pair.far = far[both].sum(axis=1)
         self._room(ROOM)

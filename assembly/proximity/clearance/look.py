@@ -275,3 +275,13 @@ def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes):
         else:
             codes[k] = look(forest, front, pose, limits, False)
             pair.part = 1.0
+
+
+@kernel(signatures=f"({FOREST}, UniTuple(i8, 2), f8[::1], f8[::1], f8[::1])")
+def gap_along(forest_arrays, nodes, turn, shift, normal):
+    """The gap of two nodes along a direction, b at a rotation (9) and a shift seen from a."""
+    table, pool, faces, links, tree_nodes, used = forest_arrays
+    forest = Forest(Store(table, pool), faces, links, tree_nodes, used)
+    rotation_b = (turn[0], turn[1], turn[2], turn[3], turn[4], turn[5], turn[6], turn[7], turn[8])
+    pose = RelativePose(rotation_b, (shift[0], shift[1], shift[2]))
+    return separation(forest, nodes[0], nodes[1], pose, (normal[0], normal[1], normal[2]))

@@ -10,19 +10,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._read_only import ReadOnlyArrays
+from assembly._record import rows_of
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
+from assembly.proximity.clearance.body_cells import BodyCells
 from assembly.proximity.clearance.forest import Fronts, PackedForest
 from assembly.proximity.clearance.inside import UNCLEAR, winding_of
-from assembly.proximity.clearance.look import AT_POSE, BEGUN_ANEW, ON_WAY, PASSED_BY, look_at_pairs
-from assembly.proximity.clearance.records import CLEAR, CROSSING, NO_ROOM, OPEN
+from assembly.proximity.clearance.look import AT_POSE, BEGUN_ANEW, ON_WAY, PASSED_BY, gap_along, look_at_pairs
+from assembly.proximity.clearance.parting import least_move
+from assembly.proximity.clearance.records import (
+    BY_PLANE,
+    CELL_FACE,
+    CLEAR,
+    CROSSING,
+    LINKS,
+    NO_ROOM,
+    NODE,
+    NODES,
+    NONE,
+    OPEN,
+    PARTED,
+)
 
-__all__ = ["Answer", "ClearanceProof", "Verdict"]
+__all__ = ["Answer", "ClearanceProof", "Verdict", "is_proven"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 # A front that has grown by more than this factor and number is begun anew.
 GROWN, MANY = 2, 200
+# Contacts are opened by this part of what is called touching, beside what they are closed by; those that are open by
+# more already by this.
+OPENED, LEAST_OPENED = 0.25, 1e-6
+# Pairs of nodes that were left open, of which directions to open them are taken at most.
+MOST_OPENED = 2000
+# The cosine above which normals of cells as small as what was left open oppose each other.
+OPPOSED = 0.98
 # Places in the stack of a ray, and points of which rays start, at most, of each part of a body.
 STACK, POINTS = 4096, 12
 
@@ -64,6 +86,11 @@ class Answer(ReadOnlyArrays):
     part: float = 1.0
 
 
+def is_proven(answer: Answer) -> bool:
+    """Whether bodies are clear, or only touch."""
+    return answer.verdict in (Verdict.CLEAR, Verdict.TOUCHING)
+
+
 class ClearanceProof:
     """The proofs of pairs of bodies, kept from look to look.
 
@@ -75,8 +102,6 @@ class ClearanceProof:
         Numbers of bodies.
     minimum : sequence of float
         Of every pair, what its gap is to be at least.
-    touching : sequence of float
-        How deep its bodies may be in each other where they touch.
     """
 
     def __init__(
@@ -84,21 +109,20 @@ class ClearanceProof:
         shapes: Sequence[tuple[Face, ...]],
         pairs: Sequence[tuple[int, int]],
         minimum: Sequence[float],
-        touching: Sequence[float],
     ) -> None:
         self.pairs = list(pairs)
         used = sorted({body for pair in pairs for body in pair})
         self._number = {body: k for k, body in enumerate(used)}
         self.forest = PackedForest([shapes[body] for body in used])
         local = [(self._number[a], self._number[b]) for a, b in pairs]
-        self.fronts = Fronts(self.forest, local, minimum, touching)
+        self.fronts = Fronts(self.forest, local, minimum)
         self.fronts.counts.body_a, self.fronts.counts.body_b = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-        self.minimum, self.touching = np.array(minimum, dtype=float), np.array(touching, dtype=float)
+        self.minimum = np.array(minimum, dtype=float)
         self._codes, self._stack = np.zeros(len(self.pairs), dtype=np.int64), np.zeros(STACK, dtype=np.int64)
         self._begun = np.zeros(len(self.pairs), dtype=bool)
 
     def look(
-        self, q: Array, moves: Array | None = None, which: Sequence[int] | None = None, swept: bool = False
+        self, q: Array, touching: float, moves: Array | None = None, which: Sequence[int] | None = None, swept: bool = False
     ) -> list[Answer]:
         """What is proven at poses.
 
@@ -106,6 +130,8 @@ class ClearanceProof:
         ----------
         q : (n, 7)
             A row a body.
+        touching : float
+            Cells that cross by no more are not said to.
         moves : (pairs, 6), optional
             Of every pair, a move of its second body before it is looked at: a translation, and a small rotation about
             its origin, in world axes.
@@ -118,6 +144,7 @@ class ClearanceProof:
         moved = np.zeros((len(self.pairs), 6)) if moves is None else np.ascontiguousarray(moves, dtype=float)
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         counts, pair = self.fronts.counts, self.fronts.pair
+        pair.touch = touching
         grown = counts.count > GROWN * counts.fresh + MANY
         tasks[rows] = np.where(
             ~self._begun | grown, BEGUN_ANEW, np.where(swept & (pair.known == 1.0), ON_WAY, AT_POSE)
@@ -139,6 +166,10 @@ class ClearanceProof:
                 self._codes[short] = OPEN
                 return
             waiting = np.where(short & (waiting == BEGUN_ANEW), AT_POSE, np.where(short, waiting, PASSED_BY))
+
+    def cells_of(self, k: int) -> BodyCells:
+        """The tree of the second body of pair k."""
+        return self.forest.cells[self._number[self.pairs[k][1]]]
 
     def bound(self, k: int) -> float:
         """A lower bound of the distance of pair k at its last look, where that ended clear."""
@@ -162,10 +193,82 @@ class ClearanceProof:
         if nested:
             return Answer(Verdict.ENCLOSED, bound, bound)
         pair.known = 1.0
-        far = float(np.linalg.norm(move[:3]))
-        if far > 0.0 or move[3:].any():
+        far = self._moved(k, q, move)
+        if far > 0.0:
             return Answer(Verdict.TOUCHING, bound - far, far, swept=swept)
         return Answer(Verdict.CLEAR, bound, swept=swept)
+
+    def is_conforming(self, k: int) -> bool:
+        """Whether what was left open of pair k are faces that lie on each other: normals oppose in all pairs of cells."""
+        count = int(self.fronts.counts.count[k])
+        open_rows = np.flatnonzero(rows_of(PARTED, self.fronts.parted[k, :count]).expiry == -np.inf)
+        nodes = rows_of(NODES, self.fronts.nodes[k, :count])[open_rows]
+        if not len(nodes):
+            return False
+        links, faces = rows_of(LINKS, self.forest.arrays[3]), rows_of(CELL_FACE, self.forest.arrays[2])
+        if (links.face[nodes.a] == NONE).any() or (links.face[nodes.b] == NONE).any():
+            return False
+        axes = rows_of(NODE, self.forest.arrays[4]).axes
+        turn = self.fronts.pair.turn[k].reshape(3, 3)
+        normal_a = axes[nodes.a, 2] * faces.sign[links.face[nodes.a]][:, None]
+        normal_b = axes[nodes.b, 2] * faces.sign[links.face[nodes.b]][:, None] @ turn.T
+        return bool(((normal_a * normal_b).sum(axis=1) < -OPPOSED).all())
+
+    def move_apart(self, k: int, q: Array, contacts: tuple[Array, Array, Array], touching: float) -> Array | None:
+        """The least move (6) of the second body of pair k that opens contacts; None where no point may move so far.
+
+        Parameters
+        ----------
+        k : int
+        q : (n, 7)
+        contacts : (m, 3), (m, 3), (m,)
+            Normals from the first body to the second, places, and gaps over the least gap; in the world.
+        touching : float
+            What a point may be moved.
+        """
+        normals, places, gaps = contacts
+        row = q[self.pairs[k][1]]
+        root = self.cells_of(k).nodes[0]
+        arm, radius = rotation_matrix(row[3:]) @ root[:3], float(root[3])
+        asked = np.maximum(OPENED * touching - gaps, LEAST_OPENED * touching)
+        move = least_move(normals, places - row[:3] - arm, asked, radius) if touching > 0.0 else None
+        if move is None or np.linalg.norm(move[:3]) + radius * np.linalg.norm(move[3:]) > touching:
+            return None
+        # About the origin of the body instead of its middle.
+        move[:3] -= np.cross(move[3:], arm)
+        return move
+
+    def opening_move(self, k: int, q: Array, touching: float) -> Array | None:
+        """The same for the pairs of nodes that the last look left open, along the directions they have."""
+        count = int(self.fronts.counts.count[k])
+        parted = rows_of(PARTED, self.fronts.parted[k, :count])
+        nodes = rows_of(NODES, self.fronts.nodes[k, :count])
+        left = np.flatnonzero((parted.expiry == -np.inf) & (nodes.how == BY_PLANE))
+        if not 0 < len(left) <= MOST_OPENED:
+            return None
+        cells = rows_of(NODE, self.forest.arrays[4])
+        a = q[self.pairs[k][0]]
+        turn, shift = self.fronts.pair.turn[k].reshape(3, 3), self.fronts.pair.shift[k]
+        places = cells.center[nodes.b[left]] @ turn.T + shift
+        normals = parted.normal[left]
+        gaps = np.array([self._gap(k, *row) for row in zip(nodes.a[left], nodes.b[left], normals, strict=True)])
+        if (np.linalg.norm(normals, axis=1) < 0.5).any() or (gaps < -touching).any():
+            return None
+        world = rotation_matrix(a[3:])
+        return self.move_apart(k, q, (normals @ world.T, places @ world.T + a[:3], gaps), touching)
+
+    def _gap(self, k: int, a: int, b: int, normal: Array) -> float:
+        """The gap of two nodes along a direction at the last pose."""
+        pair = self.fronts.pair
+        return float(gap_along(self.forest.arrays, (int(a), int(b)), pair.turn[k], pair.shift[k], normal))
+
+    def _moved(self, k: int, q: Array, move: Array) -> float:
+        """How far a move takes points of the second body of pair k, at most."""
+        if not move.any():
+            return 0.0
+        middle, radius = self.cells_of(k).nodes[0, :3], float(self.cells_of(k).nodes[0, 3])
+        way = move[:3] + np.cross(move[3:], rotation_matrix(q[self.pairs[k][1], 3:]) @ middle)
+        return float(np.linalg.norm(way) + radius * np.linalg.norm(move[3:]))
 
     def nested(self, k: int, q: Array, move: Array) -> bool | None:
         """Whether a body of pair k, whose boundaries are apart, is within the other one; None where no ray tells.

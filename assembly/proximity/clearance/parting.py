@@ -1,0 +1,49 @@
+"""The least rigid move that opens the contacts of two bodies: where it is done they are clear, and so they only touch.
+
+A contact with the normal n, from a to b, at an arm p from the middle of b opens by n.(v + w x p) as b is moved by v and
+turned by w. The least move that opens every contact by what is asked of it is a least distance program, and a problem of
+non-negative least squares (Lawson and Hanson, "Solving Least Squares Problems", chapter 23).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+__all__ = ["least_move"]
+
+Array = NDArray[np.float64]
+# Residuals of the least squares problem, over what is asked, below which no move opens all contacts.
+NONE_LEFT = 1e-9
+
+
+def least_move(normals: Array, arms: Array, asked: Array, radius: float) -> Array | None:
+    """The least move that opens contacts.
+
+    Parameters
+    ----------
+    normals, arms : (m, 3)
+        Unit vectors from a to b, and where contacts are from the middle of b, in the same axes.
+    asked : (m,)
+        By how much each is to open; positive.
+    radius : float
+        Of b: a turn by 1 counts as a way of so much.
+
+    Returns
+    -------
+    (6,) or None
+        A translation and a rotation vector about the middle of b; None where contacts hold b from all sides.
+    """
+    rates = np.column_stack([normals, np.cross(arms, normals) / radius])
+    unit = float(asked.max())
+    design = np.vstack([rates.T, asked / unit])
+    goal = np.zeros(len(design))
+    goal[-1] = 1.0
+    weights, _ = nnls(design, goal)
+    rest = design @ weights - goal
+    if -rest[-1] <= NONE_LEFT:
+        return None
+    move = -rest[:-1] / rest[-1] * unit
+    move[3:] /= radius
+    return np.asarray(move)

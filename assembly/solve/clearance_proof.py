@@ -1,0 +1,143 @@
+"""Proof of what clearances promise at the end of a solve: that bodies are clear of each other, or only touch.
+
+Bodies that touch are not clear. That they do no more is proven where they are clear after a move of one of them by less
+than what is called touching: the least one that opens the contacts that the solve has listed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.model.contact import side_faces
+from assembly.constraints.packing.scene import Packed
+from assembly.kinematics.body import Body
+from assembly.proximity.clearance.proof import Answer, ClearanceProof, Verdict, is_proven
+from assembly.proximity.extrema.pairs import ContactPair
+from assembly.solve.contact_pairs import contact_pairs, listed_contacts
+from assembly.solve.crossings import crossings_of
+from assembly.solve.interruption import CTRL_C
+
+if TYPE_CHECKING:
+    from assembly.solve.solution import Solution
+
+__all__ = ["PairAnswer", "lent_proof", "prove_end"]
+
+Array = NDArray[np.float64]
+# Contacts that are open by less than this part of what is called touching are opened.
+NEAR = 0.5
+# Moves that are tried for contacts that no row tells of.
+TRIES = 3
+
+
+@dataclass(frozen=True)
+class PairAnswer:
+    """What is proven of a pair of bodies that a clearance keeps apart.
+
+    Attributes
+    ----------
+    clearance : str
+    bodies : (str, str)
+    answer : Answer
+    holds : bool
+        Whether they are clear or touch: proven, or by samples where faces lie on each other.
+    """
+
+    clearance: str
+    bodies: tuple[str, str]
+    answer: Answer
+    holds: bool
+
+
+def _new_proof(packed: Packed, bodies: Sequence[Body]) -> ClearanceProof:
+    number = {id(body): k for k, body in enumerate(bodies)}
+    owned = [(item, pair) for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True) for pair in own]
+    rows = [(number[id(a)], number[id(b)]) for _, (a, b) in owned]
+    return ClearanceProof([side_faces(body) for body in bodies], rows, [item.minimum for item, _ in owned])
+
+
+@contextmanager
+def lent_proof(packed: Packed, bodies: Sequence[Body]) -> Iterator[ClearanceProof]:
+    """The proof of a packed scene's pairs; threads have proofs of their own."""
+    proof = packed.proofs.pop() if packed.proofs else _new_proof(packed, bodies)
+    try:
+        yield proof
+    finally:
+        packed.proofs.append(proof)
+
+
+def prove_end(solution: Solution) -> list[PairAnswer]:
+    """What is proven at the pose of a solution of all pairs that its clearances keep apart."""
+    packed, scene = solution._packed, solution._scene
+    touching = solution._touching * packed.scale
+    with lent_proof(packed, scene.bodies) as proof:
+        answers = proof.look(solution.q, touching, _opening_moves(solution, proof, touching))
+        answers = [_opened(proof, k, answer, solution.q, touching) for k, answer in enumerate(answers)]
+        conforming = [
+            answer.verdict is Verdict.UNDECIDED and proof.is_conforming(k) for k, answer in enumerate(answers)
+        ]
+    owned = [(item, pair) for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True) for pair in own]
+    sampled = [pair for (_, pair), asked in zip(owned, conforming, strict=True) if asked]
+    crossing = set(crossings_of(solution, sampled, CTRL_C).pairs) if sampled else set()
+    found = []
+    for (item, (a, b)), answer, asked in zip(owned, answers, conforming, strict=True):
+        names = a.name, b.name
+        found.append(PairAnswer(item.name, names, answer, is_proven(answer) or (asked and names not in crossing)))
+    return found
+
+
+def _opened(proof: ClearanceProof, k: int, answer: Answer, q: Array, touching: float) -> Answer:
+    """The answer to a pair again, moved by what opens the pairs of nodes that were left, where these are as good as open.
+
+    That is for contacts that no row tells of.
+    """
+    if is_proven(answer) or answer.depth > touching:
+        return answer
+    for _ in range(TRIES):
+        move = proof.opening_move(k, q, touching)
+        if move is None:
+            return answer
+        moves = np.zeros((len(proof.pairs), 6))
+        moves[k] = move
+        (again,) = proof.look(q, touching, moves, which=[k])
+        if is_proven(again):
+            return again
+    return answer
+
+
+def _contacts(solution: Solution, rows: Sequence[tuple[int, int]]) -> Iterator[tuple[int, ContactPair, float]]:
+    """The contacts of a solution between bodies that clearances keep apart: the pair, the contact, 1 or -1 if turned."""
+    for number, _, contact in listed_contacts(solution):
+        yield number, contact, 1.0
+    scene = solution._scene
+    if not scene.contacts:
+        return
+    places = {pair: number for number, pair in enumerate(rows)}
+    found = contact_pairs(solution)
+    for item in scene.contacts:
+        f, g = (scene.index(body) for body in item.bodies)
+        if (f, g) in places:
+            yield places[f, g], found[item.name], 1.0
+        elif (g, f) in places:
+            yield places[g, f], found[item.name], -1.0
+
+
+def _opening_moves(solution: Solution, proof: ClearanceProof, touching: float) -> Array:
+    """The least moves (pairs, 6) of second bodies that open the contacts there are; zero where none is as near."""
+    moves = np.zeros((len(proof.pairs), 6))
+    near: dict[int, list[tuple[Array, Array, float]]] = {}
+    for number, contact, sign in _contacts(solution, proof.pairs):
+        gap = contact.gap - float(proof.minimum[number])
+        if gap < NEAR * touching:
+            near.setdefault(number, []).append((sign * contact.normal, contact.points[1 if sign > 0.0 else 0], gap))
+    for number, contacts in near.items():
+        normals, places, gaps = (np.array(column) for column in zip(*contacts, strict=True))
+        move = proof.move_apart(number, solution.q, (normals, places, gaps), touching)
+        if move is not None:
+            moves[number] = move
+    return moves
