@@ -26,7 +26,7 @@ from assembly.solve.interruption import CTRL_C
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
 
-__all__ = ["PairAnswer", "lent_proof", "prove_end"]
+__all__ = ["PairAnswer", "lent_proof", "new_proof", "opening_moves", "prove_end"]
 
 Array = NDArray[np.float64]
 # Contacts that are open by less than this part of what is called touching are opened.
@@ -54,7 +54,8 @@ class PairAnswer:
     holds: bool
 
 
-def _new_proof(packed: Packed, bodies: Sequence[Body]) -> ClearanceProof:
+def new_proof(packed: Packed, bodies: Sequence[Body]) -> ClearanceProof:
+    """A proof of all pairs that the clearances of a packed scene keep apart."""
     number = {id(body): k for k, body in enumerate(bodies)}
     owned = [(item, pair) for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True) for pair in own]
     rows = [(number[id(a)], number[id(b)]) for _, (a, b) in owned]
@@ -64,7 +65,7 @@ def _new_proof(packed: Packed, bodies: Sequence[Body]) -> ClearanceProof:
 @contextmanager
 def lent_proof(packed: Packed, bodies: Sequence[Body]) -> Iterator[ClearanceProof]:
     """The proof of a packed scene's pairs; threads have proofs of their own."""
-    proof = packed.proofs.pop() if packed.proofs else _new_proof(packed, bodies)
+    proof = packed.proofs.pop() if packed.proofs else new_proof(packed, bodies)
     try:
         yield proof
     finally:
@@ -76,10 +77,13 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
     packed, scene = solution._packed, solution._scene
     touching = solution._touching * packed.scale
     with lent_proof(packed, scene.bodies) as proof:
-        answers = proof.look(solution.q, touching, _opening_moves(solution, proof, touching))
-        answers = [_opened(proof, k, answer, solution.q, touching) for k, answer in enumerate(answers)]
+        answers = proof.look(solution.q, touching, opening_moves(solution, proof, touching))
+        for k, answer in enumerate(answers):
+            if not is_proven(answer) and answer.depth <= touching:
+                answers[k] = _opened(proof, k, solution.q, touching)
         conforming = [
-            answer.verdict is Verdict.UNDECIDED and proof.is_conforming(k) for k, answer in enumerate(answers)
+            answer.verdict is Verdict.UNDECIDED and proof.conforms(k, solution.q, touching)
+            for k, answer in enumerate(answers)
         ]
     owned = [(item, pair) for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True) for pair in own]
     sampled = [pair for (_, pair), asked in zip(owned, conforming, strict=True) if asked]
@@ -91,23 +95,20 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
     return found
 
 
-def _opened(proof: ClearanceProof, k: int, answer: Answer, q: Array, touching: float) -> Answer:
-    """The answer to a pair again, moved by what opens the pairs of nodes that were left, where these are as good as open.
+def _opened(proof: ClearanceProof, k: int, q: Array, touching: float) -> Answer:
+    """The answer to a pair, moved by what opens the pairs of nodes that a look leaves open.
 
     That is for contacts that no row tells of.
     """
-    if is_proven(answer) or answer.depth > touching:
-        return answer
+    (answer,) = found = proof.look(q, touching, which=[k])
     for _ in range(TRIES):
-        move = proof.opening_move(k, q, touching)
+        move = None if is_proven(found[0]) else proof.opening_move(k, q, touching)
         if move is None:
-            return answer
+            break
         moves = np.zeros((len(proof.pairs), 6))
         moves[k] = move
-        (again,) = proof.look(q, touching, moves, which=[k])
-        if is_proven(again):
-            return again
-    return answer
+        found = proof.look(q, touching, moves, which=[k])
+    return found[0] if is_proven(found[0]) else answer
 
 
 def _contacts(solution: Solution, rows: Sequence[tuple[int, int]]) -> Iterator[tuple[int, ContactPair, float]]:
@@ -127,7 +128,7 @@ def _contacts(solution: Solution, rows: Sequence[tuple[int, int]]) -> Iterator[t
             yield places[g, f], found[item.name], -1.0
 
 
-def _opening_moves(solution: Solution, proof: ClearanceProof, touching: float) -> Array:
+def opening_moves(solution: Solution, proof: ClearanceProof, touching: float) -> Array:
     """The least moves (pairs, 6) of second bodies that open the contacts there are; zero where none is as near."""
     moves = np.zeros((len(proof.pairs), 6))
     near: dict[int, list[tuple[Array, Array, float]]] = {}

@@ -52,8 +52,9 @@ from assembly.solve.loop.settings import (
     VIOLATION,
 )
 from assembly.solve.options import Options
-from assembly.solve.scene import Scene
+from assembly.solve.scene import Scene, Status
 from assembly.solve.solution import Solution
+from assembly.tracking.clear_ticks import ClearTicks
 from assembly.tracking.followed import Followed
 from assembly.tracking.log import TrackLog
 from assembly.tracking.tick import Step, TrackStatus
@@ -195,6 +196,7 @@ class Tracker(InOneProcess):
         if not isinstance(second_order, (bool, np.bool_)):
             raise InputError(f"second_order is {second_order!r}; expected True or False")
         self._scene_given = scene
+        self._touching = touching
         poses = _begin(scene, q0, touching)
         held = follow if isinstance(follow, Body) else follow.body
         if held not in scene.bodies:
@@ -236,6 +238,7 @@ class Tracker(InOneProcess):
         self._pose = self._state[: self._size]
         # Numbers are read from a view in half the time it takes to read them from the array.
         self._view: Any = self._state.data
+        self._clear = ClearTicks(first, self._touching * packed.scale) if packed.clearance_rows else None
         self._before = self._pose.copy()
         self._knobs: Any = self._settings.data
         _, doubles, integers = new_workspace(packed)
@@ -303,6 +306,8 @@ class Tracker(InOneProcess):
                 self._pose[:] = self._before
         elif view[at + LAST_FEASIBLE] == 1.0:
             status = TrackStatus.HELD
+        if self._clear is not None and status is not TrackStatus.VIOLATED:
+            status = self._proven(status)
         # After a step too far the next ones are shorter, until they do better.
         radius = self._knobs[RADIUS]
         if status is TrackStatus.HELD:
@@ -315,6 +320,15 @@ class Tracker(InOneProcess):
         # What steps keep nobody writes to.
         self._before = self._pose.copy()
         return Step(self._followed, self._before, status, row, seen, perf_counter() - begin)
+
+    def _proven(self, status: TrackStatus) -> TrackStatus:
+        """The status of a tick, whose pose is that of the last one where bodies are not known to be clear at it."""
+        assert self._clear is not None
+        there = Solution(self._scene, self._packed, self._state, Status.SOLVED, 0.0, self._history)
+        if self._clear.holds(there):
+            return status
+        self._pose[:] = self._before
+        return TrackStatus.HELD
 
     def _has_changed(self) -> bool:
         """Whether a constraint of the scene, and not of another one, gained or lost a row."""

@@ -167,12 +167,20 @@ class Fronts:
     def _room(self, room: int) -> None:
         n = len(self._pair)
         self.parted, self.nodes = np.zeros((n, room, PARTED_SIZE)), np.zeros((n, room, NODES_SIZE), dtype=np.int64)
-        self._waiting = np.zeros((room, PARTED_SIZE)), np.zeros((room, NODES_SIZE), dtype=np.int64), np.zeros(WORK)
+        self._next, self._waiting = (
+            (np.zeros((room, PARTED_SIZE)), np.zeros((room, NODES_SIZE), dtype=np.int64)) for _ in range(2)
+        )
+        self._work = np.zeros(WORK)
+
+    @property
+    def left(self) -> tuple[Array, Table]:
+        """Of the pair that was looked at last, and not found clear, the rows that its look left."""
+        return self._next
 
     @property
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
         """As kernels take them."""
-        return (self._pair, self._counts, self.parted, self.nodes, *self._waiting)
+        return (self._pair, self._counts, self.parted, self.nodes, *self._next, *self._waiting, self._work)
 
     def grow(self) -> bool:
         """Twice the room for every front; False where that is more than one may have."""

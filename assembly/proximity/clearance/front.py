@@ -3,6 +3,9 @@
 As long as points of body b have gone less than a gap, its pair need not be asked again; the least of these lengths tells
 of all pairs at once. After that the gap along the same direction is asked, some nanoseconds; where it does not hold,
 another direction is sought, and then the larger node is replaced by its children.
+
+A look writes the front that follows beside the one there is. It takes its place where the look ends clear; else all is
+as it was.
 """
 
 from __future__ import annotations
@@ -16,6 +19,8 @@ from assembly.proximity.clearance.halve import put, vector
 from assembly.proximity.clearance.records import (
     BY_BORE_B,
     BY_PLANE,
+    NODES_SIZE,
+    PARTED_SIZE,
     counts_at,
     nodes_at,
     pair_proof_at,
@@ -25,8 +30,9 @@ from assembly.proximity.clearance.separation import gap_of
 from assembly.proximity.clearance.way import stays_apart
 
 # What is kept of a pair of bodies. pair: a PAIR; counts: COUNTS; parted, nodes: rows of PARTED and NODES, the front;
-# waiting, waiting_nodes: the same of the queue of a look, a ring; work: (3, 64) to work in.
-Front = namedtuple("Front", "pair counts parted nodes waiting waiting_nodes work")
+# next_parted, next_nodes: the one that follows; waiting, waiting_nodes: the queue of a look, a ring; work: (3, 64) to
+# work in.
+Front = namedtuple("Front", "pair counts parted nodes next_parted next_nodes waiting waiting_nodes work")
 # What a look asks for. needed: every gap has to be larger; touch: cells that cross by no more are no crossing;
 # resolution: pairs of cells that are smaller stay open; budget: so do those after so many pairs.
 Limits = namedtuple("Limits", "needed touch resolution budget")
@@ -34,19 +40,29 @@ Limits = namedtuple("Limits", "needed touch resolution budget")
 Parted = namedtuple("Parted", "a b how")
 
 
+@kernel(inline=True)
+def write_pair(parted, nodes, i, pair, n, expiry):
+    """Write a pair of nodes, its direction and its expiry into row i."""
+    row, direction = nodes_at(nodes, i), parted_at(parted, i)
+    row.a, row.b, row.how = pair
+    put(direction.normal, n)
+    direction.expiry = expiry
+
+
 @kernel(inner=True)
 def begin_front(front):
     """A front of one pair, the roots, of which nothing is known."""
-    counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
-    counts.count = 0
-    pair.travelled = 0.0
-    pair.soonest = math.inf
-    keep(front, Parted(counts.root_a, counts.root_b, BY_PLANE), (0.0, 0.0, 0.0), -math.inf)
+    counts = counts_at(front.counts, 0)
+    write_pair(
+        front.parted, front.nodes, 0, Parted(counts.root_a, counts.root_b, BY_PLANE), (0.0, 0.0, 0.0), -math.inf
+    )
+    counts.count = 1
+    pair_proof_at(front.pair, 0).soonest = -math.inf
 
 
 @kernel(inline=True)
 def last_pose(front):
-    """The pose of the last look."""
+    """The pose of the last look that ended clear."""
     r, x = pair_proof_at(front.pair, 0).turn, pair_proof_at(front.pair, 0).shift
     return RelativePose((r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]), (x[0], x[1], x[2]))
 
@@ -62,15 +78,26 @@ def remember(front, pose):
 
 @kernel(inner=True)
 def keep(front, nodes, n, expiry):
-    """Put a pair of nodes into the front."""
+    """Put a pair of nodes into the front that follows."""
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
-    i = counts.count
-    counts.count = i + 1
-    row, parted = nodes_at(front.nodes, i), parted_at(front.parted, i)
-    row.a, row.b, row.how = nodes
-    put(parted.normal, n)
-    parted.expiry = expiry
-    pair.soonest = min(pair.soonest, expiry)
+    write_pair(front.next_parted, front.next_nodes, counts.next_count, nodes, n, expiry)
+    counts.next_count += 1
+    pair.next_soonest = min(pair.next_soonest, expiry)
+
+
+@kernel(inner=True)
+def replace_front(front, pose, travelled):
+    """Put the front that follows in the place of the one there is, at a pose that becomes the last one."""
+    counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
+    for i in range(counts.next_count):
+        for c in range(PARTED_SIZE):
+            front.parted[i, c] = front.next_parted[i, c]
+        for c in range(NODES_SIZE):
+            front.nodes[i, c] = front.next_nodes[i, c]
+    counts.count = counts.next_count
+    pair.soonest = pair.next_soonest
+    pair.travelled = travelled
+    remember(front, pose)
 
 
 @kernel(inline=True)
@@ -85,38 +112,25 @@ def expiry_of(nodes, travelled, gap):
 @kernel(inner=True)
 def put_waiting(front, at, nodes, n):
     """Write a pair of nodes into place `at` of the queue."""
-    k = at % len(front.waiting)
-    row = nodes_at(front.waiting_nodes, k)
-    row.a, row.b, row.how = nodes
-    put(parted_at(front.waiting, k).normal, n)
-
-
-@kernel(inner=True)
-def put_back(front, head, tail):
-    """Pairs that were not decided go to the front, as such of which nothing is known."""
-    for at in range(head, tail):
-        k = at % len(front.waiting)
-        row = nodes_at(front.waiting_nodes, k)
-        keep(front, Parted(row.a, row.b, row.how), vector(parted_at(front.waiting, k).normal), -math.inf)
+    write_pair(front.waiting, front.waiting_nodes, at % len(front.waiting), nodes, n, -math.inf)
 
 
 @kernel(inner=True)
 def ask_again(forest, front, way, needed):
     """Ask the front at a new pose along its directions. Pairs that fail go to the queue; returns how many."""
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
-    travelled = pair.travelled
-    count = counts.count
-    counts.count = 0
-    pair.soonest = math.inf
+    travelled = pair.travelled + way.moved
+    counts.next_count = 0
+    pair.next_soonest = math.inf
     tail = 0
-    for i in range(count):
+    for i in range(counts.count):
         row, parted = nodes_at(front.nodes, i), parted_at(front.parted, i)
         nodes, n, expiry = Parted(row.a, row.b, row.how), vector(parted.normal), parted.expiry
         if expiry <= travelled:
             counts.asked += 1
             gap = gap_of(forest, nodes, way.after, n) - needed
             # At the last pose the gap was this at least.
-            fine = stays_apart(forest, nodes, way, n, (expiry - (travelled - way.moved), gap))
+            fine = stays_apart(forest, nodes, way, n, (expiry - pair.travelled, gap))
             if gap > 0.0 and not fine:
                 before = gap_of(forest, nodes, way.before, n) - needed
                 fine = stays_apart(forest, nodes, way, n, (before, gap))

@@ -6,7 +6,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly._record import Store
-from assembly.geometry.vec import dot, matmul_t, matvec_t, quaternion_matrix, quaternion_product
+from assembly.geometry.vec import add, dot, matmul_t, matvec_t, quaternion_matrix, quaternion_product, scale
 from assembly.kinematics.motion import RelativePose, exponential, rotation
 from assembly.proximity.clearance.front import (
     Front,
@@ -17,9 +17,9 @@ from assembly.proximity.clearance.front import (
     expiry_of,
     keep,
     last_pose,
-    put_back,
     put_waiting,
     remember,
+    replace_front,
 )
 from assembly.proximity.clearance.halve import halve, put, vector
 from assembly.proximity.clearance.inside import FOREST
@@ -45,7 +45,7 @@ from assembly.proximity.clearance.way import pose_at, sag_of, stays_apart, way_o
 
 # The most pairs that directions are sought for over a way at once: halving it is cheaper than more. The shortest part
 # of a way.
-SWEPT_BUDGET, SHORTEST = 4000, 1.0 / 256.0
+SWEPT_BUDGET, SHORTEST = 1000, 1.0 / 256.0
 # How a pair of nodes was left: parted, to be replaced by children, open, or with it the look ends.
 DONE, DIVIDED, ENDED = 0, 1, 2
 
@@ -59,7 +59,19 @@ def part_nodes(forest, front, way, nodes, hint, needed):
     before = math.inf
     if gap > 0.0 and way.swept:
         before = separation(forest, a, b, way.before, n) - needed
-    travelled = pair_proof_at(front.pair, 0).travelled
+        if not before > way.sag and dot(hint, hint) > 0.5:
+            # What parted them, or their parents, at the last pose may do so halfway.
+            middle = add(n, hint)
+            length = math.sqrt(dot(middle, middle))
+            if length > 0.5:
+                middle = scale(1.0 / length, middle)
+                gaps = (
+                    separation(forest, a, b, way.before, middle) - needed,
+                    separation(forest, a, b, way.after, middle) - needed,
+                )
+                if min(gaps[0], gaps[1]) > min(before, gap):
+                    n, before, gap = middle, gaps[0], gaps[1]
+    travelled = pair_proof_at(front.pair, 0).travelled + way.moved
     if stays_apart(forest, nodes, way, n, (before, gap)):
         keep(front, nodes, n, travelled + gap)
         return True, n, (before, gap), overlap
@@ -152,8 +164,7 @@ def seek(forest, front, way, limits, tail):
     room = min(len(front.waiting), len(front.nodes))
     head = 0
     while head < tail:
-        if counts.count + tail - head + 2 >= room:
-            put_back(front, head, tail)
+        if counts.next_count + tail - head + 2 >= room:
             return NO_ROOM
         row = nodes_at(front.waiting_nodes, head % len(front.waiting))
         nodes = Parted(row.a, row.b, BY_PLANE)
@@ -161,17 +172,14 @@ def seek(forest, front, way, limits, tail):
         head += 1
         counts.sought += 1
         if way.swept and head > SWEPT_BUDGET:
-            put_back(front, head - 1, tail)
             return UNSWEPT
         parted, n, gaps, overlap = part_nodes(forest, front, way, nodes, hint, limits.needed)
         if parted:
             continue
         cells = is_cell(forest, nodes.a) and is_cell(forest, nodes.b)
         if cells and overlap and crosses(forest, front, nodes, way.after, limits.touch):
-            put_back(front, head - 1, tail)
             return CROSSING
         if is_too_long(forest, way, nodes, gaps):
-            put_back(front, head - 1, tail)
             return UNSWEPT
         small = node_at(forest.nodes, nodes.a).radius + node_at(forest.nodes, nodes.b).radius < limits.resolution
         if cells and (small or head > limits.budget):
@@ -179,7 +187,6 @@ def seek(forest, front, way, limits, tail):
             keep(front, nodes, n, -math.inf)
             continue
         if not divide(forest, front, nodes, n, tail, max(way.sag - gaps[1], 0.0)):
-            put_back(front, head - 1, tail)
             return NO_ROOM
         tail += 2
     return OPEN if counts.opened > 0 else CLEAR
@@ -187,22 +194,23 @@ def seek(forest, front, way, limits, tail):
 
 @kernel(inner=True)
 def look(forest, front, pose, limits, swept):
-    """Prove that all pairs of the front are clear by more than `needed` at a pose and, swept, from the last one on."""
+    """Prove that all pairs of the front are clear by more than `needed` at a pose and, swept, from the last one on.
+
+    Where it ends otherwise, the front and the last pose stay as they are. What is left open is in the front that follows.
+    """
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
     root = node_at(forest.nodes, counts.root_b)
     way = way_of(last_pose(front), pose, vector(root.center), root.radius, swept)
     counts.opened = 0
-    pair.travelled += way.moved
-    code = CLEAR
-    if not pair.travelled < pair.soonest:
-        tail = ask_again(forest, front, way, limits.needed)
-        if tail > 0:
-            code = seek(forest, front, way, limits, tail)
-    if code != NO_ROOM and code != UNSWEPT:
+    travelled = pair.travelled + way.moved
+    if travelled < pair.soonest:
+        pair.travelled = travelled
         remember(front, pose)
-    else:
-        # Gaps were measured at the end of the way, and b stays where it was: as if it had gone there and back.
-        pair.travelled += way.moved
+        return CLEAR
+    tail = ask_again(forest, front, way, limits.needed)
+    code = seek(forest, front, way, limits, tail)
+    if code == CLEAR:
+        replace_front(front, pose, travelled)
     return code
 
 
@@ -210,30 +218,33 @@ def look(forest, front, pose, limits, swept):
 def go_to(forest, front, pose, limits):
     """A look at a pose and at the way to it, which is taken in parts where it is too long for one look.
 
-    `part` of the pair's record tells how much of the way was looked at.
+    `part` of the pair's record tells how much of the way is clear. Where that is not all, the last pose stays the last.
     """
     pair = pair_proof_at(front.pair, 0)
     root = node_at(forest.nodes, counts_at(front.counts, 0).root_b)
-    whole = way_of(last_pose(front), pose, vector(root.center), root.radius, True)
+    begin = last_pose(front)
+    whole = way_of(begin, pose, vector(root.center), root.radius, True)
     code = look(forest, front, pose, limits, True)
-    pair.part = 1.0 if code == CLEAR else 0.0
-    done, step = 0.0, 0.5
-    while code == UNSWEPT or (code == CLEAR and pair.part < 1.0):
+    done, step = 1.0 if code == CLEAR else 0.0, 0.5
+    while done < 1.0 and (code == CLEAR or code == UNSWEPT):
         to = min(done + step, 1.0)
         code = look(forest, front, pose if to == 1.0 else pose_at(whole, to), limits, True)
-        if code == UNSWEPT:
+        if code == CLEAR:
+            done = to
+            step *= 2.0
+        else:
             step *= 0.5
             if step < SHORTEST:
                 break
-        elif code == CLEAR:
-            done = to
-            pair.part = to
-            step *= 2.0
+    pair.part = done
+    if code != CLEAR and done > 0.0:
+        pair.travelled += done * whole.moved
+        remember(front, begin)
     return code
 
 
-# What is to be done with a pair.
-PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY = 0, 1, 2, 3
+# What is to be done with a pair: at a pose, with a new front; on the way there, with one that is made at the last pose.
+PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY, ON_WAY_ANEW = 0, 1, 2, 3, 4
 # What rounding of poses and of sums of coordinates may do to a gap, in parts of these: some thirty roundings.
 ROUNDING = 4e-15
 
@@ -247,7 +258,7 @@ def posed_with_move(q, a, b, move):
     return RelativePose(matmul_t(rotation_a, rotation_b), matvec_t(rotation_a, d))
 
 
-FRONTS = "Tuple((f8[:, ::1], i8[:, ::1], f8[:, :, ::1], i8[:, :, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1]))"
+FRONTS = "Tuple((f8[:, ::1], i8[:, ::1], f8[:, :, ::1], i8[:, :, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1]))"
 
 
 @kernel(signatures=f"({FOREST}, {FRONTS}, f8[:, ::1], f8[:, ::1], i8[::1], i8[::1])", allocates=True)
@@ -255,11 +266,11 @@ def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes):
     """Look at pairs of bodies at poses q (n, 7), each after a move (6) of its second body; how each look ended."""
     table, pool, faces, links, tree_nodes, used = forest_arrays
     forest = Forest(Store(table, pool), faces, links, tree_nodes, used)
-    pairs, counts, parted, nodes, waiting, waiting_nodes, work = front_arrays
+    pairs, counts, parted, nodes, next_parted, next_nodes, waiting, waiting_nodes, work = front_arrays
     for k in range(len(tasks)):
         if tasks[k] == PASSED_BY:
             continue
-        front = Front(pairs[k], counts[k], parted[k], nodes[k], waiting, waiting_nodes, work)
+        front = Front(pairs[k], counts[k], parted[k], nodes[k], next_parted, next_nodes, waiting, waiting_nodes, work)
         pair, count = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
         count.asked = 0
         count.sought = 0
@@ -268,13 +279,18 @@ def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes):
         pose = posed_with_move(q, count.body_a, count.body_b, moves[k])
         far = pair.far + math.sqrt(dot(pose.shift, pose.shift))
         limits = Limits(pair.needed + ROUNDING * far, pair.touch, pair.resolution, count.budget)
-        if tasks[k] == BEGUN_ANEW:
+        if tasks[k] == BEGUN_ANEW or tasks[k] == ON_WAY_ANEW:
             begin_front(front)
-        if tasks[k] == ON_WAY:
+        if tasks[k] == ON_WAY_ANEW:
+            codes[k] = look(forest, front, last_pose(front), limits, False)
+            count.fresh = count.count
+        if tasks[k] == ON_WAY or (tasks[k] == ON_WAY_ANEW and codes[k] == CLEAR):
             codes[k] = go_to(forest, front, pose, limits)
-        else:
+        elif tasks[k] != ON_WAY_ANEW:
             codes[k] = look(forest, front, pose, limits, False)
-            pair.part = 1.0
+            if tasks[k] == BEGUN_ANEW:
+                count.fresh = count.count
+            pair.part = 1.0 if codes[k] == CLEAR else 0.0
 
 
 @kernel(signatures=f"({FOREST}, UniTuple(i8, 2), f8[::1], f8[::1], f8[::1])")

@@ -16,7 +16,15 @@ from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.body_cells import BodyCells
 from assembly.proximity.clearance.forest import Fronts, PackedForest
 from assembly.proximity.clearance.inside import UNCLEAR, winding_of
-from assembly.proximity.clearance.look import AT_POSE, BEGUN_ANEW, ON_WAY, PASSED_BY, gap_along, look_at_pairs
+from assembly.proximity.clearance.look import (
+    AT_POSE,
+    BEGUN_ANEW,
+    ON_WAY,
+    ON_WAY_ANEW,
+    PASSED_BY,
+    gap_along,
+    look_at_pairs,
+)
 from assembly.proximity.clearance.parting import least_move
 from assembly.proximity.clearance.records import (
     BY_PLANE,
@@ -146,14 +154,13 @@ class ClearanceProof:
         counts, pair = self.fronts.counts, self.fronts.pair
         pair.touch = touching
         grown = counts.count > GROWN * counts.fresh + MANY
-        tasks[rows] = np.where(
-            ~self._begun | grown, BEGUN_ANEW, np.where(swept & (pair.known == 1.0), ON_WAY, AT_POSE)
-        )[rows]
-        anew = tasks == BEGUN_ANEW
+        asked = np.where(grown | ~self._begun, BEGUN_ANEW, AT_POSE)
+        if swept:
+            asked = np.where(pair.known == 1.0, np.where(grown, ON_WAY_ANEW, ON_WAY), asked)
+        tasks[rows] = asked[rows]
         self._run(np.ascontiguousarray(q, dtype=float), moved, tasks)
-        counts.fresh[anew] = counts.count[anew]
         self._begun[rows] = True
-        return [self._answer(k, q, moved[k], bool(swept and tasks[k] != AT_POSE and not anew[k])) for k in rows]
+        return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
 
     def _run(self, q: Array, moves: Array, tasks: Table) -> None:
         waiting = tasks.copy()
@@ -165,7 +172,9 @@ class ClearanceProof:
             if not (self.forest.grow() if self.forest.is_full else self.fronts.grow()):
                 self._codes[short] = OPEN
                 return
-            waiting = np.where(short & (waiting == BEGUN_ANEW), AT_POSE, np.where(short, waiting, PASSED_BY))
+            # What is in the front already stays there.
+            kept = np.where(waiting == BEGUN_ANEW, AT_POSE, waiting)
+            waiting = np.where(short, kept, PASSED_BY)
 
     def cells_of(self, k: int) -> BodyCells:
         """The tree of the second body of pair k."""
@@ -178,15 +187,13 @@ class ClearanceProof:
 
     def _answer(self, k: int, q: Array, move: Array, swept: bool) -> Answer:
         pair, code = self.fronts.pair[k], int(self._codes[k])
-        known = bool(pair.known == 1.0)
-        pair.known = 0.0
         part = float(pair.part)
         if code == CROSSING:
             place = rotation_matrix(q[self.pairs[k][0], 3:]) @ pair.place + q[self.pairs[k][0], :3]
             return Answer(Verdict.CROSSING, depth=float(pair.depth), place=place, part=part)
         if code != CLEAR:
             return Answer(Verdict.UNDECIDED, part=part)
-        nested = False if swept and known else self.nested(k, q, move)
+        nested = False if swept else self.nested(k, q, move)
         if nested is None:
             return Answer(Verdict.UNDECIDED, part=part)
         bound = self.bound(k)
@@ -198,18 +205,18 @@ class ClearanceProof:
             return Answer(Verdict.TOUCHING, bound - far, far, swept=swept)
         return Answer(Verdict.CLEAR, bound, swept=swept)
 
-    def is_conforming(self, k: int) -> bool:
-        """Whether what was left open of pair k are faces that lie on each other: normals oppose in all pairs of cells."""
-        count = int(self.fronts.counts.count[k])
-        open_rows = np.flatnonzero(rows_of(PARTED, self.fronts.parted[k, :count]).expiry == -np.inf)
-        nodes = rows_of(NODES, self.fronts.nodes[k, :count])[open_rows]
+    def conforms(self, k: int, q: Array, touching: float) -> bool:
+        """Whether what a look at pair k leaves open are faces that lie on each other: normals oppose in all cells."""
+        if self.look(q, touching, which=[k])[0].verdict is not Verdict.UNDECIDED:
+            return False
+        nodes = self._left(k)[1]
         if not len(nodes):
             return False
         links, faces = rows_of(LINKS, self.forest.arrays[3]), rows_of(CELL_FACE, self.forest.arrays[2])
         if (links.face[nodes.a] == NONE).any() or (links.face[nodes.b] == NONE).any():
             return False
         axes = rows_of(NODE, self.forest.arrays[4]).axes
-        turn = self.fronts.pair.turn[k].reshape(3, 3)
+        turn = self._relative(k, q)[0]
         normal_a = axes[nodes.a, 2] * faces.sign[links.face[nodes.a]][:, None]
         normal_b = axes[nodes.b, 2] * faces.sign[links.face[nodes.b]][:, None] @ turn.T
         return bool(((normal_a * normal_b).sum(axis=1) < -OPPOSED).all())
@@ -239,19 +246,90 @@ class ClearanceProof:
         return move
 
     def opening_move(self, k: int, q: Array, touching: float) -> Array | None:
-        """The same for the pairs of nodes that the last look left open, along the directions they have."""
-        count = int(self.fronts.counts.count[k])
-        parted = rows_of(PARTED, self.fronts.parted[k, :count])
-        nodes = rows_of(NODES, self.fronts.nodes[k, :count])
-        left = np.flatnonzero((parted.expiry == -np.inf) & (nodes.how == BY_PLANE))
-        if not 0 < len(left) <= MOST_OPENED:
+        """The same for the pairs of nodes that a look at pair k alone left open, along the directions they have."""
+        parted, nodes = self._left(k)
+        if not 0 < len(nodes) <= MOST_OPENED:
             return None
         cells = rows_of(NODE, self.forest.arrays[4])
         a = q[self.pairs[k][0]]
-        turn, shift = self.fronts.pair.turn[k].reshape(3, 3), self.fronts.pair.shift[k]
-        places = cells.center[nodes.b[left]] @ turn.T + shift
-        normals = parted.normal[left]
-        gaps = np.array([self._gap(k, *row) for row in zip(nodes.a[left], nodes.b[left], normals, strict=True)])
+        turn, shift = self._relative(k, q)
+        places = cells.center[nodes.b] @ turn.T + shift
+        normals = parted.normal
+        rows = zip(nodes.a.tolist(), nodes.b.tolist(), normals, strict=True)
+        gaps = np.array([gap_along(self.forest.arrays, (i, j), turn.ravel(), shift, n) for i, j, n in rows])
+        if (np.linalg.norm(normals, axis=1) < 0.5).any() or (gaps < -touching).any():
+            return None
+        world = rotation_matrix(a[3:])
+        return self.move_apart(k, q, (normals @ world.T, places @ world.T + a[:3], gaps), touching)
+
+    def _relative(self, k: int, q: Array) -> tuple[Array, Array]:
+        """The rotation and the shift of the second body of pair k, seen from the first."""
+        a, b = self.pairs[k]
+        turn = rotation_matrix(q[a, 3:])
+        return turn.T @ rotation_matrix(q[b, 3:]), (q[b, :3] - q[a, :3]) @ turn
+
+    def _left(self, k: int) -> tuple[np.recarray, np.recarray]:
+        """The pairs of nodes that a look at pair k left open: PARTED and NODES of each."""
+        count = int(self.fronts.counts.next_count[k])
+        parted, nodes = (rows[:count] for rows in self.fronts.left)
+        rows = rows_of(PARTED, parted)
+        is_open = rows.expiry == -np.inf
+        links = rows_of(NODES, nodes)
+        is_open &= links.how == BY_PLANE
+        return rows[is_open], links[is_open]
+
+    def conforms(self, k: int, q: Array, touching: float) -> bool:
+        """Whether what a look at pair k leaves open are faces that lie on each other: normals oppose in all cells."""
+        if self.look(q, touching, which=[k])[0].verdict is not Verdict.UNDECIDED:
+            return False
+        nodes = self._left(k)[1]
+        if not len(nodes):
+            return False
+        links, faces = rows_of(LINKS, self.forest.arrays[3]), rows_of(CELL_FACE, self.forest.arrays[2])
+        if (links.face[nodes.a] == NONE).any() or (links.face[nodes.b] == NONE).any():
+            return False
+        axes = rows_of(NODE, self.forest.arrays[4]).axes
+        turn = self._relative(k, q)[0]
+        normal_a = axes[nodes.a, 2] * faces.sign[links.face[nodes.a]][:, None]
+        normal_b = axes[nodes.b, 2] * faces.sign[links.face[nodes.b]][:, None] @ turn.T
+        return bool(((normal_a * normal_b).sum(axis=1) < -OPPOSED).all())
+
+    def move_apart(self, k: int, q: Array, contacts: tuple[Array, Array, Array], touching: float) -> Array | None:
+        """The least move (6) of the second body of pair k that opens contacts; None where no point may move so far.
+
+        Parameters
+        ----------
+        k : int
+        q : (n, 7)
+        contacts : (m, 3), (m, 3), (m,)
+            Normals from the first body to the second, places, and gaps over the least gap; in the world.
+        touching : float
+            What a point may be moved.
+        """
+        normals, places, gaps = contacts
+        row = q[self.pairs[k][1]]
+        root = self.cells_of(k).nodes[0]
+        arm, radius = rotation_matrix(row[3:]) @ root[:3], float(root[3])
+        asked = np.maximum(OPENED * touching - gaps, LEAST_OPENED * touching)
+        move = least_move(normals, places - row[:3] - arm, asked, radius) if touching > 0.0 else None
+        if move is None or np.linalg.norm(move[:3]) + radius * np.linalg.norm(move[3:]) > touching:
+            return None
+        # About the origin of the body instead of its middle.
+        move[:3] -= np.cross(move[3:], arm)
+        return move
+
+    def opening_move(self, k: int, q: Array, touching: float) -> Array | None:
+        """The same for the pairs of nodes that a look at pair k alone left open, along the directions they have."""
+        parted, nodes = self._left(k)
+        if not 0 < len(nodes) <= MOST_OPENED:
+            return None
+        cells = rows_of(NODE, self.forest.arrays[4])
+        a = q[self.pairs[k][0]]
+        turn, shift = self._relative(k, q)
+        places = cells.center[nodes.b] @ turn.T + shift
+        normals = parted.normal
+        rows = zip(nodes.a.tolist(), nodes.b.tolist(), normals, strict=True)
+        gaps = np.array([gap_along(self.forest.arrays, (i, j), turn.ravel(), shift, n) for i, j, n in rows])
         if (np.linalg.norm(normals, axis=1) < 0.5).any() or (gaps < -touching).any():
             return None
         world = rotation_matrix(a[3:])

@@ -69,14 +69,15 @@ Forest = namedtuple("Forest", "store faces links nodes used")
 # What is known of a pair of bodies, of which the first, a, is at rest.
 PAIR = record_dtype(
     "f8",
-    turn=9,  # the last pose of b seen from a
+    turn=9,  # the last pose of b, seen from a, at which a look ended clear
     shift=3,
     travelled=1,  # how far points of b may have gone in all
     soonest=1,  # when that uses up the first gap of the front
-    part=1,  # of the way of the last look, how much was looked at
+    next_soonest=1,  # the same of the front that follows
+    part=1,  # of the way of the last look, how much is clear
     depth=1,  # of a crossing: no translation of b by less undoes it
     place=3,  # where it was found, seen from a
-    known=1,  # 1: the last look ended clear, and neither is within the other
+    known=1,  # 1: there was one, and neither body was within the other
     needed=1,  # every gap has to be larger
     touch=1,  # cells that cross by no more are no crossing
     resolution=1,  # pairs of cells that are smaller stay open
@@ -92,6 +93,7 @@ COUNTS = record_dtype(
     body_b=1,
     budget=1,  # after so many pairs of nodes pairs of cells stay open
     count=1,  # of pairs of nodes in the front
+    next_count=1,  # and in the one that follows
     fresh=1,  # how many there were when it was last begun
     opened=1,  # of pairs of cells that were left open
     asked=1,  # pairs whose gap was asked again along a kept direction
