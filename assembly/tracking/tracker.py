@@ -324,10 +324,14 @@ class Tracker(InOneProcess):
     def _proven(self, status: TrackStatus) -> TrackStatus:
         """The status of a tick, whose pose is that of the last one where bodies are not known to be clear at it."""
         assert self._clear is not None
+        packed = self._packed
         there = Solution(self._scene, self._packed, self._state, Status.SOLVED, 0.0, self._history)
         if self._clear.holds(there):
             return status
         self._pose[:] = self._before
+        # What was crossed is perhaps not listed: all pairs are searched again.
+        pairs = self._state[packed.memory_at + MEMORY_HEADER :][: PAIR_MEMORY * int(packed.table[packed.table[MANAGER_RECORD] + PAIRS])]
+        pairs.reshape(-1, PAIR_MEMORY)[:, PAIR_TURN] = np.nan
         return TrackStatus.HELD
 
     def _has_changed(self) -> bool:

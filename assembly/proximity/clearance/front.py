@@ -34,8 +34,9 @@ from assembly.proximity.clearance.way import stays_apart
 # work in.
 Front = namedtuple("Front", "pair counts parted nodes next_parted next_nodes waiting waiting_nodes work")
 # What a look asks for. needed: every gap has to be larger; touch: cells that cross by no more are no crossing;
-# resolution: pairs of cells that are smaller stay open; budget: so do those after so many pairs.
-Limits = namedtuple("Limits", "needed touch resolution budget")
+# resolution: pairs of cells that are smaller stay open; budget: so do all pairs of nodes
+# after so many; swept_budget: after so many a way is too long.
+Limits = namedtuple("Limits", "needed touch resolution budget swept_budget")
 # Two nodes, and what parts them.
 Parted = namedtuple("Parted", "a b how")
 

@@ -43,8 +43,8 @@ from assembly.proximity.clearance.separation import best_bore, best_direction, g
 from assembly.proximity.clearance.stab import crossing_of
 from assembly.proximity.clearance.way import pose_at, sag_of, stays_apart, way_of
 
-# The most pairs that directions are sought for over a way at once: halving it is cheaper than more. The shortest part
-# of a way.
+# The most pairs that directions are sought for over a whole way: halving it is cheaper than more. The shortest part of
+# a way.
 SWEPT_BUDGET, SHORTEST = 1000, 1.0 / 256.0
 # How a pair of nodes was left: parted, to be replaced by children, open, or with it the look ends.
 DONE, DIVIDED, ENDED = 0, 1, 2
@@ -170,9 +170,13 @@ def seek(forest, front, way, limits, tail):
         nodes = Parted(row.a, row.b, BY_PLANE)
         hint = vector(parted_at(front.waiting, head % len(front.waiting)).normal)
         head += 1
-        counts.sought += 1
-        if way.swept and head > SWEPT_BUDGET:
+        if way.swept and head > limits.swept_budget:
             return UNSWEPT
+        if head > limits.budget:
+            counts.opened += 1
+            keep(front, nodes, hint, -math.inf)
+            continue
+        counts.sought += 1
         parted, n, gaps, overlap = part_nodes(forest, front, way, nodes, hint, limits.needed)
         if parted:
             continue
@@ -182,7 +186,7 @@ def seek(forest, front, way, limits, tail):
         if is_too_long(forest, way, nodes, gaps):
             return UNSWEPT
         small = node_at(forest.nodes, nodes.a).radius + node_at(forest.nodes, nodes.b).radius < limits.resolution
-        if cells and (small or head > limits.budget):
+        if cells and small:
             counts.opened += 1
             keep(front, nodes, n, -math.inf)
             continue
@@ -224,7 +228,8 @@ def go_to(forest, front, pose, limits):
     root = node_at(forest.nodes, counts_at(front.counts, 0).root_b)
     begin = last_pose(front)
     whole = way_of(begin, pose, vector(root.center), root.radius, True)
-    code = look(forest, front, pose, limits, True)
+    first = Limits(limits.needed, limits.touch, limits.resolution, limits.budget, SWEPT_BUDGET)
+    code = look(forest, front, pose, first, True)
     done, step = 1.0 if code == CLEAR else 0.0, 0.5
     while done < 1.0 and (code == CLEAR or code == UNSWEPT):
         to = min(done + step, 1.0)
@@ -278,7 +283,7 @@ def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes):
         count.stabbed = 0
         pose = posed_with_move(q, count.body_a, count.body_b, moves[k])
         far = pair.far + math.sqrt(dot(pose.shift, pose.shift))
-        limits = Limits(pair.needed + ROUNDING * far, pair.touch, pair.resolution, count.budget)
+        limits = Limits(pair.needed + ROUNDING * far, pair.touch, pair.resolution, count.budget, count.budget)
         if tasks[k] == BEGUN_ANEW or tasks[k] == ON_WAY_ANEW:
             begin_front(front)
         if tasks[k] == ON_WAY_ANEW:

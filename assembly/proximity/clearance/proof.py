@@ -200,7 +200,7 @@ class ClearanceProof:
         if nested:
             return Answer(Verdict.ENCLOSED, bound, bound)
         pair.known = 1.0
-        far = self._moved(k, q, move)
+        far = self.move_length(k, q, move)
         if far > 0.0:
             return Answer(Verdict.TOUCHING, bound - far, far, swept=swept)
         return Answer(Verdict.CLEAR, bound, swept=swept)
@@ -340,13 +340,24 @@ class ClearanceProof:
         pair = self.fronts.pair
         return float(gap_along(self.forest.arrays, (int(a), int(b)), pair.turn[k], pair.shift[k], normal))
 
-    def _moved(self, k: int, q: Array, move: Array) -> float:
+    def size(self, k: int) -> float:
+        """The size of the larger body of pair k."""
+        return max(self.forest.cells[self._number[body]].size for body in self.pairs[k])
+
+    def move_length(self, k: int, q: Array, move: Array) -> float:
         """How far a move takes points of the second body of pair k, at most."""
         if not move.any():
             return 0.0
         middle, radius = self.cells_of(k).nodes[0, :3], float(self.cells_of(k).nodes[0, 3])
         way = move[:3] + np.cross(move[3:], rotation_matrix(q[self.pairs[k][1], 3:]) @ middle)
         return float(np.linalg.norm(way) + radius * np.linalg.norm(move[3:]))
+
+    def way_length(self, k: int, before: Array, after: Array) -> float:
+        """How far points of the second body of pair k go between two poses, seen from the first, at most."""
+        (turn0, shift0), (turn1, shift1) = self._relative(k, before), self._relative(k, after)
+        middle, radius = self.cells_of(k).nodes[0, :3], float(self.cells_of(k).nodes[0, 3])
+        angle = 2.0 * np.arcsin(min(1.0, float(np.linalg.norm(turn1 - turn0)) / np.sqrt(8.0)))
+        return float(np.linalg.norm((turn1 - turn0) @ middle + shift1 - shift0) + angle * radius)
 
     def nested(self, k: int, q: Array, move: Array) -> bool | None:
         """Whether a body of pair k, whose boundaries are apart, is within the other one; None where no ray tells.
