@@ -17,6 +17,8 @@ BUDGET = 4000
 # How deep the way of a contact that rolls may go in, times the square of its length over the size: a chord of a curve of
 # radius r is s^2 / (8 r) off it, and the arc of a body that turns as much.
 ROLLED = 4.0
+# It may go in by so much of the size in any case: directions that part bodies are then found at once.
+ROOM = 1e-6
 
 
 class ClearTicks:
@@ -57,18 +59,20 @@ class ClearTicks:
         answers = proof.look(q, self._touching, self._moves, swept=True)
         left = [k for k, answer in enumerate(answers) if not is_proven(answer)]
         self.way_depth = 0.0
+        moves = self._moves
         if left:
-            moves = opening_moves(solution, proof, self._touching)
+            opened = opening_moves(solution, proof, self._touching)
+            moves = moves.copy()
+            moves[left] = opened[left]
             for k, answer in zip(left, self._rolled(q, moves, left), strict=True):
                 answers[k] = answer
-            self._moves = moves
         self.proved = all(map(is_proven, answers))
         doubtful = [(k, answer) for k, answer in enumerate(answers) if not is_proven(answer)]
         if not all(
             answer.verdict is Verdict.UNDECIDED and proof.conforms(k, q, self._touching) for k, answer in doubtful
         ):
             return False
-        self._q = q
+        self._q, self._moves = q, moves
         return True
 
     def _rolled(self, q: Array, moves: Array, which: list[int]) -> list[Answer]:
@@ -77,7 +81,7 @@ class ClearTicks:
         before, after = self._moves.copy(), moves.copy()
         for k in which:
             way = proof.way_length(k, self._q, q)
-            depth = min(ROLLED * way * way / proof.size(k), way)
+            depth = max(ROLLED * way * way / proof.size(k), ROOM * proof.size(k))
             self.way_depth = max(self.way_depth, depth)
             for pose, move in ((self._q, before[k]), (q, after[k])):
                 length = proof.move_length(k, pose, move)

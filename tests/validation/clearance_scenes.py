@@ -5,8 +5,9 @@
 prints how solves and ticks end, by pairs of parts, and writes every outcome to a JSON file: that of a number is of the
 same scene whatever the library does, so that files of two versions can be compared one to one.
 
-Of three in four starts the parts are brought to a signed distance of +-1e-6 to +-1e-1; others stand anywhere, or one
-wholly within the other. Half of the scenes have an objective that draws a point of the second part into the first one.
+Of six in ten starts the parts are brought to a signed distance of +-1e-6 to +-1e-1. Of others a point inside of one is
+inside of the other one, the second one is wholly within the first, or they stand anywhere. Half of the scenes have an
+objective that draws a point of the second part into the first one.
 """
 
 from __future__ import annotations
@@ -36,6 +37,10 @@ Array = NDArray[np.float64]
 # scene's, and extrema of faces that lean by less than 1e-9 are no better than that.
 TOUCHING = 1e-9
 TICKS, HELD_FOR, LOOKS = 60, 10, 25
+# Shares of kinds of starts; the rest stand anywhere.
+NEAR, PIERCED, NESTED = 0.6, 0.2, 0.1
+# What has room for others within.
+BIG = ("big box", "big ellipsoid")
 # How a tick ends that promises nothing.
 PROMISE_NOTHING = ("VIOLATED", "BAD_TARGET", "CHANGED")
 
@@ -56,6 +61,7 @@ def parts() -> dict[str, exact.Part]:
         exact.box(4.0, 3.5, 3.0, "big box"),
         exact.sheet(1.5, 1.1),
         exact.ellipsoid(0.3, 0.5, 0.7),
+        exact.ellipsoid(2.0, 2.2, 2.4, "big ellipsoid"),
         exact.capsule(0.2, 0.8),
         exact.tube(0.5, 0.4, 1.0),
     ]
@@ -131,32 +137,41 @@ def brought_to(a: exact.Part, b: exact.Part, turn: Array, base: Array, way: Arra
     return np.asarray(base + way * brentq(above, low, high, xtol=0.01 * abs(aim), disp=False))
 
 
-def _within(rng: np.random.Generator, turn: Array) -> tuple[str, Array]:
-    """Which part is in the big box, and where."""
-    big, known = parts()["big box"], [name for name in parts() if name not in ("big box", "plate")]
-    name = known[rng.integers(len(known))]
+def _nested(rng: np.random.Generator, turn: Array) -> tuple[str, str, Array]:
+    """A part wholly within a big one, their names and where."""
+    first = BIG[rng.integers(len(BIG))]
+    known = [name for name in parts() if name not in (*BIG, "plate")]
+    second, big = known[rng.integers(len(known))], parts()[first]
     while True:
         place = rng.uniform(-1.0, 1.0, 3) * big.half_extents
-        if big.distance(Motion(turn, place).apply(parts()[name].samples)).max() < -1e-3:
-            return name, place
+        if big.distance(Motion(turn, place).apply(parts()[second].samples)).max() < -1e-3:
+            return first, second, place
+
+
+def _pierced(rng: np.random.Generator, a: exact.Part, b: exact.Part, turn: Array) -> Array:
+    """Where a point inside of one part, or of a sheet, is at one inside of the other."""
+    at, of = (points[rng.integers(len(points))] for points in (p.inner if p.is_closed else p.samples for p in (a, b)))
+    return np.asarray(at - turn @ of)
 
 
 def start(rng: np.random.Generator, aims: tuple[float, float] = (-6.0, -1.0), sides: Sequence[int] = (-1, 1)) -> Start:
     """A random one; where it is near the signed distance is 10 to some power of `aims`, with a sign of `sides`."""
     first, second = _names(rng)
-    turn, way = _turn(rng), _direction(rng)
-    base = rng.uniform(-0.5, 0.5, 3) * (rng.random() < 0.6)
-    kind, aim, far = rng.random(), 10.0 ** rng.uniform(*aims) * rng.choice(sides), rng.uniform(0.0, 2.0)
-    matrix, place, how = turn.as_matrix(), None, "near"
-    if kind < 0.75:
-        place = brought_to(parts()[first], parts()[second], matrix, base, way, aim)
-    elif kind > 0.92:
-        how, first = "nested", "big box"
-        second, place = _within(rng, matrix)
+    a, b = parts()[first], parts()[second]
+    turn, way, base = _turn(rng), _direction(rng), rng.uniform(-0.5, 0.5, 3) * (rng.random() < 0.6)
+    share, aim = rng.random(), 10.0 ** rng.uniform(*aims) * rng.choice(sides)
+    matrix, place, kind = turn.as_matrix(), None, "near"
+    if share < NEAR:
+        place = brought_to(a, b, matrix, base, way, aim)
+    elif share < NEAR + PIERCED:
+        kind, place = "pierced", _pierced(rng, a, b, matrix)
+    elif share < NEAR + PIERCED + NESTED:
+        kind = "nested"
+        first, second, place = _nested(rng, matrix)
     if place is None:
-        how, place = "anywhere", base + far * way
+        kind, place = "anywhere", base + way * rng.uniform(0.0, 2.0)
     distance = least_signed_distance(parts()[first], parts()[second], Motion(matrix, place))
-    return Start(first, second, np.r_[place, turn.as_quat(scalar_first=True)], how, way, distance)
+    return Start(first, second, np.r_[place, turn.as_quat(scalar_first=True)], kind, way, distance)
 
 
 def clear_start(rng: np.random.Generator) -> Start:
@@ -346,7 +361,7 @@ def report(solves: list[SolveOutcome], tracks: list[TrackOutcome]) -> None:
     _table("wrong ticks by pair", [("pairs", " and ".join(sorted(t.pair))) for t in tracks for _ in t.wrong])
 
 
-def main(file: str = "", solves: int = 600, tracks: int = 100) -> int:
+def main(file: str = "", solves: int = 900, tracks: int = 150) -> int:
     """Run, print and write; how many are wrong."""
     solved(0), tracked(0)
     ends, ways = [solved(k) for k in range(solves)], [tracked(k) for k in range(tracks)]

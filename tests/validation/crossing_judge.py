@@ -13,7 +13,7 @@ no lower place is farther from all samples. A spacing is 1/70 of a part's extent
 convex solid there is one basin, which is found. A second basin within `APART` spacings of a lower start, and those
 behind the first `STARTS`, are missed. In a basin the least is found to 1e-11 of the size where the distance is smooth
 or has kinks across the border of a patch, as before an edge. Where parts are deep in each other the lowest points are
-on kinks, which are followed to 1e-3 of the depth or so; whether the parts cross does not depend on these.
+on kinks, which are followed to a tenth of the depth at worst; whether parts cross does not depend on these.
 """
 
 from __future__ import annotations

@@ -150,24 +150,24 @@ def extruded_distance(outline: Distance, half: float) -> Distance:
 
 
 def ellipsoid_distance(half_axes: ArrayLike) -> Distance:
-    """From an ellipsoid: the foot x of a point y is x_i = a_i^2 y_i / (a_i^2 + t), with t where it is on the surface.
+    """From an ellipsoid: the foot x of a point y is x_i = a_i^2 y_i / (a_i^2 - a_min^2 + t), where t > 0 puts it on it.
 
-    Of what is left of the sum of squares s the secular form 1/sqrt(s) - 1 is nearly straight and convex upward, so that
-    Newton's method comes to t from the left of it, in a few steps (as for the radius of a trust region).
+    With the sum s of (x_i / a_i)^2, 1 / sqrt(s) - 1 is nearly straight in t and bends so that Newton's method comes to
+    its root from the left of it, in a few steps, as for the radius of a trust region.
     """
     a = np.asarray(half_axes, dtype=float)
+    wider = a * a - a.min() ** 2
 
     def distance(p: Array) -> Array:
         # A coordinate of exactly zero may have its foot off the plane of symmetry.
         y = np.maximum(np.abs(p), 1e-14 * a.min())
-        t = (a * y - a * a).max(axis=1)
+        t = (a * y - wider).max(axis=1)
         for _ in range(30):
-            part = a * y / (t[:, None] + a * a)
-            total = (part**2).sum(axis=1)
-            slope = (part**2 / (t[:, None] + a * a)).sum(axis=1)
-            t = t + np.maximum((np.sqrt(total) - 1.0) * total / slope, 0.0)
-        foot = a * a * y / (t[:, None] + a * a)
-        off = np.linalg.norm(y - foot, axis=1)
+            below = t[:, None] + wider
+            squares = (a * y / below) ** 2
+            total = squares.sum(axis=1)
+            t = t + np.maximum((np.sqrt(total) - 1.0) * total / (squares / below).sum(axis=1), 0.0)
+        off = np.linalg.norm(y - a * a * y / (t[:, None] + wider), axis=1)
         return np.asarray(np.where(((y / a) ** 2).sum(axis=1) < 1.0, -off, off))
 
     return distance

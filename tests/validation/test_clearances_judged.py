@@ -7,16 +7,32 @@ not hold is never wrong here, but it must not be the rule: hence the shares.
 
 from __future__ import annotations
 
-from tests.validation.clearance_scenes import solved, tracked
+from tests.validation.clearance_scenes import PROMISE_NOTHING, solved, tracked
+
+# Where ends that cross are not told by the extrema of distances: a thin plate, all of whose surface near a round body
+# is pierced; a sheet; edges of concave bodies.
+HARD_SOLVES = (14, 39, 79, 105, 258, 286, 406, 759, 797, 839, 858)
+HARD_TRACKS = (35, 18, 67, 2, 15, 19, 30, 34)
 
 
 def test_what_is_solved_is_clear(cases):
-    outcomes = [solved(number) for number in range(cases(40, 3000))]
+    outcomes = [solved(number) for number in range(cases(20, 3000))]
     assert [outcome for outcome in outcomes if not outcome.is_right] == []
-    assert sum(outcome.is_solved for outcome in outcomes) >= 0.7 * len(outcomes)
+    assert sum(outcome.is_solved for outcome in outcomes) >= 0.85 * len(outcomes)
+
+
+def test_what_is_solved_is_clear_where_it_is_hard():
+    assert [outcome for outcome in map(solved, HARD_SOLVES) if not outcome.is_right] == []
 
 
 def test_ticks_that_hold_are_clear(cases):
-    outcomes = [tracked(number) for number in range(cases(10, 500))]
-    assert [(outcome, outcome.wrong) for outcome in outcomes if outcome.wrong] == []
-    assert sum(outcome.begins for outcome in outcomes) >= 0.7 * len(outcomes)
+    outcomes = [tracked(number) for number in range(cases(2, 500))]
+    assert {outcome.number: (outcome.pair, outcome.wrong) for outcome in outcomes if outcome.wrong} == {}
+    assert sum(outcome.begins for outcome in outcomes) >= 0.9 * len(outcomes)
+    told = [status for outcome in outcomes for status in outcome.statuses]
+    assert sum(status not in PROMISE_NOTHING for status in told) >= 0.9 * len(told)
+
+
+def test_ticks_that_hold_are_clear_where_it_is_hard(cases):
+    outcomes = [tracked(number) for number in HARD_TRACKS[: cases(3, len(HARD_TRACKS))]]
+    assert {outcome.number: (outcome.pair, outcome.wrong) for outcome in outcomes if outcome.wrong} == {}

@@ -31,6 +31,7 @@ VOLUMES = {
     "thin 1e-4": 1.92e-4,
     "big box": 42.0,
     "ellipsoid": 4.0 / 3.0 * np.pi * 0.105,
+    "big ellipsoid": 4.0 / 3.0 * np.pi * 10.56,
     "capsule": np.pi * 0.04 * 0.8 + 4.0 / 3.0 * np.pi * 0.008,
     "tube": np.pi * (0.25 - 0.16),
 }
@@ -76,13 +77,13 @@ def test_signed_distances(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_ball_is_as_far_as_its_center_less_its_radius(name, cases):
-    """Whether they cross or not: the foot of a center that is outside is the lowest point, as seen from the ball."""
+    """Whether they cross or not: what of the part is nearest to a center outside of it is the deepest in the ball."""
     part, rng = parts()[name], np.random.default_rng(2)
     for number in range(cases(12, 300)):
         while True:
             center = rng.uniform(-1.3, 1.3, 3) * (part.half_extents + 0.1)
             off = float(part.distance(center[None])[0])
-            if off > 0.02:
+            if off > 0.11:
                 break
         # Touching by nearly nothing, or by as much as the radius is.
         gap = (10.0 ** rng.uniform(-9, -1) * rng.choice([-1, 1])) if number % 3 else rng.uniform(-0.5, 0.5) * off
@@ -160,7 +161,7 @@ def test_sheets():
 
 
 def test_more_samples_and_more_starts_tell_the_same(cases, monkeypatch):
-    """Of random pairs near touching; what is deep may be off along kinks, but not whether it crosses."""
+    """Of random pairs near touching, from either side; depths may be off along kinks, but not whether they cross."""
     starts = [start(np.random.default_rng([4, number])) for number in range(cases(6, 300))]
     known = parts()
     monkeypatch.setattr(exact_solids, "SAMPLES", 8 * exact_solids.SAMPLES)
@@ -168,11 +169,10 @@ def test_more_samples_and_more_starts_tell_the_same(cases, monkeypatch):
     fine = parts.__wrapped__()
     for begin in starts:
         pose = Motion.of(begin.pose)
-        told = least_signed_distance(fine[begin.first], fine[begin.second], pose)
-        assert told == pytest.approx(begin.distance, abs=max(CLOSE, -1e-2 * begin.distance)), begin
         back = Motion(UPRIGHT, np.zeros(3)).seen_from(pose)
-        turned = least_signed_distance(known[begin.second], known[begin.first], back)
-        assert turned == pytest.approx(begin.distance, abs=max(CLOSE, -1e-2 * begin.distance)), begin
+        near = pytest.approx(begin.distance, abs=max(CLOSE, -0.1 * begin.distance))
+        assert least_signed_distance(fine[begin.first], fine[begin.second], pose) == near, begin
+        assert least_signed_distance(known[begin.second], known[begin.first], back) == near, begin
 
 
 def test_starts_are_the_same_again_and_where_they_were_meant_to_be():

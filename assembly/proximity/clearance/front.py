@@ -61,6 +61,23 @@ def begin_front(front):
     pair_proof_at(front.pair, 0).soonest = -math.inf
 
 
+@kernel(inner=True)
+def first_row(front):
+    """What a new front writes over: the first pair of nodes, the count, when the first gap is used up."""
+    row, parted, counts = nodes_at(front.nodes, 0), parted_at(front.parted, 0), counts_at(front.counts, 0)
+    kept = Parted(row.a, row.b, row.how), vector(parted.normal), parted.expiry
+    return kept, counts.count, pair_proof_at(front.pair, 0).soonest
+
+
+@kernel(inner=True)
+def bring_back(front, kept):
+    """Put back what a new front wrote over."""
+    (pair, n, expiry), count, soonest = kept
+    write_pair(front.parted, front.nodes, 0, pair, n, expiry)
+    counts_at(front.counts, 0).count = count
+    pair_proof_at(front.pair, 0).soonest = soonest
+
+
 @kernel(inline=True)
 def last_pose(front):
     """The pose of the last look that ended clear."""

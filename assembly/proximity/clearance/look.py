@@ -6,7 +6,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly._record import Store
-from assembly.geometry.vec import add, dot, matmul_t, matvec_t, quaternion_matrix, quaternion_product, scale
+from assembly.geometry.vec import add, dot, matmul_t, matvec, matvec_t, neg, quaternion_matrix, quaternion_product, scale
 from assembly.kinematics.motion import RelativePose, exponential, rotation
 from assembly.proximity.clearance.front import (
     Front,
@@ -14,7 +14,9 @@ from assembly.proximity.clearance.front import (
     Parted,
     ask_again,
     begin_front,
+    bring_back,
     expiry_of,
+    first_row,
     keep,
     last_pose,
     put_waiting,
@@ -27,6 +29,7 @@ from assembly.proximity.clearance.records import (
     BY_PLANE,
     CLEAR,
     CROSSING,
+    GUIDES,
     NO_ROOM,
     NONE,
     OPEN,
@@ -39,7 +42,7 @@ from assembly.proximity.clearance.records import (
     pair_proof_at,
     parted_at,
 )
-from assembly.proximity.clearance.separation import best_bore, best_direction, gap_of, is_cell, is_round, separation
+from assembly.proximity.clearance.separation import best_bore, best_direction, gap_of, is_cell, is_round, normal_of, separation
 from assembly.proximity.clearance.stab import crossing_of
 from assembly.proximity.clearance.way import pose_at, sag_of, stays_apart, way_of
 
@@ -50,27 +53,49 @@ SWEPT_BUDGET, SHORTEST = 1000, 1.0 / 256.0
 DONE, DIVIDED, ENDED = 0, 1, 2
 
 
+@kernel(inline=True)
+def better_all_along(forest, nodes, way, m, found):
+    """A direction, not of unit length, if the lesser of its gaps at both ends of a way is larger than of one found."""
+    length = math.sqrt(dot(m, m))
+    if length <= 0.5:
+        return found
+    m = scale(1.0 / length, m)
+    after = separation(forest, nodes.a, nodes.b, way.after, m)
+    before = separation(forest, nodes.a, nodes.b, way.before, m) if way.swept else math.inf
+    return (m, before, after) if min(before, after) > min(found[1], found[2]) else found
+
+
+@kernel(inner=True)
+def best_all_along(forest, front, nodes, way, hint, found):
+    """The direction with the larger of the lesser gaps at both ends of a way, of one that was found and of others.
+
+    These are what parted the nodes, or their parents, at the last pose, together with the one that was found; normals
+    of contacts; and normals of cells.
+    """
+    if way.swept:
+        found = better_all_along(forest, nodes, way, add(found[0], hint), found)
+    guides = pair_proof_at(front.pair, 0).guides
+    for i in range(GUIDES):
+        found = better_all_along(forest, nodes, way, vector(guides[i]), found)
+    if way.swept:
+        for i in range(2):
+            if is_cell(forest, nodes.a if i == 0 else nodes.b):
+                m = normal_of(forest, nodes.a) if i == 0 else matvec(way.after.rotation, normal_of(forest, nodes.b))
+                found = better_all_along(forest, nodes, way, m, found)
+                found = better_all_along(forest, nodes, way, neg(m), found)
+    return found
+
+
 @kernel(inner=True)
 def part_nodes(forest, front, way, nodes, hint, needed):
     """Seek what parts two nodes. Whether it does, the direction, the gaps before and after, and whether hulls overlap."""
     a, b = nodes.a, nodes.b
     n, gap, overlap = best_direction(forest, a, b, way.after, hint, needed + way.sag, front.work)
+    before = separation(forest, a, b, way.before, n) if way.swept else math.inf
+    if not min(before, gap) > needed + way.sag:
+        n, before, gap = best_all_along(forest, front, nodes, way, hint, (n, before, gap))
+    before -= needed
     gap -= needed
-    before = math.inf
-    if gap > 0.0 and way.swept:
-        before = separation(forest, a, b, way.before, n) - needed
-        if not before > way.sag and dot(hint, hint) > 0.5:
-            # What parted them, or their parents, at the last pose may do so halfway.
-            middle = add(n, hint)
-            length = math.sqrt(dot(middle, middle))
-            if length > 0.5:
-                middle = scale(1.0 / length, middle)
-                gaps = (
-                    separation(forest, a, b, way.before, middle) - needed,
-                    separation(forest, a, b, way.after, middle) - needed,
-                )
-                if min(gaps[0], gaps[1]) > min(before, gap):
-                    n, before, gap = middle, gaps[0], gaps[1]
     travelled = pair_proof_at(front.pair, 0).travelled + way.moved
     if stays_apart(forest, nodes, way, n, (before, gap)):
         keep(front, nodes, n, travelled + gap)
@@ -99,9 +124,9 @@ def is_halved_first(forest, a, b, short):
         if one.reach + other.reach >= 0.5 * short:
             return one.reach > other.reach, False
         return one.radius > other.radius, True
-    if round_b and not round_a and (not cell_a or one.reach >= 0.25 * short + 2.0 * one.pad):
+    if round_b and not round_a and (not cell_a or one.disc + one.rho >= 0.25 * short + 2.0 * one.pad):
         return True, False
-    if round_a and not round_b and (not cell_b or other.reach >= 0.25 * short + 2.0 * other.pad):
+    if round_a and not round_b and (not cell_b or other.disc + other.rho >= 0.25 * short + 2.0 * other.pad):
         return False, False
     # A cell is not halved for a box that is not yet taken apart.
     if cell_a or cell_b:
@@ -113,7 +138,7 @@ def is_halved_first(forest, a, b, short):
 def fineness(forest, k):
     """How much smaller nodes than node k could still be."""
     node = node_at(forest.nodes, k)
-    return node.reach if is_cell(forest, k) else node.radius
+    return node.disc + node.rho if is_cell(forest, k) else node.radius
 
 
 @kernel(inner=True)
@@ -197,22 +222,28 @@ def seek(forest, front, way, limits, tail):
 
 
 @kernel(inner=True)
-def look(forest, front, pose, limits, swept):
-    """Prove that all pairs of the front are clear by more than `needed` at a pose and, swept, from the last one on.
+def look_only(forest, front, way, limits):
+    """Prove that all pairs of the front are clear by more than `needed` at the end of a way and, swept, all along it.
 
-    Where it ends otherwise, the front and the last pose stay as they are. What is left open is in the front that follows.
+    The front and the last pose stay as they are; the front that follows is that of the end.
     """
+    counts_at(front.counts, 0).opened = 0
+    tail = ask_again(forest, front, way, limits.needed)
+    return seek(forest, front, way, limits, tail)
+
+
+@kernel(inner=True)
+def look(forest, front, pose, limits, swept):
+    """Look at a pose and, swept, at the way from the last one. Where both are clear, the pose becomes the last one."""
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
     root = node_at(forest.nodes, counts.root_b)
     way = way_of(last_pose(front), pose, vector(root.center), root.radius, swept)
-    counts.opened = 0
     travelled = pair.travelled + way.moved
     if travelled < pair.soonest:
         pair.travelled = travelled
         remember(front, pose)
         return CLEAR
-    tail = ask_again(forest, front, way, limits.needed)
-    code = seek(forest, front, way, limits, tail)
+    code = look_only(forest, front, way, limits)
     if code == CLEAR:
         replace_front(front, pose, travelled)
     return code
@@ -248,8 +279,9 @@ def go_to(forest, front, pose, limits):
     return code
 
 
-# What is to be done with a pair: at a pose, with a new front; on the way there, with one that is made at the last pose.
-PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY, ON_WAY_ANEW = 0, 1, 2, 3, 4
+# What is to be done with a pair: at a pose, with a new front; on the way there, with one that is
+# made at the last pose; at a pose, without going there.
+PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY, ON_WAY_ANEW, ONLY_TRIED = 0, 1, 2, 3, 4, 5
 # What rounding of poses and of sums of coordinates may do to a gap, in parts of these: some thirty roundings.
 ROUNDING = 4e-15
 
@@ -261,6 +293,32 @@ def posed_with_move(q, a, b, move):
     rotation_a, rotation_b = rotation(q, a), quaternion_matrix(turn[0], turn[1], turn[2], turn[3])
     d = (q[b, 0] - q[a, 0] + move[0], q[b, 1] - q[a, 1] + move[1], q[b, 2] - q[a, 2] + move[2])
     return RelativePose(matmul_t(rotation_a, rotation_b), matvec_t(rotation_a, d))
+
+
+@kernel(inner=True)
+def done_task(forest, front, pose, limits, task):
+    """Do what is to be done with a pair; how its look ended."""
+    pair, counts = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
+    if task == ON_WAY_ANEW:
+        kept = first_row(front)
+        begin_front(front)
+        if look(forest, front, last_pose(front), limits, False) == CLEAR:
+            counts.fresh = counts.count
+        else:
+            bring_back(front, kept)
+    if task == ONLY_TRIED:
+        root = node_at(forest.nodes, counts.root_b)
+        way = way_of(last_pose(front), pose, vector(root.center), root.radius, False)
+        return look_only(forest, front, way, limits)
+    if task == ON_WAY or task == ON_WAY_ANEW:
+        return go_to(forest, front, pose, limits)
+    if task == BEGUN_ANEW:
+        begin_front(front)
+    code = look(forest, front, pose, limits, False)
+    if task == BEGUN_ANEW:
+        counts.fresh = counts.count
+    pair.part = 1.0 if code == CLEAR else 0.0
+    return code
 
 
 FRONTS = "Tuple((f8[:, ::1], i8[:, ::1], f8[:, :, ::1], i8[:, :, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1]))"
@@ -284,18 +342,7 @@ def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes):
         pose = posed_with_move(q, count.body_a, count.body_b, moves[k])
         far = pair.far + math.sqrt(dot(pose.shift, pose.shift))
         limits = Limits(pair.needed + ROUNDING * far, pair.touch, pair.resolution, count.budget, count.budget)
-        if tasks[k] == BEGUN_ANEW or tasks[k] == ON_WAY_ANEW:
-            begin_front(front)
-        if tasks[k] == ON_WAY_ANEW:
-            codes[k] = look(forest, front, last_pose(front), limits, False)
-            count.fresh = count.count
-        if tasks[k] == ON_WAY or (tasks[k] == ON_WAY_ANEW and codes[k] == CLEAR):
-            codes[k] = go_to(forest, front, pose, limits)
-        elif tasks[k] != ON_WAY_ANEW:
-            codes[k] = look(forest, front, pose, limits, False)
-            if tasks[k] == BEGUN_ANEW:
-                count.fresh = count.count
-            pair.part = 1.0 if codes[k] == CLEAR else 0.0
+        codes[k] = done_task(forest, front, pose, limits, tasks[k])
 
 
 @kernel(signatures=f"({FOREST}, UniTuple(i8, 2), f8[::1], f8[::1], f8[::1])")

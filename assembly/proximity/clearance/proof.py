@@ -21,6 +21,7 @@ from assembly.proximity.clearance.look import (
     BEGUN_ANEW,
     ON_WAY,
     ON_WAY_ANEW,
+    ONLY_TRIED,
     PASSED_BY,
     gap_along,
     look_at_pairs,
@@ -31,6 +32,7 @@ from assembly.proximity.clearance.records import (
     CELL_FACE,
     CLEAR,
     CROSSING,
+    GUIDES,
     LINKS,
     NO_ROOM,
     NODE,
@@ -152,17 +154,17 @@ class ClearanceProof:
         moved = np.zeros((len(self.pairs), 6)) if moves is None else np.ascontiguousarray(moves, dtype=float)
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         counts, pair = self.fronts.counts, self.fronts.pair
-        pair.touch = touching
         grown = counts.count > GROWN * counts.fresh + MANY
         asked = np.where(grown | ~self._begun, BEGUN_ANEW, AT_POSE)
         if swept:
             asked = np.where(pair.known == 1.0, np.where(grown, ON_WAY_ANEW, ON_WAY), asked)
         tasks[rows] = asked[rows]
-        self._run(np.ascontiguousarray(q, dtype=float), moved, tasks)
+        self._run(np.ascontiguousarray(q, dtype=float), touching, moved, tasks)
         self._begun[rows] = True
         return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
 
-    def _run(self, q: Array, moves: Array, tasks: Table) -> None:
+    def _run(self, q: Array, touching: float, moves: Array, tasks: Table) -> None:
+        self.fronts.pair.touch = touching
         waiting = tasks.copy()
         while waiting.any():
             look_at_pairs(self.forest.arrays, self.fronts.arrays, q, moves, waiting, self._codes)
@@ -207,7 +209,10 @@ class ClearanceProof:
 
     def conforms(self, k: int, q: Array, touching: float) -> bool:
         """Whether what a look at pair k leaves open are faces that lie on each other: normals oppose in all cells."""
-        if self.look(q, touching, which=[k])[0].verdict is not Verdict.UNDECIDED:
+        tasks = np.zeros(len(self.pairs), dtype=np.int64)
+        tasks[k] = ONLY_TRIED
+        self._run(np.ascontiguousarray(q), touching, np.zeros((len(self.pairs), 6)), tasks)
+        if self._codes[k] != OPEN:
             return False
         nodes = self._left(k)[1]
         if not len(nodes):
@@ -238,6 +243,10 @@ class ClearanceProof:
         root = self.cells_of(k).nodes[0]
         arm, radius = rotation_matrix(row[3:]) @ root[:3], float(root[3])
         asked = np.maximum(OPENED * touching - gaps, LEAST_OPENED * touching)
+        guides = self.fronts.pair.guides[k]
+        guides[:] = 0.0
+        few = normals[np.linspace(0, len(normals) - 1, min(len(normals), GUIDES)).astype(int)]
+        guides[: len(few)] = few @ rotation_matrix(q[self.pairs[k][0], 3:])
         move = least_move(normals, places - row[:3] - arm, asked, radius) if touching > 0.0 else None
         if move is None or np.linalg.norm(move[:3]) + radius * np.linalg.norm(move[3:]) > touching:
             return None
@@ -280,7 +289,10 @@ class ClearanceProof:
 
     def conforms(self, k: int, q: Array, touching: float) -> bool:
         """Whether what a look at pair k leaves open are faces that lie on each other: normals oppose in all cells."""
-        if self.look(q, touching, which=[k])[0].verdict is not Verdict.UNDECIDED:
+        tasks = np.zeros(len(self.pairs), dtype=np.int64)
+        tasks[k] = ONLY_TRIED
+        self._run(np.ascontiguousarray(q), touching, np.zeros((len(self.pairs), 6)), tasks)
+        if self._codes[k] != OPEN:
             return False
         nodes = self._left(k)[1]
         if not len(nodes):
@@ -311,6 +323,10 @@ class ClearanceProof:
         root = self.cells_of(k).nodes[0]
         arm, radius = rotation_matrix(row[3:]) @ root[:3], float(root[3])
         asked = np.maximum(OPENED * touching - gaps, LEAST_OPENED * touching)
+        guides = self.fronts.pair.guides[k]
+        guides[:] = 0.0
+        few = normals[np.linspace(0, len(normals) - 1, min(len(normals), GUIDES)).astype(int)]
+        guides[: len(few)] = few @ rotation_matrix(q[self.pairs[k][0], 3:])
         move = least_move(normals, places - row[:3] - arm, asked, radius) if touching > 0.0 else None
         if move is None or np.linalg.norm(move[:3]) + radius * np.linalg.norm(move[3:]) > touching:
             return None

@@ -66,6 +66,8 @@ CELL_FACE_SIZE = size_of(CELL_FACE)
 # faces (CELL_FACE); links, nodes: rows of LINKS and NODE, of which the first `used[0]` are used.
 Forest = namedtuple("Forest", "store faces links nodes used")
 
+# How many normals of contacts are tried.
+GUIDES = 4
 # What is known of a pair of bodies, of which the first, a, is at rest.
 PAIR = record_dtype(
     "f8",
@@ -82,6 +84,7 @@ PAIR = record_dtype(
     touch=1,  # cells that cross by no more are no crossing
     resolution=1,  # pairs of cells that are smaller stay open
     far=1,  # the sum of the bodies' largest coordinates
+    guides=(GUIDES, 3),  # normals of contacts, from a to b, seen from a: directions that are tried as well; or zero
 )
 pair_proof_at = record_view(PAIR)
 PAIR_SIZE = size_of(PAIR)

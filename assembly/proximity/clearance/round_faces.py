@@ -1,4 +1,4 @@
-"""Faces that lie on a cylinder, a ball or a torus: exact hulls of those from outside, and bores of walls from inside.
+"""Faces that lie on a cylinder, a ball or a torus, and discs: exact hulls, and bores of walls from inside.
 
 |S - c|^2 - r^2 = N / w^2 is rational. N is made as a Bezier net, whose points bound it; on an exact cylinder or ball
 they vanish but for rounding. A torus is (|x|^2 + R^2 - r^2)^2 = 4 R^2 (|x|^2 - z^2).
@@ -177,11 +177,46 @@ def _beyond_torus(pieces: Array, center: Array, axis: Array, radii: tuple[float,
     return max(float((top / bezier_product(ww, ww)).max()), 0.0) / (4.0 * ring**2 * tube)
 
 
+def _disc(face: Face) -> Round | None:
+    """A flat face whose outer boundary is a circle, as a cylinder without length."""
+    surface = face.surface
+    net = surface.control_points
+    if net.shape != (2, 2, 3) or np.ptp(surface.weights) > 0.0 or face.outer is None:
+        return None
+    far = float(np.abs(net).max())
+    (u0, u1), (v0, v1) = surface.domain
+    along, across = (net[1, 0] - net[0, 0]) / (u1 - u0), (net[0, 1] - net[0, 0]) / (v1 - v0)
+    if np.abs(net[1, 1] - net[1, 0] - net[0, 1] + net[0, 0]).max() > EXACT * far:
+        return None
+    origin = net[0, 0] - u0 * along - v0 * across
+    axis = np.cross(along, across)
+    axis /= np.linalg.norm(axis)
+    pieces, points = [], []
+    for curve in face.boundary[: len(face.chains[0])]:
+        bezier = curve.bezier_pieces()
+        w = bezier[..., -1:]
+        space = origin * w + bezier[..., :1] * along + bezier[..., 1:2] * across
+        pieces.append(np.concatenate([space, w], axis=-1)[:, :, None])
+        uv = curve.evaluate(np.linspace(*curve.domain, 9))
+        points.append(origin + uv[:, :1] * along + uv[:, 1:] * across)
+    samples = np.concatenate(points)
+    basis = np.linalg.svd(np.eye(3) - np.outer(axis, axis))[0][:, :2]
+    middle, radius = _sphere(samples @ basis)
+    center = basis @ middle + (samples[0] @ axis) * axis
+    size = float(np.linalg.norm(np.ptp(samples, axis=0)))
+    if np.abs(np.linalg.norm(samples - center, axis=1) - radius).max() > EXACT * size:
+        return None
+    most = max(_squares(part, center, np.eye(3))[1] for part in pieces)
+    if np.sqrt(most) - radius > EXACT * size:
+        return None
+    return Round(center, axis, 8e-16 * far + EXACT * far, float(np.sqrt(most) * ROUNDED_UP + 8e-16 * far), 0.0, True)
+
+
 def round_of(face: Face) -> Round | None:
-    """What a face lies on, or None where that is no cylinder, ball or torus."""
+    """What a face lies on, or None where that is no cylinder, ball or torus, and the face no disc."""
     surface = face.surface
     if max(surface.degree) < 2:
-        return None
+        return _disc(face)
     u, v = (np.linspace(*ends, 9) for ends in surface.domain)
     points = surface.evaluate(u[:, None], v[None, :]).reshape(-1, 3)
     size = float(np.linalg.norm(np.ptp(points, axis=0)))

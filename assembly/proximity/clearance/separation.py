@@ -23,6 +23,7 @@ from assembly.proximity.clearance.records import (
     BY_BORE_A,
     BY_BORE_B,
     BY_PLANE,
+    FLAT,
     NONE,
     links_at,
     node_at,
@@ -157,14 +158,21 @@ def try_planes_of_boxes(forest, a, b, pose, middle, enough):
     return n, best
 
 
+@kernel(inline=True)
+def normal_of(forest, k):
+    """A unit normal of a cell; of one of a flat face that of the face, which its small corners do not tell as well."""
+    node = node_at(forest.nodes, k)
+    return vector(node.ruling) if links_at(forest.links, k).shape == FLAT else vector(node.axes[2])
+
+
 @kernel(inner=True)
 def try_normals(forest, a, b, pose, found):
-    """The best of a direction and its gap, and of both cells' normals either way."""
+    """The best of a direction and its gap, and of the cells' normals either way."""
     n, best = found
     for i in range(2):
-        m = vector(node_at(forest.nodes, a).axes[2])
-        if i == 1:
-            m = matvec(pose.rotation, vector(node_at(forest.nodes, b).axes[2]))
+        if not is_cell(forest, a if i == 0 else b):
+            continue
+        m = normal_of(forest, a) if i == 0 else matvec(pose.rotation, normal_of(forest, b))
         for _side in range(2):
             gap = separation(forest, a, b, pose, m)
             if gap > best:
@@ -200,14 +208,17 @@ def best_direction(forest, a, b, pose, hint, enough, work):
     hull_a, hull_b = ConvexSet(work[0], 0, count_a, -1.0), ConvexSet(work[1], 0, count_b, -1.0)
     how, v, _count = gjk(4, hull_a, hull_b, neg(n), math.inf, ROUGHLY, work[2])
     length = math.sqrt(dot(v, v))
-    if how == APART and length > 0.0:
+    is_apart = how == APART and length > 0.0
+    if is_apart:
         m = scale(-1.0 / length, v)
         gap = separation(forest, a, b, pose, m)
-        return (m, gap, False) if gap > best else (n, best, False)
-    if not cells:
-        return n, best, False
+        if gap > best:
+            n, best = m, gap
+            if best > enough:
+                return n, best, False
+    # Of hulls that all but touch the nearest points do not tell a direction well enough.
     n, best = try_normals(forest, a, b, pose, (n, best))
-    return n, best, True
+    return n, best, cells and not is_apart
 
 
 @kernel(inner=True)
