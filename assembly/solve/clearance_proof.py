@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from assembly.constraints.model.contact import side_faces
 from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
-from assembly.proximity.clearance.proof import Answer, ClearanceProof, Verdict, is_proven
+from assembly.proximity.clearance.proof import Answer, ClearanceProof, Contacts, Verdict, is_proven
 from assembly.proximity.extrema.pairs import ContactPair
 from assembly.solve.contact_pairs import contact_pairs, listed_contacts
 from assembly.solve.crossings import crossings_of
@@ -26,10 +26,10 @@ from assembly.solve.interruption import CTRL_C
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
 
-__all__ = ["PairAnswer", "lent_proof", "new_proof", "opening_moves", "prove_end"]
+__all__ = ["PairAnswer", "lent_proof", "near_contacts", "new_proof", "opening_move", "prove_end"]
 
 Array = NDArray[np.float64]
-# Contacts that are open by less than this part of what is called touching are opened.
+# Contacts that are open by less than this part of how far a body may be moved are opened.
 NEAR = 0.5
 # Moves that are tried for contacts that no row tells of.
 TRIES = 3
@@ -77,7 +77,9 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
     packed, scene = solution._packed, solution._scene
     touching = solution._touching * packed.scale
     with lent_proof(packed, scene.bodies) as proof:
-        answers = proof.look(solution.q, touching, opening_moves(solution, proof, touching))
+        near = near_contacts(solution, proof, NEAR * touching)
+        moves = np.array([opening_move(proof, k, solution.q, near.get(k), touching) for k in range(len(proof.pairs))])
+        answers = proof.look(solution.q, touching, moves)
         for k, answer in enumerate(answers):
             if not is_proven(answer) and answer.depth <= touching:
                 answers[k] = _opened(proof, k, solution.q, touching)
@@ -128,17 +130,25 @@ def _contacts(solution: Solution, rows: Sequence[tuple[int, int]]) -> Iterator[t
             yield places[g, f], found[item.name], -1.0
 
 
-def opening_moves(solution: Solution, proof: ClearanceProof, touching: float) -> Array:
-    """The least moves (pairs, 6) of second bodies that open the contacts there are; zero where none is as near."""
-    moves = np.zeros((len(proof.pairs), 6))
+def near_contacts(solution: Solution, proof: ClearanceProof, reach: float) -> dict[int, Contacts]:
+    """The contacts of a solution that are open by less than a reach, by the number of their pair of bodies."""
     near: dict[int, list[tuple[Array, Array, float]]] = {}
     for number, contact, sign in _contacts(solution, proof.pairs):
         gap = contact.gap - float(proof.minimum[number])
-        if gap < NEAR * touching:
+        if gap < reach:
             near.setdefault(number, []).append((sign * contact.normal, contact.points[1 if sign > 0.0 else 0], gap))
-    for number, contacts in near.items():
-        normals, places, gaps = (np.array(column) for column in zip(*contacts, strict=True))
-        move = proof.move_apart(number, solution.q, (normals, places, gaps), touching)
-        if move is not None:
-            moves[number] = move
-    return moves
+    return {number: Contacts(*(np.array(c) for c in zip(*rows, strict=True))) for number, rows in near.items()}
+
+
+def opening_move(proof: ClearanceProof, k: int, q: Array, contacts: Contacts | None, depth: float) -> Array:
+    """The least move (6) of the second body of pair k, by no more than a depth, that opens contacts; zero if none does.
+
+    It opens those that are open by less than half of that.
+    """
+    if contacts is None or depth <= 0.0:
+        return np.zeros(6)
+    near = contacts.gaps < NEAR * depth
+    if not near.any():
+        return np.zeros(6)
+    move = proof.move_apart(k, q, Contacts(*(column[near] for column in contacts)), depth)
+    return np.zeros(6) if move is None else move

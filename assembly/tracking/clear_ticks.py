@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.proximity.clearance.proof import Answer, ClearanceProof, Verdict, is_proven
-from assembly.solve.clearance_proof import new_proof, opening_moves
+from assembly.proximity.clearance.proof import Answer, ClearanceProof, Contacts, Verdict, is_proven
+from assembly.solve.clearance_proof import near_contacts, new_proof, opening_move
 from assembly.solve.solution import Solution
 
 __all__ = ["ClearTicks"]
@@ -19,6 +19,36 @@ BUDGET = 4000
 ROLLED = 4.0
 # It may go in by so much of the size in any case: directions that part bodies are then found at once.
 ROOM = 1e-6
+# Contacts that are nearer, in parts of the size, are remembered of a pose.
+NEAR = 1e-2
+
+
+class _Standing:
+    """Where bodies stand: what opens their contacts there, and which are near, once that is asked.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of a state that nobody writes to.
+    moves : (pairs, 6), optional
+        What opens contacts, if it is known.
+    """
+
+    def __init__(self, solution: Solution, moves: Array | None = None) -> None:
+        self.solution = solution
+        self.q = solution.q
+        self.moves = moves
+        self._near: dict[int, Contacts] | None = None
+
+    def near(self, proof: ClearanceProof) -> dict[int, Contacts]:
+        """The contacts that are near, by the number of their pair."""
+        if self._near is None:
+            self._near = near_contacts(self.solution, proof, NEAR * max(map(proof.size, range(len(proof.pairs)))))
+        return self._near
+
+    def opened(self, proof: ClearanceProof, k: int, depth: float) -> Array:
+        """The least move (6) of the second body of pair k, by no more than a depth, that opens its contacts."""
+        return opening_move(proof, k, self.q, self.near(proof).get(k), depth)
 
 
 class ClearTicks:
@@ -47,46 +77,49 @@ class ClearTicks:
         self._touching = touching
         self._proof: ClearanceProof = new_proof(first._packed, first._scene.bodies)
         self._proof.fronts.counts.budget = BUDGET
-        self._moves = np.zeros((len(self._proof.pairs), 6))
-        self._q = first.q
-        self.proved, self.way_depth = True, 0.0
-        self._moves = opening_moves(first, self._proof, touching)
+        self._at = _Standing(first)
+        self._moves = np.array([self._at.opened(self._proof, k, touching) for k in range(len(self._proof.pairs))])
+        self.way_depth = 0.0
         self.proved = all(map(is_proven, self._proof.look(first.q, touching, self._moves)))
 
     def holds(self, solution: Solution) -> bool:
-        """Whether all pairs hold at the pose of a tick, and on the way there from the last one that did."""
-        proof, q = self._proof, solution.q
-        answers = proof.look(q, self._touching, self._moves, swept=True)
+        """Whether all pairs hold at the pose of a tick, and on the way there from the last one that did.
+
+        The solution is of a state that nobody writes to.
+        """
+        proof, touching = self._proof, self._touching
+        there, moves = _Standing(solution), self._moves
+        # Contacts stay for many ticks, and so does what opens them.
+        answers = proof.look(there.q, touching, moves, swept=True)
         left = [k for k, answer in enumerate(answers) if not is_proven(answer)]
         self.way_depth = 0.0
-        moves = self._moves
         if left:
-            opened = opening_moves(solution, proof, self._touching)
             moves = moves.copy()
-            moves[left] = opened[left]
-            for k, answer in zip(left, self._rolled(q, moves, left), strict=True):
+            for k in left:
+                moves[k] = there.opened(proof, k, touching)
+            for k, answer in zip(left, self._rolled(there, moves, left), strict=True):
                 answers[k] = answer
-        self.proved = all(map(is_proven, answers))
         doubtful = [(k, answer) for k, answer in enumerate(answers) if not is_proven(answer)]
         if not all(
-            answer.verdict is Verdict.UNDECIDED and proof.conforms(k, q, self._touching) for k, answer in doubtful
+            answer.verdict is Verdict.UNDECIDED and proof.conforms(k, there.q, touching) for k, answer in doubtful
         ):
             return False
-        self._q, self._moves = q, moves
+        self.proved = not doubtful
+        self._at, self._moves = there, moves
         return True
 
-    def _rolled(self, q: Array, moves: Array, which: list[int]) -> list[Answer]:
+    def _rolled(self, there: _Standing, moves: Array, which: list[int]) -> list[Answer]:
         """What is proven of pairs that are opened on the way."""
-        proof = self._proof
+        proof, begin = self._proof, self._at
         before, after = self._moves.copy(), moves.copy()
         for k in which:
-            way = proof.way_length(k, self._q, q)
+            way = proof.way_length(k, begin.q, there.q)
             depth = max(ROLLED * way * way / proof.size(k), ROOM * proof.size(k))
             self.way_depth = max(self.way_depth, depth)
-            for pose, move in ((self._q, before[k]), (q, after[k])):
-                length = proof.move_length(k, pose, move)
-                if 0.0 < length < depth:
-                    move *= depth / length
-        proof.look(self._q, self._touching, before, which=which, swept=True)
-        proof.look(q, self._touching, after, which=which, swept=True)
-        return proof.look(q, self._touching, moves, which=which, swept=True)
+            for standing, opened in ((begin, before), (there, after)):
+                move = standing.opened(proof, k, depth)
+                if move.any():
+                    opened[k] = move
+        proof.look(begin.q, self._touching, before, which=which, swept=True)
+        proof.look(there.q, self._touching, after, which=which, swept=True)
+        return proof.look(there.q, self._touching, moves, which=which, swept=True)

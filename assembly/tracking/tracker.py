@@ -27,7 +27,6 @@ from assembly.proximity.manager.records import (
     PAIR_MEMORY,
     PAIR_TURN,
     PAIRS,
-    VERTEX_CONTACTS,
 )
 from assembly.solve.attempts.attempts import new_workspace
 from assembly.solve.loop.augmented_lagrangian import solve_program
@@ -79,7 +78,6 @@ def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
     Ticks have no final update. Which rows are in the place of a contact, or are its own pair, their first update tells.
     """
     record = packed.table[MANAGER_RECORD]
-    packed.table[record + VERTEX_CONTACTS] = 0
     packed.table[record + CLOCK] = packed.table[CLOCK_AT] if keeps_time else 0
     state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, STAYS] = 0.0
     if packed.table[record + MARK_AT]:
@@ -325,7 +323,7 @@ class Tracker(InOneProcess):
         """The status of a tick, whose pose is that of the last one where bodies are not known to be clear at it."""
         assert self._clear is not None
         packed = self._packed
-        there = Solution(self._scene, self._packed, self._state, Status.SOLVED, 0.0, self._history)
+        there = Solution(self._scene, self._packed, self._pose.copy(), Status.SOLVED, 0.0, self._history)
         if self._clear.holds(there):
             return status
         self._pose[:] = self._before

@@ -6,8 +6,9 @@ import math
 
 from assembly._kernel import kernel
 from assembly._record import Store
-from assembly.geometry.vec import add, dot, matmul_t, matvec, matvec_t, neg, quaternion_matrix, quaternion_product, scale
+from assembly.geometry.vec import dot, matmul_t, matvec_t, quaternion_matrix, quaternion_product
 from assembly.kinematics.motion import RelativePose, exponential, rotation
+from assembly.proximity.clearance.directions import best_direction
 from assembly.proximity.clearance.front import (
     Front,
     Limits,
@@ -29,7 +30,6 @@ from assembly.proximity.clearance.records import (
     BY_PLANE,
     CLEAR,
     CROSSING,
-    GUIDES,
     NO_ROOM,
     NONE,
     OPEN,
@@ -42,7 +42,7 @@ from assembly.proximity.clearance.records import (
     pair_proof_at,
     parted_at,
 )
-from assembly.proximity.clearance.separation import best_bore, best_direction, gap_of, is_cell, is_round, normal_of, separation
+from assembly.proximity.clearance.separation import best_bore, gap_of, is_cell, is_round, separation
 from assembly.proximity.clearance.stab import crossing_of
 from assembly.proximity.clearance.way import pose_at, sag_of, stays_apart, way_of
 
@@ -53,61 +53,23 @@ SWEPT_BUDGET, SHORTEST = 1000, 1.0 / 256.0
 DONE, DIVIDED, ENDED = 0, 1, 2
 
 
-@kernel(inline=True)
-def better_all_along(forest, nodes, way, m, found):
-    """A direction, not of unit length, if the lesser of its gaps at both ends of a way is larger than of one found."""
-    length = math.sqrt(dot(m, m))
-    if length <= 0.5:
-        return found
-    m = scale(1.0 / length, m)
-    after = separation(forest, nodes.a, nodes.b, way.after, m)
-    before = separation(forest, nodes.a, nodes.b, way.before, m) if way.swept else math.inf
-    return (m, before, after) if min(before, after) > min(found[1], found[2]) else found
-
-
-@kernel(inner=True)
-def best_all_along(forest, front, nodes, way, hint, found):
-    """The direction with the larger of the lesser gaps at both ends of a way, of one that was found and of others.
-
-    These are what parted the nodes, or their parents, at the last pose, together with the one that was found; normals
-    of contacts; and normals of cells.
-    """
-    if way.swept:
-        found = better_all_along(forest, nodes, way, add(found[0], hint), found)
-    guides = pair_proof_at(front.pair, 0).guides
-    for i in range(GUIDES):
-        found = better_all_along(forest, nodes, way, vector(guides[i]), found)
-    if way.swept:
-        for i in range(2):
-            if is_cell(forest, nodes.a if i == 0 else nodes.b):
-                m = normal_of(forest, nodes.a) if i == 0 else matvec(way.after.rotation, normal_of(forest, nodes.b))
-                found = better_all_along(forest, nodes, way, m, found)
-                found = better_all_along(forest, nodes, way, neg(m), found)
-    return found
-
-
 @kernel(inner=True)
 def part_nodes(forest, front, way, nodes, hint, needed):
     """Seek what parts two nodes. Whether it does, the direction, the gaps before and after, and whether hulls overlap."""
-    a, b = nodes.a, nodes.b
-    n, gap, overlap = best_direction(forest, a, b, way.after, hint, needed + way.sag, front.work)
-    before = separation(forest, a, b, way.before, n) if way.swept else math.inf
-    if not min(before, gap) > needed + way.sag:
-        n, before, gap = best_all_along(forest, front, nodes, way, hint, (n, before, gap))
-    before -= needed
-    gap -= needed
+    found, overlap = best_direction(forest, front, nodes, way, hint, needed)
+    n, gaps = found.n, (found.before - needed, found.after - needed)
     travelled = pair_proof_at(front.pair, 0).travelled + way.moved
-    if stays_apart(forest, nodes, way, n, (before, gap)):
-        keep(front, nodes, n, travelled + gap)
-        return True, n, (before, gap), overlap
-    how, room = best_bore(forest, a, b, way.after)
+    if stays_apart(forest, nodes, way, n, gaps):
+        keep(front, nodes, n, travelled + gaps[1])
+        return True, n, gaps, overlap
+    how, room = best_bore(forest, nodes.a, nodes.b, way.after)
     if how != BY_PLANE and room > needed:
-        inside = Parted(a, b, how)
+        inside = Parted(nodes.a, nodes.b, how)
         at_start = gap_of(forest, inside, way.before, n) - needed if way.swept else math.inf
         if stays_apart(forest, inside, way, n, (at_start, room - needed)):
             keep(front, inside, n, expiry_of(inside, travelled, room - needed))
-            return True, n, (before, gap), overlap
-    return False, n, (before, gap), overlap
+            return True, n, gaps, overlap
+    return False, n, gaps, overlap
 
 
 @kernel(inner=True)

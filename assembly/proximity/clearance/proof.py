@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ from assembly.proximity.clearance.records import (
     PARTED,
 )
 
-__all__ = ["Answer", "ClearanceProof", "Verdict", "is_proven"]
+__all__ = ["Answer", "ClearanceProof", "Contacts", "Verdict", "is_proven"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -94,6 +95,22 @@ class Answer(ReadOnlyArrays):
     place: Array = field(default_factory=lambda: np.full(3, np.nan))
     swept: bool = False
     part: float = 1.0
+
+
+class Contacts(NamedTuple):
+    """Contacts of a pair of bodies, in the world.
+
+    Attributes
+    ----------
+    normals, places : (m, 3)
+        Unit vectors from the first body to the second, and points of the second.
+    gaps : (m,)
+        Over the least gap.
+    """
+
+    normals: Array
+    places: Array
+    gaps: Array
 
 
 def is_proven(answer: Answer) -> bool:
@@ -226,15 +243,14 @@ class ClearanceProof:
         normal_b = axes[nodes.b, 2] * faces.sign[links.face[nodes.b]][:, None] @ turn.T
         return bool(((normal_a * normal_b).sum(axis=1) < -OPPOSED).all())
 
-    def move_apart(self, k: int, q: Array, contacts: tuple[Array, Array, Array], touching: float) -> Array | None:
+    def move_apart(self, k: int, q: Array, contacts: Contacts, touching: float) -> Array | None:
         """The least move (6) of the second body of pair k that opens contacts; None where no point may move so far.
 
         Parameters
         ----------
         k : int
         q : (n, 7)
-        contacts : (m, 3), (m, 3), (m,)
-            Normals from the first body to the second, places, and gaps over the least gap; in the world.
+        contacts : Contacts
         touching : float
             What a point may be moved.
         """
@@ -269,7 +285,7 @@ class ClearanceProof:
         if (np.linalg.norm(normals, axis=1) < 0.5).any() or (gaps < -touching).any():
             return None
         world = rotation_matrix(a[3:])
-        return self.move_apart(k, q, (normals @ world.T, places @ world.T + a[:3], gaps), touching)
+        return self.move_apart(k, q, Contacts(normals @ world.T, places @ world.T + a[:3], gaps), touching)
 
     def _relative(self, k: int, q: Array) -> tuple[Array, Array]:
         """The rotation and the shift of the second body of pair k, seen from the first."""
@@ -306,15 +322,14 @@ class ClearanceProof:
         normal_b = axes[nodes.b, 2] * faces.sign[links.face[nodes.b]][:, None] @ turn.T
         return bool(((normal_a * normal_b).sum(axis=1) < -OPPOSED).all())
 
-    def move_apart(self, k: int, q: Array, contacts: tuple[Array, Array, Array], touching: float) -> Array | None:
+    def move_apart(self, k: int, q: Array, contacts: Contacts, touching: float) -> Array | None:
         """The least move (6) of the second body of pair k that opens contacts; None where no point may move so far.
 
         Parameters
         ----------
         k : int
         q : (n, 7)
-        contacts : (m, 3), (m, 3), (m,)
-            Normals from the first body to the second, places, and gaps over the least gap; in the world.
+        contacts : Contacts
         touching : float
             What a point may be moved.
         """
@@ -349,7 +364,7 @@ class ClearanceProof:
         if (np.linalg.norm(normals, axis=1) < 0.5).any() or (gaps < -touching).any():
             return None
         world = rotation_matrix(a[3:])
-        return self.move_apart(k, q, (normals @ world.T, places @ world.T + a[:3], gaps), touching)
+        return self.move_apart(k, q, Contacts(normals @ world.T, places @ world.T + a[:3], gaps), touching)
 
     def _gap(self, k: int, a: int, b: int, normal: Array) -> float:
         """The gap of two nodes along a direction at the last pose."""

@@ -15,9 +15,8 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.distance.enclosures.gjk import APART, ConvexSet, gjk
 from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, scale, sub
-from assembly.kinematics.motion import IDENTITY, inverse_pose
+from assembly.kinematics.motion import inverse_pose
 from assembly.proximity.clearance.halve import corner_of, vector
 from assembly.proximity.clearance.records import (
     BY_BORE_A,
@@ -29,8 +28,6 @@ from assembly.proximity.clearance.records import (
     node_at,
 )
 
-# The part of a distance to which directions between hulls are sought.
-ROUGHLY = 1e-3
 
 
 @kernel(inline=True)
@@ -102,19 +99,25 @@ def gap_of(forest, nodes, pose, n):
     return room_in_bore(forest, nodes.b, nodes.a, inverse_pose(pose))
 
 
+@kernel(inline=True)
+def put_point(out, i, x):
+    """Write point i of several one after another."""
+    out[3 * i], out[3 * i + 1], out[3 * i + 2] = x
+
+
 @kernel(inner=True)
-def write_corners(forest, k, pose, out):
-    """Corners of a cell, of a box, or of the segment within what is round, seen from a; returns how many."""
+def write_corners(forest, k, pose, out, first):
+    """Corners of a cell, of a box, or of the segment within what is round, seen from a, behind others; how many."""
     node = node_at(forest.nodes, k)
     if links_at(forest.links, k).face != NONE:
         for i in range(4):
-            out[3 * i], out[3 * i + 1], out[3 * i + 2] = placed(pose, corner_of(node, i))
+            put_point(out, first + i, placed(pose, corner_of(node, i)))
         return 4
     center = placed(pose, vector(node.center))
     u = scale(node.half[0], matvec(pose.rotation, vector(node.axes[0])))
     if is_round(forest, k):
-        out[0], out[1], out[2] = add(center, u)
-        out[3], out[4], out[5] = sub(center, u)
+        put_point(out, first, add(center, u))
+        put_point(out, first + 1, sub(center, u))
         return 2
     v = scale(node.half[1], matvec(pose.rotation, vector(node.axes[1])))
     w = scale(node.half[2], matvec(pose.rotation, vector(node.axes[2])))
@@ -122,7 +125,7 @@ def write_corners(forest, k, pose, out):
         d = add(center, u) if i & 1 else sub(center, u)
         d = add(d, v) if i & 2 else sub(d, v)
         d = add(d, w) if i & 4 else sub(d, w)
-        out[3 * i], out[3 * i + 1], out[3 * i + 2] = d
+        put_point(out, first + i, d)
     return 8
 
 
@@ -139,86 +142,11 @@ def is_cell(forest, k):
     return links_at(forest.links, k).face != NONE
 
 
-@kernel(inner=True)
-def try_planes_of_boxes(forest, a, b, pose, middle, enough):
-    """The best of the axes of two boxes, as directions toward the middle of b; stops at the first above `enough`."""
-    n, best = (0.0, 0.0, 0.0), -math.inf
-    for i in range(6):
-        if i < 3:
-            m = vector(node_at(forest.nodes, a).axes[i])
-        else:
-            m = matvec(pose.rotation, vector(node_at(forest.nodes, b).axes[i - 3]))
-        if dot(m, middle) < 0.0:
-            m = neg(m)
-        gap = separation(forest, a, b, pose, m)
-        if gap > best:
-            n, best = m, gap
-            if best > enough:
-                break
-    return n, best
-
-
 @kernel(inline=True)
 def normal_of(forest, k):
     """A unit normal of a cell; of one of a flat face that of the face, which its small corners do not tell as well."""
     node = node_at(forest.nodes, k)
     return vector(node.ruling) if links_at(forest.links, k).shape == FLAT else vector(node.axes[2])
-
-
-@kernel(inner=True)
-def try_normals(forest, a, b, pose, found):
-    """The best of a direction and its gap, and of the cells' normals either way."""
-    n, best = found
-    for i in range(2):
-        if not is_cell(forest, a if i == 0 else b):
-            continue
-        m = normal_of(forest, a) if i == 0 else matvec(pose.rotation, normal_of(forest, b))
-        for _side in range(2):
-            gap = separation(forest, a, b, pose, m)
-            if gap > best:
-                n, best = m, gap
-            m = neg(m)
-    return n, best
-
-
-@kernel(inner=True)
-def best_direction(forest, a, b, pose, hint, enough, work):
-    """A direction with a large gap, that gap, and whether the hulls overlap. Stops at the first above `enough`."""
-    best = -math.inf
-    n = hint
-    if dot(hint, hint) > 0.5:
-        best = separation(forest, a, b, pose, hint)
-        if best > enough:
-            return n, best, False
-    middle = sub(placed(pose, vector(node_at(forest.nodes, b).center)), vector(node_at(forest.nodes, a).center))
-    length = math.sqrt(dot(middle, middle))
-    if length > 0.0:
-        m = scale(1.0 / length, middle)
-        gap = separation(forest, a, b, pose, m)
-        if gap > best:
-            n, best = m, gap
-            if best > enough:
-                return n, best, False
-    cells = is_cell(forest, a) and is_cell(forest, b)
-    if not cells and not is_round(forest, a) and not is_round(forest, b):
-        m, gap = try_planes_of_boxes(forest, a, b, pose, middle, enough)
-        return (m, gap, False) if gap > best else (n, best, False)
-    count_a = write_corners(forest, a, IDENTITY, work[0])
-    count_b = write_corners(forest, b, pose, work[1])
-    hull_a, hull_b = ConvexSet(work[0], 0, count_a, -1.0), ConvexSet(work[1], 0, count_b, -1.0)
-    how, v, _count = gjk(4, hull_a, hull_b, neg(n), math.inf, ROUGHLY, work[2])
-    length = math.sqrt(dot(v, v))
-    is_apart = how == APART and length > 0.0
-    if is_apart:
-        m = scale(-1.0 / length, v)
-        gap = separation(forest, a, b, pose, m)
-        if gap > best:
-            n, best = m, gap
-            if best > enough:
-                return n, best, False
-    # Of hulls that all but touch the nearest points do not tell a direction well enough.
-    n, best = try_normals(forest, a, b, pose, (n, best))
-    return n, best, cells and not is_apart
 
 
 @kernel(inner=True)

@@ -82,8 +82,8 @@ def point(x, i):
 @kernel(inner=True)
 def crossing_of(forest, a, b, pose, work):
     """Of two cells: by how much they cross, not positive where that is not proven, and where, seen from a."""
-    write_corners(forest, a, IDENTITY, work[0])
-    write_corners(forest, b, pose, work[1])
+    write_corners(forest, a, IDENTITY, work[0], 0)
+    write_corners(forest, b, pose, work[1], 0)
     best = 0.0
     place = (0.0, 0.0, 0.0)
     for side in range(2):
