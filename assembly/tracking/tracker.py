@@ -328,7 +328,9 @@ class Tracker(InOneProcess):
             return status
         self._pose[:] = self._before
         # What was crossed is perhaps not listed: all pairs are searched again.
-        pairs = self._state[packed.memory_at + MEMORY_HEADER :][: PAIR_MEMORY * int(packed.table[packed.table[MANAGER_RECORD] + PAIRS])]
+        pairs = self._state[packed.memory_at + MEMORY_HEADER :][
+            : PAIR_MEMORY * int(packed.table[packed.table[MANAGER_RECORD] + PAIRS])
+        ]
         pairs.reshape(-1, PAIR_MEMORY)[:, PAIR_TURN] = np.nan
         return TrackStatus.HELD
 

@@ -54,9 +54,7 @@ def write_pair(parted, nodes, i, pair, n, expiry):
 def begin_front(front):
     """A front of one pair, the roots, of which nothing is known."""
     counts = counts_at(front.counts, 0)
-    write_pair(
-        front.parted, front.nodes, 0, Parted(counts.root_a, counts.root_b, BY_PLANE), (0.0, 0.0, 0.0), -math.inf
-    )
+    write_pair(front.parted, front.nodes, 0, Parted(counts.root_a, counts.root_b, BY_PLANE), (0.0, 0.0, 0.0), -math.inf)
     counts.count = 1
     pair_proof_at(front.pair, 0).soonest = -math.inf
 

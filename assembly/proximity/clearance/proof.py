@@ -149,7 +149,12 @@ class ClearanceProof:
         self._begun = np.zeros(len(self.pairs), dtype=bool)
 
     def look(
-        self, q: Array, touching: float, moves: Array | None = None, which: Sequence[int] | None = None, swept: bool = False
+        self,
+        q: Array,
+        touching: float,
+        moves: Array | None = None,
+        which: Sequence[int] | None = None,
+        swept: bool = False,
     ) -> list[Answer]:
         """What is proven at poses.
 

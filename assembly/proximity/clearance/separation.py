@@ -29,7 +29,6 @@ from assembly.proximity.clearance.records import (
 )
 
 
-
 @kernel(inline=True)
 def placed(pose, x):
     """A point of b, seen from a."""
