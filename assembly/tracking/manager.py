@@ -13,10 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._copies import OwnState
 from assembly._read_only import ReadOnlyArrays
 from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.model.contact import side_faces
 from assembly.constraints.packing.scene import Packed
 from assembly.errors import InputError, number, renamed
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
+from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.extrema.rates import ARM_F, GAP, NORMAL
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
 from assembly.proximity.manager import records as manager_records
@@ -32,6 +34,9 @@ Array = NDArray[np.float64]
 _STATES = tuple(PairState)
 # Largest reach, in parts of the size of the scene.
 MOST_REACH = 0.2
+# Parts of a gap that are tried as bounds, and pairs of nodes that each may take: exact hulls need few.
+BOUND_BUDGET = 20_000
+BOUND_PARTS = ((1.0 - 1e-9, 2000), (0.95, BOUND_BUDGET))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +145,7 @@ class Manager(OwnState):
         self._merge_radius = clearance.merge_radius
         self._touching = touching_part(touching)
         self._pairs = list(combinations(names, 2))
+        self._proof: ClearanceProof | None = None
         self._seen = 0.0
         self._set_up(slots)
 
@@ -231,8 +237,7 @@ class Manager(OwnState):
         """
         if np.isnan(self._poses).any():
             return ()
-        q = self._poses.copy()
-        q[:, :3] = q[:, :3] * self._packed.scale + self._packed.reference
+        q = self._standing()
         shaped = [body for body in self._bodies if body.faces]
         posed = PosedBodies(self._bodies, q, self._touching)
         return find_crossings(posed, list(combinations(shaped, 2)), CTRL_C).pairs
@@ -312,21 +317,41 @@ class Manager(OwnState):
 
     @property
     def gaps(self) -> dict[tuple[str, str], float]:
-        """A lower bound of the gap of every pair of bodies: exact where the nearest contact is listed.
+        """A lower bound of the gap of every pair of bodies, proven anew where it is read.
 
-        Of what is not listed, the reach and what the last update left to the bodies, less what they moved since. It
-        holds for bodies that are apart, or cross no deeper than updates see; minus infinity before the first update.
+        That of the nearest contact that is listed, or the reach, or what is left of it where neither is proven to be
+        one; not positive and no bound where bodies cross or touch; minus infinity before the first update, and where
+        nothing is known.
         """
         pairs = self._parts(self._packed, self._memory)[0]
-        left = np.where(
-            np.isnan(pairs[:, manager_records.PAIR_TURN]),
-            -inf,
-            pairs[:, manager_records.MOTION_BOUND] * (1.0 - pairs[:, manager_records.PART]),
-        )
-        bounds = dict(zip(self._pairs, (self._reach + self._packed.scale * left).tolist(), strict=True))
+        if np.isnan(pairs[:, manager_records.PAIR_TURN]).any():
+            return dict.fromkeys(self._pairs, -inf)
+        left = pairs[:, manager_records.MOTION_BOUND] * (1.0 - pairs[:, manager_records.PART])
+        told = dict(zip(self._pairs, (self._reach + self._packed.scale * left).tolist(), strict=True))
         for contact in self.contacts:
-            bounds[contact.bodies] = min(bounds[contact.bodies], contact.gap)
-        return bounds
+            told[contact.bodies] = min(told[contact.bodies], contact.gap)
+        q = self._standing()
+        return {names: self._proven(k, q, gap) for k, (names, gap) in enumerate(told.items())}
+
+    def _standing(self) -> Array:
+        """Where bodies stand, (n, 7), in the unit of the scene."""
+        q = self._poses.copy()
+        q[:, :3] = q[:, :3] * self._packed.scale + self._packed.reference
+        return q
+
+    def _proven(self, k: int, q: Array, gap: float) -> float:
+        """The gap of pair k that is told, or the largest part of it that is proven to be a bound."""
+        if not gap > 0.0:
+            return gap
+        if self._proof is None:
+            pairs = list(combinations(range(len(self._bodies)), 2))
+            self._proof = ClearanceProof([side_faces(body) for body in self._bodies], pairs, [0.0] * len(pairs))
+        # What is not listed may be nearer than motion bounds say, but hardly than the reach.
+        tried = [(part * whole, most) for whole in (gap, min(gap, self._reach)) for part, most in BOUND_PARTS]
+        for bound, most in dict.fromkeys((*tried, (0.0, BOUND_BUDGET))):
+            if self._proof.is_apart(k, q, bound, most):
+                return bound
+        return -inf
 
     @property
     def log(self) -> tuple[Event, ...]:

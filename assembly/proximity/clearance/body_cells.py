@@ -24,7 +24,7 @@ from assembly.proximity.clearance.records import (
     NODE_SIZE,
     NONE,
 )
-from assembly.proximity.clearance.round_faces import Round, round_of
+from assembly.proximity.clearance.round_faces import Round, round_parts
 
 __all__ = ["BodyCells", "cells_of_body"]
 
@@ -84,7 +84,7 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
     packed = _packed_surfaces(topology.faces)
     links, nodes = _first_cells(tables, packed.curves)
     place_cells(packed.table, packed.pool, packed.faces, links, nodes)
-    builder = _Builder(links, nodes, [round_of(face) for face in topology.faces])
+    builder = _Builder(links, nodes, *_parts(topology.faces, tables))
     builder.build()
     label = _components(topology)
     owner = rows_of(LINKS, links).face
@@ -102,6 +102,18 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
         float(max(np.abs(low).max(), np.abs(high).max())),
         topology,
     )
+
+
+def _parts(faces: tuple[Face, ...], tables: list[CellTable]) -> tuple[Table, list[Round | None]]:
+    """Of every cell the number of the part of a face that it belongs to, and what each part lies on."""
+    labels: list[Table] = []
+    rounds: list[Round | None] = []
+    for face, table in zip(faces, tables, strict=True):
+        direction, parts = round_parts(face)
+        ends = face.surface.breaks()[direction][1 : len(parts)]
+        labels.append(len(rounds) + np.searchsorted(ends, table.uv[..., direction].mean(axis=1)))
+        rounds += parts
+    return np.concatenate(labels), rounds
 
 
 def _components(topology: Topology) -> Table:
@@ -192,15 +204,15 @@ def _box(points: Array, thick: Array) -> tuple[Array, Array, Array, float]:
 
 
 class _Builder:
-    """Makes the nodes above cells: first halves of a body's faces, then halves of a face's cells."""
+    """Makes the nodes above cells: first halves of a body's parts of faces, then halves of a part's cells."""
 
-    def __init__(self, cell_links: Table, cell_nodes: Array, rounds: list[Round | None]) -> None:
+    def __init__(self, cell_links: Table, cell_nodes: Array, part: Table, rounds: list[Round | None]) -> None:
         self.cell_links, self.cell_nodes = cell_links, cell_nodes
-        self.face = rows_of(LINKS, cell_links).face
+        self.part = part
         self.cells = rows_of(NODE, cell_nodes)
         self.rounds = rounds
         count = len(cell_links)
-        self.whole = np.bincount(self.face, minlength=len(rounds))
+        self.whole = np.bincount(self.part, minlength=len(rounds))
         self.links = np.zeros((2 * count - 1, LINKS_SIZE), dtype=np.int64)
         self.nodes = np.zeros((2 * count - 1, NODE_SIZE))
         self.first = np.full(count, NONE)
@@ -208,7 +220,7 @@ class _Builder:
 
     def build(self) -> None:
         """All nodes, the root first."""
-        groups = [np.flatnonzero(self.face == k) for k in range(len(self.rounds))]
+        groups = [np.flatnonzero(self.part == k) for k in range(len(self.rounds))]
         waiting = [(groups, 0)]
         while waiting:
             groups, k = waiting.pop()
@@ -239,9 +251,9 @@ class _Builder:
         """Box around cells, or what is round."""
         link, node = rows_of(LINKS, self.links[k : k + 1])[0], rows_of(NODE, self.nodes[k : k + 1])[0]
         link.face = NONE
-        face = self.face[items[0]]
-        is_face = (self.face[items] == face).all() and len(items) == self.whole[face]
-        found = self.rounds[face] if is_face else None
+        part = self.part[items[0]]
+        is_part = (self.part[items] == part).all() and len(items) == self.whole[part]
+        found = self.rounds[part] if is_part else None
         if found is not None and found.outward:
             _write_round(node, found)
             return

@@ -185,6 +185,21 @@ class ClearanceProof:
         self._begun[rows] = True
         return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
 
+    def is_apart(self, k: int, q: Array, distance: float, budget: int) -> bool:
+        """Whether it is proven, within a budget, that the bodies of pair k are farther apart and none is in the other."""
+        needed, budgets = self.fronts.pair.needed, self.fronts.counts.budget
+        before, needed[k] = float(needed[k]), distance
+        usual, budgets[k] = int(budgets[k]), budget
+        tasks = np.zeros(len(self.pairs), dtype=np.int64)
+        tasks[k] = BEGUN_ANEW
+        still = np.zeros((len(self.pairs), 6))
+        self._run(np.ascontiguousarray(q, dtype=float), 0.0, still, tasks)
+        found = self._codes[k] == CLEAR and self.nested(k, q, still[k]) is False
+        # Gaps of this front are those over another length.
+        needed[k], budgets[k], self._begun[k] = before, usual, False
+        self.fronts.pair.known[k] = 0.0
+        return bool(found)
+
     def _run(self, q: Array, touching: float, moves: Array, tasks: Table) -> None:
         self.fronts.pair.touch = touching
         waiting = tasks.copy()

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
+from assembly.geometry.splines import bezier
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.bvh.normal_nets import bezier_product
 
-__all__ = ["Round", "round_of"]
+__all__ = ["Round", "round_of", "round_parts"]
 
 Array = NDArray[np.float64]
 # How far off a face may be from what it is recognized as, in parts of its size. Bounds are those of the face itself.
@@ -236,3 +238,33 @@ def _is_outward_of_tube(face: Face, found: Round) -> bool:
     across = q - (q @ found.axis) * found.axis
     middle = found.ring * across / np.linalg.norm(across)
     return float(np.dot(np.ravel(face.normal(u, v)), q - middle)) > 0.0
+
+
+def _strip(surface: NurbsSurface, direction: int, k: int) -> NurbsSurface:
+    """Span k of a surface in one direction, and all of the other."""
+    pieces, at = surface.bezier_pieces(), list(surface.breaks())
+    part = slice(k, k + 1)
+    pieces = pieces[part] if direction == 0 else pieces[:, part]
+    at[direction] = at[direction][k : k + 2]
+    # Joined along u, then along v.
+    along_u = np.stack([bezier.joined(pieces[:, j]) for j in range(pieces.shape[1])])
+    points = bezier.joined(np.moveaxis(along_u, 1, 2)).swapaxes(0, 1)
+    knots = [bezier.full_knots(ends, degree) for ends, degree in zip(at, surface.degree, strict=True)]
+    return NurbsSurface(points[..., :3] / points[..., 3:], knots, surface.degree, points[..., 3])
+
+
+def round_parts(face: Face) -> tuple[int, list[Round | None]]:
+    """What the spans of a face without a boundary lie on: the direction of the spans, and one entry a span.
+
+    A wire with half balls on its ends is one face; its spans along it are exact. One entry where the whole face is.
+    """
+    whole = round_of(face)
+    if whole is not None or face.boundary:
+        return 0, [whole]
+    for d in (0, 1):
+        spans = len(face.surface.breaks()[d]) - 1
+        if spans > 1:
+            parts = [round_of(Face(_strip(face.surface, d, k), reversed=face.reversed)) for k in range(spans)]
+            if any(part is not None for part in parts):
+                return d, parts
+    return 0, [None]
