@@ -171,23 +171,43 @@ class Assembly(Contents):
         """A solve from this start and no other one."""
         settings = self._settings(options, interruption, isinstance(q0, Solution))
         solution = self._solved(settings, q0, starts, interruption)
-        if (
-            not solution.success
-            and not interruption.is_over()
-            and solution._packed.clearance_rows
-            and not isinstance(q0, Solution)
-            and settings[ITERATIONS] > 0.0
-        ):
-            from assembly.studies.separation import separated
-
-            spent = solution.seconds
-            begin = perf_counter()
+        is_cold = not isinstance(q0, Solution) and settings[ITERATIONS] > 0.0
+        if solution._packed.clearance_rows and is_cold and not interruption.is_over():
             q = self._given(q0)
-            poses = separated(self, q, options, interruption)
-            # All ways are measured from where the user's bodies were, and the least one is the answer.
-            ways = [solution, *(self._solved(settings, apart, starts, interruption, q) for apart in poses)]
-            solution = min((way for way in ways if way.success), key=lambda way: way.objective, default=ways[-1])
-            solution.seconds = spent + perf_counter() - begin
+            # What holds as it stands was not moved.
+            if not solution.success or (solution.q != q).any():
+                solution = self._from_apart(solution, settings, q, starts, options, interruption)
+        return solution
+
+    def _from_apart(
+        self,
+        solution: Solution,
+        settings: Array,
+        q: Array,
+        starts: Mapping[str, ArrayLike] | None,
+        options: dict[str, Any],
+        interruption: Interruption,
+    ) -> Solution:
+        """The best of a solution and of those from where bodies that are stuck in each other at q are parted.
+
+        All ways are measured from where the user's bodies were, and the least one is the answer.
+        """
+        from assembly.studies.parting import parted
+        from assembly.studies.separation import separated
+
+        spent = solution.seconds
+        begin = perf_counter()
+        ways = [solution]
+        apart = parted(self, q, float(settings[ALLOWED_OVERLAP]) * self.packed().scale, interruption)
+        if apart is not None:
+            ways.append(self._solved(settings, apart, starts, interruption, q))
+        if not any(way.success for way in ways):
+            ways += [
+                self._solved(settings, poses, starts, interruption, q)
+                for poses in separated(self, q, options, interruption)
+            ]
+        solution = min((way for way in ways if way.success), key=lambda way: way.objective, default=ways[-1])
+        solution.seconds = spent + perf_counter() - begin
         return solution
 
     def _solved(

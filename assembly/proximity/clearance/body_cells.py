@@ -179,7 +179,7 @@ def _first_cells(tables: list[CellTable], curves: list[Table]) -> tuple[Table, A
         rows = slice(at, at + len(table.uv))
         at = rows.stop
         link, node = rows_of(LINKS, links[rows]), rows_of(NODE, nodes[rows])
-        link.child, link.face, link.shape, link.hollow = NONE, number, table.shape, table.hollow
+        link.child, link.face, link.form, link.hollow = NONE, number, table.form, table.hollow
         link.rim = np.where(table.rim < 0, NONE, np.append(places, NONE)[table.rim])
         node.uv, node.second, node.first, node.pad = table.uv, table.second, table.first, table.pad
         node.rim_t, node.rim_second, node.ruling = table.rim_t, table.rim_second, table.ruling

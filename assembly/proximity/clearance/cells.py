@@ -58,7 +58,7 @@ class CellTable:
         Whether that curve bends away from the material.
     pad : (n,)
         What a radius is in any case.
-    shape : int
+    form : int
         FLAT, RULED or ROUNDED.
     ruling : (3,)
         The normal of a flat face, the direction of a ruled one's lines; else zero.
@@ -72,7 +72,7 @@ class CellTable:
     rim_second: Array
     hollow: NDArray[np.bool_]
     pad: Array
-    shape: int
+    form: int
     ruling: Array
 
 
@@ -144,7 +144,7 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
         About the most that the boundary turns from corner to corner [rad].
     """
     surface = face.surface
-    shape, ruling, off = _sweep(surface)
+    form, ruling, off = _sweep(surface)
     if face.boundary:
         cells = trimmed_cells(face, tolerance, angle)
         uv, number = cells.parameters, cells.segments
@@ -174,7 +174,7 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
             )
     first, second = surface_bounds(surface, low, high)
     if (
-        shape == FLAT
+        form == FLAT
         and np.ptp(surface.weights) == 0.0
         and max(surface.degree) == 1
         and surface.control_points.shape[:2] == (2, 2)
@@ -192,7 +192,7 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
         rim_second,
         hollow,
         ROUNDING * far + off + (first * beside).sum(axis=1),
-        shape,
+        form,
         ruling,
     )
 

@@ -64,10 +64,10 @@ def write_radii(links, node):
     node.reach = bent + border + node.pad
     node.disc = 0.0
     node.rho = node.pad
-    if links.shape == FLAT and bent == 0.0:
+    if links.form == FLAT and bent == 0.0:
         # What is beyond a chord is in the plane.
         node.disc = beyond
-    elif links.shape == ROUNDED or links.shape == FLAT:
+    elif links.form == ROUNDED or links.form == FLAT:
         node.rho += bent + beyond
     else:
         node.disc = bent

@@ -185,6 +185,11 @@ class ClearanceProof:
         self._begun[rows] = True
         return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
 
+    def cells_of_both(self, k: int) -> tuple[BodyCells, BodyCells]:
+        """The trees of both bodies of pair k."""
+        a, b = self.pairs[k]
+        return self.forest.cells[self._number[a]], self.forest.cells[self._number[b]]
+
     def is_apart(self, k: int, q: Array, distance: float, budget: int) -> bool:
         """Whether it is proven, within a budget, that the bodies of pair k are farther apart and none is in the other."""
         needed, budgets = self.fronts.pair.needed, self.fronts.counts.budget

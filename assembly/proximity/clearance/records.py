@@ -44,7 +44,7 @@ LINKS = record_dtype(
     "i8",
     child=1,  # the first of two children, which follow each other; -1 where there are none yet
     face=1,  # of a cell, the number of its face among all that are packed; else -1
-    shape=1,  # FLAT, RULED, ROUNDED
+    form=1,  # FLAT, RULED, ROUNDED
     rim=3,  # of an edge that is a chord of a boundary curve, the record of that; else -1
     hollow=3,  # 1: that curve bends away from the material, which is nowhere beyond the chord
 )

@@ -145,7 +145,7 @@ def is_cell(forest, k):
 def normal_of(forest, k):
     """A unit normal of a cell; of one of a flat face that of the face, which its small corners do not tell as well."""
     node = node_at(forest.nodes, k)
-    return vector(node.ruling) if links_at(forest.links, k).shape == FLAT else vector(node.axes[2])
+    return vector(node.ruling) if links_at(forest.links, k).form == FLAT else vector(node.axes[2])
 
 
 @kernel(inner=True)

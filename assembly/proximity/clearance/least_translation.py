@@ -1,0 +1,130 @@
+"""The least translation found that parts two bodies which cross, or of which one is within the other.
+
+Convex hulls are parted along n by h(n) = max over a of n.x - min over b of n.y, whose least value over unit vectors is the
+least translation, exactly, where both bodies are convex. It is sought from many directions and along its subgradient, the
+difference of the points that carry it. Of others shorter ways may exist, out of a hole or over a step: along each of many
+directions the first place is looked for at which the proof says CLEAR.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._record import rows_of
+from assembly.kinematics.pose import rotation_matrix
+from assembly.proximity.clearance.body_cells import BodyCells
+from assembly.proximity.clearance.proof import ClearanceProof, Verdict
+from assembly.proximity.clearance.records import FLAT, LINKS, NODE
+
+__all__ = ["least_translation"]
+
+Array = NDArray[np.float64]
+# Directions of hulls that are followed downhill, steps of each, and how much a step is cut where it leads up.
+FOLLOWED, STEPS, CUT = 4, 40, 0.5
+# Normals of flat faces that are tried of each body.
+NORMALS = 12
+# A translation is this part longer than found to part, and looks for it stop at this part of it.
+FARTHER, CLOSE = 1e-6, 1e-3
+# The first length along a direction, in parts of the longest, and looks between it and that.
+FIRST, LENGTHS = 1e-3, 10
+
+
+def _directions(a: BodyCells, b: BodyCells, turn: Array) -> Array:
+    """Directions (n, 3) that are tried, seen from a: of a grid, of both boxes, of flat faces."""
+    grid = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
+    found = [grid]
+    for cells, rotation in ((a, np.eye(3)), (b, turn)):
+        links, nodes = rows_of(LINKS, cells.links), rows_of(NODE, cells.nodes)
+        flat = nodes.ruling[cells.first][links.form[cells.first] == FLAT]
+        distinct = np.unique(np.round(flat, 6), axis=0)[:NORMALS]
+        for ways in (nodes.axes[0], distinct):
+            found += [ways @ rotation.T, -ways @ rotation.T]
+    ways = np.concatenate(found)
+    length = np.linalg.norm(ways, axis=1)
+    return np.asarray(ways[length > 0.0] / length[length > 0.0, None])
+
+
+class _Hulls:
+    """Two convex hulls, and how far they have to be moved along a direction to be parted."""
+
+    def __init__(self, a: BodyCells, b: BodyCells, turn: Array, shift: Array) -> None:
+        self.points, self.thick = [], []
+        for cells, rotation, place in ((a, np.eye(3), np.zeros(3)), (b, turn, shift)):
+            nodes = rows_of(NODE, cells.nodes)[cells.first]
+            self.points.append(nodes.corner.reshape(-1, 3) @ rotation.T + place)
+            self.thick.append(np.repeat(nodes.rho + nodes.disc, 4))
+
+    def depth(self, n: Array) -> tuple[float, Array]:
+        """h(n), and its subgradient."""
+        i = int((self.points[0] @ n + self.thick[0]).argmax())
+        j = int((self.points[1] @ n - self.thick[1]).argmin())
+        slope = self.points[0][i] - self.points[1][j]
+        return float(slope @ n + self.thick[0][i] + self.thick[1][j]), slope
+
+    def least(self, ways: Array) -> Array:
+        """The direction times the depth of the least one that is found."""
+        depths = np.array([self.depth(n)[0] for n in ways])
+        best, n = float(depths.min()), ways[depths.argmin()]
+        for way in ways[np.argsort(depths)[:FOLLOWED]]:
+            at, (depth, slope), step = way, self.depth(way), 0.3
+            for _ in range(STEPS):
+                down = slope - (slope @ at) * at
+                size = float(np.linalg.norm(down))
+                if size == 0.0 or step < 1e-9:
+                    break
+                other = at - step * down / size
+                other /= np.linalg.norm(other)
+                found = self.depth(other)
+                if found[0] < depth:
+                    at, (depth, slope) = other, found
+                else:
+                    step *= CUT
+            if depth < best:
+                best, n = depth, at
+        return np.asarray(best * n)
+
+
+def _is_clear(proof: ClearanceProof, k: int, q: Array, way: Array) -> bool:
+    moved = q.copy()
+    moved[proof.pairs[k][1], :3] += way
+    return proof.look(moved, 0.0, which=[k])[0].verdict is Verdict.CLEAR
+
+
+def _first_clear(proof: ClearanceProof, k: int, q: Array, n: Array, most: float) -> float:
+    """The least length along a direction, no more than the most, at which a pair is found clear; inf if none is."""
+    low = 0.0
+    for length in most * np.geomspace(FIRST, 1.0, LENGTHS):
+        if _is_clear(proof, k, q, length * n):
+            high = float(length)
+            while high - low > CLOSE * high:
+                middle = 0.5 * (low + high)
+                low, high = (low, middle) if _is_clear(proof, k, q, middle * n) else (middle, high)
+            return high
+        low = float(length)
+    return np.inf
+
+
+def least_translation(proof: ClearanceProof, k: int, q: Array) -> Array | None:
+    """The least translation (3,) of the second body of pair k, in the world, that is found to part it from the first.
+
+    None where none is. An upper bound; exact to 1e-3 of it where both bodies are convex and flat.
+    """
+    a, b = proof.pairs[k]
+    world, turn_b = rotation_matrix(q[a, 3:]), rotation_matrix(q[b, 3:])
+    turn, shift = world.T @ turn_b, (q[b, :3] - q[a, :3]) @ world
+    first, second = proof.cells_of_both(k)
+    ways = _directions(first, second, turn)
+    way = world @ _Hulls(first, second, turn, shift).least(ways)
+    most = float(np.linalg.norm(way)) * (1.0 + FARTHER) + FARTHER * max(first.size, second.size)
+    best = way / np.linalg.norm(way) * most
+    if not _is_clear(proof, k, q, best):
+        return None
+    for n in np.concatenate([[best / most], ways @ world.T]):
+        shorter = 0.95 * float(np.linalg.norm(best))
+        found = _first_clear(proof, k, q, n, shorter)
+        if found < shorter:
+            best = found * (1.0 + FARTHER) * n
+    return np.asarray(best)
