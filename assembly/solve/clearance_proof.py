@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import side_faces
 from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
@@ -46,20 +47,37 @@ class PairAnswer:
     answer : Answer
     holds : bool
         Whether they are clear or touch: proven, or by samples where faces lie on each other.
+    proved : bool
+        Whether that is proven, and the least gap as well: beside a contact it is the rows of the solve that keep it.
     """
 
     clearance: str
     bodies: tuple[str, str]
     answer: Answer
     holds: bool
+    proved: bool
+
+
+def _owned(packed: Packed) -> list[tuple[Clearance, tuple[Body, Body], bool]]:
+    """Clearances and the pairs that they keep apart, in the order of a proof; and whether a contact is between the two.
+
+    What is in the place of a contact is asked for no gap, but it may not cross.
+    """
+    touched = {frozenset(id(body) for body in contact.bodies) for contact in packed.contacts}
+    return [
+        (item, pair, frozenset(map(id, pair)) in touched)
+        for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True)
+        for pair in own
+    ]
 
 
 def new_proof(packed: Packed, bodies: Sequence[Body]) -> ClearanceProof:
     """A proof of all pairs that the clearances of a packed scene keep apart."""
     number = {id(body): k for k, body in enumerate(bodies)}
-    owned = [(item, pair) for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True) for pair in own]
-    rows = [(number[id(a)], number[id(b)]) for _, (a, b) in owned]
-    return ClearanceProof([side_faces(body) for body in bodies], rows, [item.minimum for item, _ in owned])
+    owned = _owned(packed)
+    rows = [(number[id(a)], number[id(b)]) for _, (a, b), _ in owned]
+    minimum = [0.0 if touched else item.minimum for item, _, touched in owned]
+    return ClearanceProof([side_faces(body) for body in bodies], rows, minimum)
 
 
 @contextmanager
@@ -87,13 +105,14 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
             answer.verdict is Verdict.UNDECIDED and proof.conforms(k, solution.q, touching)
             for k, answer in enumerate(answers)
         ]
-    owned = [(item, pair) for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True) for pair in own]
-    sampled = [pair for (_, pair), asked in zip(owned, conforming, strict=True) if asked]
+    owned = _owned(packed)
+    sampled = [pair for (_, pair, _), asked in zip(owned, conforming, strict=True) if asked]
     crossing = set(crossings_of(solution, sampled, CTRL_C).pairs) if sampled else set()
     found = []
-    for (item, (a, b)), answer, asked in zip(owned, answers, conforming, strict=True):
-        names = a.name, b.name
-        found.append(PairAnswer(item.name, names, answer, is_proven(answer) or (asked and names not in crossing)))
+    for (item, (a, b), touched), answer, asked in zip(owned, answers, conforming, strict=True):
+        names, proven = (a.name, b.name), is_proven(answer)
+        holds = proven or (asked and names not in crossing)
+        found.append(PairAnswer(item.name, names, answer, holds, proven and not (touched and item.minimum > 0.0)))
     return found
 
 

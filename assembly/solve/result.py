@@ -14,7 +14,6 @@ from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.proximity.features.solid_contact import TRACK
-from assembly.proximity.clearance.proof import is_proven
 from assembly.solve.loop.settings import COUNT, VIOLATION
 from assembly.solve.measure import measure, standing
 from assembly.solve.options import Options
@@ -78,7 +77,7 @@ class Result(ReadOnlyArrays):
 
         False at an end that is not SOLVED, and where faces lie on each other and samples stand for the proof.
         """
-        return self.success and all(is_proven(pair.answer) for pair in self._clear)
+        return self.success and all(pair.proved for pair in self._clear)
 
     @property
     def _parameters(self) -> Array:
