@@ -25,10 +25,12 @@ from assembly.proximity.clearance.records import (
     NONE,
 )
 from assembly.proximity.clearance.round_faces import Round, round_parts
+from assembly.proximity.clearance.wire_cells import WireCells, wire_cells
 
 __all__ = ["BodyCells", "cells_of_body"]
 
 Array = NDArray[np.float64]
+Cells = list[CellTable | WireCells]
 Table = NDArray[np.int64]
 # How near first cells are to faces, in parts of the body's size, and how much a boundary turns along a chord [rad].
 TOLERANCE, ANGLE = 8e-3, 0.5
@@ -80,7 +82,7 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
     boxes = np.array([face.surface.bounding_box() for face in topology.faces])
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     size = float(np.linalg.norm(high - low))
-    tables = [cells_of(face, TOLERANCE * size, ANGLE) for face in topology.faces]
+    tables = [wire_cells(face, size) or cells_of(face, TOLERANCE * size, ANGLE) for face in topology.faces]
     packed = _packed_surfaces(topology.faces)
     links, nodes = _first_cells(tables, packed.curves)
     place_cells(packed.table, packed.pool, packed.faces, links, nodes)
@@ -104,11 +106,15 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
     )
 
 
-def _parts(faces: tuple[Face, ...], tables: list[CellTable]) -> tuple[Table, list[Round | None]]:
+def _parts(faces: tuple[Face, ...], tables: Cells) -> tuple[Table, list[Round | None]]:
     """Of every cell the number of the part of a face that it belongs to, and what each part lies on."""
     labels: list[Table] = []
     rounds: list[Round | None] = []
     for face, table in zip(faces, tables, strict=True):
+        if isinstance(table, WireCells):
+            labels.append(np.full(len(table.corner), len(rounds)))
+            rounds.append(None)
+            continue
         direction, parts = round_parts(face)
         ends = face.surface.breaks()[direction][1 : len(parts)]
         labels.append(len(rounds) + np.searchsorted(ends, table.uv[..., direction].mean(axis=1)))
@@ -170,18 +176,23 @@ def _packed_surfaces(faces: tuple[Face, ...]) -> _Surfaces:
     return _Surfaces(np.concatenate(table), np.concatenate(pool), rows, curves)
 
 
-def _first_cells(tables: list[CellTable], curves: list[Table]) -> tuple[Table, Array]:
+def _first_cells(tables: Cells, curves: list[Table]) -> tuple[Table, Array]:
     """Rows of all cells; corners and radii are not written yet."""
-    count = sum(len(table.uv) for table in tables)
+    count = sum(map(len, tables))
     links, nodes = np.zeros((count, LINKS_SIZE), dtype=np.int64), np.zeros((count, NODE_SIZE))
     at = 0
     for number, (table, places) in enumerate(zip(tables, curves, strict=True)):
-        rows = slice(at, at + len(table.uv))
+        rows = slice(at, at + len(table))
         at = rows.stop
         link, node = rows_of(LINKS, links[rows]), rows_of(NODE, nodes[rows])
-        link.child, link.face, link.form, link.hollow = NONE, number, table.form, table.hollow
+        link.child, link.face, link.form = NONE, number, table.form
+        if isinstance(table, WireCells):
+            link.rim = NONE
+            node.corner, node.spine, node.first, node.pad = table.corner, table.center, table.first, table.pad
+            continue
         link.rim = np.where(table.rim < 0, NONE, np.append(places, NONE)[table.rim])
         node.uv, node.second, node.first, node.pad = table.uv, table.second, table.first, table.pad
+        link.hollow = table.hollow
         node.rim_t, node.rim_second, node.ruling = table.rim_t, table.rim_second, table.ruling
     return links, nodes
 

@@ -75,6 +75,9 @@ class CellTable:
     form: int
     ruling: Array
 
+    def __len__(self) -> int:
+        return len(self.uv)
+
 
 def _sweep(surface: NurbsSurface) -> tuple[int, Array, float]:
     """Whether a surface is flat or swept along straight lines by a curve across them; its direction; by how much not."""

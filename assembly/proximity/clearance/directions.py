@@ -18,6 +18,7 @@ from assembly.proximity.clearance.records import GUIDES, node_at, pair_proof_at
 from assembly.proximity.clearance.separation import (
     is_cell,
     is_round,
+    is_wire,
     normal_of,
     placed,
     separation,
@@ -121,4 +122,6 @@ def best_direction(forest, front, nodes, way, hint, needed):
     found, overlap = of_hulls(forest, nodes, way, found, front.work)
     if lesser(found) > enough:
         return found, False
+    # Wires are more than their spines.
+    overlap = overlap or is_wire(forest, nodes.a) or is_wire(forest, nodes.b)
     return of_normals(forest, front, nodes, way, found), cells and overlap

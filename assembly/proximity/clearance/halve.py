@@ -14,6 +14,7 @@ from assembly.proximity.clearance.records import (
     NODE_SIZE,
     NONE,
     ROUNDED,
+    WIRE,
     Forest,
     cell_face_at,
     links_at,
@@ -45,9 +46,25 @@ def is_triangle(node):
     return node.uv[2, 0] == node.uv[3, 0] and node.uv[2, 1] == node.uv[3, 1]
 
 
+@kernel(inline=True)
+def arc_height(node):
+    """How far the arc of a piece of a wire's spine is from its chord: R - sqrt(R^2 - h^2), h half the chord."""
+    bend = node.first[0]
+    if bend == 0.0:
+        return 0.0
+    d = sub(corner_of(node, 1), corner_of(node, 0))
+    h = 0.5 * bend * math.sqrt(dot(d, d))
+    return h * h / (bend * (1.0 + math.sqrt(max(1.0 - h * h, 0.0))))
+
+
 @kernel(inner=True)
 def write_radii(links, node):
     """The radii of a cell: what the surface may be off its corners' hull, and what it goes on beyond chords."""
+    node.disc = 0.0
+    if links.form == WIRE:
+        node.reach = arc_height(node) + node.pad
+        node.rho = node.first[1] + node.reach
+        return
     uv = node.uv
     lu = max(uv[0, 0], uv[1, 0], uv[2, 0], uv[3, 0]) - min(uv[0, 0], uv[1, 0], uv[2, 0], uv[3, 0])
     lv = max(uv[0, 1], uv[1, 1], uv[2, 1], uv[3, 1]) - min(uv[0, 1], uv[1, 1], uv[2, 1], uv[3, 1])
@@ -62,7 +79,6 @@ def write_radii(links, node):
             if links.hollow[e] == 0:
                 beyond = max(beyond, d)
     node.reach = bent + border + node.pad
-    node.disc = 0.0
     node.rho = node.pad
     if links.form == FLAT and bent == 0.0:
         # What is beyond a chord is in the plane.
@@ -219,6 +235,20 @@ def halve_rectangle(forest, k, n, by_length):
 
 
 @kernel(inner=True)
+def halve_wire(forest, k, n):
+    """A piece of a wire's spine is halved at the middle of its line or arc."""
+    node = node_at(forest.nodes, k)
+    x = scale(0.5, add(corner_of(node, 0), corner_of(node, 1)))
+    if node.first[0] > 0.0:
+        out = sub(x, vector(node.spine))
+        x = add(vector(node.spine), scale(1.0 / (node.first[0] * math.sqrt(dot(out, out))), out))
+    for i in range(1, 3):
+        put(node_at(forest.nodes, n).corner[i], x)
+    for i in range(0, 4, 3):
+        put(node_at(forest.nodes, n + 1).corner[i], x)
+
+
+@kernel(inner=True)
 def halve(forest, k, by_length):
     """Give cell k two children; False where there is no room."""
     n = forest.used[0]
@@ -230,7 +260,9 @@ def halve(forest, k, by_length):
         for c in range(NODE_SIZE):
             forest.nodes[child, c] = forest.nodes[k, c]
         links_at(forest.links, child).child = NONE
-    if is_triangle(node_at(forest.nodes, k)):
+    if links_at(forest.links, k).form == WIRE:
+        halve_wire(forest, k, n)
+    elif is_triangle(node_at(forest.nodes, k)):
         halve_triangle(forest, k, n, by_length)
     else:
         halve_rectangle(forest, k, n, by_length)
@@ -248,7 +280,7 @@ def place_cells(table, pool, faces, links, nodes):
     for k in range(len(links)):
         node = node_at(nodes, k)
         surface = cell_face_at(faces, links_at(links, k).face).surface
-        for i in range(4):
+        for i in range(4 if links_at(links, k).form != WIRE else 0):
             put(node.corner[i], point_on(forest.store, surface, node.uv[i, 0], node.uv[i, 1]))
         measure(links_at(links, k), node)
 

@@ -2,7 +2,8 @@
 
 Each cell's true patch is within `reach` of its facets, corner by corner on the straight way between both. If the ray's
 origin is farther than that from the facets, and the ray farther from their border, the ray crosses the patch as often as
-the facets, with signs. A cell that is not so clear is halved. The sum over all cells is 1 inside and 0 outside.
+the facets, with signs. A cell that is not so clear is halved. The sum over all cells is 1 inside and 0 outside. In a wire
+is what is nearer to its spine than its radius.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.geometry.vec import add, cross, dot, scale, sub
 from assembly.proximity.clearance.halve import corner_of, halve, vector
-from assembly.proximity.clearance.records import NONE, Forest, cell_face_at, links_at, node_at
-from assembly.proximity.clearance.stab import is_above, segments_apart
+from assembly.proximity.clearance.records import NONE, WIRE, Forest, cell_face_at, links_at, node_at
+from assembly.proximity.clearance.stab import segments_apart, triangle_distance
 
 UNCLEAR = -99
 # The size of cells, in parts of the ray's length, below which they are not halved to tell.
@@ -41,15 +42,6 @@ def misses_box(node, ray):
             s, t = (c - h) / rate, (c + h) / rate
             low, high = max(low, min(s, t)), min(high, max(s, t))
     return low > high + 1e-12 * ray.length
-
-
-@kernel(inner=True)
-def triangle_distance(p, a, b, c):
-    """The distance of a point from a triangle."""
-    n = cross(sub(b, a), sub(c, a))
-    if dot(n, n) > 0.0 and is_above(p, a, b, c, n):
-        return abs(dot(n, sub(p, a))) / math.sqrt(dot(n, n))
-    return min(segments_apart(p, p, a, b), segments_apart(p, p, b, c), segments_apart(p, p, c, a))
 
 
 @kernel(inline=True)
@@ -88,6 +80,15 @@ def crossings_of_cell(node, ray, sign):
 
 
 @kernel(inner=True)
+def side_of_wire(node, p):
+    """Whether a point is within a piece of a wire: 1, 0, or UNCLEAR."""
+    distance = segments_apart(p, p, corner_of(node, 0), corner_of(node, 1))
+    if distance + node.reach < node.first[1]:
+        return 1
+    return 0 if distance > node.rho else UNCLEAR
+
+
+@kernel(inner=True)
 def winding_along(forest, root, ray, stack):
     """How often a ray leaves the body of a root, or UNCLEAR."""
     total = 0
@@ -101,7 +102,12 @@ def winding_along(forest, root, ray, stack):
             continue
         links = links_at(forest.links, k)
         if links.face != NONE:
-            found = crossings_of_cell(node, ray, cell_face_at(forest.faces, links.face).sign)
+            if links.form == WIRE:
+                found = side_of_wire(node, ray.p)
+                if found == 1:
+                    return 1
+            else:
+                found = crossings_of_cell(node, ray, cell_face_at(forest.faces, links.face).sign)
             if found != UNCLEAR:
                 total += found
                 continue

@@ -41,6 +41,7 @@ from assembly.proximity.clearance.records import (
     NONE,
     OPEN,
     PARTED,
+    WIRE,
 )
 
 __all__ = ["Answer", "ClearanceProof", "Contacts", "Verdict", "is_proven"]
@@ -260,7 +261,7 @@ class ClearanceProof:
         if not len(nodes):
             return False
         links, faces = rows_of(LINKS, self.forest.arrays[3]), rows_of(CELL_FACE, self.forest.arrays[2])
-        if (links.face[nodes.a] == NONE).any() or (links.face[nodes.b] == NONE).any():
+        if any((links.face[side] == NONE).any() or (links.form[side] == WIRE).any() for side in (nodes.a, nodes.b)):
             return False
         axes = rows_of(NODE, self.forest.arrays[4]).axes
         turn = self._relative(k, q)[0]
@@ -339,7 +340,7 @@ class ClearanceProof:
         if not len(nodes):
             return False
         links, faces = rows_of(LINKS, self.forest.arrays[3]), rows_of(CELL_FACE, self.forest.arrays[2])
-        if (links.face[nodes.a] == NONE).any() or (links.face[nodes.b] == NONE).any():
+        if any((links.face[side] == NONE).any() or (links.form[side] == WIRE).any() for side in (nodes.a, nodes.b)):
             return False
         axes = rows_of(NODE, self.forest.arrays[4]).axes
         turn = self._relative(k, q)[0]

@@ -27,7 +27,7 @@ NODE = record_dtype(
     disc=1,
     rho=1,
     bore=1,  # of a bore's wall: how far it is from the line along `ruling` through `spine`, or from that point; else 0
-    spine=3,
+    spine=3,  # of a piece of a wire, the center of its arc
     corner=(4, 3),  # of a cell; of a triangle the last two are the same
     reach=1,  # like disc and rho together, but also of the true border from its chord where the face ends before it
     pad=1,  # of a cell, what its radius is in any case
@@ -44,7 +44,7 @@ LINKS = record_dtype(
     "i8",
     child=1,  # the first of two children, which follow each other; -1 where there are none yet
     face=1,  # of a cell, the number of its face among all that are packed; else -1
-    form=1,  # FLAT, RULED, ROUNDED
+    form=1,  # FLAT, RULED, ROUNDED, WIRE
     rim=3,  # of an edge that is a chord of a boundary curve, the record of that; else -1
     hollow=3,  # 1: that curve bends away from the material, which is nowhere beyond the chord
 )
@@ -52,7 +52,9 @@ links_at = record_view(LINKS)
 LINKS_SIZE = size_of(LINKS)
 # A face in a plane (ruling is its normal); one that is swept along straight lines, by a curve across them (ruling is
 # their direction); any other.
-FLAT, RULED, ROUNDED = 0, 1, 2
+# A piece of a round wire: corners are the ends of a piece of its spine, a line or an arc about `spine`; `first` is the
+# curvature of that and the radius of the wire.
+FLAT, RULED, ROUNDED, WIRE = 0, 1, 2, 3
 NONE = -1
 # A face among all that are packed.
 CELL_FACE = record_dtype(

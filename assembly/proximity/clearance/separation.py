@@ -24,6 +24,7 @@ from assembly.proximity.clearance.records import (
     BY_PLANE,
     FLAT,
     NONE,
+    WIRE,
     links_at,
     node_at,
 )
@@ -133,6 +134,12 @@ def is_round(forest, k):
     """Whether node k is the exact hull of what is round."""
     node = node_at(forest.nodes, k)
     return links_at(forest.links, k).face == NONE and (node.disc > 0.0 or node.rho > 0.0)
+
+
+@kernel(inline=True)
+def is_wire(forest, k):
+    """Whether node k is a piece of a wire."""
+    return links_at(forest.links, k).form == WIRE and links_at(forest.links, k).face != NONE
 
 
 @kernel(inline=True)

@@ -8,7 +8,7 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import blend, cross, dot, sub
 from assembly.kinematics.motion import IDENTITY
 from assembly.proximity.clearance.records import node_at
-from assembly.proximity.clearance.separation import write_corners
+from assembly.proximity.clearance.separation import is_wire, write_corners
 
 
 @kernel(inner=True)
@@ -80,10 +80,43 @@ def point(x, i):
 
 
 @kernel(inner=True)
+def triangle_distance(p, a, b, c):
+    """The distance of a point from a triangle."""
+    n = cross(sub(b, a), sub(c, a))
+    if dot(n, n) > 0.0 and is_above(p, a, b, c, n):
+        return abs(dot(n, sub(p, a))) / math.sqrt(dot(n, n))
+    return min(segments_apart(p, p, a, b), segments_apart(p, p, b, c), segments_apart(p, p, c, a))
+
+
+@kernel(inner=True)
+def overlap_with_wire(forest, wire, other, spine, corners):
+    """By how much a piece of a wire is in another cell, proven: two points are nearer than the radius, or both radii.
+
+    No translation by less parts them.
+    """
+    node, second = node_at(forest.nodes, wire), node_at(forest.nodes, other)
+    p, q = point(spine, 0), point(spine, 1)
+    a, b, c, d = point(corners, 0), point(corners, 1), point(corners, 2), point(corners, 3)
+    near = segments_apart(p, q, a, b)
+    reach = node.first[1] - node.reach - second.reach
+    if is_wire(forest, other):
+        return reach + second.first[1] - near
+    near = min(near, segments_apart(p, q, b, c), segments_apart(p, q, c, d), segments_apart(p, q, d, a))
+    for i in range(2):
+        x = point(spine, i)
+        near = min(near, triangle_distance(x, a, b, c), triangle_distance(x, a, c, d))
+    return reach - near
+
+
+@kernel(inner=True)
 def crossing_of(forest, a, b, pose, work):
     """Of two cells: by how much they cross, not positive where that is not proven, and where, seen from a."""
     write_corners(forest, a, IDENTITY, work[0], 0)
     write_corners(forest, b, pose, work[1], 0)
+    if is_wire(forest, a):
+        return overlap_with_wire(forest, a, b, work[0], work[1]), point(work[0], 0)
+    if is_wire(forest, b):
+        return overlap_with_wire(forest, b, a, work[1], work[0]), point(work[1], 0)
     best = 0.0
     place = (0.0, 0.0, 0.0)
     for side in range(2):

@@ -14,9 +14,9 @@ from collections import namedtuple
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, blend, dot, matmul_t, matvec, scale, sub
 from assembly.kinematics.motion import RelativePose
-from assembly.proximity.clearance.halve import vector
+from assembly.proximity.clearance.halve import corner_of, vector
 from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, node_at
-from assembly.proximity.clearance.separation import across, is_round, placed
+from assembly.proximity.clearance.separation import across, is_round, is_wire, placed
 
 # swept: whether the way is looked at, or its end alone. moved: the longest way of a point of b. sag: of any point;
 # factor: of a point at distance 1 from the axis of rotation. axis, middle: of that, in axes of b (zero: it is not known).
@@ -62,9 +62,12 @@ def off_axis(way, x):
 
 @kernel(inner=True)
 def sag_of(way, forest, b):
-    """The largest sag in node b; of what is round, of points of its axis."""
+    """The largest sag in node b; of what is round, of points of its axis, or of its spine."""
     node = node_at(forest.nodes, b)
     center = vector(node.center)
+    if is_wire(forest, b):
+        ends = max(off_axis(way, corner_of(node, 0)), off_axis(way, corner_of(node, 1)))
+        return way.factor * (ends + node.reach)
     if is_round(forest, b):
         u = scale(node.half[0], vector(node.axes[0]))
         return way.factor * max(off_axis(way, add(center, u)), off_axis(way, sub(center, u)))
