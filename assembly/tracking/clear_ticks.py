@@ -14,9 +14,9 @@ __all__ = ["ClearTicks"]
 Array = NDArray[np.float64]
 # Pairs of nodes that a tick looks at for a pair of bodies.
 BUDGET = 4000
-# How deep the way of a contact that rolls may go in, times the square of its length over the size: a chord of a curve of
-# radius r is s^2 / (8 r) off it, and the arc of a body that turns as much.
-ROLLED = 4.0
+# How deep the way of a contact that rolls may go in, in parts of the square of its length over the least radius: a chord
+# of a curve of radius r is s^2 / (8 r) off it, there are two, and a contact may go farther than the bodies.
+ROLLED = 1.0
 # It may go in by so much of the size in any case: directions that part bodies are then found at once.
 ROOM = 1e-6
 # Contacts that are nearer, in parts of the size, are remembered of a pose.
@@ -90,6 +90,9 @@ class ClearTicks:
         proof, touching = self._proof, self._touching
         there, moves = _Standing(solution), self._moves
         # Contacts stay for many ticks, and so does what opens them.
+        if proof.stays_clear(there.q, touching, moves):
+            self._at, self.way_depth, self.proved = there, 0.0, True
+            return True
         answers = proof.look(there.q, touching, moves, swept=True)
         left = [k for k, answer in enumerate(answers) if not is_proven(answer)]
         self.way_depth = 0.0
@@ -114,7 +117,7 @@ class ClearTicks:
         before, after = self._moves.copy(), moves.copy()
         for k in which:
             way = proof.way_length(k, begin.q, there.q)
-            depth = max(ROLLED * way * way / proof.size(k), ROOM * proof.size(k))
+            depth = max(ROLLED * way * way / proof.radius(k), ROOM * proof.size(k))
             self.way_depth = max(self.way_depth, depth)
             for standing, opened in ((begin, before), (there, after)):
                 move = standing.opened(proof, k, depth)

@@ -58,6 +58,8 @@ class BodyCells:
         Whether there is an inside.
     size, far : float
         The diagonal of a box around the body, and its largest coordinate.
+    radius : float
+        The least radius of what is round of the body: wires, cylinders, balls, tubes of tori; else a quarter of its size.
     topology : Topology
     """
 
@@ -72,6 +74,7 @@ class BodyCells:
     is_closed: bool
     size: float
     far: float
+    radius: float
     topology: Topology
 
 
@@ -86,7 +89,10 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
     packed = _packed_surfaces(topology.faces)
     links, nodes = _first_cells(tables, packed.curves)
     place_cells(packed.table, packed.pool, packed.faces, links, nodes)
-    builder = _Builder(links, nodes, *_parts(topology.faces, tables))
+    part, rounds = _parts(topology.faces, tables)
+    builder = _Builder(links, nodes, part, rounds)
+    radii = [found.radius for found in rounds if found is not None]
+    radii += [float(table.first[0, 1]) for table in tables if isinstance(table, WireCells)]
     builder.build()
     label = _components(topology)
     owner = rows_of(LINKS, links).face
@@ -102,6 +108,7 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
         topology.is_closed,
         size,
         float(max(np.abs(low).max(), np.abs(high).max())),
+        min([0.25 * size, *radii]),
         topology,
     )
 

@@ -148,6 +148,7 @@ class ClearanceProof:
         self.minimum = np.array(minimum, dtype=float)
         self._codes, self._stack = np.zeros(len(self.pairs), dtype=np.int64), np.zeros(STACK, dtype=np.int64)
         self._begun = np.zeros(len(self.pairs), dtype=bool)
+        self._on_way = np.full(len(self.pairs), ON_WAY)
 
     def look(
         self,
@@ -185,6 +186,18 @@ class ClearanceProof:
         self._run(np.ascontiguousarray(q, dtype=float), touching, moved, tasks)
         self._begun[rows] = True
         return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
+
+    def stays_clear(self, q: Array, touching: float, moves: Array) -> bool:
+        """Whether all pairs, of which none was found otherwise at the last look, are clear at poses and on the way there.
+
+        Where one is not, nothing is known: `look` tells what it is. It makes fronts that have grown anew, too.
+        """
+        counts = self.fronts.counts
+        if not (self.fronts.pair.known == 1.0).all() or (counts.count > GROWN * counts.fresh + MANY).any():
+            return False
+        self.fronts.pair.touch = touching
+        look_at_pairs(self.forest.arrays, self.fronts.arrays, q, moves, self._on_way, self._codes)
+        return not self._codes.any()
 
     def cells_of_both(self, k: int) -> tuple[BodyCells, BodyCells]:
         """The trees of both bodies of pair k."""
@@ -400,6 +413,10 @@ class ClearanceProof:
     def size(self, k: int) -> float:
         """The size of the larger body of pair k."""
         return max(self.forest.cells[self._number[body]].size for body in self.pairs[k])
+
+    def radius(self, k: int) -> float:
+        """The least radius of what is round of either body of pair k."""
+        return min(cells.radius for cells in self.cells_of_both(k))
 
     def move_length(self, k: int, q: Array, move: Array) -> float:
         """How far a move takes points of the second body of pair k, at most."""
