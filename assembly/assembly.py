@@ -173,7 +173,7 @@ class Assembly(Contents):
         solution = self._solved(settings, q0, starts, interruption)
         is_cold = not isinstance(q0, Solution) and settings[ITERATIONS] > 0.0
         if solution._packed.clearance_rows and is_cold and not interruption.is_over():
-            q = self._given(q0)
+            q = self._given(None if isinstance(q0, Solution) else q0)
             # What holds as it stands was not moved.
             if not solution.success or (solution.q != q).any():
                 solution = self._from_apart(solution, settings, q, starts, options, interruption)

@@ -18,7 +18,9 @@ from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import side_faces
 from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
-from assembly.proximity.clearance.proof import Answer, ClearanceProof, Contacts, Verdict, is_proven
+from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
+from assembly.proximity.clearance.proof import ClearanceProof
+from assembly.proximity.clearance.touching import conforms, left_open, move_apart
 from assembly.proximity.extrema.pairs import ContactPair
 from assembly.solve.contact_pairs import contact_pairs, listed_contacts
 from assembly.solve.crossings import crossings_of
@@ -30,8 +32,8 @@ if TYPE_CHECKING:
 __all__ = ["PairAnswer", "lent_proof", "near_contacts", "new_proof", "opening_move", "prove_end"]
 
 Array = NDArray[np.float64]
-# Contacts that are open by less than this part of how far a body may be moved are opened.
-NEAR = 0.5
+# Contacts that are open by less than so many times how far a body may be moved are in its way.
+NEAR = 2.0
 # Moves that are tried for contacts that no row tells of.
 TRIES = 3
 
@@ -102,7 +104,7 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
             if not is_proven(answer) and answer.depth <= touching:
                 answers[k] = _opened(proof, k, solution.q, touching)
         conforming = [
-            answer.verdict is Verdict.UNDECIDED and proof.conforms(k, solution.q, touching)
+            answer.verdict is Verdict.UNDECIDED and conforms(proof, k, solution.q, touching)
             for k, answer in enumerate(answers)
         ]
     owned = _owned(packed)
@@ -123,7 +125,7 @@ def _opened(proof: ClearanceProof, k: int, q: Array, touching: float) -> Answer:
     """
     (answer,) = found = proof.look(q, touching, which=[k])
     for _ in range(TRIES):
-        move = None if is_proven(found[0]) else proof.opening_move(k, q, touching)
+        move = None if is_proven(found[0]) else left_open(proof, k, q, touching)
         if move is None:
             break
         moves = np.zeros((len(proof.pairs), 6))
@@ -162,12 +164,12 @@ def near_contacts(solution: Solution, proof: ClearanceProof, reach: float) -> di
 def opening_move(proof: ClearanceProof, k: int, q: Array, contacts: Contacts | None, depth: float) -> Array:
     """The least move (6) of the second body of pair k, by no more than a depth, that opens contacts; zero if none does.
 
-    It opens those that are open by less than half of that.
+    Of those that are near it opens what is closed, and closes none.
     """
     if contacts is None or depth <= 0.0:
         return np.zeros(6)
     near = contacts.gaps < NEAR * depth
     if not near.any():
         return np.zeros(6)
-    move = proof.move_apart(k, q, Contacts(*(column[near] for column in contacts)), depth)
+    move = move_apart(proof, k, q, Contacts(*(column[near] for column in contacts)), depth)
     return np.zeros(6) if move is None else move

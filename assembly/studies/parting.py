@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.body import Body
+from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.least_translation import least_translation
-from assembly.proximity.clearance.proof import Answer, ClearanceProof, Verdict
+from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.solve.clearance_proof import lent_proof
 from assembly.solve.interruption import Interruption
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.proximity.clearance.proof import Answer, ClearanceProof, Contacts, Verdict, is_proven
+from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
+from assembly.proximity.clearance.proof import ClearanceProof
+from assembly.proximity.clearance.touching import conforms
 from assembly.solve.clearance_proof import near_contacts, new_proof, opening_move
 from assembly.solve.solution import Solution
 
@@ -17,6 +19,10 @@ BUDGET = 4000
 # How deep the way of a contact that rolls may go in, in parts of the square of its length over the least radius: a chord
 # of a curve of radius r is s^2 / (8 r) off it, there are two, and a contact may go farther than the bodies.
 ROLLED = 1.0
+# Parts of it that bodies are opened by, one after the other: as they are, they may cross elsewhere.
+OPENED = (1.0, 0.1, 0.01)
+# The part of what is called touching that such a way may go in without being opened.
+SLIGHTLY = 0.1
 # It may go in by so much of the size in any case: directions that part bodies are then found at once.
 ROOM = 1e-6
 # Contacts that are nearer, in parts of the size, are remembered of a pose.
@@ -89,35 +95,52 @@ class ClearTicks:
         """
         proof, touching = self._proof, self._touching
         there, moves = _Standing(solution), self._moves
-        # Contacts stay for many ticks, and so does what opens them.
-        if proof.stays_clear(there.q, touching, moves):
-            self._at, self.way_depth, self.proved = there, 0.0, True
-            return True
-        answers = proof.look(there.q, touching, moves, swept=True)
-        left = [k for k, answer in enumerate(answers) if not is_proven(answer)]
         self.way_depth = 0.0
-        if left:
+        rolling, last = self._rolling(there), proof.last_poses()
+        # Contacts stay for many ticks, and so does what opens them.
+        if not rolling and proof.stays_clear(there.q, touching, moves):
+            self._at, self.proved = there, True
+            return True
+        answers: dict[int, Answer] = {}
+        others = [k for k in range(len(proof.pairs)) if k not in rolling]
+        for k, answer in zip(others, proof.look(there.q, touching, moves, others, swept=True), strict=True):
+            answers[k] = answer
+            if not is_proven(answer):
+                rolling.append(k)
+        if rolling:
             moves = moves.copy()
-            for k in left:
+            for k in rolling:
                 moves[k] = there.opened(proof, k, touching)
-            for k, answer in zip(left, self._rolled(there, moves, left), strict=True):
-                answers[k] = answer
-        doubtful = [(k, answer) for k, answer in enumerate(answers) if not is_proven(answer)]
+            for part in OPENED:
+                left = [k for k in rolling if k not in answers or not is_proven(answers[k])]
+                answers.update(zip(left, self._rolled(there, moves, left, part), strict=True) if left else ())
+        doubtful = [(k, answer) for k, answer in answers.items() if not is_proven(answer)]
         if not all(
-            answer.verdict is Verdict.UNDECIDED and proof.conforms(k, there.q, touching) for k, answer in doubtful
+            answer.verdict is Verdict.UNDECIDED and conforms(proof, k, there.q, touching) for k, answer in doubtful
         ):
+            proof.go_back(last)
             return False
         self.proved = not doubtful
         self._at, self._moves = there, moves
         return True
 
-    def _rolled(self, there: _Standing, moves: Array, which: list[int]) -> list[Answer]:
-        """What is proven of pairs that are opened on the way."""
+    def _rolling(self, there: _Standing) -> list[int]:
+        """The pairs that touch and go so far that the straight way goes in by what counts beside what is touching."""
+        proof, q = self._proof, self._at.q
+        found = []
+        for k in np.flatnonzero(self._moves.any(axis=1)).tolist():
+            way = proof.way_length(k, q, there.q)
+            if ROLLED * way * way > SLIGHTLY * self._touching * proof.radius(k):
+                found.append(k)
+        return found
+
+    def _rolled(self, there: _Standing, moves: Array, which: list[int], part: float) -> list[Answer]:
+        """What is proven of pairs that are opened on the way, by a part of what it may go in."""
         proof, begin = self._proof, self._at
         before, after = self._moves.copy(), moves.copy()
         for k in which:
             way = proof.way_length(k, begin.q, there.q)
-            depth = max(ROLLED * way * way / proof.radius(k), ROOM * proof.size(k))
+            depth = max(part * ROLLED * way * way / proof.radius(k), ROOM * proof.size(k))
             self.way_depth = max(self.way_depth, depth)
             for standing, opened in ((begin, before), (there, after)):
                 move = standing.opened(proof, k, depth)

@@ -59,7 +59,7 @@ class BodyCells:
     size, far : float
         The diagonal of a box around the body, and its largest coordinate.
     radius : float
-        The least radius of what is round of the body: wires, cylinders, balls, tubes of tori; else a quarter of its size.
+        The least radius of what is round of the body, wires, cylinders, balls, tubes; else a quarter of its size.
     topology : Topology
     """
 

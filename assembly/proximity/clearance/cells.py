@@ -3,7 +3,7 @@
 A cell is a rectangle or a triangle of (u, v). Linear interpolation L of the corners over a triangle with the box
 l_u x l_v differs from the surface by no more than
 
-    |S - L| <= (M_uu l_u^2 + 2 M_uv l_u l_v + M_vv l_v^2) / 8,          M: bounds of |S_uu|, |S_uv|, |S_vv| over the box,
+    |S - L| <= (M_uu l_u^2 + 2 M_uv l_u l_v + M_vv l_v^2) / 8,       M: bounds of |S_uu|, |S_uv|, |S_vv| over the box,
 
 because each component of S - L is sum_i w_i (x_i - x)' H_i (x_i - x) / 2 with the weights w_i of the corners, and the
 variance of u under these is l_u^2 / 4 at most. The M hold for every part of the cell as well: a cell that is halved
@@ -80,7 +80,7 @@ class CellTable:
 
 
 def _sweep(surface: NurbsSurface) -> tuple[int, Array, float]:
-    """Whether a surface is flat or swept along straight lines by a curve across them; its direction; by how much not."""
+    """Whether a surface is flat or swept along lines by a curve across them; its direction; by how much it is not."""
     points = surface.control_points.reshape(-1, 3)
     far = float(np.abs(points).max())
     middle = points.mean(axis=0)
@@ -106,7 +106,7 @@ def _sweep(surface: NurbsSurface) -> tuple[int, Array, float]:
 
 
 def _grid(surface: NurbsSurface, tolerance: float) -> Array:
-    """Rectangles of an untrimmed face: lines are added in the direction that costs more until all keep the tolerance."""
+    """Rectangles of an untrimmed face: lines are added in the costlier direction until all keep the tolerance."""
     breaks = surface.breaks()
     count = [np.ones(len(at) - 1, dtype=int) for at in breaks]
     for _ in range(ROUNDS):
@@ -201,7 +201,7 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
 
 
 def _displaced(surface: NurbsSurface, ends: Array, true: Array) -> Array:
-    """How far ends of chords (n, 2, 2) are from the points (2 n, 2) of their curves, modulo periods: the larger, (n, 2).
+    """How far ends of chords (n, 2, 2) are from points (2 n, 2) of their curves, modulo periods: the larger, (n, 2).
 
     Ends may have been moved onto a line of the triangulation's grid.
     """

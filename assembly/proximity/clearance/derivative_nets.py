@@ -64,18 +64,20 @@ def _patch_bounds(net: Array) -> tuple[Array, Array]:
     if np.ptp(w) == 0.0:
         au, av = _rate(a, 1), _rate(a, 2)
         first, second = (au, av), (_rate(au, 1), _rate(au, 2), _rate(av, 2))
-        return tuple(np.column_stack([_longest(x) / least for x in nets]) for nets in (first, second))  # type: ignore[return-value]
+        rates, bends = (np.column_stack([_longest(x) / least for x in nets]) for nets in (first, second))
+        return rates, bends
     au, av, wu, wv = _rate(a, 1), _rate(a, 2), _rate(w, 1), _rate(w, 2)
     pu = _difference(bezier_product(w, au), bezier_product(wu, a))
     pv = _difference(bezier_product(w, av), bezier_product(wv, a))
 
     def second_derivative(p: Array, axis: int, rate: Array) -> Array:
         top = _difference(bezier_product(w, _rate(p, axis)), 2.0 * bezier_product(rate, p))
-        return _longest(top) / least**3
+        bound: Array = _longest(top) / least**3
+        return bound
 
-    first = np.column_stack([_longest(p) / least**2 for p in (pu, pv)])
-    bent = [second_derivative(pu, 1, wu), second_derivative(pu, 2, wv), second_derivative(pv, 2, wv)]
-    return first, np.column_stack(bent)
+    rates = np.column_stack([_longest(p) / least**2 for p in (pu, pv)])
+    bends = [second_derivative(pu, 1, wu), second_derivative(pu, 2, wv), second_derivative(pv, 2, wv)]
+    return rates, np.column_stack(bends)
 
 
 def _not_narrow(low: Array, high: Array) -> tuple[Array, Array]:

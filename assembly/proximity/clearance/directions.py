@@ -1,7 +1,7 @@
 """Directions that part two nodes at a pose, or at both ends of a way at once.
 
 What one plane keeps apart at both ends of a way it keeps apart along the chord: the direction sought is that of the
-largest lesser gap of both. It is the one between a and the hull of b at both poses; those that are asked before cost less.
+largest lesser gap of both. It is the one between a and the hull of b at both poses; those asked before cost less.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def of_boxes(forest, nodes, way, middle, found, enough):
 
 @kernel(inner=True)
 def of_hulls(forest, nodes, way, found, work):
-    """The better of one found and of that between node a and the hull of node b at both poses; whether these overlap."""
+    """The better of one found and of that between node a and the hull of b at both poses; whether these overlap."""
     count_a = write_corners(forest, nodes.a, IDENTITY, work[0], 0)
     count_b = write_corners(forest, nodes.b, way.after, work[1], 0)
     if way.swept:
@@ -102,7 +102,7 @@ def of_normals(forest, front, nodes, way, found):
 
 @kernel(inner=True)
 def best_direction(forest, front, nodes, way, hint, needed):
-    """A direction whose lesser gap is large, and whether hulls overlap. Stops at the first that is enough for the way."""
+    """A direction whose lesser gap is large, and whether hulls overlap. Stops at the first that is enough."""
     enough = needed + way.sag
     found = Direction(hint, -math.inf, -math.inf)
     if dot(hint, hint) > 0.5:

@@ -19,6 +19,7 @@ from assembly.proximity.clearance.records import (
     LINKS_SIZE,
     NODE,
     NODE_SIZE,
+    NODES,
     NODES_SIZE,
     NONE,
     PAIR,
@@ -30,8 +31,8 @@ __all__ = ["Fronts", "PackedForest"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-# Rows that there is room for at first, beside those of the first cells, and at most.
-SPARE, MOST = 1024, 1 << 20
+# Rows that there is room for at first, beside those of the first cells, and at most; so many more are large.
+SPARE, MOST, LARGE = 1024, 1 << 20, 40_000
 ROOM = 512
 WORK = (3, 64)
 _CORNER = place_of(NODE, "corner")
@@ -83,7 +84,7 @@ class PackedForest:
         self._links = np.zeros((row_at + SPARE, LINKS_SIZE), dtype=np.int64)
         self._nodes = np.zeros((row_at + SPARE, NODE_SIZE))
         self._links[:row_at], self._nodes[:row_at] = np.concatenate(links), np.concatenate(nodes)
-        self._used = np.array([row_at])
+        self._used, self._first = np.array([row_at]), row_at
         self.roots = [first[shape] for shape in shapes]
         self.cells = [self.made[distinct.index(shape)] for shape in shapes]
 
@@ -91,6 +92,38 @@ class PackedForest:
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
         """As kernels take them."""
         return (*self._fixed, self._links, self._nodes, self._used)
+
+    @property
+    def is_large(self) -> bool:
+        """Whether so many cells were made on the way that it is better to begin anew."""
+        return bool(self._used[0] > self._first + LARGE)
+
+    def forget(self, fronts: Fronts) -> None:
+        """Forget the cells that no front has, and that are above none it has, beside the first ones."""
+        used, first = int(self._used[0]), self._first
+        links = rows_of(LINKS, self._links[:used])
+        child = links.child
+        parent = np.full(used, NONE)
+        above = np.flatnonzero(child != NONE)
+        parent[child[above]] = parent[child[above] + 1] = above
+        wanted = np.zeros(used, dtype=bool)
+        at = np.unique(fronts.cells())
+        while len(at):
+            wanted[at] = True
+            at = parent[at]
+            at = np.unique(at[(at != NONE)])
+            at = at[~wanted[at]]
+        # Children come in pairs.
+        begins = child[above[child[above] >= first]]
+        begins = np.sort(begins[wanted[begins] | wanted[begins + 1]])
+        kept = np.concatenate([np.arange(first), np.stack([begins, begins + 1], axis=1).ravel()])
+        place = np.full(used + 1, NONE)
+        place[kept] = np.arange(len(kept))
+        self._links[: len(kept)], self._nodes[: len(kept)] = self._links[kept], self._nodes[kept]
+        links = rows_of(LINKS, self._links[: len(kept)])
+        links.child = place[links.child]
+        self._used[0] = len(kept)
+        fronts.renumber(place)
 
     @property
     def is_full(self) -> bool:
@@ -181,6 +214,18 @@ class Fronts:
     def arrays(self) -> tuple[NDArray[np.generic], ...]:
         """As kernels take them."""
         return (self._pair, self._counts, self.parted, self.nodes, *self._next, *self._waiting, self._work)
+
+    def _rows(self) -> list[np.recarray]:
+        return [rows_of(NODES, nodes[:count]) for nodes, count in zip(self.nodes, self.counts.count, strict=True)]
+
+    def cells(self) -> Table:
+        """The rows of all nodes in the fronts."""
+        return np.concatenate([side for rows in self._rows() for side in (rows.a, rows.b)])
+
+    def renumber(self, place: Table) -> None:
+        """Nodes have other rows by now."""
+        for rows in self._rows():
+            rows.a, rows.b = place[rows.a], place[rows.b]
 
     def grow(self) -> bool:
         """Twice the room for every front; False where that is more than one may have."""

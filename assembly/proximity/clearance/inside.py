@@ -1,9 +1,9 @@
 """Whether a point is inside a closed body: how often a ray leaves it, with signs, proven.
 
-Each cell's true patch is within `reach` of its facets, corner by corner on the straight way between both. If the ray's
-origin is farther than that from the facets, and the ray farther from their border, the ray crosses the patch as often as
-the facets, with signs. A cell that is not so clear is halved. The sum over all cells is 1 inside and 0 outside. In a wire
-is what is nearer to its spine than its radius.
+Each cell's true patch is within `reach` of its facets, corner by corner on the straight way between both. If the
+ray's origin is farther than that from the facets, and the ray farther from their border, the ray crosses the patch as
+often as the facets, with signs. A cell that is not so clear is halved. The sum over all cells is 1 inside and 0
+outside. In a wire is what is nearer to its spine than its radius.
 """
 
 from __future__ import annotations

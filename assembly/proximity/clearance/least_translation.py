@@ -1,9 +1,9 @@
 """The least translation found that parts two bodies which cross, or of which one is within the other.
 
-Convex hulls are parted along n by h(n) = max over a of n.x - min over b of n.y, whose least value over unit vectors is the
-least translation, exactly, where both bodies are convex. It is sought from many directions and along its subgradient, the
-difference of the points that carry it. Of others shorter ways may exist, out of a hole or over a step: along each of many
-directions the first place is looked for at which the proof says CLEAR.
+Convex hulls are parted along n by h(n) = max over a of n.x - min over b of n.y, whose least value over unit vectors is
+the least translation, exactly, where both bodies are convex. It is sought from many directions and along its
+subgradient, the difference of the points that carry it. Of others shorter ways may exist, out of a hole or over a step:
+along each of many directions the first place is looked for at which the proof says CLEAR.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from assembly._record import rows_of
 from assembly.kinematics.pose import rotation_matrix
+from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.body_cells import BodyCells
-from assembly.proximity.clearance.proof import ClearanceProof, Verdict
+from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.records import FLAT, LINKS, NODE
 
 __all__ = ["least_translation"]

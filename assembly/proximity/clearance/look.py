@@ -34,7 +34,6 @@ from assembly.proximity.clearance.records import (
     NONE,
     OPEN,
     UNSWEPT,
-    WIRE,
     Forest,
     counts_at,
     links_at,
@@ -56,7 +55,7 @@ DONE, DIVIDED, ENDED = 0, 1, 2
 
 @kernel(inner=True)
 def part_nodes(forest, front, way, nodes, hint, needed):
-    """Seek what parts two nodes. Whether it does, the direction, the gaps before and after, and whether hulls overlap."""
+    """Seek what parts two nodes: whether it does, the direction, gaps before and after, and whether hulls overlap."""
     found, overlap = best_direction(forest, front, nodes, way, hint, needed)
     n, gaps = found.n, (found.before - needed, found.after - needed)
     travelled = pair_proof_at(front.pair, 0).travelled + way.moved

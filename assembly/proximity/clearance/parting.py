@@ -26,7 +26,7 @@ def least_move(normals: Array, arms: Array, asked: Array, radius: float) -> Arra
     normals, arms : (m, 3)
         Unit vectors from a to b, and where contacts are from the middle of b, in the same axes.
     asked : (m,)
-        By how much each is to open; positive.
+        By how much each is to open; where it is negative, it may close by so much.
     radius : float
         Of b: a turn by 1 counts as a way of so much.
 
@@ -35,6 +35,8 @@ def least_move(normals: Array, arms: Array, asked: Array, radius: float) -> Arra
     (6,) or None
         A translation and a rotation vector about the middle of b; None where contacts hold b from all sides.
     """
+    if asked.max() <= 0.0:
+        return np.zeros(6)
     rates = np.column_stack([normals, np.cross(arms, normals) / radius])
     unit = float(asked.max())
     design = np.vstack([rates.T, asked / unit])

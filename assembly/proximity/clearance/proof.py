@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from enum import Enum
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly._read_only import ReadOnlyArrays
 from assembly._record import rows_of
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
+from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.body_cells import BodyCells
 from assembly.proximity.clearance.forest import Fronts, PackedForest
 from assembly.proximity.clearance.inside import UNCLEAR, winding_of
@@ -24,99 +21,28 @@ from assembly.proximity.clearance.look import (
     ON_WAY_ANEW,
     ONLY_TRIED,
     PASSED_BY,
-    gap_along,
     look_at_pairs,
 )
-from assembly.proximity.clearance.parting import least_move
 from assembly.proximity.clearance.records import (
     BY_PLANE,
-    CELL_FACE,
     CLEAR,
     CROSSING,
-    GUIDES,
-    LINKS,
     NO_ROOM,
-    NODE,
     NODES,
-    NONE,
     OPEN,
     PARTED,
-    WIRE,
 )
 
-__all__ = ["Answer", "ClearanceProof", "Contacts", "Verdict", "is_proven"]
+__all__ = ["ClearanceProof"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 # A front that has grown by more than this factor and number is begun anew.
 GROWN, MANY = 2, 200
-# Contacts are opened by this part of what is called touching, beside what they are closed by; those that are open by
-# more already by this.
-OPENED, LEAST_OPENED = 0.25, 1e-6
-# Pairs of nodes that were left open, of which directions to open them are taken at most.
-MOST_OPENED = 2000
-# The cosine above which normals of cells as small as what was left open oppose each other.
-OPPOSED = 0.98
+# What rounding may add to a length.
+LONGER = 1.0 + 1e-12
 # Places in the stack of a ray, and points of which rays start, at most, of each part of a body.
 STACK, POINTS = 4096, 12
-
-
-class Verdict(Enum):
-    """What two bodies are to each other; the value says it in a sentence."""
-
-    CLEAR = "apart by at least the bound, and neither is within the other"
-    TOUCHING = "clear once one of them is moved by no more than the depth"
-    CROSSING = "their boundaries cross, and no translation by less than the depth undoes it"
-    ENCLOSED = "one is wholly within the other, their boundaries apart by at least the bound"
-    UNDECIDED = "none of this is proven within the budget"
-
-
-@dataclass(frozen=True, eq=False)
-class Answer(ReadOnlyArrays):
-    """What is proven of a pair of bodies.
-
-    Attributes
-    ----------
-    verdict : Verdict
-    bound : float
-        A lower bound of the distance of their boundaries; -inf where none is known.
-    depth : float
-        See `Verdict`.
-    place : (3,)
-        Of a crossing, where it was found, in the world; else NaN.
-    swept : bool
-        Whether the way from the last look is proven as well.
-    part : float
-        Of that way, up to where it was looked at.
-    """
-
-    verdict: Verdict
-    bound: float = -np.inf
-    depth: float = 0.0
-    place: Array = field(default_factory=lambda: np.full(3, np.nan))
-    swept: bool = False
-    part: float = 1.0
-
-
-class Contacts(NamedTuple):
-    """Contacts of a pair of bodies, in the world.
-
-    Attributes
-    ----------
-    normals, places : (m, 3)
-        Unit vectors from the first body to the second, and points of the second.
-    gaps : (m,)
-        Over the least gap.
-    """
-
-    normals: Array
-    places: Array
-    gaps: Array
-
-
-def is_proven(answer: Answer) -> bool:
-    """Whether bodies are clear, or only touch."""
-    return answer.verdict in (Verdict.CLEAR, Verdict.TOUCHING)
 
 
 class ClearanceProof:
@@ -174,6 +100,7 @@ class ClearanceProof:
         swept : bool
             Whether the way from the last look is to be proven as well, of pairs that were clear there.
         """
+        self._forget()
         rows = list(range(len(self.pairs)) if which is None else which)
         moved = np.zeros((len(self.pairs), 6)) if moves is None else np.ascontiguousarray(moves, dtype=float)
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
@@ -192,12 +119,18 @@ class ClearanceProof:
 
         Where one is not, nothing is known: `look` tells what it is. It makes fronts that have grown anew, too.
         """
+        self._forget()
         counts = self.fronts.counts
         if not (self.fronts.pair.known == 1.0).all() or (counts.count > GROWN * counts.fresh + MANY).any():
             return False
         self.fronts.pair.touch = touching
         look_at_pairs(self.forest.arrays, self.fronts.arrays, q, moves, self._on_way, self._codes)
         return not self._codes.any()
+
+    def _forget(self) -> None:
+        """Forget cells where contacts that went along bodies have left too many."""
+        if self.forest.is_large:
+            self.forest.forget(self.fronts)
 
     def cells_of_both(self, k: int) -> tuple[BodyCells, BodyCells]:
         """The trees of both bodies of pair k."""
@@ -241,7 +174,7 @@ class ClearanceProof:
     def bound(self, k: int) -> float:
         """A lower bound of the distance of pair k at its last look, where that ended clear."""
         pair = self.fronts.pair[k]
-        return float(pair.soonest - pair.travelled) + float(pair.needed)
+        return float(float(pair.soonest - pair.travelled) + float(pair.needed))
 
     def _answer(self, k: int, q: Array, move: Array, swept: bool) -> Answer:
         pair, code = self.fronts.pair[k], int(self._codes[k])
@@ -263,76 +196,20 @@ class ClearanceProof:
             return Answer(Verdict.TOUCHING, bound - far, far, swept=swept)
         return Answer(Verdict.CLEAR, bound, swept=swept)
 
-    def conforms(self, k: int, q: Array, touching: float) -> bool:
-        """Whether what a look at pair k leaves open are faces that lie on each other: normals oppose in all cells."""
+    def leaves_open(self, k: int, q: Array, touching: float) -> bool:
+        """Whether a look at pair k, which leaves all as it is, ends with pairs of nodes that are open (`left`)."""
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         tasks[k] = ONLY_TRIED
         self._run(np.ascontiguousarray(q), touching, np.zeros((len(self.pairs), 6)), tasks)
-        if self._codes[k] != OPEN:
-            return False
-        nodes = self._left(k)[1]
-        if not len(nodes):
-            return False
-        links, faces = rows_of(LINKS, self.forest.arrays[3]), rows_of(CELL_FACE, self.forest.arrays[2])
-        if any((links.face[side] == NONE).any() or (links.form[side] == WIRE).any() for side in (nodes.a, nodes.b)):
-            return False
-        axes = rows_of(NODE, self.forest.arrays[4]).axes
-        turn = self._relative(k, q)[0]
-        normal_a = axes[nodes.a, 2] * faces.sign[links.face[nodes.a]][:, None]
-        normal_b = axes[nodes.b, 2] * faces.sign[links.face[nodes.b]][:, None] @ turn.T
-        return bool(((normal_a * normal_b).sum(axis=1) < -OPPOSED).all())
+        return bool(self._codes[k] == OPEN)
 
-    def move_apart(self, k: int, q: Array, contacts: Contacts, touching: float) -> Array | None:
-        """The least move (6) of the second body of pair k that opens contacts; None where no point may move so far.
-
-        Parameters
-        ----------
-        k : int
-        q : (n, 7)
-        contacts : Contacts
-        touching : float
-            What a point may be moved.
-        """
-        normals, places, gaps = contacts
-        row = q[self.pairs[k][1]]
-        root = self.cells_of(k).nodes[0]
-        arm, radius = rotation_matrix(row[3:]) @ root[:3], float(root[3])
-        asked = np.maximum(OPENED * touching - gaps, LEAST_OPENED * touching)
-        guides = self.fronts.pair.guides[k]
-        guides[:] = 0.0
-        few = normals[np.linspace(0, len(normals) - 1, min(len(normals), GUIDES)).astype(int)]
-        guides[: len(few)] = few @ rotation_matrix(q[self.pairs[k][0], 3:])
-        move = least_move(normals, places - row[:3] - arm, asked, radius) if touching > 0.0 else None
-        if move is None or np.linalg.norm(move[:3]) + radius * np.linalg.norm(move[3:]) > touching:
-            return None
-        # About the origin of the body instead of its middle.
-        move[:3] -= np.cross(move[3:], arm)
-        return move
-
-    def opening_move(self, k: int, q: Array, touching: float) -> Array | None:
-        """The same for the pairs of nodes that a look at pair k alone left open, along the directions they have."""
-        parted, nodes = self._left(k)
-        if not 0 < len(nodes) <= MOST_OPENED:
-            return None
-        cells = rows_of(NODE, self.forest.arrays[4])
-        a = q[self.pairs[k][0]]
-        turn, shift = self._relative(k, q)
-        places = cells.center[nodes.b] @ turn.T + shift
-        normals = parted.normal
-        rows = zip(nodes.a.tolist(), nodes.b.tolist(), normals, strict=True)
-        gaps = np.array([gap_along(self.forest.arrays, (i, j), turn.ravel(), shift, n) for i, j, n in rows])
-        if (np.linalg.norm(normals, axis=1) < 0.5).any() or (gaps < -touching).any():
-            return None
-        world = rotation_matrix(a[3:])
-        return self.move_apart(k, q, Contacts(normals @ world.T, places @ world.T + a[:3], gaps), touching)
-
-    def _relative(self, k: int, q: Array) -> tuple[Array, Array]:
+    def relative(self, k: int, q: Array) -> tuple[Array, Array]:
         """The rotation and the shift of the second body of pair k, seen from the first."""
         a, b = self.pairs[k]
         turn = rotation_matrix(q[a, 3:])
         return turn.T @ rotation_matrix(q[b, 3:]), (q[b, :3] - q[a, :3]) @ turn
 
-    def _left(self, k: int) -> tuple[np.recarray, np.recarray]:
+    def left(self, k: int) -> tuple[np.recarray, np.recarray]:
         """The pairs of nodes that a look at pair k left open: PARTED and NODES of each."""
         count = int(self.fronts.counts.next_count[k])
         parted, nodes = (rows[:count] for rows in self.fronts.left)
@@ -341,74 +218,6 @@ class ClearanceProof:
         links = rows_of(NODES, nodes)
         is_open &= links.how == BY_PLANE
         return rows[is_open], links[is_open]
-
-    def conforms(self, k: int, q: Array, touching: float) -> bool:
-        """Whether what a look at pair k leaves open are faces that lie on each other: normals oppose in all cells."""
-        tasks = np.zeros(len(self.pairs), dtype=np.int64)
-        tasks[k] = ONLY_TRIED
-        self._run(np.ascontiguousarray(q), touching, np.zeros((len(self.pairs), 6)), tasks)
-        if self._codes[k] != OPEN:
-            return False
-        nodes = self._left(k)[1]
-        if not len(nodes):
-            return False
-        links, faces = rows_of(LINKS, self.forest.arrays[3]), rows_of(CELL_FACE, self.forest.arrays[2])
-        if any((links.face[side] == NONE).any() or (links.form[side] == WIRE).any() for side in (nodes.a, nodes.b)):
-            return False
-        axes = rows_of(NODE, self.forest.arrays[4]).axes
-        turn = self._relative(k, q)[0]
-        normal_a = axes[nodes.a, 2] * faces.sign[links.face[nodes.a]][:, None]
-        normal_b = axes[nodes.b, 2] * faces.sign[links.face[nodes.b]][:, None] @ turn.T
-        return bool(((normal_a * normal_b).sum(axis=1) < -OPPOSED).all())
-
-    def move_apart(self, k: int, q: Array, contacts: Contacts, touching: float) -> Array | None:
-        """The least move (6) of the second body of pair k that opens contacts; None where no point may move so far.
-
-        Parameters
-        ----------
-        k : int
-        q : (n, 7)
-        contacts : Contacts
-        touching : float
-            What a point may be moved.
-        """
-        normals, places, gaps = contacts
-        row = q[self.pairs[k][1]]
-        root = self.cells_of(k).nodes[0]
-        arm, radius = rotation_matrix(row[3:]) @ root[:3], float(root[3])
-        asked = np.maximum(OPENED * touching - gaps, LEAST_OPENED * touching)
-        guides = self.fronts.pair.guides[k]
-        guides[:] = 0.0
-        few = normals[np.linspace(0, len(normals) - 1, min(len(normals), GUIDES)).astype(int)]
-        guides[: len(few)] = few @ rotation_matrix(q[self.pairs[k][0], 3:])
-        move = least_move(normals, places - row[:3] - arm, asked, radius) if touching > 0.0 else None
-        if move is None or np.linalg.norm(move[:3]) + radius * np.linalg.norm(move[3:]) > touching:
-            return None
-        # About the origin of the body instead of its middle.
-        move[:3] -= np.cross(move[3:], arm)
-        return move
-
-    def opening_move(self, k: int, q: Array, touching: float) -> Array | None:
-        """The same for the pairs of nodes that a look at pair k alone left open, along the directions they have."""
-        parted, nodes = self._left(k)
-        if not 0 < len(nodes) <= MOST_OPENED:
-            return None
-        cells = rows_of(NODE, self.forest.arrays[4])
-        a = q[self.pairs[k][0]]
-        turn, shift = self._relative(k, q)
-        places = cells.center[nodes.b] @ turn.T + shift
-        normals = parted.normal
-        rows = zip(nodes.a.tolist(), nodes.b.tolist(), normals, strict=True)
-        gaps = np.array([gap_along(self.forest.arrays, (i, j), turn.ravel(), shift, n) for i, j, n in rows])
-        if (np.linalg.norm(normals, axis=1) < 0.5).any() or (gaps < -touching).any():
-            return None
-        world = rotation_matrix(a[3:])
-        return self.move_apart(k, q, Contacts(normals @ world.T, places @ world.T + a[:3], gaps), touching)
-
-    def _gap(self, k: int, a: int, b: int, normal: Array) -> float:
-        """The gap of two nodes along a direction at the last pose."""
-        pair = self.fronts.pair
-        return float(gap_along(self.forest.arrays, (int(a), int(b)), pair.turn[k], pair.shift[k], normal))
 
     def size(self, k: int) -> float:
         """The size of the larger body of pair k."""
@@ -428,10 +237,25 @@ class ClearanceProof:
 
     def way_length(self, k: int, before: Array, after: Array) -> float:
         """How far points of the second body of pair k go between two poses, seen from the first, at most."""
-        (turn0, shift0), (turn1, shift1) = self._relative(k, before), self._relative(k, after)
-        middle, radius = self.cells_of(k).nodes[0, :3], float(self.cells_of(k).nodes[0, 3])
-        angle = 2.0 * np.arcsin(min(1.0, float(np.linalg.norm(turn1 - turn0)) / np.sqrt(8.0)))
-        return float(np.linalg.norm((turn1 - turn0) @ middle + shift1 - shift0) + angle * radius)
+        return self._length(k, self.relative(k, before), self.relative(k, after))
+
+    def _length(self, k: int, before: tuple[Array, Array], after: tuple[Array, Array]) -> float:
+        root = self.cells_of(k).nodes[0]
+        turn, shift = after[0] - before[0], after[1] - before[1]
+        angle = 2.0 * np.arcsin(min(1.0, float(np.linalg.norm(turn)) / np.sqrt(8.0)))
+        return (float(np.linalg.norm(turn @ root[:3] + shift)) + angle * float(root[3])) * LONGER
+
+    def last_poses(self) -> tuple[Array, Array]:
+        """The rotations (pairs, 9) and shifts (pairs, 3) of second bodies at the last looks that ended clear."""
+        return self.fronts.pair.turn.copy(), self.fronts.pair.shift.copy()
+
+    def go_back(self, poses: tuple[Array, Array]) -> None:
+        """Make earlier poses, from which all ways were clear, the last ones again."""
+        pair = self.fronts.pair
+        for k, (turn, shift) in enumerate(zip(*poses, strict=True)):
+            now = pair.turn[k].reshape(3, 3).copy(), pair.shift[k].copy()
+            pair.travelled[k] += self._length(k, now, (turn.reshape(3, 3), shift))
+            pair.turn[k], pair.shift[k] = turn, shift
 
     def nested(self, k: int, q: Array, move: Array) -> bool | None:
         """Whether a body of pair k, whose boundaries are apart, is within the other one; None where no ray tells.
