@@ -135,7 +135,7 @@ def _opened(proof: ClearanceProof, k: int, q: Array, touching: float) -> Answer:
 
 
 def _contacts(solution: Solution, rows: Sequence[tuple[int, int]]) -> Iterator[tuple[int, ContactPair, float]]:
-    """The contacts of a solution between bodies that clearances keep apart: the pair, the contact, 1 or -1 if turned."""
+    """Contacts of a solution between bodies that clearances keep apart: the pair, the contact, -1 if it is turned."""
     for number, _, contact in listed_contacts(solution):
         yield number, contact, 1.0
     scene = solution._scene

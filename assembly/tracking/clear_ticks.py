@@ -16,8 +16,8 @@ __all__ = ["ClearTicks"]
 Array = NDArray[np.float64]
 # Pairs of nodes that a tick looks at for a pair of bodies.
 BUDGET = 4000
-# How deep the way of a contact that rolls may go in, in parts of the square of its length over the least radius: a chord
-# of a curve of radius r is s^2 / (8 r) off it, there are two, and a contact may go farther than the bodies.
+# How deep the way of a contact that rolls may go in, in parts of the square of its length over the least radius: a
+# chord of a curve of radius r is s^2 / (8 r) off it, there are two, and a contact may go farther than the bodies.
 ROLLED = 1.0
 # Parts of it that bodies are opened by, one after the other: as they are, they may cross elsewhere.
 OPENED = (1.0, 0.1, 0.01)

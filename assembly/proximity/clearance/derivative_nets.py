@@ -10,6 +10,8 @@ that they cancel: the twist S_uv of a cylinder would not come out as zero.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,6 +57,11 @@ def _elevated(net: Array, p: int, q: int) -> Array:
     return elevated
 
 
+def _bounds_over(nets: Sequence[Array], divisor: Array) -> Array:
+    """The longest vectors of each of several nets, over a divisor: (n, nets)."""
+    return np.column_stack([_longest(net) / divisor for net in nets])
+
+
 def _patch_bounds(net: Array) -> tuple[Array, Array]:
     """Bounds of |S_u|, |S_v| (n, 2) and of |S_uu|, |S_uv|, |S_vv| (n, 3) over the unit square, of nets (n, ., ., 4)."""
     w = net[..., 3:]
@@ -63,21 +70,17 @@ def _patch_bounds(net: Array) -> tuple[Array, Array]:
     a, least = net[..., :3] - middle * w, w.min(axis=(1, 2, 3))
     if np.ptp(w) == 0.0:
         au, av = _rate(a, 1), _rate(a, 2)
-        first, second = (au, av), (_rate(au, 1), _rate(au, 2), _rate(av, 2))
-        rates, bends = (np.column_stack([_longest(x) / least for x in nets]) for nets in (first, second))
-        return rates, bends
+        second = _rate(au, 1), _rate(au, 2), _rate(av, 2)
+        return _bounds_over((au, av), least), _bounds_over(second, least)
     au, av, wu, wv = _rate(a, 1), _rate(a, 2), _rate(w, 1), _rate(w, 2)
     pu = _difference(bezier_product(w, au), bezier_product(wu, a))
     pv = _difference(bezier_product(w, av), bezier_product(wv, a))
 
     def second_derivative(p: Array, axis: int, rate: Array) -> Array:
-        top = _difference(bezier_product(w, _rate(p, axis)), 2.0 * bezier_product(rate, p))
-        bound: Array = _longest(top) / least**3
-        return bound
+        return _difference(bezier_product(w, _rate(p, axis)), 2.0 * bezier_product(rate, p))
 
-    rates = np.column_stack([_longest(p) / least**2 for p in (pu, pv)])
-    bends = [second_derivative(pu, 1, wu), second_derivative(pu, 2, wv), second_derivative(pv, 2, wv)]
-    return rates, np.column_stack(bends)
+    second = second_derivative(pu, 1, wu), second_derivative(pu, 2, wv), second_derivative(pv, 2, wv)
+    return _bounds_over((pu, pv), least**2), _bounds_over(second, least**3)
 
 
 def _not_narrow(low: Array, high: Array) -> tuple[Array, Array]:

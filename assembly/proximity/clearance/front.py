@@ -1,8 +1,8 @@
 """The front of a pair of bodies: pairs of nodes that together stand for all pairs of points, each with what parts it.
 
 As long as points of body b have gone less than a gap, its pair need not be asked again; the least of these lengths
-tells of all pairs at once. After that the gap along the same direction is asked, some nanoseconds; where it does not hold,
-another direction is sought, and then the larger node is replaced by its children.
+tells of all pairs at once. After that the gap along the same direction is asked, some nanoseconds; where it does not
+hold, another direction is sought, and then the larger node is replaced by its children.
 
 A look writes the front that follows beside the one there is. It takes its place where the look ends clear; else all is
 as it was.

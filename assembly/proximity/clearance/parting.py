@@ -1,8 +1,8 @@
 """The least rigid move that opens the contacts of two bodies: where it is done they are clear, and so they only touch.
 
 A contact with the normal n, from a to b, at an arm p from the middle of b opens by n.(v + w x p) as b is moved by v and
-turned by w. The least move that opens every contact by what is asked of it is a least distance program, and a problem of
-non-negative least squares (Lawson and Hanson, "Solving Least Squares Problems", chapter 23).
+turned by w. The least move that opens every contact by what is asked of it is a least distance program, and a problem
+of non-negative least squares (Lawson and Hanson, "Solving Least Squares Problems", chapter 23).
 """
 
 from __future__ import annotations

@@ -115,7 +115,7 @@ class ClearanceProof:
         return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
 
     def stays_clear(self, q: Array, touching: float, moves: Array) -> bool:
-        """Whether all pairs, of which none was found otherwise at the last look, are clear at poses and on the way there.
+        """Whether all pairs, all of which were clear at the last look, are so at poses and on the way there.
 
         Where one is not, nothing is known: `look` tells what it is. It makes fronts that have grown anew, too.
         """
@@ -138,7 +138,7 @@ class ClearanceProof:
         return self.forest.cells[self._number[a]], self.forest.cells[self._number[b]]
 
     def is_apart(self, k: int, q: Array, distance: float, budget: int) -> bool:
-        """Whether it is proven, within a budget, that the bodies of pair k are farther apart and none is in the other."""
+        """Whether it is proven, within a budget, that bodies of pair k are farther apart and none is in the other."""
         needed, budgets = self.fronts.pair.needed, self.fronts.counts.budget
         before, needed[k] = float(needed[k]), distance
         usual, budgets[k] = int(budgets[k]), budget
@@ -243,7 +243,8 @@ class ClearanceProof:
         root = self.cells_of(k).nodes[0]
         turn, shift = after[0] - before[0], after[1] - before[1]
         angle = 2.0 * np.arcsin(min(1.0, float(np.linalg.norm(turn)) / np.sqrt(8.0)))
-        return (float(np.linalg.norm(turn @ root[:3] + shift)) + angle * float(root[3])) * LONGER
+        length = float(np.linalg.norm(turn @ root[:3] + shift)) + float(angle) * float(root[3])
+        return length * LONGER
 
     def last_poses(self) -> tuple[Array, Array]:
         """The rotations (pairs, 9) and shifts (pairs, 3) of second bodies at the last looks that ended clear."""

@@ -4,10 +4,10 @@ A node stands for a part of a body's boundary, which is within
 
     (the hull of four corners, or an oriented box)  +  (a disc of radius `disc` across `ruling`)  +  (a ball of `rho`)
 
-(sums of sets). A cell is a part of one face in (u, v) and has corners; a node above cells has a box. Over the box of one
-whole face that lies on a cylinder, a ball or a torus from outside stands the exact hull of that: a segment and a disc, a
-point and a ball, a disc and a ball. A whole face that is the wall of a bore (a cylinder or a ball from inside) lies
-nowhere nearer than `bore` to its axis, or center: what is within that is clear of it.
+(sums of sets). A cell is a part of one face in (u, v) and has corners; a node above cells has a box. Over the box of
+one whole face that lies on a cylinder, a ball or a torus from outside stands the exact hull of that: a segment and a
+disc, a point and a ball, a disc and a ball. A whole face that is the wall of a bore (a cylinder or a ball from inside)
+lies nowhere nearer than `bore` to its axis, or center: what is within that is clear of it.
 """
 
 from __future__ import annotations

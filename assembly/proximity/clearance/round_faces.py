@@ -39,8 +39,8 @@ class Round:
     half : float
         Half the length of a cylinder.
     radius : float
-        From outside: of the cylinder, the ball, or the tube of a torus, not less than that of the face. From inside: not
-        more.
+        From outside: of the cylinder, the ball, or the tube of a torus, not less than that of the face. From inside:
+        not more.
     ring : float
         Of a torus, the radius of the circle of its middles; else 0.
     outward : bool

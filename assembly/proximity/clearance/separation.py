@@ -4,8 +4,9 @@ Everything is seen from body a: a point y of body b is at R y + t. A unit direct
 
     gap(n) = min over b of n.y - max over a of n.x
 
-is a lower bound of the distance of what the nodes stand for, whatever n is. What is within a distance d of the axis of a
-bore is farther than (bore - d) from its wall. So whatever finds directions needs no proof: only gaps have to be right.
+is a lower bound of the distance of what the nodes stand for, whatever n is. What is within a distance d of the axis of
+a bore is farther than (bore - d) from its wall. So whatever finds directions needs no proof: only gaps have to be
+right.
 
 Both keep apart along a way as well: half spaces and solid cylinders are convex.
 """

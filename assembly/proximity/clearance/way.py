@@ -1,9 +1,9 @@
 """The way between two poses of body b, seen from a: a straight line and a rotation about one axis.
 
 The middle of b's root goes along a straight line, and b turns about it, with constant rates. A point then leaves the
-straight line between its two places by no more than its distance from the axis of rotation times 1 - cos(angle / 2): the
-height of the arc over its chord, here called its sag. What is convex and holds two points holds their chord: nodes that
-one plane, or one bore, keeps apart at both poses by more than the sag are apart all the way.
+straight line between its two places by no more than its distance from the axis of rotation times 1 - cos(angle / 2):
+the height of the arc over its chord, here called its sag. What is convex and holds two points holds their chord: nodes
+that one plane, or one bore, keeps apart at both poses by more than the sag are apart all the way.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, node_at
 from assembly.proximity.clearance.separation import across, is_round, is_wire, placed
 
 # swept: whether the way is looked at, or its end alone. moved: the longest way of a point of b. sag: of any point;
-# factor: of a point at distance 1 from the axis of rotation. axis, middle: of that, in axes of b (zero: it is not known).
-# before, after: the poses.
+# factor: of a point at distance 1 from the axis of rotation. axis, middle: of that, in axes of b (zero: it is not
+# known). before, after: the poses.
 Way = namedtuple("Way", "swept moved sag factor axis middle before after")
 ROUNDED_UP = 1.0 + 1e-12
 # Below so small a sine of the angle its axis is lost in rounding, above so large an angle as well.
