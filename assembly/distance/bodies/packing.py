@@ -1,0 +1,160 @@
+"""The tree of a body: packed once from its faces, kept, and grown by searches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from math import comb
+from threading import RLock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._record import rows_of, size_of
+from assembly.distance.bodies.boundary_patches import boundary_patches
+from assembly.distance.bodies.elementary import spine_row
+from assembly.distance.bodies.nodes import plant_tree
+from assembly.distance.bodies.patch_blocks import PatchBlock, patches_of
+from assembly.distance.bodies.records import (
+    BODY_HEAD,
+    LINKS,
+    NODE,
+    NONE,
+    PATCH,
+    PATCH_SIZE,
+    SPAN,
+    USED,
+    body_head_at,
+    tree_state_at,
+)
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.bezier_packing import degree_tables
+from assembly.geometry.splines.bezier_pieces import UNIT
+
+__all__ = ["KeptTree", "tree_of"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Arrays = tuple[Ints, Array, Ints, Array, Array]
+_HEAD = size_of(BODY_HEAD)
+# Nodes for which there is room at first, beside the whole patches.
+_SPARE = 1024
+
+
+@dataclass(eq=False)
+class KeptTree:
+    """The tree of a body, as kernels read it, and who is at it.
+
+    Attributes
+    ----------
+    arrays
+        Table, pool, links, nodes and nets (`records.BodyTree`).
+    degree : int
+        The largest degree of a patch in one direction.
+    lock
+        Searches make nodes: one at a time.
+    """
+
+    arrays: Arrays
+    degree: int
+    lock: RLock = field(default_factory=RLock)
+
+    def grow(self) -> None:
+        """Room for twice as many nodes."""
+        table, pool, links, nodes, nets = self.arrays
+        state = tree_state_at(links, 0)
+        more_links = np.empty(2 * links.size, dtype=np.int64)
+        more_nodes, more_nets = np.empty(2 * nodes.size), np.empty(2 * nets.size)
+        used, at = USED + LINKS * int(state.nodes), NODE * int(state.nodes)
+        more_links[:used], more_nodes[:at] = links[:used], nodes[:at]
+        more_nets[: state.nets] = nets[: state.nets]
+        self.arrays = table, pool, more_links, more_nodes, more_nets
+
+
+@cache
+def _tables(degree: int) -> Array:
+    """Value and derivatives of the Bernstein polynomials at 1/2, and factors C(n, k - s) C(2, s) / C(n + 2, k)."""
+    n = degree
+    times = np.zeros((n + 3, 3))
+    for k in range(n + 3):
+        for s in range(3):
+            if 0 <= k - s <= n:
+                times[k, s] = comb(n, k - s) * comb(2, s) / comb(n + 2, k)
+    return np.concatenate([degree_tables(n)[3 * (n + 1) : 6 * (n + 1)], times.ravel()])
+
+
+@lru_cache(maxsize=256)
+def tree_of(faces: tuple[Face, ...]) -> KeptTree:
+    """The tree of a body with these faces."""
+    boxes = np.array([face.surface.bounding_box() for face in faces])
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    center = 0.5 * low + 0.5 * high
+    reach = 0.5 * float(np.linalg.norm(high - low)) * (1.0 + 8.0 * UNIT)
+    blocks = [patches_of(face, number, center, reach) for number, face in enumerate(faces)]
+    blocks += [curves for block in blocks if block.trimmed for curves in boundary_patches(faces[block.face], block)]
+    return _planted(faces, blocks, center, reach)
+
+
+def _planted(faces: Sequence[Face], blocks: list[PatchBlock], center: Array, reach: float) -> KeptTree:
+    """The tree of all patches."""
+    count = sum(len(block.nets) for block in blocks)
+    table, pool = _static(faces, blocks, count)
+    head = body_head_at(pool, 0)
+    head.reach, head.center, head.patches = reach, center, count
+    head.error = max(block.error for block in blocks)
+    weights = [block.nets[..., 3] for block in blocks]
+    head.weight_ratio = max(float(w.max() / w.min()) for w in weights) * (1.0 + 4.0 * UNIT)
+    head.rational = float(any(bool((w != 1.0).any()) for w in weights))
+    head.degree = max(sum(block.degree) for block in blocks)
+    doubles = 7 * max(block.nets[0, ..., 0].size for block in blocks)
+    sizes = [7 * block.nets[..., 0].size for block in blocks]
+    places = np.concatenate([[0], np.cumsum(sizes)])
+    room = 3 * count + _SPARE
+    nets = np.empty(int(places[-1]) + _SPARE * doubles)
+    rows = rows_of(PATCH, table[: PATCH_SIZE * count].reshape(-1, PATCH_SIZE))
+    first = 0
+    for block, place, size in zip(blocks, places.tolist(), sizes, strict=False):
+        n = len(block.nets)
+        nets[place : place + size].reshape(n, -1)[:, : size // n // 7 * 4] = block.nets.reshape(n, -1)
+        rows.net[first : first + n] = place + size // n * np.arange(n)
+        first += n
+    links, nodes = np.empty(USED + LINKS * room, dtype=np.int64), np.empty(NODE * room)
+    tree_state_at(links, 0).nets = places[-1]
+    plant_tree((table, links), (pool, nodes, nets), np.empty(5 * count, dtype=np.int64))
+    return KeptTree((table, pool, links, nodes, nets), max(max(block.degree) for block in blocks))
+
+
+def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int) -> tuple[Ints, Array]:
+    """Table and pool: what is told of patches, tables of their degrees, spines and trims."""
+    degrees = sorted({degree for block in blocks for degree in block.degree})
+    tables = [_tables(degree) for degree in degrees]
+    spans = np.concatenate([block.spans for block in blocks]).ravel()
+    parts = [np.zeros(_HEAD), *tables, spans]
+    at = dict(zip(degrees, np.cumsum([_HEAD, *(part.size for part in tables)]).tolist(), strict=False))
+    span_at = _HEAD + sum(part.size for part in tables)
+    pool_at = span_at + spans.size
+    table = np.empty((count, PATCH_SIZE), dtype=np.int64)
+    rows = rows_of(PATCH, table)
+    more: list[Ints] = []
+    table_at, first = table.size, 0
+    for block in blocks:
+        part = slice(first, first + len(block.nets))
+        first = part.stop
+        rows.degree_u[part], rows.degree_v[part] = block.degree
+        rows.tables_u[part], rows.tables_v[part] = at[block.degree[0]], at[block.degree[1]]
+        rows.face[part], rows.curve[part] = block.face, block.curve
+        rows.trim[part] = rows.spine[part] = NONE
+        if block.curve == NONE and (spine := spine_row(block)) is not None:
+            rows.spine[part] = pool_at
+            parts.append(spine)
+            pool_at += spine.size
+        if block.trimmed:
+            rows.trim[part] = table_at
+            trim_table, trim_pool = faces[block.face].packed_trim(table_at, pool_at)
+            more.append(trim_table)
+            parts.append(trim_pool)
+            table_at, pool_at = table_at + trim_table.size, pool_at + trim_pool.size
+    rows.span[:] = span_at + SPAN * np.arange(count)
+    rows.node[:] = NONE
+    return np.concatenate([table.ravel(), *more]), np.concatenate(parts)

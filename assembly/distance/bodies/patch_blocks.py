@@ -1,0 +1,90 @@
+"""Bezier patches of faces, about a center, as a tree of a body takes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.distance.bodies.records import NONE
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.bezier_pieces import UNIT
+
+__all__ = ["PatchBlock", "is_trimmed", "patches_of"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class PatchBlock:
+    """Patches of the same degrees of one face, or of one of its boundary curves.
+
+    Attributes
+    ----------
+    nets : (n, p + 1, q + 1, 4)
+        Homogeneous control points about the center, weights at most one.
+    spans : (n, 4)
+        Low u, high u, low v, high v of each patch on its surface; of a boundary curve its t, and 0 to 1.
+    face : int
+    curve : int
+        NONE: patches of the face.
+    trimmed : bool
+        Whether parts of the patches may be outside of the face.
+    error : float
+        How far the patches may be from what was given.
+    """
+
+    nets: Array
+    spans: Array
+    face: int
+    curve: int
+    trimmed: bool
+    error: float
+
+    @property
+    def degree(self) -> tuple[int, int]:
+        """Along u and v."""
+        return self.nets.shape[1] - 1, self.nets.shape[2] - 1
+
+
+def is_trimmed(face: Face) -> bool:
+    """Whether a face is less than its surface: its boundary has a curve that is not on an edge of the domain."""
+    if face.outer is None and not face.holes:
+        return False
+    surface = face.surface
+    for curve in face.boundary:
+        points = curve.control_points
+        edges = [
+            bool((points[:, axis] == end).all())
+            for axis in range(2)
+            if not surface.closed[axis]
+            for end in surface.domain[axis]
+        ]
+        if not any(edges):
+            return True
+    return False
+
+
+def patches_of(face: Face, number: int, center: Array, reach: float) -> PatchBlock:
+    """The patches of a face's surface.
+
+    Control points are turned into Bezier points by p + q steps of at most eight roundings each, about the origin, and
+    moved to the center: errors are parts of the largest coordinate.
+    """
+    surface = face.surface
+    pieces = surface.bezier_pieces()
+    spans_u, spans_v, m, n, _ = pieces.shape
+    nets = pieces.reshape(-1, m, n, 4).copy()
+    nets[..., :3] -= center * nets[..., 3:]
+    rational = bool(surface.weights.min() != surface.weights.max())
+    nets /= surface.weights.max()
+    if not rational:
+        nets[..., 3] = 1.0
+    at_u, at_v = surface.breaks()
+    spans = np.empty((spans_u, spans_v, 4))
+    spans[..., 0], spans[..., 1] = at_u[:-1, None], at_u[1:, None]
+    spans[..., 2], spans[..., 3] = at_v[:-1], at_v[1:]
+    size = float(np.abs(center).max()) + reach
+    error = (2.0 if rational else 1.0) * 16.0 * (m + n + 2) * UNIT * size
+    return PatchBlock(nets, spans.reshape(-1, 4), number, NONE, is_trimmed(face), error)
