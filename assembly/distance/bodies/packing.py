@@ -93,15 +93,16 @@ def tree_of(faces: tuple[Face, ...]) -> KeptTree:
     reach = 0.5 * float(np.linalg.norm(high - low)) * (1.0 + 8.0 * UNIT)
     blocks = [patches_of(face, number, center, reach) for number, face in enumerate(faces)]
     blocks += [curves for block in blocks if block.trimmed for curves in boundary_patches(faces[block.face], block)]
-    return _planted(faces, blocks, center, reach)
+    return _planted(faces, blocks, center, 0.5 * (high - low))
 
 
-def _planted(faces: Sequence[Face], blocks: list[PatchBlock], center: Array, reach: float) -> KeptTree:
+def _planted(faces: Sequence[Face], blocks: list[PatchBlock], center: Array, half: Array) -> KeptTree:
     """The tree of all patches."""
     count = sum(len(block.nets) for block in blocks)
     table, pool = _static(faces, blocks, count)
     head = body_head_at(pool, 0)
-    head.reach, head.center, head.patches = reach, center, count
+    head.reach, head.center, head.patches = float(np.linalg.norm(half)) * (1.0 + 8.0 * UNIT), center, count
+    head.half = half * (1.0 + 8.0 * UNIT)
     head.error = max(block.error for block in blocks)
     weights = [block.nets[..., 3] for block in blocks]
     head.weight_ratio = max(float(w.max() / w.min()) for w in weights) * (1.0 + 4.0 * UNIT)

@@ -39,13 +39,15 @@ class Place:
 class Nearest:
     """What a search found: bounds, the nearest points known (2, 3) in world axes, where they are, pairs looked at.
 
-    `status` is CONVERGED or SPENT (`search.py`).
+    `status` is CONVERGED or SPENT (`search.py`). `boxed`: whether the point of b is in the box of a, that of a in the
+    box of b.
     """
 
     lower: float
     upper: float
     points: Array
     places: tuple[Place, Place]
+    boxed: tuple[bool, bool]
     pairs: int
     status: int
 
@@ -70,7 +72,8 @@ def bodies_apart(a: KeptTree, b: KeptTree, q: Array, tolerance: float, budget: i
     found = body_search_at(state, 0)
     places = _place(a, int(found.patches[0]), found.places[:2]), _place(b, int(found.patches[1]), found.places[2:])
     points = found.world.reshape(2, 3)
-    return Nearest(float(found.lower), float(found.upper), points, places, int(found.pairs), int(status))
+    boxed = bool(found.boxed[0]), bool(found.boxed[1])
+    return Nearest(float(found.lower), float(found.upper), points, places, boxed, int(found.pairs), int(status))
 
 
 def _place(tree: KeptTree, number: int, x: Array) -> Place:

@@ -71,6 +71,7 @@ BODY_HEAD = record_dtype(
     patches=1,  # whole patches, of faces and of boundary curves
     degree=1,  # the largest sum of the degrees of a patch
     center=3,  # what was subtracted from all points [length]
+    half=3,  # half extents of the box about the center that has all of it [length]
 )
 body_head_at = record_view(BODY_HEAD)
 # A whole patch in the table.

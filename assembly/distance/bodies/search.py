@@ -42,7 +42,7 @@ from assembly.distance.bodies.spines import norm, spine_bound
 from assembly.distance.bodies.trims import nearest_is_elsewhere
 from assembly.distance.patches.pair import D, patch_work_at, vector_dot
 from assembly.geometry.splines.bezier_pieces import UNIT
-from assembly.geometry.vec import add, matvec, sub
+from assembly.geometry.vec import add, matvec, matvec_t, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 
 # What a search ended with. CROWDED: the arrays are too small to go on.
@@ -309,13 +309,25 @@ def relative_pose_of(a, b, q):
 
 
 @kernel(inline=True)
+def is_in_box(head, point):
+    """Whether a point, from the center of a body, is in its box."""
+    half = head.half
+    return 1.0 if abs(point[0]) <= half[0] and abs(point[1]) <= half[1] and abs(point[2]) <= half[2] else 0.0
+
+
+@kernel(inline=True)
 def write_points(search, q):
-    """The nearest points known in world axes."""
+    """The nearest points known in world axes, and which of them are in the box of the other body."""
     state, center = body_search_at(search.state, 0), body_head_at(search.a.pool, 0).center
     for i in range(0, 6, 3):
         own = (state.points[i] + center[0], state.points[i + 1] + center[1], state.points[i + 2] + center[2])
         world = add(matvec(rotation(q, 0), own), position(q, 0))
         state.world[i], state.world[i + 1], state.world[i + 2] = world
+    on_a = (state.points[0], state.points[1], state.points[2])
+    on_b = (state.points[3], state.points[4], state.points[5])
+    state.boxed[0] = is_in_box(body_head_at(search.a.pool, 0), on_b)
+    seen = matvec_t(search.pose.turn, sub(on_a, search.pose.shift))
+    state.boxed[1] = is_in_box(body_head_at(search.b.pool, 0), seen)
 
 
 @kernel(inner=True)

@@ -38,7 +38,17 @@ from assembly.proximity.features.nearest_query import (
 )
 from assembly.proximity.features.touching import flush_ways
 
-__all__ = ["Feature", "FeaturePair", "FeatureStatus", "FeatureTracker", "closest_features", "nearest_features"]
+__all__ = [
+    "Feature",
+    "FeaturePair",
+    "FeatureStatus",
+    "FeatureTracker",
+    "closest_features",
+    "faces_of",
+    "features_of",
+    "nearest_features",
+    "pose_of",
+]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -116,8 +126,8 @@ def _face_of(surface: NurbsSurface) -> Face:
     return Face(surface)
 
 
-def _faces(name: str, shape: Shape) -> Faces:
-    """The faces of a shape."""
+def faces_of(name: str, shape: Shape) -> Faces:
+    """The faces of a shape that is an argument of this name."""
     if isinstance(shape, Body):
         if not shape.faces:
             raise InputError(f"{name} is {shape!r}, a body without a shape; expected one with faces")
@@ -140,7 +150,8 @@ def _faces(name: str, shape: Shape) -> Faces:
     return tuple(faces)
 
 
-def _pose(name: str, shape: Shape, q: ArrayLike | None) -> Array:
+def pose_of(name: str, shape: Shape, q: ArrayLike | None) -> Array:
+    """The pose of a shape (7,), an argument of this name: the body's own, or none, where it is not given."""
     if q is None:
         if isinstance(shape, BodyFace):
             shape = shape.body
@@ -245,8 +256,8 @@ def closest_features(
     which is decided by how much curvatures change over it. The point of `FeatureStatus.APART` is that nothing else
     ends the search.
     """
-    faces = _faces("a", a), _faces("b", b)
-    q = np.stack([_pose("q_a", a, q_a), _pose("q_b", b, q_b)])
+    faces = faces_of("a", a), faces_of("b", b)
+    q = np.stack([pose_of("q_a", a, q_a), pose_of("q_b", b, q_b)])
     if not 0.0 <= number("touching", touching) <= 1e-3:
         raise InputError(f"touching is {touching:g}; expected a number from 0 to 0.001")
     pair = _closest(faces, q)
@@ -268,8 +279,8 @@ def nearest_features(a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: Arra
     InputError, TypeError
         As those of `closest_features`.
     """
-    faces = _faces("a", a), _faces("b", b)
-    q = np.stack([_pose("q_a", a, q_a), _pose("q_b", b, q_b)])
+    faces = faces_of("a", a), faces_of("b", b)
+    q = np.stack([pose_of("q_a", a, q_a), pose_of("q_b", b, q_b)])
     codes, out = np.zeros(2, dtype=np.int64), np.empty(PAIR)
     table, pool, shells, size = _packed(*faces)
     status = _STATUSES[find_nearest(table, pool, shells, q, size, codes, out)]
@@ -316,7 +327,7 @@ class FeatureTracker(OwnState):
 
     def __init__(self, a: Shape, b: Shape) -> None:
         self._shapes = a, b
-        faces = _faces("a", a), _faces("b", b)
+        faces = faces_of("a", a), faces_of("b", b)
         self._packed = _packed(*faces)
         self._names = features_of(faces[0]), features_of(faces[1])
         self._q = np.empty((2, 7))
@@ -341,8 +352,8 @@ class FeatureTracker(OwnState):
         InputError
             Wrong poses.
         """
-        self._q[0] = _pose("q_a", self._shapes[0], q_a)
-        self._q[1] = _pose("q_b", self._shapes[1], q_b)
+        self._q[0] = pose_of("q_a", self._shapes[0], q_a)
+        self._q[1] = pose_of("q_b", self._shapes[1], q_b)
         status = None
         if self.searches:
             table, pool, shells, size = self._packed
