@@ -160,7 +160,7 @@ def halves_of(tree, k):
         half, own = node_of(tree, low + part), links_of(tree, low + part)
         own.halves, own.patch, own.depth = NONE, links.patch, links.depth + 1
         own.place = UNPLACED if links.place == CUT else links.place
-        own.net = state.nets + part * size
+        own.net, own.spine = state.nets + part * size, links.spine
         half.low_u, half.high_u, half.low_v, half.high_v = node.low_u, node.high_u, node.low_v, node.high_v
         half.away = away
     first, second = node_of(tree, low), node_of(tree, low + 1)
@@ -225,7 +225,10 @@ def describe_group(tree, k, spare, order, ends):
         radius = max(radius, math.sqrt(square) + part.radius)
     node.radius = radius * (1.0 + 16.0 * UNIT) + 16.0 * UNIT * body_head_at(tree.pool, 0).reach
     node.extent, node.length_u, node.length_v = radius, 2.0 * radius, 0.0
-    links.patch = GROUP
+    links.patch, links.spine = GROUP, links_of(tree, spare + order[begin]).spine
+    for i in range(begin, end):
+        if links_of(tree, spare + order[i]).spine != links.spine:
+            links.spine = NONE
     sort_along(tree, spare, order, ends, axis)
 
 
@@ -245,6 +248,7 @@ def plant_tree(ints, doubles, order):
     for i in range(count):
         links, node = links_of(tree, spare + i), node_of(tree, spare + i)
         links.patch, links.net, links.depth, links.halves, links.place = i, patch_of(tree, i).net, 0, NONE, UNPLACED
+        links.spine = patch_of(tree, i).spine
         node.low_u, node.high_u, node.low_v, node.high_v = 0.0, 1.0, 0.0, 1.0
         describe_ball(tree, spare + i)
         order[i] = i

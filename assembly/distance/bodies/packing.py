@@ -61,9 +61,11 @@ class KeptTree:
     lock: RLock = field(default_factory=RLock)
 
     def grow(self) -> None:
-        """Room for twice as many nodes."""
+        """Room for twice as many nodes, where that for the next ones may be short."""
         table, pool, links, nodes, nets = self.arrays
         state = tree_state_at(links, 0)
+        if (int(state.nodes) + 2) * NODE <= nodes.size and int(state.nets) + 14 * (self.degree + 1) ** 2 <= nets.size:
+            return
         more_links = np.empty(2 * links.size, dtype=np.int64)
         more_nodes, more_nets = np.empty(2 * nodes.size), np.empty(2 * nets.size)
         used, at = USED + LINKS * int(state.nodes), NODE * int(state.nodes)
@@ -146,7 +148,7 @@ def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int) -> tupl
         rows.tables_u[part], rows.tables_v[part] = at[block.degree[0]], at[block.degree[1]]
         rows.face[part], rows.curve[part] = block.face, block.curve
         rows.trim[part] = rows.spine[part] = NONE
-        if block.curve == NONE and (spine := spine_row(block)) is not None:
+        if (spine := spine_row(block)) is not None:
             rows.spine[part] = pool_at
             parts.append(spine)
             pool_at += spine.size

@@ -65,9 +65,8 @@ def bodies_apart(a: KeptTree, b: KeptTree, q: Array, tolerance: float, budget: i
             a.grow()
             if b is not a:
                 b.grow()
-            longer = np.empty(2 * heap.size)
-            longer[: heap.size] = heap
-            heap = longer
+            if (left + 1) * PAIR > heap.size:
+                heap = np.concatenate([heap, np.empty(heap.size)])
             status, left = search_bodies(a.arrays, b.arrays, q, (tolerance, float(budget)), heap, work, left)
     found = body_search_at(state, 0)
     places = _place(a, int(found.patches[0]), found.places[:2]), _place(b, int(found.patches[1]), found.places[2:])

@@ -87,7 +87,7 @@ PATCH = record_dtype(
     tables_v=1,
     span=1,  # where in the pool its PATCH_SPAN is
     trim=1,  # where in the table the trim of its face is; NONE: all of it is of the face
-    spine=1,  # where in the pool its SPINE is; NONE: it is no elementary surface
+    spine=1,  # where in the pool its SPINE is; NONE: it is neither an elementary surface nor a line or a circle
 )
 patch_at = record_view(PATCH)
 PATCH_SIZE = size_of(PATCH)
@@ -95,7 +95,8 @@ PATCH_SIZE = size_of(PATCH)
 PATCH_SPAN = record_dtype("f8", low_u=1, high_u=1, low_v=1, high_v=1)
 patch_span_at = record_view(PATCH_SPAN)
 SPAN = size_of(PATCH_SPAN)
-# An elementary surface on which a patch lies (`spines.py`), in the body's coordinates about its center.
+# An elementary surface on which a patch lies (`spines.py`), in the body's coordinates about its center. A line is a
+# cylinder of no radius, a circle a torus with a tube of none.
 SPINE = record_dtype(
     "f8",
     kind=1,
@@ -121,6 +122,7 @@ NODE_LINKS = record_dtype(
     known=1,  # BALL, MODEL (without doubts of derivatives) or ALL of it
     net=1,  # where its control points begin
     place=1,  # INSIDE, CUT, OUTSIDE or UNPLACED
+    spine=1,  # where in the pool the SPINE is on which all of it lies; NONE
 )
 node_links_at = record_view(NODE_LINKS)
 LINKS = size_of(NODE_LINKS)

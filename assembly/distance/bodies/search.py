@@ -191,12 +191,10 @@ def pair_bound(search, i, j):
     way = (state.key_way[0], state.key_way[1], state.key_way[2])
     key = state.key
     bound = max(key, ball_bound(a, i, b, j, search.pose, search.errors.slack))
+    if bound < state.limit and links_of(a, i).spine != NONE and links_of(b, j).spine != NONE:
+        bound = max(bound, spine_bound(a, links_of(a, i).spine, b, links_of(b, j).spine, search.pose))
     if bound < state.limit and not (is_group(a, i) or is_group(b, j)):
-        patch_a, patch_b = patch_of(a, links_of(a, i).patch), patch_of(b, links_of(b, j).patch)
-        if patch_a.spine != NONE and patch_b.spine != NONE:
-            bound = max(bound, spine_bound(a, patch_a.spine, b, patch_b.spine, search.pose))
-        if bound < state.limit:
-            bound = bound_patches(search, i, j, bound)
+        bound = bound_patches(search, i, j, bound)
     tie = packed_way((state.key_way[0], state.key_way[1], state.key_way[2]))
     # The other pairs of the same two nodes begin as this one did.
     state.key = key

@@ -1,6 +1,6 @@
 """Lower bounds of the distance of elementary surfaces from their centers, axes and circles.
 
-Patches of spheres, cylinders, tori and planes lie on surfaces whose distance has a closed form where they share a
+Patches of spheres, cylinders, tori and planes, and lines and circles among boundary curves, lie on surfaces whose distance has a closed form where they share a
 center or an axis, or their axes are parallel. There the nearest points are not single ones, and bounds of parts of the
 patches come to no end; that of the whole surfaces is the distance itself.
 
