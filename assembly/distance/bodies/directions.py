@@ -91,7 +91,9 @@ def along_normals(pair, way):
     if size < long:
         p, q = unit_normal(pair, 0), unit_normal(pair, 2)
         if min(p[2], q[2]) > 0.3:
-            v0, v1, v2 = p[0] + q[0], p[1] + q[1], p[2] + q[2]
+            # On the side of the direction, unless the way there leads clearly to the other one.
+            sign = -1.0 if v2 < -0.5 * size else 1.0
+            v0, v1, v2 = sign * (p[0] + q[0]), sign * (p[1] + q[1]), sign * (p[2] + q[2])
     length = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
     if not length > 0.0:
         return size, 0.0, way
@@ -101,4 +103,4 @@ def along_normals(pair, way):
         v0 * f[1] + v1 * f[4] + v2 * f[7],
         v0 * f[2] + v1 * f[5] + v2 * f[8],
     )
-    return size, abs(v0) + abs(v1), own
+    return size, abs(v0) + abs(v1) + max(0.0, -v2), own

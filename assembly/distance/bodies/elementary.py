@@ -58,6 +58,8 @@ def spine_row(block: PatchBlock) -> Array | None:
     if found.kind == CYLINDER:
         center = center + 0.5 * float(along.min() + along.max()) * found.axis
         half = 0.5 * float(np.ptp(along)) + 16.0 * UNIT * size
+    if found.kind == PLANE:
+        half = float(np.linalg.norm(points - center, axis=1).max()) * (1.0 + 8.0 * UNIT)
     off = _off(block.nets, found, points) + 64.0 * UNIT * (size + float(np.abs(points).max()))
     # Not a number where the fit has no size.
     if not off <= _SAME * size + 256.0 * UNIT * float(np.abs(points).max()):

@@ -100,11 +100,11 @@ SPAN = size_of(PATCH_SPAN)
 SPINE = record_dtype(
     "f8",
     kind=1,
-    center=3,  # of a cylinder: the middle of its axis; of a plane: the point nearest to the origin [length]
+    center=3,  # of a cylinder: the middle of its axis; of a plane: that of its patches [length]
     axis=3,  # unit; of a plane its normal
     radius=1,  # of the sphere, the cylinder or the tube [length]
     major=1,  # radius of the circle of a torus [length]
-    half=1,  # half the length of a cylinder [length]
+    half=1,  # half the length of a cylinder; how far patches on a plane are from the center [length]
     off=1,  # how far the patch may be from it [length]
 )
 spine_at = record_view(SPINE)

@@ -90,6 +90,12 @@ def of_plane(s, plane):
 
 
 @kernel(inline=True)
+def of_planes(s, t):
+    """Two planes, of the second one what is within its half of the center."""
+    return abs(dot(s.axis, sub(t.center, s.center))) - t.half * norm(cross(s.axis, t.axis))
+
+
+@kernel(inline=True)
 def turned_parallel(s, t):
     """Where t is against s once it is turned about its center until their axes are parallel."""
     along, beside = offset_from(s, t.center)
@@ -122,7 +128,7 @@ def ordered_gap(s, t):
     if s.kind == SPHERE:
         return of_sphere(s, t)
     if t.kind == PLANE:
-        return of_plane(s, t) if s.kind != PLANE else 0.0
+        return of_plane(s, t) if s.kind != PLANE else of_planes(s, t)
     return of_torus(s, t) if t.kind == TORUS else of_cylinders(s, t)
 
 
