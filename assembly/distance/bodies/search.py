@@ -37,12 +37,12 @@ from assembly.distance.bodies.pair import (
     model_bound,
     pair_work_at,
 )
-from assembly.distance.bodies.records import ALL, MODEL, NONE, BodyTree, body_head_at
-from assembly.distance.bodies.spines import norm, spine_bound
+from assembly.distance.bodies.records import ALL, MODEL, NONE, BodyTree, body_head_at, spine_at
+from assembly.distance.bodies.spines import PLANE, norm, spine_bound, spine_of
 from assembly.distance.bodies.trims import nearest_is_elsewhere
 from assembly.distance.patches.pair import D, patch_work_at, vector_dot
 from assembly.geometry.splines.bezier_pieces import UNIT
-from assembly.geometry.vec import add, matvec, matvec_t, sub
+from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 
 # What a search ended with. CROWDED: the arrays are too small to go on.
@@ -120,6 +120,29 @@ def bound_by_ways(search, i, j, way):
         keep_way(search, bound_along(search, i, j, own), own)
 
 
+@kernel(inline=True)
+def bound_along_normal(search, i, j, n):
+    """The bound of the control points along the normal of a plane, on the side on which the middles are."""
+    pair, state = pair_work_at(search.pair, 0), body_search_at(search.state, 0)
+    a, b, pose = search.a, search.b, search.pose
+    between = sub(sub(node_of(a, i).middle, pose.shift), matvec(pose.turn, node_of(b, j).middle))
+    if dot(n, between) < 0.0:
+        n = neg(n)
+    load_frame(pair, pose.turn, n)
+    keep_way(search, hull_bound(pair, a, i, b, j, pose, search.errors.slack), n)
+
+
+@kernel(inner=True)
+def bound_by_planes(search, i, j):
+    """Lower bound of a pair of which one is plane: no way that leads from one point of it to another one need tell."""
+    a, b = search.a, search.b
+    at_a, at_b = links_of(a, i).spine, links_of(b, j).spine
+    if at_a != NONE and spine_at(a.pool, at_a).kind == PLANE:
+        bound_along_normal(search, i, j, spine_of(a.pool, at_a).axis)
+    if at_b != NONE and spine_at(b.pool, at_b).kind == PLANE:
+        bound_along_normal(search, i, j, matvec(search.pose.turn, spine_of(b.pool, at_b).axis))
+
+
 @kernel(inner=True)
 def prove_pair(search, i, j):
     """A bound by the only minimum of a pair, where it is proven to be that; -inf elsewhere. Its models are loaded.
@@ -167,7 +190,9 @@ def bound_patches(search, i, j, bound):
     describe_node(b, j, MODEL, room)
     way = (state.key_way[0], state.key_way[1], state.key_way[2])
     state.key = bound
-    bound_by_ways(search, i, j, way)
+    bound_by_planes(search, i, j)
+    if state.key < state.limit:
+        bound_by_ways(search, i, j, way)
     trimmed = is_trimmed(a, i) or is_trimmed(b, j)
     proves = (links_of(a, i).depth + links_of(b, j).depth) % _PROOF_EVERY == 0
     if state.key < state.limit and (proves or trimmed):
