@@ -1,4 +1,4 @@
-"""Directions and tensions in which a pair of nodes is bounded (`pair.py`).
+"""Directions in which a pair of nodes is bounded (`pair.py`).
 
 The direction is everything: near contact the way between two points of a long pair may be any, and its parts, which
 begin with their parent's direction, would get nowhere.
@@ -11,8 +11,6 @@ import math
 from assembly._kernel import kernel
 from assembly.distance.bodies.pair import flat_size
 
-# The tension is at most this part of the curvatures of the surfaces.
-STIFFNESS = 4.0
 # A direction is a place on an octahedron: two numbers of this many steps in one double.
 _STEPS = 2.0**25
 
@@ -38,20 +36,6 @@ def unpacked_way(number):
         x, y = math.copysign(1.0 - abs(y), x), math.copysign(1.0 - abs(x), y)
     s = 1.0 / math.sqrt(x * x + y * y + z * z)
     return (s * x, s * y, s * z)
-
-
-@kernel(inline=True)
-def tension_of(pair, upper):
-    """1 / (2 U), which curves Phi like the distance itself, or what outweighs the surfaces' own curvatures if less."""
-    most = 0.0
-    k = pair.k
-    for side in range(2):
-        u, v = flat_size(pair.j, 2 * side), flat_size(pair.j, 2 * side + 1)
-        o = 9 * side
-        most = max(most, abs(k[o + 2]) / (u * u + 1e-300))
-        most = max(most, abs(k[o + 5]) / (u * v + 1e-300))
-        most = max(most, abs(k[o + 8]) / (v * v + 1e-300))
-    return min(0.5 / max(upper * (1.0 + 1e-9), 1e-300), STIFFNESS * most)
 
 
 @kernel(inline=True)

@@ -19,7 +19,7 @@ from assembly.distance.bodies.pair import (
     flat_bend_sum,
     flat_dot,
     flat_size,
-    load_quadratic,
+    load_tense,
     pair_work_at,
     sweep,
 )
@@ -29,7 +29,7 @@ from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import dot
 
 # The part of the diagonal of the Hessian that is proven to be left.
-MARGIN = 0.05
+MARGIN = 1e-4
 _STEPS = 3
 _GROW = 1.0 + 1e-12
 
@@ -146,12 +146,12 @@ def has_one_minimum(pair):
 
 
 @kernel(inline=True)
-def may_have_one_minimum(pair, a, i, b, j, tension, doubt):
-    """`has_one_minimum` of a pair whose models are loaded; `doubt` of an evaluated slope."""
-    load_quadratic(pair, tension)
+def may_have_one_minimum(pair, a, i, b, j, upper, doubt):
+    """The tension with which a pair has one minimum, models loaded; -1 where none is known. `doubt` of a slope."""
+    tension = load_tense(pair, upper).tension
     load_change(pair, a, i, b, j, tension)
     hold_variables(pair, doubt)
-    return has_one_minimum(pair)
+    return tension if has_one_minimum(pair) else -1.0
 
 
 @kernel(inner=True)
@@ -189,13 +189,15 @@ def bound_by_tangent(search, tension):
 
 
 @kernel(inner=True)
-def proven_bound(search, i, j, tension):
+def proven_bound(search, i, j):
     """Lower bound of a pair by its only minimum, in the frame in hand; -inf where it is not proven to have just one.
 
     Its models are loaded; `pair.z` is where the search for the minimum begins.
     """
     pair, work, errors = pair_work_at(search.pair, 0), patch_work_at(search.w, 0), search.errors
-    if not may_have_one_minimum(pair, search.a, i, search.b, j, tension, errors.slope):
+    upper = body_search_at(search.state, 0).upper
+    tension = may_have_one_minimum(pair, search.a, i, search.b, j, upper, errors.slope)
+    if tension < 0.0:
         return -math.inf
     bound = -math.inf
     away = node_of(search.a, i).away + node_of(search.b, j).away

@@ -50,6 +50,10 @@ PAIR_WORK = record_dtype(
     alone=2,  # 1: the node of a, of b is a curve, and has no second parameter
     way=3,  # unit: the direction in which the pair is to be bounded, then the best one
 )
+# A tension, the value of the quadratic with it, and whether that is convex.
+Tense = namedtuple("Tense", "tension value convex")
+# The tension is at most these parts of the curvatures of the surfaces.
+STIFFNESS, STIFFER = 4.0, 64.0
 pair_work_at = record_view(PAIR_WORK)
 PAIR_DOUBLES = size_of(PAIR_WORK)
 _SWEEPS = 6
@@ -198,6 +202,41 @@ def is_definite(pair):
 
 
 @kernel(inline=True)
+def tension_at_most(pair, upper, stiffness):
+    """1 / (2 U), which curves Phi like the distance itself, or a multiple of the surfaces' own curvatures if less."""
+    most = 0.0
+    k = pair.k
+    for side in range(2):
+        u, v = flat_size(pair.j, 2 * side), flat_size(pair.j, 2 * side + 1)
+        o = 9 * side
+        most = max(most, abs(k[o + 2]) / (u * u + 1e-300))
+        most = max(most, abs(k[o + 5]) / (u * v + 1e-300))
+        most = max(most, abs(k[o + 8]) / (v * v + 1e-300))
+    return min(0.5 / max(upper * (1.0 + 1e-9), 1e-300), stiffness * most)
+
+
+@kernel(inline=True)
+def load_tense(pair, upper):
+    """Load the quadratic with a tension that outweighs the curvatures; more of it where that makes it convex.
+
+    A surface that lies in another one of nearly its own curvature needs as many times the curvature as this is larger
+    than the difference.
+    """
+    tension = tension_at_most(pair, upper, STIFFNESS)
+    value = load_quadratic(pair, tension)
+    convex = is_definite(pair)
+    if not convex:
+        more = tension_at_most(pair, upper, STIFFER)
+        if more > tension:
+            raised = load_quadratic(pair, more)
+            convex = is_definite(pair)
+            if convex:
+                return Tense(more, raised, convex)
+            value = load_quadratic(pair, tension)
+    return Tense(tension, value, convex)
+
+
+@kernel(inline=True)
 def sweep(pair, raised):
     """From z towards the least of g.z + z'(H + raised) z / 2 on the box, one variable after the other."""
     h, g, z = pair.hessian, pair.gradient, pair.z
@@ -229,18 +268,18 @@ def indefinite_part(pair, tension):
 
 
 @kernel(inline=True)
-def least_of_quadratic(pair, value, tension):
+def least_of_quadratic(pair, tense):
     """A lower bound of the quadratic on the box, near its least value; `pair.z` is near the place.
 
     Where H is not positive definite, a raise s that makes it so is added to its diagonal and s |z|^2 / 2 subtracted
     again. A convex function is nowhere below its tangent plane, so that of any place will do.
     """
     h, g, z = pair.hessian, pair.gradient, pair.z
-    raised = 0.0 if is_definite(pair) else indefinite_part(pair, tension)
+    raised = 0.0 if tense.convex else indefinite_part(pair, tense.tension)
     for i in range(4):
         z[i] = 0.0
     sweep(pair, raised)
-    least = value
+    least = tense.value
     for i in range(4):
         bent = raised * z[i]
         for m in range(4):
@@ -266,10 +305,10 @@ def doubt_of_points(a, i, b, j):
 
 
 @kernel(inline=True)
-def model_bound(pair, a, i, b, j, tension, slack):
+def model_bound(pair, a, i, b, j, upper, slack):
     """Lower bound of |D| on a pair by the quadratic below Phi; needs `load_models`."""
-    value = load_quadratic(pair, tension)
-    least = least_of_quadratic(pair, value, tension)
+    tense = load_tense(pair, upper)
+    least, tension = least_of_quadratic(pair, tense), tense.tension
     d, jacobian, k = pair.d, pair.j, pair.k
     e0 = doubt_of_points(a, i, b, j)
     rest = e0

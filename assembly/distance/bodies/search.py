@@ -24,7 +24,7 @@ from assembly.distance.bodies.descent import (
     place_on_patches,
     take_points,
 )
-from assembly.distance.bodies.directions import along_normals, packed_way, tension_of, unpacked_way
+from assembly.distance.bodies.directions import along_normals, packed_way, unpacked_way
 from assembly.distance.bodies.models import describe_node
 from assembly.distance.bodies.nodes import halves_of, has_room, is_group, links_of, node_of, node_size, patch_of
 from assembly.distance.bodies.one_minimum import may_have_one_minimum, proven_bound
@@ -82,7 +82,7 @@ def bound_along(search, i, j, n):
     bound = hull_bound(pair, a, i, b, j, pose, slack)
     if bound < state.limit:
         load_models(pair, a, i, b, j, pose)
-        bound = max(bound, model_bound(pair, a, i, b, j, tension_of(pair, state.upper), slack))
+        bound = max(bound, model_bound(pair, a, i, b, j, state.upper, slack))
     return bound
 
 
@@ -156,7 +156,7 @@ def prove_pair(search, i, j):
         patch_work_at(search.w, 0),
     )
     a, b = search.a, search.b
-    bound = proven_bound(search, i, j, tension_of(pair, state.upper))
+    bound = proven_bound(search, i, j)
     if bound == -math.inf or bound >= state.limit:
         return bound
     far = descend(search, i, j)
@@ -173,7 +173,7 @@ def prove_pair(search, i, j):
         load_places(search, patch_of(a, patch_a).node, patch_of(b, patch_b).node)
         take_points(search, patch_a, patch_b, math.sqrt(vector_dot(search.w, D, D)))
     pair.z[0], pair.z[1], pair.z[2], pair.z[3] = z
-    return max(bound, proven_bound(search, i, j, tension_of(pair, state.upper)))
+    return max(bound, proven_bound(search, i, j))
 
 
 @kernel(inline=True)
@@ -202,7 +202,7 @@ def bound_patches(search, i, j, bound):
         load_models(pair, a, i, b, j, search.pose)
         if trimmed and nearest_is_elsewhere(pair, a, i, b, j, errors.slack):
             state.key = math.inf
-        elif proves and may_have_one_minimum(pair, a, i, b, j, tension_of(pair, state.upper), errors.slope):
+        elif proves and may_have_one_minimum(pair, a, i, b, j, state.upper, errors.slope) >= 0.0:
             # The question is in line: most pairs fail it, and a call costs more.
             state.key = max(state.key, prove_pair(search, i, j))
     return state.key
