@@ -29,7 +29,7 @@ from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import dot
 
 # The part of the diagonal of the Hessian that is proven to be left.
-MARGIN = 1e-4
+MARGIN = 2e-3
 _STEPS = 3
 _GROW = 1.0 + 1e-12
 
