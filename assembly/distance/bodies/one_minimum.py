@@ -2,9 +2,9 @@
 
 V bounds how much the Hessian of Phi changes on the pair. A variable whose slope keeps its sign is least at an end of its
 own, whatever the others are. In the others the Hessian, scaled to a diagonal of ones, less the largest row sum of V and
-MARGIN, is positive definite. Then from any place x
+a margin m, is positive definite. Then from any place x
 
-    Phi >= Phi(x) + sum of the least g_i d + MARGIN H_ii d^2 / 2.
+    Phi >= Phi(x) + sum of the least g_i d + m H_ii d^2 / 2.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly.distance.bodies.descent import body_search_at, load_places
-from assembly.distance.bodies.nodes import node_of
+from assembly.distance.bodies.nodes import links_of, node_of
 from assembly.distance.bodies.pair import (
     doubt_of_points,
     flat_bend_sum,
@@ -28,8 +28,9 @@ from assembly.distance.patches.pair import patch_work_at
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import dot
 
-# The part of the diagonal of the Hessian that is proven to be left.
-MARGIN = 2e-3
+# The margin: where it is small, more pairs have one minimum, and fewer of these are let go for it. After so many
+# halvings of both nodes surfaces nearly fit into each other, and a small one is all there is.
+_MARGIN, _LEAST_MARGIN, _HALVINGS = 0.05, 1e-4, 27
 _STEPS = 3
 _GROW = 1.0 + 1e-12
 
@@ -126,7 +127,7 @@ def left_of_hessian(pair, rho):
 
 @kernel(inline=True)
 def has_one_minimum(pair):
-    """Whether Phi is proven convex in the variables that are not held, with MARGIN diag(H) left of its Hessian."""
+    """Whether Phi is proven convex in the variables that are not held, with the margin left of its Hessian."""
     h = pair.hessian
     rho = 0.0
     for i in range(4):
@@ -141,13 +142,15 @@ def has_one_minimum(pair):
                     return False
                 row += pair.change[4 * i + m] / math.sqrt(h[5 * i] * h[5 * m])
         rho = max(rho, row)
-    rho = rho * _GROW + MARGIN * (1.0 + 1e-6)
+    rho = rho * _GROW + pair.margin * (1.0 + 1e-6)
     return rho < 1.0 and left_of_hessian(pair, rho)
 
 
 @kernel(inline=True)
 def may_have_one_minimum(pair, a, i, b, j, upper, doubt):
     """The tension with which a pair has one minimum, models loaded; -1 where none is known. `doubt` of a slope."""
+    halvings = links_of(a, i).depth + links_of(b, j).depth
+    pair.margin = _MARGIN if halvings < _HALVINGS else _LEAST_MARGIN
     tension = load_tense(pair, upper).tension
     load_change(pair, a, i, b, j, tension)
     hold_variables(pair, doubt)
@@ -158,7 +161,7 @@ def may_have_one_minimum(pair, a, i, b, j, upper, doubt):
 def bound_by_tangent(search, tension):
     """Lower bound of Phi on a pair that has one minimum, from the places in hand, which are on it.
 
-    Phi is computed there; what it may still fall its slope and MARGIN diag(H) tell. Leaves in the pair the linear part
+    Phi is computed there; what it may still fall its slope and the margin tell. Leaves in the pair the linear part
     of a quadratic whose least place is nearer to the minimum.
     """
     pair, work, errors = pair_work_at(search.pair, 0), patch_work_at(search.w, 0), search.errors
@@ -181,7 +184,7 @@ def bound_by_tangent(search, tension):
             pair.gradient[i] -= pair.hessian[4 * i + m] * (work.place[m] - 0.5)
         pair.z[i] = x - 0.5
         if pair.held[i] == 0.0:
-            least += least_change(slope, doubt, MARGIN * pair.hessian[5 * i], x, 1.0 - x) * _GROW
+            least += least_change(slope, doubt, pair.margin * pair.hessian[5 * i], x, 1.0 - x) * _GROW
         elif x != (0.0 if pair.held[i] < 0.0 else 1.0):
             # Monotone in this variable: least at an end, which must be where the place is.
             return -math.inf

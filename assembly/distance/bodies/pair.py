@@ -48,7 +48,7 @@ PAIR_WORK = record_dtype(
     change=16,  # how much the Hessian may change on the pair
     held=4,  # -1 and 1: least at the low or the high end, whatever the others are
     alone=2,  # 1: the node of a, of b is a curve, and has no second parameter
-    way=3,  # unit: the direction in which the pair is to be bounded, then the best one
+    margin=1,  # the part of the diagonal of the Hessian that a proof of one minimum leaves
 )
 # A tension, the value of the quadratic with it, and whether that is convex.
 Tense = namedtuple("Tense", "tension value convex")
