@@ -49,9 +49,8 @@ def boundary_patches(face: Face, patches: PatchBlock) -> Iterator[PatchBlock]:
         for begin, end, points in _halves(part, place, net, _HALVINGS):
             t = low + (high - low) * begin, low + (high - low) * end
             spans = np.array([[*t, 0.0, 1.0]])
-            yield PatchBlock(
-                points.net[None, :, None], spans, patches.face, number, False, patches.error + points.error
-            )
+            error = patches.error + points.error
+            yield PatchBlock(points.net[None, :, None], spans, patches.face, number, face.sign, False, error)
 
 
 def _parts(face: Face) -> Iterator[tuple[int, float, float, Array]]:

@@ -47,6 +47,7 @@ BODY_SEARCH = record_dtype(
     places=4,  # where these are in the unit squares of the patches
     points=6,  # these, seen from a's center, in a's axes
     world=6,  # these in world axes
+    facing=2,  # cosine of the way to the other point and the outward normal, of a and of b; 0 on a boundary curve
     boxed=2,  # 1: the nearest point of b is in the box of a; that of a in the box of b
     way=3,  # unit vector from the one of b to the one of a
     pairs=1,  # pairs of nodes that were looked at

@@ -146,7 +146,7 @@ def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int) -> tupl
         first = part.stop
         rows.degree_u[part], rows.degree_v[part] = block.degree
         rows.tables_u[part], rows.tables_v[part] = at[block.degree[0]], at[block.degree[1]]
-        rows.face[part], rows.curve[part] = block.face, block.curve
+        rows.face[part], rows.curve[part], rows.sign[part] = block.face, block.curve, block.sign
         rows.trim[part] = rows.spine[part] = NONE
         if (spine := spine_row(block)) is not None:
             rows.spine[part] = pool_at

@@ -29,6 +29,8 @@ class PatchBlock:
     face : int
     curve : int
         NONE: patches of the face.
+    sign : int
+        1, or -1 where the outward normal is -Su x Sv.
     trimmed : bool
         Whether parts of the patches may be outside of the face.
     error : float
@@ -39,6 +41,7 @@ class PatchBlock:
     spans: Array
     face: int
     curve: int
+    sign: int
     trimmed: bool
     error: float
 
@@ -87,4 +90,4 @@ def patches_of(face: Face, number: int, center: Array, reach: float) -> PatchBlo
     spans[..., 2], spans[..., 3] = at_v[:-1], at_v[1:]
     size = float(np.abs(center).max()) + reach
     error = (2.0 if rational else 1.0) * 16.0 * (m + n + 2) * UNIT * size
-    return PatchBlock(nets, spans.reshape(-1, 4), number, NONE, is_trimmed(face), error)
+    return PatchBlock(nets, spans.reshape(-1, 4), number, NONE, face.sign, is_trimmed(face), error)

@@ -8,20 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._heap import PAIR
-from assembly._record import size_of
-from assembly.distance.bodies.descent import BODY_SEARCH, body_search_at
+from assembly._record import place_of, size_of
+from assembly.distance.bodies.descent import BODY_SEARCH
 from assembly.distance.bodies.models import RESIDUAL
 from assembly.distance.bodies.packing import KeptTree
 from assembly.distance.bodies.pair import PAIR_DOUBLES
-from assembly.distance.bodies.records import PATCH, patch_at, patch_span_at
+from assembly.distance.bodies.records import PATCH_SIZE, patch_at, patch_span_at
 from assembly.distance.bodies.search import CROWDED, search_bodies
 from assembly.distance.patches.pair import BASIS
 
 __all__ = ["Nearest", "Place", "bodies_apart"]
 
 Array = NDArray[np.float64]
-_SEARCH = size_of(BODY_SEARCH)
-_PATCH = size_of(PATCH)
+SEARCH = size_of(BODY_SEARCH)
+_LOWER, _UPPER, _PAIRS = (place_of(BODY_SEARCH, name) for name in ("lower", "upper", "pairs"))
+_PATCHES, _PLACES, _WORLD = (place_of(BODY_SEARCH, name) for name in ("patches", "places", "world"))
+_FACING, _BOXED = place_of(BODY_SEARCH, "facing"), place_of(BODY_SEARCH, "boxed")
 # Pairs for which a heap has room at first.
 _WAITING = 1024
 
@@ -35,54 +37,68 @@ class Place:
     parameters: tuple[float, float]
 
 
-@dataclass(frozen=True, eq=False)
 class Nearest:
-    """What a search found: bounds, the nearest points known (2, 3) in world axes, where they are, pairs looked at.
+    """What a search found.
 
-    `status` is CONVERGED or SPENT (`search.py`). `boxed`: whether the point of b is in the box of a, that of a in the
-    box of b.
+    Attributes
+    ----------
+    status : int
+        CONVERGED or SPENT (`search.py`).
+    lower, upper : float
+        Bounds of the distance.
+    pairs : int
+        Pairs of nodes that were looked at.
+    points : (2, 3)
+        The nearest points known, world axes.
     """
 
-    lower: float
-    upper: float
-    points: Array
-    places: tuple[Place, Place]
-    boxed: tuple[bool, bool]
-    pairs: int
-    status: int
+    __slots__ = ("_state", "_trees", "lower", "pairs", "points", "status", "upper")
+
+    def __init__(self, trees: tuple[KeptTree, KeptTree], state: Array, status: int) -> None:
+        self._trees, self._state, self.status = trees, state, status
+        row = state.tolist()
+        self.lower: float = row[_LOWER]
+        self.upper: float = row[_UPPER]
+        self.pairs = int(row[_PAIRS])
+        self.points: Array = state[_WORLD : _WORLD + 6].reshape(2, 3)
+
+    def facing(self, side: int) -> float:
+        """Cosine of the outward normal at the point of a side and the way to the other one; 0 on a boundary curve."""
+        return float(self._state[_FACING + side])
+
+    def is_boxed(self, side: int) -> bool:
+        """Whether the box of the body of a side has the point of the other one."""
+        return bool(self._state[_BOXED + side])
+
+    def place(self, side: int) -> Place:
+        """Where the point of a side is on its body."""
+        table, pool = self._trees[side].arrays[:2]
+        patch = patch_at(table, PATCH_SIZE * int(self._state[_PATCHES + side]))
+        span = patch_span_at(pool, patch.span)
+        x, y = self._state[_PLACES + 2 * side : _PLACES + 2 * side + 2].tolist()
+        u = _between(float(span.low_u), float(span.high_u), x)
+        v = _between(float(span.low_v), float(span.high_v), y) if patch.curve < 0 else 0.0
+        return Place(int(patch.face), int(patch.curve), (u, v))
 
 
 def bodies_apart(a: KeptTree, b: KeptTree, q: Array, tolerance: float, budget: int) -> Nearest:
     """Bounds of the distance of two bodies at poses q (2, 7)."""
     degree = max(a.degree, b.degree)
-    state = np.empty(_SEARCH)
-    work = (state, np.empty(PAIR_DOUBLES), np.zeros(BASIS + 6 * (degree + 1)), np.empty(RESIDUAL + 4 * (degree + 3) ** 2))
+    state = np.empty(SEARCH)
+    w, room = np.zeros(BASIS + 6 * (degree + 1)), np.empty(RESIDUAL + 4 * (degree + 3) ** 2)
+    work, asked = (state, np.empty(PAIR_DOUBLES), w, room), (tolerance, float(budget))
     heap = np.empty(_WAITING * PAIR)
     first, second = (a, b) if id(a) <= id(b) else (b, a)
     with first.lock, second.lock:
-        status, left = search_bodies(a.arrays, b.arrays, q, (tolerance, float(budget)), heap, work, -1)
+        status, left = search_bodies(a.arrays, b.arrays, q, asked, heap, work, -1)
         while status == CROWDED:
             a.grow()
             if b is not a:
                 b.grow()
             if (left + 1) * PAIR > heap.size:
                 heap = np.concatenate([heap, np.empty(heap.size)])
-            status, left = search_bodies(a.arrays, b.arrays, q, (tolerance, float(budget)), heap, work, left)
-    found = body_search_at(state, 0)
-    places = _place(a, int(found.patches[0]), found.places[:2]), _place(b, int(found.patches[1]), found.places[2:])
-    points = found.world.reshape(2, 3)
-    boxed = bool(found.boxed[0]), bool(found.boxed[1])
-    return Nearest(float(found.lower), float(found.upper), points, places, boxed, int(found.pairs), int(status))
-
-
-def _place(tree: KeptTree, number: int, x: Array) -> Place:
-    """A place in the unit square of a patch as one of its face."""
-    table, pool = tree.arrays[:2]
-    patch = patch_at(table, _PATCH * number)
-    span = patch_span_at(pool, patch.span)
-    u = _between(float(span.low_u), float(span.high_u), float(x[0]))
-    v = _between(float(span.low_v), float(span.high_v), float(x[1])) if patch.curve < 0 else 0.0
-    return Place(int(patch.face), int(patch.curve), (u, v))
+            status, left = search_bodies(a.arrays, b.arrays, q, asked, heap, work, left)
+    return Nearest((a, b), state, int(status))
 
 
 def _between(low: float, high: float, x: float) -> float:

@@ -42,7 +42,7 @@ from assembly.distance.bodies.spines import PLANE, norm, spine_bound, spine_of
 from assembly.distance.bodies.trims import nearest_is_elsewhere
 from assembly.distance.patches.pair import D, patch_work_at, vector_dot
 from assembly.geometry.splines.bezier_pieces import UNIT
-from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, sub
+from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, neg, sub
 from assembly.kinematics.motion import position, relative_pose, rotation
 
 # What a search ended with. CROWDED: the arrays are too small to go on.
@@ -339,6 +339,33 @@ def is_in_box(head, point):
 
 
 @kernel(inline=True)
+def cosine_to_normal(patch, way, j, at):
+    """Cosine of a unit vector and the outward normal of a patch, whose derivatives are rows `at` and `at` + 1 of J."""
+    if patch.curve != NONE:
+        return 0.0
+    o = 3 * at
+    normal = cross((j[o], j[o + 1], j[o + 2]), (j[o + 3], j[o + 4], j[o + 5]))
+    size = norm(normal)
+    return patch.sign * dot(way, normal) / size if size > 0.0 else 0.0
+
+
+@kernel(inner=True)
+def write_facing(search):
+    """How the nearest points known face each other."""
+    state, work = body_search_at(search.state, 0), patch_work_at(search.w, 0)
+    patch_a, patch_b = patch_of(search.a, int(state.patches[0])), patch_of(search.b, int(state.patches[1]))
+    for i in range(4):
+        work.place[i] = state.places[i]
+    load_places(search, patch_a.node, patch_b.node)
+    state.facing[0] = state.facing[1] = 0.0
+    far = math.sqrt(vector_dot(search.w, D, D))
+    if far > 0.0:
+        way = (work.d[0] / far, work.d[1] / far, work.d[2] / far)
+        state.facing[0] = cosine_to_normal(patch_a, neg(way), work.j, 0)
+        state.facing[1] = cosine_to_normal(patch_b, way, work.j, 2)
+
+
+@kernel(inline=True)
 def write_points(search, q):
     """The nearest points known in world axes, and which of them are in the box of the other body."""
     state, center = body_search_at(search.state, 0), body_head_at(search.a.pool, 0).center
@@ -388,4 +415,5 @@ def search_bodies(a, b, q, asked, heap, work, left):
         left, pairs = 0, Pairs(0, 1, 0, 1)
     status, left = advance(search, left, pairs)
     write_points(search, q)
+    write_facing(search)
     return status, left

@@ -10,19 +10,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import ReadOnlyArrays
-from assembly.distance.bodies.query import Nearest, Place, bodies_apart
+from assembly.distance.bodies.query import Nearest, bodies_apart
 from assembly.distance.bodies.search import SPENT
 from assembly.errors import InputError, integer, positive
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.features.features import Feature, Shape, faces_of, pose_of
-from assembly.proximity.features.places import body_tree, feature_at, is_behind, shells_of
+from assembly.proximity.features.places import body_tree, feature_at, is_behind, is_closed, shells_of
 
 __all__ = ["BodyDistance", "DistanceStatus", "distance"]
 
 Array = NDArray[np.float64]
 Faces = tuple[Face, ...]
 _BUDGET = 200_000
+# A cosine beyond which the way between nearest points is along a normal, so that the point is within a face.
+_ALONG = 1.0 - 1e-9
 
 
 class DistanceStatus(Enum):
@@ -55,7 +57,7 @@ class BodyDistance(ReadOnlyArrays):
     points: Array
     status: DistanceStatus
     evaluations: int
-    _found: tuple[tuple[Faces, Faces], tuple[Place, Place], Array] = field(repr=False)
+    _found: tuple[tuple[Faces, Faces], Nearest, Array] = field(repr=False)
 
     @property
     def converged(self) -> bool:
@@ -65,9 +67,10 @@ class BodyDistance(ReadOnlyArrays):
     @cached_property
     def features(self) -> tuple[Feature, Feature]:
         """The faces, edges or vertices on which the points are."""
-        faces, places, q = self._found
+        faces, found, q = self._found
         first, second = (
-            feature_at(faces[k], places[k], rotation_matrix(q[k, 3:]).T @ (self.points[k] - q[k, :3])) for k in range(2)
+            feature_at(faces[k], found.place(k), rotation_matrix(q[k, 3:]).T @ (self.points[k] - q[k, :3]))
+            for k in range(2)
         )
         return first, second
 
@@ -118,7 +121,7 @@ def distance(
     status = _status(found, tolerance)
     if status is DistanceStatus.CONVERGED and found.lower > 0.0 and _is_enclosed(faces, q, found, tolerance):
         status = DistanceStatus.ENCLOSED
-    return BodyDistance(found.lower, found.upper, found.points, status, found.pairs, (faces, found.places, q))
+    return BodyDistance(found.lower, found.upper, found.points, status, found.pairs, (faces, found, q))
 
 
 def _status(found: Nearest, tolerance: float) -> DistanceStatus:
@@ -130,25 +133,30 @@ def _status(found: Nearest, tolerance: float) -> DistanceStatus:
 def _is_enclosed(faces: tuple[Faces, Faces], q: Array, found: Nearest, tolerance: float) -> bool:
     """Whether one of two bodies whose surfaces are apart lies wholly inside the other one."""
     for outer in range(2):
-        inner = 1 - outer
-        if not found.boxed[outer] or not _holds(faces[outer], q[outer], found, outer):
+        if not found.is_boxed(outer) or not _holds(faces[outer], q[outer], found, outer):
             continue
-        shells = shells_of(faces[inner])
-        if len(shells) == 1:
-            return True
-        trees = body_tree(faces[outer])
-        others = (bodies_apart(trees, body_tree(shell), q[[outer, inner]], tolerance, _BUDGET) for shell in shells)
-        if all(
-            other.boxed[0] and other.upper - other.lower <= tolerance and _holds(faces[outer], q[outer], other, 0)
-            for other in others
-        ):
+        shells = shells_of(faces[1 - outer])
+        if len(shells) == 1 or _holds_all(faces[outer], shells, q[[outer, 1 - outer]], tolerance):
             return True
     return False
 
 
+def _holds_all(outer: Faces, shells: tuple[Faces, ...], q: Array, tolerance: float) -> bool:
+    """Whether a body has all shells of another one inside."""
+    for shell in shells:
+        found = bodies_apart(body_tree(outer), body_tree(shell), q, tolerance, _BUDGET)
+        if found.upper - found.lower > tolerance or not found.is_boxed(0) or not _holds(outer, q[0], found, 0):
+            return False
+    return True
+
+
 def _holds(faces: Faces, q: Array, found: Nearest, side: int) -> bool:
     """Whether the body on a side of nearest points has the other one's inside."""
+    if not is_closed(faces):
+        return False
+    if abs(found.facing(side)) > _ALONG:
+        return found.facing(side) < 0.0
     turn = rotation_matrix(q[3:])
     here, there = (turn.T @ (found.points[k] - q[:3]) for k in (side, 1 - side))
     way = there - here
-    return is_behind(faces, found.places[side], here, way / float(np.linalg.norm(way)))
+    return is_behind(faces, found.place(side), here, way / float(np.linalg.norm(way)))

@@ -16,7 +16,7 @@ from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.topology import Edge, Topology
 from assembly.proximity.features.features import Feature, features_of
 
-__all__ = ["body_faces", "body_tree", "feature_at", "is_behind", "shells_of"]
+__all__ = ["body_faces", "body_tree", "feature_at", "is_behind", "is_closed", "shells_of"]
 
 Array = NDArray[np.float64]
 Faces = tuple[Face, ...]
@@ -34,6 +34,12 @@ def body_faces(faces: Faces) -> Faces:
 def body_tree(faces: Faces) -> KeptTree:
     """The tree of a body."""
     return tree_of(body_faces(faces))
+
+
+@lru_cache(maxsize=256)
+def is_closed(faces: Faces) -> bool:
+    """Whether a body bounds a region."""
+    return solid_of(faces).is_closed
 
 
 @lru_cache(maxsize=256)
@@ -129,11 +135,9 @@ def _normals(faces: Faces, place: Place, feature: Feature) -> list[Array]:
 
 
 def is_behind(faces: Faces, place: Place, point: Array, way: Array) -> bool:
-    """Whether a closed body has another point inside whose nearest point of it is here; `way` leads to that one.
+    """Whether a closed body has a point inside whose nearest point of it is here; `way` leads to that one.
 
     Of the faces that meet in an edge or a vertex, that one tells whose normal is nearest to being along the way.
     """
-    if not solid_of(faces).is_closed:
-        return False
     off = [float(normal @ way) for normal in _normals(faces, place, feature_at(faces, place, point))]
     return bool(off) and max(off, key=abs) < 0.0

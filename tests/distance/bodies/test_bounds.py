@@ -24,7 +24,7 @@ TIGHT = 1e-14
 
 def searched(a, b, q, budget):
     """The search after a budget: what it keeps, and the pairs that wait."""
-    state, heap = np.empty(query._SEARCH), np.empty(PAIR * 100_000)
+    state, heap = np.empty(query.SEARCH), np.empty(PAIR * 100_000)
     work = (state, np.empty(query.PAIR_DOUBLES), np.zeros(500), np.empty(5000))
     while True:
         status, left = search_bodies(a.arrays, b.arrays, q, (1e-10, float(budget)), heap, work, -1)
