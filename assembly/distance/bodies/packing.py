@@ -141,6 +141,7 @@ def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int) -> tupl
     rows = rows_of(PATCH, table)
     more: list[Ints] = []
     table_at, first = table.size, 0
+    spine_of_face: dict[int, int] = {}
     for block in blocks:
         part = slice(first, first + len(block.nets))
         first = part.stop
@@ -152,6 +153,11 @@ def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int) -> tupl
             rows.spine[part] = pool_at
             parts.append(spine)
             pool_at += spine.size
+            if block.curve == NONE:
+                spine_of_face[block.face] = int(rows.spine[part.start])
+        elif block.curve != NONE:
+            # The curve lies on what its face is.
+            rows.spine[part] = spine_of_face.get(block.face, NONE)
         if block.trimmed:
             rows.trim[part] = table_at
             trim_table, trim_pool = faces[block.face].packed_trim(table_at, pool_at)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from assembly.distance.bodies.records import PATCH_SIZE, patch_at, patch_span_at
 from assembly.distance.bodies.search import CROWDED, search_bodies
 from assembly.distance.patches.pair import BASIS
 
-__all__ = ["Nearest", "Place", "bodies_apart"]
+__all__ = ["Nearest", "Place", "Spot", "bodies_apart", "place_of_spot"]
 
 Array = NDArray[np.float64]
 SEARCH = size_of(BODY_SEARCH)
@@ -37,6 +38,14 @@ class Place:
     parameters: tuple[float, float]
 
 
+class Spot(NamedTuple):
+    """A point of a body: on its patch of this number, at x and y from 0 to 1."""
+
+    patch: int
+    x: float
+    y: float
+
+
 class Nearest:
     """What a search found.
 
@@ -52,11 +61,11 @@ class Nearest:
         The nearest points known, world axes.
     """
 
-    __slots__ = ("_state", "_trees", "lower", "pairs", "points", "status", "upper")
+    __slots__ = ("_row", "lower", "pairs", "points", "status", "upper")
 
-    def __init__(self, trees: tuple[KeptTree, KeptTree], state: Array, status: int) -> None:
-        self._trees, self._state, self.status = trees, state, status
-        row = state.tolist()
+    def __init__(self, state: Array, status: int) -> None:
+        self.status = status
+        self._row = row = state.tolist()
         self.lower: float = row[_LOWER]
         self.upper: float = row[_UPPER]
         self.pairs = int(row[_PAIRS])
@@ -64,21 +73,26 @@ class Nearest:
 
     def facing(self, side: int) -> float:
         """Cosine of the outward normal at the point of a side and the way to the other one; 0 on a boundary curve."""
-        return float(self._state[_FACING + side])
+        return float(self._row[_FACING + side])
 
     def is_boxed(self, side: int) -> bool:
         """Whether the box of the body of a side has the point of the other one."""
-        return bool(self._state[_BOXED + side])
+        return bool(self._row[_BOXED + side])
 
-    def place(self, side: int) -> Place:
+    def spot(self, side: int) -> Spot:
         """Where the point of a side is on its body."""
-        table, pool = self._trees[side].arrays[:2]
-        patch = patch_at(table, PATCH_SIZE * int(self._state[_PATCHES + side]))
-        span = patch_span_at(pool, patch.span)
-        x, y = self._state[_PLACES + 2 * side : _PLACES + 2 * side + 2].tolist()
-        u = _between(float(span.low_u), float(span.high_u), x)
-        v = _between(float(span.low_v), float(span.high_v), y) if patch.curve < 0 else 0.0
-        return Place(int(patch.face), int(patch.curve), (u, v))
+        x, y = self._row[_PLACES + 2 * side : _PLACES + 2 * side + 2]
+        return Spot(int(self._row[_PATCHES + side]), x, y)
+
+
+def place_of_spot(tree: KeptTree, spot: Spot) -> Place:
+    """The face or the boundary curve on which a point of a body is."""
+    table, pool = tree.arrays[:2]
+    patch = patch_at(table, PATCH_SIZE * spot.patch)
+    span = patch_span_at(pool, patch.span)
+    u = _between(float(span.low_u), float(span.high_u), spot.x)
+    v = _between(float(span.low_v), float(span.high_v), spot.y) if patch.curve < 0 else 0.0
+    return Place(int(patch.face), int(patch.curve), (u, v))
 
 
 def bodies_apart(a: KeptTree, b: KeptTree, q: Array, tolerance: float, budget: int) -> Nearest:
@@ -98,7 +112,7 @@ def bodies_apart(a: KeptTree, b: KeptTree, q: Array, tolerance: float, budget: i
             if (left + 1) * PAIR > heap.size:
                 heap = np.concatenate([heap, np.empty(heap.size)])
             status, left = search_bodies(a.arrays, b.arrays, q, asked, heap, work, left)
-    return Nearest((a, b), state, int(status))
+    return Nearest(state, int(status))
 
 
 def _between(low: float, high: float, x: float) -> float:

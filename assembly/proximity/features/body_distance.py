@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import ReadOnlyArrays
-from assembly.distance.bodies.query import Nearest, bodies_apart
+from assembly.distance.bodies.query import Nearest, Spot, bodies_apart
 from assembly.distance.bodies.search import SPENT
 from assembly.errors import InputError, integer, positive
 from assembly.geometry.faces.face import Face
@@ -57,7 +57,7 @@ class BodyDistance(ReadOnlyArrays):
     points: Array
     status: DistanceStatus
     evaluations: int
-    _found: tuple[tuple[Faces, Faces], Nearest, Array] = field(repr=False)
+    _where: tuple[tuple[Faces, Faces], tuple[Spot, Spot], Array] = field(repr=False)
 
     @property
     def converged(self) -> bool:
@@ -67,10 +67,9 @@ class BodyDistance(ReadOnlyArrays):
     @cached_property
     def features(self) -> tuple[Feature, Feature]:
         """The faces, edges or vertices on which the points are."""
-        faces, found, q = self._found
+        faces, spots, q = self._where
         first, second = (
-            feature_at(faces[k], found.place(k), rotation_matrix(q[k, 3:]).T @ (self.points[k] - q[k, :3]))
-            for k in range(2)
+            feature_at(faces[k], spots[k], rotation_matrix(q[k, 3:]).T @ (self.points[k] - q[k, :3])) for k in range(2)
         )
         return first, second
 
@@ -121,7 +120,8 @@ def distance(
     status = _status(found, tolerance)
     if status is DistanceStatus.CONVERGED and found.lower > 0.0 and _is_enclosed(faces, q, found, tolerance):
         status = DistanceStatus.ENCLOSED
-    return BodyDistance(found.lower, found.upper, found.points, status, found.pairs, (faces, found, q))
+    where = faces, (found.spot(0), found.spot(1)), q
+    return BodyDistance(found.lower, found.upper, found.points, status, found.pairs, where)
 
 
 def _status(found: Nearest, tolerance: float) -> DistanceStatus:
@@ -159,4 +159,4 @@ def _holds(faces: Faces, q: Array, found: Nearest, side: int) -> bool:
     turn = rotation_matrix(q[3:])
     here, there = (turn.T @ (found.points[k] - q[:3]) for k in (side, 1 - side))
     way = there - here
-    return is_behind(faces, found.place(side), here, way / float(np.linalg.norm(way)))
+    return is_behind(faces, found.spot(side), here, way / float(np.linalg.norm(way)))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.distance.bodies.packing import KeptTree, tree_of
-from assembly.distance.bodies.query import Place
+from assembly.distance.bodies.query import Spot, place_of_spot
 from assembly.errors import InputError
 from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.smooth_faces import has_creases
@@ -57,17 +57,18 @@ def shells_of(faces: Faces) -> tuple[Faces, ...]:
     )
 
 
-def _parameters(faces: Faces, place: Place) -> tuple[float, float]:
-    """(u, v) of a place on its face."""
+def _parameters(faces: Faces, spot: Spot) -> tuple[int, float, float]:
+    """The face on which a point is, and its (u, v)."""
+    place = place_of_spot(body_tree(faces), spot)
     if place.curve < 0:
-        return place.parameters
+        return place.face, *place.parameters
     face = body_faces(faces)[place.face]
     u, v = face.boundary[place.curve].evaluate(place.parameters[0]).tolist()
     for axis, x in enumerate((u, v)):
         low, high = face.surface.domain[axis]
         if not face.surface.closed[axis]:
             u, v = (min(max(x, low), high), v) if axis == 0 else (u, min(max(x, low), high))
-    return u, v
+    return place.face, u, v
 
 
 def _edge_at(topology: Topology, face: int, u: float, v: float) -> tuple[Edge, int, float] | None:
@@ -80,7 +81,7 @@ def _edge_at(topology: Topology, face: int, u: float, v: float) -> tuple[Edge, i
     return None if number is None else (topology.edges[number], number, float(found.t))
 
 
-def feature_at(faces: Faces, place: Place, point: Array) -> Feature:
+def feature_at(faces: Faces, spot: Spot, point: Array) -> Feature:
     """The vertex, the edge or the face on which a point of a body is, to the tolerance of its topology."""
     topology, names = solid_of(faces), features_of(faces)
     if topology.vertices:
@@ -88,8 +89,9 @@ def feature_at(faces: Faces, place: Place, point: Array) -> Feature:
         nearest = int(apart.argmin())
         if apart[nearest] <= topology.tolerance:
             return names[len(topology.faces) + len(topology.edges) + nearest]
-    found = _edge_at(topology, place.face, *_parameters(faces, place))
-    return names[place.face] if found is None else names[len(topology.faces) + found[1]]
+    face, u, v = _parameters(faces, spot)
+    found = _edge_at(topology, face, u, v)
+    return names[face] if found is None else names[len(topology.faces) + found[1]]
 
 
 def _normal(face: Face, curve: int, t: float, closes: bool) -> Array | None:
@@ -104,27 +106,27 @@ def _normal(face: Face, curve: int, t: float, closes: bool) -> Array | None:
         return None
 
 
-def _normals(faces: Faces, place: Place, feature: Feature) -> list[Array]:
+def _normals(faces: Faces, spot: Spot, feature: Feature) -> list[Array]:
     """Outward normals of the faces on which a point is that is on a feature."""
     topology = solid_of(faces)
-    u, v = _parameters(faces, place)
+    number, u, v = _parameters(faces, spot)
     found: list[Array | None] = []
     if feature.kind == "face":
-        return [topology.faces[place.face].normal(u, v)]
+        return [topology.faces[number].normal(u, v)]
     if feature.kind == "edge":
-        at = _edge_at(topology, place.face, u, v)
+        at = _edge_at(topology, number, u, v)
         assert at is not None
-        edge, _number, t = at
+        edge, _k, t = at
         m0, m1 = edge.map_b
         if edge.face_b is None or edge.curve_b is None:
-            return [topology.faces[place.face].normal(u, v)]
-        t_a, t_b = (t, m0 + m1 * t) if place.face == edge.face_a else ((t - m0) / m1, t)
+            return [topology.faces[number].normal(u, v)]
+        t_a, t_b = (t, m0 + m1 * t) if number == edge.face_a else ((t - m0) / m1, t)
         closes = edge.start is None
         found.append(_normal(topology.faces[edge.face_a], edge.curve_a, t_a, closes))
         found.append(_normal(topology.faces[edge.face_b], edge.curve_b, t_b, closes))
     else:
-        for number, side in topology.vertices[feature.index].edges:
-            edge = topology.edges[number]
+        for k, side in topology.vertices[feature.index].edges:
+            edge = topology.edges[k]
             face = topology.faces[edge.face_a]
             found.append(_normal(face, edge.curve_a, face.boundary[edge.curve_a].domain[side], False))
             if edge.face_b is not None and edge.curve_b is not None:
@@ -134,10 +136,10 @@ def _normals(faces: Faces, place: Place, feature: Feature) -> list[Array]:
     return [normal for normal in found if normal is not None]
 
 
-def is_behind(faces: Faces, place: Place, point: Array, way: Array) -> bool:
+def is_behind(faces: Faces, spot: Spot, point: Array, way: Array) -> bool:
     """Whether a closed body has a point inside whose nearest point of it is here; `way` leads to that one.
 
     Of the faces that meet in an edge or a vertex, that one tells whose normal is nearest to being along the way.
     """
-    off = [float(normal @ way) for normal in _normals(faces, place, feature_at(faces, place, point))]
+    off = [float(normal @ way) for normal in _normals(faces, spot, feature_at(faces, spot, point))]
     return bool(off) and max(off, key=abs) < 0.0
