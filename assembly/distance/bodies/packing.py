@@ -11,7 +11,7 @@ from threading import RLock
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly._record import rows_of, size_of
+from assembly._record import place_of, size_of
 from assembly.distance.bodies.boundary_patches import boundary_patches
 from assembly.distance.bodies.elementary import spine_row
 from assembly.distance.bodies.nodes import plant_tree
@@ -38,6 +38,8 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Arrays = tuple[Ints, Array, Ints, Array, Array]
 _HEAD = size_of(BODY_HEAD)
+_PATCH_FIELDS: tuple[str, ...] = PATCH.names or ()
+_SPAN_AT, _NET_AT = place_of(PATCH, "span"), place_of(PATCH, "net")
 # Nodes for which there is room at first, beside the whole patches.
 _SPARE = 1024
 
@@ -92,8 +94,7 @@ def tree_of(faces: tuple[Face, ...]) -> KeptTree:
     boxes = np.array([face.surface.bounding_box() for face in faces])
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     center = 0.5 * low + 0.5 * high
-    reach = 0.5 * float(np.linalg.norm(high - low)) * (1.0 + 8.0 * UNIT)
-    blocks = [patches_of(face, number, center, reach) for number, face in enumerate(faces)]
+    blocks = [patches_of(face, number, center) for number, face in enumerate(faces)]
     blocks += [curves for block in blocks if block.trimmed for curves in boundary_patches(faces[block.face], block)]
     return _planted(faces, blocks, center, 0.5 * (high - low))
 
@@ -115,17 +116,22 @@ def _planted(faces: Sequence[Face], blocks: list[PatchBlock], center: Array, hal
     places = np.concatenate([[0], np.cumsum(sizes)])
     room = 3 * count + _SPARE
     nets = np.empty(int(places[-1]) + _SPARE * doubles)
-    rows = rows_of(PATCH, table[: PATCH_SIZE * count].reshape(-1, PATCH_SIZE))
+    starts = table[: PATCH_SIZE * count].reshape(-1, PATCH_SIZE)[:, _NET_AT]
     first = 0
     for block, place, size in zip(blocks, places.tolist(), sizes, strict=False):
         n = len(block.nets)
         nets[place : place + size].reshape(n, -1)[:, : size // n // 7 * 4] = block.nets.reshape(n, -1)
-        rows.net[first : first + n] = place + size // n * np.arange(n)
+        starts[first : first + n] = place + size // n * np.arange(n)
         first += n
     links, nodes = np.empty(USED + LINKS * room, dtype=np.int64), np.empty(NODE * room)
     tree_state_at(links, 0).nets = places[-1]
     plant_tree((table, links), (pool, nodes, nets), np.empty(5 * count, dtype=np.int64))
     return KeptTree((table, pool, links, nodes, nets), max(max(block.degree) for block in blocks))
+
+
+def _patch_row(**fields: int) -> list[int]:
+    """A PATCH as its integers; what is not given is NONE."""
+    return [fields.get(name, NONE) for name in _PATCH_FIELDS]
 
 
 def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int) -> tuple[Ints, Array]:
@@ -138,32 +144,30 @@ def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int) -> tupl
     span_at = _HEAD + sum(part.size for part in tables)
     pool_at = span_at + spans.size
     table = np.empty((count, PATCH_SIZE), dtype=np.int64)
-    rows = rows_of(PATCH, table)
     more: list[Ints] = []
     table_at, first = table.size, 0
     spine_of_face: dict[int, int] = {}
     for block in blocks:
-        part = slice(first, first + len(block.nets))
-        first = part.stop
-        rows.degree_u[part], rows.degree_v[part] = block.degree
-        rows.tables_u[part], rows.tables_v[part] = at[block.degree[0]], at[block.degree[1]]
-        rows.face[part], rows.curve[part], rows.sign[part] = block.face, block.curve, block.sign
-        rows.trim[part] = rows.spine[part] = NONE
+        trim = NONE
+        # A curve lies on what its face is.
+        place = NONE if block.curve == NONE else spine_of_face.get(block.face, NONE)
         if (spine := spine_row(block)) is not None:
-            rows.spine[part] = pool_at
+            place = pool_at
             parts.append(spine)
             pool_at += spine.size
             if block.curve == NONE:
-                spine_of_face[block.face] = int(rows.spine[part.start])
-        elif block.curve != NONE:
-            # The curve lies on what its face is.
-            rows.spine[part] = spine_of_face.get(block.face, NONE)
+                spine_of_face[block.face] = place
         if block.trimmed:
-            rows.trim[part] = table_at
+            trim = table_at
             trim_table, trim_pool = faces[block.face].packed_trim(table_at, pool_at)
             more.append(trim_table)
             parts.append(trim_pool)
             table_at, pool_at = table_at + trim_table.size, pool_at + trim_pool.size
-    rows.span[:] = span_at + SPAN * np.arange(count)
-    rows.node[:] = NONE
+        p, q = block.degree
+        table[first : first + len(block.nets)] = _patch_row(
+            degree_u=p, degree_v=q, face=block.face, curve=block.curve, sign=block.sign,
+            tables_u=at[p], tables_v=at[q], trim=trim, spine=place,
+        )  # fmt: skip
+        first += len(block.nets)
+    table[:, _SPAN_AT] = span_at + SPAN * np.arange(count)
     return np.concatenate([table.ravel(), *more]), np.concatenate(parts)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.distance.bodies.bezier_nets import write_nets
 from assembly.distance.bodies.records import NONE
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.bezier_pieces import UNIT
@@ -69,25 +70,44 @@ def is_trimmed(face: Face) -> bool:
     return False
 
 
-def patches_of(face: Face, number: int, center: Array, reach: float) -> PatchBlock:
+def patches_of(face: Face, number: int, center: Array) -> PatchBlock:
     """The patches of a face's surface.
 
-    Control points are turned into Bezier points by p + q steps of at most eight roundings each, about the origin, and
-    moved to the center: errors are parts of the largest coordinate.
+    The packed patches are within `error` of the given ones: control points are moved to the center (one rounding of
+    what is left), multiplied by their weights (two) and turned into Bezier points by p + q steps of at most eight
+    roundings each; all errors are parts of the largest distance from the center. A rational point is a quotient of two
+    such sums, which doubles that.
     """
     surface = face.surface
-    pieces = surface.bezier_pieces()
-    spans_u, spans_v, m, n, _ = pieces.shape
-    nets = pieces.reshape(-1, m, n, 4).copy()
-    nets[..., :3] -= center * nets[..., 3:]
-    rational = bool(surface.weights.min() != surface.weights.max())
-    nets /= surface.weights.max()
-    if not rational:
-        nets[..., 3] = 1.0
+    (n, m), (p, q) = surface.weights.shape, surface.degree
+    points = np.empty((n, m, 4))
+    np.subtract(surface.control_points, center, out=points[..., :3])
+    reach = float(np.abs(points[..., :3]).max())
+    lightest, heaviest = float(surface.weights.min()), float(surface.weights.max())
+    if lightest != heaviest:
+        weights = surface.weights / heaviest
+        points[..., :3] *= weights[..., None]
+        points[..., 3] = weights
+    else:
+        points[..., 3] = 1.0
     at_u, at_v = surface.breaks()
+    spans_u, spans_v = at_u.size - 1, at_v.size - 1
+    if spans_u == spans_v == 1 and (n, m) == (p + 1, q + 1) and _is_clamped(surface.knots, (p, q)):
+        nets = points[None]
+    else:
+        flat = np.empty(4 * (spans_u * spans_v * (p + 1) + 1) * (q + 1))
+        rows = np.empty(4 * (spans_u * m + 1) * (p + 1))
+        write_nets(points.ravel(), (surface.knots[0].copy(), surface.knots[1].copy()), (n, m, p, q), rows, flat)
+        nets = flat[: flat.size - 4 * (q + 1)].reshape(-1, p + 1, q + 1, 4)
+        if lightest == heaviest:
+            nets[..., 3] = 1.0
     spans = np.empty((spans_u, spans_v, 4))
     spans[..., 0], spans[..., 1] = at_u[:-1, None], at_u[1:, None]
     spans[..., 2], spans[..., 3] = at_v[:-1], at_v[1:]
-    size = float(np.abs(center).max()) + reach
-    error = (2.0 if rational else 1.0) * 16.0 * (m + n + 2) * UNIT * size
+    error = (1.0 if lightest == heaviest else 2.0) * 16.0 * (p + q + 4) * UNIT * 2.0 * reach
     return PatchBlock(nets, spans.reshape(-1, 4), number, NONE, face.sign, is_trimmed(face), error)
+
+
+def _is_clamped(knots: tuple[Array, Array], degree: tuple[int, int]) -> bool:
+    """Whether the control points of one span are its Bezier points."""
+    return all(bool(row[0] == row[p] and row[-1] == row[-1 - p]) for row, p in zip(knots, degree, strict=True))

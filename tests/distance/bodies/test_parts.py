@@ -31,7 +31,7 @@ def all_trimmed():
 
 @pytest.mark.parametrize("face", all_trimmed(), ids=repr)
 def test_boundary_curves_in_space_are_those_of_the_parameters(face):
-    patches = patches_of(face, 0, CENTER, 4.0)
+    patches = patches_of(face, 0, CENTER)
     covered = np.zeros(len(face.boundary))
     closed, (low, high) = np.array(face.surface.closed), np.array(face.surface.domain).T
     for part in boundary_patches(face, patches):
@@ -66,7 +66,7 @@ def _detour():
 
 
 def spine_of_surface(surface):
-    row = spine_row(patches_of(Face(surface), 0, np.zeros(3), 10.0))
+    row = spine_row(patches_of(Face(surface), 0, np.zeros(3)))
     return None if row is None else spine_at(row, 0)
 
 
