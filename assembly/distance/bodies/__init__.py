@@ -1,1 +1,1 @@
-"""Certified distances of posed bodies of trimmed faces: trees of patches that are kept, and a search over their pairs."""
+"""Certified distances of posed bodies: trees of patches that are kept with the shapes, a search over pairs of nodes."""

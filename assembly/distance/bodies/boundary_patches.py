@@ -1,7 +1,7 @@
 """Boundary curves of trimmed faces as Bezier curves in space, exact compositions S(c(t)): patches of degree 0 in v.
 
-A curve c of the parameters is cut where it passes from one patch of the surface to the next. With c = (U, V) / W on such
-a part, U and V from 0 to W across the patch,
+A curve c of the parameters is cut where it passes from one patch of the surface to the next. With c = (U, V) / W on
+such a part, U and V from 0 to W across the patch,
 
     sum_ij C(p, i) U^i (W - U)^(p - i) C(q, j) V^j (W - V)^(q - j) P_ij
 
@@ -145,7 +145,10 @@ def _composed(part: Array, place: Any, net: Array) -> _SpaceCurve:
         points = w[:, None] * net[0, 0] + u[:, None] * (net[1, 0] - net[0, 0]) + v[:, None] * (net[0, 1] - net[0, 0])
         size = float(np.abs(net[..., :3]).max()) * (1.0 + np.abs(u / w).max() + np.abs(v / w).max())
         return _SpaceCurve(points, error + 16.0 * UNIT * size)
-    across = _powers(u * scale, (w - u) * scale, net.shape[0] - 1), _powers(v * scale, (w - v) * scale, net.shape[1] - 1)
+    across = (
+        _powers(u * scale, (w - u) * scale, net.shape[0] - 1),
+        _powers(v * scale, (w - v) * scale, net.shape[1] - 1),
+    )
     total, majorant = _summed(across, net), _summed(across, np.abs(net), True)
     degree = len(total) - 1
     factors = np.array([comb(degree, k) for k in range(degree + 1)], dtype=float)[:, None]

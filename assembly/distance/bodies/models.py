@@ -1,8 +1,8 @@
 """Models of nodes: a quadratic at the middle of a patch, and proven doubts of it.
 
-w (S - model) is a polynomial of degree (p + 2, q + 2). A quotient of two Bernstein forms is at most the largest quotient
-of their coefficients: its coefficients over the least weight bound |S - model|, and those of its derivatives, with the
-rule for quotients, the doubts of the first and second derivatives.
+w (S - model) is a polynomial of degree (p + 2, q + 2). A quotient of two Bernstein forms is at most the largest
+quotient of their coefficients: its coefficients over the least weight bound |S - model|, and those of its derivatives,
+with the rule for quotients, the doubts of the first and second derivatives.
 """
 
 from __future__ import annotations
@@ -131,6 +131,7 @@ def rounding_of(tree, k, patch):
 
 @kernel(inline=True)
 def least_weight(tree, k, patch):
+    """The least weight of a node's control points: below all weights of its points."""
     least = math.inf
     at = links_of(tree, k).net + 3
     for i in range((patch.degree_u + 1) * (patch.degree_v + 1)):

@@ -46,6 +46,7 @@ def patch_of(tree, k):
 
 @kernel(inline=True)
 def is_group(tree, k):
+    """Whether node k is a group of patches."""
     return links_of(tree, k).patch == GROUP
 
 
@@ -179,10 +180,12 @@ def halves_of(tree, k):
 @kernel(inner=True)
 def move_node(tree, source, k):
     """Copy a node to another place."""
+    here, there = NODE * k, NODE * source
     for i in range(NODE):
-        tree.nodes[NODE * k + i] = tree.nodes[NODE * source + i]
+        tree.nodes[here + i] = tree.nodes[there + i]
+    here, there = USED + LINKS * k, USED + LINKS * source
     for i in range(LINKS):
-        tree.links[USED + LINKS * k + i] = tree.links[USED + LINKS * source + i]
+        tree.links[here + i] = tree.links[there + i]
 
 
 @kernel(inner=True)

@@ -1,8 +1,8 @@
 """Pairs of nodes on which Phi (`pair.py`) is proven to have one minimum, and the bound that this gives.
 
-V bounds how much the Hessian of Phi changes on the pair. A variable whose slope keeps its sign is least at an end of its
-own, whatever the others are. In the others the Hessian, scaled to a diagonal of ones, less the largest row sum of V and
-a margin m, is positive definite. Then from any place x
+V bounds how much the Hessian of Phi changes on the pair. Where the slope in a variable keeps its sign, Phi is least at
+an end of that one, whatever the others are. In the others the Hessian, scaled to a diagonal of ones, less the largest
+row sum of V and a margin m, is positive definite. Then from any place x
 
     Phi >= Phi(x) + sum of the least g_i d + m H_ii d^2 / 2.
 """

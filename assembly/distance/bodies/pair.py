@@ -11,8 +11,8 @@ Proof: let p = |P D|^2 and 0 <= m <= 1 / (2 t). Either n.D >= m - t p >= 0, so t
 With t = 0 this is the slab between two planes; with t = 1 / (2 |D|) it curves like the distance itself. Unlike the
 square of the distance its curvature in the surfaces' common directions does not fade with the gap.
 
-All is written in a frame whose third axis is n. With the models of both nodes, D = d + sum J_i z_i + sum K_ij z_i z_j / 2
-+ e with |e| <= E0, and Phi is at least a quadratic less
+All is written in a frame whose third axis is n. With the models of both nodes,
+D = d + sum J_i z_i + sum K_ij z_i z_j / 2 + e with |e| <= E0, and Phi is at least a quadratic less
 
     E0 + t (sum_ijk |PJ_i.PK_jk| / 8 + 2 E0 max |P (D - e)|).
 
@@ -144,6 +144,7 @@ def flat_dot(x, i, y, k):
 
 @kernel(inline=True)
 def flat_size(x, i):
+    """Length of a row across the direction."""
     return math.sqrt(flat_dot(x, i, x, i))
 
 

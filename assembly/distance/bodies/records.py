@@ -1,8 +1,8 @@
 """A body as a tree of Bezier patches in its own coordinates, made once and kept: no pose is in it.
 
-A leaf of the tree that is packed is a whole patch: of a face, or of one of the curves that bound trimmed faces, which is
-a patch of degree 0 in v. Above these stand groups of patches, which have a ball alone; below them halves, which are made
-when a search first asks for them, and stay. With x, y in [-1/2, 1/2] on a patch its model says
+A leaf of the tree that is packed is a whole patch: of a face, or of one of the curves that bound trimmed faces, which
+is a patch of degree 0 in v. Above these stand groups of patches, which have a ball alone; below them halves, which are
+made when a search first asks for them, and stay. With x, y in [-1/2, 1/2] on a patch its model says
 
     |S - (middle + Su x + Sv y + Suu x^2 / 2 + Suv x y + Svv y^2 / 2)| <= point_doubt,
 

@@ -12,38 +12,27 @@ import math
 from assembly._best_first import NO_PAIRS, Pairs, best_first
 from assembly._heap import PAIR, waiting_pair_at
 from assembly._kernel import kernel
+from assembly.distance.bodies.answer import write_facing, write_points
+from assembly.distance.bodies.bounding import bound_patches
 from assembly.distance.bodies.descent import (
     BodyErrors,
     BodySearch,
     body_search_at,
-    descend,
     descend_from_nodes,
     descend_on_patches,
-    load_places,
-    place_at_models,
-    place_on_patches,
-    take_points,
 )
-from assembly.distance.bodies.directions import along_normals, packed_way, unpacked_way
-from assembly.distance.bodies.models import describe_node
+from assembly.distance.bodies.directions import packed_way, unpacked_way
 from assembly.distance.bodies.nodes import halves_of, has_room, is_group, links_of, node_of, node_size, patch_of
-from assembly.distance.bodies.one_minimum import may_have_one_minimum, proven_bound
 from assembly.distance.bodies.pair import (
     BodyPose,
     ball_bound,
-    hull_bound,
-    load_frame,
-    load_models,
-    model_bound,
-    pair_work_at,
 )
-from assembly.distance.bodies.records import ALL, MODEL, NONE, BodyTree, body_head_at, spine_at
-from assembly.distance.bodies.spines import PLANE, norm, spine_bound, spine_of
-from assembly.distance.bodies.trims import nearest_is_elsewhere
-from assembly.distance.patches.pair import D, patch_work_at, vector_dot
+from assembly.distance.bodies.records import NONE, BodyTree, body_head_at
+from assembly.distance.bodies.spines import norm, spine_bound
+from assembly.distance.patches.pair import patch_work_at
 from assembly.geometry.splines.bezier_pieces import UNIT
-from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, neg, sub
-from assembly.kinematics.motion import position, relative_pose, rotation
+from assembly.geometry.vec import add, matvec, sub
+from assembly.kinematics.motion import relative_pose, rotation
 
 # What a search ended with. CROWDED: the arrays are too small to go on.
 CONVERGED, SPENT, CROWDED = 0, 1, 2
@@ -52,8 +41,6 @@ DEEPEST = 50
 _START_DEPTH = 3
 # Pairs taken from the heap before the first descent from one; the next ones are at every doubling.
 _FIRST_DESCENT = 16.0
-# A proof of one minimum is tried where the halvings of both nodes are a multiple: it costs more than a bound.
-_PROOF_EVERY = 3
 
 
 @kernel(inline=True)
@@ -71,141 +58,6 @@ def errors_of(a, b, pose, tolerance):
     )
     step = max(0.999 * tolerance, 8.0 * (point + head_a.error + head_b.error))
     return BodyErrors(slack, point, 8.0 * UNIT * slope, step)
-
-
-@kernel(inline=True)
-def bound_along(search, i, j, n):
-    """Lower bound of a pair of parts of patches in one direction; leaves its frame, models and quadratic."""
-    pair, state = pair_work_at(search.pair, 0), body_search_at(search.state, 0)
-    a, b, pose, slack = search.a, search.b, search.pose, search.errors.slack
-    load_frame(pair, pose.turn, n)
-    bound = hull_bound(pair, a, i, b, j, pose, slack)
-    if bound < state.limit:
-        load_models(pair, a, i, b, j, pose)
-        bound = max(bound, model_bound(pair, a, i, b, j, state.upper, slack))
-    return bound
-
-
-@kernel(inline=True)
-def keep_way(search, bound, n):
-    """Remember a direction if no better one is known of the pair in hand."""
-    state = body_search_at(search.state, 0)
-    if bound > state.key:
-        state.key = bound
-        state.key_way[0], state.key_way[1], state.key_way[2] = n
-
-
-@kernel(inner=True)
-def bound_by_ways(search, i, j, way):
-    """Lower bound of a pair of parts of patches, by up to three directions: that of the nearest points known, that of
-    the pair that it is a part of, and that of the models' nearest places. The best one is KEY_WAY then.
-    """
-    pair, state = pair_work_at(search.pair, 0), body_search_at(search.state, 0)
-    common = (state.way[0], state.way[1], state.way[2])
-    if abs(way[0] - common[0]) + abs(way[1] - common[1]) + abs(way[2] - common[2]) > 1e-7:
-        bound = bound_along(search, i, j, common)
-        keep_way(search, bound, common)
-        if bound >= state.limit:
-            return
-    bound = bound_along(search, i, j, way)
-    keep_way(search, bound, way)
-    if bound >= state.limit:
-        return
-    size, turned, own = along_normals(pair, way)
-    if size < 0.9 * state.upper and 16.0 * state.descents <= 64.0 + state.popped:
-        # Points nearer than any that are known may be here.
-        place_at_models(search)
-        descend_from_nodes(search, i, j)
-    if turned > 1e-3:
-        keep_way(search, bound_along(search, i, j, own), own)
-
-
-@kernel(inline=True)
-def bound_along_normal(search, i, j, n):
-    """The bound of the control points along the normal of a plane, on the side on which the middles are."""
-    pair, state = pair_work_at(search.pair, 0), body_search_at(search.state, 0)
-    a, b, pose = search.a, search.b, search.pose
-    between = sub(sub(node_of(a, i).middle, pose.shift), matvec(pose.turn, node_of(b, j).middle))
-    if dot(n, between) < 0.0:
-        n = neg(n)
-    load_frame(pair, pose.turn, n)
-    keep_way(search, hull_bound(pair, a, i, b, j, pose, search.errors.slack), n)
-
-
-@kernel(inner=True)
-def bound_by_planes(search, i, j):
-    """Lower bound of a pair of which one is plane: no way that leads from one point of it to another one need tell."""
-    a, b = search.a, search.b
-    at_a, at_b = links_of(a, i).spine, links_of(b, j).spine
-    if at_a != NONE and spine_at(a.pool, at_a).kind == PLANE:
-        bound_along_normal(search, i, j, spine_of(a.pool, at_a).axis)
-    if at_b != NONE and spine_at(b.pool, at_b).kind == PLANE:
-        bound_along_normal(search, i, j, matvec(search.pose.turn, spine_of(b.pool, at_b).axis))
-
-
-@kernel(inner=True)
-def prove_pair(search, i, j):
-    """A bound by the only minimum of a pair, where it is proven to be that; -inf elsewhere. Its models are loaded.
-
-    First in the direction in which the pair was bounded; then, if that gives one minimum which is not high enough, in
-    the direction of the nearest points on the pair themselves.
-    """
-    pair, state, work = (
-        pair_work_at(search.pair, 0),
-        body_search_at(search.state, 0),
-        patch_work_at(search.w, 0),
-    )
-    a, b = search.a, search.b
-    bound = proven_bound(search, i, j)
-    if bound == -math.inf or bound >= state.limit:
-        return bound
-    far = descend(search, i, j)
-    if not far > 4.0 * search.errors.point:
-        return bound
-    x = work.place
-    z = (x[0] - 0.5, x[1] - 0.5, x[2] - 0.5, x[3] - 0.5)
-    d = work.d
-    load_frame(pair, search.pose.turn, (d[0] / far, d[1] / far, d[2] / far))
-    load_models(pair, a, i, b, j, search.pose)
-    if far + search.errors.point + node_of(a, i).away + node_of(b, j).away < state.upper:
-        place_on_patches(search, i, j)
-        patch_a, patch_b = links_of(a, i).patch, links_of(b, j).patch
-        load_places(search, patch_of(a, patch_a).node, patch_of(b, patch_b).node)
-        take_points(search, patch_a, patch_b, math.sqrt(vector_dot(search.w, D, D)))
-    pair.z[0], pair.z[1], pair.z[2], pair.z[3] = z
-    return max(bound, proven_bound(search, i, j))
-
-
-@kernel(inline=True)
-def is_trimmed(tree, k):
-    return patch_of(tree, links_of(tree, k).patch).trim != NONE
-
-
-@kernel(inner=True)
-def bound_patches(search, i, j, bound):
-    """Lower bound of two parts of patches whose spines and balls say `bound`."""
-    a, b, room, errors = search.a, search.b, search.room, search.errors
-    pair, state = pair_work_at(search.pair, 0), body_search_at(search.state, 0)
-    describe_node(a, i, MODEL, room)
-    describe_node(b, j, MODEL, room)
-    way = (state.key_way[0], state.key_way[1], state.key_way[2])
-    state.key = bound
-    bound_by_planes(search, i, j)
-    if state.key < state.limit:
-        bound_by_ways(search, i, j, way)
-    trimmed = is_trimmed(a, i) or is_trimmed(b, j)
-    proves = (links_of(a, i).depth + links_of(b, j).depth) % _PROOF_EVERY == 0
-    if state.key < state.limit and (proves or trimmed):
-        describe_node(a, i, ALL, room)
-        describe_node(b, j, ALL, room)
-        load_frame(pair, search.pose.turn, (state.key_way[0], state.key_way[1], state.key_way[2]))
-        load_models(pair, a, i, b, j, search.pose)
-        if trimmed and nearest_is_elsewhere(pair, a, i, b, j, errors.slack):
-            state.key = math.inf
-        elif proves and may_have_one_minimum(pair, a, i, b, j, state.upper, errors.slope) >= 0.0:
-            # The question is in line: most pairs fail it, and a call costs more.
-            state.key = max(state.key, prove_pair(search, i, j))
-    return state.key
 
 
 @kernel(inline=True)
@@ -329,55 +181,6 @@ def relative_pose_of(a, b, q):
     shift = sub(add(relative.shift, matvec(relative.rotation, center_b)), center_a)
     size = norm(relative.shift) + norm(center_a) + norm(center_b)
     return BodyPose(relative.rotation, shift, 16.0 * UNIT * size)
-
-
-@kernel(inline=True)
-def is_in_box(head, point):
-    """Whether a point, from the center of a body, is in its box."""
-    half = head.half
-    return 1.0 if abs(point[0]) <= half[0] and abs(point[1]) <= half[1] and abs(point[2]) <= half[2] else 0.0
-
-
-@kernel(inline=True)
-def cosine_to_normal(patch, way, j, at):
-    """Cosine of a unit vector and the outward normal of a patch, whose derivatives are rows `at` and `at` + 1 of J."""
-    if patch.curve != NONE:
-        return 0.0
-    o = 3 * at
-    normal = cross((j[o], j[o + 1], j[o + 2]), (j[o + 3], j[o + 4], j[o + 5]))
-    size = norm(normal)
-    return patch.sign * dot(way, normal) / size if size > 0.0 else 0.0
-
-
-@kernel(inner=True)
-def write_facing(search):
-    """How the nearest points known face each other."""
-    state, work = body_search_at(search.state, 0), patch_work_at(search.w, 0)
-    patch_a, patch_b = patch_of(search.a, int(state.patches[0])), patch_of(search.b, int(state.patches[1]))
-    for i in range(4):
-        work.place[i] = state.places[i]
-    load_places(search, patch_a.node, patch_b.node)
-    state.facing[0] = state.facing[1] = 0.0
-    far = math.sqrt(vector_dot(search.w, D, D))
-    if far > 0.0:
-        way = (work.d[0] / far, work.d[1] / far, work.d[2] / far)
-        state.facing[0] = cosine_to_normal(patch_a, neg(way), work.j, 0)
-        state.facing[1] = cosine_to_normal(patch_b, way, work.j, 2)
-
-
-@kernel(inline=True)
-def write_points(search, q):
-    """The nearest points known in world axes, and which of them are in the box of the other body."""
-    state, center = body_search_at(search.state, 0), body_head_at(search.a.pool, 0).center
-    for i in range(0, 6, 3):
-        own = (state.points[i] + center[0], state.points[i + 1] + center[1], state.points[i + 2] + center[2])
-        world = add(matvec(rotation(q, 0), own), position(q, 0))
-        state.world[i], state.world[i + 1], state.world[i + 2] = world
-    on_a = (state.points[0], state.points[1], state.points[2])
-    on_b = (state.points[3], state.points[4], state.points[5])
-    state.boxed[0] = is_in_box(body_head_at(search.a.pool, 0), on_b)
-    seen = matvec_t(search.pose.turn, sub(on_a, search.pose.shift))
-    state.boxed[1] = is_in_box(body_head_at(search.b.pool, 0), seen)
 
 
 @kernel(inner=True)

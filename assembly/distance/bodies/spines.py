@@ -1,8 +1,9 @@
 """Lower bounds of the distance of elementary surfaces from their centers, axes and circles.
 
-Patches of spheres, cylinders, tori and planes, and lines and circles among boundary curves, lie on surfaces whose distance has a closed form where they share a
-center or an axis, or their axes are parallel. There the nearest points are not single ones, and bounds of parts of the
-patches come to no end; that of the whole surfaces is the distance itself.
+Patches of spheres, cylinders, tori and planes, and lines and circles among boundary curves, lie on surfaces whose
+distance has a closed form where they share a center or an axis, or their axes are parallel. There the nearest points
+are not single ones, and bounds of parts of the patches come to no end; that of the whole surfaces is the distance
+itself.
 
 Where axes are not parallel, or do not coincide where they should, the second surface is turned about its center and
 moved until they are or do; a point of it within h of the center moves by at most 1.5 h s, with s the sine of the angle.
@@ -28,6 +29,7 @@ Coaxial = namedtuple("Coaxial", "along beside off")
 
 @kernel(inline=True)
 def norm(x):
+    """Length of a vector."""
     return math.sqrt(dot(x, x))
 
 
@@ -105,6 +107,7 @@ def turned_parallel(s, t):
 
 @kernel(inline=True)
 def of_cylinders(s, t):
+    """Two cylinders, as if their axes were parallel."""
     at = turned_parallel(s, t)
     beyond = max(0.0, abs(at.along) - s.half - t.half)
     return math.hypot(max(0.0, ring_gap(at.beside, s.radius, t.radius)), beyond) - at.off

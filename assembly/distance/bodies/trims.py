@@ -20,8 +20,8 @@ from assembly.distance.bodies.nodes import links_of, node_of, patch_of
 from assembly.distance.bodies.pair import doubt_of_points
 from assembly.distance.bodies.records import CUT, INSIDE, NONE, OUTSIDE, UNPLACED, patch_span_at
 from assembly.geometry.faces.trim import trim_side
-from assembly.geometry.faces.trim_pieces import bounds_of, links_of as piece_links, piece_at, piece_of, trim_at
-from assembly.geometry.faces.trim_pieces import trim_frame_at
+from assembly.geometry.faces.trim_pieces import bounds_of, piece_at, piece_of, trim_at, trim_frame_at
+from assembly.geometry.faces.trim_pieces import links_of as piece_links
 
 # The boundary is known to some multiple of what is on it.
 _GRAIN = 4.0
@@ -103,16 +103,17 @@ def place_node(tree, k):
 
 @kernel(inline=True)
 def space_dot(x, i, y, k):
+    """Scalar product of two rows."""
     return x[3 * i] * y[3 * k] + x[3 * i + 1] * y[3 * k + 1] + x[3 * i + 2] * y[3 * k + 2]
 
 
 @kernel(inner=True)
-def falls_to_side(search_pair, a, i, b, j, of_a, slack):
+def falls_to_side(pair, a, i, b, j, of_a, slack):
     """Whether |D| falls everywhere on a pair along u or v of one node towards a side of it within its patch.
 
     D.J_m is off its value at the middles by at most sum_l |J_l.J_m| / 2 + far (k_m + E1) + (sum |K| / 8 + E0) |J_m|.
     """
-    d, jacobian, k = search_pair.d, search_pair.j, search_pair.k
+    d, jacobian, k = pair.d, pair.j, pair.k
     own = node_of(a, i) if of_a else node_of(b, j)
     e0 = doubt_of_points(a, i, b, j) + slack
     bent = 0.0

@@ -19,11 +19,11 @@ def ellipse(u, v, a, b):
     return NurbsCurve(_CIRCLE * [a, b] + [u, v], [0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4], 2, _WEIGHTS)
 
 
-def wavy(rng, spans=1, rational=True):
+def wavy(rng, spans=1, rational=True, height=0.3):
     """A bicubic sheet over the unit square."""
     n = 3 + spans
     x, y = np.meshgrid(*2 * [np.linspace(0.0, 1.0, n)], indexing="ij")
-    net = np.stack([x, y, 0.3 * rng.standard_normal((n, n))], axis=2)
+    net = np.stack([x, y, height * rng.standard_normal((n, n))], axis=2)
     knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, spans + 1), [1.0] * 3])
     return NurbsSurface(net, (knots, knots), (3, 3), rng.uniform(0.5, 2.0, (n, n)) if rational else None)
 

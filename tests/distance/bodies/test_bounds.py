@@ -160,6 +160,11 @@ def test_models_are_within_their_doubts(cases):
     assert (counts > 10).all(), counts
 
 
+def test_each_bound_by_itself_holds_against_samples(run_python, cases):
+    code = f"from tests.distance.bodies.pair_laws import main; main({cases(80, 3000)})"
+    assert "proof" in run_python(code, NUMBA_DISABLE_JIT="1")
+
+
 def test_a_pair_of_doubles_has_room_for_a_direction():
     from assembly.distance.bodies.directions import packed_way, unpacked_way
 
