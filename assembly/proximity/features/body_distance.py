@@ -9,13 +9,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly._read_only import ReadOnlyArrays
+from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.distance.bodies.query import Nearest, Spot, bodies_apart
 from assembly.distance.bodies.search import SPENT
 from assembly.errors import InputError, integer, positive
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.features.features import Feature, Shape, faces_of, pose_of
+from assembly.proximity.features.parting import are_balls, parting_translation
 from assembly.proximity.features.places import body_tree, feature_at, is_behind, is_closed, shells_of
 
 __all__ = ["BodyDistance", "DistanceStatus", "distance"]
@@ -63,6 +64,33 @@ class BodyDistance(ReadOnlyArrays):
     def converged(self) -> bool:
         """Whether the bounds are within the tolerance."""
         return self.status in (DistanceStatus.CONVERGED, DistanceStatus.ENCLOSED)
+
+    @cached_property
+    def translation(self) -> Array | None:
+        """The shortest translation (3,) of b found that parts the bodies, one of which is inside; None elsewhere.
+
+        Computed when it is asked for, in some tenths of a second. As long as is needed along its direction; of convex
+        bodies none is shorter but for digits, and of others there may be one.
+        """
+        if self.status is not DistanceStatus.ENCLOSED:
+            return None
+        faces, _spots, q = self._where
+        return read_only(parting_translation(faces, q))
+
+    @property
+    def depth(self) -> float | None:
+        """The length of `translation`."""
+        return None if self.translation is None else float(np.linalg.norm(self.translation))
+
+    @property
+    def proved(self) -> bool:
+        """Whether the bounds are within the tolerance, and of bodies inside each other no translation is shorter.
+
+        The latter is known of balls alone.
+        """
+        if self.status is DistanceStatus.ENCLOSED:
+            return are_balls(self._where[0])
+        return self.converged
 
     @cached_property
     def features(self) -> tuple[Feature, Feature]:

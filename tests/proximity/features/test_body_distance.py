@@ -208,6 +208,44 @@ def test_a_body_inside_another_one(name):
     check(a, b, (None, pose), expected, DistanceStatus.ENCLOSED)
 
 
+DEPTHS = {
+    "ball in a ball": 2.2,
+    "ball in a box": 1.25,
+    "box in a box": 1.15,
+    # Through the middle of a face of the box.
+    "box in a ball": 2.5,
+    # A sheet leaves as it lies.
+    "sheet in a ball": 2.0,
+}
+
+
+@pytest.mark.parametrize("name", list(DEPTHS))
+def test_how_deep_a_body_is_inside_a_convex_one(name):
+    a, b, pose, _expected = ENCLOSED[name]
+    turned = random_pose(np.random.default_rng(2), 1.0)
+    turn = rotation_matrix(turned[3:])
+    moved = np.concatenate([turn @ pose[:3] + turned[:3], turned[3:]])
+    for order in (1, -1):
+        shapes, places = (a, b)[::order], (turned, moved)[::order]
+        found = distance(*shapes, poses=places)
+        assert abs(found.depth - DEPTHS[name]) < 1e-10
+        assert found.proved is (name == "ball in a ball")
+        # Moved so far, and a little more, they are apart.
+        away = places[1] + np.concatenate([found.translation * (1.0 + 1e-9), np.zeros(4)])
+        after = distance(*shapes, poses=(places[0], away))
+        assert after.status is DistanceStatus.CONVERGED
+        assert after.upper < 1e-7
+
+
+def test_a_ball_in_a_ring_comes_out_some_way():
+    ring, ball = SHAPES.torus(2.0, 0.5), SHAPES.sphere(0.2)
+    found = distance(ring, ball, poses=(None, at(2.1)))
+    # Outward, and not through the hole: the hull of the ring has none.
+    assert abs(found.depth - 0.6) < 1e-10 and not found.proved
+    apart = distance(ring, ball, poses=(None, at(4.0)))
+    assert apart.depth is None and apart.translation is None and apart.proved
+
+
 def test_what_is_beside_or_in_a_cavity_is_not_inside():
     ring, ball = SHAPES.torus(2.0, 0.5), SHAPES.sphere(0.2)
     check(ring, ball, (None, at(0.0)), 1.3)
