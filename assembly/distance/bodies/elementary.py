@@ -51,7 +51,9 @@ def spine_row(block: PatchBlock) -> Array | None:
         found = _curve(points)
     else:
         found = _plane(points) if (block.nets[..., 3] == 1.0).all() else _round(block.nets)
-    if found is None:
+    if found is None or not (
+        found.kind == PLANE or found.radius + found.major > _RANK * size or found.kind == CYLINDER
+    ):
         return None
     along = (points - found.center) @ found.axis
     center, half = found.center, 0.0
@@ -61,7 +63,6 @@ def spine_row(block: PatchBlock) -> Array | None:
     if found.kind == PLANE:
         half = float(np.linalg.norm(points - center, axis=1).max()) * (1.0 + 8.0 * UNIT)
     off = _off(block.nets, found, points) + 64.0 * UNIT * (size + float(np.abs(points).max()))
-    # Not a number where the fit has no size.
     if not off <= _SAME * size + 256.0 * UNIT * float(np.abs(points).max()):
         return None
     row = np.zeros(SPINE_SIZE)
@@ -92,7 +93,8 @@ def _curve(points: Array) -> _Elementary | None:
     # The center is where the lines across both ends meet.
     ends, sides = points[[0, -1]], np.stack([points[1] - points[0], points[-1] - points[-2]])
     rows = np.concatenate([sides, ways[2:]])
-    if abs(float(np.linalg.det(rows / np.linalg.norm(rows, axis=1, keepdims=True)))) < 1e-6:
+    lengths = np.linalg.norm(rows, axis=1)
+    if not lengths.min() > 0.0 or abs(float(np.linalg.det(rows / lengths[:, None]))) < 1e-6:
         return None
     center = np.linalg.solve(rows, np.append((sides * ends).sum(axis=1), ways[2] @ middle))
     return _Elementary(TORUS, center, ways[2], 0.0, float(np.linalg.norm(points[0] - center)))

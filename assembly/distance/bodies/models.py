@@ -122,11 +122,13 @@ def largest_differences(room, shape, k, l):
 
 
 @kernel(inline=True)
-def rounding_of(tree, k, patch):
-    """How far a coefficient of the residual may be off, a sum of nine terms; of a difference of order m, 2^m times."""
+def rounding_of(tree, k):
+    """How far a coefficient of the residual may be off, a sum of nine terms; of a difference of order m, 2^m times.
+
+    The factors of the terms are positive and their sum is one, whatever the degrees.
+    """
     head = body_head_at(tree.pool, 0)
-    degrees = float(patch.degree_u + patch.degree_v)
-    return (16.0 * degrees + 64.0) * UNIT * head.weight_ratio * (node_of(tree, k).extent + head.reach)
+    return 64.0 * UNIT * head.weight_ratio * (node_of(tree, k).extent + head.reach)
 
 
 @kernel(inline=True)
@@ -151,7 +153,7 @@ def describe_model(tree, k, room):
     node.extent = size
     load_residual(tree, k, room)
     most, _w = largest_differences(room, (patch.degree_u + 3, patch.degree_v + 3), 0, 0)
-    node.point_doubt = (most / least_weight(tree, k, patch) + rounding_of(tree, k, patch)) * _GROW
+    node.point_doubt = (most / least_weight(tree, k, patch) + rounding_of(tree, k)) * _GROW
     links.known = MODEL
 
 
@@ -164,7 +166,7 @@ def describe_changes(tree, k, room):
     shape = (patch.degree_u + 3, patch.degree_v + 3)
     m, n = patch.degree_u + 2.0, patch.degree_v + 2.0
     v = 1.0 / least_weight(tree, k, patch)
-    rough = rounding_of(tree, k, patch)
+    rough = rounding_of(tree, k)
     e0 = node.point_doubt
     along_u, weight_u = largest_differences(room, shape, 1, 0)
     along_v, weight_v = largest_differences(room, shape, 0, 1)

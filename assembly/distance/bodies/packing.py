@@ -104,7 +104,11 @@ def _planted(faces: Sequence[Face], blocks: list[PatchBlock], center: Array, hal
     count = sum(len(block.nets) for block in blocks)
     table, pool = _static(faces, blocks, count)
     head = body_head_at(pool, 0)
-    head.reach, head.center, head.patches = float(np.linalg.norm(half)) * (1.0 + 8.0 * UNIT), center, count
+    # Control points of boundary curves may be outside of the box of the faces.
+    curves = [block.nets[..., :3] / block.nets[..., 3:] for block in blocks if block.curve != NONE]
+    farthest = max((float((points**2).sum(axis=-1).max()) for points in curves), default=0.0)
+    head.reach = max(float(np.linalg.norm(half)), farthest**0.5) * (1.0 + 8.0 * UNIT)
+    head.center, head.patches = center, count
     head.half = half * (1.0 + 8.0 * UNIT)
     head.error = max(block.error for block in blocks)
     weights = [block.nets[..., 3] for block in blocks]

@@ -29,6 +29,7 @@ from assembly.distance.bodies.pair import (
 )
 from assembly.distance.bodies.records import NONE, BodyTree, body_head_at
 from assembly.distance.bodies.spines import norm, spine_bound
+from assembly.distance.bodies.trims import is_outside
 from assembly.distance.patches.pair import patch_work_at
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import add, matvec, sub
@@ -41,6 +42,8 @@ DEEPEST = 50
 _START_DEPTH = 3
 # Pairs taken from the heap before the first descent from one; the next ones are at every doubling.
 _FIRST_DESCENT = 16.0
+# A group is split before a part of a patch that is not so many times as long.
+_GROUP_WEIGHT = 8.0
 
 
 @kernel(inline=True)
@@ -56,7 +59,10 @@ def errors_of(a, b, pose, tolerance):
         m * (4.0 * m + 12.0) * head_a.reach * head_a.weight_ratio**2,
         n * (4.0 * n + 12.0) * head_b.reach * head_b.weight_ratio**2,
     )
-    step = max(0.999 * tolerance, 8.0 * (point + head_a.error + head_b.error))
+    # What halving costs, and the least doubt of a model: bounds come no nearer to each other than that.
+    rough = (120.0 * head_a.degree + 256.0 * head_a.weight_ratio) * UNIT * head_a.reach
+    rough += (120.0 * head_b.degree + 256.0 * head_b.weight_ratio) * UNIT * head_b.reach
+    step = max(0.999 * tolerance, 4.0 * (point + head_a.error + head_b.error) + rough)
     return BodyErrors(slack, point, 8.0 * UNIT * slope, step)
 
 
@@ -68,6 +74,8 @@ def pair_bound(search, i, j):
     way = (state.key_way[0], state.key_way[1], state.key_way[2])
     key = state.key
     bound = max(key, ball_bound(a, i, b, j, search.pose, search.errors.slack))
+    if bound < state.limit and (is_outside(a, i) or is_outside(b, j)):
+        bound = math.inf
     if bound < state.limit and links_of(a, i).spine != NONE and links_of(b, j).spine != NONE:
         bound = max(bound, spine_bound(a, links_of(a, i).spine, b, links_of(b, j).spine, search.pose))
     if bound < state.limit and not (is_group(a, i) or is_group(b, j)):
@@ -98,6 +106,12 @@ def search_ended(search, top, left):
 
 
 @kernel(inline=True)
+def size_to_split(tree, k):
+    """How long a node counts: a group has a ball alone, and others are not cut down to its size for that."""
+    return node_size(tree, k) * (_GROUP_WEIGHT if is_group(tree, k) else 1.0)
+
+
+@kernel(inline=True)
 def branch(search, key, i, j):
     """The halves of the longer of two nodes with the other one; none where the pair is let go."""
     a, b, state = search.a, search.b, body_search_at(search.state, 0)
@@ -109,7 +123,7 @@ def branch(search, key, i, j):
         x[0] = x[1] = x[2] = x[3] = 0.5
         descend_from_nodes(search, i, j)
     ends_a, ends_b = links_of(a, i).depth >= DEEPEST, links_of(b, j).depth >= DEEPEST
-    size_a, size_b = node_size(a, i), node_size(b, j)
+    size_a, size_b = size_to_split(a, i), size_to_split(b, j)
     if (ends_a and ends_b) or max(size_a, size_b) <= 0.25 * search.errors.step:
         return key, NO_PAIRS
     if ends_b or (size_a >= size_b and not ends_a):

@@ -18,7 +18,7 @@ from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.distance.bodies.nodes import links_of, node_of, patch_of
 from assembly.distance.bodies.pair import doubt_of_points
-from assembly.distance.bodies.records import CUT, INSIDE, NONE, OUTSIDE, UNPLACED, patch_span_at
+from assembly.distance.bodies.records import CUT, GROUP, INSIDE, NONE, OUTSIDE, UNPLACED, patch_span_at
 from assembly.geometry.faces.trim import trim_side
 from assembly.geometry.faces.trim_pieces import bounds_of, piece_at, piece_of, trim_at, trim_frame_at
 from assembly.geometry.faces.trim_pieces import links_of as piece_links
@@ -102,6 +102,13 @@ def place_node(tree, k):
 
 
 @kernel(inline=True)
+def is_outside(tree, k):
+    """Whether node k is no group and outside of its face."""
+    links = links_of(tree, k)
+    return links.patch != GROUP and patch_of(tree, links.patch).trim != NONE and place_node(tree, k) == OUTSIDE
+
+
+@kernel(inline=True)
 def space_dot(x, i, y, k):
     """Scalar product of two rows."""
     return x[3 * i] * y[3 * k] + x[3 * i + 1] * y[3 * k + 1] + x[3 * i + 2] * y[3 * k + 2]
@@ -142,9 +149,6 @@ def falls_to_side(pair, a, i, b, j, of_a, slack):
 @kernel(inner=True)
 def nearest_is_elsewhere(pair, a, i, b, j, slack):
     """Whether trims prove that the nearest points are not on a pair. Its models are loaded and fully described."""
-    place_a, place_b = place_node(a, i), place_node(b, j)
-    if place_a == OUTSIDE or place_b == OUTSIDE:
+    if place_node(a, i) == CUT and falls_to_side(pair, a, i, b, j, True, slack):
         return True
-    if place_a == CUT and falls_to_side(pair, a, i, b, j, True, slack):
-        return True
-    return place_b == CUT and falls_to_side(pair, a, i, b, j, False, slack)
+    return place_node(b, j) == CUT and falls_to_side(pair, a, i, b, j, False, slack)
