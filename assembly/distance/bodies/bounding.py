@@ -33,6 +33,8 @@ from assembly.geometry.vec import dot, matvec, neg, sub
 
 # A proof of one minimum is tried where the halvings of both nodes are a multiple: it costs more than a bound.
 _PROOF_EVERY = 3
+# Directions that differ by less are one.
+_SAME_WAY = 1e-6
 
 
 @kernel(inline=True)
@@ -64,11 +66,14 @@ def bound_by_ways(search, i, j, way):
     """
     pair, state = pair_work_at(search.pair, 0), body_search_at(search.state, 0)
     common = (state.way[0], state.way[1], state.way[2])
-    if abs(way[0] - common[0]) + abs(way[1] - common[1]) + abs(way[2] - common[2]) > 1e-7:
+    if abs(way[0] - common[0]) + abs(way[1] - common[1]) + abs(way[2] - common[2]) > _SAME_WAY:
         bound = bound_along(search, i, j, common)
         keep_way(search, bound, common)
         if bound >= state.limit:
             return
+    else:
+        # Along straight parts the last digits of the direction count, which one that waited has lost.
+        way = common
     bound = bound_along(search, i, j, way)
     keep_way(search, bound, way)
     if bound >= state.limit:

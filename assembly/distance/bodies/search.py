@@ -43,7 +43,7 @@ _START_DEPTH = 3
 # Pairs taken from the heap before the first descent from one; the next ones are at every doubling.
 _FIRST_DESCENT = 16.0
 # A group is split before a part of a patch that is not so many times as long.
-_GROUP_WEIGHT = 8.0
+_GROUP_WEIGHT = 2.0
 
 
 @kernel(inline=True)
