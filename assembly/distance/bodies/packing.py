@@ -25,7 +25,6 @@ from assembly.distance.bodies.records import (
     PATCH_SIZE,
     SPAN,
     USED,
-    body_head_at,
     tree_state_at,
 )
 from assembly.geometry.faces.face import Face
@@ -41,7 +40,7 @@ _HEAD = size_of(BODY_HEAD)
 _PATCH_FIELDS: tuple[str, ...] = PATCH.names or ()
 _SPAN_AT, _NET_AT = place_of(PATCH, "span"), place_of(PATCH, "net")
 # Nodes for which there is room at first, beside the whole patches.
-_SPARE = 1024
+_SPARE = 256
 
 
 @dataclass(eq=False)
@@ -91,8 +90,8 @@ def _tables(degree: int) -> Array:
 @lru_cache(maxsize=256)
 def tree_of(faces: tuple[Face, ...]) -> KeptTree:
     """The tree of a body with these faces."""
-    boxes = np.array([face.surface.bounding_box() for face in faces])
-    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    boxes = [face.surface.bounding_box() for face in faces]
+    low, high = np.minimum.reduce([box[0] for box in boxes]), np.maximum.reduce([box[1] for box in boxes])
     center = 0.5 * low + 0.5 * high
     blocks = [patches_of(face, number, center) for number, face in enumerate(faces)]
     blocks += [curves for block in blocks if block.trimmed for curves in boundary_patches(faces[block.face], block)]
@@ -103,34 +102,42 @@ def _planted(faces: Sequence[Face], blocks: list[PatchBlock], center: Array, hal
     """The tree of all patches."""
     count = sum(len(block.nets) for block in blocks)
     table, pool = _static(faces, blocks, count)
-    head = body_head_at(pool, 0)
-    # Control points of boundary curves may be outside of the box of the faces.
-    curves = [block.nets[..., :3] / block.nets[..., 3:] for block in blocks if block.curve != NONE]
-    farthest = max((float((points**2).sum(axis=-1).max()) for points in curves), default=0.0)
-    head.reach = max(float(np.linalg.norm(half)), farthest**0.5) * (1.0 + 8.0 * UNIT)
-    head.center, head.patches = center, count
-    head.half = half * (1.0 + 8.0 * UNIT)
-    head.error = max(block.error for block in blocks)
-    weights = [block.nets[..., 3] for block in blocks]
-    head.weight_ratio = max(float(w.max() / w.min()) for w in weights) * (1.0 + 4.0 * UNIT)
-    head.rational = float(any(bool((w != 1.0).any()) for w in weights))
-    head.degree = max(sum(block.degree) for block in blocks)
+    pool[:_HEAD] = _head(blocks, count, center, half)
     doubles = 7 * max(block.nets[0, ..., 0].size for block in blocks)
-    sizes = [7 * block.nets[..., 0].size for block in blocks]
-    places = np.concatenate([[0], np.cumsum(sizes)])
-    room = 3 * count + _SPARE
-    nets = np.empty(int(places[-1]) + _SPARE * doubles)
+    used = sum(7 * block.nets[..., 0].size for block in blocks)
+    nets = np.empty(used + _SPARE * doubles)
     starts = table[: PATCH_SIZE * count].reshape(-1, PATCH_SIZE)[:, _NET_AT]
-    first = 0
-    for block, place, size in zip(blocks, places.tolist(), sizes, strict=False):
-        n = len(block.nets)
-        nets[place : place + size].reshape(n, -1)[:, : size // n // 7 * 4] = block.nets.reshape(n, -1)
-        starts[first : first + n] = place + size // n * np.arange(n)
-        first += n
+    first = place = 0
+    for block in blocks:
+        n, points = len(block.nets), block.nets[0, ..., 0].size
+        end = place + 7 * n * points
+        nets[place:end].reshape(n, -1)[:, : 4 * points] = block.nets.reshape(n, -1)
+        starts[first : first + n] = np.arange(place, end, 7 * points)
+        first, place = first + n, end
+    room = 3 * count + _SPARE
     links, nodes = np.empty(USED + LINKS * room, dtype=np.int64), np.empty(NODE * room)
-    tree_state_at(links, 0).nets = places[-1]
+    tree_state_at(links, 0).nets = used
     plant_tree((table, links), (pool, nodes, nets), np.empty(5 * count, dtype=np.int64))
     return KeptTree((table, pool, links, nodes, nets), max(max(block.degree) for block in blocks))
+
+
+def _head(blocks: list[PatchBlock], count: int, center: Array, half: Array) -> list[float]:
+    """A BODY_HEAD as its doubles."""
+    # Control points of boundary curves may be outside of the box of the faces. No weight is above one.
+    curves = [block.nets[..., :3] / block.nets[..., 3:] for block in blocks if block.curve != NONE]
+    farthest = max((float((points**2).sum(axis=-1).max()) for points in curves), default=0.0)
+    lightest = min(float(block.nets[..., 3].min()) for block in blocks)
+    values: dict[str, list[float]] = {
+        "reach": [max(float(np.linalg.norm(half)), farthest**0.5) * (1.0 + 8.0 * UNIT)],
+        "error": [max(block.error for block in blocks)],
+        "weight_ratio": [(1.0 + 4.0 * UNIT) / lightest],
+        "rational": [float(lightest != 1.0)],
+        "patches": [count],
+        "degree": [max(sum(block.degree) for block in blocks)],
+        "center": center.tolist(),
+        "half": (half * (1.0 + 8.0 * UNIT)).tolist(),
+    }
+    return [x for name in BODY_HEAD.names or () for x in values[name]]
 
 
 def _patch_row(**fields: int) -> list[int]:
