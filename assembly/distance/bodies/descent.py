@@ -27,6 +27,7 @@ from assembly.distance.patches.pair import (
     patch_work_at,
     vector_dot,
 )
+from assembly.distance.piece_search import bound_to_beat
 from assembly.geometry.faces.trim import trim_side
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import matvec
@@ -35,8 +36,10 @@ from assembly.geometry.vec import matvec
 # two evaluated points; slope: of an evaluated first derivative; step: bounds closer than this are equal.
 BodyErrors = namedtuple("BodyErrors", "slack point slope step")
 # a, b: trees; heap: pairs of nodes; state, pair, w: blocks of BODY_SEARCH, PAIR_WORK and PATCH_WORK, basis functions
-# behind the latter; room: for describing nodes; budget: pairs that may be looked at.
-BodySearch = namedtuple("BodySearch", "a b pose heap state pair w room errors budget")
+# behind the latter; room: for describing nodes; question: what is asked.
+BodySearch = namedtuple("BodySearch", "a b pose heap state pair w room errors question")
+# tolerance, clearance: below zero the distance itself is asked for [length]; budget: pairs that may be looked at.
+BodyQuestion = namedtuple("BodyQuestion", "tolerance clearance budget")
 BODY_SEARCH = record_dtype(
     "f8",
     limit=1,  # pairs of at least this bound are let go [length]
@@ -208,7 +211,7 @@ def take_points(search, patch_a, patch_b, far):
     if not upper < state.upper or not is_on_face(a, patch_a, x[0], x[1]) or not is_on_face(b, patch_b, x[2], x[3]):
         return
     state.upper = upper
-    state.limit = upper - search.errors.step
+    state.limit = bound_to_beat(search.question, upper, search.errors.step)
     state.patches[0], state.patches[1] = patch_a, patch_b
     for i in range(4):
         state.places[i] = x[i]

@@ -38,7 +38,7 @@ Ints = NDArray[np.int64]
 Arrays = tuple[Ints, Array, Ints, Array, Array]
 _HEAD = size_of(BODY_HEAD)
 _PATCH_FIELDS: tuple[str, ...] = PATCH.names or ()
-_SPAN_AT, _NET_AT = place_of(PATCH, "span"), place_of(PATCH, "net")
+_SPAN_AT, _NET_AT, _FACE_AT = (place_of(PATCH, name) for name in ("span", "net", "face"))
 # Nodes for which there is room at first, beside the whole patches.
 _SPARE = 256
 
@@ -53,12 +53,18 @@ class KeptTree:
         Table, pool, links, nodes and nets (`records.BodyTree`).
     degree : int
         The largest degree of a patch in one direction.
+    faces : (patches, 2)
+        Numbers of the face and of the boundary curve of each patch.
+    spans : (patches, 4)
+        Low u, high u, low v, high v of each patch on its surface; of a boundary curve its t, and 0 to 1.
     lock
         Searches make nodes: one at a time.
     """
 
     arrays: Arrays
     degree: int
+    faces: Ints
+    spans: Array
     lock: RLock = field(default_factory=RLock)
 
     def grow(self) -> None:
@@ -118,7 +124,9 @@ def _planted(faces: Sequence[Face], blocks: list[PatchBlock], center: Array, hal
     links, nodes = np.empty(USED + LINKS * room, dtype=np.int64), np.empty(NODE * room)
     tree_state_at(links, 0).nets = used
     plant_tree((table, links), (pool, nodes, nets), np.empty(5 * count, dtype=np.int64))
-    return KeptTree((table, pool, links, nodes, nets), max(max(block.degree) for block in blocks))
+    of_faces = table[: PATCH_SIZE * count].reshape(-1, PATCH_SIZE)[:, _FACE_AT : _FACE_AT + 2]
+    spans = np.concatenate([block.spans for block in blocks])
+    return KeptTree((table, pool, links, nodes, nets), max(max(block.degree) for block in blocks), of_faces, spans)
 
 
 def _head(blocks: list[PatchBlock], count: int, center: Array, half: Array) -> list[float]:

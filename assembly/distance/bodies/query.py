@@ -14,9 +14,10 @@ from assembly.distance.bodies.descent import BODY_SEARCH
 from assembly.distance.bodies.models import RESIDUAL
 from assembly.distance.bodies.packing import KeptTree
 from assembly.distance.bodies.pair import PAIR_DOUBLES
-from assembly.distance.bodies.records import PATCH_SIZE, patch_at, patch_span_at
-from assembly.distance.bodies.search import CROWDED, search_bodies
+from assembly.distance.bodies.records import NONE
+from assembly.distance.bodies.search import search_bodies
 from assembly.distance.patches.pair import BASIS
+from assembly.distance.piece_search import CROWDED
 
 __all__ = ["Nearest", "Place", "Spot", "bodies_apart", "place_of_spot"]
 
@@ -52,7 +53,7 @@ class Nearest:
     Attributes
     ----------
     status : int
-        CONVERGED or SPENT (`search.py`).
+        What `piece_search.py` has of these.
     lower, upper : float
         Bounds of the distance.
     pairs : int
@@ -87,20 +88,18 @@ class Nearest:
 
 def place_of_spot(tree: KeptTree, spot: Spot) -> Place:
     """The face or the boundary curve on which a point of a body is."""
-    table, pool = tree.arrays[:2]
-    patch = patch_at(table, PATCH_SIZE * spot.patch)
-    span = patch_span_at(pool, patch.span)
-    u = _between(float(span.low_u), float(span.high_u), spot.x)
-    v = _between(float(span.low_v), float(span.high_v), spot.y) if patch.curve < 0 else 0.0
-    return Place(int(patch.face), int(patch.curve), (u, v))
+    face, curve = tree.faces[spot.patch].tolist()
+    low_u, high_u, low_v, high_v = tree.spans[spot.patch].tolist()
+    u = _between(low_u, high_u, spot.x)
+    return Place(face, curve, (u, _between(low_v, high_v, spot.y) if curve == NONE else 0.0))
 
 
-def bodies_apart(a: KeptTree, b: KeptTree, q: Array, tolerance: float, budget: int) -> Nearest:
-    """Bounds of the distance of two bodies at poses q (2, 7)."""
+def bodies_apart(a: KeptTree, b: KeptTree, q: Array, tolerance: float, budget: int, clearance: float = -1.0) -> Nearest:
+    """Bounds of the distance of two bodies at poses q (2, 7); below zero a clearance asks for the distance itself."""
     degree = max(a.degree, b.degree)
     state = np.empty(SEARCH)
     w, room = np.zeros(BASIS + 6 * (degree + 1)), np.empty(RESIDUAL + 4 * (degree + 3) ** 2)
-    work, asked = (state, np.empty(PAIR_DOUBLES), w, room), (tolerance, float(budget))
+    work, asked = (state, np.empty(PAIR_DOUBLES), w, room), (tolerance, clearance, float(budget))
     heap = np.empty(_WAITING * PAIR)
     first, second = (a, b) if id(a) <= id(b) else (b, a)
     with first.lock, second.lock:

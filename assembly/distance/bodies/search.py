@@ -16,6 +16,7 @@ from assembly.distance.bodies.answer import write_facing, write_points
 from assembly.distance.bodies.bounding import bound_patches
 from assembly.distance.bodies.descent import (
     BodyErrors,
+    BodyQuestion,
     BodySearch,
     body_search_at,
     descend_from_nodes,
@@ -31,12 +32,11 @@ from assembly.distance.bodies.records import NONE, BodyTree, body_head_at
 from assembly.distance.bodies.spines import norm, spine_bound
 from assembly.distance.bodies.trims import is_outside
 from assembly.distance.patches.pair import patch_work_at
+from assembly.distance.piece_search import CROWDED, ended
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import add, matvec, sub
 from assembly.kinematics.motion import relative_pose, rotation
 
-# What a search ended with. CROWDED: the arrays are too small to go on.
-CONVERGED, SPENT, CROWDED = 0, 1, 2
 # Halvings after which a node is let go.
 DEEPEST = 50
 _START_DEPTH = 3
@@ -47,7 +47,7 @@ _GROUP_WEIGHT = 2.0
 
 
 @kernel(inline=True)
-def errors_of(a, b, pose, tolerance):
+def errors_of(a, b, pose, question):
     """Sums of coordinates, evaluated points and derivatives: parts of the sizes, by the degrees."""
     head_a, head_b = body_head_at(a.pool, 0), body_head_at(b.pool, 0)
     slack = 64.0 * UNIT * (head_a.reach + head_b.reach + norm(pose.shift)) + pose.rounding + 1e-150
@@ -62,7 +62,7 @@ def errors_of(a, b, pose, tolerance):
     # What halving costs, and the least doubt of a model: bounds come no nearer to each other than that.
     rough = (120.0 * head_a.degree + 256.0 * head_a.weight_ratio) * UNIT * head_a.reach
     rough += (120.0 * head_b.degree + 256.0 * head_b.weight_ratio) * UNIT * head_b.reach
-    step = max(0.999 * tolerance, 4.0 * (point + head_a.error + head_b.error) + rough)
+    step = max(0.999 * question.tolerance, 4.0 * (point + head_a.error + head_b.error) + rough)
     return BodyErrors(slack, point, 8.0 * UNIT * slope, step)
 
 
@@ -92,10 +92,9 @@ def search_ended(search, top, left):
     """What the search ends with; -1: not yet. The direction of the pair that is next is taken from its tie."""
     state = body_search_at(search.state, 0)
     state.lower = max(min(top, state.upper), 0.0)
-    if left == 0 or top >= state.limit or state.upper <= search.errors.step:
-        return CONVERGED
-    if state.pairs >= search.budget:
-        return SPENT
+    status = ended(search.question, state.upper, search.errors.step, max(top, 0.0), left, state.pairs)
+    if status >= 0:
+        return status
     first = waiting_pair_at(search.heap, 0)
     i, j = int(first.a), int(first.b)
     if (left + 1) * PAIR > search.heap.size or not (has_room(search.a, i) and has_room(search.b, j)):
@@ -215,17 +214,18 @@ def start(search):
 _TREE = "Tuple((i8[::1], f8[::1], i8[::1], f8[::1], f8[::1]))"
 
 
-@kernel(signatures=f"({_TREE}, {_TREE}, f8[:, ::1], UniTuple(f8, 2), f8[::1], UniTuple(f8[::1], 4), i8)")
+@kernel(signatures=f"({_TREE}, {_TREE}, f8[:, ::1], UniTuple(f8, 3), f8[::1], UniTuple(f8[::1], 4), i8)")
 def search_bodies(a, b, q, asked, heap, work, left):
     """Bounds of the distance of two bodies at poses q (2, 7) into BODY_SEARCH; a status, and how many pairs wait.
 
-    `asked`: tolerance and budget; `work`: state, pair, w and room; `left`: how many pairs wait, where a search goes on;
+    `asked`: a BodyQuestion; `work`: state, pair, w and room; `left`: how many pairs wait, where a search goes on;
     below zero where it starts.
     """
     tree_a, tree_b = BodyTree(*a), BodyTree(*b)
     pose = relative_pose_of(tree_a, tree_b, q)
-    errors = errors_of(tree_a, tree_b, pose, asked[0])
-    search = BodySearch(tree_a, tree_b, pose, heap, work[0], work[1], work[2], work[3], errors, asked[1])
+    question = BodyQuestion(*asked)
+    errors = errors_of(tree_a, tree_b, pose, question)
+    search = BodySearch(tree_a, tree_b, pose, heap, work[0], work[1], work[2], work[3], errors, question)
     pairs = NO_PAIRS
     if left < 0:
         start(search)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.distance.bodies.query import Nearest, Spot, bodies_apart
-from assembly.distance.bodies.search import SPENT
+from assembly.distance.piece_search import SPENT
 from assembly.errors import InputError, integer, positive
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._copies import OwnState
 from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, check_coordinates, number
-from assembly.geometry.faces.face import Face
+from assembly.geometry.faces.face import Face, whole_face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
 from assembly.kinematics.pose import IDENTITY_ROW, pose_row
@@ -121,11 +121,6 @@ class FeaturePair(ReadOnlyArrays):
     status: FeatureStatus
 
 
-@lru_cache(maxsize=256)
-def _face_of(surface: NurbsSurface) -> Face:
-    return Face(surface)
-
-
 def faces_of(name: str, shape: Shape) -> Faces:
     """The faces of a shape that is an argument of this name."""
     if isinstance(shape, Body):
@@ -135,7 +130,7 @@ def faces_of(name: str, shape: Shape) -> Faces:
     if isinstance(shape, BodyFace):
         return (shape.face,)
     if isinstance(shape, NurbsSurface):
-        return (_face_of(shape),)
+        return (whole_face(shape),)
     if isinstance(shape, Face):
         return (shape,)
     if not isinstance(shape, Iterable):
@@ -144,7 +139,7 @@ def faces_of(name: str, shape: Shape) -> Faces:
     for k, part in enumerate(shape):
         if not isinstance(part, (Face, NurbsSurface)):
             raise TypeError(f"{name}[{k}] is {part!r}; expected a Face or a NurbsSurface")
-        faces.append(part if isinstance(part, Face) else _face_of(part))
+        faces.append(part if isinstance(part, Face) else whole_face(part))
     if not faces:
         raise InputError(f"{name} is empty; expected at least one face")
     return tuple(faces)

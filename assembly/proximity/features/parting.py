@@ -80,7 +80,7 @@ class _Group(NamedTuple):
         cosine = np.abs(self.spines[:, 3:6] @ way)
         sine = np.linalg.norm(np.cross(self.spines[:, 3:6], way), axis=1)
         of_spine = self.spines[:, :3] @ way + self.spines[:, 6] * cosine + self.spines[:, 7] * sine + self.spines[:, 8]
-        return np.minimum(heights.max(axis=(1, 2)), of_spine)
+        return np.asarray(np.minimum(heights.max(axis=(1, 2)), of_spine))
 
 
 def _spine_row(pool: Array, at: int) -> list[float]:

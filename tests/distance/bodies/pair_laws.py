@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 
-from assembly.distance.bodies.descent import BodySearch, body_search_at
+from assembly.distance.bodies.descent import BodyQuestion, BodySearch, body_search_at
 from assembly.distance.bodies.models import describe_node
 from assembly.distance.bodies.nodes import halves_of, links_of, node_of, patch_of
 from assembly.distance.bodies.one_minimum import proven_bound
@@ -98,13 +98,14 @@ def main(rounds):
         n = differences.reshape(-1, 3)[far.argmin()]
         n = n + rng.choice([0.0, 0.3]) * least * rng.standard_normal(3)
         n = tuple(n / np.linalg.norm(n))
-        errors = errors_of(a, b, pose, 1e-10)
+        question = BodyQuestion(1e-10, -1.0, 0.0)
+        errors = errors_of(a, b, pose, question)
         block, state = np.zeros(PAIR_DOUBLES), np.zeros(SEARCH)
         pair = pair_work_at(block, 0)
         upper = least * rng.choice([0.1, 1.0, 2.0, 10.0])
         body_search_at(state, 0).upper = upper
         body_search_at(state, 0).limit = math.inf
-        search = BodySearch(a, b, pose, None, state, block, np.zeros(400), room, errors, 0.0)
+        search = BodySearch(a, b, pose, None, state, block, np.zeros(400), room, errors, question)
         load_frame(pair, turn, n)
         load_models(pair, a, i, b, j, pose)
         tension = load_tense(pair, upper).tension

@@ -12,7 +12,8 @@ from assembly.distance.bodies.descent import body_search_at
 from assembly.distance.bodies.nodes import links_of, node_of, patch_of
 from assembly.distance.bodies.packing import tree_of
 from assembly.distance.bodies.records import ALL, GROUP, MODEL, BodyTree, body_head_at
-from assembly.distance.bodies.search import CROWDED, search_bodies
+from assembly.distance.bodies.search import search_bodies
+from assembly.distance.piece_search import CROWDED
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.bezier import bernstein
 from assembly.kinematics.pose import rotation_matrix
@@ -27,7 +28,7 @@ def searched(a, b, q, budget):
     state, heap = np.empty(query.SEARCH), np.empty(PAIR * 100_000)
     work = (state, np.empty(query.PAIR_DOUBLES), np.zeros(500), np.empty(5000))
     while True:
-        status, left = search_bodies(a.arrays, b.arrays, q, (1e-10, float(budget)), heap, work, -1)
+        status, left = search_bodies(a.arrays, b.arrays, q, (1e-10, -1.0, float(budget)), heap, work, -1)
         if status != CROWDED:
             break
         a.grow()
