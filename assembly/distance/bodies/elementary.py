@@ -8,6 +8,7 @@ its Bernstein coefficients bound it on the patches.
 
 from __future__ import annotations
 
+from functools import cache
 from math import comb
 from typing import NamedTuple
 
@@ -28,6 +29,8 @@ _SAME = 1e-12
 # Samples along either parameter of a patch; where the normals of a surface are no longer those of another kind.
 _SAMPLES = np.array([0.1, 0.5, 0.9])
 _RANK = 1e-7
+# About as many patches of a face are sampled.
+_FEW = 4
 
 
 class _Elementary(NamedTuple):
@@ -100,15 +103,21 @@ def _curve(points: Array) -> _Elementary | None:
     return _Elementary(TORUS, center, ways[2], 0.0, float(np.linalg.norm(points[0] - center)))
 
 
+@cache
+def _basis(n: int) -> tuple[Array, Array]:
+    """Bernstein polynomials of a degree at the samples, and their derivatives."""
+    lower = bezier.bernstein(n - 1, _SAMPLES) if n else np.zeros((_SAMPLES.size, 0))
+    slopes = n * (np.pad(lower, ((0, 0), (1, 0))) - np.pad(lower, ((0, 0), (0, 1))))
+    return bezier.bernstein(n, _SAMPLES), slopes
+
+
 def _samples(nets: Array) -> tuple[Array, Array]:
-    """Points and unit normals of patches."""
-    values = []
-    for n in (nets.shape[1] - 1, nets.shape[2] - 1):
-        lower = bezier.bernstein(n - 1, _SAMPLES) if n else np.zeros((_SAMPLES.size, 0))
-        slopes = n * (np.pad(lower, ((0, 0), (1, 0))) - np.pad(lower, ((0, 0), (0, 1))))
-        values.append((bezier.bernstein(n, _SAMPLES), slopes))
-    (b, db), (c, dc) = values
-    s, su, sv = (np.einsum("xi,yj,nijk->nxyk", x, y, nets).reshape(-1, 4) for x, y in ((b, c), (db, c), (b, dc)))
+    """Points and unit normals of some patches."""
+    nets = nets[:: max(1, len(nets) // _FEW)]
+    (b, db), (c, dc) = _basis(nets.shape[1] - 1), _basis(nets.shape[2] - 1)
+    rows, slopes = np.tensordot(nets, b, (1, 1)), np.tensordot(nets, db, (1, 1))
+    s, su, sv = (np.tensordot(x, y, (1, 1)) for x, y in ((rows, c), (slopes, c), (rows, dc)))
+    s, su, sv = (np.moveaxis(x, 1, -1).reshape(-1, 4) for x in (s, su, sv))
     w = s[:, 3:]
     points = s[:, :3] / w
     normals = np.cross((su[:, :3] - su[:, 3:] * points) / w, (sv[:, :3] - sv[:, 3:] * points) / w)
@@ -175,8 +184,10 @@ def _times(f: Array, g: Array) -> Array:
     return result
 
 
-def _binomials(shape: tuple[int, ...]) -> Array:
-    rows = [np.array([comb(n - 1, k) for k in range(n)], dtype=float) for n in shape[1:3]]
+@cache
+def _binomials(m: int, n: int) -> Array:
+    """Products of binomials of the degrees m - 1 and n - 1."""
+    rows = [np.array([comb(size - 1, k) for k in range(size)], dtype=float) for size in (m, n)]
     return np.outer(*rows)
 
 
@@ -187,7 +198,7 @@ def _off(nets: Array, found: _Elementary, points: Array) -> float:
     if found.kind == CYLINDER and found.radius == 0.0:
         away = points - found.center
         return float(np.linalg.norm(away - np.outer(away @ found.axis, found.axis), axis=1).max())
-    scaled = nets * _binomials(nets.shape)[..., None]
+    scaled = nets * _binomials(*nets.shape[1:3])[..., None]
     w = scaled[..., 3]
     x = [scaled[..., c] - found.center[c] * w for c in range(3)]
     z = sum(found.axis[c] * x[c] for c in range(3))
@@ -198,7 +209,7 @@ def _off(nets: Array, found: _Elementary, points: Array) -> float:
     if found.kind == TORUS and r == 0.0:
         value = square - major**2 * heavy
         beside = float(np.abs((points - found.center) @ found.axis).max())
-        return beside + float(np.abs(value / _binomials(value.shape)).max()) / (lightest * major)
+        return beside + float(np.abs(value / _binomials(*value.shape[1:3])).max()) / (lightest * major)
     if found.kind == TORUS:
         # ((R - rho)^2 + z^2 - r^2) ((R + rho)^2 + z^2 - r^2), the second of which is at least R^2 - r^2.
         inner = square + (major**2 - r**2) * heavy
@@ -209,4 +220,4 @@ def _off(nets: Array, found: _Elementary, points: Array) -> float:
         least = lightest
         if found.kind == CYLINDER:
             value = value - _times(z, z)
-    return float(np.abs(value / _binomials(value.shape)).max()) / (least * r)
+    return float(np.abs(value / _binomials(*value.shape[1:3])).max()) / (least * r)
