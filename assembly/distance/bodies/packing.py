@@ -67,17 +67,19 @@ class KeptTree:
     spans: Array
     lock: RLock = field(default_factory=RLock)
 
-    def grow(self) -> None:
-        """Room for twice as many nodes, where that for the next ones may be short."""
+    def make_room(self, halvings: int) -> None:
+        """Room for as many halvings, and twice as many nodes where there is none."""
         table, pool, links, nodes, nets = self.arrays
-        state = tree_state_at(links, 0)
-        if (int(state.nodes) + 2) * NODE <= nodes.size and int(state.nets) + 14 * (self.degree + 1) ** 2 <= nets.size:
+        # TREE_STATE, which a record would take longer to read.
+        count, used_nets = links[:USED].tolist()
+        needed = 14 * (self.degree + 1) ** 2 * halvings
+        if (count + 2 * halvings) * NODE <= nodes.size and used_nets + needed <= nets.size:
             return
         more_links = np.empty(2 * links.size, dtype=np.int64)
-        more_nodes, more_nets = np.empty(2 * nodes.size), np.empty(2 * nets.size)
-        used, at = USED + LINKS * int(state.nodes), NODE * int(state.nodes)
+        more_nodes, more_nets = np.empty(2 * nodes.size), np.empty(2 * nets.size + needed)
+        used, at = USED + LINKS * count, NODE * count
         more_links[:used], more_nodes[:at] = links[:used], nodes[:at]
-        more_nets[: state.nets] = nets[: state.nets]
+        more_nets[:used_nets] = nets[:used_nets]
         self.arrays = table, pool, more_links, more_nodes, more_nets
 
 

@@ -28,6 +28,8 @@ _PATCHES, _PLACES, _WORLD = (place_of(BODY_SEARCH, name) for name in ("patches",
 _FACING, _BOXED = place_of(BODY_SEARCH, "facing"), place_of(BODY_SEARCH, "boxed")
 # Pairs for which a heap has room at first.
 _WAITING = 1024
+# More halvings of each body than a search starts with.
+_START = 16
 
 
 @dataclass(frozen=True)
@@ -103,11 +105,13 @@ def bodies_apart(a: KeptTree, b: KeptTree, q: Array, tolerance: float, budget: i
     heap = np.empty(_WAITING * PAIR)
     first, second = (a, b) if id(a) <= id(b) else (b, a)
     with first.lock, second.lock:
+        # For the start, which so does not depend on what was asked before.
+        a.make_room(_START)
+        b.make_room(_START)
         status, left = search_bodies(a.arrays, b.arrays, q, asked, heap, work, -1)
         while status == CROWDED:
-            a.grow()
-            if b is not a:
-                b.grow()
+            a.make_room(1)
+            b.make_room(1)
             if (left + 1) * PAIR > heap.size:
                 heap = np.concatenate([heap, np.empty(heap.size)])
             status, left = search_bodies(a.arrays, b.arrays, q, asked, heap, work, left)

@@ -31,8 +31,8 @@ def searched(a, b, q, budget):
         status, left = search_bodies(a.arrays, b.arrays, q, (1e-10, -1.0, float(budget)), heap, work, -1)
         if status != CROWDED:
             break
-        a.grow()
-        b.grow()
+        a.make_room(1)
+        b.make_room(1)
     return body_search_at(state, 0), [waiting_pair_at(heap, PAIR * k) for k in range(left)]
 
 
