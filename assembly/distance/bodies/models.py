@@ -122,23 +122,23 @@ def largest_differences(room, shape, k, l):
 
 
 @kernel(inline=True)
-def rounding_of(tree, k):
-    """How far a coefficient of the residual may be off, a sum of nine terms; of a difference of order m, 2^m times.
-
-    The factors of the terms are positive and their sum is one, whatever the degrees.
-    """
-    head = body_head_at(tree.pool, 0)
-    return 64.0 * UNIT * head.weight_ratio * (node_of(tree, k).extent + head.reach)
+def weights_of(tree, k, patch):
+    """The least weight of a node's control points, below all weights of its points, and the quotient of the largest."""
+    least, heaviest = math.inf, 0.0
+    at = links_of(tree, k).net + 3
+    for i in range((patch.degree_u + 1) * (patch.degree_v + 1)):
+        w = tree.nets[at + 4 * i]
+        least, heaviest = min(least, w), max(heaviest, w)
+    return least, heaviest / least
 
 
 @kernel(inline=True)
-def least_weight(tree, k, patch):
-    """The least weight of a node's control points: below all weights of its points."""
-    least = math.inf
-    at = links_of(tree, k).net + 3
-    for i in range((patch.degree_u + 1) * (patch.degree_v + 1)):
-        least = min(least, tree.nets[at + 4 * i])
-    return least
+def rounding_of(tree, k, ratio):
+    """How far a coefficient of the residual, over the least weight, may be off; of a difference of order m, 2^m times.
+
+    It is a sum of nine terms, whose factors are positive and one in sum, whatever the degrees.
+    """
+    return 64.0 * UNIT * ratio * (node_of(tree, k).extent + body_head_at(tree.pool, 0).reach)
 
 
 @kernel(inner=True)
@@ -153,7 +153,8 @@ def describe_model(tree, k, room):
     node.extent = size
     load_residual(tree, k, room)
     most, _w = largest_differences(room, (patch.degree_u + 3, patch.degree_v + 3), 0, 0)
-    node.point_doubt = (most / least_weight(tree, k, patch) + rounding_of(tree, k)) * _GROW
+    least, ratio = weights_of(tree, k, patch)
+    node.point_doubt = (most / least + rounding_of(tree, k, ratio)) * _GROW
     links.known = MODEL
 
 
@@ -165,8 +166,9 @@ def describe_changes(tree, k, room):
     patch = patch_of(tree, links.patch)
     shape = (patch.degree_u + 3, patch.degree_v + 3)
     m, n = patch.degree_u + 2.0, patch.degree_v + 2.0
-    v = 1.0 / least_weight(tree, k, patch)
-    rough = rounding_of(tree, k)
+    least, ratio = weights_of(tree, k, patch)
+    v = 1.0 / least
+    rough = rounding_of(tree, k, ratio)
     e0 = node.point_doubt
     along_u, weight_u = largest_differences(room, shape, 1, 0)
     along_v, weight_v = largest_differences(room, shape, 0, 1)
@@ -181,7 +183,7 @@ def describe_changes(tree, k, room):
     e2uv = duv * uv + 4.0 * m * n * rough
     if head.rational > 0.0:
         # Of a quotient X / w: (X / w)_u = (X_u - w_u (X / w)) / w, and once more.
-        tiny = 64.0 * UNIT * head.weight_ratio
+        tiny = 64.0 * UNIT * ratio
         wu = du * weight_u + m * tiny
         wv = dv * weight_v + n * tiny
         e1u += wu * e0

@@ -60,8 +60,7 @@ def errors_of(a, b, pose, question):
         n * (4.0 * n + 12.0) * head_b.reach * head_b.weight_ratio**2,
     )
     # What halving costs, and the least doubt of a model: bounds come no nearer to each other than that.
-    rough = (120.0 * head_a.degree + 256.0 * head_a.weight_ratio) * UNIT * head_a.reach
-    rough += (120.0 * head_b.degree + 256.0 * head_b.weight_ratio) * UNIT * head_b.reach
+    rough = 120.0 * (head_a.degree + 2.0) * UNIT * head_a.reach + 120.0 * (head_b.degree + 2.0) * UNIT * head_b.reach
     step = max(0.999 * question.tolerance, 4.0 * (point + head_a.error + head_b.error) + rough)
     return BodyErrors(slack, point, 8.0 * UNIT * slope, step)
 

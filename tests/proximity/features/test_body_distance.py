@@ -180,6 +180,18 @@ def test_a_coarse_tolerance_is_met():
     assert tiny.upper - tiny.lower < 1e-11
 
 
+def test_weights_far_apart():
+    rng = np.random.default_rng(9)
+    plain = wavy(rng, 2, False)
+    for ratio in (1e3, 1e6, 1e9):
+        weights = ratio ** rng.uniform(0.0, 1.0, plain.weights.shape)
+        a = asm.NurbsSurface(plain.control_points, plain.knots, plain.degree, weights)
+        found = distance(a, SHAPES.sphere(0.25), poses=(None, at(0.5, 0.4, 1.5)))
+        judge = minimum_distance(a, np.array([0.5, 0.4, 1.5]))
+        assert found.upper - found.lower <= TOLERANCE
+        assert found.lower - TIGHT <= judge.upper - 0.25 and judge.lower - 0.25 <= found.upper + TIGHT
+
+
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("offset", [0.0, 1e4])
 def test_sizes_and_places(scale, offset):
