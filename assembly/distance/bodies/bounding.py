@@ -52,10 +52,11 @@ def bound_along(search, i, j, n):
 
 @kernel(inline=True)
 def keep_way(search, bound, n):
-    """Remember a direction if no better one is known of the pair in hand."""
+    """Remember the bound of the pair in hand in a direction, and the direction if no better one is known."""
     state = body_search_at(search.state, 0)
-    if bound > state.key:
-        state.key = bound
+    state.key = max(state.key, bound)
+    if bound > state.tried:
+        state.tried = bound
         state.key_way[0], state.key_way[1], state.key_way[2] = n
 
 
@@ -78,13 +79,15 @@ def bound_by_ways(search, i, j, way):
     keep_way(search, bound, way)
     if bound >= state.limit:
         return
-    size, turned, own = along_normals(pair, way)
-    if size < 0.9 * state.upper and 16.0 * state.descents <= 64.0 + state.popped:
+    near = along_normals(pair, way)
+    if near.size < 0.9 * state.upper and 16.0 * state.descents <= 64.0 + state.popped:
         # Points nearer than any that are known may be here.
         place_at_models(search)
         descend_from_nodes(search, i, j)
-    if turned > 1e-3:
-        keep_way(search, bound_along(search, i, j, own), own)
+    if near.turned > 1e-3:
+        keep_way(search, bound_along(search, i, j, near.way), near.way)
+    if near.against and state.key < state.limit:
+        keep_way(search, bound_along(search, i, j, neg(near.way)), neg(near.way))
 
 
 @kernel(inline=True)
@@ -156,7 +159,7 @@ def bound_patches(search, i, j, bound):
     describe_node(a, i, MODEL, room)
     describe_node(b, j, MODEL, room)
     way = (state.key_way[0], state.key_way[1], state.key_way[2])
-    state.key = bound
+    state.key, state.tried = bound, -math.inf
     bound_by_planes(search, i, j)
     if state.key < state.limit:
         bound_by_ways(search, i, j, way)

@@ -58,7 +58,8 @@ BODY_SEARCH = record_dtype(
     descents=1,
     next_descent=1,  # how many are popped when the next descent is due
     key=1,  # bound of the pair in hand
-    key_way=3,  # the direction that gave it
+    tried=1,  # the best bound that a direction gave of the pair in hand
+    key_way=3,  # the direction that gave that, or the pair that this one is a part of
     on_a=3,  # points in hand, from a's center and in a's axes
     on_b=3,
 )

@@ -7,10 +7,14 @@ begin with their parent's direction, would get nowhere.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 from assembly._kernel import kernel
 from assembly.distance.bodies.pair import flat_size
 
+# Where the models of a pair are nearest: how far they are apart, how much the way there is turned from the direction of
+# the frame, that way, and whether the other way may be as good.
+Nearby = namedtuple("Nearby", "size turned way against")
 # A direction is a place on an octahedron: two numbers of this many steps in one double.
 _STEPS = 2.0**25
 
@@ -52,10 +56,7 @@ def unit_normal(pair, i):
 
 @kernel(inline=True)
 def along_normals(pair, way):
-    """The distance where the models are nearest, a direction there, and how far that is turned from the frame's.
-
-    Where the pair is long against its distance, the direction is that of its normals.
-    """
+    """Where the models are nearest. Of a pair that is long against its distance the way is along its normals."""
     z, d, j, k, f = pair.z, pair.d, pair.j, pair.k, pair.frame
     v0, v1, v2 = d[0], d[1], d[2]
     for i in range(4):
@@ -72,19 +73,20 @@ def along_normals(pair, way):
             v2 += factor * k[o + 2]
     size = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
     long = max(max(flat_size(j, 0), flat_size(j, 1)), max(flat_size(j, 2), flat_size(j, 3)))
+    against = False
     if size < long:
         p, q = unit_normal(pair, 0), unit_normal(pair, 2)
         if min(p[2], q[2]) > 0.3:
-            # On the side of the direction, unless the way there leads clearly to the other one.
-            sign = -1.0 if v2 < -0.5 * size else 1.0
-            v0, v1, v2 = sign * (p[0] + q[0]), sign * (p[1] + q[1]), sign * (p[2] + q[2])
+            # On the side of the direction; but where the way between the places leads to the other one, that may be it.
+            against = v2 < -0.5 * size
+            v0, v1, v2 = p[0] + q[0], p[1] + q[1], p[2] + q[2]
     length = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
     if not length > 0.0:
-        return size, 0.0, way
+        return Nearby(size, 0.0, way, against)
     v0, v1, v2 = v0 / length, v1 / length, v2 / length
     own = (
         v0 * f[0] + v1 * f[3] + v2 * f[6],
         v0 * f[1] + v1 * f[4] + v2 * f[7],
         v0 * f[2] + v1 * f[5] + v2 * f[8],
     )
-    return size, abs(v0) + abs(v1) + max(0.0, -v2), own
+    return Nearby(size, abs(v0) + abs(v1) + max(0.0, -v2), own, against)

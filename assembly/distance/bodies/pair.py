@@ -53,7 +53,7 @@ PAIR_WORK = record_dtype(
 # A tension, the value of the quadratic with it, and whether that is convex.
 Tense = namedtuple("Tense", "tension value convex")
 # The tension is at most these parts of the curvatures of the surfaces.
-STIFFNESS, STIFFER = 4.0, 16.0
+STIFFNESS, STIFFER = 4.0, 64.0
 pair_work_at = record_view(PAIR_WORK)
 PAIR_DOUBLES = size_of(PAIR_WORK)
 _SWEEPS = 6
