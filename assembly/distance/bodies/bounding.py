@@ -9,10 +9,8 @@ from assembly.distance.bodies.descent import (
     body_search_at,
     descend,
     descend_from_nodes,
-    load_places,
     place_at_models,
-    place_on_patches,
-    take_points,
+    take_from_nodes,
 )
 from assembly.distance.bodies.directions import along_normals
 from assembly.distance.bodies.models import describe_node
@@ -28,7 +26,7 @@ from assembly.distance.bodies.pair import (
 from assembly.distance.bodies.records import ALL, MODEL, NONE, spine_at
 from assembly.distance.bodies.spines import PLANE, spine_of
 from assembly.distance.bodies.trims import nearest_is_elsewhere
-from assembly.distance.patches.pair import D, patch_work_at, vector_dot
+from assembly.distance.patches.pair import patch_work_at
 from assembly.geometry.vec import dot, matvec, neg, sub
 
 # A proof of one minimum is tried where the halvings of both nodes are a multiple: it costs more than a bound.
@@ -137,10 +135,7 @@ def prove_pair(search, i, j):
     load_frame(pair, search.pose.turn, (d[0] / far, d[1] / far, d[2] / far))
     load_models(pair, a, i, b, j, search.pose)
     if far + search.errors.point + node_of(a, i).away + node_of(b, j).away < state.upper:
-        place_on_patches(search, i, j)
-        patch_a, patch_b = links_of(a, i).patch, links_of(b, j).patch
-        load_places(search, patch_of(a, patch_a).node, patch_of(b, patch_b).node)
-        take_points(search, patch_a, patch_b, math.sqrt(vector_dot(search.w, D, D)))
+        take_from_nodes(search, i, j)
     pair.z[0], pair.z[1], pair.z[2], pair.z[3] = z
     return max(bound, proven_bound(search, i, j))
 

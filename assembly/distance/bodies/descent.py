@@ -243,10 +243,30 @@ def place_on_patches(search, i, j):
 
 
 @kernel(inner=True)
-def descend_from_nodes(search, i, j):
-    """A local minimum of the whole patches of two nodes, from PLACE of these."""
+def take_from_nodes(search, i, j):
+    """Keep the points at PLACE of two nodes if they are the nearest known."""
+    patch_a, patch_b = links_of(search.a, i).patch, links_of(search.b, j).patch
     place_on_patches(search, i, j)
-    descend_on_patches(search, links_of(search.a, i).patch, links_of(search.b, j).patch)
+    load_places(search, patch_of(search.a, patch_a).node, patch_of(search.b, patch_b).node)
+    take_points(search, patch_a, patch_b, math.sqrt(vector_dot(search.w, D, D)))
+
+
+@kernel(inner=True)
+def descend_from_nodes(search, i, j):
+    """A local minimum of the whole patches of two nodes, from PLACE of these.
+
+    Where it may be outside of their faces, and is not the nearest known, one on the nodes as well.
+    """
+    state, x = body_search_at(search.state, 0), patch_work_at(search.w, 0).place
+    patch_a, patch_b = links_of(search.a, i).patch, links_of(search.b, j).patch
+    start, upper = (x[0], x[1], x[2], x[3]), state.upper
+    place_on_patches(search, i, j)
+    descend_on_patches(search, patch_a, patch_b)
+    trimmed = patch_of(search.a, patch_a).trim != NONE or patch_of(search.b, patch_b).trim != NONE
+    if trimmed and state.upper == upper:
+        x[0], x[1], x[2], x[3] = start
+        descend(search, i, j)
+        take_from_nodes(search, i, j)
 
 
 @kernel(inline=True)

@@ -40,7 +40,7 @@ from assembly.kinematics.motion import relative_pose, rotation
 # Halvings after which a node is let go.
 DEEPEST = 50
 _START_DEPTH = 3
-# Pairs taken from the heap before the first descent from one; the next ones are at every doubling.
+# Pairs taken from the heap before the first descent from one; the next ones come after more and more.
 _FIRST_DESCENT = 16.0
 # A group is split before a part of a patch that is not so many times as long.
 _GROUP_WEIGHT = 2.0
@@ -116,7 +116,7 @@ def branch(search, key, i, j):
     state.popped += 1.0
     if state.popped >= state.next_descent and not (is_group(a, i) or is_group(b, j)):
         # Bounds wait for a nearer pair of points: look where they are least.
-        state.next_descent *= 2.0
+        state.next_descent += _FIRST_DESCENT + state.popped / 16.0
         x = patch_work_at(search.w, 0).place
         x[0] = x[1] = x[2] = x[3] = 0.5
         descend_from_nodes(search, i, j)
