@@ -11,7 +11,6 @@ from assembly.distance.bodies.packing import KeptTree, tree_of
 from assembly.distance.bodies.query import Spot, place_of_spot
 from assembly.errors import InputError
 from assembly.geometry.faces.face import Face
-from assembly.geometry.faces.smooth_faces import has_creases
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.topology import Edge, Topology
 from assembly.proximity.features.features import Feature, features_of
@@ -22,12 +21,9 @@ Array = NDArray[np.float64]
 Faces = tuple[Face, ...]
 
 
-@lru_cache(maxsize=256)
 def body_faces(faces: Faces) -> Faces:
-    """The faces of a body as its topology has them: cut where others end, and along creases."""
-    if len(faces) == 1 and not has_creases(faces[0]):
-        return faces
-    return solid_of(faces).faces
+    """The faces of a body's tree: one as it is, several as their topology has them, cut where others end."""
+    return faces if len(faces) == 1 else solid_of(faces).faces
 
 
 @lru_cache(maxsize=256)
@@ -58,17 +54,29 @@ def shells_of(faces: Faces) -> tuple[Faces, ...]:
 
 
 def _parameters(faces: Faces, spot: Spot) -> tuple[int, float, float]:
-    """The face on which a point is, and its (u, v)."""
+    """The face of the topology on which a point is, and its (u, v)."""
     place = place_of_spot(body_tree(faces), spot)
     if place.curve < 0:
-        return place.face, *place.parameters
+        return _smooth_part(faces, place.face, *place.parameters), *place.parameters
     face = body_faces(faces)[place.face]
     u, v = face.boundary[place.curve].evaluate(place.parameters[0]).tolist()
     for axis, x in enumerate((u, v)):
         low, high = face.surface.domain[axis]
         if not face.surface.closed[axis]:
             u, v = (min(max(x, low), high), v) if axis == 0 else (u, min(max(x, low), high))
-    return place.face, u, v
+    return _smooth_part(faces, place.face, u, v), u, v
+
+
+def _smooth_part(faces: Faces, number: int, u: float, v: float) -> int:
+    """The part of a face on which a point is: the topology has one face as several if it has creases."""
+    parts = solid_of(faces).faces
+    if len(faces) > 1 or len(parts) == 1:
+        return number
+    for k, part in enumerate(parts):
+        (low_u, high_u), (low_v, high_v) = part.surface.domain
+        if low_u <= u <= high_u and low_v <= v <= high_v and (not part.boundary or bool(part.contains(u, v))):
+            return k
+    return number
 
 
 def _edge_at(topology: Topology, face: int, u: float, v: float) -> tuple[Edge, int, float] | None:

@@ -142,6 +142,22 @@ def test_features_of_boxes():
     assert "right" in name
 
 
+def test_a_crease_of_one_face_is_an_edge():
+    """A roof of one surface: two planes that meet over x = 0."""
+    ridge = np.array(
+        [
+            [[-1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]],
+            [[0.0, -1.0, 1.0], [0.0, 1.0, 1.0]],
+            [[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]],
+        ]
+    )
+    roof = asm.NurbsSurface(ridge, ([0.0, 0.0, 1.0, 2.0, 2.0], [0.0, 0.0, 1.0, 1.0]), (1, 1))
+    ball = SHAPES.sphere(0.25)
+    check(roof, ball, (None, at(0.0, 0.2, 2.0)), 0.75, features=("edge", "face"))
+    faces = [distance(roof, ball, poses=(None, at(x, 0.2, 1.5))).features[0] for x in (-1.0, 1.0)]
+    assert [feature.kind for feature in faces] == ["face", "face"] and faces[0] != faces[1]
+
+
 def test_a_pin_in_its_bore():
     plate, pin = SHAPES.plate(2.0, 2.0, 1.0, [(0.0, 0.0, 0.5)]), SHAPES.solid_cylinder(0.4, 2.0)
     check(plate, pin, (None, at(0.0)), 0.1)
