@@ -15,7 +15,7 @@ from assembly._newton import damped_newton
 from assembly._record import Store, record_dtype, record_view, size_of
 from assembly.distance.bodies.nodes import links_of, node_of, patch_of
 from assembly.distance.bodies.pair import pair_work_at
-from assembly.distance.bodies.records import NONE, patch_span_at
+from assembly.distance.bodies.records import NONE, body_head_at, patch_span_at
 from assembly.distance.patches.newton import fill_basis, newton_direction
 from assembly.distance.patches.pair import (
     BASIS,
@@ -30,7 +30,7 @@ from assembly.distance.patches.pair import (
 from assembly.distance.piece_search import bound_to_beat
 from assembly.geometry.faces.trim import trim_side
 from assembly.geometry.splines.bezier_pieces import UNIT
-from assembly.geometry.vec import matvec
+from assembly.geometry.vec import dot, matvec, matvec_t, sub
 
 # What rounding can do to this pair of bodies at this pose. slack: of sums of coordinates; point: of the difference of
 # two evaluated points; slope: of an evaluated first derivative; step: bounds closer than this are equal.
@@ -252,10 +252,39 @@ def take_from_nodes(search, i, j):
 
 
 @kernel(inner=True)
+def nearest_boundary(tree, face, point):
+    """The part of the boundary of a face whose ball is nearest to a point, from the center of the body; its patch."""
+    best, least = NONE, math.inf
+    for k in range(int(body_head_at(tree.pool, 0).patches)):
+        patch = patch_of(tree, k)
+        if patch.curve != NONE and patch.face == face:
+            node = node_of(tree, patch.node)
+            apart = sub(node.middle, point)
+            far = math.sqrt(dot(apart, apart)) - node.radius
+            if far < least:
+                best, least = k, far
+    return best
+
+
+@kernel(inner=True)
+def descend_on_boundary(search, patch_a, patch_b):
+    """From the places in hand, of two whole patches, to a local minimum on the boundary of what is trimmed."""
+    a, b, state, x = search.a, search.b, body_search_at(search.state, 0), patch_work_at(search.w, 0).place
+    on_b = matvec_t(search.pose.turn, sub(state.on_b, search.pose.shift))
+    if patch_of(a, patch_a).trim != NONE and not is_on_face(a, patch_a, x[0], x[1]):
+        patch_a = nearest_boundary(a, patch_of(a, patch_a).face, state.on_a)
+        x[0] = x[1] = 0.5
+    if patch_of(b, patch_b).trim != NONE and not is_on_face(b, patch_b, x[2], x[3]):
+        patch_b = nearest_boundary(b, patch_of(b, patch_b).face, on_b)
+        x[2] = x[3] = 0.5
+    descend_on_patches(search, patch_a, patch_b)
+
+
+@kernel(inner=True)
 def descend_from_nodes(search, i, j):
     """A local minimum of the whole patches of two nodes, from PLACE of these.
 
-    Where it may be outside of their faces, and is not the nearest known, one on the nodes as well.
+    Where it may be outside of their faces, and is not the nearest known, one on their boundary and one on the nodes.
     """
     state, x = body_search_at(search.state, 0), patch_work_at(search.w, 0).place
     patch_a, patch_b = links_of(search.a, i).patch, links_of(search.b, j).patch
@@ -264,6 +293,7 @@ def descend_from_nodes(search, i, j):
     descend_on_patches(search, patch_a, patch_b)
     trimmed = patch_of(search.a, patch_a).trim != NONE or patch_of(search.b, patch_b).trim != NONE
     if trimmed and state.upper == upper:
+        descend_on_boundary(search, patch_a, patch_b)
         x[0], x[1], x[2], x[3] = start
         descend(search, i, j)
         take_from_nodes(search, i, j)
