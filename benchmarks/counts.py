@@ -36,6 +36,7 @@ PLAIN: dict[str, tuple[str, ...]] = {
         "distance.curves.search.pair_bound",
         "distance.curves.squared_distance.least_quotient",
         "distance.enclosures.search.pair_bound",
+        "distance.bodies.search.pair_bound",
         "distance.patches.search.pair_bound",
         "distance.batch.filter.is_apart",
         "proximity.features.global_search.node_bound",

@@ -35,6 +35,7 @@ __all__ = ["compared", "from_pairs", "quick_answer", "spline_distance", "surface
 Array = NDArray[np.float64]
 # Tolerance, clearance (below zero: none), budget and polish, as kernels take them.
 Question = tuple[float, float, int, bool]
+_WHERE_THEY_ARE = np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]] * 2)
 # By the number a kernel returns.
 _DISTANCE = (
     SeparationStatus.CONVERGED,
@@ -132,8 +133,24 @@ def _patches(shape: Any) -> tuple[NDArray[np.int64], Array, Formula | None]:
     return kept
 
 
+def _surfaces_apart(a: NurbsSurface, b: NurbsSurface, question: Question) -> Separation:
+    """The answer for two surfaces: bodies of one face each, where they are."""
+    from assembly.distance.bodies.packing import tree_of
+    from assembly.distance.bodies.query import bodies_apart, place_of_spot
+    from assembly.geometry.faces.face import whole_face
+
+    tolerance, clearance, budget, _polish = question
+    trees = tree_of((whole_face(a),)), tree_of((whole_face(b),))
+    found = bodies_apart(*trees, _WHERE_THEY_ARE, tolerance, budget, clearance)
+    parameters = np.array([place_of_spot(trees[side], found.spot(side)).parameters for side in range(2)])
+    status = _status(a, b, found.status, np.array([found.lower, found.upper]), question)
+    return Separation(found.lower, found.upper, parameters.ravel(), found.points, status, found.pairs)
+
+
 def surface_distance(a: Any, b: Any, question: Question) -> Separation:
     """The answer where one is a surface, which goes first, and the other no hull."""
+    if isinstance(a, NurbsSurface) and isinstance(b, NurbsSurface) and question[3]:
+        return _surfaces_apart(a, b, question)
     out = np.empty(PATCH_ANSWER)
     swap = not isinstance(a, NurbsSurface)
     first, second = (b, a) if swap else (a, b)

@@ -38,6 +38,9 @@ if TYPE_CHECKING:
     from assembly.proximity.extrema.pairs import extremal_pair as extremal_pair
     from assembly.proximity.extrema.pairs import gap_gradient as gap_gradient
     from assembly.proximity.extrema.pairs import gap_hessian as gap_hessian
+    from assembly.proximity.features.body_distance import BodyDistance as BodyDistance
+    from assembly.proximity.features.body_distance import DistanceStatus as DistanceStatus
+    from assembly.proximity.features.body_distance import distance as distance
     from assembly.proximity.features.features import Feature as Feature
     from assembly.proximity.features.features import FeaturePair as FeaturePair
     from assembly.proximity.features.features import FeatureStatus as FeatureStatus
@@ -64,6 +67,9 @@ else:
             "curve_gap_gradient": "assembly.proximity.extrema.curve_curve",
             "curve_gap_hessian": "assembly.proximity.extrema.curve_curve",
             "extremal_curve_pair": "assembly.proximity.extrema.curve_curve",
+            "BodyDistance": "assembly.proximity.features.body_distance",
+            "DistanceStatus": "assembly.proximity.features.body_distance",
+            "distance": "assembly.proximity.features.body_distance",
             "Feature": "assembly.proximity.features.features",
             "FeaturePair": "assembly.proximity.features.features",
             "FeatureStatus": "assembly.proximity.features.features",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +22,7 @@ from assembly.geometry.splines.derivative_bounds import derivative_bounds
 from assembly.geometry.splines.evaluate import SIGN
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["BoundaryPoint", "Face"]
+__all__ = ["BoundaryPoint", "Face", "whole_face"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,3 +280,9 @@ class Face:
         record = record.copy()
         record[SIGN] = -1
         return record, pool
+
+
+@lru_cache(maxsize=256)
+def whole_face(surface: NurbsSurface) -> Face:
+    """All of a surface as a face, the same whenever it is asked for: what is known of it is kept with it."""
+    return Face(surface)

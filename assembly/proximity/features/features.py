@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._copies import OwnState
 from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, check_coordinates, number
-from assembly.geometry.faces.face import Face
+from assembly.geometry.faces.face import Face, whole_face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
 from assembly.kinematics.pose import IDENTITY_ROW, pose_row
@@ -38,7 +38,17 @@ from assembly.proximity.features.nearest_query import (
 )
 from assembly.proximity.features.touching import flush_ways
 
-__all__ = ["Feature", "FeaturePair", "FeatureStatus", "FeatureTracker", "closest_features", "nearest_features"]
+__all__ = [
+    "Feature",
+    "FeaturePair",
+    "FeatureStatus",
+    "FeatureTracker",
+    "closest_features",
+    "faces_of",
+    "features_of",
+    "nearest_features",
+    "pose_of",
+]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -111,13 +121,8 @@ class FeaturePair(ReadOnlyArrays):
     status: FeatureStatus
 
 
-@lru_cache(maxsize=256)
-def _face_of(surface: NurbsSurface) -> Face:
-    return Face(surface)
-
-
-def _faces(name: str, shape: Shape) -> Faces:
-    """The faces of a shape."""
+def faces_of(name: str, shape: Shape) -> Faces:
+    """The faces of a shape that is an argument of this name."""
     if isinstance(shape, Body):
         if not shape.faces:
             raise InputError(f"{name} is {shape!r}, a body without a shape; expected one with faces")
@@ -125,7 +130,7 @@ def _faces(name: str, shape: Shape) -> Faces:
     if isinstance(shape, BodyFace):
         return (shape.face,)
     if isinstance(shape, NurbsSurface):
-        return (_face_of(shape),)
+        return (whole_face(shape),)
     if isinstance(shape, Face):
         return (shape,)
     if not isinstance(shape, Iterable):
@@ -134,13 +139,14 @@ def _faces(name: str, shape: Shape) -> Faces:
     for k, part in enumerate(shape):
         if not isinstance(part, (Face, NurbsSurface)):
             raise TypeError(f"{name}[{k}] is {part!r}; expected a Face or a NurbsSurface")
-        faces.append(part if isinstance(part, Face) else _face_of(part))
+        faces.append(part if isinstance(part, Face) else whole_face(part))
     if not faces:
         raise InputError(f"{name} is empty; expected at least one face")
     return tuple(faces)
 
 
-def _pose(name: str, shape: Shape, q: ArrayLike | None) -> Array:
+def pose_of(name: str, shape: Shape, q: ArrayLike | None) -> Array:
+    """The pose of a shape (7,), an argument of this name: the body's own, or none, where it is not given."""
     if q is None:
         if isinstance(shape, BodyFace):
             shape = shape.body
@@ -245,8 +251,8 @@ def closest_features(
     which is decided by how much curvatures change over it. The point of `FeatureStatus.APART` is that nothing else
     ends the search.
     """
-    faces = _faces("a", a), _faces("b", b)
-    q = np.stack([_pose("q_a", a, q_a), _pose("q_b", b, q_b)])
+    faces = faces_of("a", a), faces_of("b", b)
+    q = np.stack([pose_of("q_a", a, q_a), pose_of("q_b", b, q_b)])
     if not 0.0 <= number("touching", touching) <= 1e-3:
         raise InputError(f"touching is {touching:g}; expected a number from 0 to 0.001")
     pair = _closest(faces, q)
@@ -268,8 +274,8 @@ def nearest_features(a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: Arra
     InputError, TypeError
         As those of `closest_features`.
     """
-    faces = _faces("a", a), _faces("b", b)
-    q = np.stack([_pose("q_a", a, q_a), _pose("q_b", b, q_b)])
+    faces = faces_of("a", a), faces_of("b", b)
+    q = np.stack([pose_of("q_a", a, q_a), pose_of("q_b", b, q_b)])
     codes, out = np.zeros(2, dtype=np.int64), np.empty(PAIR)
     table, pool, shells, size = _packed(*faces)
     status = _STATUSES[find_nearest(table, pool, shells, q, size, codes, out)]
@@ -316,7 +322,7 @@ class FeatureTracker(OwnState):
 
     def __init__(self, a: Shape, b: Shape) -> None:
         self._shapes = a, b
-        faces = _faces("a", a), _faces("b", b)
+        faces = faces_of("a", a), faces_of("b", b)
         self._packed = _packed(*faces)
         self._names = features_of(faces[0]), features_of(faces[1])
         self._q = np.empty((2, 7))
@@ -341,8 +347,8 @@ class FeatureTracker(OwnState):
         InputError
             Wrong poses.
         """
-        self._q[0] = _pose("q_a", self._shapes[0], q_a)
-        self._q[1] = _pose("q_b", self._shapes[1], q_b)
+        self._q[0] = pose_of("q_a", self._shapes[0], q_a)
+        self._q[1] = pose_of("q_b", self._shapes[1], q_b)
         status = None
         if self.searches:
             table, pool, shells, size = self._packed

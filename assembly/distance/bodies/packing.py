@@ -1,0 +1,194 @@
+"""The tree of a body: packed once from its faces, kept, and grown by searches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from math import comb
+from threading import RLock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._record import place_of, size_of
+from assembly.distance.bodies.boundary_patches import boundary_patches
+from assembly.distance.bodies.elementary import spine_row
+from assembly.distance.bodies.nodes import plant_tree
+from assembly.distance.bodies.patch_blocks import PatchBlock, patches_of
+from assembly.distance.bodies.records import (
+    BODY_HEAD,
+    LINKS,
+    NODE,
+    NONE,
+    PATCH,
+    PATCH_SIZE,
+    SPAN,
+    USED,
+    tree_state_at,
+)
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.bezier_packing import degree_tables
+from assembly.geometry.splines.bezier_pieces import UNIT
+
+__all__ = ["KeptTree", "tree_of"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Arrays = tuple[Ints, Array, Ints, Array, Array]
+_HEAD = size_of(BODY_HEAD)
+_PATCH_FIELDS: tuple[str, ...] = PATCH.names or ()
+_SPAN_AT, _NET_AT, _FACE_AT = (place_of(PATCH, name) for name in ("span", "net", "face"))
+# Nodes for which there is room at first, beside the whole patches.
+_SPARE = 256
+
+
+@dataclass(eq=False)
+class KeptTree:
+    """The tree of a body, as kernels read it, and who is at it.
+
+    Attributes
+    ----------
+    arrays
+        Table, pool, links, nodes and nets (`records.BodyTree`).
+    degree : int
+        The largest degree of a patch in one direction.
+    faces : (patches, 2)
+        Numbers of the face and of the boundary curve of each patch.
+    spans : (patches, 4)
+        Low u, high u, low v, high v of each patch on its surface; of a boundary curve its t, and 0 to 1.
+    lock
+        Searches make nodes: one at a time.
+    """
+
+    arrays: Arrays
+    degree: int
+    faces: Ints
+    spans: Array
+    lock: RLock = field(default_factory=RLock)
+
+    def make_room(self, halvings: int) -> None:
+        """Room for as many halvings, and twice as many nodes where there is none."""
+        table, pool, links, nodes, nets = self.arrays
+        # TREE_STATE, which a record would take longer to read.
+        count, used_nets = links[:USED].tolist()
+        needed = 14 * (self.degree + 1) ** 2 * halvings
+        if (count + 2 * halvings) * NODE <= nodes.size and used_nets + needed <= nets.size:
+            return
+        more_links = np.empty(2 * links.size, dtype=np.int64)
+        more_nodes, more_nets = np.empty(2 * nodes.size), np.empty(2 * nets.size + needed)
+        used, at = USED + LINKS * count, NODE * count
+        more_links[:used], more_nodes[:at] = links[:used], nodes[:at]
+        more_nets[:used_nets] = nets[:used_nets]
+        self.arrays = table, pool, more_links, more_nodes, more_nets
+
+
+@cache
+def _tables(degree: int) -> Array:
+    """Value and derivatives of the Bernstein polynomials at 1/2, and factors C(n, k - s) C(2, s) / C(n + 2, k)."""
+    n = degree
+    times = np.zeros((n + 3, 3))
+    for k in range(n + 3):
+        for s in range(3):
+            if 0 <= k - s <= n:
+                times[k, s] = comb(n, k - s) * comb(2, s) / comb(n + 2, k)
+    return np.concatenate([degree_tables(n)[3 * (n + 1) : 6 * (n + 1)], times.ravel()])
+
+
+@lru_cache(maxsize=256)
+def tree_of(faces: tuple[Face, ...]) -> KeptTree:
+    """The tree of a body with these faces."""
+    boxes = [face.surface.bounding_box() for face in faces]
+    low, high = np.minimum.reduce([box[0] for box in boxes]), np.maximum.reduce([box[1] for box in boxes])
+    center = 0.5 * low + 0.5 * high
+    blocks = [patches_of(face, number, center) for number, face in enumerate(faces)]
+    blocks += [curves for block in blocks if block.trimmed for curves in boundary_patches(faces[block.face], block)]
+    return _planted(faces, blocks, center, 0.5 * (high - low))
+
+
+def _planted(faces: Sequence[Face], blocks: list[PatchBlock], center: Array, half: Array) -> KeptTree:
+    """The tree of all patches."""
+    count = sum(len(block.nets) for block in blocks)
+    table, pool = _static(faces, blocks, count)
+    pool[:_HEAD] = _head(blocks, count, center, half)
+    doubles = 7 * max(block.nets[0, ..., 0].size for block in blocks)
+    used = sum(7 * block.nets[..., 0].size for block in blocks)
+    nets = np.empty(used + _SPARE * doubles)
+    starts = table[: PATCH_SIZE * count].reshape(-1, PATCH_SIZE)[:, _NET_AT]
+    first = place = 0
+    for block in blocks:
+        n, points = len(block.nets), block.nets[0, ..., 0].size
+        end = place + 7 * n * points
+        nets[place:end].reshape(n, -1)[:, : 4 * points] = block.nets.reshape(n, -1)
+        starts[first : first + n] = np.arange(place, end, 7 * points)
+        first, place = first + n, end
+    room = 3 * count + _SPARE
+    links, nodes = np.empty(USED + LINKS * room, dtype=np.int64), np.empty(NODE * room)
+    tree_state_at(links, 0).nets = used
+    plant_tree((table, links), (pool, nodes, nets), np.empty(5 * count, dtype=np.int64))
+    of_faces = table[: PATCH_SIZE * count].reshape(-1, PATCH_SIZE)[:, _FACE_AT : _FACE_AT + 2]
+    spans = np.concatenate([block.spans for block in blocks])
+    return KeptTree((table, pool, links, nodes, nets), max(max(block.degree) for block in blocks), of_faces, spans)
+
+
+def _head(blocks: list[PatchBlock], count: int, center: Array, half: Array) -> list[float]:
+    """A BODY_HEAD as its doubles."""
+    # Control points of boundary curves may be outside of the box of the faces. No weight is above one.
+    curves = [block.nets[..., :3] / block.nets[..., 3:] for block in blocks if block.curve != NONE]
+    farthest = max((float((points**2).sum(axis=-1).max()) for points in curves), default=0.0)
+    lightest = min(float(block.nets[..., 3].min()) for block in blocks)
+    values: dict[str, list[float]] = {
+        "reach": [max(float(np.linalg.norm(half)), farthest**0.5) * (1.0 + 8.0 * UNIT)],
+        "error": [max(block.error for block in blocks)],
+        "weight_ratio": [(1.0 + 4.0 * UNIT) / lightest],
+        "rational": [float(lightest != 1.0)],
+        "patches": [count],
+        "degree": [max(sum(block.degree) for block in blocks)],
+        "center": center.tolist(),
+        "half": (half * (1.0 + 8.0 * UNIT)).tolist(),
+    }
+    return [x for name in BODY_HEAD.names or () for x in values[name]]
+
+
+def _patch_row(**fields: int) -> list[int]:
+    """A PATCH as its integers; what is not given is NONE."""
+    return [fields.get(name, NONE) for name in _PATCH_FIELDS]
+
+
+def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int) -> tuple[Ints, Array]:
+    """Table and pool: what is told of patches, tables of their degrees, spines and trims."""
+    degrees = sorted({degree for block in blocks for degree in block.degree})
+    tables = [_tables(degree) for degree in degrees]
+    spans = np.concatenate([block.spans for block in blocks]).ravel()
+    parts = [np.zeros(_HEAD), *tables, spans]
+    at = dict(zip(degrees, np.cumsum([_HEAD, *(part.size for part in tables)]).tolist(), strict=False))
+    span_at = _HEAD + sum(part.size for part in tables)
+    pool_at = span_at + spans.size
+    table = np.empty((count, PATCH_SIZE), dtype=np.int64)
+    more: list[Ints] = []
+    table_at, first = table.size, 0
+    spine_of_face: dict[int, int] = {}
+    for block in blocks:
+        trim = NONE
+        # A curve lies on what its face is.
+        place = NONE if block.curve == NONE else spine_of_face.get(block.face, NONE)
+        if (spine := spine_row(block)) is not None:
+            place = pool_at
+            parts.append(spine)
+            pool_at += spine.size
+            if block.curve == NONE:
+                spine_of_face[block.face] = place
+        if block.trimmed:
+            trim = table_at
+            trim_table, trim_pool = faces[block.face].packed_trim(table_at, pool_at)
+            more.append(trim_table)
+            parts.append(trim_pool)
+            table_at, pool_at = table_at + trim_table.size, pool_at + trim_pool.size
+        p, q = block.degree
+        table[first : first + len(block.nets)] = _patch_row(
+            degree_u=p, degree_v=q, face=block.face, curve=block.curve, sign=block.sign,
+            tables_u=at[p], tables_v=at[q], trim=trim, spine=place,
+        )  # fmt: skip
+        first += len(block.nets)
+    table[:, _SPAN_AT] = span_at + SPAN * np.arange(count)
+    return np.concatenate([table.ravel(), *more]), np.concatenate(parts)

@@ -1,0 +1,235 @@
+"""Certified distance of two posed bodies: best-first branch and bound over pairs of nodes of their trees.
+
+U is the distance of the nearest points known; a pair is let go once its bound is within the tolerance of U, or its only
+minimum is known. The least bound of all pairs that wait and that were let go is a lower bound at any time, so that a
+search may end whenever its caller likes. Halves that it makes stay with the bodies.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._best_first import NO_PAIRS, Pairs, best_first
+from assembly._heap import PAIR, waiting_pair_at
+from assembly._kernel import kernel
+from assembly.distance.bodies.answer import write_facing, write_points
+from assembly.distance.bodies.bounding import bound_patches
+from assembly.distance.bodies.descent import (
+    BodyErrors,
+    BodyQuestion,
+    BodySearch,
+    body_search_at,
+    descend_from_nodes,
+    descend_on_patches,
+)
+from assembly.distance.bodies.directions import packed_way, unpacked_way
+from assembly.distance.bodies.nodes import halves_of, has_room, is_group, links_of, node_of, node_size, patch_of
+from assembly.distance.bodies.pair import (
+    BodyPose,
+    ball_bound,
+)
+from assembly.distance.bodies.records import NONE, BodyTree, body_head_at
+from assembly.distance.bodies.spines import norm, spine_bound
+from assembly.distance.bodies.trims import is_outside
+from assembly.distance.patches.pair import patch_work_at
+from assembly.distance.piece_search import CROWDED, ended
+from assembly.geometry.splines.bezier_pieces import UNIT
+from assembly.geometry.vec import add, matvec, sub
+from assembly.kinematics.motion import relative_pose, rotation
+
+# Halvings after which a node is let go.
+DEEPEST = 50
+_START_DEPTH = 3
+# Pairs taken from the heap before the first descent from one; the next ones come after more and more.
+_FIRST_DESCENT = 16.0
+# A group is split before a part of a patch that is not so many times as long.
+_GROUP_WEIGHT = 2.0
+
+
+@kernel(inline=True)
+def errors_of(a, b, pose, question):
+    """Sums of coordinates, evaluated points and derivatives: parts of the sizes, by the degrees."""
+    head_a, head_b = body_head_at(a.pool, 0), body_head_at(b.pool, 0)
+    slack = 64.0 * UNIT * (head_a.reach + head_b.reach + norm(pose.shift)) + pose.rounding + 1e-150
+    point = slack
+    point += (1.0 + head_a.rational) * (8.0 * head_a.degree + 24.0) * UNIT * head_a.reach
+    point += (1.0 + head_b.rational) * (8.0 * head_b.degree + 24.0) * UNIT * head_b.reach
+    m, n = head_a.degree + 1.0, head_b.degree + 1.0
+    slope = max(
+        m * (4.0 * m + 12.0) * head_a.reach * head_a.weight_ratio**2,
+        n * (4.0 * n + 12.0) * head_b.reach * head_b.weight_ratio**2,
+    )
+    # What halving costs, and the least doubt of a model: bounds come no nearer to each other than that.
+    rough = 120.0 * (head_a.degree + 2.0) * UNIT * head_a.reach + 120.0 * (head_b.degree + 2.0) * UNIT * head_b.reach
+    step = max(0.999 * question.tolerance, 4.0 * (point + head_a.error + head_b.error) + rough)
+    return BodyErrors(slack, point, 8.0 * UNIT * slope, step)
+
+
+@kernel(inline=True)
+def pair_bound(search, i, j):
+    """Lower bound of the distance of two nodes, and its direction."""
+    a, b, state = search.a, search.b, body_search_at(search.state, 0)
+    state.pairs += 1.0
+    way = (state.key_way[0], state.key_way[1], state.key_way[2])
+    key = state.key
+    bound = max(key, ball_bound(a, i, b, j, search.pose, search.errors.slack))
+    if bound < state.limit and (is_outside(a, i) or is_outside(b, j)):
+        bound = math.inf
+    if bound < state.limit and links_of(a, i).spine != NONE and links_of(b, j).spine != NONE:
+        bound = max(bound, spine_bound(a, links_of(a, i).spine, b, links_of(b, j).spine, search.pose))
+    if bound < state.limit and not (is_group(a, i) or is_group(b, j)):
+        bound = bound_patches(search, i, j, bound)
+    tie = packed_way((state.key_way[0], state.key_way[1], state.key_way[2]))
+    # The other pairs of the same two nodes begin as this one did.
+    state.key = key
+    state.key_way[0], state.key_way[1], state.key_way[2] = way
+    return bound, tie
+
+
+@kernel(inline=True)
+def search_ended(search, top, left):
+    """What the search ends with; -1: not yet. The direction of the pair that is next is taken from its tie."""
+    state = body_search_at(search.state, 0)
+    state.lower = max(min(top, state.upper), 0.0)
+    status = ended(search.question, state.upper, search.errors.step, max(top, 0.0), left, state.pairs)
+    if status >= 0:
+        return status
+    first = waiting_pair_at(search.heap, 0)
+    i, j = int(first.a), int(first.b)
+    if (left + 1) * PAIR > search.heap.size or not (has_room(search.a, i) and has_room(search.b, j)):
+        return CROWDED
+    state.key = first.bound
+    state.key_way[0], state.key_way[1], state.key_way[2] = unpacked_way(first.tie)
+    return -1
+
+
+@kernel(inline=True)
+def size_to_split(tree, k):
+    """How long a node counts: a group has a ball alone, and others are not cut down to its size for that."""
+    return node_size(tree, k) * (_GROUP_WEIGHT if is_group(tree, k) else 1.0)
+
+
+@kernel(inline=True)
+def branch(search, key, i, j):
+    """The halves of the longer of two nodes with the other one; none where the pair is let go."""
+    a, b, state = search.a, search.b, body_search_at(search.state, 0)
+    state.popped += 1.0
+    if state.popped >= state.next_descent and not (is_group(a, i) or is_group(b, j)):
+        # Bounds wait for a nearer pair of points: look where they are least.
+        state.next_descent += _FIRST_DESCENT + state.popped / 16.0
+        x = patch_work_at(search.w, 0).place
+        x[0] = x[1] = x[2] = x[3] = 0.5
+        descend_from_nodes(search, i, j)
+    ends_a, ends_b = links_of(a, i).depth >= DEEPEST, links_of(b, j).depth >= DEEPEST
+    size_a, size_b = size_to_split(a, i), size_to_split(b, j)
+    if (ends_a and ends_b) or max(size_a, size_b) <= 0.25 * search.errors.step:
+        return key, NO_PAIRS
+    if ends_b or (size_a >= size_b and not ends_a):
+        half = halves_of(a, i)
+        return key, Pairs(half, half + 2, j, j + 1)
+    half = halves_of(b, j)
+    return key, Pairs(i, i + 1, half, half + 2)
+
+
+advance = kernel(inner=True)(best_first(body_search_at, pair_bound, search_ended, branch))
+
+
+@kernel(inline=True)
+def middles_apart(search, i, j):
+    """Square of the distance of the middles of two nodes."""
+    node_a, node_b, pose = node_of(search.a, i), node_of(search.b, j), search.pose
+    square = 0.0
+    for r in range(3):
+        x = node_a.middle[r] - pose.shift[r]
+        for c in range(3):
+            x -= pose.turn[3 * r + c] * node_b.middle[c]
+        square += x * x
+    return square
+
+
+@kernel(inner=True)
+def start_from_nearest_middles(search):
+    """Down both trees to the halves whose middles are nearest, then down the slope."""
+    a, b = search.a, search.b
+    i = j = 0
+    while True:
+        more_a = (is_group(a, i) or links_of(a, i).depth < _START_DEPTH) and has_room(a, i)
+        more_b = (is_group(b, j) or links_of(b, j).depth < _START_DEPTH) and has_room(b, j)
+        if not (more_a or more_b):
+            break
+        if more_a and (not more_b or node_size(a, i) >= node_size(b, j)):
+            i = halves_of(a, i)
+            if middles_apart(search, i + 1, j) < middles_apart(search, i, j):
+                i += 1
+        else:
+            j = halves_of(b, j)
+            if middles_apart(search, i, j + 1) < middles_apart(search, i, j):
+                j += 1
+    if not (is_group(a, i) or is_group(b, j)):
+        x = patch_work_at(search.w, 0).place
+        x[0] = x[1] = x[2] = x[3] = 0.5
+        descend_from_nodes(search, i, j)
+
+
+@kernel(inner=True)
+def start_from_corners(search):
+    """Points of patches all of which are of the faces: there are some, for the boundary of a trimmed face is."""
+    state, x = body_search_at(search.state, 0), patch_work_at(search.w, 0).place
+    for i in range(int(body_head_at(search.a.pool, 0).patches)):
+        for j in range(int(body_head_at(search.b.pool, 0).patches)):
+            if patch_of(search.a, i).trim == NONE and patch_of(search.b, j).trim == NONE:
+                x[0] = x[1] = x[2] = x[3] = 0.0
+                descend_on_patches(search, i, j)
+            if state.upper < math.inf:
+                return
+
+
+@kernel(inline=True)
+def relative_pose_of(a, b, q):
+    """b seen from a, both about their centers, from two poses."""
+    turn_a = rotation(q, 0)
+    relative = relative_pose(q, 0, turn_a, 1, rotation(q, 1))
+    center_a, center_b = body_head_at(a.pool, 0).center, body_head_at(b.pool, 0).center
+    shift = sub(add(relative.shift, matvec(relative.rotation, center_b)), center_a)
+    size = norm(relative.shift) + norm(center_a) + norm(center_b)
+    return BodyPose(relative.rotation, shift, 16.0 * UNIT * size)
+
+
+@kernel(inner=True)
+def start(search):
+    """First points of both bodies, and all that is kept of a search."""
+    state = body_search_at(search.state, 0)
+    state.upper = state.limit = state.let_go = math.inf
+    state.lower = state.pairs = state.popped = state.descents = state.key = 0.0
+    state.next_descent = _FIRST_DESCENT
+    state.way[0] = state.way[1] = 0.0
+    state.way[2] = 1.0
+    start_from_nearest_middles(search)
+    if state.upper == math.inf:
+        start_from_corners(search)
+    state.key_way[0], state.key_way[1], state.key_way[2] = state.way[0], state.way[1], state.way[2]
+
+
+_TREE = "Tuple((i8[::1], f8[::1], i8[::1], f8[::1], f8[::1]))"
+
+
+@kernel(signatures=f"({_TREE}, {_TREE}, f8[:, ::1], UniTuple(f8, 3), f8[::1], UniTuple(f8[::1], 4), i8)")
+def search_bodies(a, b, q, asked, heap, work, left):
+    """Bounds of the distance of two bodies at poses q (2, 7) into BODY_SEARCH; a status, and how many pairs wait.
+
+    `asked`: a BodyQuestion; `work`: state, pair, w and room; `left`: how many pairs wait, where a search goes on;
+    below zero where it starts.
+    """
+    tree_a, tree_b = BodyTree(*a), BodyTree(*b)
+    pose = relative_pose_of(tree_a, tree_b, q)
+    question = BodyQuestion(*asked)
+    errors = errors_of(tree_a, tree_b, pose, question)
+    search = BodySearch(tree_a, tree_b, pose, heap, work[0], work[1], work[2], work[3], errors, question)
+    pairs = NO_PAIRS
+    if left < 0:
+        start(search)
+        left, pairs = 0, Pairs(0, 1, 0, 1)
+    status, left = advance(search, left, pairs)
+    write_points(search, q)
+    write_facing(search)
+    return status, left

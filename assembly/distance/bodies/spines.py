@@ -1,0 +1,144 @@
+"""Lower bounds of the distance of elementary surfaces from their centers, axes and circles.
+
+Patches of spheres, cylinders, tori and planes, and lines and circles among boundary curves, lie on surfaces whose
+distance has a closed form where they share a center or an axis, or their axes are parallel. There the nearest points
+are not single ones, and bounds of parts of the patches come to no end; that of the whole surfaces is the distance
+itself.
+
+Where axes are not parallel, or do not coincide where they should, the second surface is turned about its center and
+moved until they are or do; a point of it within h of the center moves by at most 1.5 h s, with s the sine of the angle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+from assembly._kernel import kernel
+from assembly.distance.bodies.records import spine_at
+from assembly.geometry.splines.bezier_pieces import UNIT
+from assembly.geometry.vec import add, cross, dot, matvec, sub
+
+# Kinds, in the order in which a pair of them is looked at.
+SPHERE, CYLINDER, TORUS, PLANE = 1.0, 2.0, 3.0, 4.0
+# An elementary surface, seen from a; see records.SPINE.
+Spine = namedtuple("Spine", "kind center axis radius major half")
+# Where a second one is against a first: along its axis, across it, and how far its points may be off.
+Coaxial = namedtuple("Coaxial", "along beside off")
+
+
+@kernel(inline=True)
+def norm(x):
+    """Length of a vector."""
+    return math.sqrt(dot(x, x))
+
+
+@kernel(inline=True)
+def spine_of(pool, at):
+    """The elementary surface of a patch in its body's coordinates."""
+    s = spine_at(pool, at)
+    center = (s.center[0], s.center[1], s.center[2])
+    return Spine(s.kind, center, (s.axis[0], s.axis[1], s.axis[2]), s.radius, s.major, s.half)
+
+
+@kernel(inline=True)
+def seen_spine(pool, at, pose):
+    """The elementary surface of a patch of b, seen from a."""
+    s = spine_of(pool, at)
+    center = add(matvec(pose.turn, s.center), pose.shift)
+    return Spine(s.kind, center, matvec(pose.turn, s.axis), s.radius, s.major, s.half)
+
+
+@kernel(inline=True)
+def ring_gap(apart, r, s):
+    """Distance of two circles of a plane, or spheres, whose centers are `apart`; not positive where they meet."""
+    return max(apart - r - s, abs(r - s) - apart)
+
+
+@kernel(inline=True)
+def offset_from(s, point):
+    """How far a point is along the axis from the center, and across it from the axis."""
+    d = sub(point, s.center)
+    return dot(d, s.axis), norm(cross(d, s.axis))
+
+
+@kernel(inline=True)
+def of_sphere(ball, s):
+    """A sphere and any elementary surface."""
+    if s.kind == SPHERE:
+        return ring_gap(norm(sub(ball.center, s.center)), ball.radius, s.radius)
+    if s.kind == PLANE:
+        return abs(dot(s.axis, sub(ball.center, s.center))) - ball.radius
+    along, beside = offset_from(s, ball.center)
+    if s.kind == CYLINDER:
+        beyond = max(0.0, abs(along) - s.half)
+        nearest = math.hypot(beside - s.radius, beyond)
+        farthest = math.hypot(beside + s.radius, abs(along) + s.half)
+        return max(nearest - ball.radius, ball.radius - farthest)
+    nearest = abs(math.hypot(beside - s.major, along) - s.radius)
+    farthest = math.hypot(beside + s.major, along) + s.radius
+    return max(nearest - ball.radius, ball.radius - farthest)
+
+
+@kernel(inline=True)
+def of_plane(s, plane):
+    """A cylinder or a torus, and a plane."""
+    n = plane.axis
+    across = norm(cross(n, s.axis))
+    reach = s.half * abs(dot(n, s.axis)) + s.radius * across
+    if s.kind == TORUS:
+        reach = s.major * across + s.radius
+    return abs(dot(n, sub(s.center, plane.center))) - reach
+
+
+@kernel(inline=True)
+def of_planes(s, t):
+    """Two planes, of the second one what is within its half of the center."""
+    return abs(dot(s.axis, sub(t.center, s.center))) - t.half * norm(cross(s.axis, t.axis))
+
+
+@kernel(inline=True)
+def turned_parallel(s, t):
+    """Where t is against s once it is turned about its center until their axes are parallel."""
+    along, beside = offset_from(s, t.center)
+    size = math.hypot(t.half + t.radius, t.major)
+    return Coaxial(along, beside, 1.5 * size * norm(cross(s.axis, t.axis)))
+
+
+@kernel(inline=True)
+def of_cylinders(s, t):
+    """Two cylinders, as if their axes were parallel."""
+    at = turned_parallel(s, t)
+    beyond = max(0.0, abs(at.along) - s.half - t.half)
+    return math.hypot(max(0.0, ring_gap(at.beside, s.radius, t.radius)), beyond) - at.off
+
+
+@kernel(inline=True)
+def of_torus(s, ring):
+    """A cylinder or a torus, and a torus, as if their axes were one."""
+    at = turned_parallel(s, ring)
+    if s.kind == CYLINDER:
+        beyond = max(0.0, abs(at.along) - s.half)
+        gap = math.hypot(s.radius - ring.major, beyond) - ring.radius
+    else:
+        gap = ring_gap(math.hypot(s.major - ring.major, at.along), s.radius, ring.radius)
+    return gap - at.off - at.beside
+
+
+@kernel(inline=True)
+def ordered_gap(s, t):
+    """Lower bound of the distance of two elementary surfaces, the kind of the first not after that of the second."""
+    if s.kind == SPHERE:
+        return of_sphere(s, t)
+    if t.kind == PLANE:
+        return of_plane(s, t) if s.kind != PLANE else of_planes(s, t)
+    return of_torus(s, t) if t.kind == TORUS else of_cylinders(s, t)
+
+
+@kernel(inner=True)
+def spine_bound(a, at_a, b, at_b, pose):
+    """Lower bound of the distance of two patches on elementary surfaces, whose places in their pools are given."""
+    s, t = spine_of(a.pool, at_a), seen_spine(b.pool, at_b, pose)
+    gap = ordered_gap(s, t) if s.kind <= t.kind else ordered_gap(t, s)
+    size = norm(s.center) + norm(t.center) + s.radius + t.radius + s.major + t.major + s.half + t.half
+    return gap - spine_at(a.pool, at_a).off - spine_at(b.pool, at_b).off - 64.0 * UNIT * size - pose.rounding

@@ -1,0 +1,136 @@
+"""Each bound of a pair of nodes by itself against samples, in Python: `python -m tests.distance.bodies.pair_laws 60`.
+
+With NUMBA_DISABLE_JIT=1, for the kernels here are parts of a search and none of them has an entry.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import numpy as np
+
+from assembly.distance.bodies.descent import BodyQuestion, BodySearch, body_search_at
+from assembly.distance.bodies.models import describe_node
+from assembly.distance.bodies.nodes import halves_of, links_of, node_of, patch_of
+from assembly.distance.bodies.one_minimum import proven_bound
+from assembly.distance.bodies.packing import tree_of
+from assembly.distance.bodies.pair import (
+    PAIR_DOUBLES,
+    BodyPose,
+    ball_bound,
+    hull_bound,
+    load_frame,
+    load_models,
+    load_tense,
+    model_bound,
+    pair_work_at,
+)
+from assembly.distance.bodies.query import SEARCH
+from assembly.distance.bodies.records import ALL, GROUP, BodyTree
+from assembly.distance.bodies.search import errors_of
+from assembly.distance.bodies.trims import falls_to_side
+from assembly.geometry.faces.face import Face
+from assembly.geometry.splines.bezier import bernstein
+from tests.distance.bodies.example_shapes import trimmed_faces, wavy
+
+COUNT = 9
+TIGHT = 1e-14
+
+
+def random_node(tree, rng, depth):
+    k = 0
+    while links_of(tree, k).patch == GROUP:
+        k = int(links_of(tree, k).halves + rng.integers(2))
+    for _ in range(depth):
+        k = int(halves_of(tree, k) + rng.integers(2))
+    return k
+
+
+def grid_of(tree, k):
+    """Points of a node."""
+    links = links_of(tree, k)
+    patch = patch_of(tree, links.patch)
+    m, n = int(patch.degree_u) + 1, int(patch.degree_v) + 1
+    net = tree.nets[links.net : links.net + 4 * m * n].reshape(m, n, 4)
+    x = np.linspace(0.0, 1.0, COUNT)
+    s = np.einsum("xi,yj,ijk->xyk", bernstein(m - 1, x), bernstein(n - 1, x), net)
+    return s[..., :3] / s[..., 3:]
+
+
+def sides_hold(p, q, tree_a, i, tree_b, j, of_a):
+    """Whether of each sample of one side the nearest of its row or column is where the node has a side of its own."""
+    squares = ((p[:, :, None, None] - q[None, None]) ** 2).sum(axis=-1)
+    near = squares.min(axis=(2, 3)) if of_a else squares.min(axis=(0, 1))
+    node = node_of(tree_a, i) if of_a else node_of(tree_b, j)
+    falls = []
+    for axis, (low, high) in enumerate(((node.low_u, node.high_u), (node.low_v, node.high_v))):
+        steps = np.diff(near, axis=axis)
+        falls.append((steps > -1e-15).all() and low > 0.0)
+        falls.append((steps < 1e-15).all() and high < 1.0)
+    return any(falls)
+
+
+def main(rounds):
+    rng = np.random.default_rng(0)
+    told = dict.fromkeys(("ball", "hull", "model", "proof", "fall"), 0)
+    for k in range(rounds):
+        if k % 50 == 0:
+            # Their trees are full some time.
+            faces = list(trimmed_faces(rng).values())
+        sheets = (Face(wavy(rng, 1, height=rng.choice([0.3, 1.0]))) for _ in range(2))
+        kinds = [sheet if rng.random() < 0.6 else faces[int(rng.integers(len(faces)))] for sheet in sheets]
+        a, b = (BodyTree(*tree_of((face,)).arrays) for face in kinds)
+        depth = int(rng.integers(0, 11))
+        i, j = random_node(a, rng, depth), random_node(b, rng, depth)
+        room = np.empty(36 + 4 * 40**2)
+        for tree, k in ((a, i), (b, j)):
+            describe_node(tree, k, ALL, room)
+        turn = tuple(np.linalg.qr(rng.standard_normal((3, 3)))[0].ravel())
+        matrix = np.array(turn).reshape(3, 3)
+        gap = rng.standard_normal(3) * 10.0 ** rng.uniform(-3.0, 0.3)
+        shift = np.array(node_of(a, i).middle) - matrix @ np.array(node_of(b, j).middle) + gap
+        pose = BodyPose(turn, tuple(shift), 0.0)
+        p, q = grid_of(a, i), grid_of(b, j) @ matrix.T + shift
+        differences = p.reshape(-1, 1, 3) - q.reshape(1, -1, 3)
+        far = np.linalg.norm(differences, axis=2)
+        least = float(far.min())
+        n = differences.reshape(-1, 3)[far.argmin()]
+        n = n + rng.choice([0.0, 0.3]) * least * rng.standard_normal(3)
+        n = tuple(n / np.linalg.norm(n))
+        question = BodyQuestion(1e-10, -1.0, 0.0)
+        errors = errors_of(a, b, pose, question)
+        block, state = np.zeros(PAIR_DOUBLES), np.zeros(SEARCH)
+        pair = pair_work_at(block, 0)
+        upper = least * rng.choice([0.1, 1.0, 2.0, 10.0])
+        body_search_at(state, 0).upper = upper
+        body_search_at(state, 0).limit = math.inf
+        search = BodySearch(a, b, pose, None, state, block, np.zeros(400), room, errors, question)
+        load_frame(pair, turn, n)
+        load_models(pair, a, i, b, j, pose)
+        tension = load_tense(pair, upper).tension
+        bounds = {
+            "ball": ball_bound(a, i, b, j, pose, errors.slack),
+            "hull": hull_bound(pair, a, i, b, j, pose, errors.slack),
+            "model": model_bound(pair, a, i, b, j, upper, errors.slack),
+            "proof": proven_bound(search, i, j),
+        }
+        for name, bound in bounds.items():
+            assert bound <= least + TIGHT, (name, bound, least, depth)
+            told[name] += bound > 0.0
+        # The quadratic and the only minimum bound Phi, which is sharper.
+        along = differences @ np.array(n)
+        phi = along + tension * ((differences**2).sum(axis=2) - along**2)
+        for name in ("model", "proof"):
+            assert bounds[name] <= float(phi.min()) + TIGHT * (1.0 + tension), (name, bounds[name], phi.min(), depth)
+            assert bounds[name] * tension <= 0.5
+        for of_a in (True, False):
+            if falls_to_side(pair, a, i, b, j, of_a, errors.slack):
+                told["fall"] += 1
+                assert sides_hold(p, q, a, i, b, j, of_a)
+    print(told)
+    assert all(count > 0.05 * rounds for count in told.values()), told
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))
