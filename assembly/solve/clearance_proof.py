@@ -29,11 +29,13 @@ from assembly.solve.interruption import CTRL_C
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
 
-__all__ = ["PairAnswer", "lent_proof", "near_contacts", "new_proof", "opening_move", "prove_end"]
+__all__ = ["PairAnswer", "can_prove", "lent_proof", "near_contacts", "new_proof", "opening_move", "prove_end"]
 
 Array = NDArray[np.float64]
 # Contacts that are open by less than so many times how far a body may be moved are in its way.
 NEAR = 2.0
+# Of smaller scenes, and of larger ones than one over it, nothing is proven: rows alone keep bodies apart.
+LEAST_SIZE = 1e-30
 # Moves that are tried for contacts that no row tells of.
 TRIES = 3
 
@@ -92,9 +94,17 @@ def lent_proof(packed: Packed, bodies: Sequence[Body]) -> Iterator[ClearanceProo
         packed.proofs.append(proof)
 
 
+def can_prove(packed: Packed) -> bool:
+    """Whether a scene has a size at which products of six lengths are numbers that doubles carry."""
+    return LEAST_SIZE < packed.scale < 1.0 / LEAST_SIZE
+
+
 def prove_end(solution: Solution) -> list[PairAnswer]:
     """What is proven at the pose of a solution of all pairs that its clearances keep apart."""
     packed, scene = solution._packed, solution._scene
+    if not can_prove(packed):
+        unknown = Answer(Verdict.UNDECIDED)
+        return [PairAnswer(item.name, (a.name, b.name), unknown, True, False) for item, (a, b), _ in _owned(packed)]
     touching = solution._touching * packed.scale
     with lent_proof(packed, scene.bodies) as proof:
         near = near_contacts(solution, proof, NEAR * touching)

@@ -16,7 +16,7 @@ from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.least_translation import least_translation
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.solve.clearance_proof import lent_proof
+from assembly.solve.clearance_proof import can_prove, lent_proof
 from assembly.solve.interruption import Interruption
 
 if TYPE_CHECKING:
@@ -35,6 +35,8 @@ def parted(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     None where none are stuck at q by more than what is called touching, and where no way apart is found.
     """
     packed = scene.packed()
+    if not can_prove(packed):
+        return None
     moved = q.copy()
     with lent_proof(packed, scene.bodies) as proof:
         for _ in range(ROUNDS):

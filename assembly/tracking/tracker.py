@@ -29,6 +29,7 @@ from assembly.proximity.manager.records import (
     PAIRS,
 )
 from assembly.solve.attempts.attempts import new_workspace
+from assembly.solve.clearance_proof import can_prove
 from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.parameters import ROUNDING
 from assembly.solve.loop.settings import (
@@ -236,7 +237,8 @@ class Tracker(InOneProcess):
         self._pose = self._state[: self._size]
         # Numbers are read from a view in half the time it takes to read them from the array.
         self._view: Any = self._state.data
-        self._clear = ClearTicks(first, self._touching * packed.scale) if packed.clearance_rows else None
+        proves = packed.clearance_rows and can_prove(packed)
+        self._clear = ClearTicks(first, self._touching * packed.scale) if proves else None
         self._before = self._pose.copy()
         self._knobs: Any = self._settings.data
         _, doubles, integers = new_workspace(packed)
