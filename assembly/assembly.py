@@ -264,7 +264,7 @@ class Assembly(Contents):
         """A solution under clearances, STALLED where it is not known that its bodies are clear."""
         from assembly.solve.clearance_proof import prove_end
 
-        if interruption.is_over() or solution._is_lost:
+        if solution._is_lost or (interruption.is_over() and not solution.success):
             return solution
         begin = perf_counter()
         solution._clear = prove_end(solution)

@@ -61,6 +61,8 @@ class Result(ReadOnlyArrays):
         self.restarted = False
         self._fit = fit
         self._clear: list[PairAnswer] = []
+        # Of a tick: whether samples stand for its proof.
+        self._is_sampled = False
         # What bodies may be in each other and still touch, in parts of the scene's size.
         self._touching = Options.touching
         # Flat contacts alone need it again, for the center of their pressure.
@@ -77,7 +79,7 @@ class Result(ReadOnlyArrays):
 
         False at an end that is not SOLVED, and where faces lie on each other and samples stand for the proof.
         """
-        return self.success and all(pair.proved for pair in self._clear)
+        return self.success and not self._is_sampled and all(pair.proved for pair in self._clear)
 
     @property
     def _parameters(self) -> Array:

@@ -55,12 +55,24 @@ class Step(ReadOnlyArrays):
         From the call of `step` to its end.
     events : tuple of Event
         Contacts of clearances that came, went, were handed off or merged in this tick.
+    proved : bool
+        Whether it is proven that bodies which clearances keep apart are clear, or only touch, at the pose and on the
+        way to it. False where the constraints do not hold, and where faces lie on each other and rows stand for it.
+    way_depth : float
+        How deep bodies that touch may be in each other on the way to the pose, at most.
     solution : Solution
         The same pose with all that a solution tells: contacts, multipliers, wrenches of every constraint.
     """
 
     def __init__(
-        self, followed: Followed, state: Array, status: TrackStatus, target: Array, seen: float, seconds: float
+        self,
+        followed: Followed,
+        state: Array,
+        status: TrackStatus,
+        target: Array,
+        seen: float,
+        seconds: float,
+        way_depth: float | None = 0.0,
     ) -> None:
         self._followed = followed
         self._state = state
@@ -68,6 +80,8 @@ class Step(ReadOnlyArrays):
         self.status = status
         self._seen = seen
         self.seconds = seconds
+        self.proved = way_depth is not None and status is not TrackStatus.VIOLATED
+        self.way_depth = 0.0 if way_depth is None else way_depth
 
     @cached_property
     def q(self) -> Array:
@@ -127,7 +141,9 @@ class Step(ReadOnlyArrays):
         status = followed.begun if self.status is TrackStatus.FOLLOWED else Status.ITERATION_LIMIT
         # A solution writes what it tracks; the tracker goes back to the state of its last step.
         state = self._state.copy()
-        return Solution(followed.scene, followed.packed, state, status, self.seconds, np.empty((0, HISTORY)))
+        solution = Solution(followed.scene, followed.packed, state, status, self.seconds, np.empty((0, HISTORY)))
+        solution._is_sampled = not self.proved
+        return solution
 
     def __repr__(self) -> str:
         return f"Step({self.status.name}, feasibility={self.feasibility:.1e}, {1e6 * self.seconds:.0f} us)"

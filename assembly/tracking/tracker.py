@@ -319,7 +319,8 @@ class Tracker(InOneProcess):
             self._seen = view[packed.memory_at + EVENT_COUNT]
         # What steps keep nobody writes to.
         self._before = self._pose.copy()
-        return Step(self._followed, self._before, status, row, seen, perf_counter() - begin)
+        way_depth = 0.0 if self._clear is None else self._clear.way_depth if self._clear.proved else None
+        return Step(self._followed, self._before, status, row, seen, perf_counter() - begin, way_depth)
 
     def _proven(self, status: TrackStatus) -> TrackStatus:
         """The status of a tick, whose pose is that of the last one where bodies are not known to be clear at it."""

@@ -79,6 +79,13 @@ def thickness(forest, k):
     return node.reach if is_wire(forest, k) else node.disc + node.rho
 
 
+@kernel(inline=True)
+def extent(forest, k):
+    """The radius of a ball around the corners of a cell, or around a node: halving makes no wire thinner."""
+    node = node_at(forest.nodes, k)
+    return node.radius - node.rho if is_cell(forest, k) else node.radius
+
+
 @kernel(inner=True)
 def is_halved_first(forest, a, b, short):
     """Of two nodes whose gap is short by so much: whether a is halved, and whether by length or by chord error.
@@ -92,7 +99,7 @@ def is_halved_first(forest, a, b, short):
     if cell_a and cell_b:
         if one.reach + other.reach >= 0.5 * short:
             return one.reach > other.reach, False
-        return one.radius > other.radius, True
+        return extent(forest, a) > extent(forest, b), True
     if round_b and not round_a and (not cell_a or thickness(forest, a) >= 0.25 * short + 2.0 * one.pad):
         return True, False
     if round_a and not round_b and (not cell_b or thickness(forest, b) >= 0.25 * short + 2.0 * other.pad):
@@ -116,7 +123,7 @@ def is_too_long(forest, way, nodes, gaps):
     before, after = gaps
     if not way.swept or not after > 0.0:
         return False
-    small = node_at(forest.nodes, nodes.a).radius + node_at(forest.nodes, nodes.b).radius < way.moved
+    small = extent(forest, nodes.a) + extent(forest, nodes.b) < way.moved
     finer = fineness(forest, nodes.a) + (0.0 if is_round(forest, nodes.b) else fineness(forest, nodes.b))
     return small or (before > 0.0 and finer < sag_of(way, forest, nodes.b) - min(after, before))
 
@@ -179,7 +186,7 @@ def seek(forest, front, way, limits, tail):
             return CROSSING
         if is_too_long(forest, way, nodes, gaps):
             return UNSWEPT
-        small = node_at(forest.nodes, nodes.a).radius + node_at(forest.nodes, nodes.b).radius < limits.resolution
+        small = extent(forest, nodes.a) + extent(forest, nodes.b) < limits.resolution
         if cells and small:
             counts.opened += 1
             keep(front, nodes, n, -math.inf)
@@ -249,8 +256,8 @@ def go_to(forest, front, pose, limits):
 
 
 # What is to be done with a pair: at a pose, with a new front; on the way there, with one that is
-# made at the last pose; at a pose, without going there.
-PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY, ON_WAY_ANEW, ONLY_TRIED = 0, 1, 2, 3, 4, 5
+# made at the last pose.
+PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY, ON_WAY_ANEW = 0, 1, 2, 3, 4
 # What rounding of poses and of sums of coordinates may do to a gap, in parts of these: some thirty roundings.
 ROUNDING = 4e-15
 
@@ -275,10 +282,6 @@ def done_task(forest, front, pose, limits, task):
             counts.fresh = counts.count
         else:
             bring_back(front, kept)
-    if task == ONLY_TRIED:
-        root = node_at(forest.nodes, counts.root_b)
-        way = way_of(last_pose(front), pose, vector(root.center), root.radius, False)
-        return look_only(forest, front, way, limits)
     if task == ON_WAY or task == ON_WAY_ANEW:
         return go_to(forest, front, pose, limits)
     if task == BEGUN_ANEW:

@@ -19,7 +19,6 @@ from assembly.proximity.clearance.look import (
     BEGUN_ANEW,
     ON_WAY,
     ON_WAY_ANEW,
-    ONLY_TRIED,
     PASSED_BY,
     look_at_pairs,
 )
@@ -110,7 +109,7 @@ class ClearanceProof:
         if swept:
             asked = np.where(pair.known == 1.0, np.where(grown, ON_WAY_ANEW, ON_WAY), asked)
         tasks[rows] = asked[rows]
-        self._run(np.ascontiguousarray(q, dtype=float), touching, moved, tasks)
+        self._run(np.array(q, dtype=float), touching, moved, tasks)
         self._begun[rows] = True
         return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
 
@@ -124,7 +123,7 @@ class ClearanceProof:
         if not (self.fronts.pair.known == 1.0).all() or (counts.count > GROWN * counts.fresh + MANY).any():
             return False
         self.fronts.pair.touch = touching
-        look_at_pairs(self.forest.arrays, self.fronts.arrays, q, moves, self._on_way, self._codes)
+        look_at_pairs(self.forest.arrays, self.fronts.arrays, q.copy(), moves, self._on_way, self._codes)
         return not self._codes.any()
 
     def _forget(self) -> None:
@@ -145,7 +144,7 @@ class ClearanceProof:
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         tasks[k] = BEGUN_ANEW
         still = np.zeros((len(self.pairs), 6))
-        self._run(np.ascontiguousarray(q, dtype=float), 0.0, still, tasks)
+        self._run(np.array(q, dtype=float), 0.0, still, tasks)
         found = self._codes[k] == CLEAR and self.nested(k, q, still[k]) is False
         # Gaps of this front are those over another length.
         needed[k], budgets[k], self._begun[k] = before, usual, False
@@ -195,13 +194,6 @@ class ClearanceProof:
         if far > 0.0:
             return Answer(Verdict.TOUCHING, bound - far, far, swept=swept)
         return Answer(Verdict.CLEAR, bound, swept=swept)
-
-    def leaves_open(self, k: int, q: Array, touching: float) -> bool:
-        """Whether a look at pair k, which leaves all as it is, ends with pairs of nodes that are open (`left`)."""
-        tasks = np.zeros(len(self.pairs), dtype=np.int64)
-        tasks[k] = ONLY_TRIED
-        self._run(np.ascontiguousarray(q), touching, np.zeros((len(self.pairs), 6)), tasks)
-        return bool(self._codes[k] == OPEN)
 
     def relative(self, k: int, q: Array) -> tuple[Array, Array]:
         """The rotation and the shift of the second body of pair k, seen from the first."""

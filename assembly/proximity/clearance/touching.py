@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from assembly._record import rows_of
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Contacts
+from assembly.proximity.clearance.body_cells import BodyCells
 from assembly.proximity.clearance.look import gap_along
 from assembly.proximity.clearance.parting import least_move
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.proximity.clearance.records import CELL_FACE, LINKS, NODE, NONE, WIRE
+from assembly.proximity.clearance.records import CELL_FACE, FLAT, GUIDES, LINKS, NODE, NONE
 
 __all__ = ["conforms", "left_open", "move_apart"]
 
@@ -20,25 +21,55 @@ Array = NDArray[np.float64]
 OPENED = (0.25, 0.05, 0.01)
 # Pairs of nodes that were left open, of which directions to open them are taken at most.
 MOST_OPENED = 2000
-# The cosine above which normals of cells as small as what was left open oppose each other.
-OPPOSED = 0.98
 
 
 def conforms(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
-    """Whether what a look at pair k leaves open are faces that lie on each other: normals oppose in all cells."""
-    if not proof.leaves_open(k, q, touching):
-        return False
-    nodes = proof.left(k)[1]
-    if not len(nodes):
-        return False
-    links, faces = rows_of(LINKS, proof.forest.arrays[3]), rows_of(CELL_FACE, proof.forest.arrays[2])
-    if any((links.face[side] == NONE).any() or (links.form[side] == WIRE).any() for side in (nodes.a, nodes.b)):
-        return False
-    axes = rows_of(NODE, proof.forest.arrays[4]).axes
-    turn = proof.relative(k, q)[0]
-    normal_a = axes[nodes.a, 2] * faces.sign[links.face[nodes.a]][:, None]
-    normal_b = axes[nodes.b, 2] * faces.sign[links.face[nodes.b]][:, None] @ turn.T
-    return bool(((normal_a * normal_b).sum(axis=1) < -OPPOSED).all())
+    """Whether faces of the bodies of pair k lie on each other: cylinders in bores of their radius, or planes.
+
+    By what is recognized of the faces; which parts of them they have is not asked.
+    """
+    a, b = proof.cells_of_both(k)
+    turn, shift = proof.relative(k, q)
+    return (
+        _are_flush(a, b, (turn, shift), touching)
+        or _is_in_bore(a, b, (turn, shift), touching)
+        or _is_in_bore(b, a, (turn.T, -turn.T @ shift), touching)
+    )
+
+
+def _is_in_bore(outer: BodyCells, inner: BodyCells, pose: tuple[Array, Array], touching: float) -> bool:
+    """Whether a cylinder of the inner body, at a pose seen from the outer one, has the axis and radius of a bore."""
+    turn, shift = pose
+    walls, pins = rows_of(NODE, outer.nodes), rows_of(NODE, inner.nodes)
+    walls = walls[walls.bore > 0.0]
+    pins = pins[(rows_of(LINKS, inner.links).face == NONE) & (pins.disc > 0.0) & (pins.rho == 0.0)]
+    for wall in walls:
+        axis = wall.ruling
+        for pin in pins[np.abs(pins.disc - wall.bore) <= touching]:
+            ends = [turn @ (pin.center + side * pin.half[0] * pin.axes[0]) + shift - wall.spine for side in (-1.0, 1.0)]
+            if pin.half[0] > touching and all(np.linalg.norm(end - (end @ axis) * axis) <= touching for end in ends):
+                return True
+    return False
+
+
+def _are_flush(a: BodyCells, b: BodyCells, pose: tuple[Array, Array], touching: float) -> bool:
+    """Whether a flat face of b, at a pose seen from a, is in the plane of one of a that looks the other way."""
+    (points_a, normals_a), (points_b, normals_b) = _planes(a), _planes(b)
+    turn, shift = pose
+    points_b, normals_b = points_b @ turn.T + shift, normals_b @ turn.T
+    opposed = np.linalg.norm(normals_a[:, None] + normals_b, axis=2) * max(a.size, b.size) <= touching
+    apart = np.abs(((points_b - points_a[:, None]) * normals_a[:, None]).sum(axis=2))
+    return bool((opposed & (apart <= touching)).any())
+
+
+def _planes(cells: BodyCells) -> tuple[Array, Array]:
+    """A point and the outward normal of the first cells of flat faces."""
+    links, nodes = rows_of(LINKS, cells.links)[cells.first], rows_of(NODE, cells.nodes)[cells.first]
+    flat = np.flatnonzero(links.form == FLAT)
+    signs = rows_of(CELL_FACE, cells.faces).sign[links.face[flat]]
+    # The normal by the corners has the sense of S_u x S_v, that of the face is exact.
+    senses = np.sign((nodes.axes[flat, 2] * nodes.ruling[flat]).sum(axis=1)) * signs
+    return nodes.corner[flat, 0], nodes.ruling[flat] * senses[:, None]
 
 
 def move_apart(proof: ClearanceProof, k: int, q: Array, contacts: Contacts, touching: float) -> Array | None:
@@ -56,6 +87,10 @@ def move_apart(proof: ClearanceProof, k: int, q: Array, contacts: Contacts, touc
     row = q[proof.pairs[k][1]]
     root = proof.cells_of(k).nodes[0]
     arm, radius = rotation_matrix(row[3:]) @ root[:3], float(root[3])
+    guides = proof.fronts.pair.guides[k]
+    guides[:] = 0.0
+    few = normals[np.linspace(0, len(normals) - 1, min(len(normals), GUIDES)).astype(int)]
+    guides[: len(few)] = few @ rotation_matrix(q[proof.pairs[k][0], 3:])
     for part in OPENED if touching > 0.0 else ():
         # Contacts between which a body is wedged open by less than it is moved.
         move = least_move(normals, places - row[:3] - arm, part * touching - gaps, radius)
