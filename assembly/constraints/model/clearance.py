@@ -31,9 +31,9 @@ class Clearance(Constraint):
     contact is that of the rows, and `Solution.proved` is False where `minimum` is above zero.
 
     Bodies that cross at the start are pushed apart by their contacts. From a start in which they are stuck through each
-    other, or within each other, they are also parted by the least translation that is found; of both ways that hold the
-    one with the least objective is the answer, the least move where nothing else is asked for. A solve that finds no way
-    is STALLED.
+    other, or within each other, they are also parted by the least translation that is found; of the ways that hold the
+    one with the least objective is the answer, the least move where nothing else is asked for. Where there is none the
+    solve is STALLED.
 
     Of solids with edges corners are contacts too: vertices and points of edges over a face, and edges that cross, whose
     normal misses their cones by less than 0.3 rad, and points of a curve along which two faces all but touch, as a ring
