@@ -77,7 +77,8 @@ class Result(ReadOnlyArrays):
     def proved(self) -> bool:
         """Whether it is proven that all pairs of bodies which clearances keep apart are clear, or only touch.
 
-        False at an end that is not SOLVED, and where faces lie on each other and samples stand for the proof.
+        False at an end that is not SOLVED or FITTED, where faces lie on each other and samples stand for the proof, and
+        where a clearance asks for a gap above zero beside a contact of the same bodies.
         """
         return self.success and not self._is_sampled and all(pair.proved for pair in self._clear)
 

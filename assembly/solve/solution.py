@@ -41,6 +41,9 @@ class Solution(Result):
         start: the least move is a preference.
     objective : float
         In the user's units.
+    proved : bool
+        Whether it is proven that all pairs of bodies which clearances keep apart are clear, or only touch. False where
+        faces lie on each other and samples stand for the proof, and where a clearance asks for a gap beside a contact.
     restarted : bool
         Whether the constraints did not hold near the start, and the solution was found from another one.
     feasibility : float

@@ -319,9 +319,9 @@ class Manager(OwnState):
     def gaps(self) -> dict[tuple[str, str], float]:
         """A lower bound of the gap of every pair of bodies, proven anew where it is read.
 
-        That of the nearest contact that is listed, or the reach, or what is left of it where neither is proven to be
-        one; not positive and no bound where bodies cross or touch; minus infinity before the first update, and where
-        nothing is known.
+        The gap of the nearest contact that is listed, or how far what is not listed is away at least, less a part of
+        1e-9; a smaller one where that is not proven. Not positive, and no bound, where bodies cross or touch; minus
+        infinity before the first update, and where nothing is proven.
         """
         pairs = self._parts(self._packed, self._memory)[0]
         if np.isnan(pairs[:, manager_records.PAIR_TURN]).any():

@@ -22,7 +22,10 @@ Array = NDArray[np.float64]
 
 
 class TrackStatus(Enum):
-    """How a tick ended; the value says it in a sentence."""
+    """How a tick ended; the value says it in a sentence.
+
+    Under a clearance a pose holds only where it is proven that bodies are clear or touch, at it and on the way there.
+    """
 
     FOLLOWED = "the constraints hold and the pose is as near to the hand as they allow"
     APPROACHING = "the constraints hold; the next tick goes on toward the hand"

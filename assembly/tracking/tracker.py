@@ -139,7 +139,8 @@ class Tracker(InOneProcess):
 
     Every tick is a few steps of the loop that `solve` runs, from the pose and the multipliers of the tick before. The
     hand is a spring: it draws the point by `stiffness` times the distance, and the constraints hold all the time. Other
-    objectives of the scene count beside it.
+    objectives of the scene count beside it. Under a clearance a pose is taken only where bodies are proven clear, or to
+    touch, at it and on the way from the last one; else the tick is HELD there.
 
     Parameters
     ----------

@@ -18,17 +18,22 @@ class Clearance(Constraint):
 
     Contacts come and go as the bodies move: a contact manager lists every extremal pair of points that comes near
     (`Manager`), each is a row gap >= minimum as long as it is near, and a step is never longer than to where something
-    that is not listed could touch. A solve ends SOLVED only after an update at its pose found no violated contact.
+    that is not listed could touch. A solve ends SOLVED only where every pair of bodies is proven clear, or clear after
+    a move of one of them by what is called touching; a tick is held to the same, and so is the way to it
+    (`docs/certified.md`). Of faces that lie on each other without play neither can be proven: there samples stand in,
+    and `Solution.proved` is False. A solve that knows neither of a pair is STALLED and names it.
 
     Pairs of points that a `Contact` of the same two bodies has are that contact's: its gap of zero is no violation. A
     `minimum` above zero does not ask for the place of the contact: what is reached from its points, between the two
     bodies, without their gap rising to `minimum`. Nothing crosses there, and elsewhere the bodies keep it. The place of
     a contact that is still open is the one it will have once it is closed; a one-sided one that is open by `minimum` or
-    more leaves nothing out that is nearer.
+    more leaves nothing out that is nearer. Of the two bodies it is proven that they do not cross; the gap around the
+    contact is that of the rows, and `Solution.proved` is False where `minimum` is above zero.
 
-    Bodies that cross at the start are pushed apart where they are in each other by less than a tenth of the scene's
-    size and less than their radii of curvature. Deeper ones stay, and the solve ends STALLED, never SOLVED; a tracker
-    does not begin there.
+    Bodies that cross at the start are pushed apart by their contacts. From a start in which they are stuck through each
+    other, or within each other, they are also parted by the least translation that is found; of the ways that hold the
+    one with the least objective is the answer, the least move where nothing else is asked for. Where there is none the
+    solve is STALLED.
 
     Of solids with edges corners are contacts too: vertices and points of edges over a face, and edges that cross, whose
     normal misses their cones by less than 0.3 rad, and points of a curve along which two faces all but touch, as a ring
