@@ -168,8 +168,9 @@ def test_a_tick_that_fails_goes_back_to_what_held(chain, clips):
             else:
                 assert (doubts(tracker) <= 1.0).all()
     assert statuses[TrackStatus.HELD] > 0
-    # A tick ends after four times its steps; the last of them is not carried any more.
-    assert most == EXTRA_TIME * iterations
+    # A tick ends after four times its steps; the last of them is not carried any more. After ticks whose way is not
+    # proven to be clear steps are shorter, and most ticks need fewer.
+    assert iterations < most <= EXTRA_TIME * iterations
 
 
 @pytest.mark.parametrize("held", ["frame", "body", "with another objective"])
