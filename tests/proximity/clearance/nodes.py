@@ -22,11 +22,11 @@ def leaves(forest):
     return np.flatnonzero((links.face != NONE) & (links.child == NONE))
 
 
-def halve_all(forest, rng, share=1.0):
-    """Halve a random share of the cells without children, by length or by chord error."""
+def halve_all(forest, rng, share=1.0, by_length=None):
+    """Halve a random share of the cells without children, by length or by chord error, or by either."""
     for k in leaves(forest):
         if rng.random() < share:
-            while not halve_cell(*forest.arrays, int(k), bool(rng.random() < 0.5)):
+            while not halve_cell(*forest.arrays, int(k), bool(rng.random() < 0.5) if by_length is None else by_length):
                 assert forest.grow()
 
 
@@ -70,28 +70,29 @@ def nearest_on_triangles(p, a, b, c):
 
 
 def outside(forest, rows, points):
-    """How far each point is, at most, outside of the cell of some rows that it is least outside of; by support heights.
+    """How far each point is, at most, outside of the cell that it is least outside of, by heights; inf: of all balls.
 
     Directions are that from the nearest point of the corners' triangles, and its parts along and across the ruling.
     """
     _, nodes = tree_of(forest)
     cells = nodes[rows]
+    far = np.abs(points).max()
+    off = points[:, None] - cells.center
+    which, of = np.nonzero((off * off).sum(axis=-1) <= (cells.radius * (1.0 + 1e-12) + 1e-14 * far) ** 2)
+    p, c, ruling = points[which], cells.corner[of], cells.ruling[of]
+    x = nearest_on_triangles(p, c[:, 0], c[:, 1], c[:, 2])
+    y = nearest_on_triangles(p, c[:, 0], c[:, 2], c[:, 3])
+    nearer = np.linalg.norm(y - p, axis=-1) < np.linalg.norm(x - p, axis=-1)
+    off = p - np.where(nearer[:, None], y, x)
+    along = (off * ruling).sum(axis=-1)[:, None] * ruling
+    most = np.zeros(len(p))
+    for way in (off, along, off - along):
+        length = np.linalg.norm(way, axis=-1)
+        n = way / np.where(length > 0.0, length, 1.0)[:, None]
+        high = np.einsum("mi,mji->mj", n, c).max(axis=-1)
+        flat = n - (n * ruling).sum(axis=-1)[:, None] * ruling
+        high += cells.disc[of] * np.linalg.norm(flat, axis=-1) + cells.rho[of]
+        most = np.maximum(most, np.where(length > 0.0, (n * p).sum(axis=-1) - high, 0.0))
     best = np.full(len(points), np.inf)
-    for part in np.array_split(np.arange(len(points)), 1 + len(points) * len(rows) // 200_000):
-        p = points[part][:, None]
-        c = cells.corner
-        x = nearest_on_triangles(p, c[:, 0], c[:, 1], c[:, 2])
-        y = nearest_on_triangles(p, c[:, 0], c[:, 2], c[:, 3])
-        nearer = np.linalg.norm(y - p, axis=-1) < np.linalg.norm(x - p, axis=-1)
-        off = p - np.where(nearer[..., None], y, x)
-        along = (off * cells.ruling).sum(axis=-1)[..., None] * cells.ruling
-        most = np.zeros(off.shape[:2])
-        for way in (off, along, off - along):
-            length = np.linalg.norm(way, axis=-1)
-            n = way / np.where(length > 0.0, length, 1.0)[..., None]
-            high = np.einsum("mki,kji->mkj", n, c).max(axis=-1)
-            flat = n - (n * cells.ruling).sum(axis=-1)[..., None] * cells.ruling
-            high += cells.disc * np.linalg.norm(flat, axis=-1) + cells.rho
-            most = np.maximum(most, np.where(length > 0.0, (n * p).sum(axis=-1) - high, 0.0))
-        best[part] = most.min(axis=1)
+    np.minimum.at(best, which, most)
     return best
