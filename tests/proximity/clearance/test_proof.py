@@ -1,7 +1,8 @@
 """What a proof says of random pairs of bodies is what closed forms say, and it says something nearly always.
 
-Distances of the judge are found to 1e-11 of a part's size, and from above (`crossing_judge`): hence `CLOSE`, in the unit
-of parts that are up to 6 in size. Where it says crossing, the judge's signed distance is below zero but for rounding.
+Distances of the judge are found to 1e-11 of a part's size, and from above (`crossing_judge`): hence `CLOSE`, in the
+unit of parts that are up to 6 in size. Where it says crossing, the judge's signed distance is below zero but for
+rounding.
 """
 
 from __future__ import annotations
