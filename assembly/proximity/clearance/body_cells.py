@@ -24,7 +24,7 @@ from assembly.proximity.clearance.records import (
     NODE_SIZE,
     NONE,
 )
-from assembly.proximity.clearance.round_faces import Round, round_parts
+from assembly.proximity.clearance.round_faces import Round, round_of, round_parts
 from assembly.proximity.clearance.wire_cells import WireCells, wire_cells
 
 __all__ = ["BodyCells", "cells_of_body"]
@@ -120,7 +120,8 @@ def _parts(faces: tuple[Face, ...], tables: Cells) -> tuple[Table, list[Round | 
     for face, table in zip(faces, tables, strict=True):
         if isinstance(table, WireCells):
             labels.append(np.full(len(table.corner), len(rounds)))
-            rounds.append(None)
+            # A ring is a torus, whose hull is exact.
+            rounds.append(round_of(face))
             continue
         direction, parts = round_parts(face)
         ends = face.surface.breaks()[direction][1 : len(parts)]

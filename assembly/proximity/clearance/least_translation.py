@@ -24,11 +24,15 @@ __all__ = ["least_translation"]
 
 Array = NDArray[np.float64]
 # Directions of hulls that are followed downhill, steps of each, and how much a step is cut where it leads up.
-FOLLOWED, STEPS, CUT = 4, 40, 0.5
+FOLLOWED, STEPS, CUT = 8, 60, 0.5
+# The first step, and directions around the subgradient that are tried.
+WIDEST, AROUND = 0.3, np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
 # Normals of flat faces that are tried of each body.
 NORMALS = 12
 # A translation is this part longer than found to part, and looks for it stop at this part of it.
 FARTHER, CLOSE = 1e-6, 1e-3
+# Other directions are of use where they are shorter by this factor.
+SHORTER = 0.95
 # The first length along a direction, in parts of the longest, and looks between it and that.
 FIRST, LENGTHS = 1e-3, 10
 
@@ -58,29 +62,41 @@ class _Hulls:
             self.points.append(nodes.corner.reshape(-1, 3) @ rotation.T + place)
             self.thick.append(np.repeat(nodes.rho + nodes.disc, 4))
 
-    def depth(self, n: Array) -> tuple[float, Array]:
-        """h(n), and its subgradient."""
+    def depths(self, ways: Array) -> Array:
+        """h of unit vectors (n, 3)."""
+        one, other = (points @ ways.T for points in self.points)
+        found = (one + self.thick[0][:, None]).max(axis=0) - (other - self.thick[1][:, None]).min(axis=0)
+        return np.asarray(found)
+
+    def slope(self, n: Array) -> Array:
+        """The subgradient of h."""
         i = int((self.points[0] @ n + self.thick[0]).argmax())
         j = int((self.points[1] @ n - self.thick[1]).argmin())
-        slope = self.points[0][i] - self.points[1][j]
-        return float(slope @ n + self.thick[0][i] + self.thick[1][j]), slope
+        return np.asarray(self.points[0][i] - self.points[1][j])
+
+    def _lower(self, n: Array, step: float) -> tuple[float, Array]:
+        """The lowest of several directions a step from one: along the subgradient, and around, for it has creases."""
+        down = self.slope(n)
+        down = down - (down @ n) * n
+        if not down.any():
+            down = np.eye(3)[np.abs(n).argmin()]
+            down = down - (down @ n) * n
+        down /= np.linalg.norm(down)
+        tried = n - step * (np.cos(AROUND)[:, None] * down + np.sin(AROUND)[:, None] * np.cross(n, down))
+        tried /= np.linalg.norm(tried, axis=1)[:, None]
+        found = self.depths(tried)
+        return float(found.min()), tried[found.argmin()]
 
     def least(self, ways: Array) -> Array:
         """The direction times the depth of the least one that is found."""
-        depths = np.array([self.depth(n)[0] for n in ways])
+        depths = self.depths(ways)
         best, n = float(depths.min()), ways[depths.argmin()]
-        for way in ways[np.argsort(depths)[:FOLLOWED]]:
-            at, (depth, slope), step = way, self.depth(way), 0.3
+        for k in np.argsort(depths)[:FOLLOWED]:
+            at, depth, step = ways[k], float(depths[k]), WIDEST
             for _ in range(STEPS):
-                down = slope - (slope @ at) * at
-                size = float(np.linalg.norm(down))
-                if size == 0.0 or step < 1e-9:
-                    break
-                other = at - step * down / size
-                other /= np.linalg.norm(other)
-                found = self.depth(other)
-                if found[0] < depth:
-                    at, (depth, slope) = other, found
+                found, other = self._lower(at, step)
+                if found < depth:
+                    at, depth = other, found
                 else:
                     step *= CUT
             if depth < best:
@@ -123,8 +139,9 @@ def least_translation(proof: ClearanceProof, k: int, q: Array) -> Array | None:
     best = way / np.linalg.norm(way) * most
     if not _is_clear(proof, k, q, best):
         return None
-    for n in np.concatenate([[best / most], ways @ world.T]):
-        shorter = 0.95 * float(np.linalg.norm(best))
+    for k_way, n in enumerate([best / most, *(ways @ world.T)]):
+        # First cells of what is round are thicker than it: the way along hulls is shortened by any part.
+        shorter = (1.0 if k_way == 0 else SHORTER) * float(np.linalg.norm(best))
         found = _first_clear(proof, k, q, n, shorter)
         if found < shorter:
             best = found * (1.0 + FARTHER) * n

@@ -184,12 +184,13 @@ class ClearanceProof:
         if code != CLEAR:
             return Answer(Verdict.UNDECIDED, part=part)
         nested = False if swept else self.nested(k, q, move)
+        # From a pose within another body, or that is not told from one, no way to a clear one is proven.
+        pair.known = float(nested is False)
         if nested is None:
             return Answer(Verdict.UNDECIDED, part=part)
         bound = self.bound(k)
         if nested:
             return Answer(Verdict.ENCLOSED, bound, bound)
-        pair.known = 1.0
         far = self.move_length(k, q, move)
         if far > 0.0:
             return Answer(Verdict.TOUCHING, bound - far, far, swept=swept)

@@ -1,0 +1,180 @@
+"""Gaps of nodes are lower bounds of distances of samples, along any direction; so is the room in a bore.
+
+Kernels are run as plain Python. Samples are points of the true faces below a node.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from assembly._record import Store
+from assembly.geometry.shapes.path import Path
+from assembly.kinematics.motion import RelativePose
+from assembly.proximity.clearance.directions import best_direction
+from assembly.proximity.clearance.front import Front, Parted
+from assembly.proximity.clearance.look import gap_along
+from assembly.proximity.clearance.records import BY_PLANE, Forest
+from assembly.proximity.clearance.separation import best_bore, room_in_bore, separation
+from assembly.proximity.clearance.way import Way, pose_at, sag_of, way_of
+from tests.proximity.clearance.nodes import forest_of, halve_all, tree_of
+from tests.proximity.clearance.scenes import direction, faces_of
+from tests.proximity.clearance.splines import points_of, shapes
+
+ROUNDING = 1e-13
+SHAPES = {name: shape for name, shape in shapes().items() if name not in ("clip", "slot", "over the seam")}
+
+
+def packed(forest):
+    table, pool, faces, links, nodes, used = forest.arrays
+    return Forest(Store(table, pool), faces, links, nodes, used)
+
+
+def relative(turn, shift):
+    return RelativePose(tuple(turn.as_matrix().ravel().tolist()), tuple(map(float, shift)))
+
+
+def random_turn(rng):
+    return Rotation.random(random_state=int(rng.integers(1 << 30)))
+
+
+def distances(points, others):
+    return np.linalg.norm(points[:, None] - others, axis=-1)
+
+
+def test_gaps_along_any_direction(cases):
+    rng, names, above = np.random.default_rng(0), list(SHAPES), 0
+    for _ in range(cases(40, 2000)):
+        one, other = (SHAPES[names[rng.integers(len(names))]] for _ in range(2))
+        forest = forest_of(faces_of(one), faces_of(other))
+        turn, shift, n = random_turn(rng), 2.5 * direction(rng), direction(rng)
+        if rng.random() < 0.7:
+            n = shift / np.linalg.norm(shift)
+        gap = gap_along(forest.arrays, tuple(forest.roots), turn.as_matrix().ravel(), shift, n)
+        points = points_of(one, 150, rng), turn.apply(points_of(other, 150, rng)) + shift
+        # Heights, and so distances.
+        assert gap <= (points[1] @ n).min() - (points[0] @ n).max() + ROUNDING
+        assert gap <= distances(*points).min() + ROUNDING
+        assert gap == pytest.approx(separation(packed(forest), *forest.roots, relative(turn, shift), n), abs=ROUNDING)
+        above += gap > 0.0
+    assert above > 5
+
+
+def nodes_below(forest, k):
+    links, _ = tree_of(forest)
+    found, waiting = [], [k]
+    while waiting:
+        k = waiting.pop()
+        if links.child[k] < 0:
+            found.append(k)
+        else:
+            waiting += [links.child[k], links.child[k] + 1]
+    return found
+
+
+@pytest.mark.parametrize("name", ["plate", "ellipsoid", "wire", "pin", "trimmed sheet"])
+def test_gaps_of_all_nodes(name, cases):
+    """Of corners of cells below them, which are points of the faces, or of the spine."""
+    rng, forest = np.random.default_rng(1), forest_of(faces_of(SHAPES[name]), faces_of(SHAPES["torus"]))
+    halve_all(forest, rng, 0.3)
+    _, nodes = tree_of(forest)
+    for _ in range(cases(40, 2000)):
+        turn, shift, n = random_turn(rng), 2.0 * direction(rng), direction(rng)
+        a, b = forest.roots
+        for _ in range(int(rng.integers(0, 12))):
+            links, _ = tree_of(forest)
+            a, b = (k if links.child[k] < 0 else links.child[k] + int(rng.integers(2)) for k in (a, b))
+        below = (nodes.corner[nodes_below(forest, k)].reshape(-1, 3) for k in (a, b))
+        first, second = next(below), turn.apply(next(below)) + shift
+        gap = separation(packed(forest), a, b, relative(turn, shift), n)
+        assert gap <= (second @ n).min() - (first @ n).max() + ROUNDING
+
+
+def test_room_in_a_bore(cases):
+    """What is told is less than the distance of any sample of the other body from the wall."""
+    rng, roomy = np.random.default_rng(2), 0
+    plate = shapes()["plate"]
+    walls = [face for face in faces_of(plate) if max(face.surface.degree) > 1]
+    wire = asm.shapes.pipe(Path().line(0.3).arc(0.2, 1.0, toward=(1, 0, 0)), 0.05)
+    small = [asm.shapes.sphere(0.15), asm.shapes.solid_cylinder(0.1, 0.3), wire, asm.shapes.box(0.3, 0.2, 0.1)]
+    for shape in [*small, shapes()["cone"]]:
+        forest = forest_of(faces_of(plate), faces_of(shape))
+        _, nodes = tree_of(forest)
+        bores = np.flatnonzero(nodes.bore > 0.0)
+        for _ in range(cases(10, 300)):
+            wall = int(rng.choice(bores))
+            face = walls[int(abs(nodes.bore[wall] - 0.5) > 0.05)]
+            turn, place = random_turn(rng), nodes.spine[wall] + 0.15 * rng.normal(size=3)
+            points = turn.apply(points_of(shape, 60, rng)) + place
+            room = room_in_bore(packed(forest), wall, forest.roots[1], relative(turn, place))
+            surface = face.surface.evaluate(*(rng.uniform(*ends, 800) for ends in face.surface.domain))
+            assert room <= distances(points, surface).min() + ROUNDING
+            off = points[:, :2] - nodes.spine[wall, :2]
+            assert room <= nodes.bore[wall] - np.hypot(*off.T).max() + ROUNDING
+            how, best = best_bore(packed(forest), wall, forest.roots[1], relative(turn, place))
+            assert how != BY_PLANE and best == room
+            roomy += room > 0.0
+    assert roomy > 3
+
+
+def way_between(before, after, center, radius):
+    return way_of(before, after, tuple(center), radius, True)
+
+
+def posed(pose, points):
+    return points @ np.reshape(pose.rotation, (3, 3)).T + pose.shift
+
+
+def test_ways_go_straight_and_turn_about_one_axis(cases):
+    """Ends are the poses, rates are constant; no point goes farther than is said, none is farther off its chord."""
+    rng, forest = np.random.default_rng(3), forest_of(faces_of(shapes()["wire"]))
+    _, nodes = tree_of(forest)
+    root = nodes[0]
+    points = points_of(shapes()["wire"], 60, rng)
+    for _ in range(cases(40, 2000)):
+        before = relative(random_turn(rng), rng.normal(size=3))
+        step = 10.0 ** rng.uniform(-8.0, 0.3)
+        turn = Rotation.from_rotvec(step * rng.normal(size=3)) * Rotation.from_matrix(
+            np.reshape(before.rotation, (3, 3))
+        )
+        after = relative(turn, np.array(before.shift) + step * rng.normal(size=3))
+        way = way_between(before, after, root.center.tolist(), float(root.radius))
+        start, end = posed(before, points), posed(after, points)
+        length = np.zeros(len(points))
+        last, parts = start, np.linspace(0.0, 1.0, 9)
+        for s in parts[1:]:
+            here = posed(pose_at(way, float(s)), points)
+            length += np.linalg.norm(here - last, axis=1)
+            last = here
+            off = np.linalg.norm(here - (1.0 - s) * start - s * end, axis=1).max()
+            assert off <= way.sag + 1e-14
+            assert off <= sag_of(way, packed(forest), 0) + 1e-14
+        assert np.abs(last - end).max() < 1e-14
+        assert length.max() <= way.moved + 1e-14
+        middle = posed(pose_at(way, 0.25), root.center[None])
+        assert middle[0] == pytest.approx(
+            0.75 * posed(before, root.center) + 0.25 * posed(after, root.center), abs=1e-14
+        )
+        turned = [Rotation.from_matrix(np.reshape(pose_at(way, s).rotation, (3, 3))) for s in (0.0, 0.25, 0.5, 1.0)]
+        angles = [(turned[0].inv() * r).magnitude() for r in turned]
+        assert angles[1:3] == pytest.approx([0.25 * angles[3], 0.5 * angles[3]], abs=1e-7)
+
+
+def test_directions_part_what_is_apart(cases):
+    """Of two balls, and of a ball and a face: the best direction is that of the nearest points."""
+    rng = np.random.default_rng(4)
+    forest = forest_of(faces_of(asm.shapes.sphere(0.4)), faces_of(asm.shapes.sphere(0.3)))
+    pair = np.zeros((1, 64))
+    front = Front(pair[0], None, None, None, None, None, None, None, np.zeros((3, 64)))
+    for _ in range(cases(20, 500)):
+        shift, turn = (0.7 + 10.0 ** rng.uniform(-9.0, 0.0)) * direction(rng), random_turn(rng)
+        pose = relative(turn, shift)
+        way = Way(False, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), pose, pose)
+        found, _ = best_direction(packed(forest), front, Parted(*forest.roots, BY_PLANE), way, (0.0, 0.0, 0.0), 0.0)
+        assert found.after == pytest.approx(np.linalg.norm(shift) - 0.7, abs=1e-14)
+        assert math.isinf(found.before)
+        assert np.linalg.norm(found.n) == pytest.approx(1.0, abs=1e-15)
