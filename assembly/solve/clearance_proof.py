@@ -107,12 +107,12 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
         return [PairAnswer(item.name, (a.name, b.name), unknown, True, False) for item, (a, b), _ in _owned(packed)]
     touching = solution._touching * packed.scale
     with lent_proof(packed, scene.bodies) as proof:
-        near = near_contacts(solution, proof, NEAR * touching)
-        moves = np.array([opening_move(proof, k, solution.q, near.get(k), touching) for k in range(len(proof.pairs))])
-        answers = proof.look(solution.q, touching, moves)
-        for k, answer in enumerate(answers):
-            if not is_proven(answer) and answer.depth <= touching:
-                answers[k] = _opened(proof, k, solution.q, touching)
+        # What opened contacts at the last solve may do so here.
+        answers = proof.look(solution.q, touching, proof.moves)
+        left = [k for k, answer in enumerate(answers) if not is_proven(answer)]
+        near = near_contacts(solution, proof, NEAR * touching) if left else {}
+        for k in left:
+            answers[k] = _opened(proof, k, solution.q, near.get(k), touching)
         conforming = [
             answer.verdict is Verdict.UNDECIDED and conforms(proof, k, solution.q, touching)
             for k, answer in enumerate(answers)
@@ -128,20 +128,27 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
     return found
 
 
-def _opened(proof: ClearanceProof, k: int, q: Array, touching: float) -> Answer:
-    """The answer to a pair, moved by what opens the pairs of nodes that a look leaves open.
+def _opened(proof: ClearanceProof, k: int, q: Array, near: Contacts | None, touching: float) -> Answer:
+    """The answer to a pair, moved by what opens its contacts, or else pairs of nodes that a look leaves open.
 
-    That is for contacts that no row tells of.
+    The latter is for contacts that no row tells of.
     """
-    (answer,) = found = proof.look(q, touching, which=[k])
+    moves = proof.moves
+    moves[k] = opening_move(proof, k, q, near, touching)
+    (answer,) = found = proof.look(q, touching, moves, which=[k])
+    if moves[k].any() and not is_proven(answer):
+        moves[k] = 0.0
+        (answer,) = found = proof.look(q, touching, moves, which=[k])
     for _ in range(TRIES):
-        move = None if is_proven(found[0]) else left_open(proof, k, q, touching)
+        move = None if is_proven(found[0]) or answer.depth > touching else left_open(proof, k, q, touching)
         if move is None:
             break
-        moves = np.zeros((len(proof.pairs), 6))
         moves[k] = move
         found = proof.look(q, touching, moves, which=[k])
-    return found[0] if is_proven(found[0]) else answer
+    if not is_proven(found[0]):
+        moves[k] = 0.0
+        return answer
+    return found[0]
 
 
 def _contacts(solution: Solution, rows: Sequence[tuple[int, int]]) -> Iterator[tuple[int, ContactPair, float]]:

@@ -35,6 +35,8 @@ Table = NDArray[np.int64]
 SPARE, MOST, LARGE = 1024, 1 << 20, 40_000
 ROOM = 512
 WORK = (3, 64)
+# Points of each connected part of a boundary.
+POINTS = 12
 _CORNER = place_of(NODE, "corner")
 
 
@@ -85,6 +87,7 @@ class PackedForest:
         self._nodes = np.zeros((row_at + SPARE, NODE_SIZE))
         self._links[:row_at], self._nodes[:row_at] = np.concatenate(links), np.concatenate(nodes)
         self._used, self._first = np.array([row_at]), row_at
+        self._shells: dict[int, list[Array]] = {}
         self.roots = [first[shape] for shape in shapes]
         self.cells = [self.made[distinct.index(shape)] for shape in shapes]
 
@@ -138,11 +141,14 @@ class PackedForest:
         self._nodes = np.concatenate([self._nodes, np.zeros_like(self._nodes)])
         return True
 
-    def corners(self, body: int, component: int) -> Array:
-        """Points of a connected part of a body's boundary, (n, 3): a corner of each of its first cells."""
+    def shells(self, body: int) -> list[Array]:
+        """Of every connected part of a body's boundary a few points of it, (n, 3)."""
         cells = self.cells[body]
-        rows = cells.first[cells.component == component]
-        return cells.nodes[rows, _CORNER : _CORNER + 3]
+        if body not in self._shells:
+            rows = [cells.first[cells.component == part] for part in np.unique(cells.component)]
+            some = [at[np.linspace(0, len(at) - 1, min(len(at), POINTS)).astype(int)] for at in rows]
+            self._shells[body] = [np.ascontiguousarray(cells.nodes[at, _CORNER : _CORNER + 3]) for at in some]
+        return self._shells[body]
 
 
 def _moved(cells: BodyCells, at: int, used: int, surfaces: Table) -> Table:

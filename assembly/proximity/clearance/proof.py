@@ -40,8 +40,8 @@ Table = NDArray[np.int64]
 GROWN, MANY = 2, 200
 # What rounding may add to a length.
 LONGER = 1.0 + 1e-12
-# Places in the stack of a ray, and points of which rays start, at most, of each part of a body.
-STACK, POINTS = 4096, 12
+# Places in the stack of a ray.
+STACK = 4096
 
 
 class ClearanceProof:
@@ -73,6 +73,8 @@ class ClearanceProof:
         self.minimum = np.array(minimum, dtype=float)
         self._codes, self._stack = np.zeros(len(self.pairs), dtype=np.int64), np.zeros(STACK, dtype=np.int64)
         self._begun = np.zeros(len(self.pairs), dtype=bool)
+        # What opened contacts at the last look of a solve.
+        self.moves = np.zeros((len(self.pairs), 6))
         self._on_way = np.full(len(self.pairs), ON_WAY)
 
     def look(
@@ -256,31 +258,25 @@ class ClearanceProof:
 
         One point of every connected part of a boundary is enough.
         """
-        a, b = self.pairs[k]
-        turn_a, turn_b = rotation_matrix(q[a, 3:]), _turned(move[3:]) @ rotation_matrix(q[b, 3:])
-        at_a, at_b = q[a, :3], q[b, :3] + move[:3]
-        for outer, inner, turns, places in (
-            (a, b, (turn_a, turn_b), (at_a, at_b)),
-            (b, a, (turn_b, turn_a), (at_b, at_a)),
-        ):
-            number = self._number[outer]
-            if not self.forest.cells[number].is_closed:
+        turn, shift = self.relative(k, q)
+        if move.any():
+            world = rotation_matrix(q[self.pairs[k][0], 3:])
+            turn, shift = world.T @ _turned(move[3:]) @ world @ turn, shift + move[:3] @ world
+        a, b = (self._number[body] for body in self.pairs[k])
+        for outer, inner, rotation, place in ((a, b, turn, shift), (b, a, turn.T, -shift @ turn)):
+            if not self.forest.cells[outer].is_closed:
                 continue
-            inside = self.forest.cells[self._number[inner]]
-            for component in np.unique(inside.component):
-                points = self.forest.corners(self._number[inner], component)
-                points = (points @ turns[1].T + places[1] - places[0]) @ turns[0]
-                side = self._winding(number, points)
+            for points in self.forest.shells(inner):
+                side = self._winding(outer, points @ rotation.T + place)
                 if side != 0:
                     return None if side == UNCLEAR else True
         return False
 
     def _winding(self, body: int, points: Array) -> int:
         """Whether points of a boundary that does not cross a body's are within that: 1, 0, or UNCLEAR."""
-        some = np.ascontiguousarray(points[np.linspace(0, len(points) - 1, min(len(points), POINTS)).astype(int)])
-        found = np.full(len(some), UNCLEAR)
+        found = np.full(len(points), UNCLEAR)
         while True:
-            asked = winding_of(self.forest.arrays, self.forest.roots[body], some, self._stack, found)
+            asked = winding_of(self.forest.arrays, self.forest.roots[body], points, self._stack, found)
             if found[asked - 1] != UNCLEAR or not self.forest.is_full or not self.forest.grow():
                 return int(found[asked - 1])
 
