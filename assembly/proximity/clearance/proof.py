@@ -147,7 +147,7 @@ class ClearanceProof:
         tasks[k] = BEGUN_ANEW
         still = np.zeros((len(self.pairs), 6))
         self._run(np.array(q, dtype=float), 0.0, still, tasks)
-        found = self._codes[k] == CLEAR and self.nested(k, q, still[k]) is False
+        found = self._codes[k] == CLEAR and self.nested(k) is False
         # Gaps of this front are those over another length.
         needed[k], budgets[k], self._begun[k] = before, usual, False
         self.fronts.pair.known[k] = 0.0
@@ -185,7 +185,7 @@ class ClearanceProof:
             return Answer(Verdict.CROSSING, depth=float(pair.depth), place=place, part=part)
         if code != CLEAR:
             return Answer(Verdict.UNDECIDED, part=part)
-        nested = False if swept else self.nested(k, q, move)
+        nested = False if swept else self.nested(k)
         # From a pose within another body, or that is not told from one, no way to a clear one is proven.
         pair.known = float(nested is False)
         if nested is None:
@@ -253,15 +253,13 @@ class ClearanceProof:
             pair.travelled[k] += self._length(k, now, (turn.reshape(3, 3), shift))
             pair.turn[k], pair.shift[k] = turn, shift
 
-    def nested(self, k: int, q: Array, move: Array) -> bool | None:
-        """Whether a body of pair k, whose boundaries are apart, is within the other one; None where no ray tells.
+    def nested(self, k: int) -> bool | None:
+        """Whether a body of pair k, just found clear, is within the other one; None where no ray tells.
 
         One point of every connected part of a boundary is enough.
         """
-        turn, shift = self.relative(k, q)
-        if move.any():
-            world = rotation_matrix(q[self.pairs[k][0], 3:])
-            turn, shift = world.T @ _turned(move[3:]) @ world @ turn, shift + move[:3] @ world
+        # The pose that a look found clear is the last one.
+        turn, shift = self.fronts.pair.turn[k].reshape(3, 3), self.fronts.pair.shift[k]
         a, b = (self._number[body] for body in self.pairs[k])
         for outer, inner, rotation, place in ((a, b, turn, shift), (b, a, turn.T, -shift @ turn)):
             if not self.forest.cells[outer].is_closed:
@@ -279,12 +277,3 @@ class ClearanceProof:
             asked = winding_of(self.forest.arrays, self.forest.roots[body], points, self._stack, found)
             if found[asked - 1] != UNCLEAR or not self.forest.is_full or not self.forest.grow():
                 return int(found[asked - 1])
-
-
-def _turned(vector: Array) -> Array:
-    """The matrix of a rotation vector."""
-    angle = float(np.linalg.norm(vector))
-    if angle == 0.0:
-        return np.eye(3)
-    axis = vector / angle
-    return rotation_matrix(np.concatenate([[np.cos(0.5 * angle)], np.sin(0.5 * angle) * axis]))
