@@ -24,7 +24,7 @@ MOST_OPENED = 2000
 
 
 def conforms(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
-    """Whether faces of the bodies of pair k lie on each other: cylinders in bores of their radius, or planes.
+    """Whether faces of the bodies of pair k lie on each other: cylinders or balls in bores of their radius, or planes.
 
     By what is recognized of the faces; which parts of them they have is not asked.
     """
@@ -38,16 +38,19 @@ def conforms(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
 
 
 def _is_in_bore(outer: BodyCells, inner: BodyCells, pose: tuple[Array, Array], touching: float) -> bool:
-    """Whether a cylinder of the inner body, at a pose seen from the outer one, has the axis and radius of a bore."""
+    """Whether a cylinder or a ball of the inner body, at a pose seen from the outer one, fills a bore of its radius."""
     turn, shift = pose
-    walls, pins = rows_of(NODE, outer.nodes), rows_of(NODE, inner.nodes)
+    walls, rounds = rows_of(NODE, outer.nodes), rows_of(NODE, inner.nodes)
     walls = walls[walls.bore > 0.0]
-    pins = pins[(rows_of(LINKS, inner.links).face == NONE) & (pins.disc > 0.0) & (pins.rho == 0.0)]
+    # Of the hull of a torus both are above zero.
+    rounds = rounds[(rows_of(LINKS, inner.links).face == NONE) & ((rounds.disc > 0.0) != (rounds.rho > 0.0))]
     for wall in walls:
-        axis = wall.ruling
-        for pin in pins[np.abs(pins.disc - wall.bore) <= touching]:
-            ends = [turn @ (pin.center + side * pin.half[0] * pin.axes[0]) + shift - wall.spine for side in (-1.0, 1.0)]
-            if pin.half[0] > touching and all(np.linalg.norm(end - (end @ axis) * axis) <= touching for end in ends):
+        for body in rounds[np.abs(rounds.disc + rounds.rho - wall.bore) <= touching]:
+            reach = body.half[0] * body.axes[0]
+            ends = turn @ (body.center + np.outer((-1.0, 1.0), reach)).T + (shift - wall.spine)[:, None]
+            off = ends - np.outer(wall.ruling, wall.ruling @ ends)
+            is_disc = body.disc > 0.0 and body.half[0] <= touching
+            if not is_disc and np.linalg.norm(off, axis=0).max() <= touching:
                 return True
     return False
 
