@@ -19,7 +19,7 @@ from assembly.constraints.model.contact import side_faces
 from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
-from assembly.proximity.clearance.proof import ClearanceProof
+from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
 from assembly.proximity.clearance.touching import conforms, left_open, move_apart
 from assembly.proximity.extrema.pairs import ContactPair
 from assembly.solve.contact_pairs import contact_pairs, listed_contacts
@@ -34,8 +34,6 @@ __all__ = ["PairAnswer", "can_prove", "lent_proof", "near_contacts", "new_proof"
 Array = NDArray[np.float64]
 # Contacts that are open by less than so many times how far a body may be moved are in its way.
 NEAR = 2.0
-# Of smaller scenes, and of larger ones than one over it, nothing is proven: rows alone keep bodies apart.
-LEAST_SIZE = 1e-30
 # Moves that are tried for contacts that no row tells of.
 TRIES = 3
 
@@ -95,7 +93,7 @@ def lent_proof(packed: Packed, bodies: Sequence[Body]) -> Iterator[ClearanceProo
 
 
 def can_prove(packed: Packed) -> bool:
-    """Whether a scene has a size at which products of six lengths are numbers that doubles carry."""
+    """Whether a scene has a size at which a proof is possible; else rows alone keep bodies apart."""
     return LEAST_SIZE < packed.scale < 1.0 / LEAST_SIZE
 
 

@@ -1,6 +1,7 @@
 """Bodies that cross at the pose of a solution.
 
-Of all pairs of bodies those are searched whose boxes meet: bodies are within the hulls of their control points. Updates
+Of all pairs of bodies those are searched whose boxes meet: bodies are within the hulls of their control points. Of most
+a proof tells (`proximity/clearance/proof.py`). Others touch, and updates of a contact manager tell of those, which
 go on in slices, between which the interpreter runs, so that Ctrl-C and a time limit are answered.
 """
 
@@ -25,6 +26,8 @@ from assembly.constraints.program import records as layout
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.bvh.facet_tree import FacetTree
+from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
 from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
 from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager import update as manager
@@ -162,16 +165,53 @@ def find_crossings(posed: PosedBodies, pairs: Sequence[Pair], interruption: Inte
     near = _near(posed, pairs)
     if not near:
         return Crossings(())
+    told = _proven(posed, near, interruption)
+    found = _searched(posed, [pair for pair, crosses in zip(near, told, strict=True) if crosses is None], interruption)
+    crossing = {_key(a, b) for a, b in found[0]}
+    crossing |= {_key(*pair) for pair, crosses in zip(near, told, strict=True) if crosses}
+    return Crossings(_named([pair for pair in near if _key(*pair) in crossing]), _named(found[1]))
+
+
+def _proven(posed: PosedBodies, pairs: Sequence[Pair], interruption: Interruption) -> list[bool | None]:
+    """Whether pairs cross, or one is within the other, by a proof; None where it does not tell.
+
+    That is of bodies that touch, and of those that are in each other where a contact of theirs is.
+    """
+    size = max(body.size for pair in pairs for body in pair)
+    if not LEAST_SIZE < size < 1.0 / LEAST_SIZE:
+        return [None] * len(pairs)
+    number = {id(body): k for k, body in enumerate(posed.bodies)}
+    shapes = [side_faces(body) for body in posed.bodies]
+    touched = {_key(*contact.bodies) for contact in posed.contacts}
+    told: list[bool | None] = []
+    for pair in pairs:
+        if interruption.is_over():
+            return told + [None] * (len(pairs) - len(told))
+        a, b = pair
+        proof = ClearanceProof(shapes, [(number[id(a)], number[id(b)])], [0.0])
+        (answer,) = proof.look(posed.q, max(ROUNDED, posed.touching) * size)
+        crosses = answer.verdict in (Verdict.CROSSING, Verdict.ENCLOSED)
+        known = answer.verdict is Verdict.CLEAR or (crosses and _key(a, b) not in touched)
+        told.append(crosses if known else None)
+    return told
+
+
+def _searched(
+    posed: PosedBodies, near: Sequence[Pair], interruption: Interruption
+) -> tuple[Sequence[Pair], Sequence[Pair]]:
+    """The pairs that updates of a contact manager find to cross, and those that were not searched to the end."""
+    if not near:
+        return (), ()
     name = "crossings"
     while any(item.name == name for item in posed.contacts):
         name += "'"
     if not _known_shapes(near, interruption):
-        return Crossings((), _named(near))
+        return (), near
     packed = Packed(posed.bodies, [*posed.contacts, _Watched(near, name)], ())
     found, is_complete = _seen(packed, posed, interruption)
     crossing = [pair for k, pair in enumerate(near) if k in found]
     unseen = [] if is_complete else [pair for k, pair in enumerate(near) if k not in found]
-    return Crossings(_named(crossing), _named(unseen))
+    return crossing, unseen
 
 
 def _named(pairs: Sequence[Pair]) -> tuple[tuple[str, str], ...]:

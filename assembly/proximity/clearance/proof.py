@@ -32,7 +32,7 @@ from assembly.proximity.clearance.records import (
     PARTED,
 )
 
-__all__ = ["ClearanceProof"]
+__all__ = ["LEAST_SIZE", "ClearanceProof"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -40,6 +40,8 @@ Table = NDArray[np.int64]
 GROWN, MANY = 2, 200
 # What rounding may add to a length.
 LONGER = 1.0 + 1e-12
+# Of smaller bodies, and of larger ones than one over it, nothing is proven: products of six lengths are no numbers.
+LEAST_SIZE = 1e-30
 # Places in the stack of a ray.
 STACK = 4096
 
