@@ -110,7 +110,7 @@ class ClearanceProof:
         if swept:
             asked = np.where(pair.known == 1.0, np.where(grown, ON_WAY_ANEW, ON_WAY), asked)
         tasks[rows] = asked[rows]
-        self._run(np.ascontiguousarray(q, dtype=float), touching, moved, tasks)
+        self._run(q, touching, moved, tasks)
         self._begun[rows] = True
         return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
 
@@ -124,7 +124,7 @@ class ClearanceProof:
         if not (self.fronts.pair.known == 1.0).all() or (counts.count > GROWN * counts.fresh + MANY).any():
             return False
         self.fronts.pair.touch = touching
-        look_at_pairs(self.forest.arrays, self.fronts.arrays, q, moves, self._on_way, self._codes)
+        look_at_pairs(self.forest.arrays, self.fronts.arrays, _writable(q), moves, self._on_way, self._codes)
         return not self._codes.any()
 
     def _forget(self) -> None:
@@ -145,7 +145,7 @@ class ClearanceProof:
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         tasks[k] = BEGUN_ANEW
         still = np.zeros((len(self.pairs), 6))
-        self._run(np.ascontiguousarray(q, dtype=float), 0.0, still, tasks)
+        self._run(q, 0.0, still, tasks)
         found = self._codes[k] == CLEAR and self.nested(k, q, still[k]) is False
         # Gaps of this front are those over another length.
         needed[k], budgets[k], self._begun[k] = before, usual, False
@@ -154,9 +154,9 @@ class ClearanceProof:
 
     def _run(self, q: Array, touching: float, moves: Array, tasks: Table) -> None:
         self.fronts.pair.touch = touching
-        waiting = tasks.copy()
+        waiting, at = tasks.copy(), _writable(q)
         while waiting.any():
-            look_at_pairs(self.forest.arrays, self.fronts.arrays, q, moves, waiting, self._codes)
+            look_at_pairs(self.forest.arrays, self.fronts.arrays, at, moves, waiting, self._codes)
             short = (waiting != PASSED_BY) & (self._codes == NO_ROOM)
             if not short.any():
                 return
@@ -201,7 +201,7 @@ class ClearanceProof:
         """Whether a look at pair k, which leaves all as it is, ends with pairs of nodes that are open (`left`)."""
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         tasks[k] = ONLY_TRIED
-        self._run(np.ascontiguousarray(q), touching, np.zeros((len(self.pairs), 6)), tasks)
+        self._run(q, touching, np.zeros((len(self.pairs), 6)), tasks)
         return bool(self._codes[k] == OPEN)
 
     def relative(self, k: int, q: Array) -> tuple[Array, Array]:
@@ -290,6 +290,11 @@ class ClearanceProof:
             asked = winding_of(self.forest.arrays, self.forest.roots[body], some, self._stack, found)
             if found[asked - 1] != UNCLEAR or not self.forest.is_full or not self.forest.grow():
                 return int(found[asked - 1])
+
+
+def _writable(q: Array) -> Array:
+    """Poses as the kernel is compiled for: those of solutions are read-only."""
+    return np.array(q, dtype=float, order="C")
 
 
 def _turned(vector: Array) -> Array:
