@@ -76,8 +76,8 @@ def _patch_bounds(net: Array) -> tuple[Array, Array]:
         return bound
 
     rates = np.column_stack([_longest(p) / least**2 for p in (pu, pv)])
-    bends = [second_derivative(pu, 1, wu), second_derivative(pu, 2, wv), second_derivative(pv, 2, wv)]
-    return rates, np.column_stack(bends)
+    in_u, twist, in_v = second_derivative(pu, 1, wu), second_derivative(pu, 2, wv), second_derivative(pv, 2, wv)
+    return rates, np.column_stack([in_u, twist, in_v])
 
 
 def _not_narrow(low: Array, high: Array) -> tuple[Array, Array]:

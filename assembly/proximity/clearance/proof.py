@@ -243,7 +243,7 @@ class ClearanceProof:
     def _length(self, k: int, before: tuple[Array, Array], after: tuple[Array, Array]) -> float:
         root = self.cells_of(k).nodes[0]
         turn, shift = after[0] - before[0], after[1] - before[1]
-        angle = 2.0 * np.arcsin(min(1.0, float(np.linalg.norm(turn)) / np.sqrt(8.0)))
+        angle = float(2.0 * np.arcsin(min(1.0, float(np.linalg.norm(turn)) / np.sqrt(8.0))))
         return (float(np.linalg.norm(turn @ root[:3] + shift)) + angle * float(root[3])) * LONGER
 
     def last_poses(self) -> tuple[Array, Array]:
