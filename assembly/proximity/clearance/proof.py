@@ -113,7 +113,7 @@ class ClearanceProof:
         if swept:
             asked = np.where(pair.known == 1.0, np.where(grown, ON_WAY_ANEW, ON_WAY), asked)
         tasks[rows] = asked[rows]
-        self._run(np.array(q, dtype=float), touching, moved, tasks)
+        self._run(q, touching, moved, tasks)
         self._begun[rows] = True
         return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
 
@@ -148,7 +148,7 @@ class ClearanceProof:
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         tasks[k] = BEGUN_ANEW
         still = np.zeros((len(self.pairs), 6))
-        self._run(np.array(q, dtype=float), 0.0, still, tasks)
+        self._run(q, 0.0, still, tasks)
         found = self._codes[k] == CLEAR and self.nested(k) is False
         # Gaps of this front are those over another length.
         needed[k], budgets[k], self._begun[k] = before, usual, False
@@ -157,9 +157,9 @@ class ClearanceProof:
 
     def _run(self, q: Array, touching: float, moves: Array, tasks: Table) -> None:
         self.fronts.pair.touch = touching
-        waiting = tasks.copy()
+        waiting, at = tasks.copy(), np.array(q, dtype=float)
         while waiting.any():
-            look_at_pairs(self.forest.arrays, self.fronts.arrays, q, moves, waiting, self._codes)
+            look_at_pairs(self.forest.arrays, self.fronts.arrays, at, moves, waiting, self._codes)
             short = (waiting != PASSED_BY) & (self._codes == NO_ROOM)
             if not short.any():
                 return

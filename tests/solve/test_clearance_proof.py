@@ -1,0 +1,97 @@
+"""What clearances promise at the end of a solve is proven; where it is not, no solve says that it is solved."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.proximity.clearance.answers import Verdict
+from assembly.solve.clearance_proof import lent_proof, near_contacts, new_proof, opening_move, prove_end
+from tests.validation.clearance_scenes import scene_of, start
+from tests.validation.crossing_judge import Motion, crossing_depth
+
+BALL, BOX = asm.shapes.sphere(0.5), asm.shapes.box(1.0, 1.0, 1.0)
+
+
+def scene(second, place, first=BOX, **others):
+    bodies = [asm.Body("plate", first, fixed=True), asm.Body("part", second, place)]
+    found = asm.Assembly(bodies)
+    found.constrain(asm.Clearance(name="gap", **others))
+    return found
+
+
+def test_a_start_that_crosses_is_stalled_where_nothing_may_move():
+    solution = scene(BALL, (0.8, 0.1, 0.2)).solve(max_iterations=0)
+    assert solution.status is asm.Status.STALLED and not solution.success and not solution.proved
+    # A ball by 0.2 in a face: what is proven of that depth is no more.
+    assert 1e-3 < solution.violations["gap"] <= 0.2
+    assert solution.feasibility == solution.violations["gap"]
+    assert "plate and part (CROSSING)" in solution.message
+    assert "'gap'" in solution.message
+
+
+def test_a_start_within_another_body_is_stalled_where_nothing_may_move():
+    solution = scene(asm.shapes.sphere(0.3), (0.1, 0.1, 0.1), asm.shapes.box(3.0, 3.0, 3.0)).solve(max_iterations=0)
+    assert solution.status is asm.Status.STALLED and not solution.proved
+    assert "plate and part (ENCLOSED)" in solution.message
+    # It is no nearer to the walls than that.
+    assert 0.5 < solution.violations["gap"] <= 1.1 + 1e-12
+
+
+@pytest.mark.parametrize("place", [(2.0, 0.0, 0.0), (0.8, 0.1, 0.2), (1.0, 0.0, 0.0), (0.1, 0.1, 0.1)])
+def test_solved_is_proven(place):
+    solution = scene(BALL, place).solve()
+    assert solution.success and solution.proved
+    assert solution.violations["gap"] < 1e-9
+    assert "not clear" not in solution.message
+
+
+def test_a_least_gap_is_proven():
+    solution = scene(BALL, (0.8, 0.1, 0.2), minimum=0.1).solve()
+    assert solution.success and solution.proved
+    (answer,) = prove_end(solution)
+    assert answer.clearance == "gap" and answer.bodies == ("plate", "part") and answer.holds
+    assert answer.answer.bound <= 0.1 + 1e-9
+
+
+def test_touching_at_the_end_is_proven_by_a_move():
+    """Drawn against the box: there is a contact, and its gap is opened."""
+    found = scene(BALL, (1.2, 0.1, 0.2))
+    found.minimize(asm.PointDistance(found.bodies[1].point(0, 0, 0), (0.9, 0.1, 0.2)))
+    solution = found.solve()
+    assert solution.success and solution.proved
+    assert solution.q[1, 0] == pytest.approx(1.0, abs=1e-9)
+    (pair,) = prove_end(solution)
+    assert pair.answer.verdict in (Verdict.TOUCHING, Verdict.CLEAR) and pair.proved
+    packed = found.packed()
+    with lent_proof(packed, found.bodies) as proof:
+        near = near_contacts(solution, proof, 1e-3)
+        assert list(near) == [0]
+        assert near[0].normals[0] == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
+        move = opening_move(proof, 0, solution.q, near[0], 1e-6)
+        assert move[0] > 0.0 and np.linalg.norm(move) < 1e-6
+        assert not opening_move(proof, 0, solution.q, near[0], 0.0).any()
+        assert not opening_move(proof, 0, solution.q, None, 1e-6).any()
+    # It is given back.
+    assert len(packed.proofs) >= 1
+
+
+def test_a_pair_is_looked_at_as_the_clearance_asks():
+    found = scene(BALL, (2.0, 0.0, 0.0), minimum=0.25)
+    made = new_proof(found.packed(), found.bodies)
+    assert made.pairs in ([(0, 1)], [(1, 0)]) and made.minimum.tolist() == [0.25]
+
+
+def test_random_solves_say_what_is_so(cases):
+    """Where it is proven the judge finds none in the other; where not, it is not SOLVED, or samples stand for it."""
+    for number in range(cases(8, 500)):
+        begin = start(np.random.default_rng([51, number]))
+        solution = scene_of(begin).solve(max_iterations=0 if number % 2 else 200)
+        seen = Motion.of(solution.q[1]).seen_from(Motion.of(solution.q[0]))
+        depth = crossing_depth(begin.a, begin.b, seen) / begin.size
+        if solution.proved:
+            assert solution.success and depth <= 1e-9, begin
+        if depth > 1e-9:
+            assert not solution.success and not solution.proved, begin
+            assert solution.feasibility > 0.0 and "a and b" in solution.message

@@ -1,0 +1,112 @@
+"""Ticks under clearances end clear, or touching, and HELD where no proof is found: then nothing has moved.
+
+Judged by closed forms, to 1e-9 of the size (`clearance_scenes.TOUCHING`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.tracking.clear_ticks import ClearTicks
+from assembly.tracking.tick import TrackStatus
+from tests.validation import exact_solids as exact
+from tests.validation.clearance_scenes import PROMISE_NOTHING, TOUCHING, tracked
+from tests.validation.crossing_judge import Motion, crossing_depth
+
+
+def tracker_of(first, second, place):
+    """A tracker of the middle of the second part, and its scene."""
+    bodies = [asm.Body("a", first.shape, fixed=True), asm.Body("b", second.shape, place)]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+    return scene, scene.tracker(bodies[1].point(0, 0, 0))
+
+
+def depth_of(first, second, q):
+    return crossing_depth(first, second, Motion.of(q[1]).seen_from(Motion.of(q[0])))
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (exact.box(1.0, 0.7, 0.5), exact.ball(0.4)),
+        (exact.box(1.6, 1.2, 1e-4), exact.box(0.4, 0.3, 0.2)),
+        (exact.torus(0.6, 0.15), exact.pin(0.1, 0.8)),
+    ],
+)
+def test_a_hand_through_a_body(first, second):
+    """However fast: no tick that promises anything ends in the other body, nor beyond what it cannot pass."""
+    for many in (4, 25):
+        _, tracker = tracker_of(first, second, (0.55, 0.0, 1.0))
+        for z in np.linspace(1.0, -1.0, many):
+            step = tracker.step((0.55, 0.0, z))
+            if step.status.name not in PROMISE_NOTHING:
+                assert depth_of(first, second, step.q) <= TOUCHING * 2.0
+
+
+def test_what_is_held_has_gone_back(monkeypatch):
+    """Where nothing is proven a tick has the pose of the one before, and the next one starts from there."""
+    first, second = exact.box(1.0, 0.7, 0.5), exact.ball(0.4)
+    _, tracker = tracker_of(first, second, (0.0, 0.0, 1.5))
+    before = tracker.step((0.0, 0.0, 1.3))
+    assert before.status is TrackStatus.FOLLOWED
+    usual = ClearTicks.holds
+    monkeypatch.setattr(ClearTicks, "holds", lambda self, solution: False)
+    held = tracker.step((0.0, 0.0, 1.1))
+    assert held.status is TrackStatus.HELD and held.q.tobytes() == before.q.tobytes()
+    monkeypatch.setattr(ClearTicks, "holds", usual)
+    statuses = [tracker.step((0.0, 0.0, 1.1)).status for _ in range(12)]
+    assert statuses[-1] is TrackStatus.FOLLOWED
+
+
+def solution_at(scene, q):
+    """The state of the scene's bodies at poses, as it stands."""
+    return scene.solve(q, max_iterations=0)
+
+
+def test_a_way_through_a_plate_does_not_hold():
+    """Clear at both poses. What does not hold leaves all as it was: the same again, and ways that do."""
+    plate, ball = exact.box(1.6, 1.2, 1e-2), exact.ball(0.4)
+    scene, _ = tracker_of(plate, ball, (0.0, 0.0, 0.6))
+
+    def q(z):
+        return np.array([[0, 0, 0, 1, 0, 0, 0], [0, 0, z, 1, 0, 0, 0]], dtype=float)
+
+    ticks = ClearTicks(solution_at(scene, q(0.6)), 1e-9)
+    assert ticks.proved
+    for _ in range(2):
+        assert not ticks.holds(solution_at(scene, q(-0.6)))
+        assert ticks.holds(solution_at(scene, q(0.5))) and ticks.proved
+        assert ticks.holds(solution_at(scene, q(0.6)))
+    assert not ticks.holds(solution_at(scene, q(0.3)))
+
+
+def test_a_ball_that_slides_on_a_face_holds():
+    """It touches at every tick; the straight way between two is in the face."""
+    plate, ball = exact.box(1.6, 1.2, 0.1), exact.ball(0.4)
+    scene, tracker = tracker_of(plate, ball, (-0.5, 0.0, 0.6))
+    for x in np.linspace(-0.5, 0.5, 15):
+        step = tracker.step((x, 0.0, 0.3))
+        assert step.status.name not in PROMISE_NOTHING
+        assert depth_of(plate, ball, step.q) <= TOUCHING * 2.0
+    assert step.q[1, 0] == pytest.approx(0.5, abs=1e-6) and step.q[1, 2] == pytest.approx(0.45, abs=1e-8)
+
+
+def test_a_wheel_that_rolls_over_an_edge():
+    """Ticks of a hand around a box's edge: of rolling contacts nearly none are held."""
+    box, pin = exact.box(1.0, 0.7, 0.5), exact.pin(0.1, 0.8)
+    _, tracker = tracker_of(box, pin, (0.0, 0.0, 0.9))
+    statuses = []
+    for angle in np.linspace(0.0, 1.6, 30):
+        step = tracker.step((0.62 * np.sin(angle), 0.05, 0.8 * np.cos(angle)))
+        statuses.append(step.status)
+        if step.status.name not in PROMISE_NOTHING:
+            assert depth_of(box, pin, step.q) <= TOUCHING * 2.0
+    assert statuses.count(TrackStatus.HELD) <= 6
+
+
+def test_random_hands(cases):
+    outcomes = [tracked(1000 + number) for number in range(cases(1, 200))]
+    assert {outcome.number: outcome.wrong for outcome in outcomes if outcome.wrong} == {}
