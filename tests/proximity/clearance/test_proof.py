@@ -60,7 +60,7 @@ def is_enclosed(begin):
 
 
 def test_random_pairs(cases):
-    count, found = cases(36, 20_000), Counter()
+    count, found = cases(26, 20_000), Counter()
     for number in range(count):
         begin = start_of(number)
         (answer,) = proof_of(begin.a.shape, begin.b.shape).look(poses(begin.pose), 0.0)
