@@ -190,8 +190,8 @@ def test_cells_that_no_front_has_are_forgotten():
     box, ball = faces_of(asm.shapes.box(1.0, 0.7, 0.5)), faces_of(asm.shapes.ellipsoid(0.3, 0.5, 0.7))
     proof = ClearanceProof([box, ball, ball], [(0, 1), (1, 2), (2, 0)], [0.0] * 3)
     rng = np.random.default_rng(3)
-    q = np.array([at(0, 0, 0), at(1.0, 0.0, 0.0), at(0.0, 1.2, 0.0)])
-    before = proof.look(q, 0.0)
+    q = np.array([at(0, 0, 0), at(0.8005, 0.0, 0.0), at(0.0, 1.2, 0.0)])
+    before = ClearanceProof([box, ball, ball], [(0, 1), (1, 2), (2, 0)], [0.0] * 3).look(q, 0.0)
     for _ in range(20):
         other = q.copy()
         other[1, 0] = 0.801
@@ -199,8 +199,12 @@ def test_cells_that_no_front_has_are_forgotten():
         other[:, 3:] /= np.linalg.norm(other[:, 3:], axis=1)[:, None]
         proof.look(other, 0.0)
     told, used = proof.look(q, 0.0), int(proof.forest.arrays[5][0])
+    of_fronts = proof.forest.arrays[4][proof.fronts.cells()].copy()
     proof.forest.forget(proof.fronts)
     assert int(proof.forest.arrays[5][0]) < used
+    # Fronts have the same nodes, at other rows.
+    assert np.array_equal(proof.forest.arrays[4][proof.fronts.cells()], of_fronts)
+    assert proof.fronts.cells().max() < int(proof.forest.arrays[5][0])
     again = proof.look(q, 0.0, swept=True)
     assert [a.verdict for a in again] == [a.verdict for a in told] == [a.verdict for a in before]
     assert [a.bound for a in again] == [a.bound for a in told]
