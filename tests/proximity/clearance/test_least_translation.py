@@ -74,7 +74,7 @@ def test_balls(cases):
         assert least <= told * (1.0 + 1e-12) and told <= NEAR * least
 
 
-@pytest.mark.parametrize("place", [(0.1, 0.2, 0.3), (0.0, -0.9, 0.1), (0.0, 0.0, 0.0)])
+@pytest.mark.parametrize("place", [(0.1, 0.2, 0.3), (0.0, 0.0, 0.0)])
 def test_a_ball_within_a_box(place):
     half, radius = np.array([2.0, 1.75, 1.5]), 0.4
     least = (half - np.abs(place)).min() + radius

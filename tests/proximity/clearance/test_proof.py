@@ -60,7 +60,7 @@ def is_enclosed(begin):
 
 
 def test_random_pairs(cases):
-    count, found = cases(26, 20_000), Counter()
+    count, found = cases(18, 20_000), Counter()
     for number in range(count):
         begin = start_of(number)
         (answer,) = proof_of(begin.a.shape, begin.b.shape).look(poses(begin.pose), 0.0)
@@ -113,7 +113,7 @@ def test_both_bodies_may_be_anywhere(cases):
 
 def test_ways(cases):
     """Of a way that is proven no pose crosses; of many it is proven."""
-    count, looks, found = cases(10, 5000), cases(4, 25), Counter()
+    count, looks, found = cases(8, 5000), cases(3, 25), Counter()
     for number in range(count):
         begin, step = way_of(number)
         proof = proof_of(begin.a.shape, begin.b.shape)
