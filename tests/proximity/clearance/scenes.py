@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from assembly.proximity.clearance.proof import ClearanceProof
+from tests.validation.clearance_scenes import clear_start, start, way
 
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
@@ -45,3 +48,17 @@ def direction(rng):
     """A random unit vector."""
     way = rng.normal(size=3)
     return way / np.linalg.norm(way)
+
+
+@cache
+def start_of(number):
+    """A random pair of parts, judged: many tests ask for the same."""
+    return start(np.random.default_rng([21, number]))
+
+
+@cache
+def way_of(number):
+    """A start whose parts are apart, and a way from it."""
+    rng = np.random.default_rng([20, number])
+    begin = clear_start(rng)
+    return begin, way(rng, begin)

@@ -48,7 +48,7 @@ def distances(points, others):
 
 def test_gaps_along_any_direction(cases):
     rng, names, above = np.random.default_rng(0), list(SHAPES), 0
-    for _ in range(cases(40, 2000)):
+    for _ in range(cases(20, 2000)):
         one, other = (SHAPES[names[rng.integers(len(names))]] for _ in range(2))
         forest = forest_of(faces_of(one), faces_of(other))
         turn, shift, n = random_turn(rng), 2.5 * direction(rng), direction(rng)
@@ -61,7 +61,7 @@ def test_gaps_along_any_direction(cases):
         assert gap <= distances(*points).min() + ROUNDING
         assert gap == pytest.approx(separation(packed(forest), *forest.roots, relative(turn, shift), n), abs=ROUNDING)
         above += gap > 0.0
-    assert above > 5
+    assert above > 3
 
 
 def nodes_below(forest, k):

@@ -11,7 +11,7 @@ import pytest
 from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.stab import segments_apart, stabbed, triangle_distance
 from tests.proximity.clearance.nodes import nearest_on_triangles
-from tests.proximity.clearance.scenes import direction, moved, poses, proof_of
+from tests.proximity.clearance.scenes import direction, moved, poses, proof_of, start_of
 from tests.validation.clearance_scenes import start
 from tests.validation.crossing_judge import Motion, least_signed_distance
 
@@ -93,8 +93,8 @@ def test_stabs_stay_whatever_both_stand_for(cases):
 
 def test_no_translation_by_less_than_the_depth_parts(cases):
     rng, found = np.random.default_rng(3), 0
-    for number in range(cases(16, 1000)):
-        begin = start(np.random.default_rng([31, number]), aims=(-3.0, -0.5), sides=(-1,))
+    for number in range(cases(24, 2000)):
+        begin = start_of(number)
         (answer,) = proof_of(begin.a.shape, begin.b.shape).look(poses(begin.pose), 0.0)
         if answer.verdict is not Verdict.CROSSING:
             continue

@@ -133,38 +133,42 @@ def test_wedged():
 
 
 def test_moves_open_by_no_more_than_is_touching(cases):
-    rng = np.random.default_rng(0)
-    proof, q, _ = scene("box on plate", turned=Rotation.from_rotvec([0.3, 0.2, 0.1]))
-    middle, radius = proof.cells_of(0).nodes[0, :3], float(proof.cells_of(0).nodes[0, 3])
-    for _ in range(cases(30, 1000)):
+    """Of a body that is far from its own origin: moves are about that, lengths are those of points of the body."""
+    rng, tried = np.random.default_rng(0), 0
+    part = asm.shapes.ellipsoid(0.3, 0.5, 0.7).transformed(translation=[4.0, 1.0, 0.5])
+    turn = Rotation.from_rotvec([0.3, 0.2, 0.1])
+    proof, q = proof_of(PLATE, part), poses(at(1.0, 2.0, 3.0, turn))
+    middle = turn.apply([4.0, 1.0, 0.5])
+    for _ in range(cases(40, 1000)):
         many = int(rng.integers(1, 5))
         normals = np.array([direction(rng) for _ in range(many)])
-        places = q[1, :3] + rng.uniform(-0.5, 0.5, (many, 3))
+        arms = middle + rng.uniform(-0.5, 0.5, (many, 3))
         gaps = rng.uniform(-0.4, 1.5, many) * TOUCHING
-        move = move_apart(proof, 0, q, Contacts(normals, places, gaps), TOUCHING)
-        if move is None:
+        move = move_apart(proof, 0, q, Contacts(normals, q[1, :3] + arms, gaps), TOUCHING)
+        if move is None or not move.any():
             continue
+        tried += 1
         length = proof.move_length(0, q, move)
-        assert length <= TOUCHING * (1.0 + 1e-12)
-        points = q[1, :3] + (rng.uniform(-1.0, 1.0, (50, 3)) * 0.5 * [1.0, 0.8, 0.5])
+        assert length <= TOUCHING * (1.0 + 1e-6)
+        points = turn.apply(part.evaluate(*(rng.uniform(*ends, 50) for ends in part.domain)))
         # To first order: a turn by 1e-9 leaves 1e-18.
-        moved = move[:3] + np.cross(move[3:], points - q[1, :3])
-        assert np.linalg.norm(moved, axis=1).max() <= length * (1.0 + 1e-6)
-        after = gaps + (normals * (move[:3] + np.cross(move[3:], places - q[1, :3]))).sum(axis=1)
+        assert np.linalg.norm(move[:3] + np.cross(move[3:], points), axis=1).max() <= length * (1.0 + 1e-6)
+        after = gaps + (normals * (move[:3] + np.cross(move[3:], arms))).sum(axis=1)
         assert after.min() > 0.0
-    assert radius > 0.5 and np.abs(middle).max() < 1e-12
+    assert tried > 10
 
 
-def test_faces_that_lie_on_each_other():
-    """A pin that fills its bore: no move opens it, and normals oppose in all that is left open."""
-    shapes = PLATE, asm.shapes.solid_cylinder(0.4, 1.0)
-    proof, q = proof_of(*shapes), poses(at(0.7, 0.1, 0.1))
+def test_a_pin_that_fills_its_bore_is_not_decided():
+    """All around nothing parts it, and nothing crosses."""
+    proof, q = proof_of(PLATE, asm.shapes.solid_cylinder(0.4, 1.0)), poses(at(0.7, 0.1, 0.1))
     proof.fronts.counts.budget = 3000
-    (answer,) = proof.look(q, TOUCHING)
-    assert answer.verdict is Verdict.UNDECIDED
-    crossed = proof_of(asm.shapes.box(1.0, 1.0, 1.0), asm.shapes.sphere(0.4))
-    assert not conforms(crossed, 0, poses(at(0.8, 0.0, 0.0)), TOUCHING)
-    assert not conforms(crossed, 0, poses(at(2.0, 0.0, 0.0)), TOUCHING)
+    assert proof.look(q, TOUCHING)[0].verdict is Verdict.UNDECIDED
+
+
+def test_what_crosses_or_is_clear_does_not_conform():
+    proof = proof_of(asm.shapes.box(1.0, 1.0, 1.0), asm.shapes.sphere(0.4))
+    assert not conforms(proof, 0, poses(at(0.8, 0.0, 0.0)), TOUCHING)
+    assert not conforms(proof, 0, poses(at(2.0, 0.0, 0.0)), TOUCHING)
 
 
 def test_what_is_left_open_tells_how_to_open_it():
@@ -184,8 +188,8 @@ def test_cells_that_no_front_has_are_forgotten():
     box, ball = faces_of(asm.shapes.box(1.0, 0.7, 0.5)), faces_of(asm.shapes.ellipsoid(0.3, 0.5, 0.7))
     proof = ClearanceProof([box, ball, ball], [(0, 1), (1, 2), (2, 0)], [0.0] * 3)
     rng = np.random.default_rng(3)
-    q = np.array([at(0, 0, 0), at(1.0, 0.0, 0.0), at(0.0, 1.2, 0.0)])
-    before = proof.look(q, 0.0)
+    q = np.array([at(0, 0, 0), at(0.8005, 0.0, 0.0), at(0.0, 1.2, 0.0)])
+    before = ClearanceProof([box, ball, ball], [(0, 1), (1, 2), (2, 0)], [0.0] * 3).look(q, 0.0)
     for _ in range(20):
         other = q.copy()
         other[1, 0] = 0.801
@@ -193,8 +197,12 @@ def test_cells_that_no_front_has_are_forgotten():
         other[:, 3:] /= np.linalg.norm(other[:, 3:], axis=1)[:, None]
         proof.look(other, 0.0)
     told, used = proof.look(q, 0.0), int(proof.forest.arrays[5][0])
+    of_fronts = proof.forest.arrays[4][proof.fronts.cells()].copy()
     proof.forest.forget(proof.fronts)
     assert int(proof.forest.arrays[5][0]) < used
+    # Fronts have the same nodes, at other rows.
+    assert np.array_equal(proof.forest.arrays[4][proof.fronts.cells()], of_fronts)
+    assert proof.fronts.cells().max() < int(proof.forest.arrays[5][0])
     again = proof.look(q, 0.0, swept=True)
     assert [a.verdict for a in again] == [a.verdict for a in told] == [a.verdict for a in before]
     assert [a.bound for a in again] == [a.bound for a in told]
