@@ -42,7 +42,7 @@ from assembly.proximity.clearance.records import (
     pair_proof_at,
     parted_at,
 )
-from assembly.proximity.clearance.separation import best_bore, gap_of, is_cell, is_round, is_wire, separation
+from assembly.proximity.clearance.separation import best_bore, gap_of, is_cell, is_round, separation
 from assembly.proximity.clearance.stab import crossing_of
 from assembly.proximity.clearance.way import pose_at, sag_of, stays_apart, way_of
 
@@ -73,13 +73,6 @@ def part_nodes(forest, front, way, nodes, hint, needed):
 
 
 @kernel(inline=True)
-def thickness(forest, k):
-    """What keeps a cell from being parted that is parted by its corners, and halving makes less."""
-    node = node_at(forest.nodes, k)
-    return node.reach if is_wire(forest, k) else node.disc + node.rho
-
-
-@kernel(inline=True)
 def extent(forest, k):
     """The radius of a ball around the corners of a cell, or around a node: halving makes no wire thinner."""
     node = node_at(forest.nodes, k)
@@ -100,9 +93,9 @@ def is_halved_first(forest, a, b, short):
         if one.reach + other.reach >= 0.5 * short:
             return one.reach > other.reach, False
         return extent(forest, a) > extent(forest, b), True
-    if round_b and not round_a and (not cell_a or thickness(forest, a) >= 0.25 * short + 2.0 * one.pad):
+    if round_b and not round_a and (not cell_a or one.reach >= 0.25 * short + 2.0 * one.pad):
         return True, False
-    if round_a and not round_b and (not cell_b or thickness(forest, b) >= 0.25 * short + 2.0 * other.pad):
+    if round_a and not round_b and (not cell_b or other.reach >= 0.25 * short + 2.0 * other.pad):
         return False, False
     # A cell is not halved for a box that is not yet taken apart.
     if cell_a or cell_b:
@@ -114,7 +107,7 @@ def is_halved_first(forest, a, b, short):
 def fineness(forest, k):
     """How much smaller nodes than node k could still be."""
     node = node_at(forest.nodes, k)
-    return thickness(forest, k) if is_cell(forest, k) else node.radius
+    return node.reach if is_cell(forest, k) else node.radius
 
 
 @kernel(inner=True)
