@@ -105,9 +105,9 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
         return [PairAnswer(item.name, (a.name, b.name), unknown, True, False) for item, (a, b), _ in _owned(packed)]
     touching = solution._touching * packed.scale
     with lent_proof(packed, scene.bodies) as proof:
-        # What opened contacts at the last solve may do so here.
+        # What opened contacts at the last solve may do so here, if no more was called touching there.
         answers = proof.look(solution.q, touching, proof.moves)
-        left = [k for k, answer in enumerate(answers) if not is_proven(answer)]
+        left = [k for k, answer in enumerate(answers) if not is_proven(answer) or answer.depth > touching]
         near = near_contacts(solution, proof, NEAR * touching) if left else {}
         for k in left:
             answers[k] = _opened(proof, k, solution.q, near.get(k), touching)

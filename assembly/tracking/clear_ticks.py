@@ -30,20 +30,11 @@ NEAR = 1e-2
 
 
 class _Standing:
-    """Where bodies stand: what opens their contacts there, and which are near, once that is asked.
+    """Where bodies of a solution stand, and which contacts are near there, once that is asked."""
 
-    Parameters
-    ----------
-    solution : Solution
-        Of a state that nobody writes to.
-    moves : (pairs, 6), optional
-        What opens contacts, if it is known.
-    """
-
-    def __init__(self, solution: Solution, moves: Array | None = None) -> None:
+    def __init__(self, solution: Solution) -> None:
         self.solution = solution
         self.q = solution.q
-        self.moves = moves
         self._near: dict[int, Contacts] | None = None
 
     def near(self, proof: ClearanceProof) -> dict[int, Contacts]:

@@ -96,3 +96,17 @@ def test_random_solves_say_what_is_so(cases):
         if depth > 1e-9:
             assert not solution.success and not solution.proved, begin
             assert solution.feasibility > 0.0 and "a and b" in solution.message
+
+
+def test_what_opened_contacts_elsewhere_is_no_proof_of_more_than_touching():
+    """A proof is kept from solve to solve, with its moves: one that was allowed more is not to be taken."""
+    floor = asm.Body("floor", asm.shapes.box(4.0, 4.0, 1.0), fixed=True)
+    block = asm.Body("block", asm.shapes.box(1.0, 1.0, 1.0), position=(0.0, 0.0, 1.0))
+    scene = asm.Assembly([floor, block])
+    scene.constrain(asm.Clearance())
+    solution = scene.solve()
+    touching = solution._touching * solution._packed.scale
+    (proof,) = solution._packed.proofs
+    proof.moves[:] = [0.0, 0.0, 1e-3, 0.0, 0.0, 0.0]
+    (pair,) = prove_end(solution)
+    assert pair.proved and pair.answer.depth <= touching

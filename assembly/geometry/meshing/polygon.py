@@ -425,4 +425,5 @@ def _halved(u: Array, v: Array, apart: Apart, triangles: Indices) -> tuple[Array
             low = np.unique(index.min(axis=1)[index[:, 0] != index[:, 1]])
             new[d].append(0.5 * (lines[low] + lines[low + 1]))
     # Two arrays, u and v; to mypy a tuple of a generator has any length.
-    return tuple(np.union1d(lines, np.concatenate(added)) for lines, added in zip((u, v), new, strict=True))  # type: ignore[return-value]
+    in_u, in_v = (np.union1d(lines, np.concatenate(added)) for lines, added in zip((u, v), new, strict=True))
+    return in_u, in_v

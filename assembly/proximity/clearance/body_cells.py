@@ -23,6 +23,7 @@ from assembly.proximity.clearance.records import (
     NODE,
     NODE_SIZE,
     NONE,
+    node_at,
 )
 from assembly.proximity.clearance.round_faces import Round, round_of, round_parts
 from assembly.proximity.clearance.wire_cells import WireCells, wire_cells
@@ -60,7 +61,6 @@ class BodyCells:
         The diagonal of a box around the body, and its largest coordinate.
     radius : float
         The least radius of what is round of the body, wires, cylinders, balls, tubes; else a quarter of its size.
-    topology : Topology
     """
 
     table: Table
@@ -75,7 +75,12 @@ class BodyCells:
     size: float
     far: float
     radius: float
-    topology: Topology
+
+    @property
+    def root(self) -> np.record:
+        """The root's NODE."""
+        root: np.record = node_at(self.nodes, 0)
+        return root
 
 
 @lru_cache(maxsize=128)
@@ -109,7 +114,6 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
         size,
         float(max(np.abs(low).max(), np.abs(high).max())),
         min([0.25 * size, *radii]),
-        topology,
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly._record import place_of, rows_of
+from assembly._record import rows_of
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import spline_curve_at, surface_at
 from assembly.proximity.clearance.body_cells import BodyCells, cells_of_body
@@ -37,7 +37,6 @@ ROOM = 512
 WORK = (3, 64)
 # Points of each connected part of a boundary.
 POINTS = 12
-_CORNER = place_of(NODE, "corner")
 
 
 class PackedForest:
@@ -147,7 +146,8 @@ class PackedForest:
         if body not in self._shells:
             rows = [cells.first[cells.component == part] for part in np.unique(cells.component)]
             some = [at[np.linspace(0, len(at) - 1, min(len(at), POINTS)).astype(int)] for at in rows]
-            self._shells[body] = [np.ascontiguousarray(cells.nodes[at, _CORNER : _CORNER + 3]) for at in some]
+            corners = rows_of(NODE, cells.nodes).corner[:, 0]
+            self._shells[body] = [np.ascontiguousarray(corners[at]) for at in some]
         return self._shells[body]
 
 

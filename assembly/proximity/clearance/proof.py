@@ -228,19 +228,19 @@ class ClearanceProof:
         """How far a move takes points of the second body of pair k, at most."""
         if not move.any():
             return 0.0
-        middle, radius = self.cells_of(k).nodes[0, :3], float(self.cells_of(k).nodes[0, 3])
-        way = move[:3] + np.cross(move[3:], rotation_matrix(q[self.pairs[k][1], 3:]) @ middle)
-        return float(np.linalg.norm(way) + radius * np.linalg.norm(move[3:]))
+        root = self.cells_of(k).root
+        way = move[:3] + np.cross(move[3:], rotation_matrix(q[self.pairs[k][1], 3:]) @ root.center)
+        return float(np.linalg.norm(way) + root.radius * np.linalg.norm(move[3:]))
 
     def way_length(self, k: int, before: Array, after: Array) -> float:
         """How far points of the second body of pair k go between two poses, seen from the first, at most."""
         return self._length(k, self.relative(k, before), self.relative(k, after))
 
     def _length(self, k: int, before: tuple[Array, Array], after: tuple[Array, Array]) -> float:
-        root = self.cells_of(k).nodes[0]
+        root = self.cells_of(k).root
         turn, shift = after[0] - before[0], after[1] - before[1]
         angle = 2.0 * np.arcsin(min(1.0, float(np.linalg.norm(turn)) / np.sqrt(8.0)))
-        length = float(np.linalg.norm(turn @ root[:3] + shift)) + float(angle) * float(root[3])
+        length = float(np.linalg.norm(turn @ root.center + shift)) + float(angle) * float(root.radius)
         return length * LONGER
 
     def last_poses(self) -> tuple[Array, Array]:

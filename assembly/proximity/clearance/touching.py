@@ -88,8 +88,8 @@ def move_apart(proof: ClearanceProof, k: int, q: Array, contacts: Contacts, touc
     """
     normals, places, gaps = contacts
     row = q[proof.pairs[k][1]]
-    root = proof.cells_of(k).nodes[0]
-    arm, radius = rotation_matrix(row[3:]) @ root[:3], float(root[3])
+    root = proof.cells_of(k).root
+    arm, radius = rotation_matrix(row[3:]) @ root.center, float(root.radius)
     guides = proof.fronts.pair.guides[k]
     guides[:] = 0.0
     few = normals[np.linspace(0, len(normals) - 1, min(len(normals), GUIDES)).astype(int)]
