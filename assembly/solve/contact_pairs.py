@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import side_faces
@@ -21,16 +22,19 @@ if TYPE_CHECKING:
 
 __all__ = ["contact_pairs", "listed_contacts"]
 
+Table = NDArray[np.int64]
+
 
 def contact_pairs(solution: Solution) -> dict[str, ContactPair]:
     """The pair of every contact by its name, at the poses of a solution."""
     scene = solution._scene
     pairs = {}
+    table = solution._packed.table
     for k, contact in enumerate(scene.contacts):
         f, g = scene.sides[k]
         places = [scene.index(body) for body in contact.bodies]
-        if solution._packed.table[solution._packed.table[ROW_TABLE] + ROW * k + SHELL_F] >= 0:
-            pairs[contact.name] = _solids(solution, k, places)
+        if table[table[ROW_TABLE] + ROW * k + SHELL_F] >= 0:
+            pairs[contact.name] = _solids(solution, table, k, places)
         else:
             assert isinstance(f, BodyFace) and isinstance(g, BodyFace)
             start = solution._parameters[k, :4]
@@ -45,6 +49,7 @@ def listed_contacts(solution: Solution) -> Iterator[tuple[int, Clearance, Contac
     owners = [(item, pair) for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True) for pair in own]
     if solution._state.size <= packed.memory_at:
         return
+    table = packed.table_at(solution._state)
     places = [(number, k, pair) for k, (pair, number) in enumerate(packed.listed(solution._state)) if pair >= 0]
     for _, k, pair in sorted(places):
         clearance, bodies = owners[pair]
@@ -52,8 +57,8 @@ def listed_contacts(solution: Solution) -> Iterator[tuple[int, Clearance, Contac
         if np.isnan(solution._parameters[r, 0]):
             continue
         f, g = bodies
-        if packed.table_at(solution._state)[packed.table[ROW_TABLE] + ROW * r + SHELL_F] >= 0:
-            contact = _solids(solution, r, [scene.index(f), scene.index(g)], bodies)
+        if table[table[ROW_TABLE] + ROW * r + SHELL_F] >= 0:
+            contact = _solids(solution, table, r, [scene.index(f), scene.index(g)], bodies)
         else:
             q_f, q_g = solution.q[[scene.index(f), scene.index(g)]]
             contact = extremal_pair(f.faces[0], q_f, g.faces[0], q_g, solution._parameters[r, :4])
@@ -74,11 +79,14 @@ def _listed(solution: Solution) -> dict[str, ContactPair]:
 
 
 def _solids(
-    solution: Solution, k: int, places: list[int], sides: tuple[Body | BodyFace, Body | BodyFace] | None = None
+    solution: Solution,
+    table: Table,
+    k: int,
+    places: list[int],
+    sides: tuple[Body | BodyFace, Body | BodyFace] | None = None,
 ) -> ContactPair:
-    """The pair of features of contact k, between bodies in the given places; `sides` are those of a clearance's."""
+    """The pair of features of contact k of a table, between bodies in places; `sides` are those of a clearance's."""
     packed = solution._packed
-    table = packed.table_at(solution._state)
     row = table[ROW_TABLE] + ROW * k
     sides = solution._scene.sides[k] if sides is None else sides
     q = solution.q[places]
