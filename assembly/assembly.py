@@ -24,7 +24,7 @@ from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.attempts.attempts import attempt, load
 from assembly.solve.attempts.postures import postures_from
 from assembly.solve.interruption import CTRL_C, Interruption
-from assembly.solve.loop.settings import ALLOWED_OVERLAP, ANY_POSE, GATHER, ITERATIONS, STRAYS
+from assembly.solve.loop.settings import ALLOWED_OVERLAP, ANY_POSE, GATHER, ITERATIONS, PLACES, STRAYS
 from assembly.solve.options import Options
 from assembly.solve.scene import Scene, Status
 from assembly.solve.solution import Solution
@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 _SETTINGS = CTRL_C.fill(Options().settings())
 _WARM_SETTINGS = CTRL_C.fill(Options().settings(warm=True))
 # How many times as many places as they ask for a solve gives to clearances.
-MOST_CROWDING = 16
+MORE_PLACES, MOST_CROWDING = 4, 16
 
 
 class Assembly(Contents):
@@ -228,6 +228,10 @@ class Assembly(Contents):
         apart = q0._fit.apart if isinstance(q0, Solution) and q0._fit is not None else None
         while True:
             packed = self.packed()
+            may_grow = self._crowding < MOST_CROWDING and not isinstance(q0, Solution)
+            if packed.clearance_rows and settings[PLACES] != may_grow:
+                settings = settings.copy()
+                settings[PLACES] = float(may_grow)
             start = partial(self._start, packed, q0, starts, turns)
             load(packed, start)
             begin = perf_counter()
@@ -237,8 +241,7 @@ class Assembly(Contents):
                 with postures_from(packed, reference):
                     outcome = attempt(packed, settings, start, interruption, turns, apart)
             spent += perf_counter() - begin
-            fits = not packed.is_crowded(outcome.state) or self._crowding >= MOST_CROWDING or isinstance(q0, Solution)
-            if fits or interruption.is_over():
+            if not (may_grow and packed.is_crowded(outcome.state)) or interruption.is_over():
                 assert self._scene is not None
                 code, state, history, order, fit = outcome
                 status = Status.FITTED if fit is not None and fit.apart is not None else interruption.status(code)
@@ -256,7 +259,7 @@ class Assembly(Contents):
                 solution = Solution(self._scene, packed, state, status, spent, history, order, fit)
                 solution._touching = float(settings[ALLOWED_OVERLAP])
                 return self._proven(solution, interruption) if packed.clearance_rows else solution
-            self._crowding *= 2
+            self._crowding *= MORE_PLACES
             self._packed = None
 
     @staticmethod

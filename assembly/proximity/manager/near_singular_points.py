@@ -6,18 +6,16 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from assembly._kernel import kernel
 from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.vec import dot, sub
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import FACE, FACE_RECORD, shell_at
 from assembly.proximity.extrema.pair_matrix import CONTINUUM
-from assembly.proximity.features.holding import HELD_F, HELD_G
+from assembly.proximity.features.holding import HELD_F
 from assembly.proximity.features.region_tests import is_feasible
 from assembly.proximity.features.solid_contact import pair_parameters
-from assembly.proximity.manager.extrema import NEW, ROOT, USELESS, extremum_at
+from assembly.proximity.manager.extrema import USELESS, extremum_at
 from assembly.proximity.manager.near_singular import across_near_singular, into_near_singular
 
 # Cosine of the angle by which a valley turns from one of its points that are held to the next.
@@ -40,10 +38,16 @@ def features_of(posed, codes):
     return feature_at(table, shells[0], codes[0]), feature_at(table, shells[1], codes[1])
 
 
+@kernel(inline=True)
+def is_any_of_many(extremum):
+    """Whether an extremum is one of a continuum as far as Newton's method can tell."""
+    return abs(extremum.fold) <= CONTINUUM
+
+
 @kernel(inner=True)
 def is_loose(extremum):
     """Whether an extremum is any one of a continuum, where it is by chance."""
-    return extremum.corner == 0.0 and abs(extremum.fold) <= CONTINUUM
+    return extremum.corner == 0.0 and is_any_of_many(extremum)
 
 
 @kernel(inner=True)
@@ -67,42 +71,6 @@ def is_next_in_near_singular(posed, codes, surfaces, x, along, extrema, count):
             if step.found and dot(along, step.along) > APART and 2.0 * part * part >= square - NEAR * NEAR:
                 return False
     return True
-
-
-@kernel(inner=True)
-def is_left_out(posed, extrema, k):
-    """Whether extremum k, behind all that stay, is of a continuum and next to what is held; if not, it is held."""
-    extremum = extremum_at(extrema.rows, k)
-    codes = (np.int64(extremum.code_f), np.int64(extremum.code_g))
-    if extremum.origin == USELESS or not is_loose(extremum) or not is_of_faces(posed, codes):
-        return False
-    surfaces = features_of(posed, codes)
-    x = pair_parameters(extremum)
-    step = across_near_singular(posed.store, surfaces[0], surfaces[1], posed.pose, x)
-    if not step.found:
-        return False
-    if extremum.origin == NEW and not is_next_in_near_singular(posed, codes, surfaces, x, step.along, extrema, k):
-        return True
-    extremum.corner = HELD_F if step.on_f else HELD_G
-    return False
-
-
-@kernel(inner=True)
-def hold_continua(posed, extrema):
-    """Of a continuum of extrema along a valley between two faces, hold those that are listed and few of the new ones.
-
-    What Newton's method finds there are as many as it has starts, and may fill the room; one that is not next to what
-    is held is left out.
-    """
-    rows = extrema.rows
-    stay = 0
-    for k in range(extrema.count[0]):
-        for l in range(ROOT):
-            rows[stay, l] = rows[k, l]
-        stay += 1
-        if is_left_out(posed, extrema, stay - 1):
-            stay -= 1
-    extrema.count[0] = stay
 
 
 @kernel(inner=True)

@@ -13,37 +13,27 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import cross, dot
-from assembly.proximity.brep.apexes import unit
-from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import EDGE, FACE
 from assembly.proximity.bvh.tree import pairs_about, three_of
-from assembly.proximity.extrema.feature_jets import edge_jet
 from assembly.proximity.features.holding import FEATURES, HELD_F, HELD_G, POINT, TILT
 from assembly.proximity.features.solid_contact import pair_parameters
+from assembly.proximity.manager.continua import (
+    SLACK,
+    hold_continua,
+    is_next,
+    is_straight,
+    kinds_of,
+)
 from assembly.proximity.manager.extrema import NEW, NOTHING, add_extremum, extremum_at, is_list_full, solids_extremum
 from assembly.proximity.manager.near_singular import into_near_singular
 from assembly.proximity.manager.near_singular_points import (
     features_of,
-    hold_continua,
+    is_any_of_many,
     is_next_in_near_singular,
     is_of_faces,
     is_on_face,
 )
 from assembly.proximity.manager.overlap import is_outside, patch_at
-
-# Rounding of gaps.
-SLACK = 1e-9
-# Cosine of the angle by which an edge turns from one of its points that are held to the next; an edge is straight whose
-# parts turn by less than this.
-NEXT, STRAIGHT = 0.75, 0.02
-
-
-@kernel(inner=True)
-def kinds_of(posed, codes):
-    """What two features are: faces, edges or vertices."""
-    table, shells = posed.store.table, posed.shells
-    return feature_kind(table, shells[0], codes[0]), feature_kind(table, shells[1], codes[1])
 
 
 @kernel(inner=True)
@@ -66,28 +56,6 @@ def hold_extrema(posed, extrema):
         x, n = pair_parameters(extremum), three_of(extremum.normal)
         found = solids_extremum(posed, codes, x, n, extrema, FEATURES)
         extremum.corner = 0.0 if found == NOTHING else FEATURES
-
-
-@kernel(inner=True)
-def is_next(posed, codes, side, start, width, extrema):
-    """Whether the middle of a part of an edge, at `start`, is to be held over the face that the other feature is.
-
-    So it is where the edge is bent, and has turned far from all of its points that are known over that face.
-    """
-    store = posed.store
-    edge = feature_at(store.table, posed.shells[side], codes[side])
-    _p, along, bent = edge_jet(store, edge, start[2 * side])
-    side_of = cross(along, bent)
-    if width * width * dot(side_of, side_of) < STRAIGHT * STRAIGHT * dot(along, along) * dot(along, along):
-        return False
-    along = unit(along)
-    for k in range(extrema.count[0]):
-        extremum = extremum_at(extrema.rows, k)
-        if extremum.code_f == codes[0] and extremum.code_g == codes[1]:
-            _p, other, _bent = edge_jet(store, edge, extremum.parameters[2 * side])
-            if dot(along, unit(other)) > NEXT:
-                return False
-    return True
 
 
 @kernel(inner=True)
@@ -140,12 +108,17 @@ def add_vertex_contacts(posed, span, merge_radius, stack, candidates, extrema):
             add_near_singular(posed, codes, start, half, span, merge_radius, extrema)
         if not is_vertex_contact(posed, codes):
             continue
+        before = extrema.count[0]
         add_vertex_contact(posed, codes, start, span, merge_radius, extrema, FEATURES)
         kinds = kinds_of(posed, codes)
         side = 0 if kinds[0] == EDGE else 1
-        width = f.half[0] if side == 0 else g.half[0]
-        if kinds[side] == EDGE and kinds[1 - side] == FACE and not is_list_full(extrema):
-            if is_next(posed, codes, side, start, width, extrema):
-                add_vertex_contact(posed, codes, start, span, merge_radius, extrema, POINT)
+        if kinds[side] != EDGE or kinds[1 - side] != FACE:
+            continue
+        if extrema.count[0] > before and is_any_of_many(extremum_at(extrema.rows, before)):
+            extrema.count[0] = before
+        t, width = start[2 * side], f.half[0] if side == 0 else g.half[0]
+        bends = not is_straight(posed, codes, side, t, width)
+        if bends and not is_list_full(extrema) and is_next(posed, codes, side, t, extrema, extrema.count[0]):
+            add_vertex_contact(posed, codes, start, span, merge_radius, extrema, POINT)
     if 0 <= found <= candidates.shape[0]:
         hold_extrema(posed, extrema)

@@ -25,6 +25,7 @@ from assembly.solve.loop.settings import (
     HISTORY,
     LIFT_TRIMS,
     OBJECTIVE,
+    PLACES,
     SCATTER,
     SOLVED,
     UNSURE,
@@ -81,7 +82,7 @@ def attempt(
     # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
     table = packed.table.copy() if packed.clearance_rows else packed.table
     outcome = begin(packed, interruption, table, settings, start(), turns)
-    if outcome.code == SOLVED:
+    if outcome.code == SOLVED or (settings[PLACES] == 1.0 and packed.is_crowded(outcome.state)):
         return outcome
     loop = _loop(interruption, turns)
 

@@ -7,6 +7,7 @@ import math
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import TOUCHING
 from assembly.constraints.program.records import header_at
+from assembly.proximity.manager.records import memory_header_at
 from assembly.proximity.manager.update import AS_NEEDED, CAREFUL, DOUBTFUL, IN_TURNS, MEASURED, SPARING
 from assembly.solve.loop.begin import let_touch, overlap_allowed, rearrange
 from assembly.solve.loop.clearances import place_clearance_rows, update_again
@@ -104,6 +105,8 @@ def evaluate_iterate(task, history, current, rows, system):
     if loop.status == RUNNING and loop.late:
         # Not every pair of bodies that is near has been updated.
         loop.status, loop.violation = OUT_OF_TIME, math.inf
+    if task.watched and limits.places == 1.0 and memory_header_at(program.lifted.memory, 0).crowded == 1.0:
+        loop.status = OUT_OF_TIME
     if loop.status != RUNNING:
         loop.over = 1
         return False

@@ -31,6 +31,7 @@ SETTINGS_RECORD = record_dtype(
     touching=1,  # depth that bodies may be in each other by where a solve begins, and may stay
     ask_address=1,  # kernel that is asked whether to go on (`solve/interruption.py`); 0: none
     strays=1,  # 1: ends early where bodies go away without bound
+    places=1,  # 1: ends where near contacts find no place among those of clearances (it begins again with more)
 )
 settings_at = record_view(SETTINGS_RECORD)
 FEASIBILITY = place_of(SETTINGS_RECORD, "feasibility")
@@ -51,6 +52,7 @@ FIT = place_of(SETTINGS_RECORD, "fit")
 ALLOWED_OVERLAP = place_of(SETTINGS_RECORD, "touching")
 ASK_ADDRESS = place_of(SETTINGS_RECORD, "ask_address")
 STRAYS = place_of(SETTINGS_RECORD, "strays")
+PLACES = place_of(SETTINGS_RECORD, "places")
 SETTINGS = size_of(SETTINGS_RECORD)
 # Whether the end is tested for a minimum (TESTED: and saddles are left before they are reached to the last digit).
 TESTED, REACHED = 1.0, 2.0

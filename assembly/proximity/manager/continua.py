@@ -1,0 +1,129 @@
+"""Of a continuum of extrema few are held: of an edge that lies on a face, of a valley between two faces.
+
+Where an edge is equally near to a face all along, as two flush plates are along their rims, Newton's method finds as
+many extrema as it has starts. The gap is affine along a straight edge: its ends are corners, which have rows of their
+own, and what is between them is implied. Of a curved edge points are held that stay where they are on it, one for each
+40 degrees or so by which it turns; where it is tilted, the extremum is isolated, and a row beside them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import cross, dot
+from assembly.proximity.brep.apexes import unit
+from assembly.proximity.brep.borders import feature_at, feature_kind
+from assembly.proximity.brep.records import EDGE, EDGE_CELL_SIZE, FACE, edge_at
+from assembly.proximity.extrema.feature_jets import edge_jet
+from assembly.proximity.features.holding import HELD_F, HELD_G, POINT
+from assembly.proximity.features.solid_contact import pair_parameters
+from assembly.proximity.manager.extrema import NEW, ROOT, USELESS, extremum_at
+from assembly.proximity.manager.near_singular import across_near_singular
+from assembly.proximity.manager.near_singular_points import features_of, is_loose, is_next_in_near_singular
+
+# Cosine of the angle by which an edge turns from one of its points that are held to the next; a part of an edge is
+# straight that turns by less than this.
+NEXT, STRAIGHT = 0.75, 0.02
+# Rounding of gaps.
+SLACK = 1e-9
+
+
+@kernel(inner=True)
+def kinds_of(posed, codes):
+    """What two features are: faces, edges or vertices."""
+    table, shells = posed.store.table, posed.shells
+    return feature_kind(table, shells[0], codes[0]), feature_kind(table, shells[1], codes[1])
+
+
+@kernel(inner=True)
+def is_straight(posed, codes, side, t, width):
+    """Whether an edge turns by next to nothing along so much of its parameter, as it is bent at t."""
+    _p, along, bent = edge_jet(posed.store, feature_at(posed.store.table, posed.shells[side], codes[side]), t)
+    side_of = cross(along, bent)
+    square = dot(along, along)
+    return width * width * dot(side_of, side_of) < STRAIGHT * STRAIGHT * square * square
+
+
+@kernel(inner=True)
+def is_next(posed, codes, side, t, extrema, count):
+    """Whether an edge has turned, at t, far from all of its points over a face that are among the first `count`."""
+    store = posed.store
+    edge = feature_at(store.table, posed.shells[side], codes[side])
+    along = unit(edge_jet(store, edge, t)[1])
+    for k in range(count):
+        extremum = extremum_at(extrema.rows, k)
+        if extremum.code_f == codes[0] and extremum.code_g == codes[1]:
+            other = edge_jet(store, edge, extremum.parameters[2 * side])[1]
+            if dot(along, unit(other)) > NEXT:
+                return False
+    return True
+
+
+@kernel(inner=True)
+def width_of(posed, codes, side):
+    """The width of the parameter of an edge."""
+    table, pool = posed.store.table, posed.store.pool
+    edge = edge_at(table, feature_at(table, posed.shells[side], codes[side]))
+    return pool[edge.cells + EDGE_CELL_SIZE * (edge.cell_count - 1) + 1] - pool[edge.cells]
+
+
+@kernel(inner=True)
+def is_implied_on_edge(posed, codes, side, extrema, k):
+    """Whether extremum k, any point of an edge that lies on a face, says no more than others do; if not, it is held."""
+    extremum = extremum_at(extrema.rows, k)
+    t = extremum.parameters[2 * side]
+    if extremum.origin == NEW:
+        # Of edges that have crossed the crossing is no corner.
+        has_corners = extremum.gap >= -SLACK and is_straight(posed, codes, side, t, width_of(posed, codes, side))
+        if has_corners or not is_next(posed, codes, side, t, extrema, k):
+            return True
+    extremum.corner = POINT
+    return False
+
+
+@kernel(inner=True)
+def is_implied_in_valley(posed, codes, extrema, k):
+    """The same of any point of a valley between two faces."""
+    extremum = extremum_at(extrema.rows, k)
+    surfaces = features_of(posed, codes)
+    x = pair_parameters(extremum)
+    step = across_near_singular(posed.store, surfaces[0], surfaces[1], posed.pose, x)
+    if not step.found:
+        return False
+    if extremum.origin == NEW and not is_next_in_near_singular(posed, codes, surfaces, x, step.along, extrema, k):
+        return True
+    extremum.corner = HELD_F if step.on_f else HELD_G
+    return False
+
+
+@kernel(inner=True)
+def is_implied(posed, extrema, k):
+    """Whether extremum k, behind all that stay, is of a continuum and next to what is held; if not, it is held."""
+    extremum = extremum_at(extrema.rows, k)
+    if extremum.origin == USELESS or not is_loose(extremum):
+        return False
+    codes = (np.int64(extremum.code_f), np.int64(extremum.code_g))
+    f, g = kinds_of(posed, codes)
+    if f == FACE and g == FACE:
+        return is_implied_in_valley(posed, codes, extrema, k)
+    if (f == EDGE and g == FACE) or (f == FACE and g == EDGE):
+        return is_implied_on_edge(posed, codes, 0 if f == EDGE else 1, extrema, k)
+    return False
+
+
+@kernel(inner=True)
+def hold_continua(posed, extrema):
+    """Of every continuum of extrema hold those that are listed and few of the new ones, and leave the others out.
+
+    What Newton's method finds there may fill the room.
+    """
+    rows = extrema.rows
+    stay = 0
+    for k in range(extrema.count[0]):
+        for l in range(ROOT):
+            rows[stay, l] = rows[k, l]
+        stay += 1
+        if is_implied(posed, extrema, stay - 1):
+            stay -= 1
+    extrema.count[0] = stay
