@@ -14,6 +14,7 @@ from assembly.kinematics.motion import RelativePose
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import shell_at
 from assembly.proximity.features.holding import HELD_F, HELD_G
+from assembly.proximity.manager.continua import hold_continua
 from assembly.proximity.manager.extrema import (
     EXTREMUM,
     LISTED,
@@ -23,7 +24,7 @@ from assembly.proximity.manager.extrema import (
     extremum_at,
 )
 from assembly.proximity.manager.near_singular import ARRIVED, across_near_singular, into_near_singular
-from assembly.proximity.manager.near_singular_points import hold_continua, is_next_in_near_singular, sunk
+from assembly.proximity.manager.near_singular_points import is_next_in_near_singular, sunk
 from assembly.proximity.manager.records import pair_in
 from tests.laws.scenes import list_of, posed
 
