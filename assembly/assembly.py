@@ -170,13 +170,36 @@ class Assembly(Contents):
     ) -> Solution:
         """A solve from this start and no other one."""
         settings = self._settings(options, interruption, isinstance(q0, Solution))
-        solution = self._solved(settings, q0, starts, interruption)
-        is_cold = not isinstance(q0, Solution) and settings[ITERATIONS] > 0.0
-        if solution._packed.clearance_rows and is_cold and not interruption.is_over():
-            q = self._given(None if isinstance(q0, Solution) else q0)
-            # What holds as it stands was not moved.
-            if not solution.success or (solution.q != q).any():
-                solution = self._from_apart(solution, settings, q, starts, options, interruption)
+        if isinstance(q0, Solution) or settings[ITERATIONS] == 0.0 or not self.packed().clearance_rows:
+            return self._solved(settings, q0, starts, interruption)
+        from assembly.studies.put_together import put_together
+
+        q = self._given(q0)
+        first = put_together(self, q, starts, options, interruption)
+        if first is not None and not first.keeps_topology:
+            solution = self._put_together(first.poses, settings, q, starts, interruption)
+            if solution.success or interruption.is_over():
+                return solution
+        solution = self._solved(settings, q, starts, interruption)
+        # What holds as it stands was not moved.
+        if not interruption.is_over() and not (solution.success and (solution.q == q).all()):
+            solution = self._from_apart(solution, settings, q, starts, options, interruption)
+        if first is not None and first.keeps_topology and not solution.success and not interruption.is_over():
+            other = self._put_together(first.poses, settings, q, starts, interruption)
+            solution = other if other.success else solution
+        return solution
+
+    def _put_together(
+        self,
+        poses: Array,
+        settings: Array,
+        q: Array,
+        starts: Mapping[str, ArrayLike] | None,
+        interruption: Interruption,
+    ) -> Solution:
+        """A solve from where bodies were put together without clearances; postures are measured from q."""
+        solution = self._solved(settings, poses, starts, interruption, q)
+        solution.put_together = True
         return solution
 
     def _from_apart(

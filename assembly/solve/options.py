@@ -61,6 +61,9 @@ class Options:
     touching : float
         What bodies of a contact or a clearance may be in each other where the solve begins: so much is called touching,
         they need not be parted, and no contact of these goes deeper. For parts of files 1e-6 is right, say.
+    keep_topology : bool
+        Under a clearance, whether bodies are never put together without it first, from a start at which joints or
+        contacts are far from holding: to there they may pass through each other (`Solution.put_together` tells).
     verbose : int
         1 prints a table of the iterations after the solve; nothing is printed at 0.
     """
@@ -73,11 +76,14 @@ class Options:
     radius: float = 0.2
     fit: float = 1e-6
     touching: float = 1e-9
+    keep_topology: bool = False
     verbose: int = 0
 
     def __post_init__(self) -> None:
         integer("max_iterations", self.max_iterations, 0, 10**9)
         integer("verbose", self.verbose, 0, 1)
+        if not isinstance(self.keep_topology, bool):
+            raise TypeError(f"keep_topology is {self.keep_topology!r}; expected True or False")
         for name, high in (("tolerance", 1e-2), ("stationarity", 1e-2), ("penalty", 1e3), ("radius", 1.0)):
             value = number(name, getattr(self, name))
             if not 0.0 < value <= high:

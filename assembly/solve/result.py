@@ -59,6 +59,7 @@ class Result(ReadOnlyArrays):
         self.seconds = seconds
         self._order = order
         self.restarted = False
+        self.put_together = False
         self._fit = fit
         self._clear: list[PairAnswer] = []
         # Of a tick: whether samples stand for its proof.

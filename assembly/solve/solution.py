@@ -46,6 +46,9 @@ class Solution(Result):
         faces lie on each other and samples stand for the proof, and where a clearance asks for a gap beside a contact.
     restarted : bool
         Whether the constraints did not hold near the start, and the solution was found from another one.
+    put_together : bool
+        Whether, where joints or contacts did not hold at the start, bodies were put together without clearances first:
+        to there they may have passed through each other. The option `keep_topology` forbids it.
     feasibility : float
         Largest violation of a constraint, in the user's units, evaluated at `q`. Of a contact that has no extremal pair
         there it is the distance of the points in `contacts`. Infinite only where an `Expression` or a derivative of it

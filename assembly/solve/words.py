@@ -29,6 +29,8 @@ def message(solution: Solution) -> str:
         return f"{solution._packed.pair_name(culprit)!r}: {text}"
     if solution.restarted:
         text += "; found from another start: near the one given constraints did not hold"
+    if solution.put_together:
+        text += "; bodies were put together without clearances first, and may have passed through each other"
     scale = solution._scene.scale
     # Of a contact that was lost there are lengths alone.
     parts = {k: v / scale for k, v in solution.violations.items()} if solution._is_lost else solution._largest(scale)

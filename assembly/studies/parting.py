@@ -22,7 +22,7 @@ from assembly.solve.interruption import Interruption
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["parted"]
+__all__ = ["is_stuck", "parted"]
 
 Array = NDArray[np.float64]
 # Rounds in which all pairs that are stuck are parted: to part one may drive another together.
@@ -40,7 +40,7 @@ def parted(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     moved = q.copy()
     with lent_proof(packed, scene.bodies) as proof:
         for _ in range(ROUNDS):
-            stuck = [k for k, answer in enumerate(proof.look(moved, touching)) if _is_stuck(answer, touching)]
+            stuck = [k for k, answer in enumerate(proof.look(moved, touching)) if is_stuck(answer, touching)]
             if not stuck:
                 return moved if (moved != q).any() else None
             for k in stuck:
@@ -49,7 +49,8 @@ def parted(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     return None
 
 
-def _is_stuck(answer: Answer, touching: float) -> bool:
+def is_stuck(answer: Answer, touching: float) -> bool:
+    """Whether an answer says that two bodies are in each other by more than what is called touching."""
     if answer.verdict is Verdict.CROSSING:
         return answer.depth > touching
     return answer.verdict is Verdict.ENCLOSED
