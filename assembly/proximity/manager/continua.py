@@ -14,8 +14,8 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import cross, dot
 from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import feature_at, feature_kind
-from assembly.proximity.brep.records import EDGE, EDGE_CELL_SIZE, FACE, edge_at
-from assembly.proximity.extrema.feature_jets import edge_jet
+from assembly.proximity.brep.records import EDGE, FACE
+from assembly.proximity.extrema.feature_jets import edge_jet, edge_limits
 from assembly.proximity.features.holding import HELD_F, HELD_G, POINT
 from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.extrema import NEW, ROOT, USELESS, extremum_at
@@ -63,9 +63,8 @@ def is_next(posed, codes, side, t, extrema, count):
 @kernel(inner=True)
 def width_of(posed, codes, side):
     """The width of the parameter of an edge."""
-    table, pool = posed.store.table, posed.store.pool
-    edge = edge_at(table, feature_at(table, posed.shells[side], codes[side]))
-    return pool[edge.cells + EDGE_CELL_SIZE * (edge.cell_count - 1) + 1] - pool[edge.cells]
+    low, high, _endless = edge_limits(posed.store, feature_at(posed.store.table, posed.shells[side], codes[side]))
+    return high - low
 
 
 @kernel(inner=True)
