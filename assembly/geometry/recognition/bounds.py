@@ -64,7 +64,7 @@ def _largest(value: Array, least: Array) -> float:
 
 def _beside_circle(net: Net, fit: Fit, point: Array) -> float:
     """Of a cylinder or a sphere."""
-    radius = fit.shape[0]
+    radius = float(fit.shape[0])
     e, w = local_net(net, _from_base(fit, point, np.array([radius, 0.0, 0.0])))
     if fit.kind == "cylinder":
         e = e[:, :2]
@@ -97,7 +97,7 @@ def _beside_cone(net: Net, fit: Fit, point: Array, tolerance: float) -> float:
 
 
 def _beside_torus(net: Net, fit: Fit, point: Array) -> float:
-    major, minor = fit.shape
+    major, minor = fit.shape.tolist()
     if not 0.0 < minor < _WIDEST * major:
         return np.inf
     e, w = local_net(net, _from_base(fit, point, np.array([major, 0.0, 0.0])))

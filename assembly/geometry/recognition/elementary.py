@@ -149,7 +149,5 @@ def _swept(net: Net, samples: Samples, allowed: float) -> Form:
     rings = rings_of(net, samples, allowed)
     if rings is not None:
         turn = turn_of(net, rings.origin, rings.axes)
-        return Revolution(
-            _placed(net, rings.origin), rings.axes[2], rings.around, turn, _length(net, rings.deviation)
-        )
+        return Revolution(_placed(net, rings.origin), rings.axes[2], rings.around, turn, _length(net, rings.deviation))
     return Freeform()

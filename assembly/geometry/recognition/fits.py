@@ -23,7 +23,7 @@ Kind = Literal["cylinder", "cone", "sphere", "torus"]
 # A first guess that is farther off than this, in parts of the size, is not improved.
 _LOOSE = 1e-5
 # Singular values below this part of the largest one are none, in guesses and in steps of Newton's method.
-_RANK, _WEAK = 1e-7, 1e-14
+_RANK, _WEAK = 1e-7, 1e-12
 _STEPS = 4
 _UNIT = np.finfo(float).eps
 
@@ -84,7 +84,8 @@ def rigid_rates(local: Array, gradient: Array) -> Array:
 
 def moved(origin: Array, axes: Array, step: Array) -> tuple[Array, Array]:
     """A frame moved by the first three of six numbers and turned by the last three, all along its own axes."""
-    turned = (np.eye(3) + np.cross(np.eye(3), -step[3:6])) @ axes
+    a, b, c = step[3:6].tolist()
+    turned = np.array([[1.0, c, -b], [-c, 1.0, a], [b, -a, 1.0]]) @ axes
     z = turned[2] / np.linalg.norm(turned[2])
     x = turned[0] - (turned[0] @ z) * z
     x /= np.linalg.norm(x)
@@ -121,9 +122,9 @@ def _through(points: Array, normals: Array) -> tuple[Array, float]:
 
 
 def axis_of_normals(points: Array, normals: Array) -> tuple[Array, Array] | None:
-    """A point and the direction of the one axis that all normals meet: (p x n).a = n.(a x c)."""
+    """A point c and the direction a of an axis that all normals meet: (p x n).a = n.(a x c)."""
     sizes, ways = np.linalg.svd(np.concatenate([np.cross(points, normals), -normals], axis=1), full_matrices=False)[1:]
-    if len(sizes) < 6 or sizes[5] > _LOOSE * sizes[0] or sizes[4] <= _RANK * sizes[0]:
+    if len(sizes) < 6 or sizes[5] > _LOOSE * sizes[0]:
         return None
     axis, moment = ways[5, :3], ways[5, 3:]
     length = float(np.linalg.norm(axis))

@@ -94,8 +94,10 @@ def samples_of(net: Net) -> Samples:
     (b, db), (c, dc) = _basis(m - 1), _basis(n - 1)
 
     def evaluated(along_u: Array, along_v: Array) -> Array:
-        values = np.einsum("ap,ijpqx,bq->iajbx", along_u, some, along_v)
-        return values.reshape(values.shape[0] * len(_PLACES), -1, 4)
+        # (i, j, p, q, 4) to (i, a, j, b, 4).
+        rows = np.matmul(along_u, some.reshape(*some.shape[:3], -1)).reshape(*some.shape[:2], -1, n, 4)
+        values = np.matmul(along_v, rows).swapaxes(1, 2)
+        return np.asarray(values.reshape(some.shape[0] * len(_PLACES), -1, 4))
 
     s, su, sv = evaluated(b, c), evaluated(db, c), evaluated(b, dc)
     w = s[..., 3:]

@@ -23,7 +23,7 @@ __all__ = ["Lines", "Rings", "lines_of", "rings_of"]
 
 Array = NDArray[np.float64]
 _STEPS = 3
-_WEAK = 1e-14
+_WEAK = 1e-12
 # Rings are sampled where they are wider than this, in parts of the size.
 _NARROW = 1e-6
 

@@ -23,12 +23,12 @@ _AT_AXIS, _GAP = 1e-9, 1e-9
 
 @lru_cache(maxsize=64)
 def _cut(degree: int) -> Array:
-    """Matrices (parts, degree + 1, degree + 1) from Bezier points of a piece to those of its parts."""
+    """Matrix (parts * (degree + 1), degree + 1) from Bezier points of a piece to those of its parts, one by one."""
     rest, parts = np.eye(degree + 1), []
     for k in range(_PARTS, 1, -1):
         first, rest = bezier.divided(rest, 1.0 / k)
         parts.append(first)
-    return np.stack([*parts, rest])
+    return np.concatenate([*parts, rest])
 
 
 def turn_of(net: Net, origin: Array, axes: Array) -> Turn:
@@ -36,7 +36,9 @@ def turn_of(net: Net, origin: Array, axes: Array) -> Turn:
     p, q = (n - 1 for n in net.pieces.shape[2:4])
     flat = net.pieces.reshape(-1, p + 1, q + 1, 4)
     flat = np.concatenate([(flat[..., :3] - origin * flat[..., 3:]) @ axes[:2].T, flat[..., 3:]], axis=-1)
-    parts = np.einsum("apk,nkli,bql->nabpqi", _cut(p), flat, _cut(q)).reshape(-1, (p + 1) * (q + 1), 3)
+    rows = np.matmul(_cut(p), flat.reshape(len(flat), p + 1, -1)).reshape(len(flat), -1, q + 1, 3)
+    parts = np.matmul(_cut(q), rows).reshape(len(flat), _PARTS, p + 1, _PARTS, q + 1, 3)
+    parts = parts.swapaxes(2, 3).reshape(-1, (p + 1) * (q + 1), 3)
     z = (parts[..., 0] + 1.0j * parts[..., 1]) / parts[..., 2]
     far = np.abs(z) > _AT_AXIS
     z = np.where(far, z, z[np.arange(len(z)), np.argmax(far, axis=1), None])
