@@ -21,11 +21,13 @@ from numpy.typing import NDArray
 from assembly.geometry.recognition.fits import Fit
 from assembly.geometry.recognition.nets import Net, bezier_dot
 
-__all__ = ["deviation_of", "local_net"]
+__all__ = ["deviation_of", "local_net", "with_apex_of"]
 
 Array = NDArray[np.float64]
 # A cone whose apex is nearer than this, in parts of the surface's size, is measured from there.
 _NEAR_APEX = 4.0
+# A pole of a cone's net is its apex that is nearer to that than this many tolerances.
+_NEAR_POLE = 1e3
 # A torus with a tube as wide as this part of its circle would meet its axis.
 _WIDEST = 1.0 - 1e-9
 
@@ -73,6 +75,14 @@ def _beside_circle(net: Net, fit: Fit, point: Array) -> float:
     return _largest(bezier_dot(e, other), bezier_dot(w, w)) / radius
 
 
+def with_apex_of(net: Net, fit: Fit, tolerance: float) -> Fit:
+    """A cone with its apex at the pole of a net, if that has one: samples tell less of where along the axis it is."""
+    points = net.points.reshape(-1, 3)
+    away = np.linalg.norm(points - fit.origin, axis=1)
+    at_pole = away <= _NEAR_POLE * tolerance
+    return fit._replace(origin=points[at_pole].mean(axis=0)) if at_pole.any() else fit
+
+
 def _beside_cone(net: Net, fit: Fit, point: Array, tolerance: float) -> float:
     c, s = np.cos(fit.shape[0]), np.sin(fit.shape[0])
     slant = (point - fit.origin) @ fit.axes[2] / c
@@ -97,7 +107,7 @@ def _beside_cone(net: Net, fit: Fit, point: Array, tolerance: float) -> float:
 
 
 def _beside_torus(net: Net, fit: Fit, point: Array) -> float:
-    major, minor = fit.shape.tolist()
+    major, minor = float(fit.shape[0]), float(fit.shape[1])
     if not 0.0 < minor < _WIDEST * major:
         return np.inf
     e, w = local_net(net, _from_base(fit, point, np.array([major, 0.0, 0.0])))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import positive
-from assembly.geometry.recognition.bounds import deviation_of, local_net
+from assembly.geometry.recognition.bounds import deviation_of, local_net, with_apex_of
 from assembly.geometry.recognition.fits import Fit, fits
 from assembly.geometry.recognition.forms import (
     Cone,
@@ -106,6 +106,8 @@ def _round(net: Net, samples: Samples, allowed: float) -> Form | None:
     """The cylinder, cone, sphere or torus that a net is."""
     for fit in fits(samples, allowed):
         place = len(samples.points) // 2
+        if fit.kind == "cone":
+            fit = with_apex_of(net, fit, allowed)
         off = deviation_of(net, fit, samples.points[place], allowed)
         if off <= allowed:
             return _form(net, fit, _is_outward(fit, samples.points[place], samples.normals[place]), _length(net, off))

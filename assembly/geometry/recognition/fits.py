@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from assembly.geometry.recognition.nets import Samples
 
-__all__ = ["Fit", "axis_of_normals", "fits", "frame_along", "moved", "polished", "rigid_rates"]
+__all__ = ["Fit", "axis_of_normals", "fits", "frame_along", "loose_of", "moved", "polished", "rigid_rates"]
 
 Array = NDArray[np.float64]
 Kind = Literal["cylinder", "cone", "sphere", "torus"]
@@ -46,6 +46,11 @@ class Fit(NamedTuple):
     origin: Array
     axes: Array
     shape: Array
+
+
+def loose_of(tolerance: float) -> float:
+    """How far off a first guess may be where so much is allowed of what it becomes."""
+    return max(_LOOSE, 100.0 * tolerance)
 
 
 def frame_along(axis: Array) -> Array:
@@ -121,10 +126,10 @@ def _through(points: Array, normals: Array) -> tuple[Array, float]:
     return solution[:d], float(solution[d])
 
 
-def axis_of_normals(points: Array, normals: Array) -> tuple[Array, Array] | None:
+def axis_of_normals(points: Array, normals: Array, loose: float) -> tuple[Array, Array] | None:
     """A point c and the direction a of an axis that all normals meet: (p x n).a = n.(a x c)."""
     sizes, ways = np.linalg.svd(np.concatenate([np.cross(points, normals), -normals], axis=1), full_matrices=False)[1:]
-    if len(sizes) < 6 or sizes[5] > _LOOSE * sizes[0]:
+    if len(sizes) < 6 or sizes[5] > loose * sizes[0]:
         return None
     axis, moment = ways[5, :3], ways[5, 3:]
     length = float(np.linalg.norm(axis))
@@ -140,20 +145,20 @@ def _cylinder(points: Array, normals: Array, ways: Array) -> Fit:
     return Fit("cylinder", center @ across, frame_along(ways[2]), np.array([abs(radius)]))
 
 
-def _cone(points: Array, normals: Array) -> Fit | None:
+def _cone(points: Array, normals: Array, loose: float) -> Fit | None:
     """The cone whose tangent planes go through one point, and whose normals have one angle with one direction."""
     mean = normals.mean(axis=0)
     sizes, ways = np.linalg.svd(normals - mean, full_matrices=False)[1:]
     sine = float(abs(mean @ ways[2]))
-    if sizes[2] > _LOOSE * sizes[0] or not 0.0 < sine < 1.0:
+    if sizes[2] > loose * sizes[0] or not 0.0 < sine < 1.0:
         return None
     apex = np.linalg.lstsq(normals, (normals * points).sum(axis=1), rcond=_WEAK)[0]
     axis = ways[2] if ways[2] @ (points.mean(axis=0) - apex) > 0.0 else -ways[2]
     return Fit("cone", apex, frame_along(axis), np.array([np.arcsin(sine)]))
 
 
-def _torus(points: Array, normals: Array) -> Fit | None:
-    found = axis_of_normals(points, normals)
+def _torus(points: Array, normals: Array, loose: float) -> Fit | None:
+    found = axis_of_normals(points, normals, loose)
     if found is None:
         return None
     foot, axis = found
@@ -165,26 +170,27 @@ def _torus(points: Array, normals: Array) -> Fit | None:
     return Fit("torus", foot + center[1] * axis, frame_along(axis), np.array([center[0], abs(radius)]))
 
 
-def _guesses(samples: Samples) -> Iterator[Fit | None]:
+def _guesses(samples: Samples, loose: float) -> Iterator[Fit | None]:
     points, normals = samples.points, samples.normals
     sizes, ways = np.linalg.svd(normals, full_matrices=False)[1:]
-    if sizes[2] <= _LOOSE * sizes[0] and sizes[1] > _RANK * sizes[0]:
+    if sizes[2] <= loose * sizes[0] and sizes[1] > _RANK * sizes[0]:
         yield _cylinder(points, normals, ways)
-    yield _cone(points, normals)
+    yield _cone(points, normals, loose)
     center, radius = _through(points, normals)
     yield Fit("sphere", center, np.eye(3), np.array([abs(radius)]))
     with np.errstate(all="ignore"):
-        yield _torus(points, normals)
+        yield _torus(points, normals, loose)
 
 
 def fits(samples: Samples, tolerance: float) -> Iterator[Fit]:
     """What samples lie on to within a tolerance, one after another; cylinders come before cones."""
-    for guess in _guesses(samples):
+    loose = loose_of(tolerance)
+    for guess in _guesses(samples, loose):
         if guess is None or not np.isfinite(guess.shape).all():
             continue
         with np.errstate(all="ignore"):
             first = np.abs(residuals(guess, (samples.points - guess.origin) @ guess.axes.T)[0]).max()
-        if first <= max(_LOOSE, 100.0 * tolerance):
+        if first <= loose:
             fit, off = polished(guess, samples.points)
             if off <= tolerance:
                 yield fit

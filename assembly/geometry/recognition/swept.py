@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.recognition.fits import axis_of_normals, frame_along, moved, rigid_rates
+from assembly.geometry.recognition.fits import axis_of_normals, frame_along, loose_of, moved, rigid_rates
 from assembly.geometry.recognition.nets import Net, Samples, bezier_dot
 
 __all__ = ["Lines", "Rings", "lines_of", "rings_of"]
@@ -82,10 +82,10 @@ def lines_of(net: Net, tolerance: float) -> Lines | None:
     return None
 
 
-def _axis(samples: Samples, around: int) -> tuple[Array, Array] | None:
+def _axis(samples: Samples, around: int, loose: float) -> tuple[Array, Array] | None:
     """The frame of an axis about which samples of one value of a parameter are rings."""
     with np.errstate(all="ignore"):
-        guess = axis_of_normals(samples.points, samples.normals)
+        guess = axis_of_normals(samples.points, samples.normals, loose)
     if guess is None:
         return None
     origin, axes = guess[0], frame_along(guess[1])
@@ -115,7 +115,7 @@ def rings_of(net: Net, samples: Samples, tolerance: float) -> Rings | None:
     for around in (0, 1):
         points, weights = _rows(net, around)
         columns, along, off = _split_weights(weights)
-        frame = _axis(samples, around) if off <= tolerance else None
+        frame = _axis(samples, around, loose_of(tolerance)) if off <= tolerance else None
         if frame is None:
             continue
         origin, axes = frame
