@@ -21,19 +21,14 @@ from assembly.geometry.recognition.forms import (
     Sphere,
     Torus,
 )
-from assembly.geometry.recognition.nets import Net, Samples, net_of, samples_of
+from assembly.geometry.recognition.nets import Net, Samples, exactness, net_of, samples_of
 from assembly.geometry.recognition.swept import lines_of, rings_of
 from assembly.geometry.recognition.turns import turn_of
-from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.splines.surface import NurbsSurface
 
 __all__ = ["elementary_form"]
 
 Array = NDArray[np.float64]
-# Exact is what is off by no more than this part of a surface's size, and what its coordinates tell: some 4,000
-# roundings of makers and of moves, and a millionth of what two different shapes of a drawing are apart.
-EXACT = 1e-12
-COORDINATES = 256.0 * UNIT
 _known: WeakKeyDictionary[NurbsSurface, dict[float | None, Form]] = WeakKeyDictionary()
 
 
@@ -69,10 +64,8 @@ def _recognized(surface: NurbsSurface, tolerance: float | None) -> Form:
     if net is None:
         return Freeform()
     if tolerance is None:
-        far = float(np.abs(surface.control_points).max())
-        allowed = EXACT + COORDINATES * far / net.size
-    else:
-        allowed = tolerance / net.size
+        tolerance = exactness(net.size, float(np.abs(surface.control_points).max()))
+    allowed = tolerance / net.size
     samples = samples_of(net)
     if not len(samples.points):
         return Freeform()

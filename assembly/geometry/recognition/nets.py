@@ -14,7 +14,7 @@ from assembly.geometry.splines import bezier
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["Net", "Samples", "bezier_dot", "net_of", "samples_of"]
+__all__ = ["Net", "Samples", "bezier_dot", "exactness", "net_of", "samples_of"]
 
 Array = NDArray[np.float64]
 # Parameters of samples in a piece: inside of it, where poles are not.
@@ -23,6 +23,10 @@ _PLACES = np.array([0.1, 0.5, 0.9])
 _FEW = 3
 # Where the normal is shorter than this part of the longest one, rounding decides on its direction.
 _SHORT = 1e-9
+# Exact is what is off by no more than this part of a size, and what coordinates tell: some 4,000 roundings of makers
+# and of moves, and a millionth of what two different shapes of a drawing are apart.
+_EXACT = 1e-12
+_COORDINATES = 256.0 * UNIT
 
 
 class Net(NamedTuple):
@@ -55,6 +59,11 @@ class Samples(NamedTuple):
     points: Array
     normals: Array
     grid: Array
+
+
+def exactness(size: float, far: float) -> float:
+    """How far what counts as exact may be off, of a size and with coordinates up to `far` [length]."""
+    return _EXACT * size + _COORDINATES * far
 
 
 def net_of(surface: NurbsSurface) -> Net | None:

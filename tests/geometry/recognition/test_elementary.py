@@ -12,7 +12,7 @@ import pytest
 import assembly as asm
 from assembly import NurbsSurface
 from assembly.errors import InputError
-from assembly.geometry.recognition.elementary import COORDINATES, EXACT, elementary_form
+from assembly.geometry.recognition.elementary import elementary_form
 from assembly.geometry.recognition.forms import (
     Cone,
     Cylinder,
@@ -23,6 +23,7 @@ from assembly.geometry.recognition.forms import (
     Sphere,
     Torus,
 )
+from assembly.geometry.recognition.nets import exactness
 from assembly.geometry.splines.bezier import bernstein, elevation
 from tests.geometry.recognition.constructions import (
     Placement,
@@ -107,7 +108,7 @@ def test_what_is_built_is_recognized(kind, far, cases):
         form = elementary_form(surface)
         assert type(form) is KINDS[kind]
         largest = np.abs(surface.control_points).max()
-        assert form.deviation <= 2.0 * (EXACT * surface.size + COORDINATES * largest)
+        assert form.deviation <= 2.0 * exactness(surface.size, largest)
         points = samples(surface)
         assert distances(form, points).max() <= form.deviation + EVALUATED * largest
         check(form, kind, numbers, where, surface.size, largest)
@@ -158,7 +159,7 @@ def test_radii_of_a_thousandth_to_a_thousand_sizes(exponent):
         # Samples are measured from centers that far away.
         rounding = EVALUATED * (largest + radius * surface.size)
         assert distances(form, samples(surface)).max() <= form.deviation + rounding
-        assert form.deviation < 2e-12 * surface.size + COORDINATES * largest
+        assert form.deviation < 2.0 * exactness(surface.size, largest)
 
 
 def test_makers_of_the_library():
