@@ -57,7 +57,8 @@ def curve_form(parts: Sequence[Array], tolerance: float | None = None) -> Line |
         return None
     allowed = exactness(size, far) if tolerance is None else tolerance
     middle = points.mean(axis=0)
-    ways = np.linalg.svd(points - middle, full_matrices=False)[2]
+    # All three directions, of two points as well.
+    ways = np.linalg.svd(points - middle, full_matrices=len(points) < 3)[2]
     rounding = _ROUNDING * (size + far)
     local = (points - middle) @ ways.T
     off = float(np.hypot(local[:, 1], local[:, 2]).max())
