@@ -18,7 +18,6 @@ __all__ = ["Circle", "Line", "curve_form"]
 Array = NDArray[np.float64]
 # Samples of a piece.
 _PLACES = np.linspace(0.0, 1.0, 5)
-_ROUNDING = 64.0 * UNIT
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +58,7 @@ def curve_form(parts: Sequence[Array], tolerance: float | None = None) -> Line |
     middle = points.mean(axis=0)
     # All three directions, of two points as well.
     ways = np.linalg.svd(points - middle, full_matrices=len(points) < 3)[2]
-    rounding = _ROUNDING * (size + far)
+    rounding = UNIT * (16.0 * size + 8.0 * far)
     local = (points - middle) @ ways.T
     off = float(np.hypot(local[:, 1], local[:, 2]).max())
     if off <= allowed:

@@ -24,11 +24,14 @@ from assembly.geometry.recognition.forms import (
 from assembly.geometry.recognition.nets import Net, Samples, exactness, net_of, samples_of
 from assembly.geometry.recognition.swept import lines_of, rings_of
 from assembly.geometry.recognition.turns import turn_of
+from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.splines.surface import NurbsSurface
 
 __all__ = ["elementary_form"]
 
 Array = NDArray[np.float64]
+# What a difference of points and a scalar product may be off, in parts of the largest coordinate.
+_DOT = 4.0 * UNIT
 _known: WeakKeyDictionary[NurbsSurface, dict[float | None, Form]] = WeakKeyDictionary()
 
 
@@ -69,7 +72,7 @@ def _recognized(surface: NurbsSurface, tolerance: float | None) -> Form:
     samples = samples_of(net)
     if not len(samples.points):
         return Freeform()
-    return _plane(net, samples, allowed) or _round(net, samples, allowed) or _swept(net, samples, allowed)
+    return _plane(surface, net, samples, allowed) or _round(net, samples, allowed) or _swept(net, samples, allowed)
 
 
 def _length(net: Net, deviation: float) -> float:
@@ -83,16 +86,18 @@ def _placed(net: Net, point: Array) -> Array:
     return placed
 
 
-def _plane(net: Net, samples: Samples, allowed: float) -> Plane | None:
+def _plane(surface: NurbsSurface, net: Net, samples: Samples, allowed: float) -> Plane | None:
     points = net.points.reshape(-1, 3)
     middle = points.mean(axis=0)
     normal = np.linalg.svd(points - middle, full_matrices=False)[2][2]
-    off = float(np.abs((points - middle) @ normal).max())
-    if off > allowed:
+    if float(np.abs((points - middle) @ normal).max()) > allowed:
         return None
     if normal @ samples.normals.mean(axis=0) < 0.0:
         normal = -normal
-    return Plane(_placed(net, middle), normal, _length(net, off))
+    # The control points tell it themselves, with nothing computed of them.
+    point = _placed(net, middle)
+    off = float(np.abs((surface.control_points - point) @ normal).max())
+    return Plane(point, normal, off + _DOT * float(np.abs(surface.control_points).max()))
 
 
 def _round(net: Net, samples: Samples, allowed: float) -> Form | None:

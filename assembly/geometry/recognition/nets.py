@@ -78,7 +78,7 @@ def net_of(surface: NurbsSurface) -> Net | None:
     pieces /= pieces[..., 3].max()
     pieces[..., :3] = (pieces[..., :3] - middle * pieces[..., 3:]) / size
     far = float(np.maximum(np.abs(low), np.abs(high)).max())
-    rounding = 64.0 * UNIT * (1.0 + far / size)
+    rounding = 16.0 * UNIT + 8.0 * UNIT * far / size
     return Net(pieces, pieces[..., :3] / pieces[..., 3:], middle, size, rounding)
 
 

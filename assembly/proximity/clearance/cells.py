@@ -35,8 +35,8 @@ Indices = NDArray[np.int64]
 # What evaluation may be off, in parts of the largest coordinate: Horner's rule in two directions and a quotient, about
 # 4 (p + q) roundings; held against samples of doubled precision.
 ROUNDING = 4e-15
-# How far heights of a face that counts as swept by a curve across straight lines may be from those of an even one, in
-# parts of its largest coordinate; it is added to the radius.
+# How far a face that counts as swept by a curve across straight lines may be from that, in parts of its largest
+# coordinate; it is added to the radius.
 EXACT = 1e-13
 # Rounds in which a grid of rectangles becomes finer.
 ROUNDS = 12
@@ -88,25 +88,29 @@ def _sweep(surface: NurbsSurface) -> tuple[int, Array, float]:
         return FLAT, form.normal, 2.0 * form.deviation
     if isinstance(form, (Cylinder, Extrusion)):
         ruling = form.axis if isinstance(form, Cylinder) else form.direction
-        uneven = min(_unevenness(surface, ruling, along) for along in (0, 1))
-        if uneven <= EXACT * float(np.abs(surface.control_points).max()):
-            return RULED, ruling, 2.0 * (form.deviation + uneven)
+        off = min(_unevenness(surface, ruling, along) for along in (0, 1))
+        if off <= EXACT * float(np.abs(surface.control_points).max()):
+            return RULED, ruling, 2.0 * off
     return ROUNDED, np.zeros(3), 0.0
 
 
 def _unevenness(surface: NurbsSurface, ruling: Array, along: int) -> float:
-    """How far heights along a ruling are from those of a parameter that runs evenly from one to the other end of it."""
-    heights, weights = surface.control_points @ ruling, surface.weights
+    """How far a surface is from lines along a ruling that a parameter runs along at the same speed, side by side."""
+    points, weights = surface.control_points, surface.weights
     if along == 0:
-        heights, weights = heights.T, weights.T
-    if np.ptp(weights, axis=1).max() > EXACT * weights.min():
-        return np.inf
+        points, weights = points.swapaxes(0, 1), weights.T
+    # A mean with weights that are off by a part of themselves is off by no more than that part of the way.
+    unlike = (np.ptp(weights, axis=1) / weights.min(axis=1)).max()
     degree, knots = surface.degree[along], surface.knots[along]
     # Of a function that is linear the control values are those at averages of knots.
     at = np.convolve(knots[1:-1], np.full(degree, 1.0 / degree), mode="valid")
     part = (at - at[0]) / (at[-1] - at[0])
-    even = heights.mean(axis=0)[[0, -1]]
-    return float(np.abs(heights - even[0] - (even[1] - even[0]) * part).max())
+    heights = points @ ruling
+    ways = points - points[:, :1]
+    beside = ways - (ways @ ruling)[..., None] * ruling
+    first, last = heights[0, [0, -1]]
+    uneven = np.abs(heights - first - (last - first) * part).max() + unlike * surface.size
+    return float(uneven + np.linalg.norm(beside, axis=-1).max())
 
 
 def _grid(surface: NurbsSurface, tolerance: float) -> Array:

@@ -154,6 +154,19 @@ def test_less_than_half_a_cylinder_is_no_round_body():
     assert round_of(Face(wall, reversed=bool(is_outward))).radius == pytest.approx(1.0, abs=1e-14)
 
 
+@pytest.mark.parametrize("name", SURFACES)
+def test_rewritten_ones_are_the_same(name):
+    """Higher degrees, more knots and exchanged parameters change nothing of what a face lies on."""
+    surface = SURFACES[name]
+    plain = round_of(Face(surface))
+    degree = tuple(d + 1 for d in surface.degree)
+    for other in (surface.elevate(degree), surface.elevate(degree).insert_knot(0, 0.1).transposed().reversed(1)):
+        found = round_of(Face(other))
+        assert found.outward
+        assert found.radius == pytest.approx(plain.radius, abs=1e-14)
+        assert (found.half, found.ring) == pytest.approx((plain.half, plain.ring), abs=1e-14)
+
+
 def test_spans_of_a_rod_with_half_balls():
     rod = asm.shapes.pipe(Path((0.0, 0.0, -0.4), (0.0, 0.0, 1.0)).line(0.8), 0.2)
     direction_of_spans, parts = round_parts(Face(rod))
