@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
 
@@ -13,9 +14,10 @@ from assembly.geometry.recognition.curves import Circle, curve_form
 from assembly.geometry.recognition.elementary import elementary_form
 from assembly.geometry.recognition.forms import Cylinder, Plane, Sphere, Torus
 from assembly.geometry.splines import bezier
+from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["Round", "round_of", "round_parts"]
+__all__ = ["Round", "round_holes", "round_of", "round_parts"]
 
 Array = NDArray[np.float64]
 # A face that goes around less of a cylinder than about half is no round body.
@@ -23,6 +25,10 @@ HALF = 0.95 * pi
 # A ball of more than this part of a face's size is no ball that the face goes around.
 LARGEST_BALL = 0.7
 ROUNDED_UP = 1.0 + 1e-15
+# How far the corners of a flat face may be from a parallelogram, in parts of their largest coordinate.
+FLAT = 1e-12
+# Samples of a boundary curve that tell how often it goes around a point.
+SAMPLES = 33
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,30 +63,78 @@ def _radius(radius: float, deviation: float, outward: bool) -> float:
     return (radius + deviation) * ROUNDED_UP if outward else (radius - deviation) / ROUNDED_UP
 
 
-def _disc(face: Face) -> Round | None:
-    """A flat face whose outer boundary is a circle, as a cylinder without length."""
-    surface = face.surface
+@dataclass(frozen=True, eq=False)
+class _FlatMap:
+    """A flat surface as (u, v) -> origin + u along + v across, and how far it is from that."""
+
+    origin: Array
+    along: Array
+    across: Array
+    off: float
+
+    def circle(self, curves: Sequence[NurbsCurve]) -> Circle | None:
+        """The circle in space that curves of (u, v), one after another, go along."""
+        if max(curve.degree for curve in curves) < 2:
+            return None
+        parts = []
+        for curve in curves:
+            pieces = curve.bezier_pieces()
+            w = pieces[..., -1:]
+            space = self.origin * w + pieces[..., :1] * self.along + pieces[..., 1:2] * self.across
+            parts.append(np.concatenate([space, w], axis=-1))
+        circle = curve_form(parts)
+        return circle if isinstance(circle, Circle) else None
+
+    def turns_around(self, point: Array, curves: Sequence[NurbsCurve]) -> int:
+        """How often closed curves go around a point, counterclockwise in (u, v)."""
+        uv = np.concatenate([curve.evaluate(np.linspace(*curve.domain, SAMPLES)) for curve in curves])
+        x = self.along / np.linalg.norm(self.along)
+        y = self.across - (self.across @ x) * x
+        off = self.origin - point + uv[:, :1] * self.along + uv[:, 1:] * self.across
+        z = off @ x + 1.0j * (off @ y) / np.linalg.norm(y)
+        return round(float(np.angle(np.roll(z, -1) * z.conj()).sum()) / (2.0 * pi))
+
+
+def _flat_map(surface: NurbsSurface) -> _FlatMap | None:
+    """The map of a flat surface whose parameters are lengths along two directions."""
     net = surface.control_points
-    if net.shape != (2, 2, 3) or np.ptp(surface.weights) > 0.0 or face.outer is None:
+    if net.shape != (2, 2, 3) or np.ptp(surface.weights) > 0.0:
         return None
-    far = float(np.abs(net).max())
+    bent = float(np.abs(net[1, 1] - net[1, 0] - net[0, 1] + net[0, 0]).max())
+    if bent > FLAT * float(np.abs(net).max()):
+        return None
     (u0, u1), (v0, v1) = surface.domain
     along, across = (net[1, 0] - net[0, 0]) / (u1 - u0), (net[0, 1] - net[0, 0]) / (v1 - v0)
-    bent = float(np.abs(net[1, 1] - net[1, 0] - net[0, 1] + net[0, 0]).max())
-    if bent > 1e-12 * far:
+    return _FlatMap(net[0, 0] - u0 * along - v0 * across, along, across, bent)
+
+
+def _disc(face: Face) -> Round | None:
+    """A flat face whose outer boundary is a circle, as a cylinder without length."""
+    flat = _flat_map(face.surface)
+    if flat is None or face.outer is None:
         return None
-    origin = net[0, 0] - u0 * along - v0 * across
-    parts = []
-    for curve in face.boundary[: len(face.chains[0])]:
-        pieces = curve.bezier_pieces()
-        w = pieces[..., -1:]
-        space = origin * w + pieces[..., :1] * along + pieces[..., 1:2] * across
-        parts.append(np.concatenate([space, w], axis=-1))
-    circle = curve_form(parts)
-    if not isinstance(circle, Circle):
+    circle = flat.circle(face.boundary[: len(face.chains[0])])
+    if circle is None:
         return None
-    off = circle.deviation + bent
+    off = circle.deviation + flat.off
     return Round(circle.center, circle.axis, off, (circle.radius + off) * ROUNDED_UP, 0.0, True)
+
+
+def round_holes(face: Face) -> list[Round]:
+    """The circles of a flat face's round holes, as bores without length: all of the face is beyond each of them."""
+    flat = _flat_map(face.surface)
+    if flat is None:
+        return []
+    found = []
+    for chain in face.chains:
+        curves = [face.boundary[k] for k in chain]
+        circle = flat.circle(curves)
+        # Clockwise around its center: material is outside.
+        if circle is None or flat.turns_around(circle.center, curves) != -1:
+            continue
+        off = circle.deviation + flat.off
+        found.append(Round(circle.center, circle.axis, off, (circle.radius - off) / ROUNDED_UP, 0.0, False))
+    return found
 
 
 def round_of(face: Face) -> Round | None:
