@@ -92,20 +92,19 @@ def test_sides_of_bodies(name):
         assert ((off * normals).sum(axis=1) < 0.0).all() != found.outward
 
 
-def test_bores_of_bodies():
-    """Above the wall of a hole stands its radius and its axis; nothing of the wall is nearer to that."""
+def test_walls_of_bodies():
+    """Of the wall of a hole radius and axis are known; nothing of the wall is nearer to that."""
     rng = np.random.default_rng(2)
-    nodes = rows_of(NODE, cells_of_body(faces_of(shapes()["plate"])).nodes)
-    bores = nodes[nodes.bore > 0.0]
-    assert sorted(bores.bore.tolist()) == pytest.approx([0.4, 0.5], abs=1e-13)
+    found = cells_of_body(faces_of(shapes()["plate"])).walls
+    assert sorted(wall.radius for wall in found) == pytest.approx([0.4, 0.5], abs=1e-13)
     walls = [face for face in faces_of(shapes()["plate"]) if face.surface.degree != (1, 1)]
     assert len(walls) == 2
-    for node in bores:
+    for wall in found:
         near = []
-        for wall in walls:
-            off = surface_points(wall, 2000, rng) - node.spine
-            near.append(np.linalg.norm(off - (off @ node.ruling)[:, None] * node.ruling, axis=1).min())
-        assert min(near) >= node.bore - OFF
+        for face in walls:
+            off = surface_points(face, 2000, rng) - wall.center
+            near.append(np.linalg.norm(off - (off @ wall.axis)[:, None] * wall.axis, axis=1).min())
+        assert min(near) >= wall.radius - OFF
 
 
 @pytest.mark.parametrize("name", ["pin", "ball", "torus", "cylinder", "wire", "clip"])
