@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from assembly.proximity.clearance.round_faces import Round
 
-__all__ = ["Bores", "bores_of"]
+__all__ = ["Bores", "bores_of", "distances_of_parts"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -105,7 +105,7 @@ def bores_of(
     least, own = np.zeros((len(found), len(distinct))), np.zeros((len(found), len(distinct)), dtype=bool)
     for b, bore in enumerate(distinct):
         if bore.axis.any():
-            least[:, b] = _distances(bore, part, cells, len(found))
+            least[:, b] = distances_of_parts(bore, part, cells, len(found))
         for p, bores in enumerate(found):
             for one in bores:
                 off = _apart(one, bore, size)
@@ -125,7 +125,7 @@ def _apart(one: Round, other: Round, size: float) -> float:
     return float(np.linalg.norm(off) + 2.0 * size * np.linalg.norm(np.cross(one.axis, other.axis)))
 
 
-def _distances(bore: Round, part: Table, cells: np.recarray, count: int) -> Array:
+def distances_of_parts(bore: Round, part: Table, cells: np.recarray, count: int) -> Array:
     """How far parts are from the axis of a bore, at least, by a plane between that and each cell."""
     corners = cells.corner - bore.center
     corners = corners - (corners @ bore.axis)[..., None] * bore.axis

@@ -201,10 +201,27 @@ def swept_line(rng):
     return NurbsSurface(net, (knots, [0, 0, 1, 1]), (4, 1), np.column_stack([weights, weights]))
 
 
-def turned_curve(rng):
+def turned_curve(rng, angle=None):
     profile = np.column_stack([rng.uniform(0.5, 2.0, 4), rng.uniform(-1.0, 1.0, 4), rng.uniform(0.5, 2.0, 4)])
-    angle = random_angle(rng)
+    angle = random_angle(rng) if angle is None else angle
     return revolved(profile, bezier_knots(4), 3, angle, spans_of(angle))
+
+
+def check_sweep(form, surface):
+    """Points of one line, or of one ring, are apart by no more than the deviation on either side."""
+    u, v = (np.linspace(*ends, 15) for ends in surface.domain)
+    grid = surface.evaluate(u[:, None], v[None, :])
+    if isinstance(form, Extrusion):
+        lines = grid if form.along == 1 else grid.swapaxes(0, 1)
+        off = lines - lines[:, :1]
+        off -= (off @ form.direction)[..., None] * form.direction
+        apart = np.linalg.norm(off, axis=-1).max()
+    else:
+        rings = (grid if form.around == 0 else grid.swapaxes(0, 1)) - form.point
+        z = rings @ form.axis
+        rho = np.linalg.norm(rings - z[..., None] * form.axis, axis=-1)
+        apart = max(np.ptp(z, axis=0).max(), np.ptp(rho, axis=0).max())
+    assert apart <= 2.0 * form.deviation + 2.0 * EVALUATED * np.abs(surface.control_points).max()
 
 
 @pytest.mark.parametrize("far", [0.0, 1.0, 1e3])
@@ -219,14 +236,7 @@ def test_what_is_swept(far, cases):
         assert isinstance(form, Extrusion)
         slack = 1e-11 + 1e-12 * far
         assert np.linalg.norm(np.cross(form.direction, where.direction(way / np.linalg.norm(way)))) < slack
-        # Lines of one parameter: points of one are off by multiples of the direction.
-        u, v = (np.linspace(*ends, 15) for ends in moved.domain)
-        grid = moved.evaluate(u[:, None], v[None, :])
-        lines = grid if form.along == 1 else grid.swapaxes(0, 1)
-        off = lines - lines[:, :1]
-        off -= (off @ form.direction)[..., None] * form.direction
-        largest = np.abs(moved.control_points).max()
-        assert np.linalg.norm(off, axis=-1).max() <= 2.0 * form.deviation + 2.0 * EVALUATED * largest
+        check_sweep(form, moved)
 
         surface = turned_curve(rng)
         where = Placement(rng, surface.size, far)
@@ -234,14 +244,37 @@ def test_what_is_swept(far, cases):
         form = elementary_form(moved)
         assert isinstance(form, Revolution)
         assert np.linalg.norm(np.cross(form.axis, where.direction([0, 0, 1]))) < 1e-9 + 1e-10 * far
-        u, v = (np.linspace(*ends, 15) for ends in moved.domain)
-        grid = moved.evaluate(u[:, None], v[None, :]) - form.point
-        rings = grid if form.around == 0 else grid.swapaxes(0, 1)
-        z = rings @ form.axis
-        rho = np.linalg.norm(rings - z[..., None] * form.axis, axis=-1)
-        largest = np.abs(moved.control_points).max()
-        allowed = 2.0 * form.deviation + 2.0 * EVALUATED * largest
-        assert max(np.ptp(z, axis=0).max(), np.ptp(rho, axis=0).max()) <= allowed
+        check_sweep(form, moved)
+
+
+@pytest.mark.parametrize("change", [1e-3, 1e-6, 1e-9])
+def test_what_is_nearly_swept(change, cases):
+    """Rings that are ellipses or wavy, all alike, rings that are not level, and lines of which one is not parallel."""
+    rng = np.random.default_rng(8)
+    for _ in range(cases(10, 300)):
+        turned, swept = turned_curve(rng), swept_line(rng)
+        wide, sheared = np.diag([1.0 + change, 1.0, 1.0]), np.eye(3)
+        sheared[2, 0] = change
+        points = swept.control_points.copy()
+        points[2, 1] += change * rng.standard_normal(3)
+        near = [
+            (swept, points),
+            (turned, turned.control_points @ wide),
+            (turned, turned.control_points @ sheared.T),
+        ]
+        # Waves by cos(2 phi), which no other axis takes up.
+        whole = turned_curve(rng, 2.0 * np.pi)
+        wave = change * np.cos(np.pi * np.arange(len(whole.control_points)) / 2.0)[:, None]
+        wavy, uneven = whole.control_points.copy(), whole.control_points.copy()
+        wavy[..., 2] += wave
+        uneven[..., :2] *= 1.0 + wave[..., None]
+        near += [(whole, wavy), (whole, uneven)]
+        for surface, net in near:
+            other = NurbsSurface(net, surface.knots, surface.degree, surface.weights)
+            assert isinstance(elementary_form(other), Freeform)
+            form = elementary_form(other, 100.0 * change * other.size)
+            if isinstance(form, (Extrusion, Revolution)):
+                check_sweep(form, other)
 
 
 def test_near_misses(cases):

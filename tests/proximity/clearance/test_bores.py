@@ -17,10 +17,11 @@ from assembly.geometry.faces.face import Face
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.body_cells import cells_of_body
+from assembly.proximity.clearance.bores import distances_of_parts
 from assembly.proximity.clearance.records import LINKS, NODE, NONE
-from assembly.proximity.clearance.round_faces import round_holes
+from assembly.proximity.clearance.round_faces import Round, round_holes
 from tests.proximity.clearance.nodes import forest_of, halve_all, tree_of
-from tests.proximity.clearance.scenes import at, faces_of, poses, proof_of
+from tests.proximity.clearance.scenes import at, direction, faces_of, poses, proof_of
 from tests.proximity.clearance.splines import shapes, surface_points
 
 # Of points and axes, in parts of the largest coordinate.
@@ -78,6 +79,26 @@ def test_nodes_are_outside_of_their_bores(name):
                 off -= (off @ nodes.ruling[k])[:, None] * nodes.ruling[k]
                 nearest[line, number] = np.linalg.norm(off, axis=1).min()
             assert nearest[line, number] >= nodes.bore[k] - OFF * far
+
+
+@pytest.mark.parametrize("name", ["ellipsoid", "torus", "sheet", "trimmed ball", "cam", "cone"])
+def test_distances_from_axes(name, cases):
+    """A line past a body is no nearer to its faces than their cells tell."""
+    rng, told = np.random.default_rng(0), 0
+    faces = faces_of(shapes()[name])
+    cells = cells_of_body(faces)
+    rows = cells.first
+    parts = rows_of(LINKS, cells.links).face[rows]
+    records = rows_of(NODE, cells.nodes)[rows]
+    points = [surface_points(face, 4000, rng) for face in solid_of(faces).faces]
+    for _ in range(cases(20, 500)):
+        axis, center = direction(rng), cells.size * rng.uniform(-0.6, 0.6, 3)
+        found = distances_of_parts(Round(center, axis, 0.0, 0.0, 0.0, False), parts, records, len(points))
+        for least, samples in zip(found, points, strict=True):
+            off = samples - center
+            assert least <= np.linalg.norm(off - (off @ axis)[:, None] * axis, axis=1).min() + OFF
+            told += least > 0.0
+    assert told > 5
 
 
 @pytest.mark.parametrize("name", PLATES)
