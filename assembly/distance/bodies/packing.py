@@ -109,7 +109,7 @@ def tree_of(faces: tuple[Face, ...]) -> KeptTree:
 def _planted(faces: Sequence[Face], blocks: list[PatchBlock], center: Array, half: Array) -> KeptTree:
     """The tree of all patches."""
     count = sum(len(block.nets) for block in blocks)
-    table, pool = _static(faces, blocks, count)
+    table, pool = _static(faces, blocks, count, center)
     pool[:_HEAD] = _head(blocks, count, center, half)
     doubles = 7 * max(block.nets[0, ..., 0].size for block in blocks)
     used = sum(7 * block.nets[..., 0].size for block in blocks)
@@ -155,7 +155,7 @@ def _patch_row(**fields: int) -> list[int]:
     return [fields.get(name, NONE) for name in _PATCH_FIELDS]
 
 
-def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int) -> tuple[Ints, Array]:
+def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int, center: Array) -> tuple[Ints, Array]:
     """Table and pool: what is told of patches, tables of their degrees, spines and trims."""
     degrees = sorted({degree for block in blocks for degree in block.degree})
     tables = [_tables(degree) for degree in degrees]
@@ -172,7 +172,7 @@ def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int) -> tupl
         trim = NONE
         # A curve lies on what its face is.
         place = NONE if block.curve == NONE else spine_of_face.get(block.face, NONE)
-        if (spine := spine_row(block)) is not None:
+        if (spine := spine_row(block, faces[block.face], center)) is not None:
             place = pool_at
             parts.append(spine)
             pool_at += spine.size

@@ -13,6 +13,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import spline_curve_at, surface_at
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.topology import Topology
+from assembly.proximity.clearance.bores import Bores, bores_of
 from assembly.proximity.clearance.cells import CellTable, cells_of
 from assembly.proximity.clearance.halve import place_cells
 from assembly.proximity.clearance.records import (
@@ -23,9 +24,10 @@ from assembly.proximity.clearance.records import (
     NODE,
     NODE_SIZE,
     NONE,
+    WIRE,
     node_at,
 )
-from assembly.proximity.clearance.round_faces import Round, round_of, round_parts
+from assembly.proximity.clearance.round_faces import Round, round_holes, round_of, round_parts
 from assembly.proximity.clearance.wire_cells import WireCells, wire_cells
 
 __all__ = ["BodyCells", "cells_of_body"]
@@ -61,6 +63,8 @@ class BodyCells:
         The diagonal of a box around the body, and its largest coordinate.
     radius : float
         The least radius of what is round of the body, wires, cylinders, balls, tubes; else a quarter of its size.
+    walls : tuple of Round
+        Faces that are walls of bores, or of hollow balls.
     """
 
     table: Table
@@ -75,6 +79,7 @@ class BodyCells:
     size: float
     far: float
     radius: float
+    walls: tuple[Round, ...]
 
     @property
     def root(self) -> np.record:
@@ -94,8 +99,9 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
     packed = _packed_surfaces(topology.faces)
     links, nodes = _first_cells(tables, packed.curves)
     place_cells(packed.table, packed.pool, packed.faces, links, nodes)
-    part, rounds = _parts(topology.faces, tables)
-    builder = _Builder(links, nodes, part, rounds)
+    part, rounds, holes = _parts(topology.faces, tables)
+    bores = bores_of(rounds, holes, part, rows_of(NODE, nodes), size)
+    builder = _Builder(links, nodes, part, rounds, bores)
     radii = [found.radius for found in rounds if found is not None]
     radii += [float(table.first[0, 1]) for table in tables if isinstance(table, WireCells)]
     builder.build()
@@ -114,24 +120,29 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
         size,
         float(max(np.abs(low).max(), np.abs(high).max())),
         min([0.25 * size, *radii]),
+        tuple(found for found in rounds if found is not None and not found.outward),
     )
 
 
-def _parts(faces: tuple[Face, ...], tables: Cells) -> tuple[Table, list[Round | None]]:
-    """Of every cell the number of the part of a face that it belongs to, and what each part lies on."""
+def _parts(faces: tuple[Face, ...], tables: Cells) -> tuple[Table, list[Round | None], list[list[Round]]]:
+    """Of every cell the number of the part of a face that it is of; what each part lies on, and its round holes."""
     labels: list[Table] = []
     rounds: list[Round | None] = []
+    holes: list[list[Round]] = []
     for face, table in zip(faces, tables, strict=True):
         if isinstance(table, WireCells):
             labels.append(np.full(len(table.corner), len(rounds)))
             # A ring is a torus, whose hull is exact.
             rounds.append(round_of(face))
+            holes.append([])
             continue
         direction, parts = round_parts(face)
         ends = face.surface.breaks()[direction][1 : len(parts)]
         labels.append(len(rounds) + np.searchsorted(ends, table.uv[..., direction].mean(axis=1)))
         rounds += parts
-    return np.concatenate(labels), rounds
+        # Only a face without a boundary has several parts.
+        holes += [round_holes(face) if len(parts) == 1 else [] for _ in parts]
+    return np.concatenate(labels), rounds, holes
 
 
 def _components(topology: Topology) -> Table:
@@ -229,8 +240,11 @@ def _box(points: Array, thick: Array) -> tuple[Array, Array, Array, float]:
 class _Builder:
     """Makes the nodes above cells: first halves of a body's parts of faces, then halves of a part's cells."""
 
-    def __init__(self, cell_links: Table, cell_nodes: Array, part: Table, rounds: list[Round | None]) -> None:
+    def __init__(
+        self, cell_links: Table, cell_nodes: Array, part: Table, rounds: list[Round | None], bores: Bores | None
+    ) -> None:
         self.cell_links, self.cell_nodes = cell_links, cell_nodes
+        self.bores = bores
         self.part = part
         self.cells = rows_of(NODE, cell_nodes)
         self.rounds = rounds
@@ -251,6 +265,7 @@ class _Builder:
             if len(items) == 1:
                 self.first[items[0]] = k
                 self.links[k], self.nodes[k] = self.cell_links[items[0]], self.cell_nodes[items[0]]
+                self._write_bore(items, k, rows_of(LINKS, self.links[k : k + 1])[0].form)
                 continue
             self._write(items, k)
             child, self.used = self.used, self.used + 2
@@ -283,8 +298,24 @@ class _Builder:
         points = self.cells.corner[items].reshape(-1, 3)
         thick = np.repeat(self.cells.rho[items] + self.cells.disc[items], 4)
         node.center, node.axes, node.half, node.radius = _box(points, thick)
-        if found is not None:
-            node.bore, node.ruling, node.spine = found.radius, found.axis, found.center
+        self._write_bore(items, k)
+
+    def _write_bore(self, items: Table, k: int, form: int | None = None) -> None:
+        """The bore that a node is outside of; that of a cell has the direction of its ruling."""
+        if self.bores is None or form == WIRE:
+            return
+        node = rows_of(NODE, self.nodes[k : k + 1])[0]
+        parts = np.unique(self.part[items])
+        if form is None:
+            found = self.bores.of_node(parts, np.array(node.center)[None])
+        else:
+            found = self.bores.of_node(parts, np.array(node.corner[:3]), np.array(node.ruling))
+        if found is None:
+            return
+        b, node.bore = found
+        node.spine = self.bores.center[b]
+        if form is None:
+            node.ruling = self.bores.axis[b]
 
 
 def _write_round(node: np.record, found: Round) -> None:

@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
 from assembly.geometry.meshing.polygon import trimmed_cells
+from assembly.geometry.recognition.elementary import elementary_form
+from assembly.geometry.recognition.forms import Cylinder, Extrusion, Plane
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.clearance.derivative_nets import bends_away, curve_bounds, surface_bounds
 from assembly.proximity.clearance.records import FLAT, ROUNDED, RULED
@@ -33,8 +35,8 @@ Indices = NDArray[np.int64]
 # What evaluation may be off, in parts of the largest coordinate: Horner's rule in two directions and a quotient, about
 # 4 (p + q) roundings; held against samples of doubled precision.
 ROUNDING = 4e-15
-# How far a face that counts as flat, or as swept by a curve across straight lines, may be from that, in parts of its
-# largest coordinate; it is added to the radius.
+# How far a face that counts as swept by a curve across straight lines may be from that, in parts of its largest
+# coordinate; it is added to the radius.
 EXACT = 1e-13
 # Rounds in which a grid of rectangles becomes finer.
 ROUNDS = 12
@@ -81,28 +83,34 @@ class CellTable:
 
 def _sweep(surface: NurbsSurface) -> tuple[int, Array, float]:
     """Whether a surface is flat or swept along lines by a curve across them; its direction; by how much it is not."""
-    points = surface.control_points.reshape(-1, 3)
-    far = float(np.abs(points).max())
-    middle = points.mean(axis=0)
-    normal = np.linalg.svd(points - middle, full_matrices=True)[2][2]
-    off = float(np.abs((points - middle) @ normal).max())
-    if off <= EXACT * far:
-        return FLAT, normal, 2.0 * off
-    for d in range(2):
-        net = surface.control_points if d == 1 else surface.control_points.swapaxes(0, 1)
-        weights = surface.weights if d == 1 else surface.weights.T
-        if surface.degree[d] != 1 or net.shape[1] != 2 or np.ptp(weights, axis=1).max() > 0.0:
-            continue
-        way = net[:, 1] - net[:, 0]
-        length = np.linalg.norm(way[0])
-        if length == 0.0 or np.abs(way - way[0]).max() > EXACT * far:
-            continue
-        ruling = way[0] / length
-        heights = net[:, 0] @ ruling
-        off = float(np.abs(way - way[0]).max() + np.ptp(heights))
-        if off <= EXACT * far:
+    form = elementary_form(surface)
+    if isinstance(form, Plane):
+        return FLAT, form.normal, 2.0 * form.deviation
+    if isinstance(form, (Cylinder, Extrusion)):
+        ruling = form.axis if isinstance(form, Cylinder) else form.direction
+        off = min(_unevenness(surface, ruling, along) for along in (0, 1))
+        if off <= EXACT * float(np.abs(surface.control_points).max()):
             return RULED, ruling, 2.0 * off
     return ROUNDED, np.zeros(3), 0.0
+
+
+def _unevenness(surface: NurbsSurface, ruling: Array, along: int) -> float:
+    """How far a surface is from lines along a ruling that a parameter runs along at the same speed, side by side."""
+    points, weights = surface.control_points, surface.weights
+    if along == 0:
+        points, weights = points.swapaxes(0, 1), weights.T
+    # A mean with weights that are off by a part of themselves is off by no more than that part of the way.
+    unlike = (np.ptp(weights, axis=1) / weights.min(axis=1)).max()
+    degree, knots = surface.degree[along], surface.knots[along]
+    # Of a function that is linear the control values are those at averages of knots.
+    at = np.convolve(knots[1:-1], np.full(degree, 1.0 / degree), mode="valid")
+    part = (at - at[0]) / (at[-1] - at[0])
+    heights = points @ ruling
+    ways = points - points[:, :1]
+    beside = ways - (ways @ ruling)[..., None] * ruling
+    first, last = heights[0, [0, -1]]
+    uneven = np.abs(heights - first - (last - first) * part).max() + unlike * surface.size
+    return float(uneven + np.linalg.norm(beside, axis=-1).max())
 
 
 def _grid(surface: NurbsSurface, tolerance: float) -> Array:

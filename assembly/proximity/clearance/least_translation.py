@@ -44,7 +44,9 @@ def _directions(a: BodyCells, b: BodyCells, turn: Array) -> Array:
     for cells, rotation in ((a, np.eye(3)), (b, turn)):
         links, nodes = rows_of(LINKS, cells.links), rows_of(NODE, cells.nodes)
         flat = nodes.ruling[cells.first][links.form[cells.first] == FLAT]
-        distinct = np.unique(np.round(flat, 6), axis=0)[:NORMALS]
+        # Of opposite faces one is enough: both ways are tried.
+        largest = np.take_along_axis(flat, np.abs(flat).argmax(axis=1)[:, None], axis=1)
+        distinct = np.unique(np.round(flat * np.sign(largest), 6), axis=0)[:NORMALS]
         for ways in (nodes.axes[0], distinct):
             found += [ways @ rotation.T, -ways @ rotation.T]
     ways = np.concatenate(found)

@@ -40,15 +40,14 @@ def conforms(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
 def _is_in_bore(outer: BodyCells, inner: BodyCells, pose: tuple[Array, Array], touching: float) -> bool:
     """Whether a cylinder or a ball of the inner body, at a pose seen from the outer one, fills a bore of its radius."""
     turn, shift = pose
-    walls, rounds = rows_of(NODE, outer.nodes), rows_of(NODE, inner.nodes)
-    walls = walls[walls.bore > 0.0]
+    rounds = rows_of(NODE, inner.nodes)
     # Of the hull of a torus both are above zero.
     rounds = rounds[(rows_of(LINKS, inner.links).face == NONE) & ((rounds.disc > 0.0) != (rounds.rho > 0.0))]
-    for wall in walls:
-        for body in rounds[np.abs(rounds.disc + rounds.rho - wall.bore) <= touching]:
+    for wall in outer.walls:
+        for body in rounds[np.abs(rounds.disc + rounds.rho - wall.radius) <= touching]:
             reach = body.half[0] * body.axes[0]
-            ends = turn @ (body.center + np.outer((-1.0, 1.0), reach)).T + (shift - wall.spine)[:, None]
-            off = ends - np.outer(wall.ruling, wall.ruling @ ends)
+            ends = turn @ (body.center + np.outer((-1.0, 1.0), reach)).T + (shift - wall.center)[:, None]
+            off = ends - np.outer(wall.axis, wall.axis @ ends)
             is_disc = body.disc > 0.0 and body.half[0] <= touching
             if not is_disc and np.linalg.norm(off, axis=0).max() <= touching:
                 return True

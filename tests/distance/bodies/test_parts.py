@@ -66,7 +66,8 @@ def _detour():
 
 
 def spine_of_surface(surface):
-    row = spine_row(patches_of(Face(surface), 0, np.zeros(3)))
+    face = Face(surface)
+    row = spine_row(patches_of(face, 0, np.zeros(3)), face, np.zeros(3))
     return None if row is None else spine_at(row, 0)
 
 

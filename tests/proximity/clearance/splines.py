@@ -85,6 +85,7 @@ def shapes():
         "torus": asm.shapes.torus(0.6, 0.15),
         "cone": asm.shapes.cone(0.5, 1.0),
         "cylinder": asm.shapes.cylinder(0.3, 1.2),
+        "wall of degree 3, 2": asm.shapes.cylinder(0.3, 1.2).elevate((3, 2)),
         "pin": asm.shapes.solid_cylinder(0.3, 1.2),
         "plate": asm.shapes.plate(3.0, 2.0, 0.3, [(-0.7, 0.0, 0.5), (0.7, 0.1, 0.4)]),
         "slot": asm.shapes.plate_with_slot(3.0, 2.0, 0.3, 1.2, 0.5, angle=0.3),

@@ -11,6 +11,7 @@ import pytest
 
 import assembly as asm
 from assembly._record import rows_of
+from assembly.geometry.faces.face import Face
 from assembly.proximity.clearance.body_cells import cells_of_body
 from assembly.proximity.clearance.cells import cells_of
 from assembly.proximity.clearance.records import FLAT, LINKS, NODE, NONE, ROUNDED, RULED
@@ -101,6 +102,24 @@ def test_all_of_a_body_is_within_its_root_and_its_halves(name):
 def test_forms(name, forms):
     found = {cells_of(face, 0.01, 0.5).form for face in faces_of(SHAPES[name])}
     assert found == forms
+
+
+@pytest.mark.parametrize("degrees", [(2, 2), (3, 4), (4, 1)])
+def test_lines_of_any_degree_are_lines(degrees):
+    """A wall of other degrees, with more knots, and with the parameters exchanged, has the cells of the plain one."""
+    wall = asm.shapes.cylinder(0.3, 1.2)
+    plain = cells_of(Face(wall), 0.01, 0.5)
+    assert plain.form == RULED
+    written = wall.elevate(degrees).insert_knot(1, 0.4)
+    for surface in (written, written.transposed().reversed(0)):
+        table = cells_of(Face(surface), 0.01, 0.5)
+        assert table.form == RULED
+        assert np.linalg.norm(np.cross(table.ruling, plain.ruling)) < 1e-14
+        assert table.pad.max() < 1e-13
+    # Not at one speed: heights are no linear function of the parameters, and cells would be off along the lines.
+    even = wall.elevate((2, 2))
+    slow = asm.NurbsSurface(even.control_points, even.knots, (2, 2), even.weights * [1.0, 0.7, 1.0])
+    assert cells_of(Face(slow), 0.01, 0.5).form == ROUNDED
 
 
 def test_a_flat_face_of_straight_lines_is_exact():

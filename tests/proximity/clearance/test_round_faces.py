@@ -92,20 +92,19 @@ def test_sides_of_bodies(name):
         assert ((off * normals).sum(axis=1) < 0.0).all() != found.outward
 
 
-def test_bores_of_bodies():
-    """Above the wall of a hole stands its radius and its axis; nothing of the wall is nearer to that."""
+def test_walls_of_bodies():
+    """Of the wall of a hole radius and axis are known; nothing of the wall is nearer to that."""
     rng = np.random.default_rng(2)
-    nodes = rows_of(NODE, cells_of_body(faces_of(shapes()["plate"])).nodes)
-    bores = nodes[nodes.bore > 0.0]
-    assert sorted(bores.bore.tolist()) == pytest.approx([0.4, 0.5], abs=1e-13)
+    found = cells_of_body(faces_of(shapes()["plate"])).walls
+    assert sorted(wall.radius for wall in found) == pytest.approx([0.4, 0.5], abs=1e-13)
     walls = [face for face in faces_of(shapes()["plate"]) if face.surface.degree != (1, 1)]
     assert len(walls) == 2
-    for node in bores:
+    for wall in found:
         near = []
-        for wall in walls:
-            off = surface_points(wall, 2000, rng) - node.spine
-            near.append(np.linalg.norm(off - (off @ node.ruling)[:, None] * node.ruling, axis=1).min())
-        assert min(near) >= node.bore - OFF
+        for face in walls:
+            off = surface_points(face, 2000, rng) - wall.center
+            near.append(np.linalg.norm(off - (off @ wall.axis)[:, None] * wall.axis, axis=1).min())
+        assert min(near) >= wall.radius - OFF
 
 
 @pytest.mark.parametrize("name", ["pin", "ball", "torus", "cylinder", "wire", "clip"])
@@ -152,6 +151,19 @@ def test_less_than_half_a_cylinder_is_no_round_body():
     assert round_of(Face(wall, reversed=not is_outward)) is None
     # As a part of a bore it keeps others away as any does.
     assert round_of(Face(wall, reversed=bool(is_outward))).radius == pytest.approx(1.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_rewritten_ones_are_the_same(name):
+    """Higher degrees, more knots and exchanged parameters change nothing of what a face lies on."""
+    surface = SURFACES[name]
+    plain = round_of(Face(surface))
+    degree = tuple(d + 1 for d in surface.degree)
+    for other in (surface.elevate(degree), surface.elevate(degree).insert_knot(0, 0.1).transposed().reversed(1)):
+        found = round_of(Face(other))
+        assert found.outward
+        assert found.radius == pytest.approx(plain.radius, abs=1e-14)
+        assert (found.half, found.ring) == pytest.approx((plain.half, plain.ring), abs=1e-14)
 
 
 def test_spans_of_a_rod_with_half_balls():

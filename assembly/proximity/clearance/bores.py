@@ -1,0 +1,142 @@
+"""Bores of a body, and which parts of its boundary are outside of each of them.
+
+A bore is a line with a radius: no point of a wall on a cylinder is nearer to its axis than that, and neither is one of
+a flat face whose round hole the bore ends in, for the face is what is outside of that circle. Of other parts cells tell
+how near to the line they are. A node of the tree is outside of the least of its parts, so that a pin that is within is
+clear of all of them at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.proximity.clearance.round_faces import Round
+
+__all__ = ["Bores", "bores_of", "distances_of_parts"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+# Axes that are nearer to each other than this over a body, in parts of its size, are one.
+SAME = 1e-9
+# What rounding does to distances of points from an axis, in parts of the largest coordinate.
+ROUNDING = 1e-15
+
+
+@dataclass(frozen=True, eq=False)
+class Bores:
+    """Axes of bores, or centers of hollow balls, b rows.
+
+    Attributes
+    ----------
+    center, axis : (b, 3)
+        The axis is zero for a ball.
+    least : (parts, b)
+        No point of a part is nearer to the axis than this; 0 where nothing is known.
+    own : (parts, b) of bool
+        Whether a part is a wall of the bore, or a flat face with a hole around it.
+    size : float
+        Of the body.
+    """
+
+    center: Array
+    axis: Array
+    least: Array
+    own: NDArray[np.bool_]
+    size: float
+
+    def of_node(self, parts: Table, points: Array, ruling: Array | None = None) -> tuple[int, float] | None:
+        """The nearest bore that a node of some parts is outside of, and its radius.
+
+        Parameters
+        ----------
+        parts : (k,) of int
+        points : (m, 3)
+            The center of the node, or corners of a cell. The second nearest of these counts: a cell is of the bore of
+            which it has a chord, though it may have a corner at another one.
+        ruling : (3,), optional
+            The direction of a cell that cannot have another axis than this.
+        """
+        least = self.least[parts].min(axis=0)
+        usable = self.own[parts].any(axis=0)
+        if ruling is not None:
+            # The same axis along the ruling is so far off over the body.
+            along = self.axis.any(axis=1) == ruling.any()
+            least = least - 2.0 * self.size * np.linalg.norm(np.cross(self.axis, ruling), axis=1)
+            usable &= along
+        usable &= least > 0.0
+        if not usable.any():
+            return None
+        d = points[:, None] - self.center
+        d = d - (d * self.axis).sum(axis=2, keepdims=True) * self.axis
+        far = np.sort(np.linalg.norm(d, axis=2), axis=0)[min(1, len(points) - 1)]
+        k = int(np.argmin(np.where(usable, far / np.maximum(least, SAME * self.size), np.inf)))
+        return k, float(least[k])
+
+
+def bores_of(
+    rounds: list[Round | None], holes: list[list[Round]], part: Table, cells: np.recarray, size: float
+) -> Bores | None:
+    """The bores of a body, or None.
+
+    Parameters
+    ----------
+    rounds : list
+        What each part lies on.
+    holes : list of list
+        The round holes of each part.
+    part : (n,) of int
+        Of every cell the part that it is of.
+    cells : (n,) of NODE
+    size : float
+        Of the body.
+    """
+    found = [
+        [*own, *([one] if one is not None and not one.outward else [])] for one, own in zip(rounds, holes, strict=True)
+    ]
+    distinct: list[Round] = []
+    for bore in (bore for own in found for bore in own):
+        if all(_apart(bore, other, size) > SAME * size for other in distinct):
+            distinct.append(bore)
+    if not distinct:
+        return None
+    least, own = np.zeros((len(found), len(distinct))), np.zeros((len(found), len(distinct)), dtype=bool)
+    for b, bore in enumerate(distinct):
+        if bore.axis.any():
+            least[:, b] = distances_of_parts(bore, part, cells, len(found))
+        for p, bores in enumerate(found):
+            for one in bores:
+                off = _apart(one, bore, size)
+                if off <= SAME * size:
+                    own[p, b], least[p, b] = True, one.radius - off
+    return Bores(
+        np.array([bore.center for bore in distinct]), np.array([bore.axis for bore in distinct]), least, own, size
+    )
+
+
+def _apart(one: Round, other: Round, size: float) -> float:
+    """How far two axes, or two centers, are apart over a body."""
+    if one.axis.any() != other.axis.any():
+        return np.inf
+    off = one.center - other.center
+    off = off - (off @ other.axis) * other.axis
+    return float(np.linalg.norm(off) + 2.0 * size * np.linalg.norm(np.cross(one.axis, other.axis)))
+
+
+def distances_of_parts(bore: Round, part: Table, cells: np.recarray, count: int) -> Array:
+    """How far parts are from the axis of a bore, at least, by a plane between that and each cell."""
+    corners = cells.corner - bore.center
+    corners = corners - (corners @ bore.axis)[..., None] * bore.axis
+    normals = cells.axes[:, 2] - (cells.axes[:, 2] @ bore.axis)[:, None] * bore.axis
+    best = np.zeros(len(corners))
+    for ways in (corners.mean(axis=1), normals):
+        lengths = np.linalg.norm(ways, axis=1)
+        units = ways / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+        heights = (corners * units[:, None]).sum(axis=2)
+        best = np.maximum(best, np.maximum(heights.min(axis=1), -heights.max(axis=1)))
+    far = float(np.abs(cells.corner).max())
+    least = np.full(count, np.inf)
+    np.minimum.at(least, part, best - (cells.rho + cells.disc) - ROUNDING * far)
+    return np.asarray(np.maximum(least, 0.0))
