@@ -19,8 +19,9 @@ from assembly.constraints.model.contact import side_faces
 from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
+from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
-from assembly.proximity.clearance.touching import conforms, left_open, move_apart
+from assembly.proximity.clearance.touching import left_open, move_apart
 from assembly.proximity.extrema.pairs import ContactPair
 from assembly.solve.contact_pairs import contact_pairs, listed_contacts
 from assembly.solve.crossings import crossings_of

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
+from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.proximity.clearance.touching import conforms
 from assembly.solve.clearance_proof import near_contacts, new_proof, opening_move
 from assembly.solve.solution import Solution
 

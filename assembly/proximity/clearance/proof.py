@@ -66,6 +66,7 @@ class ClearanceProof:
         minimum: Sequence[float],
     ) -> None:
         self.pairs = list(pairs)
+        self.faces = list(shapes)
         used = sorted({body for pair in pairs for body in pair})
         self._number = {body: k for k, body in enumerate(used)}
         self.forest = PackedForest([shapes[body] for body in used])

@@ -1,4 +1,4 @@
-"""Bodies that touch: what opens their contacts, and whether what is open are faces that lie on each other."""
+"""Bodies that touch: what opens their contacts."""
 
 from __future__ import annotations
 
@@ -8,70 +8,18 @@ from numpy.typing import NDArray
 from assembly._record import rows_of
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Contacts
-from assembly.proximity.clearance.body_cells import BodyCells
 from assembly.proximity.clearance.look import gap_along
 from assembly.proximity.clearance.parting import least_move
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.proximity.clearance.records import CELL_FACE, FLAT, GUIDES, LINKS, NODE, NONE
+from assembly.proximity.clearance.records import GUIDES, NODE
 
-__all__ = ["conforms", "left_open", "move_apart"]
+__all__ = ["left_open", "move_apart"]
 
 Array = NDArray[np.float64]
 # Contacts are opened, or may close, to the first of these parts of what a body may be moved that it can be moved to.
 OPENED = (0.25, 0.05, 0.01)
 # Pairs of nodes that were left open, of which directions to open them are taken at most.
 MOST_OPENED = 2000
-
-
-def conforms(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
-    """Whether faces of the bodies of pair k lie on each other: cylinders or balls in bores of their radius, or planes.
-
-    By what is recognized of the faces; which parts of them they have is not asked.
-    """
-    a, b = proof.cells_of_both(k)
-    turn, shift = proof.relative(k, q)
-    return (
-        _are_flush(a, b, (turn, shift), touching)
-        or _is_in_bore(a, b, (turn, shift), touching)
-        or _is_in_bore(b, a, (turn.T, -turn.T @ shift), touching)
-    )
-
-
-def _is_in_bore(outer: BodyCells, inner: BodyCells, pose: tuple[Array, Array], touching: float) -> bool:
-    """Whether a cylinder or a ball of the inner body, at a pose seen from the outer one, fills a bore of its radius."""
-    turn, shift = pose
-    rounds = rows_of(NODE, inner.nodes)
-    # Of the hull of a torus both are above zero.
-    rounds = rounds[(rows_of(LINKS, inner.links).face == NONE) & ((rounds.disc > 0.0) != (rounds.rho > 0.0))]
-    for wall in outer.walls:
-        for body in rounds[np.abs(rounds.disc + rounds.rho - wall.radius) <= touching]:
-            reach = body.half[0] * body.axes[0]
-            ends = turn @ (body.center + np.outer((-1.0, 1.0), reach)).T + (shift - wall.center)[:, None]
-            off = ends - np.outer(wall.axis, wall.axis @ ends)
-            is_disc = body.disc > 0.0 and body.half[0] <= touching
-            if not is_disc and np.linalg.norm(off, axis=0).max() <= touching:
-                return True
-    return False
-
-
-def _are_flush(a: BodyCells, b: BodyCells, pose: tuple[Array, Array], touching: float) -> bool:
-    """Whether a flat face of b, at a pose seen from a, is in the plane of one of a that looks the other way."""
-    (points_a, normals_a), (points_b, normals_b) = _planes(a), _planes(b)
-    turn, shift = pose
-    points_b, normals_b = points_b @ turn.T + shift, normals_b @ turn.T
-    opposed = np.linalg.norm(normals_a[:, None] + normals_b, axis=2) * max(a.size, b.size) <= touching
-    apart = np.abs(((points_b - points_a[:, None]) * normals_a[:, None]).sum(axis=2))
-    return bool((opposed & (apart <= touching)).any())
-
-
-def _planes(cells: BodyCells) -> tuple[Array, Array]:
-    """A point and the outward normal of the first cells of flat faces."""
-    links, nodes = rows_of(LINKS, cells.links)[cells.first], rows_of(NODE, cells.nodes)[cells.first]
-    flat = np.flatnonzero(links.form == FLAT)
-    signs = rows_of(CELL_FACE, cells.faces).sign[links.face[flat]]
-    # The normal by the corners has the sense of S_u x S_v, that of the face is exact.
-    senses = np.sign((nodes.axes[flat, 2] * nodes.ruling[flat]).sum(axis=1)) * signs
-    return nodes.corner[flat, 0], nodes.ruling[flat] * senses[:, None]
 
 
 def move_apart(proof: ClearanceProof, k: int, q: Array, contacts: Contacts, touching: float) -> Array | None:

@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from assembly.proximity.clearance.answers import Contacts, Verdict, is_proven
+from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.proximity.clearance.touching import conforms, left_open, move_apart
+from assembly.proximity.clearance.touching import left_open, move_apart
 from tests.proximity.clearance.scenes import at, direction, faces_of, poses, proof_of
 
 TOUCHING = 1e-9
