@@ -1,9 +1,10 @@
-"""Pairs of points through which bodies with flush faces seem to be in each other: a head on a plate, beside its hole.
+"""Pairs of points through which bodies with faces that all but touch seem to be in each other: a head on a plate,
+beside its hole.
 
-Where a face lies on another one, the pair of an edge of one and of a wall beside it may have normals that oppose each
-other and a negative gap: the rim of a head is behind the wall of the hole that it covers. The segment between its
-points runs between the two faces. The way apart there is off the faces, which is next to nothing, and they have rows of
-their own; that of the pair would lead along them.
+Where a face lies on another one, or is in it by a little, the pair of an edge of one and of a wall beside it may have
+normals that oppose each other and a gap far below zero: the rim of a head is behind the wall of the hole that it
+covers. The segment between its points runs between the two faces. The way apart there is off the faces, which is next
+to nothing, and they have rows of their own; that of the pair would lead along them.
 
 Of bodies that are in each other along a segment its middle is in both. A dovetail's bottom is behind the top of the
 lip over it, and between the two is the lip alone.
@@ -24,10 +25,9 @@ from assembly.proximity.manager.overlap import DEPTH, facets_cut, next_near, pro
 from assembly.proximity.manager.records import HANDED_OFF, LOST
 from assembly.proximity.manager.slots import give_up
 
-# Faces are flush at a pair where they are nearer to its middle than this part of how deep it is,
-SHORT = 1e-3
-# and their normals oppose each other but for this cosine.
-OPPOSED = 1e-6
+# What bodies have in common is thin at a pair where faces of both are nearer to its middle than this part of how deep it
+# is, and their normals are opposed, by the cosine between the one and what is opposed to the other.
+SHORT, OPPOSED = 0.1, 0.5
 # Depths that are rounding, and room for faces about a point.
 DEPTH_ROUNDING, FACES_ABOUT = 1e-9, 16
 
@@ -50,8 +50,8 @@ def faces_about(posed, side, y, distance, stack, normals):
 
 
 @kernel(inner=True)
-def is_between_flush_faces(posed, extremum, stack, normals):
-    """Whether the middle of an extremum, with a negative gap, is between two faces that all but touch there."""
+def is_between_faces(posed, extremum, stack, normals):
+    """Whether the middle of an extremum, with a negative gap, is between two faces that are near each other there."""
     c = scale(0.5, add(three_of(extremum.point_f), three_of(extremum.point_g)))
     distance = -SHORT * extremum.gap
     many = faces_about(posed, 0, c, distance, stack, normals[0])
@@ -61,7 +61,7 @@ def is_between_flush_faces(posed, extremum, stack, normals):
     for i in range(others):
         n = matvec(posed.pose.rotation, (normals[1, i, 0], normals[1, i, 1], normals[1, i, 2]))
         for l in range(many):
-            if dot(n, (normals[0, l, 0], normals[0, l, 1], normals[0, l, 2])) < OPPOSED - 1.0:
+            if dot(n, (normals[0, l, 0], normals[0, l, 1], normals[0, l, 2])) < -OPPOSED:
                 return True
     return False
 
@@ -120,7 +120,7 @@ def drop_flush(manager, p, posed, extrema, tracked):
         is_listed = np.int64(extremum.origin) >= LISTED
         if not extremum.gap < -DEPTH_ROUNDING or not (extremum.origin == NEW or is_listed):
             continue
-        beside = is_between_flush_faces(posed, extremum, stack, normals)
+        beside = is_between_faces(posed, extremum, stack, normals)
         if not (beside or is_in_one_alone(posed, extremum, stack, normals[0])):
             continue
         if is_listed:
