@@ -216,12 +216,20 @@ class Assembly(Contents):
         All ways are measured from where the user's bodies were, and the least one is the answer.
         """
         from assembly.studies.parting import parted
+        from assembly.studies.seated import seated
         from assembly.studies.separation import separated
 
         spent = solution.seconds
         begin = perf_counter()
         ways = [solution]
-        apart = parted(self, q, float(settings[ALLOWED_OVERLAP]) * self.packed().scale, interruption)
+        touching = float(settings[ALLOWED_OVERLAP]) * self.packed().scale
+        seat = seated(self, q, touching, interruption)
+        if seat is not None:
+            ways.append(self._solved(settings, seat, starts, interruption, q))
+            if not (ways[-1].success or self._objectives):
+                # Any pose does, if not the one with the least move.
+                ways.append(self._solved(settings, seat, starts, interruption))
+        apart = None if ways[-1].success else parted(self, q, touching, interruption)
         if apart is not None:
             ways.append(self._solved(settings, apart, starts, interruption, q))
         if not any(way.success for way in ways):

@@ -1,0 +1,171 @@
+"""Bodies that are stuck in each other where they nearly fit, put where they do: a shaft into its bore, flush faces.
+
+Of a shaft that leans in its bore, a bolt beside its hole or a slider that is off its rail, rows of a clearance are many
+and contradict each other. But where faces conform but for a little play, tilt and shift, it is known where they fit:
+where their axes and planes coincide. A solve begins there as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from itertools import count
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.model.constraint import Constraint
+from assembly.constraints.model.contact import side_faces
+from assembly.constraints.model.joints import Cylindrical, Planar, Spherical
+from assembly.geometry.faces.face import Face
+from assembly.geometry.recognition.elementary import elementary_form
+from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import rotation_matrix
+from assembly.solve.clearance_proof import can_prove, lent_proof
+from assembly.solve.interruption import Interruption
+from assembly.studies.parting import is_stuck
+
+if TYPE_CHECKING:
+    from assembly.assembly import Assembly
+
+__all__ = ["seated"]
+
+Array = NDArray[np.float64]
+# Faces that nearly fit lean by no more than this [rad], and are off by no more than that part of the smaller body's
+# size, or of the radius; a shaft with less than so much of its bore's radius does not fit it.
+LEAN, OFF, FILLS = 0.15, 0.1, 0.8
+
+
+class _Face:
+    """A face of a body at a pose: what it is, which way it looks, its box; and the same face in the body's axes."""
+
+    def __init__(self, body: Body, row: Array, form: Form, is_outward: bool, box: Array) -> None:
+        self.body, self.form, self.is_outward = body, form, is_outward
+        self.turn, self.shift = rotation_matrix(row[3:]), row[:3]
+        corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3) @ self.turn.T + self.shift
+        self.low, self.high = corners.min(axis=0), corners.max(axis=0)
+
+    def at(self, point: Array) -> Array:
+        """A point of the body in the scene's axes."""
+        return np.asarray(self.turn @ point + self.shift)
+
+    def near(self, other: _Face, reach: float) -> bool:
+        """Whether the boxes are within a reach of each other."""
+        return bool((self.low <= other.high + reach).all() and (other.low <= self.high + reach).all())
+
+
+@lru_cache(maxsize=128)
+def _elementary(faces: tuple[Face, ...]) -> tuple[tuple[Form, bool, Array], ...]:
+    """Faces that may conform to others, which of them look outward, along the normal of planes, and their boxes."""
+    found: list[tuple[Form, bool, Array]] = []
+    for face in faces:
+        form = elementary_form(face.surface)
+        if isinstance(form, Plane | Cylinder | Cone | Sphere):
+            is_outward = (face.sign > 0) == (isinstance(form, Plane) or form.outward)
+            found.append((form, is_outward, np.array(face.surface.bounding_box())))
+    return tuple(found)
+
+
+def seated(scene: Assembly, q: Array, touching: float, interruption: Interruption) -> Array | None:
+    """Where bodies that clearances keep apart, and that are stuck in each other at poses (n, 7), fit each other.
+
+    Where they do not all fit at once, as both sides of a key with play, they are off by as little as can be. None where
+    none are stuck, and where none of their faces nearly fit.
+    """
+    packed = scene.packed()
+    if not can_prove(packed):
+        return None
+    with lent_proof(packed, scene.bodies) as proof:
+        pairs = proof.pairs
+        stuck = [pairs[k] for k, answer in enumerate(proof.look(q, touching)) if is_stuck(answer, touching)]
+    others = [item for item in scene.constraints if not isinstance(item, Clearance)]
+    taken = {item.name for item in others}
+    names = (name for name in map("fit {}".format, count()) if name not in taken)
+    joints = [joint for a, b in stuck for joint in _fits((scene.bodies[a], scene.bodies[b]), q[[a, b]], names)]
+    if not joints or interruption.is_over():
+        return None
+    inner = type(scene)(scene.bodies)
+    inner.constrain(*others, *joints)
+    poses = inner._from_start(q, None, {}, interruption).q
+    return poses.copy() if np.isfinite(poses).all() else None
+
+
+def _fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterator[Constraint]:
+    """Joints by which faces of two bodies would fit that nearly do at poses (2, 7)."""
+    reach = OFF * min(body.size for body in bodies)
+    ones, others = (
+        [_Face(body, row, *face) for face in _elementary(side_faces(body))]
+        for body, row in zip(bodies, rows, strict=True)
+    )
+    axes: list[tuple[Array, Array]] = []
+    for one in ones:
+        for other in others:
+            if not one.near(other, reach):
+                continue
+            if isinstance(one.form, Plane) and isinstance(other.form, Plane):
+                yield from _flush(one, other, reach, names)
+            elif one.is_outward != other.is_outward:
+                yield from _round(one, other, axes, names)
+
+
+def _flush(one: _Face, other: _Face, reach: float, names: Iterator[str]) -> Iterator[Constraint]:
+    assert isinstance(one.form, Plane) and isinstance(other.form, Plane)
+    m = one.form.normal if one.is_outward else -one.form.normal
+    n = other.form.normal if other.is_outward else -other.form.normal
+    up = one.turn @ m
+    # Opposed, and off by little where they are near each other.
+    middle = 0.5 * (np.maximum(one.low, other.low) + np.minimum(one.high, other.high))
+    off = [abs((middle - face.at(face.form.point)) @ up) for face in (one, other) if isinstance(face.form, Plane)]
+    if up @ (other.turn @ n) < -np.cos(LEAN) and sum(off) <= reach:
+        yield Planar(one.body.frame(one.form.point, m), other.body.frame(other.form.point, -n), next(names))
+
+
+def _round(one: _Face, other: _Face, axes: list[tuple[Array, Array]], names: Iterator[str]) -> Iterator[Constraint]:
+    """The joint of a shaft and its bore, a cone and its seat, a ball and its socket; one for each axis."""
+    hollow, full = (other, one) if one.is_outward else (one, other)
+    h, f = hollow.form, full.form
+    if isinstance(h, Sphere) and isinstance(f, Sphere) and FILLS * h.radius <= f.radius <= (1.0 + 1e-9) * h.radius:
+        if np.linalg.norm(hollow.at(h.center) - full.at(f.center)) <= h.radius:
+            yield Spherical(hollow.body.point(*h.center), full.body.point(*f.center), next(names))
+    elif (
+        isinstance(h, Cylinder) and isinstance(f, Cylinder) and FILLS * h.radius <= f.radius <= (1.0 + 1e-9) * h.radius
+    ):
+        if _is_near_axis((hollow, full), (h.point, h.axis), (f.point, f.axis), h.radius, axes):
+            sense = np.sign((hollow.turn @ h.axis) @ (full.turn @ f.axis))
+            yield Cylindrical(hollow.body.frame(h.point, h.axis), full.body.frame(f.point, sense * f.axis), next(names))
+    elif isinstance(h, Cone) and isinstance(f, Cone) and abs(h.half_angle - f.half_angle) < 1e-9:
+        radius = max(f.heights) * np.tan(f.half_angle)
+        if (hollow.turn @ h.axis) @ (full.turn @ f.axis) > 0.0 and _is_near_axis(
+            (hollow, full), (h.apex, h.axis), (f.apex, f.axis), radius, axes
+        ):
+            yield Cylindrical(
+                hollow.body.frame(h.apex, h.axis), full.body.frame(f.apex, f.axis), next(names), slide=0.0
+            )
+
+
+def _is_near_axis(
+    faces: tuple[_Face, _Face],
+    hollow: tuple[Array, Array],
+    full: tuple[Array, Array],
+    radius: float,
+    axes: list[tuple[Array, Array]],
+) -> bool:
+    """Whether two axes, each a point and a direction of its body, all but coincide, and are the first that do."""
+    along = faces[0].turn @ hollow[1]
+    off = faces[1].at(full[0]) - faces[0].at(hollow[0])
+    off = off - (off @ along) * along
+    if abs(along @ (faces[1].turn @ full[1])) < np.cos(LEAN) or np.linalg.norm(off) > radius:
+        return False
+    point = faces[0].at(hollow[0])
+    for known, direction in axes:
+        away = point - known
+        if (
+            np.linalg.norm(np.cross(along, direction)) < 1e-9
+            and np.linalg.norm(np.cross(away, direction)) < 1e-9 * radius
+        ):
+            return False
+    axes.append((point, along))
+    return True
