@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from assembly.solve.clearance_proof import PairAnswer
     from assembly.solve.second_order.classification import SecondOrder
     from assembly.solve.second_order.leave import Fit
+    from assembly.solve.way import Way
 
 __all__ = ["Iteration", "Result"]
 
@@ -59,7 +60,10 @@ class Result(ReadOnlyArrays):
         self.seconds = seconds
         self._order = order
         self.restarted = False
+        self.way: Way | None = None
         self._fit = fit
+        # What it was solved with: a solve that goes on from it may ask for the way.
+        self._asked = packed.asked
         self._clear: list[PairAnswer] = []
         # Of a tick: whether samples stand for its proof.
         self._is_sampled = False

@@ -46,6 +46,8 @@ class Solution(Result):
         faces lie on each other and samples stand for the proof, and where a clearance asks for a gap beside a contact.
     restarted : bool
         Whether the constraints did not hold near the start, and the solution was found from another one.
+    way : Way or None
+        Of a solve with `swept=True`: how far its way is clear, and of a BLOCKED one what is in the way.
     feasibility : float
         Largest violation of a constraint, in the user's units, evaluated at `q`. Of a contact that has no extremal pair
         there it is the distance of the points in `contacts`. Infinite only where an `Expression` or a derivative of it

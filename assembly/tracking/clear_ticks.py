@@ -61,23 +61,36 @@ class ClearTicks:
         Where the tracker begins.
     touching : float
         What bodies may be in each other and touch, in the unit of the scene.
+    proof : ClearanceProof, optional
+        That of the same pairs, whose last poses are forgotten.
+    sampled_way : float
+        How far bodies whose faces lie on each other may go between two ticks, in parts of their size.
 
     Attributes
     ----------
+    doubtful : dict of int -> Answer
+        Where the last tick does not hold, or the first one: the pairs of which it is not known.
     proved : bool
         Whether all pairs were proven clear, or touching, at the last tick that holds; else faces lie on each other.
     way_depth : float
         How deep bodies may be in each other on the way to it, at most.
     """
 
-    def __init__(self, first: Solution, touching: float) -> None:
-        self._touching = touching
-        self._proof: ClearanceProof = new_proof(first._packed, first._scene.bodies)
-        self._proof.fronts.counts.budget = BUDGET
+    def __init__(
+        self, first: Solution, touching: float, proof: ClearanceProof | None = None, sampled_way: float = np.inf
+    ) -> None:
+        self._touching, self._sampled_way = touching, sampled_way
+        if proof is None:
+            proof = new_proof(first._packed, first._scene.bodies)
+            proof.fronts.counts.budget = BUDGET
+        proof.forget_poses()
+        self._proof = proof
         self._at = _Standing(first)
         self._moves = np.array([self._at.opened(self._proof, k, touching) for k in range(len(self._proof.pairs))])
         self.way_depth = 0.0
-        self.proved = all(map(is_proven, self._proof.look(first.q, touching, self._moves)))
+        answers = dict(enumerate(proof.look(first.q, touching, self._moves)))
+        self.proved = all(map(is_proven, answers.values()))
+        self.doubtful = self._not_known(answers, self._at)
 
     def holds(self, solution: Solution) -> bool:
         """Whether all pairs hold at the pose of a tick, and on the way there from the last one that did.
@@ -105,15 +118,27 @@ class ClearTicks:
             for part in OPENED:
                 left = [k for k in rolling if k not in answers or not is_proven(answers[k])]
                 answers.update(zip(left, self._rolled(there, moves, left, part), strict=True) if left else ())
-        doubtful = [(k, answer) for k, answer in answers.items() if not is_proven(answer)]
-        if not all(
-            answer.verdict is Verdict.UNDECIDED and conforms(proof, k, there.q, touching) for k, answer in doubtful
-        ):
+        self.doubtful = self._not_known(answers, there)
+        if self.doubtful:
             proof.go_back(last)
             return False
-        self.proved = not doubtful
+        self.proved = all(map(is_proven, answers.values()))
         self._at, self._moves = there, moves
         return True
+
+    def _not_known(self, answers: dict[int, Answer], there: _Standing) -> dict[int, Answer]:
+        """The pairs that are not proven to be clear, or to touch, and whose faces do not lie on each other."""
+        proof, q = self._proof, there.q
+        return {
+            k: answer
+            for k, answer in answers.items()
+            if not is_proven(answer)
+            and not (
+                answer.verdict is Verdict.UNDECIDED
+                and conforms(proof, k, q, self._touching)
+                and proof.way_length(k, self._at.q, q) <= self._sampled_way * proof.size(k)
+            )
+        }
 
     def _rolling(self, there: _Standing) -> list[int]:
         """The pairs that touch and go so far that the straight way goes in by what counts beside what is touching."""

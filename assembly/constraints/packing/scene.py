@@ -22,6 +22,7 @@ from assembly.constraints.model.objectives import Objective, Posture
 from assembly.constraints.model.trim_contact import TrimContact
 from assembly.constraints.packing import addresses
 from assembly.constraints.packing import manager as manager_packing
+from assembly.constraints.packing.asked import Asked
 from assembly.constraints.packing.elimination_order import FEW, block_record
 from assembly.constraints.packing.numbering import number_bodies
 from assembly.constraints.packing.revolutions import Turns
@@ -80,6 +81,8 @@ class Packed:
         What solves that are over worked in, for the next ones (`solve/attempts/attempts.py`).
     proofs : list of ClearanceProof
         Of the pairs that clearances keep apart, of solves that have ended.
+    asked : Asked
+        What the last solve was asked for.
     has_size : bool
         Whether the scene has a size.
     outgrown : Packed or None
@@ -156,6 +159,7 @@ class Packed:
         if self.clearance_rows:
             # The first update sees what crosses at the start as well, if it is no deeper than this.
             self._memory = fresh_memory(sum(map(len, self.clearance_pairs)), self.clearance_rows, LARGEST_MARGIN)
+        self.asked = Asked([], [], [])
         self.workspaces: list[tuple[Array, Array, Table]] = []
         self.proofs: list[ClearanceProof] = []
         self.kept_at = self.memory_at + self._memory.size
@@ -401,11 +405,14 @@ class Packed:
         """Write what may have changed since the last solve: values and targets."""
         pool, scale, far = self.pool, self.scale, FARTHEST * self.scale
         x, y, z = self._reference
+        values = []
         for equation, at, unit in self._sources:
-            value = equation.current() / unit
+            current = equation.current()
+            value = current / unit
             if not -FARTHEST <= value <= FARTHEST and not equation.terms[0][1].is_angle:
                 assert equation.source is not None
-                check_reach(f"a value of {equation.source[0]!r}", abs(equation.current()), scale)
+                check_reach(f"a value of {equation.source[0]!r}", abs(current), scale)
+            values.append(current)
             pool[at] = value
         for distance, at in self._targets:
             a, b, c = distance._target.tolist()
@@ -416,6 +423,18 @@ class Packed:
             pool[at + 2] = (c - z) / scale
         for frame_distance, at in self._turns:
             pool[at : at + 4] = frame_distance.body_quaternion
+        self.asked = Asked(values, [item._target for item, _ in self._targets], [item.target for item, _ in self._turns])
+
+    def ask_for(self, asked: Asked) -> None:
+        """Set values and targets of the scene's constraints and objectives, and write them."""
+        for (equation, _, _), value in zip(self._sources, asked.values, strict=True):
+            equation.ask_for(value)
+        for (distance, _), target in zip(self._targets, asked.points, strict=True):
+            if isinstance(distance, PointDistance):
+                distance.target = target
+        for (frame_distance, _), pose in zip(self._turns, asked.poses, strict=True):
+            frame_distance.target = pose
+        self.refresh()
 
 
 def structure_of(constraints: Sequence[Constraint]) -> tuple[tuple[object, ...], ...]:
