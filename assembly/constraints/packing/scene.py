@@ -18,7 +18,7 @@ from assembly.constraints.model.contact import Contact, side_face
 from assembly.constraints.model.couplings import Coupling
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.joint import Joint
-from assembly.constraints.model.objectives import Objective, Posture
+from assembly.constraints.model.objectives import FrameDistance, Objective, Posture
 from assembly.constraints.model.trim_contact import TrimContact
 from assembly.constraints.packing import addresses
 from assembly.constraints.packing import manager as manager_packing
@@ -423,14 +423,16 @@ class Packed:
             pool[at + 2] = (c - z) / scale
         for frame_distance, at in self._turns:
             pool[at : at + 4] = frame_distance.body_quaternion
-        self.asked = Asked(values, [item._target for item, _ in self._targets], [item.target for item, _ in self._turns])
+        self.asked = Asked(
+            values, [item._target for item, _ in self._targets], [item.target for item, _ in self._turns]
+        )
 
     def ask_for(self, asked: Asked) -> None:
         """Set values and targets of the scene's constraints and objectives, and write them."""
         for (equation, _, _), value in zip(self._sources, asked.values, strict=True):
             equation.ask_for(value)
         for (distance, _), target in zip(self._targets, asked.points, strict=True):
-            if isinstance(distance, PointDistance):
+            if not isinstance(distance, FrameDistance):
                 distance.target = target
         for (frame_distance, _), pose in zip(self._turns, asked.poses, strict=True):
             frame_distance.target = pose
