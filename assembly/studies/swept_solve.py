@@ -30,7 +30,7 @@ from assembly.solve.scene import Status
 from assembly.solve.solution import Solution
 from assembly.solve.way import Way
 from assembly.studies.seen_poses import SeenPoses
-from assembly.tracking.clear_ticks import ClearTicks
+from assembly.tracking.clear_ticks import ClearTicks, WayLimits
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -40,8 +40,8 @@ __all__ = ["swept_solve"]
 Array = NDArray[np.float64]
 # Nothing that is asked for, and no angle that is counted, changes by more in one step: radians, parts of the size.
 LONGEST = 0.25
-# The way is known to this part of it.
-SHORTEST = 2.0**-20
+# The way is known to this part of it, and of its longest step.
+SHORTEST, LEAST_HALVED = 2.0**-20, 2.0**-10
 # In the middle of a step points of a body, seen from another one, are off its straight way by no more, in parts of the
 # size.
 STRAIGHT = 1e-4
@@ -107,7 +107,7 @@ class _Walk:
         self._options, self._interruption = {**options, "max_iterations": most}, interruption
         self._start, self._asked = start, direct._asked
         touching = direct._touching * self._packed.scale
-        self._ticks = ClearTicks(start, touching, proof, SAMPLED_WAY)
+        self._ticks = ClearTicks(start, touching, proof, WayLimits(SAMPLED_WAY, self._allowed))
         if self._ticks.doubtful:
             named = self._named(self._ticks.doubtful)
             raise InputError(f"q0 is a solution with swept=True at which {named} are not clear; expected a clear one")
@@ -116,31 +116,32 @@ class _Walk:
 
     def end(self) -> Solution:
         """The solution of what is asked for, or the last one on the way there."""
-        done, step, at = 0.0, self._first_step(), self._start
+        done, at = 0.0, self._start
+        step = longest = self._longest_step()
         there = self._solved(at, step)
         while True:
-            if self._interruption.is_over():
-                return self._ended(self._interruption.status(OUT_OF_TIME), at, done, None)
             middle = self._solved(at, done + 0.5 * step)
             found = self._hindrance(at, middle, there)
+            if self._interruption.is_over():
+                return self._ended(self._interruption.status(OUT_OF_TIME), at, done, None)
             if found is None:
                 done, at = done + step, there
                 if done == 1.0:
                     return self._ended(at.status, at, done, None)
                 # Parts are multiples of powers of two, and so 1 is reached exactly.
-                if 2.0 * step <= self._first_step() and done % (2.0 * step) == 0.0:
+                if 2.0 * step <= longest and done % (2.0 * step) == 0.0:
                     step *= 2.0
                 there = self._solved(at, done + step)
-            elif step <= SHORTEST:
+            elif step <= min(SHORTEST, LEAST_HALVED * longest):
                 return self._ended(Status.BLOCKED, at, done, found)
             else:
                 step, there = 0.5 * step, middle
 
-    def _first_step(self) -> float:
-        """The longest step, a power of two: in it nothing that is asked for changes by more than is allowed."""
+    def _longest_step(self) -> float:
+        """A power of two: in steps of it nothing that is asked for changes by more than is allowed."""
         is_angle = [equation.terms[0][1].is_angle for equation, _, _ in self._packed._sources]
         change = self._start._asked.change(self._asked, self._packed.scale, is_angle)
-        return float(min(1.0, max(2.0 ** np.floor(np.log2(LONGEST / change)), SHORTEST))) if change > 0.0 else 1.0
+        return float(2.0 ** np.floor(np.log2(LONGEST / change))) if change > LONGEST else 1.0
 
     def _solved(self, at: Solution, part: float) -> Solution:
         """The solution at a part of the way, from an earlier one; at its end the direct one, if it is the same."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,7 @@ from assembly.proximity.clearance.touching import conforms
 from assembly.solve.clearance_proof import near_contacts, new_proof, opening_move
 from assembly.solve.solution import Solution
 
-__all__ = ["ClearTicks"]
+__all__ = ["ClearTicks", "WayLimits"]
 
 Array = NDArray[np.float64]
 # Pairs of nodes that a tick looks at for a pair of bodies.
@@ -48,6 +50,21 @@ class _Standing:
         return opening_move(proof, k, self.q, self.near(proof).get(k), depth)
 
 
+class WayLimits(NamedTuple):
+    """Where ways of bodies that touch end to be known.
+
+    Attributes
+    ----------
+    sampled : float
+        How far bodies whose faces lie on each other may go in one way, in parts of their size.
+    depth : float
+        How deep a way may go in, in the unit of the scene.
+    """
+
+    sampled: float = np.inf
+    depth: float = np.inf
+
+
 class ClearTicks:
     """The proofs of the pairs that a tracker's clearances keep apart, from tick to tick.
 
@@ -63,8 +80,7 @@ class ClearTicks:
         What bodies may be in each other and touch, in the unit of the scene.
     proof : ClearanceProof, optional
         That of the same pairs, whose last poses are forgotten.
-    sampled_way : float
-        How far bodies whose faces lie on each other may go between two ticks, in parts of their size.
+    limits : WayLimits
 
     Attributes
     ----------
@@ -77,9 +93,13 @@ class ClearTicks:
     """
 
     def __init__(
-        self, first: Solution, touching: float, proof: ClearanceProof | None = None, sampled_way: float = np.inf
+        self,
+        first: Solution,
+        touching: float,
+        proof: ClearanceProof | None = None,
+        limits: WayLimits = WayLimits(),  # noqa: B008
     ) -> None:
-        self._touching, self._sampled_way = touching, sampled_way
+        self._touching, self._limits = touching, limits
         if proof is None:
             proof = new_proof(first._packed, first._scene.bodies)
             proof.fronts.counts.budget = BUDGET
@@ -106,6 +126,8 @@ class ClearTicks:
             self._at, self.proved = there, True
             return True
         answers: dict[int, Answer] = {}
+        # Where a long way may not go in by its square, one along flat faces still may do.
+        rolling = [k for k in rolling if self._roll_depth(k, there, OPENED[0]) <= self._limits.depth]
         others = [k for k in range(len(proof.pairs)) if k not in rolling]
         for k, answer in zip(others, proof.look(there.q, touching, moves, others, swept=True), strict=True):
             answers[k] = answer
@@ -116,7 +138,12 @@ class ClearTicks:
             for k in rolling:
                 moves[k] = there.opened(proof, k, touching)
             for part in OPENED:
-                left = [k for k in rolling if k not in answers or not is_proven(answers[k])]
+                left = [
+                    k
+                    for k in rolling
+                    if not (k in answers and is_proven(answers[k]))
+                    and self._roll_depth(k, there, part) <= self._limits.depth
+                ]
                 answers.update(zip(left, self._rolled(there, moves, left, part), strict=True) if left else ())
         self.doubtful = self._not_known(answers, there)
         if self.doubtful:
@@ -136,7 +163,7 @@ class ClearTicks:
             and not (
                 answer.verdict is Verdict.UNDECIDED
                 and conforms(proof, k, q, self._touching)
-                and proof.way_length(k, self._at.q, q) <= self._sampled_way * proof.size(k)
+                and proof.way_length(k, self._at.q, q) <= self._limits.sampled * proof.size(k)
             )
         }
 
@@ -150,13 +177,17 @@ class ClearTicks:
                 found.append(k)
         return found
 
+    def _roll_depth(self, k: int, there: _Standing, part: float) -> float:
+        """A part of what the way of pair k may go in if it touches all along."""
+        way = self._proof.way_length(k, self._at.q, there.q)
+        return max(part * ROLLED * way * way / self._proof.radius(k), ROOM * self._proof.size(k))
+
     def _rolled(self, there: _Standing, moves: Array, which: list[int], part: float) -> list[Answer]:
         """What is proven of pairs that are opened on the way, by a part of what it may go in."""
         proof, begin = self._proof, self._at
         before, after = self._moves.copy(), moves.copy()
         for k in which:
-            way = proof.way_length(k, begin.q, there.q)
-            depth = max(part * ROLLED * way * way / proof.radius(k), ROOM * proof.size(k))
+            depth = self._roll_depth(k, there, part)
             self.way_depth = max(self.way_depth, depth)
             for standing, opened in ((begin, before), (there, after)):
                 move = standing.opened(proof, k, depth)
