@@ -137,14 +137,12 @@ class Assembly(Contents):
             Check `success`; the status and the message say what happened otherwise.
         """
         interruption = CTRL_C if time_limit is None and callback is None else Interruption(time_limit, callback)
-        if not isinstance(swept, (bool, np.bool_)):
+        if swept is not False and not isinstance(swept, (bool, np.bool_)):
             raise InputError(f"swept is {swept!r}; expected True or False")
         if swept:
             from assembly.studies.swept_solve import swept_solve
 
-            if starts is not None:
-                raise InputError(f"starts is {starts!r} with swept=True; expected None, contacts go on from q0")
-            solution = swept_solve(self, q0, options, interruption)
+            solution = swept_solve(self, q0, starts, options, interruption)
         else:
             solution = self._from_start(q0, starts, options, interruption)
         if not solution.success:

@@ -41,6 +41,8 @@ class Iteration(tuple[float, ...]):
 class Result(ReadOnlyArrays):
     """The state that a solve ended with; `Solution` documents the attributes."""
 
+    way: Way | None = None
+
     def __init__(
         self,
         scene: Scene,
@@ -60,7 +62,6 @@ class Result(ReadOnlyArrays):
         self.seconds = seconds
         self._order = order
         self.restarted = False
-        self.way: Way | None = None
         self._fit = fit
         # What it was solved with: a solve that goes on from it may ask for the way.
         self._asked = packed.asked

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.packing.asked import asked_between, asked_change
 from assembly.errors import InputError
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
@@ -46,7 +47,7 @@ SHORTEST, LEAST_HALVED = 2.0**-20, 2.0**-10
 # size.
 STRAIGHT = 1e-4
 # Bodies whose faces lie on each other go no farther in one step, in parts of their size: there is no proof between.
-SAMPLED_WAY = 1e-2
+SAMPLED_WAY = 5e-2
 # Contacts that are open by less, in parts of the size, are where a body is in the way.
 NEAR = 1e-2
 
@@ -65,10 +66,14 @@ class _Hindrance(NamedTuple):
     pairs: dict[int, Answer]
 
 
-def swept_solve(scene: Assembly, start: object, options: dict[str, Any], interruption: Interruption) -> Solution:
+def swept_solve(
+    scene: Assembly, start: object, starts: object, options: dict[str, Any], interruption: Interruption
+) -> Solution:
     """See `Assembly.solve`."""
     begin = perf_counter()
     packed = scene.packed()
+    if starts is not None:
+        raise InputError(f"starts is {starts!r} with swept=True; expected None, contacts go on from q0")
     if not isinstance(start, Solution):
         raise InputError(f"q0 is {type(start).__name__!r} with swept=True; expected a Solution, where the way begins")
     scene._state_of("q0", packed, start)
@@ -139,15 +144,14 @@ class _Walk:
 
     def _longest_step(self) -> float:
         """A power of two: in steps of it nothing that is asked for changes by more than is allowed."""
-        is_angle = [equation.terms[0][1].is_angle for equation, _, _ in self._packed._sources]
-        change = self._start._asked.change(self._asked, self._packed.scale, is_angle)
+        change = asked_change(self._start._asked, self._asked, self._packed.asked_units)
         return float(2.0 ** np.floor(np.log2(LONGEST / change))) if change > LONGEST else 1.0
 
     def _solved(self, at: Solution, part: float) -> Solution:
         """The solution at a part of the way, from an earlier one; at its end the direct one, if it is the same."""
         if part == 1.0 and at is self._start:
             return self._direct
-        asked = self._asked if part == 1.0 else self._start._asked.toward(self._asked, part)
+        asked = self._asked if part == 1.0 else asked_between(self._start._asked, self._asked, part)
         self._packed.ask_for(asked)
         solution = self._scene._from_start(at, None, self._options, self._interruption)
         is_direct = part == 1.0 and self._direct.success and solution.success
@@ -189,7 +193,7 @@ class _Walk:
         free._objectives = list(scene._objectives)
         as_it_is = {**self._options, "max_iterations": 0}
         for beyond in BEYOND:
-            self._packed.ask_for(self._start._asked.toward(self._asked, min(1.0, done + beyond)))
+            self._packed.ask_for(asked_between(self._start._asked, self._asked, min(1.0, done + beyond)))
             freely = free.solve(at.q)
             if not freely.success:
                 break

@@ -1,51 +1,40 @@
-"""What a solve is asked for that may change between solves, and what is between two of these."""
+"""What a solve is asked for that may change between solves, and what is between two of these.
+
+In the order of the packed scene: values of rows (driven values, limits, offsets), in the user's units; positions of
+targets; targets of frames, as poses.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.kinematics.pose import Pose
 
-__all__ = ["Asked"]
+__all__ = ["Asked", "asked_between", "asked_change"]
 
 Array = NDArray[np.float64]
+# Numbers, arrays (3,) and poses.
+Asked = list[Any]
 
 
-class Asked(NamedTuple):
-    """Values and targets of a packed scene, in its order.
+def asked_between(here: Asked, there: Asked, part: float) -> Asked:
+    """What is asked for a part of the way: numbers and points go along lines, frames turn the shorter way."""
+    return [
+        _pose_between(a, b, part) if isinstance(a, Pose) else a + part * (b - a)
+        for a, b in zip(here, there, strict=True)
+    ]
 
-    Attributes
-    ----------
-    values : list of float
-        Right-hand sides of rows: driven values, limits, offsets, in the user's units.
-    points : list of (3,) array
-        Of terms with a target its position.
-    poses : list of Pose
-        Targets of frames.
-    """
 
-    values: list[float]
-    points: list[Array]
-    poses: list[Pose]
-
-    def toward(self, other: Asked, part: float) -> Asked:
-        """What is asked for a part of the way to another one: numbers go along lines, frames turn the shorter way."""
-        return Asked(
-            [here + part * (there - here) for here, there in zip(self.values, other.values, strict=True)],
-            [here + part * (there - here) for here, there in zip(self.points, other.points, strict=True)],
-            [_between(here, there, part) for here, there in zip(self.poses, other.poses, strict=True)],
-        )
-
-    def change(self, other: Asked, scale: float, is_angle: list[bool]) -> float:
-        """The largest difference to another one: lengths over a scale, and radians."""
-        lengths = [1.0 if angle else scale for angle in is_angle]
-        values = [abs(b - a) / unit for a, b, unit in zip(self.values, other.values, lengths, strict=True)]
-        points = [float(np.linalg.norm(b - a)) / scale for a, b in zip(self.points, other.points, strict=True)]
-        turns = [2.0 * _half_angle(a, b) for a, b in zip(self.poses, other.poses, strict=True)]
-        return max([*values, *points, *turns], default=0.0)
+def asked_change(here: Asked, there: Asked, units: list[float]) -> float:
+    """The largest difference, each in its unit."""
+    changes = [
+        2.0 * _half_angle(a, b) if isinstance(a, Pose) else float(np.linalg.norm(b - a))
+        for a, b in zip(here, there, strict=True)
+    ]
+    return max((change / unit for change, unit in zip(changes, units, strict=True)), default=0.0)
 
 
 def _half_angle(here: Pose, there: Pose) -> float:
@@ -55,10 +44,11 @@ def _half_angle(here: Pose, there: Pose) -> float:
     return float(np.arctan2(sine, abs(cosine)))
 
 
-def _between(here: Pose, there: Pose, part: float) -> Pose:
+def _pose_between(here: Pose, there: Pose, part: float) -> Pose:
     """A pose a part of the way: its origin goes along a line, and it turns the shorter way at constant speed."""
     half = _half_angle(here, there)
     end = there.quaternion if here.quaternion @ there.quaternion >= 0.0 else -there.quaternion
-    weights = np.sinc(np.array([1.0 - part, part]) * half / np.pi) * [1.0 - part, part]
-    quaternion = weights @ np.stack([here.quaternion, end])
+    parts = np.array([1.0 - part, part])
+    # The common factor half / sin(half) goes with the length.
+    quaternion = (parts * np.sinc(parts * half / np.pi)) @ np.stack([here.quaternion, end])
     return Pose(here.position + part * (there.position - here.position), quaternion / np.linalg.norm(quaternion))

@@ -18,7 +18,7 @@ from assembly.constraints.model.contact import Contact, side_face
 from assembly.constraints.model.couplings import Coupling
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.joint import Joint
-from assembly.constraints.model.objectives import FrameDistance, Objective, Posture
+from assembly.constraints.model.objectives import Objective, Posture
 from assembly.constraints.model.trim_contact import TrimContact
 from assembly.constraints.packing import addresses
 from assembly.constraints.packing import manager as manager_packing
@@ -159,7 +159,7 @@ class Packed:
         if self.clearance_rows:
             # The first update sees what crosses at the start as well, if it is no deeper than this.
             self._memory = fresh_memory(sum(map(len, self.clearance_pairs)), self.clearance_rows, LARGEST_MARGIN)
-        self.asked = Asked([], [], [])
+        self.asked: Asked = []
         self.workspaces: list[tuple[Array, Array, Table]] = []
         self.proofs: list[ClearanceProof] = []
         self.kept_at = self.memory_at + self._memory.size
@@ -392,6 +392,12 @@ class Packed:
         return other
 
     @property
+    def asked_units(self) -> list[float]:
+        """What every number that may change between solves is measured in: the scene's size, or radians."""
+        values = [1.0 if equation.terms[0][1].is_angle else self.scale for equation, _, _ in self._sources]
+        return [*values, *(self.scale for _ in self._targets), *(1.0 for _ in self._turns)]
+
+    @property
     def value_rows(self) -> NDArray[np.int64]:
         """The rows of joints and couplings, which have a value each."""
         first = int((self.pairs >= 0).sum())
@@ -405,37 +411,38 @@ class Packed:
         """Write what may have changed since the last solve: values and targets."""
         pool, scale, far = self.pool, self.scale, FARTHEST * self.scale
         x, y, z = self._reference
-        values = []
+        asked: Asked = []
+        self.asked = asked
         for equation, at, unit in self._sources:
             current = equation.current()
             value = current / unit
             if not -FARTHEST <= value <= FARTHEST and not equation.terms[0][1].is_angle:
                 assert equation.source is not None
                 check_reach(f"a value of {equation.source[0]!r}", abs(current), scale)
-            values.append(current)
+            asked.append(current)
             pool[at] = value
         for distance, at in self._targets:
-            a, b, c = distance._target.tolist()
+            target = distance._target
+            asked.append(target)
+            a, b, c = target.tolist()
             if not (-far <= a <= far and -far <= b <= far and -far <= c <= far):
                 check_reach(f"a target of body {distance.bodies[0].name!r}", max(abs(a), abs(b), abs(c)), scale)
             pool[at] = (a - x) / scale
             pool[at + 1] = (b - y) / scale
             pool[at + 2] = (c - z) / scale
         for frame_distance, at in self._turns:
+            asked.append(frame_distance.target)
             pool[at : at + 4] = frame_distance.body_quaternion
-        self.asked = Asked(
-            values, [item._target for item, _ in self._targets], [item.target for item, _ in self._turns]
-        )
 
     def ask_for(self, asked: Asked) -> None:
         """Set values and targets of the scene's constraints and objectives, and write them."""
-        for (equation, _, _), value in zip(self._sources, asked.values, strict=True):
-            equation.ask_for(value)
-        for (distance, _), target in zip(self._targets, asked.points, strict=True):
-            if not isinstance(distance, FrameDistance):
-                distance.target = target
-        for (frame_distance, _), pose in zip(self._turns, asked.poses, strict=True):
-            frame_distance.target = pose
+        remaining = iter(asked)
+        for equation, _, _ in self._sources:
+            equation.ask_for(next(remaining))
+        for distance, _ in self._targets:
+            distance._target = next(remaining)
+        for frame_distance, _ in self._turns:
+            frame_distance.target = next(remaining)
         self.refresh()
 
 
