@@ -60,10 +60,17 @@ UNKNOWN = np.full(3, np.nan)
 
 
 class _Hindrance(NamedTuple):
-    """Why a step is not made: what it says of that, and what is proven of the pairs of bodies that are in the way."""
+    """Why a step is not made.
+
+    Attributes
+    ----------
+    reason : str
+    pairs : dict of int -> Answer, optional
+        The pairs of bodies that are in the way, and what is proven of them; None where that is not known yet.
+    """
 
     reason: str
-    pairs: dict[int, Answer]
+    pairs: dict[int, Answer] | None = None
 
 
 def swept_solve(
@@ -164,10 +171,10 @@ class _Walk:
     def _hindrance(self, at: Solution, middle: Solution, there: Solution) -> _Hindrance | None:
         """Why the way from one solution to another is not known to be clear; None where it is."""
         if not there.success:
-            return _Hindrance(f"a solve beyond is {there.status.name}", {})
+            return _Hindrance(f"a solve beyond is {there.status.name}")
         turned = there._state[self._angles] - at._state[self._angles]
         if not middle.success or np.abs(turned).max(initial=0.0) > LONGEST:
-            return _Hindrance("constraints do not hold all along", {})
+            return _Hindrance("constraints do not hold all along")
         off = self._seen.bend(at.q, middle.q, there.q)
         if off > self._allowed:
             return _Hindrance("the pose jumps", {})
@@ -223,7 +230,7 @@ class _Walk:
         if found is None:
             solution.way = Way(part, self._depth, (), UNKNOWN, "")
             return solution
-        pairs = found.pairs or self._in_the_way(at, part)
+        pairs = self._in_the_way(at, part) if found.pairs is None else found.pairs
         if not pairs:
             solution.way = Way(part, self._depth, (), UNKNOWN, found.reason)
             return solution
