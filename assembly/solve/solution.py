@@ -82,7 +82,7 @@ class Solution(Result):
         Of the pairs that a joint or a coupling ties directly those that cross.
     iterations : int
     seconds : float
-        Time in the compiled loop.
+        Time in the compiled loop; of a solve with `swept=True` all of its time.
     history : (iterations + 1, 7)
         Columns `Iteration.COLUMNS`; lengths over the scene's size.
     message : str

@@ -256,15 +256,15 @@ def test_what_is_pushed_gives_way_until_it_cannot():
     assert -2.5 * 2.0 * RESOLUTION <= blocked.values["drive.slide"] - (2.95 - 0.5 - 0.1) <= 1e-8
 
 
-def geared():
-    """A bar that a gear turns seven times as fast; a peg in its way at a right angle less asin(0.045 / 0.4)."""
+def geared(ratio=7.0):
+    """A bar that a gear turns seven times as fast, or more; a peg in its way at a right angle less asin(0.045 / 0.4)."""
     base = asm.Body("base", fixed=True)
     wheel = asm.Body("wheel", asm.shapes.box(1.0, 0.05, 0.05))
     bar = asm.Body("bar", asm.shapes.box(1.0, 0.05, 0.05), position=(3.0, 0.0, 0.0))
     peg = asm.Body("peg", asm.shapes.solid_cylinder(0.02, 1.0), position=(3.0, 0.4, 0.0), fixed=True)
     drive = asm.Revolute(base.frame(), wheel.frame(), "drive", angle=0.0)
     driven = asm.Revolute(base.frame(at=(3.0, 0.0, 0.0)), bar.frame(), "driven")
-    gear = asm.Gear(drive.freedom("angle"), driven.freedom("angle"), ratio=7.0)
+    gear = asm.Gear(drive.freedom("angle"), driven.freedom("angle"), ratio=ratio)
     scene = asm.Assembly([base, wheel, bar, peg])
     scene.constrain(drive, driven, gear, asm.Clearance())
     return scene, drive, gear
@@ -289,6 +289,17 @@ def test_all_that_may_change_between_solves_goes_along(moved):
     assert -40.0 * RESOLUTION <= off <= 1e-8
     if moved == "limits":
         assert drive.freedom("angle").limits == (1.0, 6.0)
+
+
+def test_poses_that_are_alike_at_every_step():
+    """A bar that turns 64 times as fast, and twice around in the longest step of what drives it."""
+    scene, drive, _ = geared(64.0)
+    start = scene.solve()
+    drive.angle = np.pi / 16.0
+    blocked = scene.solve(start, swept=True)
+    assert blocked.status is asm.Status.BLOCKED
+    off = blocked.values["driven.angle"] - (0.5 * np.pi - np.arcsin(0.045 / 0.4))
+    assert -8.0 * np.pi * RESOLUTION <= off <= 1e-8
 
 
 def aimed(shape, target):
