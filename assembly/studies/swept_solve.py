@@ -53,7 +53,7 @@ NEAR = 1e-2
 
 
 # Steps of the loop in each solve on the way: what holds after a short step holds after a few.
-ITERATIONS = 50
+ITERATIONS = 30
 # Parts of the way beyond its end at which it is looked for what is in the way.
 BEYOND = (2.0**-10, 2.0**-7, 2.0**-4)
 UNKNOWN = np.full(3, np.nan)
@@ -201,7 +201,7 @@ class _Walk:
         as_it_is = {**self._options, "max_iterations": 0}
         for beyond in BEYOND:
             self._packed.ask_for(asked_between(self._start._asked, self._asked, min(1.0, done + beyond)))
-            freely = free.solve(at.q)
+            freely = free._from_start(at.q, None, self._options, self._interruption)
             if not freely.success:
                 break
             there = scene._from_start(freely.q, None, as_it_is, self._interruption)

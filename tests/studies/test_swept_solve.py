@@ -199,6 +199,29 @@ def test_a_linkage_that_is_free(cases):
     assert swept.success and swept.proved and swept.q.tobytes() == direct.q.tobytes()
 
 
+def test_joints_may_be_in_the_way():
+    """A crank of 2 whose rod of 1 ends on a line through its pivot turns by asin(1 / 2); no body is in its way."""
+    base = asm.Body("base", fixed=True)
+    far = asm.Body("far", asm.shapes.box(1.0, 1.0, 1.0), position=(0.0, 9.0, 0.0), fixed=True)
+    crank, rod = asm.Body("crank", asm.shapes.box(2.0, 0.1, 0.1), position=(1.0, 0.0, 0.0)), asm.Body("rod")
+    drive = asm.Revolute(base.frame(), crank.frame(at=(-1.0, 0.0, 0.0)), "drive", angle=0.0)
+    rod.pose = asm.Pose((2.0, 0.0, 0.0))
+    scene = asm.Assembly([base, far, crank, rod])
+    scene.constrain(
+        drive,
+        asm.Revolute(crank.frame(at=(1.0, 0.0, 0.0)), rod.frame()),
+        asm.PointOnPlane(rod.point(1.0, 0.0, 0.0), base.frame(z=(0.0, 1.0, 0.0))),
+        asm.Clearance(),
+    )
+    start = scene.solve()
+    drive.angle = 1.0
+    blocked = scene.solve(start, swept=True)
+    assert blocked.status is asm.Status.BLOCKED and blocked.way.obstacles == ()
+    assert blocked.way.reason.startswith("a solve beyond is") and np.isnan(blocked.way.place).all()
+    # At the dead center a residual of 2e-13 is an angle of its root.
+    assert blocked.values["drive.angle"] == pytest.approx(np.pi / 6.0, abs=2e-6)
+
+
 def on_a_plate(body, height):
     """A body that lies on a plate and is driven along x."""
     base = asm.Body("base", fixed=True)

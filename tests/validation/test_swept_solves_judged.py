@@ -16,7 +16,6 @@ import assembly as asm
 from tests.validation.clearance_scenes import TOUCHING, parts
 from tests.validation.crossing_judge import Motion, crossing_depth, least_signed_distance, sampled_distance
 
-SAMPLES = 30
 # A part of the way that is not known, times what bodies go along the longest one, in sizes: 10 in lengths and turns.
 RESOLUTION = 10.0 * 2.0**-20
 BEYOND = (1e-5, 1e-4, 1e-3, 1e-2)
@@ -83,7 +82,7 @@ def drawn(number):
 
 
 def test_random_screws(cases):
-    count = cases(6, 400)
+    count, samples = cases(4, 400), cases(8, 30)
     blocked = 0
     for number in range(count):
         way = drawn(number)
@@ -94,7 +93,7 @@ def test_random_screws(cases):
         found = scene.solve(start, swept=True)
         assert found.q[2, :3] == pytest.approx(way.at(found.way.part).place, abs=1e-11 * way.size), way
         allowed = found.way.depth + TOUCHING * way.size
-        for part in np.linspace(0.0, found.way.part, SAMPLES):
+        for part in np.linspace(0.0, found.way.part, samples):
             assert crossing_depth(*way.both, way.at(part)) <= allowed, way
         if found.success:
             assert found.way.part == 1.0 and found.q.tobytes() == scene.solve(start).q.tobytes(), way
