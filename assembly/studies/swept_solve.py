@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.packing.asked import asked_between, asked_change
 from assembly.errors import InputError
 from assembly.proximity.clearance.answers import Answer, Verdict
@@ -30,6 +29,7 @@ from assembly.solve.options import Options
 from assembly.solve.scene import Status
 from assembly.solve.solution import Solution
 from assembly.solve.way import Way
+from assembly.studies.obstacles import Obstacles
 from assembly.studies.seen_poses import SeenPoses
 from assembly.tracking.clear_ticks import ClearTicks, WayLimits
 
@@ -118,13 +118,17 @@ class _Walk:
         most = min(Options.of(options).max_iterations, ITERATIONS)
         self._options, self._interruption = {**options, "max_iterations": most}, interruption
         self._start, self._asked = start, direct._asked
-        touching = direct._touching * self._packed.scale
-        self._ticks = ClearTicks(start, touching, proof, WayLimits(SAMPLED_WAY, self._allowed))
+        self._ticks = self._ticks_from(start)
         if self._ticks.doubtful:
             named = self._named(self._ticks.doubtful)
             raise InputError(f"q0 is a solution with swept=True at which {named} are not clear; expected a clear one")
         self._is_proven, self._depth = self._ticks.proved, 0.0
         self._seen = SeenPoses(proof)
+
+    def _ticks_from(self, at: Solution) -> ClearTicks:
+        """The proof of ways, from a solution on."""
+        touching = self._direct._touching * self._packed.scale
+        return ClearTicks(at, touching, self._proof, WayLimits(SAMPLED_WAY, self._allowed))
 
     def end(self) -> Solution:
         """The solution of what is asked for, or the last one on the way there."""
@@ -193,20 +197,15 @@ class _Walk:
         return slice(self._packed.angles_at, self._packed.multipliers_at, TRACK)
 
     def _in_the_way(self, at: Solution, done: float) -> dict[int, Answer]:
-        """The pairs of bodies without whose clearances the way would go on; what is proven of them a little beyond."""
-        scene = self._scene
-        free = type(scene)(scene.bodies)
-        free.constrain(*(item for item in scene.constraints if not isinstance(item, Clearance)))
-        free._objectives = list(scene._objectives)
-        as_it_is = {**self._options, "max_iterations": 0}
+        """The pairs of bodies that are in the way, and what is proven of them a little beyond."""
+        obstacles = Obstacles(
+            self._scene, at, self._proof, lambda: self._ticks_from(at), self._options, self._interruption
+        )
         for beyond in BEYOND:
             self._packed.ask_for(asked_between(self._start._asked, self._asked, min(1.0, done + beyond)))
-            freely = free._from_start(at.q, None, self._options, self._interruption)
-            if not freely.success:
-                break
-            there = scene._from_start(freely.q, None, as_it_is, self._interruption)
-            if not self._ticks.holds(there):
-                return self._ticks.doubtful
+            pairs = obstacles.found()
+            if pairs:
+                return pairs
         return {}
 
     def _place(self, k: int, answer: Answer, at: Solution) -> Array:

@@ -241,6 +241,41 @@ def test_what_only_touches_is_not_in_the_way(shape):
     assert swept.success and swept.proved and swept.q.tobytes() == direct.q.tobytes()
 
 
+def test_what_is_only_touched_is_not_told_of():
+    """A box that slides on a plate comes to a step on it: the plate is not in its way."""
+    base = asm.Body("base", fixed=True)
+    plate = asm.Body("plate", asm.shapes.box(4.0, 2.0, 0.2), fixed=True)
+    step = asm.Body("step", asm.shapes.box(0.2, 2.0, 0.1), position=(1.1, 0.0, 0.15), fixed=True)
+    box = asm.Body("box", asm.shapes.box(0.5, 0.4, 0.3), position=(0.0, 0.0, 0.25))
+    drive = asm.Prismatic(base.frame(at=(0.0, 0.0, 0.25), **ALONG_X), box.frame(**ALONG_X), "drive", slide=0.0)
+    scene = asm.Assembly([base, plate, step, box])
+    scene.constrain(drive, asm.Clearance())
+    start = scene.solve()
+    drive.slide = 1.8
+    blocked = scene.solve(start, swept=True)
+    assert blocked.status is asm.Status.BLOCKED and blocked.way.obstacles == (("step", "box"),)
+    assert -1.8 * 2.0 * RESOLUTION <= blocked.values["drive.slide"] - 0.75 <= 1e-8
+
+
+def test_two_that_are_in_the_way_at_once():
+    """Without the one it is the other one that stops the bar: both are told of."""
+    base = asm.Body("base", fixed=True)
+    left, right = (
+        asm.Body(name, asm.shapes.solid_cylinder(0.1, 1.0), position=(x, 1.0, 0.0), fixed=True)
+        for name, x in (("left", -0.6), ("right", 0.6))
+    )
+    bar = asm.Body("bar", asm.shapes.box(2.0, 0.2, 0.2))
+    y = (0.0, 1.0, 0.0)
+    drive = asm.Prismatic(base.frame(z=y), bar.frame(z=y), "drive", slide=0.0)
+    scene = asm.Assembly([base, left, right, bar])
+    scene.constrain(drive, asm.Clearance())
+    start = scene.solve()
+    drive.slide = 2.0
+    blocked = scene.solve(start, swept=True)
+    assert blocked.status is asm.Status.BLOCKED and blocked.way.obstacles == (("left", "bar"), ("right", "bar"))
+    assert -2.0 * 2.0 * RESOLUTION <= blocked.values["drive.slide"] - 0.8 <= 1e-8
+
+
 def test_a_wheel_that_rolls():
     """Poses between two steps go in by the square of the step, which is no more than is allowed of all ways."""
     wheel = asm.Body("wheel", asm.shapes.solid_cylinder(0.15, 0.1), position=(-1.0, 0.0, 0.25), quaternion=TIPPED)
@@ -275,7 +310,7 @@ def test_what_is_pushed_gives_way_until_it_cannot():
     assert pushed.success and pushed.q[2, 0] == pytest.approx(1.35, abs=1e-8)
     drive.slide = 3.5
     blocked = scene.solve(pushed, swept=True)
-    assert blocked.status is asm.Status.BLOCKED and ("block", "ball") in blocked.way.obstacles
+    assert blocked.status is asm.Status.BLOCKED and blocked.way.obstacles == (("wall", "block"), ("block", "ball"))
     assert -2.5 * 2.0 * RESOLUTION <= blocked.values["drive.slide"] - (2.95 - 0.5 - 0.1) <= 1e-8
 
 
