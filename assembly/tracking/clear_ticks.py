@@ -127,7 +127,7 @@ class ClearTicks:
             return True
         answers: dict[int, Answer] = {}
         # Where a long way may not go in by its square, one along flat faces still may do.
-        rolling = [k for k in rolling if self._roll_depth(k, there, OPENED[0]) <= self._limits.depth]
+        rolling = [k for k in rolling if self._may_go_in(k, there, OPENED[0])]
         others = [k for k in range(len(proof.pairs)) if k not in rolling]
         for k, answer in zip(others, proof.look(there.q, touching, moves, others, swept=True), strict=True):
             answers[k] = answer
@@ -141,8 +141,7 @@ class ClearTicks:
                 left = [
                     k
                     for k in rolling
-                    if not (k in answers and is_proven(answers[k]))
-                    and self._roll_depth(k, there, part) <= self._limits.depth
+                    if not (k in answers and is_proven(answers[k])) and self._may_go_in(k, there, part)
                 ]
                 answers.update(zip(left, self._rolled(there, moves, left, part), strict=True) if left else ())
         self.doubtful = self._not_known(answers, there)
@@ -176,6 +175,10 @@ class ClearTicks:
             if ROLLED * way * way > SLIGHTLY * self._touching * proof.radius(k):
                 found.append(k)
         return found
+
+    def _may_go_in(self, k: int, there: _Standing, part: float) -> bool:
+        """Whether pair k may go in by a part of what it may if it touches all along."""
+        return self._limits.depth == np.inf or self._roll_depth(k, there, part) <= self._limits.depth
 
     def _roll_depth(self, k: int, there: _Standing, part: float) -> float:
         """A part of what the way of pair k may go in if it touches all along."""
