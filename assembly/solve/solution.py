@@ -222,7 +222,8 @@ class Solution(Result):
         """
         from assembly.solve.diagnosis.pose_error import pose_error
 
-        return pose_error(self._scene, self._packed, self._state)
+        # Values may be others by now.
+        return pose_error(self._scene, self._packed.as_asked(self._asked), self._state)
 
     @property
     def message(self) -> str:

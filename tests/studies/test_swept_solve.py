@@ -58,7 +58,7 @@ def test_a_pin_does_not_jump_over_a_thin_plate():
     assert blocked.status is asm.Status.BLOCKED and not blocked.success and not blocked.proved
     assert 0.0 <= blocked.q[2, 2] - (0.25 + 5e-4) <= 2.0 * RESOLUTION
     # It is a pose of the mechanism, with the drive at a part of its way.
-    assert blocked.feasibility < 1e-11
+    assert blocked.feasibility < 1e-11 and blocked.pose_error < 1e-11
     assert blocked.way.part == pytest.approx((1.0 - blocked.q[2, 2]) / 2.0, abs=1e-12)
     assert blocked.way.obstacles == (("plate", "pin"),)
     assert np.hypot(*(blocked.way.place[:2] - (0.1, 0.2))) <= 0.1 + 1e-9

@@ -391,6 +391,13 @@ class Packed:
         other.workspaces, other.proofs = self.workspaces, self.proofs
         return other
 
+    def as_asked(self, asked: Asked) -> Packed:
+        """The same with a pool of its own, in which rows have the values that a solve was asked for."""
+        other = self.twin()
+        for (_, at, unit), value in zip(self._sources, asked, strict=False):
+            other.pool[at] = value / unit
+        return other
+
     @property
     def asked_units(self) -> list[float]:
         """What every number that may change between solves is measured in: the scene's size, or radians."""

@@ -59,3 +59,14 @@ def test_solutions_know_what_they_were_asked_for():
     assert scene.solve(first).q == pytest.approx(first.q, abs=1e-12)
     scene.packed().ask_for(second._asked)
     assert (joint.angle, plane.offset, joint.slide_limits) == (0.5, 0.5, (-2.0, 3.0))
+
+
+def test_a_solution_is_as_exact_as_it_was_whatever_is_asked_for_since():
+    base, arm = asm.Body("base", fixed=True), asm.Body("arm")
+    drive = asm.Revolute(base.frame(), arm.frame(at=(-1.0, 0.0, 0.0)), "drive", angle=0.2)
+    scene = asm.Assembly([base, arm])
+    scene.constrain(drive)
+    first = scene.solve()
+    drive.angle = 1.4
+    second = scene.solve(first)
+    assert max(first.pose_error, second.pose_error) < 1e-12
