@@ -64,6 +64,7 @@ if TYPE_CHECKING:
     from assembly.solve.scene import Status as Status
     from assembly.solve.second_order.classification import SecondOrder as SecondOrder
     from assembly.solve.solution import Solution as Solution
+    from assembly.solve.way import Way as Way
     from assembly.step import read_step as read_step
     from assembly.step import write_step as write_step
     from assembly.studies.interference.clash import Clash as Clash
@@ -127,6 +128,7 @@ else:
             "Tracker": "assembly.tracking.tracker",
             "TrimContact": "assembly.constraints.model.trim_contact",
             "Universal": "assembly.constraints.model.joints",
+            "Way": "assembly.solve.way",
             "Wrench": "assembly.solve.forces.statics",
             "curves": "assembly.geometry.shapes.curves",
             "dexterity_ellipsoid": "assembly.solve.forces.end_effector",

@@ -100,6 +100,7 @@ class Assembly(Contents):
         starts: Mapping[str, ArrayLike] | None = None,
         time_limit: float | None = None,
         callback: Callable[[int, float, float], object] | None = None,
+        swept: bool = False,
         **options: Any,
     ) -> Solution:
         """Find the pose where every constraint holds and the objective has a local minimum.
@@ -122,6 +123,11 @@ class Assembly(Contents):
             are known) every 50 ms, or after a step that takes longer; where it returns True the solve ends with
             `Status.STOPPED`. What it raises is raised here. Ctrl-C is answered as often, with or without a callback;
             the scene stays usable.
+        swept : bool
+            Whether the way from q0, a solution, is asked for as well. Driven values, offsets, limits and targets go
+            from what q0 was solved with to what they are now, along a line, and the scene is solved in many steps.
+            Where bodies that a clearance keeps apart are in the way, the solve ends at the last pose before, as
+            `Status.BLOCKED`; `way` and the message say what is in the way, and where.
         **options
             See `Options`.
 
@@ -131,7 +137,14 @@ class Assembly(Contents):
             Check `success`; the status and the message say what happened otherwise.
         """
         interruption = CTRL_C if time_limit is None and callback is None else Interruption(time_limit, callback)
-        solution = self._from_start(q0, starts, options, interruption)
+        if swept is not False and not isinstance(swept, (bool, np.bool_)):
+            raise InputError(f"swept is {swept!r}; expected True or False")
+        if swept:
+            from assembly.studies.swept_solve import swept_solve
+
+            solution = swept_solve(self, q0, starts, options, interruption)
+        else:
+            solution = self._from_start(q0, starts, options, interruption)
         if not solution.success:
             from assembly.studies.restarts import may_hold_elsewhere, restarted
 

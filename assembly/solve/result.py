@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from assembly.solve.clearance_proof import PairAnswer
     from assembly.solve.second_order.classification import SecondOrder
     from assembly.solve.second_order.leave import Fit
+    from assembly.solve.way import Way
 
 __all__ = ["Iteration", "Result"]
 
@@ -39,6 +40,8 @@ class Iteration(tuple[float, ...]):
 
 class Result(ReadOnlyArrays):
     """The state that a solve ended with; `Solution` documents the attributes."""
+
+    way: Way | None = None
 
     def __init__(
         self,
@@ -61,6 +64,8 @@ class Result(ReadOnlyArrays):
         self.restarted = False
         self.put_together = False
         self._fit = fit
+        # What it was solved with: a solve that goes on from it may ask for the way.
+        self._asked = packed.asked
         self._clear: list[PairAnswer] = []
         # Of a tick: whether samples stand for its proof.
         self._is_sampled = False

@@ -34,6 +34,7 @@ class Status(Enum):
     STOPPED = "the callback ended it; the pose is the last that held, if one did"
     UNBOUNDED = "the objective is unbounded, it falls on and on along poses that hold; bound it by a limit or a term"
     FITTED = "constraints that repeat each other disagree by a little and hold as well as they can; all others hold"
+    BLOCKED = "something is in the way to what is asked for; the pose is the last one before: look at the message"
 
 
 class Scene:

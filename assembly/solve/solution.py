@@ -49,6 +49,8 @@ class Solution(Result):
     put_together : bool
         Whether, where joints or contacts did not hold at the start, bodies were put together without clearances first:
         to there they may have passed through each other. The option `keep_topology` forbids it.
+    way : Way or None
+        Of a solve with `swept=True`: how far its way is clear, and of a BLOCKED one what is in the way.
     feasibility : float
         Largest violation of a constraint, in the user's units, evaluated at `q`. Of a contact that has no extremal pair
         there it is the distance of the points in `contacts`. Infinite only where an `Expression` or a derivative of it
@@ -83,7 +85,7 @@ class Solution(Result):
         Of the pairs that a joint or a coupling ties directly those that cross.
     iterations : int
     seconds : float
-        Time in the compiled loop.
+        Time in the compiled loop; of a solve with `swept=True` all of its time.
     history : (iterations + 1, 7)
         Columns `Iteration.COLUMNS`; lengths over the scene's size.
     message : str
@@ -223,7 +225,8 @@ class Solution(Result):
         """
         from assembly.solve.diagnosis.pose_error import pose_error
 
-        return pose_error(self._scene, self._packed, self._state)
+        # Values may be others by now.
+        return pose_error(self._scene, self._packed.as_asked(self._asked), self._state)
 
     @property
     def message(self) -> str:

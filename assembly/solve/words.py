@@ -43,6 +43,8 @@ def message(solution: Solution) -> str:
     if doubtful:
         named = ", ".join(f"{a} and {b} ({pair.answer.verdict.name})" for pair in doubtful for a, b in [pair.bodies])
         text += f"; not clear: {named}"
+    if solution.way is not None and solution.way.reason:
+        text += f"; {solution.way.part:.6g} of the way is clear: {solution.way.reason}"
     if solution.status is Status.FITTED:
         text += "; disagreeing: " + ", ".join(f"{name!r} ({off:.3g})" for name, off in solution.disagreeing.items())
     if solution.status is Status.INFEASIBLE:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,7 @@ from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.solve.clearance_proof import near_contacts, new_proof, opening_move
 from assembly.solve.solution import Solution
 
-__all__ = ["ClearTicks"]
+__all__ = ["ClearTicks", "WayLimits"]
 
 Array = NDArray[np.float64]
 # Pairs of nodes that a tick looks at for a pair of bodies.
@@ -48,6 +50,21 @@ class _Standing:
         return opening_move(proof, k, self.q, self.near(proof).get(k), depth)
 
 
+class WayLimits(NamedTuple):
+    """Where ways of bodies that touch end to be known.
+
+    Attributes
+    ----------
+    sampled : float
+        How far bodies whose faces lie on each other may go in one way, in parts of their size.
+    depth : float
+        How deep a way may go in, in the unit of the scene.
+    """
+
+    sampled: float = np.inf
+    depth: float = np.inf
+
+
 class ClearTicks:
     """The proofs of the pairs that a tracker's clearances keep apart, from tick to tick.
 
@@ -61,23 +78,39 @@ class ClearTicks:
         Where the tracker begins.
     touching : float
         What bodies may be in each other and touch, in the unit of the scene.
+    proof : ClearanceProof, optional
+        That of the same pairs, whose last poses are forgotten.
+    limits : WayLimits
 
     Attributes
     ----------
+    doubtful : dict of int -> Answer
+        Where the last tick does not hold, or the first one: the pairs of which it is not known.
     proved : bool
         Whether all pairs were proven clear, or touching, at the last tick that holds; else faces lie on each other.
     way_depth : float
         How deep bodies may be in each other on the way to it, at most.
     """
 
-    def __init__(self, first: Solution, touching: float) -> None:
-        self._touching = touching
-        self._proof: ClearanceProof = new_proof(first._packed, first._scene.bodies)
-        self._proof.fronts.counts.budget = BUDGET
+    def __init__(
+        self,
+        first: Solution,
+        touching: float,
+        proof: ClearanceProof | None = None,
+        limits: WayLimits = WayLimits(),  # noqa: B008
+    ) -> None:
+        self._touching, self._limits = touching, limits
+        if proof is None:
+            proof = new_proof(first._packed, first._scene.bodies)
+            proof.fronts.counts.budget = BUDGET
+        proof.forget_poses()
+        self._proof = proof
         self._at = _Standing(first)
         self._moves = np.array([self._at.opened(self._proof, k, touching) for k in range(len(self._proof.pairs))])
         self.way_depth = 0.0
-        self.proved = all(map(is_proven, self._proof.look(first.q, touching, self._moves)))
+        answers = dict(enumerate(proof.look(first.q, touching, self._moves)))
+        self.proved = all(map(is_proven, answers.values()))
+        self.doubtful = self._not_known(answers, self._at)
 
     def holds(self, solution: Solution) -> bool:
         """Whether all pairs hold at the pose of a tick, and on the way there from the last one that did.
@@ -93,6 +126,8 @@ class ClearTicks:
             self._at, self.proved = there, True
             return True
         answers: dict[int, Answer] = {}
+        # Where a long way may not go in by its square, one along flat faces still may do.
+        rolling = [k for k in rolling if self._may_go_in(k, there, OPENED[0])]
         others = [k for k in range(len(proof.pairs)) if k not in rolling]
         for k, answer in zip(others, proof.look(there.q, touching, moves, others, swept=True), strict=True):
             answers[k] = answer
@@ -103,17 +138,33 @@ class ClearTicks:
             for k in rolling:
                 moves[k] = there.opened(proof, k, touching)
             for part in OPENED:
-                left = [k for k in rolling if k not in answers or not is_proven(answers[k])]
+                left = [
+                    k
+                    for k in rolling
+                    if not (k in answers and is_proven(answers[k])) and self._may_go_in(k, there, part)
+                ]
                 answers.update(zip(left, self._rolled(there, moves, left, part), strict=True) if left else ())
-        doubtful = [(k, answer) for k, answer in answers.items() if not is_proven(answer)]
-        if not all(
-            answer.verdict is Verdict.UNDECIDED and conforms(proof, k, there.q, touching) for k, answer in doubtful
-        ):
+        self.doubtful = self._not_known(answers, there)
+        if self.doubtful:
             proof.go_back(last)
             return False
-        self.proved = not doubtful
+        self.proved = all(map(is_proven, answers.values()))
         self._at, self._moves = there, moves
         return True
+
+    def _not_known(self, answers: dict[int, Answer], there: _Standing) -> dict[int, Answer]:
+        """The pairs that are not proven to be clear, or to touch, and whose faces do not lie on each other."""
+        proof, q = self._proof, there.q
+        return {
+            k: answer
+            for k, answer in answers.items()
+            if not is_proven(answer)
+            and not (
+                answer.verdict is Verdict.UNDECIDED
+                and conforms(proof, k, q, self._touching)
+                and proof.way_length(k, self._at.q, q) <= self._limits.sampled * proof.size(k)
+            )
+        }
 
     def _rolling(self, there: _Standing) -> list[int]:
         """The pairs that touch and go so far that the straight way goes in by what counts beside what is touching."""
@@ -125,13 +176,21 @@ class ClearTicks:
                 found.append(k)
         return found
 
+    def _may_go_in(self, k: int, there: _Standing, part: float) -> bool:
+        """Whether pair k may go in by a part of what it may if it touches all along."""
+        return self._limits.depth == np.inf or self._roll_depth(k, there, part) <= self._limits.depth
+
+    def _roll_depth(self, k: int, there: _Standing, part: float) -> float:
+        """A part of what the way of pair k may go in if it touches all along."""
+        way = self._proof.way_length(k, self._at.q, there.q)
+        return max(part * ROLLED * way * way / self._proof.radius(k), ROOM * self._proof.size(k))
+
     def _rolled(self, there: _Standing, moves: Array, which: list[int], part: float) -> list[Answer]:
         """What is proven of pairs that are opened on the way, by a part of what it may go in."""
         proof, begin = self._proof, self._at
         before, after = self._moves.copy(), moves.copy()
         for k in which:
-            way = proof.way_length(k, begin.q, there.q)
-            depth = max(part * ROLLED * way * way / proof.radius(k), ROOM * proof.size(k))
+            depth = self._roll_depth(k, there, part)
             self.way_depth = max(self.way_depth, depth)
             for standing, opened in ((begin, before), (there, after)):
                 move = standing.opened(proof, k, depth)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.tracking.clear_ticks import ClearTicks
+from assembly.tracking.clear_ticks import ClearTicks, WayLimits
 from assembly.tracking.tick import TrackStatus
 from tests.validation import exact_solids as exact
 from tests.validation.clearance_scenes import PROMISE_NOTHING, TOUCHING, tracked
@@ -110,3 +110,36 @@ def test_a_wheel_that_rolls_over_an_edge():
 def test_random_hands(cases):
     outcomes = [tracked(1000 + number) for number in range(cases(1, 200))]
     assert {outcome.number: outcome.wrong for outcome in outcomes if outcome.wrong} == {}
+
+
+def test_a_way_that_touches_may_be_asked_to_go_in_by_less():
+    """A ball that goes over an arc of a cylinder in one step: the chord is in it, by less than is allowed or not."""
+    pin, ball = exact.pin(0.5, 2.0), exact.ball(0.2)
+    scene, _ = tracker_of(pin, ball, (0.7, 0.0, 0.0))
+
+    def there(angle):
+        q = np.array([[0, 0, 0, 1, 0, 0, 0], [0.7 * np.cos(angle), 0.7 * np.sin(angle), 0, 1, 0, 0, 0]], dtype=float)
+        return solution_at(scene, q)
+
+    for depth, holds in ((1e-2, True), (1e-4, False), (np.inf, True)):
+        ticks = ClearTicks(there(0.0), 1e-9, limits=WayLimits(depth=depth))
+        assert ticks.proved and not ticks.doubtful
+        assert ticks.holds(there(0.05)) is holds
+        assert list(ticks.doubtful) == ([] if holds else [0])
+        assert ticks.way_depth <= depth
+
+
+def test_faces_on_each_other_may_be_asked_to_be_looked_at_often():
+    """A shaft that fills its bore: its way is not proven, and no longer than is allowed without."""
+    bore = asm.Body("bore", asm.shapes.plate(1.0, 1.0, 0.4, holes=[(0.0, 0.0, 0.1)]), fixed=True)
+    shaft = asm.Body("shaft", asm.shapes.solid_cylinder(0.1, 0.6))
+    scene = asm.Assembly([bore, shaft])
+    scene.constrain(asm.Clearance())
+
+    def there(z):
+        return solution_at(scene, np.array([[0, 0, 0, 1, 0, 0, 0], [0, 0, z, 1, 0, 0, 0]], dtype=float))
+
+    for sampled, holds in ((0.01, False), (0.1, True)):
+        ticks = ClearTicks(there(0.0), 1e-9, limits=WayLimits(sampled=sampled))
+        assert not ticks.proved and not ticks.doubtful
+        assert ticks.holds(there(0.05)) is holds

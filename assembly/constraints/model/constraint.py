@@ -148,6 +148,13 @@ class Equation:
         value = float(getattr(owner, attribute))
         return -value if attribute == "upper" else value
 
+    def ask_for(self, value: float) -> None:
+        """Set what `current` reads. The value is taken as it is, limits of a driven freedom or not."""
+        if self.source is not None:
+            owner, attribute = self.source
+            name = f"_{attribute}" if isinstance(owner, Freedom) else attribute
+            setattr(owner, name, -value if attribute == "upper" else value)
+
     @property
     def value(self) -> float:
         """The same as `current()`."""

@@ -22,6 +22,7 @@ from assembly.constraints.model.objectives import Objective, Posture
 from assembly.constraints.model.trim_contact import TrimContact
 from assembly.constraints.packing import addresses
 from assembly.constraints.packing import manager as manager_packing
+from assembly.constraints.packing.asked import Asked
 from assembly.constraints.packing.elimination_order import FEW, block_record
 from assembly.constraints.packing.numbering import number_bodies
 from assembly.constraints.packing.revolutions import Turns
@@ -80,6 +81,8 @@ class Packed:
         What solves that are over worked in, for the next ones (`solve/attempts/attempts.py`).
     proofs : list of ClearanceProof
         Of the pairs that clearances keep apart, of solves that have ended.
+    asked : Asked
+        What the last solve was asked for.
     has_size : bool
         Whether the scene has a size.
     outgrown : Packed or None
@@ -156,6 +159,7 @@ class Packed:
         if self.clearance_rows:
             # The first update sees what crosses at the start as well, if it is no deeper than this.
             self._memory = fresh_memory(sum(map(len, self.clearance_pairs)), self.clearance_rows, LARGEST_MARGIN)
+        self.asked: Asked = []
         self.workspaces: list[tuple[Array, Array, Table]] = []
         self.proofs: list[ClearanceProof] = []
         self.kept_at = self.memory_at + self._memory.size
@@ -387,6 +391,19 @@ class Packed:
         other.workspaces, other.proofs = self.workspaces, self.proofs
         return other
 
+    def as_asked(self, asked: Asked) -> Packed:
+        """The same with a pool of its own, in which rows have the values that a solve was asked for."""
+        other = self.twin()
+        for (_, at, unit), value in zip(self._sources, asked, strict=False):
+            other.pool[at] = value / unit
+        return other
+
+    @property
+    def asked_units(self) -> list[float]:
+        """What every number that may change between solves is measured in: the scene's size, or radians."""
+        values = [1.0 if equation.terms[0][1].is_angle else self.scale for equation, _, _ in self._sources]
+        return [*values, *(self.scale for _ in self._targets), *(1.0 for _ in self._turns)]
+
     @property
     def value_rows(self) -> NDArray[np.int64]:
         """The rows of joints and couplings, which have a value each."""
@@ -401,21 +418,39 @@ class Packed:
         """Write what may have changed since the last solve: values and targets."""
         pool, scale, far = self.pool, self.scale, FARTHEST * self.scale
         x, y, z = self._reference
+        asked: Asked = []
+        self.asked = asked
         for equation, at, unit in self._sources:
-            value = equation.current() / unit
+            current = equation.current()
+            value = current / unit
             if not -FARTHEST <= value <= FARTHEST and not equation.terms[0][1].is_angle:
                 assert equation.source is not None
-                check_reach(f"a value of {equation.source[0]!r}", abs(equation.current()), scale)
+                check_reach(f"a value of {equation.source[0]!r}", abs(current), scale)
+            asked.append(current)
             pool[at] = value
         for distance, at in self._targets:
-            a, b, c = distance._target.tolist()
+            target = distance._target
+            asked.append(target)
+            a, b, c = target.tolist()
             if not (-far <= a <= far and -far <= b <= far and -far <= c <= far):
                 check_reach(f"a target of body {distance.bodies[0].name!r}", max(abs(a), abs(b), abs(c)), scale)
             pool[at] = (a - x) / scale
             pool[at + 1] = (b - y) / scale
             pool[at + 2] = (c - z) / scale
         for frame_distance, at in self._turns:
+            asked.append(frame_distance.target)
             pool[at : at + 4] = frame_distance.body_quaternion
+
+    def ask_for(self, asked: Asked) -> None:
+        """Set values and targets of the scene's constraints and objectives, and write them."""
+        remaining = iter(asked)
+        for equation, _, _ in self._sources:
+            equation.ask_for(next(remaining))
+        for distance, _ in self._targets:
+            distance._target = next(remaining)
+        for frame_distance, _ in self._turns:
+            frame_distance.target = next(remaining)
+        self.refresh()
 
 
 def structure_of(constraints: Sequence[Constraint]) -> tuple[tuple[object, ...], ...]:

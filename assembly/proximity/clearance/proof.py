@@ -131,6 +131,10 @@ class ClearanceProof:
         look_at_pairs(self.forest.arrays, self.fronts.arrays, q.copy(), moves, self._on_way, self._codes)
         return not self._codes.any()
 
+    def forget_poses(self) -> None:
+        """From now on no way leads from the last poses."""
+        self.fronts.pair.known = 0.0
+
     def _forget(self) -> None:
         """Forget cells where contacts that went along bodies have left too many."""
         if self.forest.is_large:

@@ -228,6 +228,15 @@ def test_through_a_thin_plate():
     assert proof.look(below, 0.0)[0].verdict is Verdict.CLEAR
 
 
+def test_no_way_leads_from_poses_that_are_forgotten():
+    proof = proof_of(parts()["thin 1e-4"].shape, parts()["ball"].shape)
+    above, below = poses(at(0.1, 0.1, 0.5)), poses(at(0.1, 0.1, -0.6))
+    assert proof.look(above, 0.0)[0].verdict is Verdict.CLEAR
+    proof.forget_poses()
+    (answer,) = proof.look(below, 0.0, swept=True)
+    assert answer.verdict is Verdict.CLEAR and not answer.swept
+
+
 def test_within_another_and_out_of_it():
     """Also of a proof that found them clear before: no way is proven from within."""
     big, ball = parts()["big box"], parts()["ball"]

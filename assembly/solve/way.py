@@ -1,0 +1,37 @@
+"""What is known of the way of a solve that goes on from another one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._read_only import ReadOnlyArrays
+
+__all__ = ["Way"]
+
+
+@dataclass(frozen=True, eq=False)
+class Way(ReadOnlyArrays):
+    """How far a solve with `swept=True` got, and what was in its way.
+
+    Attributes
+    ----------
+    part : float
+        Of the way from what the start was solved with to what is asked for: 1 at its end.
+    depth : float
+        How deep bodies may be in each other on it, at most, in the user's unit.
+    obstacles : tuple of (str, str)
+        The pairs of bodies that are in the way; none where it goes to its end, or something else ended it.
+    place : (3,)
+        Where the first of these pairs meets, or nearly does, in the world; NaN where that is not known.
+    reason : str
+        What ended the way; empty where it goes to its end.
+    """
+
+    part: float
+    depth: float
+    obstacles: tuple[tuple[str, str], ...]
+    place: NDArray[np.float64]
+    reason: str

@@ -1,0 +1,91 @@
+"""Which bodies are in the way where a solve that goes on from a pose fails: those without which it would not.
+
+A solve that fails under clearances leaves bodies clear of each other, and what drives them behind: it does not say who
+stopped it. So the scene is solved with one pair of bodies after the other left out that are nearly in touch, and
+without any clearance where that does not tell: as where two posts stop a bar at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from typing import TYPE_CHECKING, Any
+
+from assembly.constraints.model.clearance import Clearance
+from assembly.proximity.clearance.answers import Answer
+from assembly.proximity.clearance.proof import ClearanceProof
+from assembly.solve.clearance_proof import near_contacts
+from assembly.solve.interruption import Interruption
+from assembly.solve.solution import Solution
+from assembly.tracking.clear_ticks import ClearTicks
+
+if TYPE_CHECKING:
+    from assembly.assembly import Assembly
+
+__all__ = ["Obstacles"]
+
+# Bodies whose contacts are open by less, in parts of the size, are nearly in touch.
+TOUCHED = 1e-4
+# Where more pairs of bodies are, none of them is left out alone: each takes a solve.
+MOST_TRIED = 16
+
+
+class Obstacles:
+    """What is asked about a pose of a scene that a way ends at.
+
+    Parameters
+    ----------
+    scene : Assembly
+    at : Solution
+    proof : ClearanceProof
+    ticks : callable
+        A proof of ways that begins at the pose.
+    options, interruption
+        Of solves.
+    """
+
+    def __init__(
+        self,
+        scene: Assembly,
+        at: Solution,
+        proof: ClearanceProof,
+        ticks: Callable[[], ClearTicks],
+        options: dict[str, Any],
+        interruption: Interruption,
+    ) -> None:
+        self._scene, self._at, self._proof, self._ticks = scene, at, proof, ticks
+        self._options, self._interruption = options, interruption
+
+    def found(self) -> dict[int, Answer]:
+        """The pairs of bodies, by their numbers in the proof, without which what is asked for now is reached.
+
+        Of each, what is proven on the way there.
+        """
+        near = sorted(near_contacts(self._at, self._proof, TOUCHED * self._scene.packed().scale))
+        tried = {k: self._crossed_without([k]) for k in near} if len(near) <= MOST_TRIED else {}
+        alone = {k: crossed[k] for k, crossed in tried.items() if k in crossed}
+        return alone or self._crossed_without(range(len(self._proof.pairs)))
+
+    def _crossed_without(self, left_out: list[int] | range) -> dict[int, Answer]:
+        """The pairs that do not stay clear on the way to what is asked for, where some are not kept apart."""
+        other = self._without(left_out)
+        settings = other._settings(self._options, self._interruption, warm=False)
+        reached = other._solved(settings, self._at.q, None, self._interruption)
+        if not reached.success:
+            return {}
+        there = self._scene._from_start(reached.q, None, {**self._options, "max_iterations": 0}, self._interruption)
+        ticks = self._ticks()
+        return {} if ticks.holds(there) else ticks.doubtful
+
+    def _without(self, left_out: list[int] | range) -> Assembly:
+        """The scene, without the clearances of some pairs."""
+        bodies = self._scene.bodies
+        pairs = [(bodies[a], bodies[b]) for a, b in (self._proof.pairs[k] for k in left_out)]
+        other = type(self._scene)(bodies)
+        for item in self._scene.constraints:
+            if isinstance(item, Clearance):
+                item = copy(item)
+                item._excluded = (*item._excluded, *pairs)
+            other.constrain(item)
+        other._objectives = list(self._scene._objectives)
+        return other
