@@ -185,74 +185,9 @@ class Assembly(Contents):
         settings = self._settings(options, interruption, isinstance(q0, Solution))
         if isinstance(q0, Solution) or settings[ITERATIONS] == 0.0 or not self.packed().clearance_rows:
             return self._solved(settings, q0, starts, interruption)
-        from assembly.studies.put_together import put_together
+        from assembly.studies.first_solve import first_solve
 
-        q = self._given(q0)
-        first = put_together(self, q, starts, options, interruption)
-        if first is not None and not first.keeps_topology:
-            solution = self._put_together(first.poses, settings, q, starts, interruption)
-            if solution.success or interruption.is_over():
-                return solution
-        solution = self._solved(settings, q, starts, interruption)
-        # What holds as it stands was not moved.
-        if not interruption.is_over() and not (solution.success and (solution.q == q).all()):
-            solution = self._from_apart(solution, settings, q, starts, options, interruption)
-        if first is not None and first.keeps_topology and not solution.success and not interruption.is_over():
-            other = self._put_together(first.poses, settings, q, starts, interruption)
-            solution = other if other.success else solution
-        return solution
-
-    def _put_together(
-        self,
-        poses: Array,
-        settings: Array,
-        q: Array,
-        starts: Mapping[str, ArrayLike] | None,
-        interruption: Interruption,
-    ) -> Solution:
-        """A solve from where bodies were put together without clearances; postures are measured from q."""
-        solution = self._solved(settings, poses, starts, interruption, q)
-        solution.put_together = True
-        return solution
-
-    def _from_apart(
-        self,
-        solution: Solution,
-        settings: Array,
-        q: Array,
-        starts: Mapping[str, ArrayLike] | None,
-        options: dict[str, Any],
-        interruption: Interruption,
-    ) -> Solution:
-        """The best of a solution and of those from where bodies that are stuck in each other at q are parted.
-
-        All ways are measured from where the user's bodies were, and the least one is the answer.
-        """
-        from assembly.studies.parting import parted
-        from assembly.studies.seated import seated
-        from assembly.studies.separation import separated
-
-        spent = solution.seconds
-        begin = perf_counter()
-        ways = [solution]
-        touching = float(settings[ALLOWED_OVERLAP]) * self.packed().scale
-        seat = seated(self, q, touching, interruption)
-        if seat is not None:
-            ways.append(self._solved(settings, seat, starts, interruption, q))
-            if not (ways[-1].success or self._objectives):
-                # Any pose does, if not the one with the least move.
-                ways.append(self._solved(settings, seat, starts, interruption))
-        apart = None if ways[-1].success else parted(self, q, touching, interruption)
-        if apart is not None:
-            ways.append(self._solved(settings, apart, starts, interruption, q))
-        if not any(way.success for way in ways):
-            ways += [
-                self._solved(settings, poses, starts, interruption, q)
-                for poses in separated(self, q, options, interruption)
-            ]
-        solution = min((way for way in ways if way.success), key=lambda way: way.objective, default=ways[-1])
-        solution.seconds = spent + perf_counter() - begin
-        return solution
+        return first_solve(self, self._given(q0), settings, starts, options, interruption)
 
     def _solved(
         self,

@@ -25,8 +25,8 @@ from assembly.proximity.manager.overlap import DEPTH, facets_cut, next_near, pro
 from assembly.proximity.manager.records import HANDED_OFF, LOST
 from assembly.proximity.manager.slots import give_up
 
-# What bodies have in common is thin at a pair where faces of both are nearer to its middle than this part of how deep it
-# is, and their normals are opposed, by the cosine between the one and what is opposed to the other.
+# What bodies have in common is thin at a pair where faces of both are nearer to its middle than this part of its depth,
+# and their normals are opposed, by the cosine between the one and what is opposed to the other.
 SHORT, OPPOSED = 0.1, 0.5
 # Depths that are rounding, and room for faces about a point.
 DEPTH_ROUNDING, FACES_ABOUT = 1e-9, 16

@@ -1,0 +1,108 @@
+"""A first solve of a scene with clearances: from the start itself, and from where bodies are put in other ways.
+
+Rows of clearances lead bodies that are in each other by a little. From a start at which bodies are stuck in each other,
+or joints far from holding, they may lead nowhere, and a solve begins where bodies are put together
+(`put_together.py`), seated (`seated.py`), parted (`parting.py`) or separated (`separation.py`) as well. Every way is
+measured from where the user's bodies were.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.solve.interruption import Interruption
+from assembly.solve.loop.settings import ALLOWED_OVERLAP
+from assembly.solve.solution import Solution
+from assembly.studies.parting import parted
+from assembly.studies.put_together import put_together
+from assembly.studies.seated import seated
+from assembly.studies.separation import separated
+
+if TYPE_CHECKING:
+    from assembly.assembly import Assembly
+
+__all__ = ["first_solve"]
+
+Array = NDArray[np.float64]
+
+
+def first_solve(
+    scene: Assembly,
+    q: Array,
+    settings: Array,
+    starts: Mapping[str, ArrayLike] | None,
+    options: dict[str, Any],
+    interruption: Interruption,
+) -> Solution:
+    """The solution of a scene with clearances from poses q (n, 7), with settings made of options."""
+    return _FirstSolve(scene, q, settings, starts, options, interruption).solution()
+
+
+@dataclass(frozen=True, eq=False)
+class _FirstSolve:
+    """What a first solve is asked for; see `first_solve`."""
+
+    scene: Assembly
+    q: Array
+    settings: Array
+    starts: Mapping[str, ArrayLike] | None
+    options: dict[str, Any]
+    interruption: Interruption
+
+    def solution(self) -> Solution:
+        """The solution."""
+        begin = perf_counter()
+        together = put_together(self.scene, self.q, self.starts, self.options, self.interruption)
+        ways = []
+        if together is not None and not together.keeps_topology:
+            ways.append(self._put_together(together.poses))
+        if not self._is_done(ways):
+            ways.append(self.scene._solved(self.settings, self.q, self.starts, self.interruption))
+            # What holds as it stands is not moved.
+            if not (ways[-1].success and (ways[-1].q == self.q).all()) and not self.interruption.is_over():
+                ways += self._from_apart(ways[-1].success)
+        if not self._is_done(ways) and together is not None and together.keeps_topology:
+            ways.append(self._put_together(together.poses))
+        solution = min((way for way in ways if way.success), key=lambda way: way.objective, default=ways[-1])
+        if len(ways) > 1:
+            solution.seconds = perf_counter() - begin
+        return solution
+
+    def _is_done(self, ways: list[Solution]) -> bool:
+        """Whether one of the ways ends at a solution, or there is no time for another one."""
+        return bool(ways) and (any(way.success for way in ways) or self.interruption.is_over())
+
+    def _from(self, poses: Array) -> Solution:
+        """A solve that begins at other poses than the user's."""
+        return self.scene._solved(self.settings, poses, self.starts, self.interruption, self.q)
+
+    def _put_together(self, poses: Array) -> Solution:
+        """The same, from where bodies were put together without clearances."""
+        solution = self._from(poses)
+        solution.put_together = True
+        return solution
+
+    def _from_apart(self, is_solved: bool) -> list[Solution]:
+        """Solves from where bodies that are stuck in each other fit, or are parted; fewer where there is a solution."""
+        touching = float(self.settings[ALLOWED_OVERLAP]) * self.scene.packed().scale
+        ways = []
+        seat = seated(self.scene, self.q, touching, self.interruption)
+        if seat is not None:
+            ways.append(self._from(seat))
+            if not (is_solved or ways[-1].success or self.scene.objectives):
+                # Any pose does, if not the one with the least move.
+                ways.append(self.scene._solved(self.settings, seat, self.starts, self.interruption))
+        if self._is_done(ways):
+            return ways
+        apart = parted(self.scene, self.q, touching, self.interruption)
+        if apart is not None:
+            ways.append(self._from(apart))
+        if not is_solved and not self._is_done(ways):
+            ways += [self._from(poses) for poses in separated(self.scene, self.q, self.options, self.interruption)]
+        return ways
