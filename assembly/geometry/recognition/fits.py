@@ -165,6 +165,8 @@ def _torus(points: Array, normals: Array, loose: float) -> Fit | None:
     along = (points - foot) @ axis
     beside = points - foot - along[:, None] * axis
     radii = np.linalg.norm(beside, axis=1)
+    if not radii.min() > 0.0:
+        return None
     outward = (normals * beside).sum(axis=1) / radii
     center, radius = _through(np.stack([radii, along], axis=1), np.stack([outward, normals @ axis], axis=1))
     return Fit("torus", foot + center[1] * axis, frame_along(axis), np.array([center[0], abs(radius)]))

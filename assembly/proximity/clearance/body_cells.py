@@ -14,6 +14,7 @@ from assembly.geometry.splines.evaluate import spline_curve_at, surface_at
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.topology import Topology
 from assembly.proximity.clearance.bores import Bores, bores_of
+from assembly.proximity.clearance.boxes import ROUNDED_UP, Groups, boxes_around
 from assembly.proximity.clearance.cells import CellTable, cells_of
 from assembly.proximity.clearance.halve import place_cells
 from assembly.proximity.clearance.records import (
@@ -37,7 +38,6 @@ Cells = list[CellTable | WireCells]
 Table = NDArray[np.int64]
 # How near first cells are to faces, in parts of the body's size, and how much a boundary turns along a chord [rad].
 TOLERANCE, ANGLE = 8e-3, 0.5
-ROUNDED_UP = 1.0 + 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,23 +220,6 @@ def _first_cells(tables: Cells, curves: list[Table]) -> tuple[Table, Array]:
     return links, nodes
 
 
-def _box(points: Array, thick: Array) -> tuple[Array, Array, Array, float]:
-    """Center, axes, half widths and radius of a box around balls."""
-    middle = points.mean(axis=0)
-    principal = np.linalg.eigh(np.cov((points - middle).T))[1].T[::-1]
-    if np.linalg.det(principal) < 0.0:
-        principal = principal * np.array([[1.0], [1.0], [-1.0]])
-    boxes = []
-    for axes in (principal, np.eye(3)):
-        heights = points @ axes.T
-        low, high = (heights - thick[:, None]).min(axis=0), (heights + thick[:, None]).max(axis=0)
-        half = 0.5 * (high - low)
-        boxes.append((float((half + 0.05 * half.max()).prod()), 0.5 * (low + high) @ axes, axes, half))
-    _, center, axes, half = boxes[1] if boxes[1][0] < 1.02 * boxes[0][0] else boxes[0]
-    radius = min(float((np.linalg.norm(points - center, axis=1) + thick).max()), float(np.linalg.norm(half)))
-    return center, axes, half * ROUNDED_UP, radius * ROUNDED_UP
-
-
 class _Builder:
     """Makes the nodes above cells: first halves of a body's parts of faces, then halves of a part's cells."""
 
@@ -252,26 +235,30 @@ class _Builder:
         self.whole = np.bincount(self.part, minlength=len(rounds))
         self.links = np.zeros((2 * count - 1, LINKS_SIZE), dtype=np.int64)
         self.nodes = np.zeros((2 * count - 1, NODE_SIZE))
+        self.child = np.full(2 * count - 1, NONE)
         self.first = np.full(count, NONE)
         self.used = 1
 
     def build(self) -> None:
         """All nodes, the root first."""
         groups = [np.flatnonzero(self.part == k) for k in range(len(self.rounds))]
-        waiting = [(groups, 0)]
+        waiting, boxed = [(groups, 0)], []
         while waiting:
             groups, k = waiting.pop()
             items = np.concatenate(groups)
             if len(items) == 1:
                 self.first[items[0]] = k
-                self.links[k], self.nodes[k] = self.cell_links[items[0]], self.cell_nodes[items[0]]
-                self._write_bore(items, k, rows_of(LINKS, self.links[k : k + 1])[0].form)
                 continue
-            self._write(items, k)
+            found = self._hull_of(items)
+            if found is None:
+                boxed.append((k, items))
+            else:
+                _write_round(rows_of(NODE, self.nodes[k : k + 1])[0], found)
             child, self.used = self.used, self.used + 2
-            rows_of(LINKS, self.links[k : k + 1]).child = child
+            self.child[k] = child
             one, other = self._halves(groups, k)
             waiting += [(other, child + 1), (one, child)]
+        self._write(boxed)
 
     def _halves(self, groups: list[Table], k: int) -> tuple[list[Table], list[Table]]:
         if len(groups) > 1:
@@ -281,41 +268,46 @@ class _Builder:
             return [groups[i] for i in order[:half]], [groups[i] for i in order[half:]]
         (items,) = groups
         centers = self.cells.center[items]
-        along = np.linalg.svd(centers - centers.mean(axis=0), full_matrices=True)[2][0]
+        along = np.linalg.svd(centers - centers.mean(axis=0), full_matrices=False)[2][0]
         order = items[np.argsort(centers @ along, kind="stable")]
         return [order[: len(order) // 2]], [order[len(order) // 2 :]]
 
-    def _write(self, items: Table, k: int) -> None:
-        """Box around cells, or what is round."""
-        link, node = rows_of(LINKS, self.links[k : k + 1])[0], rows_of(NODE, self.nodes[k : k + 1])[0]
-        link.face = NONE
+    def _hull_of(self, items: Table) -> Round | None:
+        """What a node's cells, if they are all of one part, lie on from outside."""
         part = self.part[items[0]]
-        is_part = (self.part[items] == part).all() and len(items) == self.whole[part]
-        found = self.rounds[part] if is_part else None
-        if found is not None and found.outward:
-            _write_round(node, found)
-            return
-        points = self.cells.corner[items].reshape(-1, 3)
-        thick = np.repeat(self.cells.rho[items] + self.cells.disc[items], 4)
-        node.center, node.axes, node.half, node.radius = _box(points, thick)
-        self._write_bore(items, k)
+        found = self.rounds[part]
+        is_part = len(items) == self.whole[part] and bool((self.part[items] == part).all())
+        return found if is_part and found is not None and found.outward else None
 
-    def _write_bore(self, items: Table, k: int, form: int | None = None) -> None:
-        """The bore that a node is outside of; that of a cell has the direction of its ruling."""
-        if self.bores is None or form == WIRE:
-            return
-        node = rows_of(NODE, self.nodes[k : k + 1])[0]
-        parts = np.unique(self.part[items])
-        if form is None:
-            found = self.bores.of_node(parts, np.array(node.center)[None])
-        else:
-            found = self.bores.of_node(parts, np.array(node.corner[:3]), np.array(node.ruling))
-        if found is None:
-            return
-        b, node.bore = found
-        node.spine = self.bores.center[b]
-        if form is None:
-            node.ruling = self.bores.axis[b]
+    def _write(self, boxed: list[tuple[int, Table]]) -> None:
+        """Links, cells, boxes around cells, and the bores that all these are outside of."""
+        links, nodes = rows_of(LINKS, self.links), rows_of(NODE, self.nodes)
+        links.face, links.child = NONE, self.child
+        self.links[self.first], self.nodes[self.first] = self.cell_links, self.cell_nodes
+        if boxed:
+            groups = Groups.of([items for _, items in boxed])
+            rows = np.array([k for k, _ in boxed])
+            boxes = boxes_around(self.cells.corner, self.cells.rho + self.cells.disc, groups)
+            nodes.center[rows], nodes.axes[rows], nodes.half[rows], nodes.radius[rows] = boxes
+            if self.bores is not None:
+                parts = groups._replace(members=self.part[groups.members])
+                self._write_bores(rows, self.bores.nearest(parts, boxes.center[:, None]))
+        if self.bores is not None:
+            # A cell has the direction of its ruling already; of a wire it is none.
+            cells = np.flatnonzero(rows_of(LINKS, self.cell_links).form != WIRE)
+            parts = Groups(self.part[cells], np.arange(len(cells)))
+            corners, rulings = self.cells.corner[cells, :3], self.cells.ruling[cells]
+            self._write_bores(self.first[cells], self.bores.nearest(parts, corners, rulings), turned=False)
+
+    def _write_bores(self, rows: Table, found: tuple[Table, Array], turned: bool = True) -> None:
+        """Write bores into nodes, and their directions unless these have them."""
+        assert self.bores is not None
+        bore, radius = found
+        rows, bore, radius = rows[bore >= 0], bore[bore >= 0], radius[bore >= 0]
+        nodes = rows_of(NODE, self.nodes)
+        nodes.bore[rows], nodes.spine[rows] = radius, self.bores.center[bore]
+        if turned:
+            nodes.ruling[rows] = self.bores.axis[bore]
 
 
 def _write_round(node: np.record, found: Round) -> None:

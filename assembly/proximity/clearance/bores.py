@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.proximity.clearance.boxes import Groups
 from assembly.proximity.clearance.round_faces import Round
 
 __all__ = ["Bores", "bores_of", "distances_of_parts"]
@@ -47,33 +48,35 @@ class Bores:
     own: NDArray[np.bool_]
     size: float
 
-    def of_node(self, parts: Table, points: Array, ruling: Array | None = None) -> tuple[int, float] | None:
-        """The nearest bore that a node of some parts is outside of, and its radius.
+    def nearest(self, groups: Groups, points: Array, rulings: Array | None = None) -> tuple[Table, Array]:
+        """The nearest bore that nodes are outside of, or -1, and its radius.
 
         Parameters
         ----------
-        parts : (k,) of int
-        points : (m, 3)
-            The center of the node, or corners of a cell. The second nearest of these counts: a cell is of the bore of
+        groups : Groups
+            Numbers of the parts that each node has cells of.
+        points : (n, m, 3)
+            The center of each node, or corners of a cell. The second nearest of these counts: a cell is of the bore of
             which it has a chord, though it may have a corner at another one.
-        ruling : (3,), optional
-            The direction of a cell that cannot have another axis than this.
+        rulings : (n, 3), optional
+            Directions of cells that cannot have another axis than these.
         """
-        least = self.least[parts].min(axis=0)
-        usable = self.own[parts].any(axis=0)
-        if ruling is not None:
-            # The same axis along the ruling is so far off over the body.
-            along = self.axis.any(axis=1) == ruling.any()
-            least = least - 2.0 * self.size * np.linalg.norm(np.cross(self.axis, ruling), axis=1)
-            usable &= along
-        usable &= least > 0.0
-        if not usable.any():
-            return None
-        d = points[:, None] - self.center
-        d = d - (d * self.axis).sum(axis=2, keepdims=True) * self.axis
-        far = np.sort(np.linalg.norm(d, axis=2), axis=0)[min(1, len(points) - 1)]
-        k = int(np.argmin(np.where(usable, far / np.maximum(least, SAME * self.size), np.inf)))
-        return k, float(least[k])
+        n = len(groups.starts)
+        best, bore, radius = np.full(n, np.inf), np.full(n, -1), np.zeros(n)
+        for b, (center, axis) in enumerate(zip(self.center, self.axis, strict=True)):
+            least = np.minimum.reduceat(self.least[groups.members, b], groups.starts)
+            usable = np.logical_or.reduceat(self.own[groups.members, b], groups.starts)
+            if rulings is not None:
+                # The same axis along the ruling is so far off over the body.
+                least = least - 2.0 * self.size * np.linalg.norm(np.cross(axis, rulings), axis=1)
+                usable &= rulings.any(axis=1) == axis.any()
+            off = points - center
+            off = off - (off @ axis)[..., None] * axis
+            far = np.sort(np.linalg.norm(off, axis=2), axis=1)[:, min(1, points.shape[1] - 1)]
+            score = np.where(usable & (least > 0.0), far / np.maximum(least, SAME * self.size), np.inf)
+            better = score < best
+            best[better], bore[better], radius[better] = score[better], b, least[better]
+        return bore, radius
 
 
 def bores_of(

@@ -38,6 +38,7 @@ ROUNDING = 4e-15
 # How far a face that counts as swept by a curve across straight lines may be from that, in parts of its largest
 # coordinate; it is added to the radius.
 EXACT = 1e-13
+ROUNDED_UP = 1.0 + 1e-14
 # Rounds in which a grid of rectangles becomes finer.
 ROUNDS = 12
 
@@ -183,16 +184,11 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
                 np.maximum(low[:, d], surface.domain[d][0]),
                 np.minimum(high[:, d], surface.domain[d][1]),
             )
-    first, second = surface_bounds(surface, low, high)
-    if (
-        form == FLAT
-        and np.ptp(surface.weights) == 0.0
-        and max(surface.degree) == 1
-        and surface.control_points.shape[:2] == (2, 2)
-    ):
-        net = surface.control_points
-        if np.abs(net[0, 0] - net[1, 0] - net[0, 1] + net[1, 1]).max() <= EXACT * np.abs(net).max():
-            second = np.zeros_like(second)
+    speeds = _even_speeds(surface) if form == FLAT else None
+    if speeds is None:
+        first, second = surface_bounds(surface, low, high)
+    else:
+        first, second = np.tile(speeds, (n, 1)), np.zeros((n, 3))
     far = float(np.abs(surface.control_points).max())
     return CellTable(
         uv,
@@ -206,6 +202,18 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
         form,
         ruling,
     )
+
+
+def _even_speeds(surface: NurbsSurface) -> Array | None:
+    """|S_u| and |S_v| of a parallelogram, bounded from above; None of what is none."""
+    net = surface.control_points
+    if net.shape[:2] != (2, 2) or np.ptp(surface.weights) != 0.0:
+        return None
+    if np.abs(net[0, 0] - net[1, 0] - net[0, 1] + net[1, 1]).max() > EXACT * np.abs(net).max():
+        return None
+    lengths = [np.linalg.norm(np.diff(net, axis=d), axis=-1).max() for d in (0, 1)]
+    speeds: Array = np.array(lengths) / np.ptp(surface.domain, axis=1) * ROUNDED_UP
+    return speeds
 
 
 def _displaced(surface: NurbsSurface, ends: Array, true: Array) -> Array:

@@ -386,6 +386,22 @@ def test_other_ways_to_write_a_plane():
     assert isinstance(form, Plane) and form.point[2] == pytest.approx(2.0, abs=1e-15)
 
 
+def test_surfaces_that_are_hardly_any(cases):
+    """Lines, points, edges that are one point, nets that fold back: an answer that its samples agree with, or none."""
+    rng = np.random.default_rng(13)
+    for _ in range(cases(200, 5000)):
+        p, q = (int(n) for n in rng.integers(1, 4, 2))
+        net = rng.integers(-1, 2, (p + 1, q + 1, 3)) * rng.choice([0.0, 1.0], 3) * 10.0 ** rng.integers(-30, 31)
+        if rng.random() < 0.5:
+            net[0] = net[0, 0]
+        weights = rng.choice([0.5, 1.0, 2.0], net.shape[:2])
+        surface = NurbsSurface(net, (bezier_knots(p + 1), bezier_knots(q + 1)), (p, q), weights)
+        form = elementary_form(surface)
+        if isinstance(form, (Plane, Cylinder, Cone, Sphere, Torus)):
+            largest = np.abs(net).max()
+            assert distances(form, samples(surface, 11)).max() <= form.deviation + EVALUATED * largest
+
+
 def test_it_is_kept_with_the_surface():
     surface = SHAPES.torus(1.0, 0.2)
     assert elementary_form(surface) is elementary_form(surface)
