@@ -4,6 +4,9 @@ Where an edge is equally near to a face all along, as two flush plates are along
 many extrema as it has starts. The gap is affine along a straight edge: its ends are corners, which have rows of their
 own, and what is between them is implied. Of a curved edge points are held that stay where they are on it, one for each
 40 degrees or so by which it turns; where it is tilted, the extremum is isolated, and a row beside them.
+
+A ball in a socket of its radius has no extremum at all, or any point is one. There points of the hollow face are held,
+as far apart in their normals as those of an edge.
 """
 
 from __future__ import annotations
@@ -11,10 +14,12 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import cross, dot
+from assembly.geometry.splines.evaluate import surface_at, surface_point
+from assembly.geometry.vec import cross, dot, matvec, scale
 from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import feature_at, feature_kind
 from assembly.proximity.brep.records import EDGE, FACE
+from assembly.proximity.bvh.tree import three_of
 from assembly.proximity.extrema.feature_jets import edge_jet, edge_limits
 from assembly.proximity.features.holding import HELD_F, HELD_G, POINT
 from assembly.proximity.features.solid_contact import pair_parameters
@@ -25,6 +30,8 @@ from assembly.proximity.manager.near_singular_points import features_of, is_loos
 # Cosine of the angle by which an edge turns from one of its points that are held to the next; a part of an edge is
 # straight that turns by less than this.
 NEXT, STRAIGHT = 0.75, 0.02
+# A bulge fills a hollow whose curvature is off by no more than this part.
+ALIKE_BENT = 0.05
 # Rounding of gaps.
 SLACK = 1e-9
 
@@ -65,6 +72,46 @@ def width_of(posed, codes, side):
     """The width of the parameter of an edge."""
     low, high, _endless = edge_limits(posed.store, feature_at(posed.store.table, posed.shells[side], codes[side]))
     return high - low
+
+
+@kernel(inner=True)
+def bulge_at(posed, side, code, u, v):
+    """Gaussian curvature of a face of one body, above zero where it is a bulge or a hollow, below where it is a hollow.
+
+    A saddle counts as flat. And its outward normal, in the axes of f.
+    """
+    store = posed.store
+    surface = feature_at(store.table, posed.shells[side], code)
+    _p, su, sv, suu, suv, svv = surface_point(store.table, store.pool, surface, u, v)
+    sign = float(surface_at(store.table, surface).sign)
+    n = scale(sign, unit(cross(su, sv)))
+    e, f, g = dot(su, su), dot(su, sv), dot(sv, sv)
+    l, m, k = dot(n, suu), dot(n, suv), dot(n, svv)
+    area = e * g - f * f
+    curvature = max(l * k - m * m, 0.0) / area if area > 0.0 else 0.0
+    if side == 1:
+        n = matvec(posed.pose.rotation, n)
+    # Towards the outside a hollow bends.
+    return (-curvature if l + k > 0.0 else curvature), n
+
+
+@kernel(inner=True)
+def next_in_socket(posed, codes, x, extrema):
+    """Of which of two faces a point is to be held, where one is a hollow that the other fills: HELD_F, HELD_G or 0.
+
+    So it is where the normal has turned far from those of all points that are known between the two.
+    """
+    bulge_f, n_f = bulge_at(posed, 0, codes[0], x[0], x[1])
+    bulge_g, n_g = bulge_at(posed, 1, codes[1], x[2], x[3])
+    if not bulge_f * bulge_g < 0.0 or abs(bulge_f + bulge_g) > ALIKE_BENT * abs(bulge_f):
+        return 0.0
+    n = n_f if bulge_f < 0.0 else scale(-1.0, n_g)
+    for k in range(extrema.count[0]):
+        extremum = extremum_at(extrema.rows, k)
+        if extremum.code_f == codes[0] and extremum.code_g == codes[1] and extremum.origin != USELESS:
+            if dot(n, three_of(extremum.normal)) > NEXT:
+                return 0.0
+    return HELD_F if bulge_f < 0.0 else HELD_G
 
 
 @kernel(inner=True)

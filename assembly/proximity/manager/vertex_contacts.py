@@ -26,6 +26,7 @@ from assembly.proximity.manager.continua import (
     is_next,
     is_straight,
     kinds_of,
+    next_in_socket,
 )
 from assembly.proximity.manager.extrema import NEW, NOTHING, add_extremum, extremum_at, is_list_full, solids_extremum
 from assembly.proximity.manager.near_singular import into_near_singular
@@ -133,6 +134,9 @@ def add_vertex_contacts(posed, span, merge_radius, stack, candidates, extrema):
         if is_of_faces(posed, codes):
             half = (f.half[0], f.half[1], g.half[0], g.half[1])
             add_near_singular(posed, codes, start, half, span, merge_radius, extrema)
+            holds = next_in_socket(posed, codes, start, extrema)
+            if holds != 0.0 and not is_list_full(extrema):
+                add_vertex_contact(posed, codes, start, span, merge_radius, extrema, holds)
         if not is_vertex_contact(posed, codes):
             continue
         kinds = kinds_of(posed, codes)
