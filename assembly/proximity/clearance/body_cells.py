@@ -202,10 +202,11 @@ def _first_cells(tables: Cells, curves: list[Table]) -> tuple[Table, Array]:
             link.rim = NONE
             node.corner, node.spine, node.first, node.pad = table.corner, table.center, table.first, table.pad
             continue
-        link.rim = np.where(table.rim < 0, NONE, np.append(places, NONE)[table.rim])
+        rims = table.rims
+        link.rim = np.where(rims.curve == NONE, NONE, np.append(places, NONE)[rims.curve])
         node.uv, node.second, node.first, node.pad = table.uv, table.second, table.first, table.pad
-        link.hollow = table.hollow
-        node.rim_t, node.rim_second, node.ruling = table.rim_t, table.rim_second, table.ruling
+        link.hollow = rims.hollow
+        node.rim_t, node.rim_second, node.ruling = rims.t, rims.second, table.ruling
     return links, nodes
 
 

@@ -11,11 +11,14 @@ needs new points alone.
 
 Where an edge of a triangle is a chord of a boundary curve c, the face may go on beyond it, by no more than (d_u, d_v) =
 (dt^2 / 8) (max |c_u''|, max |c_v''|) in (u, v), which is M_u d_u + M_v d_v in space.
+
+Where the face ends before a chord, what lies between is of that one triangle (`rims.py`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +26,9 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.face import Face
 from assembly.geometry.meshing.polygon import trimmed_cells
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.proximity.clearance.derivative_nets import bends_away, curve_bounds, surface_bounds
+from assembly.proximity.clearance.derivative_nets import surface_bounds
 from assembly.proximity.clearance.records import FLAT, ROUNDED, RULED
+from assembly.proximity.clearance.rims import Rims, no_rims, rims_of, spilling
 
 __all__ = ["CellTable", "cells_of"]
 
@@ -50,12 +54,7 @@ class CellTable:
         Parameters of the corners; of a triangle the last two are the same.
     second, first : (n, 3), (n, 2)
         Bounds of |S_uu|, |S_uv|, |S_vv| and of |S_u|, |S_v|.
-    rim : (n, 3)
-        The boundary curve that edge k (corner k to k + 1) is a chord of, or -1.
-    rim_t, rim_second : (n, 3, 2)
-        Its parameters there, and bounds of |c_u''|, |c_v''|.
-    hollow : (n, 3)
-        Whether that curve bends away from the material.
+    rims : Rims
     pad : (n,)
         What a radius is in any case.
     form : int
@@ -67,10 +66,7 @@ class CellTable:
     uv: Array
     second: Array
     first: Array
-    rim: Indices
-    rim_t: Array
-    rim_second: Array
-    hollow: NDArray[np.bool_]
+    rims: Rims
     pad: Array
     form: int
     ruling: Array
@@ -149,25 +145,13 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
     surface = face.surface
     form, ruling, off = _sweep(surface)
     if face.boundary:
-        cells = trimmed_cells(face, tolerance, angle)
-        uv, number = cells.parameters, cells.segments
-        uv = np.concatenate([uv, uv[:, 2:]], axis=1)
+        cells = trimmed_cells(face, tolerance, angle, partial(spilling, face))
+        uv = np.concatenate([cells.parameters, cells.parameters[:, 2:]], axis=1)
+        rims = rims_of(face, cells)
     else:
         uv = _grid(surface, tolerance)
-        number = np.full((len(uv), 3), -1)
-    n = len(uv)
-    rim, hollow = np.full((n, 3), -1), np.zeros((n, 3), dtype=bool)
-    rim_t, rim_second, beside = np.zeros((n, 3, 2)), np.zeros((n, 3, 2)), np.zeros((n, 2))
-    if face.boundary:
-        border = cells.border
-        for c in np.unique(border.curve[border.curve >= 0]):
-            curve = face.boundary[c]
-            row, k = np.nonzero((number >= 0) & (border.curve[np.maximum(number, 0)] == c))
-            t = border.t[number[row, k]]
-            rim[row, k], rim_t[row, k] = c, t
-            rim_second[row, k], hollow[row, k] = curve_bounds(curve, t), bends_away(curve, t)
-            np.maximum.at(beside, row, _displaced(surface, border.ends[number[row, k]], curve.evaluate(t.ravel())))
-    reach = (0.125 * np.diff(rim_t, axis=2) ** 2 * rim_second).max(axis=1) + beside
+        rims = no_rims(len(uv))
+    reach = rims.sag.max(axis=1) + rims.beside
     low, high = uv.min(axis=1) - reach, uv.max(axis=1) + reach
     for d in range(2):
         if not surface.closed[d]:
@@ -186,29 +170,9 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
         if np.abs(net[0, 0] - net[1, 0] - net[0, 1] + net[1, 1]).max() <= EXACT * np.abs(net).max():
             second = np.zeros_like(second)
     far = float(np.abs(surface.control_points).max())
-    return CellTable(
-        uv,
-        second,
-        first,
-        rim,
-        rim_t,
-        rim_second,
-        hollow,
-        ROUNDING * far + off + (first * beside).sum(axis=1),
-        form,
-        ruling,
-    )
-
-
-def _displaced(surface: NurbsSurface, ends: Array, true: Array) -> Array:
-    """How far ends of chords (n, 2, 2) are from points (2 n, 2) of their curves, modulo periods: the larger, (n, 2).
-
-    Ends may have been moved onto a line of the triangulation's grid.
-    """
-    apart = ends - true.reshape(ends.shape)
-    for d in range(2):
-        if surface.closed[d]:
-            period = float(np.ptp(surface.domain[d]))
-            apart[..., d] -= period * np.round(apart[..., d] / period)
-    largest: Array = np.abs(apart).max(axis=1)
-    return largest
+    pad = ROUNDING * far + off + (first * rims.beside).sum(axis=1)
+    wrong = rims.spills(uv[:, :3])
+    if wrong.any():
+        # What is cut off there is of other triangles: no farther from their borders than curves from chords.
+        pad += (first[:, None] * rims.sag).sum(axis=2)[wrong].max()
+    return CellTable(uv, second, first, rims, pad, form, ruling)

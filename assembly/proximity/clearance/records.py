@@ -46,7 +46,7 @@ LINKS = record_dtype(
     face=1,  # of a cell, the number of its face among all that are packed; else -1
     form=1,  # FLAT, RULED, ROUNDED, WIRE
     rim=3,  # of an edge that is a chord of a boundary curve, the record of that; else -1
-    hollow=3,  # 1: that curve bends away from the material, which is nowhere beyond the chord
+    hollow=3,  # 1: that curve bends away from the material, which is nowhere beyond the chord; -1: towards it; 0: else
 )
 links_at = record_view(LINKS)
 LINKS_SIZE = size_of(LINKS)
