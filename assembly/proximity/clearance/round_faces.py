@@ -21,6 +21,8 @@ __all__ = ["Round", "round_of", "round_parts"]
 Array = NDArray[np.float64]
 # How far off a face may be from what it is recognized as, in parts of its size. Bounds are those of the face itself.
 EXACT = 1e-12
+# The same of cylinders and balls, some of which files have to 1e-11.
+NEARLY = 1e-10
 # A face around less of a cylinder than about half is no round body: both extents across the axis, over the radius.
 HALF = 0.95
 # A ball of more than this part of a face's size is no ball that the face goes around.
@@ -91,10 +93,10 @@ def _radius(bounds: tuple[float, float], outward: bool, far: float) -> float:
 def _ball(face: Face, points: Array, pieces: Array, size: float) -> Round | None:
     center, radius = _sphere(points)
     off = np.abs(np.linalg.norm(points - center, axis=1) - radius).max()
-    if not 0.0 < radius < LARGEST_BALL * size or off > EXACT * size:
+    if not 0.0 < radius < LARGEST_BALL * size or off > NEARLY * size:
         return None
     bounds = _squares(pieces, center, np.eye(3))
-    if max(np.sqrt(bounds[1]) - radius, radius - np.sqrt(max(bounds[0], 0.0))) > EXACT * size:
+    if max(np.sqrt(bounds[1]) - radius, radius - np.sqrt(max(bounds[0], 0.0))) > NEARLY * size:
         return None
     outward = _is_outward(face, center, np.eye(3))
     far = float(np.abs(points).max())
@@ -119,10 +121,10 @@ def _cylinder(face: Face, points: Array, pieces: Array, size: float) -> Round | 
         middle, radius = _sphere(flat)
         center = basis @ middle
         off = np.abs(np.linalg.norm((points - center) @ project, axis=1) - radius).max()
-        if off > EXACT * size or not radius > 0.0:
+        if off > NEARLY * size or not radius > 0.0:
             continue
         bounds = _squares(pieces, center, project)
-        if max(np.sqrt(bounds[1]) - radius, radius - np.sqrt(max(bounds[0], 0.0))) > EXACT * size:
+        if max(np.sqrt(bounds[1]) - radius, radius - np.sqrt(max(bounds[0], 0.0))) > NEARLY * size:
             continue
         outward = _is_outward(face, center, project)
         if outward and np.ptp(flat, axis=0).min() < HALF * radius:

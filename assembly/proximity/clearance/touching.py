@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,13 +17,73 @@ from assembly.proximity.clearance.parting import least_move
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.records import CELL_FACE, FLAT, GUIDES, LINKS, NODE, NONE
 
-__all__ = ["conforms", "left_open", "move_apart"]
+__all__ = ["conforms", "fills_bore", "left_open", "move_apart", "off_flush_faces", "recognized"]
 
 Array = NDArray[np.float64]
 # Contacts are opened, or may close, to the first of these parts of what a body may be moved that it can be moved to.
 OPENED = (0.25, 0.05, 0.01)
 # Pairs of nodes that were left open, of which directions to open them are taken at most.
 MOST_OPENED = 2000
+# What is round and shorter than this part of its radius is a disc.
+SHORT = 1e-9
+
+
+class Recognized(NamedTuple):
+    """What is recognized of a body.
+
+    Attributes
+    ----------
+    flat : (f,) of int
+        Its flat faces.
+    points, normals : (f, 3)
+        Of these, normals outward.
+    centers, radii : tuple of arrays
+        Balls around the first cells of each of these.
+    walls : recarray of NODE
+        Walls of bores.
+    ends : (r, 2, 3)
+        Of its cylinders and balls those of the axis, or the center twice.
+    round_radii : (r,)
+    """
+
+    flat: NDArray[np.int64]
+    points: Array
+    normals: Array
+    centers: tuple[Array, ...]
+    radii: tuple[Array, ...]
+    walls: np.recarray
+    ends: Array
+    round_radii: Array
+
+
+@lru_cache(maxsize=256)
+def recognized(cells: BodyCells) -> Recognized:
+    """What is recognized of a body's faces."""
+    links, nodes = rows_of(LINKS, cells.links)[cells.first], rows_of(NODE, cells.nodes)[cells.first]
+    flat = np.flatnonzero(links.form == FLAT)
+    owner, first = np.unique(links.face[flat], return_index=True)
+    some = flat[first]
+    # The normal by the corners has the sense of S_u x S_v, that of the face is exact.
+    senses = (
+        np.sign((nodes.axes[some, 2] * nodes.ruling[some]).sum(axis=1)) * rows_of(CELL_FACE, cells.faces).sign[owner]
+    )
+    of_face = [flat[links.face[flat] == face] for face in owner]
+    every = rows_of(NODE, cells.nodes)
+    # Of the hull of a torus both are above zero; a disc has no length.
+    is_round = (rows_of(LINKS, cells.links).face == NONE) & ((every.disc > 0.0) != (every.rho > 0.0))
+    rounds = every[is_round & ((every.disc == 0.0) | (every.half[:, 0] > SHORT * every.disc))]
+    along = (rounds.half[:, 0, None] * rounds.axes[:, 0])[:, None]
+    ends = rounds.center[:, None] + np.array([[[-1.0], [1.0]]]) * along
+    return Recognized(
+        owner,
+        nodes.corner[some, 0],
+        nodes.ruling[some] * senses[:, None],
+        tuple(nodes.center[rows] for rows in of_face),
+        tuple(nodes.radius[rows] for rows in of_face),
+        every[every.bore > 0.0],
+        ends,
+        rounds.disc + rounds.rho,
+    )
 
 
 def conforms(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
@@ -28,51 +91,64 @@ def conforms(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
 
     By what is recognized of the faces; which parts of them they have is not asked.
     """
-    a, b = proof.cells_of_both(k)
+    return fills_bore(proof, k, q, touching) or bool(len(_flush(proof, k, q, touching)[0]))
+
+
+def fills_bore(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
+    """Whether cylinders or balls of one of the bodies of pair k are in bores of their radius in the other one."""
+    a, b = map(recognized, proof.cells_of_both(k))
     turn, shift = proof.relative(k, q)
-    return (
-        _are_flush(a, b, (turn, shift), touching)
-        or _is_in_bore(a, b, (turn, shift), touching)
-        or _is_in_bore(b, a, (turn.T, -turn.T @ shift), touching)
-    )
+    return _is_in_bore(a, b, (turn, shift), touching) or _is_in_bore(b, a, (turn.T, -turn.T @ shift), touching)
 
 
-def _is_in_bore(outer: BodyCells, inner: BodyCells, pose: tuple[Array, Array], touching: float) -> bool:
+def _is_in_bore(outer: Recognized, inner: Recognized, pose: tuple[Array, Array], touching: float) -> bool:
     """Whether a cylinder or a ball of the inner body, at a pose seen from the outer one, fills a bore of its radius."""
     turn, shift = pose
-    walls, rounds = rows_of(NODE, outer.nodes), rows_of(NODE, inner.nodes)
-    walls = walls[walls.bore > 0.0]
-    # Of the hull of a torus both are above zero.
-    rounds = rounds[(rows_of(LINKS, inner.links).face == NONE) & ((rounds.disc > 0.0) != (rounds.rho > 0.0))]
-    for wall in walls:
-        for body in rounds[np.abs(rounds.disc + rounds.rho - wall.bore) <= touching]:
-            reach = body.half[0] * body.axes[0]
-            ends = turn @ (body.center + np.outer((-1.0, 1.0), reach)).T + (shift - wall.spine)[:, None]
-            off = ends - np.outer(wall.ruling, wall.ruling @ ends)
-            is_disc = body.disc > 0.0 and body.half[0] <= touching
-            if not is_disc and np.linalg.norm(off, axis=0).max() <= touching:
-                return True
-    return False
+    fits = np.abs(inner.round_radii - outer.walls.bore[:, None]) <= touching
+    if not fits.any():
+        return False
+    wall, body = np.nonzero(fits)
+    ends = inner.ends[body] @ turn.T + shift - outer.walls.spine[wall][:, None]
+    axes = outer.walls.ruling[wall][:, None]
+    off = ends - (ends * axes).sum(axis=2, keepdims=True) * axes
+    return bool((np.linalg.norm(off, axis=2).max(axis=1) <= touching).any())
 
 
-def _are_flush(a: BodyCells, b: BodyCells, pose: tuple[Array, Array], touching: float) -> bool:
-    """Whether a flat face of b, at a pose seen from a, is in the plane of one of a that looks the other way."""
-    (points_a, normals_a), (points_b, normals_b) = _planes(a), _planes(b)
-    turn, shift = pose
-    points_b, normals_b = points_b @ turn.T + shift, normals_b @ turn.T
-    opposed = np.linalg.norm(normals_a[:, None] + normals_b, axis=2) * max(a.size, b.size) <= touching
-    apart = np.abs(((points_b - points_a[:, None]) * normals_a[:, None]).sum(axis=2))
-    return bool((opposed & (apart <= touching)).any())
+def _flush(proof: ClearanceProof, k: int, q: Array, touching: float) -> tuple[Array, Array]:
+    """Where flat faces of pair k lie on each other: normals of those of the first body, in its axes, and the gaps."""
+    a, b = map(recognized, proof.cells_of_both(k))
+    turn, shift = proof.relative(k, q)
+    opposed = np.linalg.norm(a.normals[:, None] + b.normals @ turn.T, axis=2) * proof.size(k) <= touching
+    i, j = np.nonzero(opposed)
+    gaps = ((b.points[j] @ turn.T + shift - a.points[i]) * a.normals[i]).sum(axis=1)
+    found = [
+        row
+        for row in np.flatnonzero(np.abs(gaps) <= touching).tolist()
+        if _are_beside(
+            (a.centers[i[row]], a.radii[i[row]]), (b.centers[j[row]] @ turn.T + shift, b.radii[j[row]]), touching
+        )
+    ]
+    return a.normals[i[found]], gaps[found]
 
 
-def _planes(cells: BodyCells) -> tuple[Array, Array]:
-    """A point and the outward normal of the first cells of flat faces."""
-    links, nodes = rows_of(LINKS, cells.links)[cells.first], rows_of(NODE, cells.nodes)[cells.first]
-    flat = np.flatnonzero(links.form == FLAT)
-    signs = rows_of(CELL_FACE, cells.faces).sign[links.face[flat]]
-    # The normal by the corners has the sense of S_u x S_v, that of the face is exact.
-    senses = np.sign((nodes.axes[flat, 2] * nodes.ruling[flat]).sum(axis=1)) * signs
-    return nodes.corner[flat, 0], nodes.ruling[flat] * senses[:, None]
+def _are_beside(a: tuple[Array, Array], b: tuple[Array, Array], touching: float) -> bool:
+    """Whether any ball of one set is as near to one of the other set as what touches."""
+    apart = np.linalg.norm(a[0][:, None] - b[0], axis=2)
+    return bool((apart <= a[1][:, None] + b[1] + touching).any())
+
+
+def off_flush_faces(proof: ClearanceProof, k: int, q: Array, touching: float) -> Array | None:
+    """The least translation of the second body of pair k, as a move (6), off faces that lie on each other.
+
+    Zero where there are none; None where none so small leads off all of them.
+    """
+    normals, gaps = _flush(proof, k, q, touching)
+    if not len(normals):
+        return np.zeros(6)
+    row, root = q[proof.pairs[k][1]], proof.cells_of(k).root
+    middle = rotation_matrix(row[3:]) @ root.center + row[:3]
+    world = normals @ rotation_matrix(q[proof.pairs[k][0], 3:]).T
+    return move_apart(proof, k, q, Contacts(world, np.tile(middle, (len(world), 1)), gaps), touching)
 
 
 def move_apart(proof: ClearanceProof, k: int, q: Array, contacts: Contacts, touching: float) -> Array | None:
