@@ -1,9 +1,9 @@
 """Bodies that cross at the pose of a solution.
 
-Of all pairs of bodies those are looked at whose boxes meet: bodies are within the hulls of their control points. A proof
-tells what they are to each other (`proximity/clearance/proof.py`), of most in one look. Of pairs with flat faces that
-lie on each other one body is moved off these before, by less than what is called touching; others that touch are moved
-along the directions that a look leaves open. Where the proof does not tell, samples do (`samples.py`).
+Of all pairs of bodies those are looked at whose boxes meet: bodies are within the hulls of their control points. A
+proof tells what they are to each other (`proximity/clearance/proof.py`), of most in one look. Of pairs with flat faces
+that lie on each other one body is moved off these before, by less than what is called touching; others that touch are
+moved along the directions that a look leaves open. Where the proof does not tell, samples do (`samples.py`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
-from assembly.proximity.clearance.touching import fills_bore, left_open, off_flush_faces
+from assembly.proximity.clearance.touching import fills_bore, left_open, off_contacts
 from assembly.solve.interruption import Interruption
 from assembly.solve.samples import ROUNDED, PosedBodies, sampled
 
@@ -43,7 +43,6 @@ __all__ = [
     "joined_pairs",
     "looks_at",
     "posed_box",
-    "proven_answers",
 ]
 
 Array = NDArray[np.float64]
@@ -182,14 +181,33 @@ def find_crossings(posed: PosedBodies, pairs: Sequence[Pair], interruption: Inte
     return Crossings(tuple(found), tuple(unseen))
 
 
-def looks_at(posed: PosedBodies, pairs: Sequence[Pair], interruption: Interruption) -> list[PairLook]:
+def looks_at(
+    posed: PosedBodies,
+    pairs: Sequence[Pair],
+    interruption: Interruption,
+    normals: Sequence[Array | None] | None = None,
+) -> list[PairLook]:
     """What pairs of bodies are to each other: by a proof, or by samples where it does not tell.
 
     Of bodies that cross and have a contact, samples tell whether they do so elsewhere.
+
+    Parameters
+    ----------
+    posed : PosedBodies
+    pairs : sequence of (Body, Body)
+    interruption : Interruption
+    normals : sequence of (3,) or None, optional
+        Of every pair, from the first body to the second where they touch, as far as that is known.
+
+    Raises
+    ------
+    InputError
+        Bodies of sizes that clearances cannot have.
     """
+    hints = [None] * len(pairs) if normals is None else normals
     touched = {_key(*contact.bodies) for contact in posed.contacts}
     looks = []
-    for (a, b), answer in zip(pairs, _answers(posed, pairs, interruption), strict=True):
+    for (a, b), answer in zip(pairs, _answers(posed, pairs, hints, interruption), strict=True):
         crosses = answer.verdict in (Verdict.CROSSING, Verdict.ENCLOSED)
         proved = answer.verdict is not Verdict.UNDECIDED and not (crosses and _key(a, b) in touched)
         looks.append(PairLook(answer, crosses if proved else None, proved))
@@ -201,7 +219,9 @@ def looks_at(posed: PosedBodies, pairs: Sequence[Pair], interruption: Interrupti
     return looks
 
 
-def _answers(posed: PosedBodies, pairs: Sequence[Pair], interruption: Interruption) -> list[Answer]:
+def _answers(
+    posed: PosedBodies, pairs: Sequence[Pair], normals: Sequence[Array | None], interruption: Interruption
+) -> list[Answer]:
     """What is proven of pairs; nothing of those for which there is no time."""
     answers = [Answer(Verdict.UNDECIDED)] * len(pairs)
     size = max((body.size for body in posed.bodies if body.faces), default=0.0)
@@ -214,17 +234,18 @@ def _answers(posed: PosedBodies, pairs: Sequence[Pair], interruption: Interrupti
         if interruption.is_over():
             break
         rows = [(number[id(a)], number[id(b)]) for a, b in pairs[start : start + AT_ONCE]]
-        told = proven_answers(ClearanceProof(shapes, rows, [0.0] * len(rows)), posed.q, touching)
+        proof = ClearanceProof(shapes, rows, [0.0] * len(rows))
+        told = _proven(proof, posed.q, touching, normals[start : start + AT_ONCE])
         answers[start : start + AT_ONCE] = told
     return answers
 
 
-def proven_answers(proof: ClearanceProof, q: Array, touching: float) -> list[Answer]:
+def _proven(proof: ClearanceProof, q: Array, touching: float, normals: Sequence[Array | None]) -> list[Answer]:
     """What is proven of all pairs of a proof."""
     count = len(proof.pairs)
     moves, moved, hopeless = np.zeros((count, 6)), [], set()
     for k in range(count):
-        off = None if fills_bore(proof, k, q, touching) else off_flush_faces(proof, k, q, touching)
+        off = None if fills_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, normals[k])
         if off is None:
             hopeless.add(k)
         elif off.any():

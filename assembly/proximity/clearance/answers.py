@@ -38,7 +38,8 @@ class Answer(ReadOnlyArrays):
     depth : float
         See `Verdict`.
     place : (3,)
-        Of a crossing, where it was found, in the world; else NaN.
+        Of a crossing, where it was found, in the world; else NaN. Both boundaries are as near as cells that prove it
+        are to them; of wires it is a point of a piece's spine.
     swept : bool
         Whether the way from the last look is proven as well.
     part : float

@@ -17,7 +17,7 @@ from assembly.proximity.clearance.parting import least_move
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.records import CELL_FACE, FLAT, GUIDES, LINKS, NODE, NONE
 
-__all__ = ["conforms", "fills_bore", "left_open", "move_apart", "off_flush_faces", "recognized"]
+__all__ = ["conforms", "fills_bore", "left_open", "move_apart", "off_contacts", "recognized"]
 
 Array = NDArray[np.float64]
 # Contacts are opened, or may close, to the first of these parts of what a body may be moved that it can be moved to.
@@ -137,18 +137,30 @@ def _are_beside(a: tuple[Array, Array], b: tuple[Array, Array], touching: float)
     return bool((apart <= a[1][:, None] + b[1] + touching).any())
 
 
-def off_flush_faces(proof: ClearanceProof, k: int, q: Array, touching: float) -> Array | None:
-    """The least translation of the second body of pair k, as a move (6), off faces that lie on each other.
+def off_contacts(proof: ClearanceProof, k: int, q: Array, touching: float, normal: Array | None) -> Array | None:
+    """The least translation of the second body of pair k, as a move (6), off what the two seem to touch at.
 
-    Zero where there are none; None where none so small leads off all of them.
+    Zero where nothing is known of that; None where none so small leads off all of it.
+
+    Parameters
+    ----------
+    k : int
+    q : (n, 7)
+    touching : float
+    normal : (3,), optional
+        From the first body to the second where they touch, in the world: of bodies that have no flat faces which lie on
+        each other.
     """
     normals, gaps = _flush(proof, k, q, touching)
-    if not len(normals):
+    if len(normals):
+        normals = normals @ rotation_matrix(q[proof.pairs[k][0], 3:]).T
+    elif normal is not None:
+        normals, gaps = normal[None], np.zeros(1)
+    else:
         return np.zeros(6)
     row, root = q[proof.pairs[k][1]], proof.cells_of(k).root
     middle = rotation_matrix(row[3:]) @ root.center + row[:3]
-    world = normals @ rotation_matrix(q[proof.pairs[k][0], 3:]).T
-    return move_apart(proof, k, q, Contacts(world, np.tile(middle, (len(world), 1)), gaps), touching)
+    return move_apart(proof, k, q, Contacts(normals, np.tile(middle, (len(normals), 1)), gaps), touching)
 
 
 def move_apart(proof: ClearanceProof, k: int, q: Array, contacts: Contacts, touching: float) -> Array | None:

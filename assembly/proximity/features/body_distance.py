@@ -17,7 +17,7 @@ from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.features.features import Feature, Shape, faces_of, pose_of
 from assembly.proximity.features.parting import are_balls, parting_translation
-from assembly.proximity.features.places import body_tree, feature_at, is_behind, is_closed, shells_of
+from assembly.proximity.features.places import body_tree, feature_at, is_behind, is_closed, normals_at, shells_of
 
 __all__ = ["BodyDistance", "DistanceStatus", "distance"]
 
@@ -91,6 +91,18 @@ class BodyDistance(ReadOnlyArrays):
         if self.status is DistanceStatus.ENCLOSED:
             return are_balls(self._where[0])
         return self.converged
+
+    @cached_property
+    def normal(self) -> Array | None:
+        """A unit vector (3,) from a towards b: the outward normal of a, or of b reversed, where a point is on a face.
+
+        None where both are on edges or vertices.
+        """
+        faces, spots, q = self._where
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            if self.features[side].kind == "face":
+                return read_only(sign * rotation_matrix(q[side, 3:]) @ normals_at(faces[side], spots[side])[0])
+        return None
 
     @cached_property
     def features(self) -> tuple[Feature, Feature]:

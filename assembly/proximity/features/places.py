@@ -15,7 +15,7 @@ from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.topology import Edge, Topology
 from assembly.proximity.features.features import Feature, features_of
 
-__all__ = ["body_faces", "body_tree", "feature_at", "is_behind", "is_closed", "shells_of"]
+__all__ = ["body_faces", "body_tree", "feature_at", "is_behind", "is_closed", "normals_at", "shells_of"]
 
 Array = NDArray[np.float64]
 Faces = tuple[Face, ...]
@@ -114,12 +114,12 @@ def _normal(face: Face, curve: int, t: float, closes: bool) -> Array | None:
         return None
 
 
-def _normals(faces: Faces, spot: Spot, feature: Feature) -> list[Array]:
-    """Outward normals of the faces on which a point is that is on a feature."""
+def normals_at(faces: Faces, spot: Spot, feature: Feature | None = None) -> list[Array]:
+    """Outward normals of the faces on which a point is that is on a feature, or within a face."""
     topology = solid_of(faces)
     number, u, v = _parameters(faces, spot)
     found: list[Array | None] = []
-    if feature.kind == "face":
+    if feature is None or feature.kind == "face":
         return [topology.faces[number].normal(u, v)]
     if feature.kind == "edge":
         at = _edge_at(topology, number, u, v)
@@ -149,5 +149,5 @@ def is_behind(faces: Faces, spot: Spot, point: Array, way: Array) -> bool:
 
     Of the faces that meet in an edge or a vertex, that one tells whose normal is nearest to being along the way.
     """
-    off = [float(normal @ way) for normal in _normals(faces, spot, feature_at(faces, spot, point))]
+    off = [float(normal @ way) for normal in normals_at(faces, spot, feature_at(faces, spot, point))]
     return bool(off) and max(off, key=abs) < 0.0

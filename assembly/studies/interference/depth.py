@@ -25,7 +25,7 @@ from assembly.proximity.clearance.body_cells import cells_of_body
 from assembly.proximity.clearance.round_faces import round_of
 from assembly.proximity.clearance.touching import recognized
 from assembly.proximity.features.body_distance import BodyDistance, DistanceStatus, distance
-from assembly.proximity.features.features import FeatureStatus, closest_features
+from assembly.proximity.features.features import FeatureStatus, closest_features, features_of
 from assembly.solve.crossings import posed_box
 from assembly.tracking.manager import Manager
 
@@ -164,11 +164,12 @@ def _between_flat_faces(two: Two, faces: tuple[int, int], depth: float, normal: 
     if near.upper > depth + IN_PLANE * two.size:
         return None
     points = near.points - np.array([np.zeros(3), 2.0 * depth * normal])
-    return Depth(-depth, points, _names(two, points))
+    one, other = (features_of(side_faces(body))[k].name for body, k in zip(two.bodies, faces, strict=True))
+    return Depth(-depth, points, (one, other))
 
 
 def common_point(two: Two, points: Array) -> Array | None:
-    """A point around which a ball, larger than what is called touching, is inside of both bodies; None if none is found.
+    """A point around which a ball, larger than what is called touching, is inside of both; None where none is found.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """What a pair of bodies is: by their nearest points and, where these meet, by what is proven of the pair.
 
-Nearest points that are apart tell all (`assembly.proximity.distance`). Bodies that have points in common touch or cross:
-a look at the pair tells which (`assembly/solve/crossings.py`).
+Nearest points that are apart tell all (`assembly.proximity.distance`). Bodies that have points in common touch or
+cross: a look at the pair tells which (`assembly/solve/crossings.py`).
 """
 
 from __future__ import annotations
@@ -23,10 +23,8 @@ from assembly.studies.interference.depth import Depth, Two, common_point
 __all__ = ["NearPair"]
 
 Array = NDArray[np.float64]
-# Bounds of a distance that agree to this part of the size are one number.
+# Bounds of a distance that agree to this part of the size are one number, and nearest points are sought to it.
 AGREED = 1e-9
-# Nearest points are sought to this part of it.
-TOLERANCE = 1e-12
 # Pairs of parts that a search for them may look at, and pairs of nodes that a proof of a bound may.
 BUDGET, BOUND_BUDGET = 20_000, 2000
 
@@ -48,7 +46,7 @@ class NearPair:
     def nearest(self) -> BodyDistance:
         """Their nearest points."""
         a, b = self.two.q
-        return distance(*self.two.bodies, poses=(a, b), tolerance=TOLERANCE * self.two.size, budget=BUDGET)
+        return distance(*self.two.bodies, poses=(a, b), tolerance=AGREED * self.two.size, budget=BUDGET)
 
     @property
     def _agreed(self) -> bool:
@@ -56,7 +54,7 @@ class NearPair:
 
     @property
     def is_told(self) -> bool:
-        """Whether nearest points tell what the pair is: they are apart, and whether one is inside the other is known."""
+        """Whether nearest points tell what the pair is: they are apart, and so it is known whether one is inside."""
         return self.nearest.converged and self.nearest.upper > self.two.touching
 
     @cached_property
@@ -85,7 +83,9 @@ class NearPair:
         if look.answer.verdict is Verdict.ENCLOSED or (look.crosses and self.bound > 0.0):
             return self._row("enclosed", -near.upper, look.proved)
         if near.upper <= self.two.touching:
-            return self._row("touching", near.upper, look.proved)
+            # What is no farther apart than points are sought to has points in common.
+            gap = near.upper if near.upper > AGREED * self.two.size else 0.0
+            return self._row("touching", gap, look.proved)
         return self._row("clear", near.upper, look.proved and self._agreed)
 
     def is_deep(self, look: PairLook) -> bool:
@@ -93,7 +93,7 @@ class NearPair:
         return bool(look.crosses) and look.answer.verdict is not Verdict.ENCLOSED and not self.bound > 0.0
 
     def crossing(self, look: PairLook, depth: Depth) -> Clash:
-        """The row of bodies that cross: where they are deepest in each other, and a point inside of both, if one is found."""
+        """The row of bodies that cross: where they are deepest in each other."""
         inside = common_point(self.two, depth.points)
         proved = inside is not None or look.answer.verdict is Verdict.CROSSING
         return Clash(self._names, "crossing", depth.gap, 0.0, depth.points, depth.faces, proved, self.relation, inside)

@@ -68,8 +68,8 @@ def interference(
     -----
     Boxes tell which pairs may be near; of those the nearest points are searched for by branch and bound
     (`assembly.proximity.distance`). Of bodies that have points in common a look proves that they touch, or cross, as in
-    `Solution.crossings`. Where it does not tell, as of pins in bores of their own radius, samples do, and the row is not
-    proved.
+    `Solution.crossings`. Where it does not tell, as of pins in bores of their own radius, samples do, and the row is
+    not proved.
     """
     interruption = CTRL_C if time_limit is None else Interruption(time_limit)
     margin = bounded("margin", margin)
@@ -147,7 +147,8 @@ def _rows_of(
             rows.append(pair.told())
         else:
             doubtful.append((pair, apart))
-    looks = looks_at(posed, [pair.two.bodies for pair, _ in doubtful], interruption)
+    bodies, normals = [pair.two.bodies for pair, _ in doubtful], [pair.nearest.normal for pair, _ in doubtful]
+    looks = looks_at(posed, bodies, interruption, normals)
     for (pair, apart), look in zip(doubtful, looks, strict=True):
         if look.crosses is None or interruption.is_over():
             rows.append(pair.unsearched(apart))
