@@ -8,7 +8,7 @@ moved along the directions that a look leaves open. Where the proof does not tel
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
@@ -47,10 +47,11 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Pair = tuple[Body, Body]
-# Pairs that are looked at between two questions about the time.
-AT_ONCE = 16
-# Pairs of nodes that a look may take after bodies are moved off flat faces, and where they conform.
-FEW, FEWEST = 2000, 500
+Normal = Callable[[], Array | None]
+# Pairs whose proofs are made at once.
+AT_ONCE = 64
+# Pairs of nodes that a look may take where bodies conform.
+FEW = 500
 # Moves that are tried for what a look leaves open.
 TRIES = 2
 # What rounding may make of boxes, in parts of where they end.
@@ -185,7 +186,7 @@ def looks_at(
     posed: PosedBodies,
     pairs: Sequence[Pair],
     interruption: Interruption,
-    normals: Sequence[Array | None] | None = None,
+    normals: Sequence[Normal] | None = None,
 ) -> list[PairLook]:
     """What pairs of bodies are to each other: by a proof, or by samples where it does not tell.
 
@@ -196,15 +197,16 @@ def looks_at(
     posed : PosedBodies
     pairs : sequence of (Body, Body)
     interruption : Interruption
-    normals : sequence of (3,) or None, optional
-        Of every pair, from the first body to the second where they touch, as far as that is known.
+    normals : sequence of callable, optional
+        Of every pair, what gives the normal (3,) from the first body to the second where they touch, or None where it
+        is not known.
 
     Raises
     ------
     InputError
         Bodies of sizes that clearances cannot have.
     """
-    hints = [None] * len(pairs) if normals is None else normals
+    hints = [_unknown] * len(pairs) if normals is None else normals
     touched = {_key(*contact.bodies) for contact in posed.contacts}
     looks = []
     for (a, b), answer in zip(pairs, _answers(posed, pairs, hints, interruption), strict=True):
@@ -219,8 +221,13 @@ def looks_at(
     return looks
 
 
+def _unknown() -> None:
+    """Nothing is known of where bodies touch."""
+    return None
+
+
 def _answers(
-    posed: PosedBodies, pairs: Sequence[Pair], normals: Sequence[Array | None], interruption: Interruption
+    posed: PosedBodies, pairs: Sequence[Pair], normals: Sequence[Normal], interruption: Interruption
 ) -> list[Answer]:
     """What is proven of pairs; nothing of those for which there is no time."""
     answers = [Answer(Verdict.UNDECIDED)] * len(pairs)
@@ -235,40 +242,39 @@ def _answers(
             break
         rows = [(number[id(a)], number[id(b)]) for a, b in pairs[start : start + AT_ONCE]]
         proof = ClearanceProof(shapes, rows, [0.0] * len(rows))
-        told = _proven(proof, posed.q, touching, normals[start : start + AT_ONCE])
+        told = _proven(proof, posed.q, touching, normals[start : start + AT_ONCE], interruption)
         answers[start : start + AT_ONCE] = told
     return answers
 
 
-def _proven(proof: ClearanceProof, q: Array, touching: float, normals: Sequence[Array | None]) -> list[Answer]:
+def _proven(
+    proof: ClearanceProof, q: Array, touching: float, normals: Sequence[Normal], interruption: Interruption
+) -> list[Answer]:
     """What is proven of all pairs of a proof."""
-    count = len(proof.pairs)
-    moves, moved, hopeless = np.zeros((count, 6)), [], set()
-    for k in range(count):
+    moves, moved, hopeless, asked = np.zeros((len(proof.pairs), 6)), [], [], []
+    for k in range(len(proof.pairs)):
         off = None if fills_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, normals[k])
         if off is None:
-            hopeless.add(k)
+            hopeless.append(k)
         elif off.any():
             moves[k] = off
             moved.append(k)
-    answers = [Answer(Verdict.UNDECIDED)] * count
-    for k, answer in zip(moved, proof.look(q, touching, moves, which=moved, budget=FEW), strict=True):
-        if answer.verdict is Verdict.TOUCHING:
-            answers[k] = answer
-    for k, answer in enumerate(answers):
-        if answer.verdict is Verdict.UNDECIDED:
-            answers[k] = _at_rest(proof, k, q, touching, k in hopeless)
-    return answers
+        else:
+            asked.append(k)
+    answers = dict(zip(moved, proof.look(q, touching, moves, which=moved), strict=True))
+    asked += [k for k, answer in answers.items() if answer.verdict is not Verdict.TOUCHING]
+    for k in asked:
+        answers[k] = Answer(Verdict.UNDECIDED) if interruption.is_over() else _at_rest(proof, k, q, touching)
+    # No look at rest tells that bodies conform, and no move opens them: only that they cross may be found.
+    answers.update(zip(hopeless, proof.look(q, touching, which=hopeless, budget=FEW), strict=True))
+    return [answers[k] for k in range(len(proof.pairs))]
 
 
-def _at_rest(proof: ClearanceProof, k: int, q: Array, touching: float, hopeless: bool) -> Answer:
-    """What is proven of a pair where it is, or where it is moved off what that leaves open.
-
-    No look at rest tells that bodies conform, and no move opens them: only that they cross may be found.
-    """
-    (answer,) = found = proof.look(q, touching, which=[k], budget=FEWEST if hopeless else None)
+def _at_rest(proof: ClearanceProof, k: int, q: Array, touching: float) -> Answer:
+    """What is proven of a pair where it is, or where it is moved off what that leaves open."""
+    (answer,) = found = proof.look(q, touching, which=[k])
     moves = np.zeros((len(proof.pairs), 6))
-    for _ in range(0 if hopeless else TRIES):
+    for _ in range(TRIES):
         move = left_open(proof, k, q, touching) if found[0].verdict is Verdict.UNDECIDED else None
         if move is None:
             break

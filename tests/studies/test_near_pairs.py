@@ -42,7 +42,7 @@ def check(a, b, expected, kind, proved=True):
     assert between == pytest.approx(abs(row.gap), abs=same)
     for body, name, point in zip((a, b), row.faces, row.points, strict=True):
         # What is as near to an edge as edges of faces are to each other is on it.
-        assert off_feature(body, name, point) < 1e-8
+        assert off_feature(body, name, point) < 1e-7
     if kind == "clear":
         assert expected - 1e-8 <= row.bound <= expected + 1e-14
     return row

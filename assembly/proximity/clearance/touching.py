@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -137,7 +138,9 @@ def _are_beside(a: tuple[Array, Array], b: tuple[Array, Array], touching: float)
     return bool((apart <= a[1][:, None] + b[1] + touching).any())
 
 
-def off_contacts(proof: ClearanceProof, k: int, q: Array, touching: float, normal: Array | None) -> Array | None:
+def off_contacts(
+    proof: ClearanceProof, k: int, q: Array, touching: float, known: Callable[[], Array | None]
+) -> Array | None:
     """The least translation of the second body of pair k, as a move (6), off what the two seem to touch at.
 
     Zero where nothing is known of that; None where none so small leads off all of it.
@@ -147,17 +150,18 @@ def off_contacts(proof: ClearanceProof, k: int, q: Array, touching: float, norma
     k : int
     q : (n, 7)
     touching : float
-    normal : (3,), optional
-        From the first body to the second where they touch, in the world: of bodies that have no flat faces which lie on
-        each other.
+    known : callable
+        Of bodies that have no flat faces which lie on each other, what gives the normal (3,) from the first body to the
+        second where they touch, in the world, or None.
     """
     normals, gaps = _flush(proof, k, q, touching)
     if len(normals):
         normals = normals @ rotation_matrix(q[proof.pairs[k][0], 3:]).T
-    elif normal is not None:
-        normals, gaps = normal[None], np.zeros(1)
     else:
-        return np.zeros(6)
+        normal = known()
+        if normal is None:
+            return np.zeros(6)
+        normals, gaps = normal[None], np.zeros(1)
     row, root = q[proof.pairs[k][1]], proof.cells_of(k).root
     middle = rotation_matrix(row[3:]) @ root.center + row[:3]
     return move_apart(proof, k, q, Contacts(normals, np.tile(middle, (len(normals), 1)), gaps), touching)

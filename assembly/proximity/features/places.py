@@ -93,13 +93,23 @@ def feature_at(faces: Faces, spot: Spot, point: Array) -> Feature:
     """The vertex, the edge or the face on which a point of a body is, to the tolerance of its topology."""
     topology, names = solid_of(faces), features_of(faces)
     if topology.vertices:
-        apart = np.linalg.norm([vertex.point - point for vertex in topology.vertices], axis=1)
+        apart = ((_vertex_points(faces) - point) ** 2).sum(axis=1)
         nearest = int(apart.argmin())
-        if apart[nearest] <= topology.tolerance:
+        if apart[nearest] <= topology.tolerance**2:
             return names[len(topology.faces) + len(topology.edges) + nearest]
+    place = place_of_spot(body_tree(faces), spot)
+    if place.curve >= 0 and len(body_faces(faces)) == len(topology.faces):
+        number = topology.face_edges[place.face][place.curve]
+        return names[place.face] if number is None else names[len(topology.faces) + number]
     face, u, v = _parameters(faces, spot)
     found = _edge_at(topology, face, u, v)
     return names[face] if found is None else names[len(topology.faces) + found[1]]
+
+
+@lru_cache(maxsize=256)
+def _vertex_points(faces: Faces) -> Array:
+    """The vertices of a body (n, 3)."""
+    return np.array([vertex.point for vertex in solid_of(faces).vertices])
 
 
 def _normal(face: Face, curve: int, t: float, closes: bool) -> Array | None:

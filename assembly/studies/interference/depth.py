@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +69,7 @@ class Two:
         """Both."""
         return self.a, self.b
 
-    @property
+    @cached_property
     def size(self) -> float:
         """The larger one's size."""
         return max(self.a.size, self.b.size)

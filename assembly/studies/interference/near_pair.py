@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from assembly.constraints.model.contact import side_faces
 from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.proximity.features.body_distance import BodyDistance, DistanceStatus, distance
+from assembly.proximity.features.body_distance import Beyond, BodyDistance, DistanceStatus, beyond, distance
 from assembly.solve.crossings import PairLook
 from assembly.studies.interference.clash import Clash, Kind, Relation
 from assembly.studies.interference.depth import Depth, Two, common_point
@@ -42,11 +42,19 @@ class NearPair:
     two: Two
     relation: Relation = field(repr=False)
 
+    def beyond(self, margin: float) -> Beyond:
+        """Whether the two are farther apart than a margin, and whether one may be inside of the other one."""
+        return beyond(*self.two.bodies, self.two.q, max(margin, self.two.touching), BUDGET)
+
     @cached_property
     def nearest(self) -> BodyDistance:
         """Their nearest points."""
         a, b = self.two.q
         return distance(*self.two.bodies, poses=(a, b), tolerance=AGREED * self.two.size, budget=BUDGET)
+
+    def normal(self) -> Array | None:
+        """From the first body to the second where they touch; None where they do not, or it is not known."""
+        return self.nearest.normal if self.nearest.upper <= self.two.touching else None
 
     @property
     def _agreed(self) -> bool:

@@ -13,6 +13,7 @@ from assembly.constraints.model.contact import Contact
 from assembly.errors import InputError, bounded
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
+from assembly.proximity.clearance.answers import Verdict
 from assembly.solve.crossings import free_pairs, joined_pairs, looks_at, posed_box
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.options import touching_part
@@ -86,7 +87,7 @@ def interference(
     for i, j, apart in _near(scene, q, shaped, margin):
         a, b = scene.bodies[i], scene.bodies[j]
         near.append((NearPair(Two(a, b, q[[i, j]], within), _relation(scene, a, b)), apart))
-    rows, searched = _rows_of(near, posed, interruption)
+    rows, searched = _rows_of(near, posed, margin, interruption)
     kept = [row for row in rows if row.bound <= margin or row.kind in ("crossing", "enclosed", "undecided")]
     return Interference(
         rows=tuple(sorted(kept, key=lambda row: row.order)),
@@ -132,24 +133,30 @@ def _relation(scene: Assembly, a: Body, b: Body) -> Relation:
 
 
 def _rows_of(
-    near: Sequence[tuple[NearPair, float]], posed: PosedBodies, interruption: Interruption
+    near: Sequence[tuple[NearPair, float]], posed: PosedBodies, margin: float, interruption: Interruption
 ) -> tuple[list[Clash], int]:
-    """The rows of pairs, and how many were searched for their nearest points."""
+    """The rows of pairs that are not beyond a margin, and how many were searched."""
     rows: list[Clash] = []
-    doubtful: list[tuple[NearPair, float]] = []
+    asked: list[tuple[NearPair, float, bool]] = []
     searched = 0
     for pair, apart in near:
         if interruption.is_over():
             rows.append(pair.unsearched(apart))
             continue
         searched += 1
-        if pair.is_told:
+        beyond = pair.beyond(margin)
+        if beyond.is_apart:
+            if beyond.may_nest:
+                asked.append((pair, apart, True))
+        elif pair.is_told:
             rows.append(pair.told())
         else:
-            doubtful.append((pair, apart))
-    bodies, normals = [pair.two.bodies for pair, _ in doubtful], [pair.nearest.normal for pair, _ in doubtful]
-    looks = looks_at(posed, bodies, interruption, normals)
-    for (pair, apart), look in zip(doubtful, looks, strict=True):
+            asked.append((pair, apart, False))
+    normals = [pair.normal for pair, _, _ in asked]
+    looks = looks_at(posed, [pair.two.bodies for pair, _, _ in asked], interruption, normals)
+    for (pair, apart, is_apart), look in zip(asked, looks, strict=True):
+        if is_apart and look.answer.verdict is Verdict.CLEAR:
+            continue
         if look.crosses is None or interruption.is_over():
             rows.append(pair.unsearched(apart))
         elif pair.is_deep(look):
