@@ -25,7 +25,7 @@ from assembly.proximity.clearance.records import (
     NONE,
     node_at,
 )
-from assembly.proximity.clearance.round_faces import Round, round_of, round_parts
+from assembly.proximity.clearance.round_faces import Round, round_holes, round_of, round_parts
 from assembly.proximity.clearance.wire_cells import WireCells, wire_cells
 
 __all__ = ["BodyCells", "cells_of_body"]
@@ -95,12 +95,13 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
     links, nodes = _first_cells(tables, packed.curves)
     place_cells(packed.table, packed.pool, packed.faces, links, nodes)
     part, rounds = _parts(topology.faces, tables)
-    builder = _Builder(links, nodes, part, rounds)
+    holes = [round_holes(face) for face in topology.faces]
+    owner = rows_of(LINKS, links).face
+    builder = _Builder(links, nodes, part, rounds, [holes[owner[cells][0]] for cells in _of_parts(part, len(rounds))])
     radii = [found.radius for found in rounds if found is not None]
     radii += [float(table.first[0, 1]) for table in tables if isinstance(table, WireCells)]
     builder.build()
     label = _components(topology)
-    owner = rows_of(LINKS, links).face
     return BodyCells(
         packed.table,
         packed.pool,
@@ -132,6 +133,11 @@ def _parts(faces: tuple[Face, ...], tables: Cells) -> tuple[Table, list[Round | 
         labels.append(len(rounds) + np.searchsorted(ends, table.uv[..., direction].mean(axis=1)))
         rounds += parts
     return np.concatenate(labels), rounds
+
+
+def _of_parts(part: Table, count: int) -> list[Table]:
+    """The cells of every part."""
+    return [np.flatnonzero(part == k) for k in range(count)]
 
 
 def _components(topology: Topology) -> Table:
@@ -230,9 +236,16 @@ def _box(points: Array, thick: Array) -> tuple[Array, Array, Array, float]:
 class _Builder:
     """Makes the nodes above cells: first halves of a body's parts of faces, then halves of a part's cells."""
 
-    def __init__(self, cell_links: Table, cell_nodes: Array, part: Table, rounds: list[Round | None]) -> None:
+    def __init__(
+        self,
+        cell_links: Table,
+        cell_nodes: Array,
+        part: Table,
+        rounds: list[Round | None],
+        holes: list[list[Round]],
+    ) -> None:
         self.cell_links, self.cell_nodes = cell_links, cell_nodes
-        self.part = part
+        self.part, self.holes = part, holes
         self.cells = rows_of(NODE, cell_nodes)
         self.rounds = rounds
         count = len(cell_links)
@@ -244,7 +257,7 @@ class _Builder:
 
     def build(self) -> None:
         """All nodes, the root first."""
-        groups = [np.flatnonzero(self.part == k) for k in range(len(self.rounds))]
+        groups = _of_parts(self.part, len(self.rounds))
         waiting = [(groups, 0)]
         while waiting:
             groups, k = waiting.pop()
@@ -252,6 +265,7 @@ class _Builder:
             if len(items) == 1:
                 self.first[items[0]] = k
                 self.links[k], self.nodes[k] = self.cell_links[items[0]], self.cell_nodes[items[0]]
+                self._write_hole(items, k)
                 continue
             self._write(items, k)
             child, self.used = self.used, self.used + 2
@@ -286,6 +300,18 @@ class _Builder:
         node.center, node.axes, node.half, node.radius = _box(points, thick)
         if found is not None:
             node.bore, node.ruling, node.spine = found.radius, found.axis, found.center
+        self._write_hole(items, k)
+
+    def _write_hole(self, items: Table, k: int) -> None:
+        """Of cells of one flat face, that of its holes which is nearest to them."""
+        part = self.part[items[0]]
+        holes = self.holes[part]
+        if not holes or (self.part[items] != part).any():
+            return
+        apart = [np.linalg.norm(self.cells.center[items] - hole.center, axis=1).min() - hole.radius for hole in holes]
+        hole = holes[int(np.argmin(apart))]
+        node = rows_of(NODE, self.nodes[k : k + 1])[0]
+        node.bore, node.ruling, node.spine = hole.radius, hole.axis, hole.center
 
 
 def _write_round(node: np.record, found: Round) -> None:

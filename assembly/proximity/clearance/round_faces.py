@@ -16,7 +16,7 @@ from assembly.geometry.splines import bezier
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.bvh.normal_nets import bezier_product
 
-__all__ = ["Round", "round_of", "round_parts"]
+__all__ = ["Round", "round_holes", "round_of", "round_parts"]
 
 Array = NDArray[np.float64]
 # How far off a face may be from what it is recognized as, in parts of its size. Bounds are those of the face itself.
@@ -181,22 +181,25 @@ def _beyond_torus(pieces: Array, center: Array, axis: Array, radii: tuple[float,
     return max(float((top / bezier_product(ww, ww)).max()), 0.0) / (4.0 * ring**2 * tube)
 
 
-def _disc(face: Face) -> Round | None:
-    """A flat face whose outer boundary is a circle, as a cylinder without length."""
-    surface = face.surface
-    net = surface.control_points
-    if net.shape != (2, 2, 3) or np.ptp(surface.weights) > 0.0 or face.outer is None:
+def _affine_plane(face: Face) -> tuple[Array, Array, Array] | None:
+    """Of a flat face whose surface is an affine map of (u, v): where (0, 0) is, and its derivatives."""
+    net = face.surface.control_points
+    if net.shape != (2, 2, 3) or np.ptp(face.surface.weights) > 0.0 or face.outer is None:
         return None
-    far = float(np.abs(net).max())
-    (u0, u1), (v0, v1) = surface.domain
+    (u0, u1), (v0, v1) = face.surface.domain
     along, across = (net[1, 0] - net[0, 0]) / (u1 - u0), (net[0, 1] - net[0, 0]) / (v1 - v0)
-    if np.abs(net[1, 1] - net[1, 0] - net[0, 1] + net[0, 0]).max() > EXACT * far:
+    if np.abs(net[1, 1] - net[1, 0] - net[0, 1] + net[0, 0]).max() > EXACT * float(np.abs(net).max()):
         return None
-    origin = net[0, 0] - u0 * along - v0 * across
+    return net[0, 0] - u0 * along - v0 * across, along, across
+
+
+def _circle(face: Face, chain: range, plane: tuple[Array, Array, Array], outward: bool) -> Round | None:
+    """The circle that a loop of a flat face is, as a cylinder without length."""
+    origin, along, across = plane
     axis = np.cross(along, across)
     axis /= np.linalg.norm(axis)
     pieces, points = [], []
-    for curve in face.boundary[: len(face.chains[0])]:
+    for curve in (face.boundary[k] for k in chain):
         bezier = curve.bezier_pieces()
         w = bezier[..., -1:]
         space = origin * w + bezier[..., :1] * along + bezier[..., 1:2] * across
@@ -208,12 +211,27 @@ def _disc(face: Face) -> Round | None:
     middle, radius = _sphere(samples @ basis)
     center = basis @ middle + (samples[0] @ axis) * axis
     size = float(np.linalg.norm(np.ptp(samples, axis=0)))
-    if np.abs(np.linalg.norm(samples - center, axis=1) - radius).max() > EXACT * size:
+    if not radius > 0.0 or np.abs(np.linalg.norm(samples - center, axis=1) - radius).max() > EXACT * size:
         return None
-    most = max(_squares(part, center, np.eye(3))[1] for part in pieces)
-    if np.sqrt(most) - radius > EXACT * size:
+    bounds = [_squares(part, center, np.eye(3)) for part in pieces]
+    least, most = min(low for low, _ in bounds), max(high for _, high in bounds)
+    if max(np.sqrt(most) - radius, radius - np.sqrt(max(least, 0.0))) > EXACT * size:
         return None
-    return Round(center, axis, 8e-16 * far + EXACT * far, float(np.sqrt(most) * ROUNDED_UP + 8e-16 * far), 0.0, True)
+    far = float(np.abs(face.surface.control_points).max())
+    return Round(center, axis, 8e-16 * far + EXACT * far, _radius((least, most), outward, far), 0.0, outward)
+
+
+def _disc(face: Face) -> Round | None:
+    """A flat face whose outer boundary is a circle."""
+    plane = _affine_plane(face)
+    return None if plane is None else _circle(face, face.chains[0], plane, True)
+
+
+def round_holes(face: Face) -> list[Round]:
+    """The round holes of a flat face: all of it is outside of the cylinders that these bound."""
+    plane = _affine_plane(face)
+    found = [] if plane is None else [_circle(face, chain, plane, False) for chain in face.chains[1:]]
+    return [hole for hole in found if hole is not None]
 
 
 def round_of(face: Face) -> Round | None:

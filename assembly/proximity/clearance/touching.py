@@ -41,7 +41,7 @@ class Recognized(NamedTuple):
     centers, radii : tuple of arrays
         Balls around the first cells of each of these.
     walls : recarray of NODE
-        Walls of bores.
+        Walls of bores, and faces beside round holes.
     ends : (r, 2, 3)
         Of its cylinders and balls those of the axis, or the center twice.
     round_radii : (r,)
@@ -75,13 +75,16 @@ def recognized(cells: BodyCells) -> Recognized:
     rounds = every[is_round & ((every.disc == 0.0) | (every.half[:, 0] > SHORT * every.disc))]
     along = (rounds.half[:, 0, None] * rounds.axes[:, 0])[:, None]
     ends = rounds.center[:, None] + np.array([[[-1.0], [1.0]]]) * along
+    walls = every[every.bore > 0.0]
+    # Cells beside one hole are one.
+    _, distinct = np.unique(np.column_stack([walls.bore, walls.ruling, walls.spine]), axis=0, return_index=True)
     return Recognized(
         owner,
         nodes.corner[some, 0],
         nodes.ruling[some] * senses[:, None],
         tuple(nodes.center[rows] for rows in of_face),
         tuple(nodes.radius[rows] for rows in of_face),
-        every[every.bore > 0.0],
+        walls[distinct],
         ends,
         rounds.disc + rounds.rho,
     )

@@ -25,8 +25,10 @@ __all__ = ["NearPair"]
 Array = NDArray[np.float64]
 # Bounds of a distance that agree to this part of the size are one number, and nearest points are sought to it.
 AGREED = 1e-9
-# Pairs of parts that a search for them may look at, and pairs of nodes that a proof of a bound may.
-BUDGET, BOUND_BUDGET = 20_000, 2000
+# Pairs of parts that a search for them, or a proof of a bound, may look at.
+BUDGET = 20_000
+# Parts of a gap that are tried as bounds.
+PARTS = (0.99, 0.9, 0.75, 0.5)
 
 
 @dataclass(eq=False)
@@ -69,14 +71,17 @@ class NearPair:
     def bound(self) -> float:
         """No points of the two surfaces are nearer than this.
 
-        A search among points of which very many are nearest has no room to end: there radii may tell.
+        A search among points of which very many are nearest has no room to end: there radii may tell, or at least of
+        most of the gap.
         """
         near = self.nearest
         if near.converged or near.upper <= self.two.touching:
             return near.lower
         proof = ClearanceProof([side_faces(body) for body in self.two.bodies], [(0, 1)], [0.0])
-        almost = near.upper - AGREED * self.two.size
-        return almost if proof.is_apart(0, self.two.q, almost, BOUND_BUDGET) else near.lower
+        for length in (near.upper - AGREED * self.two.size, *(part * near.upper for part in PARTS)):
+            if length > near.lower and proof.is_apart(0, self.two.q, length, BUDGET):
+                return length
+        return near.lower
 
     def told(self) -> Clash:
         """The row of a pair whose nearest points tell what it is."""
