@@ -186,7 +186,7 @@ def looks_at(
     posed: PosedBodies,
     pairs: Sequence[Pair],
     interruption: Interruption,
-    normals: Sequence[Normal] | None = None,
+    normals: Sequence[Normal | None] | None = None,
 ) -> list[PairLook]:
     """What pairs of bodies are to each other: by a proof, or by samples where it does not tell.
 
@@ -197,7 +197,7 @@ def looks_at(
     posed : PosedBodies
     pairs : sequence of (Body, Body)
     interruption : Interruption
-    normals : sequence of callable, optional
+    normals : sequence of callable or None, optional
         Of every pair, what gives the normal (3,) from the first body to the second where they touch, or None where it
         is not known.
 
@@ -206,7 +206,7 @@ def looks_at(
     InputError
         Bodies of sizes that clearances cannot have.
     """
-    hints = [_unknown] * len(pairs) if normals is None else normals
+    hints = [normal or _unknown for normal in normals or [None] * len(pairs)]
     touched = {_key(*contact.bodies) for contact in posed.contacts}
     looks = []
     for (a, b), answer in zip(pairs, _answers(posed, pairs, hints, interruption), strict=True):

@@ -67,7 +67,7 @@ def directions(rng):
 def test_random_boxes(cases):
     """Along the axes of both: the distance of corners, the least overlap, the least wall of a nested one."""
     rng, kinds = np.random.default_rng(7), set()
-    for _ in range(cases(20, 1000)):
+    for _ in range(cases(12, 1000)):
         turn, (one, other) = directions(rng), rng.uniform(0.3, 2.0, (2, 3))
         middle = rng.uniform(-1.0, 1.0, 3) * rng.choice([0.2, 1.0, 2.0])
         apart = np.abs(middle) - 0.5 * (one + other)
@@ -87,7 +87,7 @@ def test_random_boxes(cases):
 
 def test_random_boxes_that_lie_on_each_other(cases):
     rng = np.random.default_rng(1)
-    for _ in range(cases(8, 500)):
+    for _ in range(cases(5, 500)):
         turn, (one, other) = directions(rng), rng.uniform(0.3, 2.0, (2, 3))
         middle = rng.uniform(-0.5, 0.5, 3) * (one + other)
         k = rng.integers(3)
@@ -117,7 +117,7 @@ def test_random_balls(cases):
 def test_random_pins_in_holes(cases):
     """Off the middle by less than the play they are clear, by as much they touch along a line, by more they cross."""
     rng, proved, rows = np.random.default_rng(3), 0, 0
-    for _ in range(cases(6, 300)):
+    for _ in range(cases(4, 300)):
         turn, r = directions(rng), rng.uniform(0.1, 0.6)
         play = r * 10.0 ** rng.uniform(-2.0, -0.7)
         plate = placed(
@@ -139,7 +139,7 @@ def test_thin_plates(cases):
     thin = [side.face for side in asm.Body("plate", SHAPES.box(3.0, 2.0, 0.01)).faces]
     radii = rng.uniform(0.1, 0.5, 2)
     balls = [asm.Face(SHAPES.sphere(r)) for r in radii]
-    for _ in range(cases(20, 400)):
+    for _ in range(cases(12, 400)):
         turn, k = directions(rng), rng.integers(2)
         height = rng.uniform(-2.0, 2.0) * radii[k]
         gap = abs(height) - 0.005 - radii[k]
@@ -171,7 +171,7 @@ def test_nested_shells(cases):
 
 def test_a_shaft_in_a_blind_bore_is_as_deep_as_it_is_in_the_floor(cases):
     rng = np.random.default_rng(6)
-    for _ in range(cases(3, 60)):
+    for _ in range(cases(2, 60)):
         r, deep, turn = rng.uniform(0.1, 0.5), rng.uniform(0.01, 0.2), directions(rng)
         block = [face for face in SHAPES.box(4.0, 4.0, 1.0) if face.name != "top"]
         block += [face for face in SHAPES.plate(4.0, 4.0, 1.0, [(0.0, 0.0, r)]) if face.name == "top"]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,22 +57,28 @@ class Depth:
 
 @dataclass(frozen=True, eq=False)
 class Two:
-    """Two bodies at poses q (2, 7), and what they may be in each other and still touch."""
+    """Two bodies at poses.
+
+    Attributes
+    ----------
+    a, b : Body
+    q : (2, 7)
+    size : float
+        The larger one's.
+    touching : float
+        What they may be in each other and still touch.
+    """
 
     a: Body
     b: Body
     q: Array
+    size: float
     touching: float
 
     @property
     def bodies(self) -> tuple[Body, Body]:
         """Both."""
         return self.a, self.b
-
-    @cached_property
-    def size(self) -> float:
-        """The larger one's size."""
-        return max(self.a.size, self.b.size)
 
     @property
     def part(self) -> float:

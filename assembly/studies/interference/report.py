@@ -82,11 +82,12 @@ def interference(
     q = _rows(scene, poses)
     shaped = [k for k, body in enumerate(scene.bodies) if body.faces]
     posed = PosedBodies(scene.bodies, q, touching)
-    within = touching * max((scene.bodies[k].size for k in shaped), default=0.0)
+    sizes = {k: scene.bodies[k].size for k in shaped}
+    within = touching * max(sizes.values(), default=0.0)
     near = []
     for i, j, apart in _near(scene, q, shaped, margin):
         a, b = scene.bodies[i], scene.bodies[j]
-        near.append((NearPair(Two(a, b, q[[i, j]], within), _relation(scene, a, b)), apart))
+        near.append((NearPair(Two(a, b, q[[i, j]], max(sizes[i], sizes[j]), within), _relation(scene, a, b)), apart))
     rows, searched = _rows_of(near, posed, margin, interruption)
     kept = [row for row in rows if row.bound <= margin or row.kind in ("crossing", "enclosed", "undecided")]
     return Interference(
@@ -152,7 +153,7 @@ def _rows_of(
             rows.append(pair.told())
         else:
             asked.append((pair, apart, False))
-    normals = [pair.normal for pair, _, _ in asked]
+    normals = [None if is_apart else pair.normal for pair, _, is_apart in asked]
     looks = looks_at(posed, [pair.two.bodies for pair, _, _ in asked], interruption, normals)
     for (pair, apart, is_apart), look in zip(asked, looks, strict=True):
         if is_apart and look.answer.verdict is Verdict.CLEAR:
