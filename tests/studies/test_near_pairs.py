@@ -30,16 +30,16 @@ DOT = asm.Face(SHAPES.sphere(TINY))
 
 
 def check(a, b, expected, kind, always=True):
-    """The row of two bodies is what a closed form says; where it is not always proved, between bounds at least."""
+    """The row of two bodies is what a closed form says; where a search may have no room, by bounds at least."""
     report = interference([a, b], margin=10.0)
     (row,) = report.rows
     assert row.kind == kind
-    if not row.proved and not always:
+    if not row.proved and not always and kind == "clear":
         assert 0.4 * expected <= row.bound <= expected <= row.gap
         return row
     assert row.proved
-    # Where a line of points touches the search has no room to end: it is good to the root of the last digits.
-    assert row.gap == pytest.approx(expected, abs=1e-7 if kind == "touching" else SAME)
+    # Where a line of points touches the search has no room to end.
+    assert row.gap == pytest.approx(expected, abs=SAME if always else 2e-6)
     between = np.linalg.norm(row.points[1] - row.points[0])
     same = COMMON if kind == "touching" else SAME
     assert between == pytest.approx(abs(row.gap), abs=same)
@@ -128,7 +128,7 @@ def test_random_pins_in_holes(cases):
             off = part * play * np.array([np.cos(angle), np.sin(angle)])
             pin = placed("pin", SHAPES.solid_cylinder(r, 1.5), turn, np.array([0.4 + off[0], off[1] - 0.2, high]))
             # Lines all along which a pin is as near leave the search no room to end.
-            proved += check(plate, pin, (1.0 - part) * play, kind, always=kind != "clear").proved
+            proved += check(plate, pin, (1.0 - part) * play, kind, always=kind == "crossing").proved
             rows += 1
     assert proved > 0.8 * rows
 

@@ -15,8 +15,8 @@ from assembly._record import rows_of
 from assembly.geometry.faces.face import Face
 from assembly.geometry.shapes.path import Path
 from assembly.proximity.clearance.body_cells import cells_of_body
-from assembly.proximity.clearance.records import NODE
-from assembly.proximity.clearance.round_faces import round_of, round_parts
+from assembly.proximity.clearance.records import LINKS, NODE, NONE
+from assembly.proximity.clearance.round_faces import round_holes, round_of, round_parts
 from tests.proximity.clearance.nodes import top
 from tests.proximity.clearance.scenes import direction, faces_of
 from tests.proximity.clearance.splines import bumpy_hole, shapes, surface_points
@@ -93,19 +93,48 @@ def test_sides_of_bodies(name):
 
 
 def test_bores_of_bodies():
-    """Above the wall of a hole stands its radius and its axis; nothing of the wall is nearer to that."""
+    """Of the wall of a hole, and of cells of faces beside it, the radius and the axis: nothing of them is nearer."""
     rng = np.random.default_rng(2)
-    nodes = rows_of(NODE, cells_of_body(faces_of(shapes()["plate"])).nodes)
-    bores = nodes[nodes.bore > 0.0]
-    assert sorted(bores.bore.tolist()) == pytest.approx([0.4, 0.5], abs=1e-13)
-    walls = [face for face in faces_of(shapes()["plate"]) if face.surface.degree != (1, 1)]
-    assert len(walls) == 2
-    for node in bores:
-        near = []
-        for wall in walls:
-            off = surface_points(wall, 2000, rng) - node.spine
-            near.append(np.linalg.norm(off - (off @ node.ruling)[:, None] * node.ruling, axis=1).min())
-        assert min(near) >= node.bore - OFF
+    faces = faces_of(shapes()["plate"])
+    cells = cells_of_body(faces)
+    nodes, links = rows_of(NODE, cells.nodes), rows_of(LINKS, cells.links)
+    # Above walls stands one node each; all cells of both faces that have the holes have one of these.
+    bores = np.flatnonzero(nodes.bore > 0.0)
+    walls = [k for k, face in enumerate(faces) if face.surface.degree != (1, 1)]
+    with_holes = [k for k, face in enumerate(faces) if len(face.chains) == 3]
+    assert len(walls) == len(with_holes) == 2
+    firsts = np.isin(cells.first, bores)
+    assert (firsts == np.isin(links.face[cells.first], with_holes)).all()
+    radii = np.unique(np.round(nodes.bore[bores], 12))
+    assert radii == pytest.approx([0.4, 0.5], abs=1e-13)
+
+    def below(k):
+        if links.child[k] == NONE:
+            return {int(links.face[k])}
+        return below(links.child[k]) | below(links.child[k] + 1)
+
+    for k in bores.tolist():
+        node, (owner,) = nodes[k], below(k)
+        off = points_within(faces[owner], 2000, rng) - node.spine
+        near = np.linalg.norm(off - (off @ node.ruling)[:, None] * node.ruling, axis=1).min()
+        assert near >= node.bore - OFF
+
+
+def points_within(face, count, rng):
+    """Random points of a face within its trim."""
+    u, v = (rng.uniform(*ends, count) for ends in face.surface.domain)
+    kept = face.contains(u, v) if face.boundary else np.ones(count, dtype=bool)
+    return face.surface.evaluate(u[kept], v[kept])
+
+
+def test_holes_of_flat_faces():
+    """Circles within the outer boundary alone."""
+    (flat,) = [face for face in faces_of(asm.shapes.plate(4.0, 2.0, 0.3, [(0.5, 0.1, 0.4)])) if face.name == "top"]
+    (hole,) = round_holes(flat)
+    assert not hole.outward and hole.radius == pytest.approx(0.4, abs=1e-14) and hole.radius <= 0.4
+    assert hole.center == pytest.approx([0.5, 0.1, 0.15], abs=1e-14)
+    (disc,) = [face for face in faces_of(asm.shapes.solid_cylinder(0.4, 1.0)) if face.name == "top"]
+    assert round_holes(disc) == [] and all(round_holes(face) == [] for face in faces_of(asm.shapes.sphere(1.0)))
 
 
 @pytest.mark.parametrize("name", ["pin", "ball", "torus", "cylinder", "wire", "clip"])
