@@ -3,7 +3,8 @@
 Of all pairs of bodies those are looked at whose boxes meet: bodies are within the hulls of their control points. A
 proof tells what they are to each other (`proximity/clearance/proof.py`), of most in one look. Of pairs with flat faces
 that lie on each other one body is moved off these before, by less than what is called touching; others that touch are
-moved along the directions that a look leaves open. Where the proof does not tell, samples do (`samples.py`).
+moved along the directions that a look leaves open; what fills a bore is made slimmer. Where none of this tells, samples
+do (`samples.py`).
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
-from assembly.proximity.clearance.touching import fills_bore, left_open, off_contacts
+from assembly.proximity.clearance.slimming import slim_answer
+from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
 from assembly.solve.interruption import Interruption
 from assembly.solve.samples import ROUNDED, PosedBodies, sampled
 
@@ -244,16 +246,22 @@ def _answers(
         proof = ClearanceProof(shapes, rows, [0.0] * len(rows))
         told = _proven(proof, posed.q, touching, normals[start : start + AT_ONCE], interruption)
         answers[start : start + AT_ONCE] = told
+        for k, answer in enumerate(told):
+            # No move opens bodies one of which fills a bore.
+            if answer.verdict is Verdict.UNDECIDED and not interruption.is_over():
+                i, j = rows[k]
+                slim = slim_answer(proof, k, posed.q, touching, (shapes[i], shapes[j]))
+                answers[start + k] = answer if slim is None else slim
     return answers
 
 
 def _proven(
     proof: ClearanceProof, q: Array, touching: float, normals: Sequence[Normal], interruption: Interruption
 ) -> list[Answer]:
-    """What is proven of all pairs of a proof."""
+    """What is proven of all pairs of a proof where they are, or after a move."""
     moves, moved, hopeless, asked = np.zeros((len(proof.pairs), 6)), [], [], []
     for k in range(len(proof.pairs)):
-        off = None if fills_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, normals[k])
+        off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, normals[k])
         if off is None:
             hopeless.append(k)
         elif off.any():

@@ -161,15 +161,23 @@ def test_bad_input(options, message):
         row_of_blocks(2)[0].find_crossings(**options)
 
 
-def shafts_in_bores(count):
-    """Plates whose bores shafts of the same radius fill, the first half of which have one more in their material."""
-    bodies = []
-    for k in range(count):
-        holes = [(0.0, 0.0, 0.3)]
-        bodies.append(asm.Body(f"plate {k}", asm.shapes.plate(3.0, 2.0, 0.5, holes), (4.0 * k, 0, 0)))
-        deep = 0.1 if k < count // 2 else 0.0
-        bodies.append(asm.Body(f"shaft {k}", asm.shapes.solid_cylinder(0.3, 0.5), (4.0 * k + deep, 0, 0)))
-    return asm.Assembly(bodies).solve()
+def slotted(width):
+    """A channel along z, open above, of a width."""
+    corners = [(-2, -1), (2, -1), (2, 1), (width / 2, 1), (width / 2, 0), (-width / 2, 0), (-width / 2, 1), (-2, 1)]
+    points = np.array(corners, float)
+    sides = [asm.NurbsCurve([p, q], [0, 0, 1, 1], 1) for p, q in zip(points, np.roll(points, -1, 0), strict=True)]
+    return asm.shapes.extrusion(sides, 4.0)
+
+
+def scene_of_fits():
+    """A shaft in a bore of its radius, and one beside the axis of its bore; two blocks in slots of their width."""
+    plate, shaft = asm.shapes.plate(3.0, 2.0, 0.5, [(0.0, 0.0, 0.3)]), asm.shapes.solid_cylinder(0.3, 0.5)
+    bodies = [asm.Body("plate a", plate), asm.Body("shaft a", shaft)]
+    bodies += [asm.Body("plate b", plate, (9, 0, 0)), asm.Body("shaft b", shaft, (9.1, 0, 0))]
+    for name, x, high in (("a", 20, 0.7), ("b", 30, 0.4)):
+        bodies.append(asm.Body(f"slot {name}", slotted(1.0), (x, 0, 0)))
+        bodies.append(asm.Body(f"block {name}", asm.shapes.box(1.0, 1.0, 1.0), (x, high, 1.5)))
+    return asm.Assembly(bodies)
 
 
 def test_a_look_tells_how_deep_and_where():
@@ -189,10 +197,11 @@ def test_samples_stand_in_where_bodies_conform_alone(monkeypatch):
     asked = []
     search = crossings.sampled
     monkeypatch.setattr(crossings, "sampled", lambda at, pairs, limit: asked.append(pairs) or search(at, pairs, limit))
-    solution = shafts_in_bores(4)
+    solution = scene_of_fits().solve()
     found = solution.find_crossings().found
-    assert [crossing.bodies for crossing in found] == [("plate 0", "shaft 0"), ("plate 1", "shaft 1")]
-    assert [[a.name for a, _ in pairs] for pairs in asked] == [["plate 2", "plate 3"]]
+    assert [crossing.bodies for crossing in found] == [("plate b", "shaft b"), ("slot b", "block b")]
+    # What fills a bore is made slimmer; what fills a slot is neither moved nor made so.
+    assert [[a.name for a, _ in pairs] for pairs in asked] == [["slot a"]]
     # Boxes that lie on each other are proven to touch.
     assert asm.Assembly([block("a", 0.0, fixed=True), block("b", 1.0)]).solve().crossings == () and asked[1] == []
 

@@ -18,7 +18,7 @@ from assembly.proximity.clearance.parting import least_move
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.records import CELL_FACE, FLAT, GUIDES, LINKS, NODE, NONE
 
-__all__ = ["conforms", "fills_bore", "left_open", "move_apart", "off_contacts", "recognized"]
+__all__ = ["conforms", "filled_bore", "left_open", "move_apart", "off_contacts", "recognized"]
 
 Array = NDArray[np.float64]
 # Contacts are opened, or may close, to the first of these parts of what a body may be moved that it can be moved to.
@@ -95,27 +95,37 @@ def conforms(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
 
     By what is recognized of the faces; which parts of them they have is not asked.
     """
-    return fills_bore(proof, k, q, touching) or bool(len(_flush(proof, k, q, touching)[0]))
+    return filled_bore(proof, k, q, touching) is not None or bool(len(_flush(proof, k, q, touching)[0]))
 
 
-def fills_bore(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
-    """Whether cylinders or balls of one of the bodies of pair k are in bores of their radius in the other one."""
+def filled_bore(proof: ClearanceProof, k: int, q: Array, touching: float) -> tuple[int, Array] | None:
+    """A cylinder or a ball of a body of pair k that is in a bore of its own radius in the other one, or None.
+
+    Returns
+    -------
+    (int, (2, 3))
+        Which body it is of, and in the axes of that both ends of its axis, or its center twice.
+    """
     a, b = map(recognized, proof.cells_of_both(k))
     turn, shift = proof.relative(k, q)
-    return _is_in_bore(a, b, (turn, shift), touching) or _is_in_bore(b, a, (turn.T, -turn.T @ shift), touching)
+    inner = _in_bore(a, b, (turn, shift), touching)
+    if inner is not None:
+        return 1, inner
+    inner = _in_bore(b, a, (turn.T, -turn.T @ shift), touching)
+    return None if inner is None else (0, inner)
 
 
-def _is_in_bore(outer: Recognized, inner: Recognized, pose: tuple[Array, Array], touching: float) -> bool:
-    """Whether a cylinder or a ball of the inner body, at a pose seen from the outer one, fills a bore of its radius."""
+def _in_bore(outer: Recognized, inner: Recognized, pose: tuple[Array, Array], touching: float) -> Array | None:
+    """The ends of a cylinder or a ball of the inner body, at a pose seen from the outer one, that fills a bore."""
     turn, shift = pose
-    fits = np.abs(inner.round_radii - outer.walls.bore[:, None]) <= touching
-    if not fits.any():
-        return False
-    wall, body = np.nonzero(fits)
+    wall, body = np.nonzero(np.abs(inner.round_radii - outer.walls.bore[:, None]) <= touching)
+    if not len(wall):
+        return None
     ends = inner.ends[body] @ turn.T + shift - outer.walls.spine[wall][:, None]
     axes = outer.walls.ruling[wall][:, None]
     off = ends - (ends * axes).sum(axis=2, keepdims=True) * axes
-    return bool((np.linalg.norm(off, axis=2).max(axis=1) <= touching).any())
+    fits = np.flatnonzero(np.linalg.norm(off, axis=2).max(axis=1) <= touching)
+    return np.asarray(inner.ends[body[fits[0]]]) if len(fits) else None
 
 
 def _flush(proof: ClearanceProof, k: int, q: Array, touching: float) -> tuple[Array, Array]:

@@ -52,7 +52,7 @@ class Clash(ReadOnlyArrays):
         The face, edge or vertex of either body that the point is on.
     proved : bool
         Whether `kind` is certified. Clear: `bound` is the gap but for 1e-9 of the bodies' size. Touching: the bodies
-        are clear where they are, or after a move of one of them that takes no point farther than what is called
+        are clear where they are, or once one of them is moved or made slimmer, by no more than what is called
         touching. Crossing: the surfaces cross, and no translation by less than that undoes it, or there is a ball that
         is inside of both bodies. Enclosed: the surfaces are apart, and the one is inside of the other one.
     relation : str

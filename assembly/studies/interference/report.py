@@ -69,8 +69,8 @@ def interference(
     -----
     Boxes tell which pairs may be near; of those the nearest points are searched for by branch and bound
     (`assembly.proximity.distance`). Of bodies that have points in common a look proves that they touch, or cross, as in
-    `Solution.crossings`. Where it does not tell, as of pins in bores of their own radius, samples do, and the row is
-    not proved.
+    `Solution.crossings`. Where it does not tell, as of blocks in slots of their width, samples do, and the row is not
+    proved.
     """
     interruption = CTRL_C if time_limit is None else Interruption(time_limit)
     margin = bounded("margin", margin)
