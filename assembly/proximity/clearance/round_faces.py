@@ -21,8 +21,10 @@ __all__ = ["Round", "round_holes", "round_of", "round_parts"]
 Array = NDArray[np.float64]
 # How far off a face may be from what it is recognized as, in parts of its size. Bounds are those of the face itself.
 EXACT = 1e-12
-# The same of cylinders and balls, some of which files have to 1e-11.
+# The same of cylinders, balls and circles, some of which files have to 1e-11.
 NEARLY = 1e-10
+# The same of holes, whose boundaries files may have as curves through points of circles.
+HOLE = 1e-4
 # A face around less of a cylinder than about half is no round body: both extents across the axis, over the radius.
 HALF = 0.95
 # A ball of more than this part of a face's size is no ball that the face goes around.
@@ -209,13 +211,17 @@ def _circle(face: Face, chain: range, plane: tuple[Array, Array, Array], outward
     samples = np.concatenate(points)
     basis = np.linalg.svd(np.eye(3) - np.outer(axis, axis))[0][:, :2]
     middle, radius = _sphere(samples @ basis)
+    x, y = (samples @ basis - middle).T
+    # A slot along an arc does not go around its center.
+    if abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())) < 4.0 * radius**2:
+        return None
     center = basis @ middle + (samples[0] @ axis) * axis
-    size = float(np.linalg.norm(np.ptp(samples, axis=0)))
-    if not radius > 0.0 or np.abs(np.linalg.norm(samples - center, axis=1) - radius).max() > EXACT * size:
+    off = (NEARLY if outward else HOLE) * float(np.linalg.norm(np.ptp(samples, axis=0)))
+    if not radius > 0.0 or np.abs(np.linalg.norm(samples - center, axis=1) - radius).max() > off:
         return None
     bounds = [_squares(part, center, np.eye(3)) for part in pieces]
     least, most = min(low for low, _ in bounds), max(high for _, high in bounds)
-    if max(np.sqrt(most) - radius, radius - np.sqrt(max(least, 0.0))) > EXACT * size:
+    if max(np.sqrt(most) - radius, radius - np.sqrt(max(least, 0.0))) > off:
         return None
     far = float(np.abs(face.surface.control_points).max())
     return Round(center, axis, 8e-16 * far + EXACT * far, _radius((least, most), outward, far), 0.0, outward)
