@@ -26,6 +26,7 @@ from assembly.constraints.model.joint import Joint
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Answer, Verdict
+from assembly.proximity.clearance.body_cells import has_cells
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
 from assembly.proximity.clearance.slimming import slim_answer
 from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
@@ -239,19 +240,23 @@ def _answers(
     number = {id(body): k for k, body in enumerate(posed.bodies)}
     shapes = [side_faces(body) for body in posed.bodies]
     touching = max(ROUNDED, posed.touching) * size
-    for start in range(0, len(pairs), AT_ONCE):
+    used = {number[id(body)] for pair in pairs for body in pair}
+    known = {k for k in used if not interruption.is_over() and has_cells(shapes[k])}
+    asked = [k for k, pair in enumerate(pairs) if all(number[id(body)] in known for body in pair)]
+    for start in range(0, len(asked), AT_ONCE):
+        some = asked[start : start + AT_ONCE]
         if interruption.is_over():
             break
-        rows = [(number[id(a)], number[id(b)]) for a, b in pairs[start : start + AT_ONCE]]
+        rows = [(number[id(a)], number[id(b)]) for a, b in (pairs[k] for k in some)]
         proof = ClearanceProof(shapes, rows, [0.0] * len(rows))
-        told = _proven(proof, posed.q, touching, normals[start : start + AT_ONCE], interruption)
-        answers[start : start + AT_ONCE] = told
-        for k, answer in enumerate(told):
+        told = _proven(proof, posed.q, touching, [normals[k] for k in some], interruption)
+        for place, (k, answer) in enumerate(zip(some, told, strict=True)):
+            answers[k] = answer
             # No move opens bodies one of which fills a bore.
             if answer.verdict is Verdict.UNDECIDED and not interruption.is_over():
-                i, j = rows[k]
-                slim = slim_answer(proof, k, posed.q, touching, (shapes[i], shapes[j]))
-                answers[start + k] = answer if slim is None else slim
+                i, j = rows[place]
+                slim = slim_answer(proof, place, posed.q, touching, (shapes[i], shapes[j]))
+                answers[k] = answer if slim is None else slim
     return answers
 
 

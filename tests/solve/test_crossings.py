@@ -206,6 +206,15 @@ def test_samples_stand_in_where_bodies_conform_alone(monkeypatch):
     assert asm.Assembly([block("a", 0.0, fixed=True), block("b", 1.0)]).solve().crossings == () and asked[1] == []
 
 
+def test_bodies_of_which_nothing_can_be_proven_are_sampled(monkeypatch):
+    """As those of files with faces whose boundaries have gaps."""
+    monkeypatch.setattr(crossings, "has_cells", lambda faces: False)
+    solution, expected = row_of_blocks(3)
+    found = solution.find_crossings().found
+    assert tuple(crossing.bodies for crossing in found) == expected
+    assert not any(crossing.proved or crossing.depth > 0.0 for crossing in found)
+
+
 def test_updates_in_slices_find_the_same(monkeypatch):
     bodies = [block(f"{k}", 0.7 * k) for k in range(6)]
     posed = samples.PosedBodies(bodies, np.array([body.q for body in bodies]), 1e-9)

@@ -314,16 +314,17 @@ class _Trimmed:
                 break
             self.rim = self.rim.split(crossing)
         n = len(found.parameters)
-        if len(crossing):
-            # Curves that touch: which side a triangle is on is asked of the true boundary.
-            real = mesh.triangles[(mesh.triangles < n).all(axis=1)]
-            at = found.parameters[real].mean(axis=1)
-            within = self.face.locate(at[:, 0], at[:, 1]) > 0
-            return found, real[within], mesh.edges, mesh.owner
-        of_border = mesh.owner < k
-        walls = mesh.edges[(~of_border) & np.append(np.zeros(k, dtype=bool), hull)[mesh.owner]]
-        kept = mesh.triangles[inside(mesh.triangles, n + 12, mesh.edges[of_border], walls)]
-        return found, kept, mesh.edges, mesh.owner
+        if not len(crossing):
+            of_border = mesh.owner < k
+            walls = mesh.edges[(~of_border) & np.append(np.zeros(k, dtype=bool), hull)[mesh.owner]]
+            kept = mesh.triangles[inside(mesh.triangles, n + 12, mesh.edges[of_border], walls)]
+            if (kept < n).all():
+                return found, kept, mesh.edges, mesh.owner
+        # Curves that touch, or a boundary with a gap: which side a triangle is on is asked of the true boundary.
+        real = mesh.triangles[(mesh.triangles < n).all(axis=1)]
+        at = found.parameters[real].mean(axis=1)
+        within = self.face.locate(at[:, 0], at[:, 1]) > 0
+        return found, real[within], mesh.edges, mesh.owner
 
     def _points(self, parameters: Array) -> Array:
         """In space; both sides of a cut, and all of a pole, equal to the last bit."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import rows_of
+from assembly.errors import InputError
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import spline_curve_at, surface_at
 from assembly.proximity.brep.solid import solid_of
@@ -28,7 +29,7 @@ from assembly.proximity.clearance.records import (
 from assembly.proximity.clearance.round_faces import Round, round_holes, round_of, round_parts
 from assembly.proximity.clearance.wire_cells import WireCells, wire_cells
 
-__all__ = ["BodyCells", "cells_of_body"]
+__all__ = ["BodyCells", "cells_of_body", "has_cells"]
 
 Array = NDArray[np.float64]
 Cells = list[CellTable | WireCells]
@@ -116,6 +117,15 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
         float(max(np.abs(low).max(), np.abs(high).max())),
         min([0.25 * size, *radii]),
     )
+
+
+def has_cells(faces: tuple[Face, ...]) -> bool:
+    """Whether a proof may be made of faces: files have some whose boundaries have gaps, or touch themselves."""
+    try:
+        cells_of_body(faces)
+    except InputError:
+        return False
+    return True
 
 
 def _parts(faces: tuple[Face, ...], tables: Cells) -> tuple[Table, list[Round | None]]:

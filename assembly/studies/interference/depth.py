@@ -21,7 +21,7 @@ from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import IDENTITY_ROW, rotation_matrix
 from assembly.proximity.brep.solid import solid_of
-from assembly.proximity.clearance.body_cells import cells_of_body
+from assembly.proximity.clearance.body_cells import cells_of_body, has_cells
 from assembly.proximity.clearance.round_faces import round_of
 from assembly.proximity.clearance.touching import recognized
 from assembly.proximity.features.body_distance import BodyDistance, DistanceStatus, distance
@@ -96,11 +96,12 @@ def depth_of(two: Two, crosses: Callable[[Array], bool]) -> Depth:
         Whether they do so where the second one is at another pose (7,).
     """
     found = _way_apart(two)
-    if not all(_is_convex(side_faces(body)) for body in two.bodies):
+    known = all(has_cells(side_faces(body)) for body in two.bodies)
+    if not known or not all(_is_convex(side_faces(body)) for body in two.bodies):
         local = _listed(two)
         if local is not None and local.gap > found.gap:
             found = local
-        flat = _along_flat_faces(two, found.gap, crosses)
+        flat = _along_flat_faces(two, found.gap, crosses) if known else None
         found = found if flat is None else flat
     return found if np.isfinite(found.gap) else Depth(0.0, found.points, found.faces)
 

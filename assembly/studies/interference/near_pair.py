@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.contact import side_faces
 from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.clearance.body_cells import has_cells
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.features.body_distance import Beyond, BodyDistance, DistanceStatus, beyond, distance
 from assembly.solve.crossings import PairLook
@@ -76,6 +77,8 @@ class NearPair:
         """
         near = self.nearest
         if near.converged or near.upper <= self.two.touching:
+            return near.lower
+        if not all(has_cells(side_faces(body)) for body in self.two.bodies):
             return near.lower
         proof = ClearanceProof([side_faces(body) for body in self.two.bodies], [(0, 1)], [0.0])
         for length in (near.upper - AGREED * self.two.size, *(part * near.upper for part in PARTS)):
