@@ -24,8 +24,8 @@ from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
 from assembly.proximity.clearance.touching import left_open, move_apart
 from assembly.proximity.extrema.pairs import ContactPair
 from assembly.solve.contact_pairs import contact_pairs, listed_contacts
-from assembly.solve.crossings import crossings_of
 from assembly.solve.interruption import CTRL_C
+from assembly.solve.samples import PosedBodies, sampled
 
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
@@ -117,13 +117,14 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
             for k, answer in enumerate(answers)
         ]
     owned = _owned(packed)
-    sampled = [pair for (_, pair, _), asked in zip(owned, conforming, strict=True) if asked]
-    crossing = set(crossings_of(solution, sampled, CTRL_C).pairs) if sampled else set()
+    asked = [k for k, conform in enumerate(conforming) if conform]
+    found_crossing = sampled(PosedBodies.of(solution), [owned[k][1] for k in asked], CTRL_C).crossing
+    clear = {k for place, k in enumerate(asked) if place not in found_crossing}
     found = []
-    for (item, (a, b), touched), answer, asked in zip(owned, answers, conforming, strict=True):
-        names, proven = (a.name, b.name), is_proven(answer)
-        holds = proven or (asked and names not in crossing)
-        found.append(PairAnswer(item.name, names, answer, holds, proven and not (touched and item.minimum > 0.0)))
+    for k, ((item, (a, b), touched), answer) in enumerate(zip(owned, answers, strict=True)):
+        proven = is_proven(answer)
+        proved = proven and not (touched and item.minimum > 0.0)
+        found.append(PairAnswer(item.name, (a.name, b.name), answer, proven or k in clear, proved))
     return found
 
 

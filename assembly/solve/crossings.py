@@ -1,56 +1,85 @@
 """Bodies that cross at the pose of a solution.
 
-Of all pairs of bodies those are searched whose boxes meet: bodies are within the hulls of their control points. Of most
-a proof tells (`proximity/clearance/proof.py`). Others touch, and updates of a contact manager tell of those, which
-go on in slices, between which the interpreter runs, so that Ctrl-C and a time limit are answered.
+Of all pairs of bodies those are looked at whose boxes meet: bodies are within the hulls of their control points. A
+proof tells what they are to each other (`proximity/clearance/proof.py`), of most in one look. Of pairs with flat faces
+that lie on each other one body is moved off these before, by less than what is called touching; others that touch are
+moved along the directions that a look leaves open; what fills a bore is made slimmer. Where none of this tells, samples
+do (`samples.py`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from itertools import combinations
-from time import perf_counter_ns
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import ReadOnlyArrays
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint
-from assembly.constraints.model.contact import Contact, side_faces
+from assembly.constraints.model.contact import side_faces
 from assembly.constraints.model.couplings import Coupling
 from assembly.constraints.model.joint import Joint
-from assembly.constraints.packing.scene import Packed
-from assembly.constraints.program import records as layout
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
-from assembly.proximity.bvh.facet_tree import FacetTree
-from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.clearance.answers import Answer, Verdict
+from assembly.proximity.clearance.body_cells import has_cells
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
-from assembly.proximity.features.solid_contact import PAIR_GAP, TRACK
-from assembly.proximity.manager import records as manager_records
-from assembly.proximity.manager import update as manager
-from assembly.proximity.manager.parameters import SLICE
+from assembly.proximity.clearance.slimming import slim_answer
+from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
 from assembly.solve.interruption import Interruption
+from assembly.solve.samples import ROUNDED, PosedBodies, sampled
 
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
 
-__all__ = ["Crossings", "PosedBodies", "crossings_of", "find_crossings", "free_pairs", "joined_pairs"]
+__all__ = [
+    "Crossing",
+    "Crossings",
+    "PairLook",
+    "crossings_of",
+    "find_crossings",
+    "free_pairs",
+    "joined_pairs",
+    "looks_at",
+    "posed_box",
+]
 
 Array = NDArray[np.float64]
 Pair = tuple[Body, Body]
-# What is in each other by less, in parts of the scene's size, may be so by rounding.
-ROUNDED = 1e-10
-# How deep updates see, in parts of that size. A deep update of wires that cross often finds so much that it lacks
-# room for the rest, so that there are several.
-DEPTHS = (0.005, 0.015, 0.05)
-# Contacts of a pair, or of a body in many, that may be near at a time. What is beyond is known where bodies cross by
-# more than updates take for nothing.
-PLACES = 8
+Normal = Callable[[], Array | None]
+# Pairs whose proofs are made at once.
+AT_ONCE = 64
+# Pairs of nodes that a look may take where bodies conform.
+FEW = 500
+# Moves that are tried for what a look leaves open.
+TRIES = 2
 # What rounding may make of boxes, in parts of where they end.
 END_ROUNDING = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing(ReadOnlyArrays):
+    """Two bodies that cross, or of which one is within the other.
+
+    Attributes
+    ----------
+    bodies : (name, name)
+    depth : float
+        No translation by less undoes it; 0 where that is not proven.
+    place : (3,)
+        Where a crossing was proven, in the world; else NaN.
+    proved : bool
+        Whether it is proven; else samples tell.
+    """
+
+    bodies: tuple[str, str]
+    depth: float
+    place: Array = field(repr=False)
+    proved: bool
 
 
 @dataclass(frozen=True)
@@ -59,14 +88,19 @@ class Crossings:
 
     Attributes
     ----------
-    pairs : tuple of (name, name)
+    found : tuple of Crossing
         Bodies that cross elsewhere than at their contacts.
     unseen : tuple of (name, name)
         Bodies of which nobody knows, because the time limit was over: they may cross.
     """
 
-    pairs: tuple[tuple[str, str], ...]
+    found: tuple[Crossing, ...]
     unseen: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Names of the bodies that cross."""
+        return tuple(crossing.bodies for crossing in self.found)
 
     @property
     def is_complete(self) -> bool:
@@ -76,44 +110,25 @@ class Crossings:
     @property
     def is_clear(self) -> bool:
         """Whether all pairs were searched and none crosses."""
-        return not self.pairs and not self.unseen
+        return not self.found and not self.unseen
 
 
-@dataclass(frozen=True, eq=False)
-class PosedBodies:
-    """Bodies at poses, and what of them is no crossing.
+class PairLook(NamedTuple):
+    """What a pair of bodies is to each other.
 
     Attributes
     ----------
-    bodies : sequence of Body
-    q : (n, 7)
-    touching : float
-        What may be in each other and still touch, in parts of the scene's size.
-    contacts : sequence of Contact
-    given : (k, TRACK), optional
-        Pairs of the contacts, as they are tracked.
+    answer : Answer
+        What is proven.
+    crosses : bool or None
+        Whether they cross or one is within the other, by that or by samples; None where there was no time.
+    proved : bool
+        Whether that is proven.
     """
 
-    bodies: Sequence[Body]
-    q: Array
-    touching: float
-    contacts: Sequence[Contact] = ()
-    given: Array | None = None
-
-
-class _Watched(Clearance):
-    """A clearance of given pairs, any bodies of which may be moved, and extrema alone."""
-
-    corners = False
-
-    def __init__(self, pairs: Sequence[Pair], name: str) -> None:
-        bodies = dict.fromkeys(body for pair in pairs for body in pair)
-        super().__init__(bodies, name=name, slots=PLACES * (1 + min(len(pairs), len(bodies))))
-        self._pairs = list(pairs)
-
-    def pairs(self, bodies: Sequence[Body]) -> list[Pair]:
-        """Those that were given."""
-        return self._pairs
+    answer: Answer
+    crosses: bool | None
+    proved: bool
 
 
 def _key(a: Body, b: Body) -> frozenset[int]:
@@ -148,10 +163,7 @@ def joined_pairs(bodies: Iterable[Body], constraints: Sequence[Constraint]) -> l
 
 def crossings_of(solution: Solution, pairs: Sequence[Pair], interruption: Interruption) -> Crossings:
     """Which of those pairs cross elsewhere than at contacts that the scene has, or are in each other."""
-    contacts = [item for item in solution._scene.constraints if isinstance(item, Contact)]
-    given = solution._parameters[: len(contacts)]
-    posed = PosedBodies(solution._scene.bodies, solution.q, solution._touching, contacts, given)
-    return find_crossings(posed, pairs, interruption)
+    return find_crossings(PosedBodies.of(solution), pairs, interruption)
 
 
 def find_crossings(posed: PosedBodies, pairs: Sequence[Pair], interruption: Interruption) -> Crossings:
@@ -162,121 +174,141 @@ def find_crossings(posed: PosedBodies, pairs: Sequence[Pair], interruption: Inte
     InputError
         Bodies of sizes that clearances cannot have.
     """
+    found, unseen = [], []
     near = _near(posed, pairs)
-    if not near:
-        return Crossings(())
-    told = _proven(posed, near, interruption)
-    found = _searched(posed, [pair for pair, crosses in zip(near, told, strict=True) if crosses is None], interruption)
-    crossing = {_key(a, b) for a, b in found[0]}
-    crossing |= {_key(*pair) for pair, crosses in zip(near, told, strict=True) if crosses}
-    return Crossings(_named([pair for pair in near if _key(*pair) in crossing]), _named(found[1]))
+    for (a, b), look in zip(near, looks_at(posed, near, interruption), strict=True):
+        if look.crosses is None:
+            unseen.append((a.name, b.name))
+        elif look.crosses:
+            answer = look.answer
+            found.append(Crossing((a.name, b.name), answer.depth if look.proved else 0.0, answer.place, look.proved))
+    return Crossings(tuple(found), tuple(unseen))
 
 
-def _proven(posed: PosedBodies, pairs: Sequence[Pair], interruption: Interruption) -> list[bool | None]:
-    """Whether pairs cross, or one is within the other, by a proof; None where it does not tell.
+def looks_at(
+    posed: PosedBodies,
+    pairs: Sequence[Pair],
+    interruption: Interruption,
+    normals: Sequence[Normal | None] | None = None,
+) -> list[PairLook]:
+    """What pairs of bodies are to each other: by a proof, or by samples where it does not tell.
 
-    That is of bodies that touch, and of those that are in each other where a contact of theirs is.
+    Of bodies that cross and have a contact, samples tell whether they do so elsewhere.
+
+    Parameters
+    ----------
+    posed : PosedBodies
+    pairs : sequence of (Body, Body)
+    interruption : Interruption
+    normals : sequence of callable or None, optional
+        Of every pair, what gives the normal (3,) from the first body to the second where they touch, or None where it
+        is not known.
+
+    Raises
+    ------
+    InputError
+        Bodies of sizes that clearances cannot have.
     """
-    size = max(body.size for pair in pairs for body in pair)
+    hints = [normal or _unknown for normal in normals or [None] * len(pairs)]
+    touched = {_key(*contact.bodies) for contact in posed.contacts}
+    looks = []
+    for (a, b), answer in zip(pairs, _answers(posed, pairs, hints, interruption), strict=True):
+        crosses = answer.verdict in (Verdict.CROSSING, Verdict.ENCLOSED)
+        proved = answer.verdict is not Verdict.UNDECIDED and not (crosses and _key(a, b) in touched)
+        looks.append(PairLook(answer, crosses if proved else None, proved))
+    asked = [k for k, look in enumerate(looks) if not look.proved]
+    found = sampled(posed, [pairs[k] for k in asked], interruption)
+    for place, k in enumerate(asked):
+        if place in found.crossing or found.is_complete:
+            looks[k] = looks[k]._replace(crosses=place in found.crossing)
+    return looks
+
+
+def _unknown() -> None:
+    """Nothing is known of where bodies touch."""
+    return None
+
+
+def _answers(
+    posed: PosedBodies, pairs: Sequence[Pair], normals: Sequence[Normal], interruption: Interruption
+) -> list[Answer]:
+    """What is proven of pairs; nothing of those for which there is no time."""
+    answers = [Answer(Verdict.UNDECIDED)] * len(pairs)
+    size = max((body.size for body in posed.bodies if body.faces), default=0.0)
     if not LEAST_SIZE < size < 1.0 / LEAST_SIZE:
-        return [None] * len(pairs)
+        return answers
     number = {id(body): k for k, body in enumerate(posed.bodies)}
     shapes = [side_faces(body) for body in posed.bodies]
-    touched = {_key(*contact.bodies) for contact in posed.contacts}
-    told: list[bool | None] = []
-    for pair in pairs:
+    touching = max(ROUNDED, posed.touching) * size
+    used = {number[id(body)] for pair in pairs for body in pair}
+    known = {k for k in used if not interruption.is_over() and has_cells(shapes[k])}
+    asked = [k for k, pair in enumerate(pairs) if all(number[id(body)] in known for body in pair)]
+    for start in range(0, len(asked), AT_ONCE):
+        some = asked[start : start + AT_ONCE]
         if interruption.is_over():
-            return told + [None] * (len(pairs) - len(told))
-        a, b = pair
-        proof = ClearanceProof(shapes, [(number[id(a)], number[id(b)])], [0.0])
-        (answer,) = proof.look(posed.q, max(ROUNDED, posed.touching) * size)
-        crosses = answer.verdict in (Verdict.CROSSING, Verdict.ENCLOSED)
-        known = answer.verdict is Verdict.CLEAR or (crosses and _key(a, b) not in touched)
-        told.append(crosses if known else None)
-    return told
+            break
+        rows = [(number[id(a)], number[id(b)]) for a, b in (pairs[k] for k in some)]
+        proof = ClearanceProof(shapes, rows, [0.0] * len(rows))
+        told = _proven(proof, posed.q, touching, [normals[k] for k in some], interruption)
+        for place, (k, answer) in enumerate(zip(some, told, strict=True)):
+            answers[k] = answer
+            # No move opens bodies one of which fills a bore.
+            if answer.verdict is Verdict.UNDECIDED and not interruption.is_over():
+                i, j = rows[place]
+                slim = slim_answer(proof, place, posed.q, touching, (shapes[i], shapes[j]))
+                answers[k] = answer if slim is None else slim
+    return answers
 
 
-def _searched(
-    posed: PosedBodies, near: Sequence[Pair], interruption: Interruption
-) -> tuple[Sequence[Pair], Sequence[Pair]]:
-    """The pairs that updates of a contact manager find to cross, and those that were not searched to the end."""
-    if not near:
-        return (), ()
-    name = "crossings"
-    while any(item.name == name for item in posed.contacts):
-        name += "'"
-    if not _known_shapes(near, interruption):
-        return (), near
-    packed = Packed(posed.bodies, [*posed.contacts, _Watched(near, name)], ())
-    found, is_complete = _seen(packed, posed, interruption)
-    crossing = [pair for k, pair in enumerate(near) if k in found]
-    unseen = [] if is_complete else [pair for k, pair in enumerate(near) if k not in found]
-    return crossing, unseen
+def _proven(
+    proof: ClearanceProof, q: Array, touching: float, normals: Sequence[Normal], interruption: Interruption
+) -> list[Answer]:
+    """What is proven of all pairs of a proof where they are, or after a move."""
+    moves, moved, hopeless, asked = np.zeros((len(proof.pairs), 6)), [], [], []
+    for k in range(len(proof.pairs)):
+        off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, normals[k])
+        if off is None:
+            hopeless.append(k)
+        elif off.any():
+            moves[k] = off
+            moved.append(k)
+        else:
+            asked.append(k)
+    answers = dict(zip(moved, proof.look(q, touching, moves, which=moved), strict=True))
+    asked += [k for k, answer in answers.items() if answer.verdict is not Verdict.TOUCHING]
+    for k in asked:
+        answers[k] = Answer(Verdict.UNDECIDED) if interruption.is_over() else _at_rest(proof, k, q, touching)
+    # No look at rest tells that bodies conform, and no move opens them: only that they cross may be found.
+    answers.update(zip(hopeless, proof.look(q, touching, which=hopeless, budget=FEW), strict=True))
+    return [answers[k] for k in range(len(proof.pairs))]
 
 
-def _named(pairs: Sequence[Pair]) -> tuple[tuple[str, str], ...]:
-    return tuple((a.name, b.name) for a, b in pairs)
+def _at_rest(proof: ClearanceProof, k: int, q: Array, touching: float) -> Answer:
+    """What is proven of a pair where it is, or where it is moved off what that leaves open."""
+    (answer,) = found = proof.look(q, touching, which=[k])
+    moves = np.zeros((len(proof.pairs), 6))
+    for _ in range(TRIES):
+        move = left_open(proof, k, q, touching) if found[0].verdict is Verdict.UNDECIDED else None
+        if move is None:
+            break
+        moves[k] = move
+        found = proof.look(q, touching, moves, which=[k])
+    return found[0] if found[0].verdict is Verdict.TOUCHING else answer
 
 
 def _near(posed: PosedBodies, pairs: Sequence[Pair]) -> list[Pair]:
     """Those pairs of bodies with shapes whose boxes, along the world's axes, meet."""
     placed = zip(posed.bodies, posed.q, strict=True)
-    boxes = {id(body): _box(body, row) for body, row in placed if body.faces}
+    boxes = {id(body): posed_box(body, row) for body, row in placed if body.faces}
     low = np.array([[boxes[id(a)][0], boxes[id(b)][0]] for a, b in pairs]).reshape(-1, 2, 3)
     high = np.array([[boxes[id(a)][1], boxes[id(b)][1]] for a, b in pairs]).reshape(-1, 2, 3)
     meet = (low.max(axis=1) <= high.min(axis=1)).all(axis=1)
     return [pair for pair, near in zip(pairs, meet.tolist(), strict=True) if near]
 
 
-def _box(body: Body, row: Array) -> tuple[Array, Array]:
+def posed_box(body: Body, row: Array) -> tuple[Array, Array]:
     """The lower and the upper corner of a box around a body at a pose."""
     points = np.concatenate([face.face.surface.control_points.reshape(-1, 3) for face in body.faces])
     points = points @ rotation_matrix(row[3:]).T + row[:3]
     margin = END_ROUNDING * np.abs(points).max()
     return points.min(axis=0) - margin, points.max(axis=0) + margin
-
-
-def _known_shapes(pairs: Iterable[Pair], interruption: Interruption) -> bool:
-    """Make what an update has to know of shapes, which takes longer than the update; whether there was time to.
-
-    Where there is no limit it is made as the scene is packed: of very many shapes it is not kept until then.
-    """
-    if not interruption.is_limited:
-        return True
-    for faces in dict.fromkeys(side_faces(body) for pair in pairs for body in pair):
-        FacetTree.of(faces)
-        if interruption.is_over():
-            return False
-    return True
-
-
-def _seen(packed: Packed, posed: PosedBodies, interruption: Interruption) -> tuple[set[int], bool]:
-    """Places of pairs that updates of several depths find to cross, and whether all were searched."""
-    q, contacts = posed.q.copy(), len(posed.contacts)
-    q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
-    count = manager_records.PAIR_MEMORY * len(packed.clearance_pairs[0])
-    deep = max(ROUNDED, posed.touching)
-    record = packed.table[layout.MANAGER_RECORD]
-    # Where there is no clock updates are not cut.
-    packed.table[record + manager_records.CLOCK] = packed.table[layout.CLOCK_AT]
-    found: set[int] = set()
-    for depth in DEPTHS:
-        state = packed.new_state()
-        memory = state[packed.memory_at :]
-        memory[manager_records.OVERLAP] = posed.touching
-        pairs = memory[manager_records.MEMORY_HEADER :][:count].reshape(-1, manager_records.PAIR_MEMORY)
-        pairs[:, manager_records.QUERY_MARGIN] = depth
-        tracked = np.full((packed.pair_rows, TRACK), np.nan)
-        if posed.given is not None:
-            tracked[:contacts] = posed.given
-        is_cut = True
-        while is_cut and not interruption.is_over():
-            memory[manager_records.DEADLINE] = perf_counter_ns() + SLICE
-            manager.update(packed.table, packed.pool, record, memory, q, tracked, manager.EVERYTHING)
-            is_cut = memory[manager_records.DEADLINE] < 0.0
-        found |= set(np.flatnonzero(pairs[:, manager_records.CROSSED] == 1.0).tolist())
-        gaps = tracked[contacts:, PAIR_GAP]
-        found |= {pair for gap, (pair, _) in zip(gaps, packed.listed(state), strict=True) if pair >= 0 and gap < -deep}
-        if is_cut:
-            return found, False
-    return found, True

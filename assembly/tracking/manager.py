@@ -23,9 +23,10 @@ from assembly.proximity.extrema.rates import ARM_F, GAP, NORMAL
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
 from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.events import Event, PairState, events_of
-from assembly.solve.crossings import PosedBodies, find_crossings
+from assembly.solve.crossings import find_crossings
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.options import Options, touching_part
+from assembly.solve.samples import PosedBodies
 from assembly.tracking.follow import follow
 
 __all__ = ["ListedContact", "Manager"]

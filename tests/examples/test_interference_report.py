@@ -29,7 +29,8 @@ def test_what_is_drawn_wrong_is_found(run):
     assert found["handle", "weight"] == ("enclosed", True, pytest.approx(-2.0, abs=1e-9))
     assert found["board", "handle"][0] == "touching"
     assert found["housing", "cover"] == ("touching", True, pytest.approx(0.0, abs=1e-12))
-    assert found["cover", "board"] == ("clear", True, pytest.approx(0.3, abs=1e-12))
+    # Nearest points are sought to 1e-9 of the size.
+    assert found["cover", "board"] == ("clear", True, pytest.approx(0.3, abs=1e-10))
     # Nearest all around, which radii about the axis prove.
     assert found["cover", "left screw"] == ("clear", True, pytest.approx(0.4, abs=1e-9))
     assert len(found) == 8

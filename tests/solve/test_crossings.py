@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 import assembly as asm
 from assembly.errors import InputError
-from assembly.solve import crossings
-from assembly.solve.interruption import Interruption
+from assembly.solve import crossings, samples
+from assembly.solve.interruption import CTRL_C, Interruption
 
 
 def block(name, x, size=1.0, **others):
@@ -159,15 +161,71 @@ def test_bad_input(options, message):
         row_of_blocks(2)[0].find_crossings(**options)
 
 
+def slotted(width):
+    """A channel along z, open above, of a width."""
+    corners = [(-2, -1), (2, -1), (2, 1), (width / 2, 1), (width / 2, 0), (-width / 2, 0), (-width / 2, 1), (-2, 1)]
+    points = np.array(corners, float)
+    sides = [asm.NurbsCurve([p, q], [0, 0, 1, 1], 1) for p, q in zip(points, np.roll(points, -1, 0), strict=True)]
+    return asm.shapes.extrusion(sides, 4.0)
+
+
+def scene_of_fits():
+    """A shaft in a bore of its radius, and one beside the axis of its bore; two blocks in slots of their width."""
+    plate, shaft = asm.shapes.plate(3.0, 2.0, 0.5, [(0.0, 0.0, 0.3)]), asm.shapes.solid_cylinder(0.3, 0.5)
+    bodies = [asm.Body("plate a", plate), asm.Body("shaft a", shaft)]
+    bodies += [asm.Body("plate b", plate, (9, 0, 0)), asm.Body("shaft b", shaft, (9.1, 0, 0))]
+    for name, x, high in (("a", 20, 0.7), ("b", 30, 0.4)):
+        bodies.append(asm.Body(f"slot {name}", slotted(1.0), (x, 0, 0)))
+        bodies.append(asm.Body(f"block {name}", asm.shapes.box(1.0, 1.0, 1.0), (x, high, 1.5)))
+    return asm.Assembly(bodies)
+
+
+def test_a_look_tells_how_deep_and_where():
+    places = [np.array([0.7, 0.2, 0.1]) * k for k in range(3)]
+    bodies = [asm.Body(f"{k}", asm.shapes.box(1.0, 1.0, 1.0), place) for k, place in enumerate(places)]
+    found = asm.Assembly(bodies).solve().find_crossings().found
+    assert [crossing.bodies for crossing in found] == [("0", "1"), ("1", "2")]
+    for k, crossing in enumerate(found):
+        # In each other by 0.3: what is proven is no more.
+        assert crossing.proved and 0.0 < crossing.depth <= 0.3
+        # On both, to rounding: cells of boxes are exact.
+        for middle in places[k : k + 2]:
+            assert np.abs(crossing.place - middle).max() == pytest.approx(0.5, abs=1e-14)
+
+
+def test_samples_stand_in_where_bodies_conform_alone(monkeypatch):
+    asked = []
+    search = crossings.sampled
+    monkeypatch.setattr(crossings, "sampled", lambda at, pairs, limit: asked.append(pairs) or search(at, pairs, limit))
+    solution = scene_of_fits().solve()
+    found = solution.find_crossings().found
+    assert [crossing.bodies for crossing in found] == [("plate b", "shaft b"), ("slot b", "block b")]
+    # What fills a bore is made slimmer; what fills a slot is neither moved nor made so.
+    assert [[a.name for a, _ in pairs] for pairs in asked] == [["slot a"]]
+    # Boxes that lie on each other are proven to touch.
+    assert asm.Assembly([block("a", 0.0, fixed=True), block("b", 1.0)]).solve().crossings == () and asked[1] == []
+
+
+def test_bodies_of_which_nothing_can_be_proven_are_sampled(monkeypatch):
+    """As those of files with faces whose boundaries have gaps."""
+    monkeypatch.setattr(crossings, "has_cells", lambda faces: False)
+    solution, expected = row_of_blocks(3)
+    found = solution.find_crossings().found
+    assert tuple(crossing.bodies for crossing in found) == expected
+    assert not any(crossing.proved or crossing.depth > 0.0 for crossing in found)
+
+
 def test_updates_in_slices_find_the_same(monkeypatch):
-    solution, expected = row_of_blocks(6)
+    bodies = [block(f"{k}", 0.7 * k) for k in range(6)]
+    posed = samples.PosedBodies(bodies, np.array([body.q for body in bodies]), 1e-9)
+    pairs = list(pairwise(bodies))
     updates = []
-    update = crossings.manager.update
+    update = samples.manager.update
     # A slice that is over when it begins: every update is of one pair.
-    monkeypatch.setattr(crossings, "SLICE", -1)
-    monkeypatch.setattr(crossings.manager, "update", lambda *arguments: updates.append(arguments) or update(*arguments))
-    assert solution.find_crossings().pairs == expected
-    assert len(updates) == len(crossings.DEPTHS) * len(expected)
+    monkeypatch.setattr(samples, "SLICE", -1)
+    monkeypatch.setattr(samples.manager, "update", lambda *arguments: updates.append(arguments) or update(*arguments))
+    assert samples.sampled(posed, pairs, CTRL_C) == samples.Sampled(set(range(5)), True)
+    assert len(updates) == len(pairs)
 
     def later(*arguments):
         updates.append(arguments)
@@ -177,11 +235,9 @@ def test_updates_in_slices_find_the_same(monkeypatch):
 
     limit = Interruption(time_limit=1e6)
     updates.clear()
-    monkeypatch.setattr(crossings.manager, "update", later)
-    pairs = crossings.free_pairs(solution._scene.bodies, ())
-    partly = crossings.crossings_of(solution, pairs, limit)
+    monkeypatch.setattr(samples.manager, "update", later)
     # What was found by then crosses for certain, and the rest is not known.
-    assert len(updates) == 4 and partly.pairs == expected[:4] and partly.unseen == expected[4:]
+    assert samples.sampled(posed, pairs, limit) == samples.Sampled({0, 1, 2, 3}, False)
 
 
 def test_bodies_are_where_their_boxes_are(cases):

@@ -9,6 +9,7 @@ against the facet, along the surface's normal. Points go where it is too far, un
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi
 from typing import NamedTuple
@@ -31,6 +32,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 # Rounds of measuring, and of parting chords that cross each other.
 _ROUNDS, _PARTINGS = 30, 12
+# Rounds of cutting segments in two whose curves leave their triangles.
+_SPILLS = 12
 _MOST_POINTS = 4_000_000
 # Points of the grid nearer to the boundary than this part of a step are left out.
 _NEAR = 0.4
@@ -84,8 +87,17 @@ class BoundaryCells:
     border: Border
 
 
-def trimmed_cells(face: Face, tolerance: float, angle: float) -> BoundaryCells:
+def trimmed_cells(
+    face: Face, tolerance: float, angle: float, spilling: Callable[[BoundaryCells], Indices]
+) -> BoundaryCells:
     """Triangles of a face that has a boundary, and their chords of it; see `facets`.
+
+    Parameters
+    ----------
+    face : Face
+    tolerance, angle : float
+    spilling : callable
+        Of triangles the segments that are still to be cut in two. There may be some in the end.
 
     Raises
     ------
@@ -93,6 +105,18 @@ def trimmed_cells(face: Face, tolerance: float, angle: float) -> BoundaryCells:
         Chords of the boundary that are edges of no triangle: loops that cross or touch each other.
     """
     made = _Trimmed(face, positive("tolerance", tolerance), min(positive("angle", angle), 0.25 * pi))
+    for _ in range(_SPILLS):
+        cells = _cells_of(made)
+        wrong = spilling(cells)
+        if not len(wrong):
+            break
+        made.rim = made.rim.split(wrong)
+    return cells
+
+
+def _cells_of(made: _Trimmed) -> BoundaryCells:
+    """The triangles and their chords."""
+    face = made.face
     found = made.facets()
     border = made.rim
     corners = found.triangles[:, :: face.sign]
@@ -290,16 +314,17 @@ class _Trimmed:
                 break
             self.rim = self.rim.split(crossing)
         n = len(found.parameters)
-        if len(crossing):
-            # Curves that touch: which side a triangle is on is asked of the true boundary.
-            real = mesh.triangles[(mesh.triangles < n).all(axis=1)]
-            at = found.parameters[real].mean(axis=1)
-            within = self.face.locate(at[:, 0], at[:, 1]) > 0
-            return found, real[within], mesh.edges, mesh.owner
-        of_border = mesh.owner < k
-        walls = mesh.edges[(~of_border) & np.append(np.zeros(k, dtype=bool), hull)[mesh.owner]]
-        kept = mesh.triangles[inside(mesh.triangles, n + 12, mesh.edges[of_border], walls)]
-        return found, kept, mesh.edges, mesh.owner
+        if not len(crossing):
+            of_border = mesh.owner < k
+            walls = mesh.edges[(~of_border) & np.append(np.zeros(k, dtype=bool), hull)[mesh.owner]]
+            kept = mesh.triangles[inside(mesh.triangles, n + 12, mesh.edges[of_border], walls)]
+            if (kept < n).all():
+                return found, kept, mesh.edges, mesh.owner
+        # Curves that touch, or a boundary with a gap: which side a triangle is on is asked of the true boundary.
+        real = mesh.triangles[(mesh.triangles < n).all(axis=1)]
+        at = found.parameters[real].mean(axis=1)
+        within = self.face.locate(at[:, 0], at[:, 1]) > 0
+        return found, real[within], mesh.edges, mesh.owner
 
     def _points(self, parameters: Array) -> Array:
         """In space; both sides of a cut, and all of a pole, equal to the last bit."""

@@ -20,7 +20,7 @@ class Verdict(Enum):
     """What two bodies are to each other; the value says it in a sentence."""
 
     CLEAR = "apart by at least the bound, and neither is within the other"
-    TOUCHING = "clear once one of them is moved by no more than the depth"
+    TOUCHING = "clear once one of them is moved, or made slimmer, by no more than the depth"
     CROSSING = "their boundaries cross, and no translation by less than the depth undoes it"
     ENCLOSED = "one is wholly within the other, their boundaries apart by at least the bound"
     UNDECIDED = "none of this is proven within the budget"
@@ -38,7 +38,8 @@ class Answer(ReadOnlyArrays):
     depth : float
         See `Verdict`.
     place : (3,)
-        Of a crossing, where it was found, in the world; else NaN.
+        Of a crossing, where it was found, in the world; else NaN. Both boundaries are as near as cells that prove it
+        are to them; of wires it is a point of a piece's spine.
     swept : bool
         Whether the way from the last look is proven as well.
     part : float

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import rows_of
+from assembly.errors import InputError
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import spline_curve_at, surface_at
 from assembly.proximity.brep.solid import solid_of
@@ -31,7 +32,7 @@ from assembly.proximity.clearance.records import (
 from assembly.proximity.clearance.round_faces import Round, round_holes, round_of, round_parts
 from assembly.proximity.clearance.wire_cells import WireCells, wire_cells
 
-__all__ = ["BodyCells", "cells_of_body"]
+__all__ = ["BodyCells", "cells_of_body", "has_cells"]
 
 Array = NDArray[np.float64]
 Cells = list[CellTable | WireCells]
@@ -106,7 +107,6 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
     radii += [float(table.first[0, 1]) for table in tables if isinstance(table, WireCells)]
     builder.build()
     label = _components(topology)
-    owner = rows_of(LINKS, links).face
     return BodyCells(
         packed.table,
         packed.pool,
@@ -115,13 +115,22 @@ def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
         builder.links,
         builder.nodes,
         builder.first,
-        label[owner],
+        label[rows_of(LINKS, links).face],
         topology.is_closed,
         size,
         float(max(np.abs(low).max(), np.abs(high).max())),
         min([0.25 * size, *radii]),
         tuple(found for found in rounds if found is not None and not found.outward),
     )
+
+
+def has_cells(faces: tuple[Face, ...]) -> bool:
+    """Whether a proof may be made of faces: files have some whose boundaries have gaps, or touch themselves."""
+    try:
+        cells_of_body(faces)
+    except InputError:
+        return False
+    return True
 
 
 def _parts(faces: tuple[Face, ...], tables: Cells) -> tuple[Table, list[Round | None], list[list[Round]]]:
@@ -213,10 +222,11 @@ def _first_cells(tables: Cells, curves: list[Table]) -> tuple[Table, Array]:
             link.rim = NONE
             node.corner, node.spine, node.first, node.pad = table.corner, table.center, table.first, table.pad
             continue
-        link.rim = np.where(table.rim < 0, NONE, np.append(places, NONE)[table.rim])
+        rims = table.rims
+        link.rim = np.where(rims.curve == NONE, NONE, np.append(places, NONE)[rims.curve])
         node.uv, node.second, node.first, node.pad = table.uv, table.second, table.first, table.pad
-        link.hollow = table.hollow
-        node.rim_t, node.rim_second, node.ruling = table.rim_t, table.rim_second, table.ruling
+        link.hollow = rims.hollow
+        node.rim_t, node.rim_second, node.ruling = rims.t, rims.second, table.ruling
     return links, nodes
 
 

@@ -11,11 +11,14 @@ needs new points alone.
 
 Where an edge of a triangle is a chord of a boundary curve c, the face may go on beyond it, by no more than (d_u, d_v) =
 (dt^2 / 8) (max |c_u''|, max |c_v''|) in (u, v), which is M_u d_u + M_v d_v in space.
+
+Where the face ends before a chord, what lies between is of that one triangle (`rims.py`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +28,9 @@ from assembly.geometry.meshing.polygon import trimmed_cells
 from assembly.geometry.recognition.elementary import elementary_form
 from assembly.geometry.recognition.forms import Cylinder, Extrusion, Plane
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.proximity.clearance.derivative_nets import bends_away, curve_bounds, surface_bounds
+from assembly.proximity.clearance.derivative_nets import surface_bounds
 from assembly.proximity.clearance.records import FLAT, ROUNDED, RULED
+from assembly.proximity.clearance.rims import Rims, no_rims, rims_of, spilling
 
 __all__ = ["CellTable", "cells_of"]
 
@@ -53,12 +57,7 @@ class CellTable:
         Parameters of the corners; of a triangle the last two are the same.
     second, first : (n, 3), (n, 2)
         Bounds of |S_uu|, |S_uv|, |S_vv| and of |S_u|, |S_v|.
-    rim : (n, 3)
-        The boundary curve that edge k (corner k to k + 1) is a chord of, or -1.
-    rim_t, rim_second : (n, 3, 2)
-        Its parameters there, and bounds of |c_u''|, |c_v''|.
-    hollow : (n, 3)
-        Whether that curve bends away from the material.
+    rims : Rims
     pad : (n,)
         What a radius is in any case.
     form : int
@@ -70,10 +69,7 @@ class CellTable:
     uv: Array
     second: Array
     first: Array
-    rim: Indices
-    rim_t: Array
-    rim_second: Array
-    hollow: NDArray[np.bool_]
+    rims: Rims
     pad: Array
     form: int
     ruling: Array
@@ -158,25 +154,13 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
     surface = face.surface
     form, ruling, off = _sweep(surface)
     if face.boundary:
-        cells = trimmed_cells(face, tolerance, angle)
-        uv, number = cells.parameters, cells.segments
-        uv = np.concatenate([uv, uv[:, 2:]], axis=1)
+        cells = trimmed_cells(face, tolerance, angle, partial(spilling, face))
+        uv = np.concatenate([cells.parameters, cells.parameters[:, 2:]], axis=1)
+        rims = rims_of(face, cells)
     else:
         uv = _grid(surface, tolerance)
-        number = np.full((len(uv), 3), -1)
-    n = len(uv)
-    rim, hollow = np.full((n, 3), -1), np.zeros((n, 3), dtype=bool)
-    rim_t, rim_second, beside = np.zeros((n, 3, 2)), np.zeros((n, 3, 2)), np.zeros((n, 2))
-    if face.boundary:
-        border = cells.border
-        for c in np.unique(border.curve[border.curve >= 0]):
-            curve = face.boundary[c]
-            row, k = np.nonzero((number >= 0) & (border.curve[np.maximum(number, 0)] == c))
-            t = border.t[number[row, k]]
-            rim[row, k], rim_t[row, k] = c, t
-            rim_second[row, k], hollow[row, k] = curve_bounds(curve, t), bends_away(curve, t)
-            np.maximum.at(beside, row, _displaced(surface, border.ends[number[row, k]], curve.evaluate(t.ravel())))
-    reach = (0.125 * np.diff(rim_t, axis=2) ** 2 * rim_second).max(axis=1) + beside
+        rims = no_rims(len(uv))
+    reach = rims.sag.max(axis=1) + rims.beside
     low, high = uv.min(axis=1) - reach, uv.max(axis=1) + reach
     for d in range(2):
         if not surface.closed[d]:
@@ -188,20 +172,14 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
     if speeds is None:
         first, second = surface_bounds(surface, low, high)
     else:
-        first, second = np.tile(speeds, (n, 1)), np.zeros((n, 3))
+        first, second = np.tile(speeds, (len(uv), 1)), np.zeros((len(uv), 3))
     far = float(np.abs(surface.control_points).max())
-    return CellTable(
-        uv,
-        second,
-        first,
-        rim,
-        rim_t,
-        rim_second,
-        hollow,
-        ROUNDING * far + off + (first * beside).sum(axis=1),
-        form,
-        ruling,
-    )
+    pad = ROUNDING * far + off + (first * rims.beside).sum(axis=1)
+    wrong = rims.spills(uv[:, :3])
+    if wrong.any():
+        # What is cut off there is of other triangles: no farther from their borders than curves from chords.
+        pad += (first[:, None] * rims.sag).sum(axis=2)[wrong].max()
+    return CellTable(uv, second, first, rims, pad, form, ruling)
 
 
 def _even_speeds(surface: NurbsSurface) -> Array | None:
@@ -214,17 +192,3 @@ def _even_speeds(surface: NurbsSurface) -> Array | None:
     lengths = [np.linalg.norm(np.diff(net, axis=d), axis=-1).max() for d in (0, 1)]
     speeds: Array = np.array(lengths) / np.ptp(surface.domain, axis=1) * ROUNDED_UP
     return speeds
-
-
-def _displaced(surface: NurbsSurface, ends: Array, true: Array) -> Array:
-    """How far ends of chords (n, 2, 2) are from points (2 n, 2) of their curves, modulo periods: the larger, (n, 2).
-
-    Ends may have been moved onto a line of the triangulation's grid.
-    """
-    apart = ends - true.reshape(ends.shape)
-    for d in range(2):
-        if surface.closed[d]:
-            period = float(np.ptp(surface.domain[d]))
-            apart[..., d] -= period * np.round(apart[..., d] / period)
-    largest: Array = np.abs(apart).max(axis=1)
-    return largest

@@ -20,10 +20,9 @@ from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.bvh.normal_nets import bezier_product, restricted, restriction
 
-__all__ = ["bends_away", "curve_bounds", "surface_bounds"]
+__all__ = ["bends", "curve_bounds", "surface_bounds"]
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 # Bounds over parts of a span that only rounding leaves are divided by their width: they are widened to this part of it.
 NARROWEST = 1e-6
 # So many restricted nets are made at a time.
@@ -151,14 +150,15 @@ def curve_bounds(curve: NurbsCurve, t: Array) -> Array:
     return found
 
 
-def bends_away(curve: NurbsCurve, t: Array) -> Flags:
-    """Over which intervals t (n, 2) a boundary curve is left of its chord, and of the chords of all its parts.
+def bends(curve: NurbsCurve, t: Array) -> NDArray[np.int64]:
+    """To which side of its chord, and of the chords of all its parts, a boundary curve is over intervals t (n, 2).
 
-    That is where its control polygon over the interval, within one span, turns right only, and by less than half a
-    turn in all: then so do the polygons of its parts. The material of a face is left of its boundary.
+    1: left, where the material of a face is; -1: right; 0: not known. Left is where its control polygon over the
+    interval, within one span, turns right only, and by less than half a turn in all: then so do the polygons of its
+    parts.
     """
     pieces, at = curve.bezier_pieces(), curve.breaks()
-    found = np.zeros(len(t), dtype=bool)
+    found = np.zeros(len(t), dtype=np.int64)
     for k in range(len(at) - 1):
         width = at[k + 1] - at[k]
         low, high = (t.min(axis=1) - at[k]) / width, (t.max(axis=1) - at[k]) / width
@@ -166,7 +166,8 @@ def bends_away(curve: NurbsCurve, t: Array) -> Flags:
         net = restriction(pieces.shape[1] - 1, np.clip(low[rows], 0, 1), np.clip(high[rows], 0, 1)) @ pieces[k][None]
         way = np.diff(net[..., :2] / net[..., -1:], axis=1)
         turn = way[:, :-1, 0] * way[:, 1:, 1] - way[:, :-1, 1] * way[:, 1:, 0]
-        ahead = (way[:, :1] * way).sum(axis=2) > 0.0
-        size = (way**2).sum(axis=2).max(axis=1)[:, None]
-        found[rows] = (turn <= 1e-15 * size).all(axis=1) & ahead.all(axis=1)
+        ahead = ((way[:, :1] * way).sum(axis=2) > 0.0).all(axis=1)
+        little = 1e-15 * (way**2).sum(axis=2).max(axis=1)[:, None]
+        left, right = (turn <= little).all(axis=1), (turn >= -little).all(axis=1)
+        found[rows] = np.where(ahead & left, 1, np.where(ahead & right, -1, 0))
     return found

@@ -57,6 +57,13 @@ def arc_height(node):
     return h * h / (bend * (1.0 + math.sqrt(max(1.0 - h * h, 0.0))))
 
 
+@kernel(inline=True)
+def sag_of_rim(node, e):
+    """How far a boundary curve is from the edge that is its chord, at most."""
+    dt = node.rim_t[e, 1] - node.rim_t[e, 0]
+    return 0.125 * dt * dt * (node.rim_second[e, 0] * node.first[0] + node.rim_second[e, 1] * node.first[1])
+
+
 @kernel(inner=True)
 def write_radii(links, node):
     """The radii of a cell: what the surface may be off its corners' hull, and what it goes on beyond chords."""
@@ -73,10 +80,9 @@ def write_radii(links, node):
     beyond = 0.0
     for e in range(3):
         if links.rim[e] != NONE:
-            dt = node.rim_t[e, 1] - node.rim_t[e, 0]
-            d = 0.125 * dt * dt * (node.rim_second[e, 0] * node.first[0] + node.rim_second[e, 1] * node.first[1])
+            d = sag_of_rim(node, e)
             border = max(border, d)
-            if links.hollow[e] == 0:
+            if links.hollow[e] != 1:
                 beyond = max(beyond, d)
     node.reach = bent + border + node.pad
     node.rho = node.pad
@@ -170,8 +176,7 @@ def side_cost(links, node, i, j, by_length):
     du, dv = abs(node.uv[i, 0] - node.uv[j, 0]), abs(node.uv[i, 1] - node.uv[j, 1])
     cost = node.second[0] * du * du + 2.0 * node.second[1] * du * dv + node.second[2] * dv * dv
     if i < 3 and j == (i + 1) % 3 and links.rim[i] != NONE:
-        dt = node.rim_t[i, 1] - node.rim_t[i, 0]
-        cost += dt * dt * (node.rim_second[i, 0] * node.first[0] + node.rim_second[i, 1] * node.first[1])
+        cost += 8.0 * sag_of_rim(node, i)
     return cost
 
 
@@ -183,27 +188,84 @@ def put_corner(node, i, uv, x):
 
 
 @kernel(inner=True)
-def halve_triangle(forest, k, n, by_length):
-    """The costliest side is halved; a chord of the boundary at its curve."""
-    links, node = links_at(forest.links, k), node_at(forest.nodes, k)
-    one, other = node_at(forest.nodes, n), node_at(forest.nodes, n + 1)
-    surface = cell_face_at(forest.faces, links.face).surface
-    i = 0
-    best = -1.0
-    for e in range(3):
-        cost = side_cost(links, node, e, (e + 1) % 3, by_length)
-        if cost > best:
-            best, i = cost, e
+def middle_of(forest, links, node, i):
+    """The parameters at which side i of a triangle is halved: a chord of the boundary at its curve."""
     j = (i + 1) % 3
     uv = 0.5 * (node.uv[i, 0] + node.uv[j, 0]), 0.5 * (node.uv[i, 1] + node.uv[j, 1])
+    if links.rim[i] == NONE:
+        return uv
+    at, _rate, _bend = curve_lanes(forest.store, links.rim[i], 0.5 * (node.rim_t[i, 0] + node.rim_t[i, 1]))
+    x = xyz(at)
+    return into_period(forest.store, cell_face_at(forest.faces, links.face).surface, uv, (x[0], x[1]))
+
+
+@kernel(inline=True)
+def uv_of(node, i):
+    """Parameters of a corner."""
+    return node.uv[i, 0], node.uv[i, 1]
+
+
+@kernel(inner=True)
+def held(links, node, e, part, p, q, r):
+    """Above 1: a part of edge e's curve with the ends p and q stays in the triangle p q r; see `rims.py`."""
+    dt = part * (node.rim_t[e, 1] - node.rim_t[e, 0])
+    if links.rim[e] == NONE or links.hollow[e] == -1 or dt == 0.0:
+        return math.inf
+    bend_u, bend_v = node.rim_second[e, 0], node.rim_second[e, 1]
+    area = abs((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
+    one = abs(r[1] - p[1]) * bend_u + abs(r[0] - p[0]) * bend_v
+    other = abs(r[1] - q[1]) * bend_u + abs(r[0] - q[0]) * bend_v
+    asked = 0.5 * dt * dt * max(one, other)
+    return area / asked if asked > 0.0 else math.inf
+
+
+@kernel(inner=True)
+def held_after(links, node, i, m):
+    """The least of those of a triangle whose side i is halved at m."""
+    j, k = (i + 1) % 3, (i + 2) % 3
+    p, q, r = uv_of(node, i), uv_of(node, j), uv_of(node, k)
+    halves = min(held(links, node, i, 0.5, p, m, r), held(links, node, i, 0.5, m, q, r))
+    return min(halves, held(links, node, j, 1.0, q, r, m), held(links, node, k, 1.0, r, p, m))
+
+
+@kernel(inner=True)
+def best_side(forest, links, node, by_length):
+    """The side of a triangle to halve and its middle: the costliest after which curves stay in their triangles.
+
+    Also by how much others may then be cut off by curves.
+    """
+    best, i = -1.0, 0
+    most, j = -1.0, 0
+    for e in range(3):
+        hold = held_after(links, node, e, middle_of(forest, links, node, e))
+        cost = side_cost(links, node, e, (e + 1) % 3, by_length)
+        if hold >= 1.0 and cost > best:
+            best, i = cost, e
+        if hold > most:
+            most, j = hold, e
+    if best >= 0.0:
+        return i, middle_of(forest, links, node, i), 0.0
+    cut = 0.0
+    for e in range(3):
+        if links.rim[e] != NONE and links.hollow[e] != -1:
+            cut = max(cut, sag_of_rim(node, e))
+    return j, middle_of(forest, links, node, j), cut
+
+
+@kernel(inner=True)
+def halve_triangle(forest, k, n, by_length):
+    """A side is halved, a chord of the boundary at its curve."""
+    links, node = links_at(forest.links, k), node_at(forest.nodes, k)
+    one, other = node_at(forest.nodes, n), node_at(forest.nodes, n + 1)
+    i, uv, cut = best_side(forest, links, node, by_length)
+    j = (i + 1) % 3
     if links.rim[i] != NONE:
         t = 0.5 * (node.rim_t[i, 0] + node.rim_t[i, 1])
-        at, _rate, _bend = curve_lanes(forest.store, links.rim[i], t)
-        x = xyz(at)
-        uv = into_period(forest.store, surface, uv, (x[0], x[1]))
         one.rim_t[i, 1] = t
         other.rim_t[i, 0] = t
-    x = point_on(forest.store, surface, uv[0], uv[1])
+    one.pad += cut
+    other.pad += cut
+    x = point_on(forest.store, cell_face_at(forest.faces, links.face).surface, uv[0], uv[1])
     put_corner(one, j, uv, x)
     put_corner(other, i, uv, x)
     if j == 2:

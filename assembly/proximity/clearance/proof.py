@@ -87,6 +87,7 @@ class ClearanceProof:
         moves: Array | None = None,
         which: Sequence[int] | None = None,
         swept: bool = False,
+        budget: int | None = None,
     ) -> list[Answer]:
         """What is proven at poses.
 
@@ -103,6 +104,8 @@ class ClearanceProof:
             The pairs that are looked at; all by default.
         swept : bool
             Whether the way from the last look is to be proven as well, of pairs that were clear there.
+        budget : int, optional
+            Of each pair, the pairs of nodes after which it stays undecided, where that is not to be the usual number.
         """
         self._forget()
         rows = list(range(len(self.pairs)) if which is None else which)
@@ -114,7 +117,10 @@ class ClearanceProof:
         if swept:
             asked = np.where(pair.known == 1.0, np.where(grown, ON_WAY_ANEW, ON_WAY), asked)
         tasks[rows] = asked[rows]
+        usual = counts.budget.copy()
+        counts.budget = usual if budget is None else budget
         self._run(q, touching, moved, tasks)
+        counts.budget = usual
         self._begun[rows] = True
         return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
 

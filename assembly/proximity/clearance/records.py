@@ -7,7 +7,8 @@ A node stands for a part of a body's boundary, which is within
 (sums of sets). A cell is a part of one face in (u, v) and has corners; a node above cells has a box. Over the box of
 one whole face that lies on a cylinder, a ball or a torus from outside stands the exact hull of that: a segment and a
 disc, a point and a ball, a disc and a ball. A whole face that is the wall of a bore (a cylinder or a ball from inside)
-lies nowhere nearer than `bore` to its axis, or center: what is within that is clear of it.
+lies nowhere nearer than `bore` to its axis, or center: what is within that is clear of it. So it is with all of a flat
+face that has a round hole.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ NODE = record_dtype(
     ruling=3,  # across which the disc lies: a unit vector
     disc=1,
     rho=1,
-    bore=1,  # of a bore's wall: how far it is from the line along `ruling` through `spine`, or from that point; else 0
-    spine=3,  # of a piece of a wire, the center of its arc
+    bore=1,  # how far a bore's wall, or a face beside a hole, is from the line along `ruling` by `spine`, or that point
+    spine=3,  # of a piece of a wire the center of its arc, of a bore a point of its axis
     corner=(4, 3),  # of a cell; of a triangle the last two are the same
     reach=1,  # like disc and rho together, but also of the true border from its chord where the face ends before it
     pad=1,  # of a cell, what its radius is in any case
@@ -46,7 +47,7 @@ LINKS = record_dtype(
     face=1,  # of a cell, the number of its face among all that are packed; else -1
     form=1,  # FLAT, RULED, ROUNDED, WIRE
     rim=3,  # of an edge that is a chord of a boundary curve, the record of that; else -1
-    hollow=3,  # 1: that curve bends away from the material, which is nowhere beyond the chord
+    hollow=3,  # 1: that curve bends away from the material, which is nowhere beyond the chord; -1: towards it; 0: else
 )
 links_at = record_view(LINKS)
 LINKS_SIZE = size_of(LINKS)

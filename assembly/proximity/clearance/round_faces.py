@@ -22,6 +22,8 @@ __all__ = ["Round", "round_holes", "round_of", "round_parts"]
 Array = NDArray[np.float64]
 # A face that goes around less of a cylinder than about half is no round body.
 HALF = 0.95 * pi
+# [size of a face] A round hole of a file may be a curve through points of a circle, off by so much.
+HOLE = 1e-4
 # A ball of more than this part of a face's size is no ball that the face goes around.
 LARGEST_BALL = 0.7
 ROUNDED_UP = 1.0 + 1e-15
@@ -72,8 +74,8 @@ class _FlatMap:
     across: Array
     off: float
 
-    def circle(self, curves: Sequence[NurbsCurve]) -> Circle | None:
-        """The circle in space that curves of (u, v), one after another, go along."""
+    def circle(self, curves: Sequence[NurbsCurve], tolerance: float | None = None) -> Circle | None:
+        """The circle in space that curves of (u, v), one after another, go along, to a tolerance [length]."""
         if max(curve.degree for curve in curves) < 2:
             return None
         parts = []
@@ -82,7 +84,7 @@ class _FlatMap:
             w = pieces[..., -1:]
             space = self.origin * w + pieces[..., :1] * self.along + pieces[..., 1:2] * self.across
             parts.append(np.concatenate([space, w], axis=-1))
-        circle = curve_form(parts)
+        circle = curve_form(parts, tolerance)
         return circle if isinstance(circle, Circle) else None
 
     def turns_around(self, point: Array, curves: Sequence[NurbsCurve]) -> int:
@@ -128,12 +130,13 @@ def round_holes(face: Face) -> list[Round]:
     found = []
     for chain in face.chains:
         curves = [face.boundary[k] for k in chain]
-        circle = flat.circle(curves)
+        circle = flat.circle(curves, HOLE * face.surface.size)
         # Clockwise around its center: material is outside.
         if circle is None or flat.turns_around(circle.center, curves) != -1:
             continue
         off = circle.deviation + flat.off
-        found.append(Round(circle.center, circle.axis, off, (circle.radius - off) / ROUNDED_UP, 0.0, False))
+        if off < circle.radius:
+            found.append(Round(circle.center, circle.axis, off, (circle.radius - off) / ROUNDED_UP, 0.0, False))
     return found
 
 

@@ -48,29 +48,30 @@ def is_above(x, a, b, c, n):
 
 @kernel(inner=True)
 def stabbed(segment, thick, triangle, rho):
-    """By how much a segment stabs a triangle, beyond what both stand for; not positive where it does not.
+    """By how much a segment stabs a triangle, beyond what both stand for, and at which part of it.
 
-    The true curve is within `thick` of the segment and has its ends; the true patch is within rho of the triangle. On
-    the straight way from segment and triangle to curve and patch the ends never meet the patch, since they are farther
-    than rho from the plane of the triangle, and the curve never meets the border of the patch, from which the segment
-    is farther than rho + thick. So the curve pierces the patch as often as the segment does the triangle: once, and no
-    move of one of them by less than the smaller of both margins undoes it.
+    That is not positive where the segment does not. The true curve is within `thick` of the segment and has its ends;
+    the true patch is within rho of the triangle. On the straight way from segment and triangle to curve and patch the
+    ends never meet the patch, since they are farther than rho from the plane of the triangle, and the curve never meets
+    the border of the patch, from which the segment is farther than rho + thick. So the curve pierces the patch as often
+    as the segment does the triangle: once, and no move of one of them by less than the smaller of both margins undoes
+    it.
     """
     p, q = segment
     a, b, c = triangle
     n = cross(sub(b, a), sub(c, a))
     length = math.sqrt(dot(n, n))
     if length == 0.0:
-        return 0.0
+        return 0.0, 0.0
     hp, hq = dot(n, sub(p, a)) / length, dot(n, sub(q, a)) / length
     depth = min(abs(hp), abs(hq)) - rho
     if hp * hq >= 0.0 or depth <= 0.0:
-        return 0.0
+        return 0.0, 0.0
     f = hp / (hp - hq)
     if not is_above(blend(1.0 - f, p, f, q), a, b, c, n):
-        return 0.0
+        return 0.0, 0.0
     beside = min(segments_apart(p, q, a, b), segments_apart(p, q, b, c), segments_apart(p, q, c, a)) - rho - thick
-    return min(depth, beside)
+    return min(depth, beside), f
 
 
 @kernel(inline=True)
@@ -127,8 +128,8 @@ def crossing_of(forest, a, b, pose, work):
             p, q = point(one, i), point(one, (i + 1) % 4)
             for k in range(2):
                 triangle = point(other, 0), point(other, k + 1), point(other, k + 2)
-                depth = stabbed((p, q), thick, triangle, rho)
+                depth, f = stabbed((p, q), thick, triangle, rho)
                 if depth > best:
                     best = depth
-                    place = blend(0.5, p, 0.5, q)
+                    place = blend(1.0 - f, p, f, q)
     return best, place

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +18,9 @@ from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.features.features import Feature, Shape, faces_of, pose_of
 from assembly.proximity.features.parting import are_balls, parting_translation
-from assembly.proximity.features.places import body_tree, feature_at, is_behind, is_closed, shells_of
+from assembly.proximity.features.places import body_tree, feature_at, is_behind, is_closed, normals_at, shells_of
 
-__all__ = ["BodyDistance", "DistanceStatus", "distance"]
+__all__ = ["BodyDistance", "DistanceStatus", "beyond", "distance"]
 
 Array = NDArray[np.float64]
 Faces = tuple[Face, ...]
@@ -93,6 +94,18 @@ class BodyDistance(ReadOnlyArrays):
         return self.converged
 
     @cached_property
+    def normal(self) -> Array | None:
+        """A unit vector (3,) from a towards b: the outward normal of a, or of b reversed, where a point is on a face.
+
+        None where both are on edges or vertices.
+        """
+        faces, spots, q = self._where
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            if self.features[side].kind == "face":
+                return read_only(sign * rotation_matrix(q[side, 3:]) @ normals_at(faces[side], spots[side])[0])
+        return None
+
+    @cached_property
     def features(self) -> tuple[Feature, Feature]:
         """The faces, edges or vertices on which the points are."""
         faces, spots, q = self._where
@@ -150,6 +163,20 @@ def distance(
         status = DistanceStatus.ENCLOSED
     where = faces, (found.spot(0), found.spot(1)), q
     return BodyDistance(found.lower, found.upper, found.points, status, found.pairs, where)
+
+
+class Beyond(NamedTuple):
+    """Whether two bodies are proven to be farther apart than a length, and whether one may be inside of the other."""
+
+    is_apart: bool
+    may_nest: bool
+
+
+def beyond(a: Shape, b: Shape, q: Array, length: float, budget: int) -> Beyond:
+    """Whether surfaces at poses q (2, 7) are farther apart than a length, as far as a budget tells."""
+    faces = faces_of("a", a), faces_of("b", b)
+    found = bodies_apart(body_tree(faces[0]), body_tree(faces[1]), q, length, budget, length)
+    return Beyond(found.lower > length, found.is_boxed(0) or found.is_boxed(1))
 
 
 def _status(found: Nearest, tolerance: float) -> DistanceStatus:

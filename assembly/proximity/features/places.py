@@ -15,7 +15,7 @@ from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.topology import Edge, Topology
 from assembly.proximity.features.features import Feature, features_of
 
-__all__ = ["body_faces", "body_tree", "feature_at", "is_behind", "is_closed", "shells_of"]
+__all__ = ["body_faces", "body_tree", "feature_at", "is_behind", "is_closed", "normals_at", "shells_of"]
 
 Array = NDArray[np.float64]
 Faces = tuple[Face, ...]
@@ -93,13 +93,23 @@ def feature_at(faces: Faces, spot: Spot, point: Array) -> Feature:
     """The vertex, the edge or the face on which a point of a body is, to the tolerance of its topology."""
     topology, names = solid_of(faces), features_of(faces)
     if topology.vertices:
-        apart = np.linalg.norm([vertex.point - point for vertex in topology.vertices], axis=1)
+        apart = ((_vertex_points(faces) - point) ** 2).sum(axis=1)
         nearest = int(apart.argmin())
-        if apart[nearest] <= topology.tolerance:
+        if apart[nearest] <= topology.tolerance**2:
             return names[len(topology.faces) + len(topology.edges) + nearest]
+    place = place_of_spot(body_tree(faces), spot)
+    if place.curve >= 0 and len(body_faces(faces)) == len(topology.faces):
+        number = topology.face_edges[place.face][place.curve]
+        return names[place.face] if number is None else names[len(topology.faces) + number]
     face, u, v = _parameters(faces, spot)
     found = _edge_at(topology, face, u, v)
     return names[face] if found is None else names[len(topology.faces) + found[1]]
+
+
+@lru_cache(maxsize=256)
+def _vertex_points(faces: Faces) -> Array:
+    """The vertices of a body (n, 3)."""
+    return np.array([vertex.point for vertex in solid_of(faces).vertices])
 
 
 def _normal(face: Face, curve: int, t: float, closes: bool) -> Array | None:
@@ -114,12 +124,12 @@ def _normal(face: Face, curve: int, t: float, closes: bool) -> Array | None:
         return None
 
 
-def _normals(faces: Faces, spot: Spot, feature: Feature) -> list[Array]:
-    """Outward normals of the faces on which a point is that is on a feature."""
+def normals_at(faces: Faces, spot: Spot, feature: Feature | None = None) -> list[Array]:
+    """Outward normals of the faces on which a point is that is on a feature, or within a face."""
     topology = solid_of(faces)
     number, u, v = _parameters(faces, spot)
     found: list[Array | None] = []
-    if feature.kind == "face":
+    if feature is None or feature.kind == "face":
         return [topology.faces[number].normal(u, v)]
     if feature.kind == "edge":
         at = _edge_at(topology, number, u, v)
@@ -149,5 +159,5 @@ def is_behind(faces: Faces, spot: Spot, point: Array, way: Array) -> bool:
 
     Of the faces that meet in an edge or a vertex, that one tells whose normal is nearest to being along the way.
     """
-    off = [float(normal @ way) for normal in _normals(faces, spot, feature_at(faces, spot, point))]
+    off = [float(normal @ way) for normal in normals_at(faces, spot, feature_at(faces, spot, point))]
     return bool(off) and max(off, key=abs) < 0.0

@@ -47,18 +47,18 @@ class Clash(ReadOnlyArrays):
     bound : float
         No points of the two surfaces are nearer than this; 0 where none is proven apart.
     points : (2, 3) or None
-        The point of either body, in the world.
+        The point of either body, in the world: as far apart as `gap` says.
     faces : (str, str) or None
         The face, edge or vertex of either body that the point is on.
     proved : bool
-        Whether `kind` is certified. Clear: `bound` is the gap but for 1e-9 of the bodies' size. Touching: a plane
-        between the two that neither passes by more than what is called touching, or a surface of revolution, as between
-        a pin and its bore. Crossing: a ball that is inside of both bodies. Enclosed: the surfaces are apart, and the
-        one is on the inner side of the other one's nearest face or edge.
+        Whether `kind` is certified. Clear: `bound` is the gap but for 1e-9 of the bodies' size. Touching: the bodies
+        are clear where they are, or once one of them is moved or made slimmer, by no more than what is called
+        touching. Crossing: the surfaces cross, and no translation by less than that undoes it, or there is a ball that
+        is inside of both bodies. Enclosed: the surfaces are apart, and the one is inside of the other one.
     relation : str
         ``"joined"`` by a joint, a gear or a rack, ``"excluded"`` by a clearance, in ``"contact"``, or ``"free"``.
     witness : (3,) or None
-        Of a proved crossing the middle of that ball.
+        Of a crossing the middle of that ball, where one was found.
     """
 
     bodies: tuple[str, str]

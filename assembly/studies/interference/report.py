@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,19 +13,23 @@ from assembly.constraints.model.contact import Contact
 from assembly.errors import InputError, bounded
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import pose_rows
-from assembly.solve.crossings import PosedBodies, find_crossings, free_pairs, joined_pairs
+from assembly.proximity.clearance.answers import Verdict
+from assembly.solve.crossings import free_pairs, joined_pairs, looks_at, posed_box
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.options import touching_part
+from assembly.solve.samples import PosedBodies
 from assembly.solve.solution import Solution
-from assembly.studies.interference.bounds import Posed
 from assembly.studies.interference.clash import Clash, Interference, Relation
-from assembly.studies.interference.judge import Pair
+from assembly.studies.interference.depth import Two, depth_of
+from assembly.studies.interference.near_pair import NearPair
 
 __all__ = ["interference"]
 
 Array = NDArray[np.float64]
 # What parts of CAD files are in each other by rounding, in parts of the scene's size.
 TOUCHING = 1e-6
+# What rounding may make of distances of boxes, in parts of these.
+ROUNDING = 1e-14
 
 
 def interference(
@@ -62,10 +67,10 @@ def interference(
 
     Notes
     -----
-    Boxes around faces tell which pairs may be near; of those the nearest points are searched for by branch and bound
-    (`assembly.proximity.closest_features`). Of bodies that have points in common a plane between them proves that they
-    touch, or a surface of revolution, and a ball inside of both that they cross. Where none is found, one search of a
-    contact manager for all such pairs tells, as in `Solution.crossings`, and the row is not proved.
+    Boxes tell which pairs may be near; of those the nearest points are searched for by branch and bound
+    (`assembly.proximity.distance`). Of bodies that have points in common a look proves that they touch, or cross, as in
+    `Solution.crossings`. Where it does not tell, as of blocks in slots of their width, samples do, and the row is not
+    proved.
     """
     interruption = CTRL_C if time_limit is None else Interruption(time_limit)
     margin = bounded("margin", margin)
@@ -75,11 +80,15 @@ def interference(
     if not isinstance(scene, Assembly):
         scene = Assembly(scene)
     q = _rows(scene, poses)
-    shaped = [Posed(body, row) for body, row in zip(scene.bodies, q, strict=True) if body.faces]
-    within = touching * max((posed.body.size for posed in shaped), default=0.0)
-    pairs = [Pair(a, b, _relation(scene, a.body, b.body), within) for a, b in _near(shaped, margin)]
-    near = [pair for pair in pairs if pair.apart <= margin or pair.may_nest]
-    rows, searched = _rows_of(near, PosedBodies(scene.bodies, q, touching), interruption)
+    shaped = [k for k, body in enumerate(scene.bodies) if body.faces]
+    posed = PosedBodies(scene.bodies, q, touching)
+    sizes = {k: scene.bodies[k].size for k in shaped}
+    within = touching * max(sizes.values(), default=0.0)
+    near = []
+    for i, j, apart in _near(scene, q, shaped, margin):
+        a, b = scene.bodies[i], scene.bodies[j]
+        near.append((NearPair(Two(a, b, q[[i, j]], max(sizes[i], sizes[j]), within), _relation(scene, a, b)), apart))
+    rows, searched = _rows_of(near, posed, margin, interruption)
     kept = [row for row in rows if row.bound <= margin or row.kind in ("crossing", "enclosed", "undecided")]
     return Interference(
         rows=tuple(sorted(kept, key=lambda row: row.order)),
@@ -103,13 +112,15 @@ def _rows(scene: Assembly, poses: Solution | ArrayLike | None) -> Array:
     return np.array(poses.q)
 
 
-def _near(shaped: Sequence[Posed], margin: float) -> Iterator[tuple[Posed, Posed]]:
-    """Pairs of bodies that are within a margin of each other by the boxes around them."""
-    boxes = np.array([posed.box for posed in shaped]).reshape(-1, 2, 3)
-    for k, one in enumerate(shaped):
-        between = np.maximum(boxes[k + 1 :, 0] - one.box[1], one.box[0] - boxes[k + 1 :, 1])
-        for other in np.flatnonzero(np.linalg.norm(np.maximum(between, 0.0), axis=1) <= margin).tolist():
-            yield one, shaped[k + 1 + other]
+def _near(scene: Assembly, q: Array, shaped: Sequence[int], margin: float) -> Iterator[tuple[int, int, float]]:
+    """Bodies that are within a margin of each other by the boxes around them, and how far apart these are."""
+    boxes = np.array([posed_box(scene.bodies[k], q[k]) for k in shaped]).reshape(-1, 2, 3)
+    for place, k in enumerate(shaped):
+        low, high = boxes[place]
+        between = np.maximum(boxes[place + 1 :, 0] - high, low - boxes[place + 1 :, 1])
+        apart = np.linalg.norm(np.maximum(between, 0.0), axis=1) * (1.0 - ROUNDING)
+        for other in np.flatnonzero(apart <= margin).tolist():
+            yield k, shaped[place + 1 + other], float(apart[other])
 
 
 def _relation(scene: Assembly, a: Body, b: Body) -> Relation:
@@ -122,28 +133,42 @@ def _relation(scene: Assembly, a: Body, b: Body) -> Relation:
     return "contact" if any({*item.bodies} == {a, b} for item in contacts) else "free"
 
 
-def _rows_of(near: Sequence[Pair], posed: PosedBodies, interruption: Interruption) -> tuple[list[Clash], int]:
-    """The rows of pairs, and how many were searched for their nearest points."""
+def _rows_of(
+    near: Sequence[tuple[NearPair, float]], posed: PosedBodies, margin: float, interruption: Interruption
+) -> tuple[list[Clash], int]:
+    """The rows of pairs that are not beyond a margin, and how many were searched."""
     rows: list[Clash] = []
-    doubtful: list[Pair] = []
+    asked: list[tuple[NearPair, float, bool]] = []
     searched = 0
-    for pair in near:
+    for pair, apart in near:
         if interruption.is_over():
-            rows.append(pair.unsearched())
+            rows.append(pair.unsearched(apart))
             continue
         searched += 1
-        row = pair.judged()
-        if row is None:
-            doubtful.append(pair)
+        beyond = pair.beyond(margin)
+        if beyond.is_apart:
+            if beyond.may_nest:
+                asked.append((pair, apart, True))
+        elif pair.is_told:
+            rows.append(pair.told())
         else:
-            rows.append(row)
-    if not doubtful:
-        return rows, searched
-    found = find_crossings(posed, [(pair.a.body, pair.b.body) for pair in doubtful], interruption)
-    for pair in doubtful:
-        names = pair.a.body.name, pair.b.body.name
-        if names in found.unseen or interruption.is_over():
-            rows.append(pair.unsearched())
+            asked.append((pair, apart, False))
+    normals = [None if is_apart else pair.normal for pair, _, is_apart in asked]
+    looks = looks_at(posed, [pair.two.bodies for pair, _, _ in asked], interruption, normals)
+    for (pair, apart, is_apart), look in zip(asked, looks, strict=True):
+        if is_apart and look.answer.verdict is Verdict.CLEAR:
+            continue
+        if look.crosses is None or interruption.is_over():
+            rows.append(pair.unsearched(apart))
+        elif pair.is_deep(look):
+            rows.append(pair.crossing(look, depth_of(pair.two, partial(_crosses_at, pair.two, interruption))))
         else:
-            rows.append(pair.searched(names in found.pairs))
+            rows.append(pair.looked(look))
     return rows, searched
+
+
+def _crosses_at(two: Two, interruption: Interruption, row: Array) -> bool:
+    """Whether two bodies cross, the second one at another pose; they may where there is no time."""
+    posed = PosedBodies(two.bodies, np.stack([two.q[0], row]), two.part)
+    (look,) = looks_at(posed, [two.bodies], interruption)
+    return look.crosses is not False

@@ -11,7 +11,7 @@ import pytest
 
 import assembly as asm
 from assembly.proximity.clearance.cells import ROUNDING
-from assembly.proximity.clearance.derivative_nets import bends_away, curve_bounds, surface_bounds
+from assembly.proximity.clearance.derivative_nets import bends, curve_bounds, surface_bounds
 from tests.proximity.clearance.splines import random_curve, random_surface
 
 # What samples of derivatives may be off by rounding, in parts of themselves.
@@ -96,35 +96,35 @@ def test_curves(cases):
             assert (bend * wide <= bound[k] * wide * (1.0 + CLOSE) + ROUNDING * 10.0).all()
 
 
-def left_of_chord(curve, a, b):
-    """The least height of samples over the chord, to its left, in parts of its length."""
+def heights_over_chord(curve, a, b):
+    """How far samples are to the left of the chord, in parts of its length."""
     start, *points, end = curve.evaluate(np.linspace(a, b, 33))
     chord, off = end - start, np.array(points) - start
-    return float((chord[0] * off[:, 1] - chord[1] * off[:, 0]).min() / (chord @ chord))
+    return (chord[0] * off[:, 1] - chord[1] * off[:, 0]) / (chord @ chord)
 
 
-def test_what_bends_away_is_left_of_all_chords(cases):
-    rng, found = np.random.default_rng(4), [0, 0]
+def test_what_bends_to_one_side_is_there_of_all_chords(cases):
+    rng, found = np.random.default_rng(4), {side: 0 for side in (-1, 0, 1)}
     for _ in range(cases(200, 5000)):
         curve = random_curve(rng)
         begin, end = curve.domain
         t = np.sort(rng.uniform(begin, end, (8, 2)), axis=1)
         t[4:, 1] = np.minimum(t[4:, 0] + 0.1, end)
-        told = bends_away(curve, t)
-        for (a, b), away in zip(t, told, strict=True):
-            found[int(away)] += 1
-            if away:
+        told = bends(curve, t)
+        for (a, b), side in zip(t, told.tolist(), strict=True):
+            found[side] += 1
+            if side != 0:
                 parts = np.sort(rng.uniform(a, b, (3, 2)), axis=1)
                 # Of a chord as short as 1e-6 rounding of points tells no side better than 1e-9.
-                heights = [left_of_chord(curve, *ends) for ends in ((a, b), *parts) if np.ptp(ends) > 1e-6]
-                assert min(heights) > -1e-9
+                heights = [side * heights_over_chord(curve, *ends) for ends in ((a, b), *parts) if np.ptp(ends) > 1e-6]
+                assert np.min(heights) > -1e-9
     # Of short intervals of curves that bend the right way most are told.
-    assert min(found) > 100
+    assert min(found.values()) > 100
 
 
 def test_arcs_bend_away_from_the_inside_of_holes_alone():
     """Material is left of a boundary: of a circle that is run through clockwise it is outside of it."""
     arc = asm.NurbsCurve([[1, 0], [1, 1], [0, 1]], [0, 0, 0, 1, 1, 1], 2, [1, np.sqrt(0.5), 1])
     t = np.array([[0.05, 0.95], [0.2, 0.4]])
-    assert bends_away(arc.reversed(), t).all()
-    assert not bends_away(arc, t).any()
+    assert (bends(arc.reversed(), t) == 1).all()
+    assert (bends(arc, t) == -1).all()

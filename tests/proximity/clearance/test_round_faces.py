@@ -16,7 +16,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.shapes.path import Path
 from assembly.proximity.clearance.body_cells import cells_of_body
 from assembly.proximity.clearance.records import NODE
-from assembly.proximity.clearance.round_faces import round_of, round_parts
+from assembly.proximity.clearance.round_faces import round_holes, round_of, round_parts
 from tests.proximity.clearance.nodes import top
 from tests.proximity.clearance.scenes import direction, faces_of
 from tests.proximity.clearance.splines import bumpy_hole, shapes, surface_points
@@ -105,6 +105,22 @@ def test_walls_of_bodies():
             off = surface_points(face, 2000, rng) - wall.center
             near.append(np.linalg.norm(off - (off @ wall.axis)[:, None] * wall.axis, axis=1).min())
         assert min(near) >= wall.radius - OFF
+
+
+def test_holes_of_flat_faces():
+    """Circles within the outer boundary alone."""
+    (flat,) = [face for face in faces_of(asm.shapes.plate(4.0, 2.0, 0.3, [(0.5, 0.1, 0.4)])) if face.name == "top"]
+    (hole,) = round_holes(flat)
+    assert not hole.outward and hole.radius == pytest.approx(0.4, abs=1e-14) and hole.radius <= 0.4
+    assert hole.center == pytest.approx([0.5, 0.1, 0.15], abs=1e-14)
+    # A slot along half of that circle leaves its middle: nothing tells by how it is round.
+    angle = np.linspace(0.0, 3.0, 300)
+    arcs = [r * np.column_stack([np.cos(t), np.sin(t)]) for r, t in ((0.4, angle), (0.40002, angle[::-1]))]
+    points = np.concatenate([*arcs, arcs[0][:1]])[::-1]
+    slot = asm.NurbsCurve(points, [0.0, *np.linspace(0.0, 1.0, len(points)), 1.0], 1)
+    assert round_holes(Face(flat.surface, flat.outer, [slot])) == []
+    (disc,) = [face for face in faces_of(asm.shapes.solid_cylinder(0.4, 1.0)) if face.name == "top"]
+    assert round_holes(disc) == [] and all(round_holes(face) == [] for face in faces_of(asm.shapes.sphere(1.0)))
 
 
 @pytest.mark.parametrize("name", ["pin", "ball", "torus", "cylinder", "wire", "clip"])

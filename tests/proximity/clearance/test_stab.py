@@ -69,8 +69,11 @@ def test_distances_of_triangles(cases):
 )
 def test_stabs(segment, thick, rho, depth):
     """By heights of the ends and distances from sides; what both stand for is taken off."""
-    told = stabbed(segment, thick, TRIANGLE, rho)
+    told, part = stabbed(segment, thick, TRIANGLE, rho)
     assert max(told, 0.0) == pytest.approx(depth, abs=1e-15)
+    if depth > 0.0:
+        (_, _, high), (_, _, low) = segment
+        assert part == pytest.approx(high / (high - low), abs=1e-15)
 
 
 def test_stabs_stay_whatever_both_stand_for(cases):
@@ -79,7 +82,7 @@ def test_stabs_stay_whatever_both_stand_for(cases):
     for _ in range(cases(600, 20_000)):
         segment, triangle = rng.normal(size=(2, 3)), rng.normal(size=(3, 3))
         rho = 10.0 ** rng.uniform(-3.0, -1.0)
-        depth = stabbed(rows(segment), 0.0, rows(triangle), rho)
+        depth, _ = stabbed(rows(segment), 0.0, rows(triangle), rho)
         if not depth > 0.0:
             continue
         stabs += 1
@@ -87,7 +90,7 @@ def test_stabs_stay_whatever_both_stand_for(cases):
         for _ in range(4):
             other = triangle + rho * np.array([direction(rng) for _ in range(3)])
             shifted = segment + 0.999 * depth * direction(rng)
-            assert stabbed(rows(shifted), 0.0, rows(other), 0.0) > 0.0
+            assert stabbed(rows(shifted), 0.0, rows(other), 0.0)[0] > 0.0
     assert stabs > 20
 
 

@@ -1,0 +1,109 @@
+"""Edges of triangles that are chords of a face's boundary curves, and whether the curves stay in their triangles.
+
+Where the face ends before a chord, what is between curve and chord is no part of it: of that triangle alone, if the
+curve does not leave it. Of a triangle p q r with the chord p q let f be linear, 0 on the side r p and 1 in q, so that
+it is s on the chord's point s. The curve is off that by s (1 - s) dt^2 |c''| / 2 at most, and stays on that side if
+
+    2 (area) >= (dt^2 / 2) (|r_v - p_v| max |c_u''| + |r_u - p_u| max |c_v''|),
+
+and so for the other side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.geometry.faces.face import Face
+from assembly.geometry.meshing.polygon import BoundaryCells
+from assembly.geometry.splines.surface import NurbsSurface
+from assembly.proximity.clearance.derivative_nets import bends, curve_bounds
+from assembly.proximity.clearance.records import NONE
+
+__all__ = ["Rims", "no_rims", "rims_of", "spilling"]
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Rims:
+    """Chords of boundary curves, n rows.
+
+    Attributes
+    ----------
+    curve : (n, 3)
+        The boundary curve that edge k (corner k to k + 1) is a chord of, or -1.
+    t, second : (n, 3, 2)
+        Its parameters there, and bounds of |c_u''|, |c_v''|.
+    hollow : (n, 3)
+        1: that curve bends away from the material; -1: towards it; 0: not known.
+    beside : (n, 2)
+        How far ends of the chords are from the curves in (u, v).
+    """
+
+    curve: Indices
+    t: Array
+    second: Array
+    hollow: Indices
+    beside: Array
+
+    @property
+    def sag(self) -> Array:
+        """How far curves are from their chords in (u, v), at most (n, 3, 2)."""
+        return np.asarray(0.125 * np.diff(self.t, axis=2) ** 2 * self.second)
+
+    def spills(self, uv: Array) -> NDArray[np.bool_]:
+        """Which curves (n, 3), but those that bend towards the material, may leave their triangles (n, 3, 2)."""
+        p, q, r = (np.roll(uv, -k, axis=1) for k in range(3))
+        area = np.abs((q - p)[..., 0] * (r - p)[..., 1] - (q - p)[..., 1] * (r - p)[..., 0])
+        sides = np.abs(np.stack([r - q, r - p]))[..., ::-1]
+        asked = 4.0 * (sides * self.sag).sum(axis=-1).max(axis=0)
+        return np.asarray((self.curve != NONE) & (self.hollow != -1) & (area < asked))
+
+
+def no_rims(count: int) -> Rims:
+    """Those of cells that have none."""
+    return Rims(
+        np.full((count, 3), NONE),
+        np.zeros((count, 3, 2)),
+        np.zeros((count, 3, 2)),
+        np.zeros((count, 3), dtype=np.int64),
+        np.zeros((count, 2)),
+    )
+
+
+def rims_of(face: Face, cells: BoundaryCells) -> Rims:
+    """The chords of a face's triangles."""
+    number, border = cells.segments, cells.border
+    found = no_rims(len(number))
+    for c in np.unique(border.curve[border.curve >= 0]):
+        curve = face.boundary[c]
+        row, k = np.nonzero((number >= 0) & (border.curve[np.maximum(number, 0)] == c))
+        t = border.t[number[row, k]]
+        found.curve[row, k], found.t[row, k] = c, t
+        found.second[row, k], found.hollow[row, k] = curve_bounds(curve, t), bends(curve, t)
+        apart = _displaced(face.surface, border.ends[number[row, k]], curve.evaluate(t.ravel()))
+        np.maximum.at(found.beside, row, apart)
+    return found
+
+
+def spilling(face: Face, cells: BoundaryCells) -> Indices:
+    """The segments of the border whose curves may leave their triangles."""
+    return np.unique(cells.segments[rims_of(face, cells).spills(cells.parameters)])
+
+
+def _displaced(surface: NurbsSurface, ends: Array, true: Array) -> Array:
+    """How far ends of chords (n, 2, 2) are from points (2 n, 2) of their curves, modulo periods: the larger, (n, 2).
+
+    Ends may have been moved onto a line of the triangulation's grid.
+    """
+    apart = ends - true.reshape(ends.shape)
+    for d in range(2):
+        if surface.closed[d]:
+            period = float(np.ptp(surface.domain[d]))
+            apart[..., d] -= period * np.round(apart[..., d] / period)
+    largest: Array = np.abs(apart).max(axis=1)
+    return largest
