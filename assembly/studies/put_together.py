@@ -2,8 +2,9 @@
 
 What the other constraints ask for is the least that a solution has to have. Where nothing crosses at that pose, it is
 the solution: no clearance pushes there. To it bodies may pass through each other, as a bolt on the wrong side of its
-plate has to. So it is the first thing to try from a start at which bodies are far from where joints want them, or in
-each other; from one that is near and clear it is the last, because there linked rings are to stay linked.
+plate has to. So it is the first thing to try from a start at which bodies are in each other, or each is on a side of a
+plane that parts it from the others, as in an exploded view. Elsewhere bodies may be linked, as rings are, or in each
+other's holes, and are to stay so: there it is the last thing.
 """
 
 from __future__ import annotations
@@ -27,9 +28,8 @@ if TYPE_CHECKING:
 __all__ = ["PutTogether", "put_together"]
 
 Array = NDArray[np.float64]
-# [size of the scene] Constraints that are off by no more hold; those that are off by more are far from holding, and
-# what is clear there is no topology to keep.
-HELD, FAR = 1e-9, 0.1
+# [size of the scene] Constraints that are off by no more hold.
+HELD = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class PutTogether:
     ----------
     poses : (n, 7)
     keeps_topology : bool
-        Whether the start was near and clear, so that other ways come first.
+        Whether bodies were clear at the start, but not all parted by planes, so that other ways come first.
     """
 
     poses: Array
@@ -76,4 +76,6 @@ def put_together(
     with lent_proof(packed, scene.bodies) as proof:
         touching = settings.touching * packed.scale
         is_clear = not any(is_stuck(answer, touching) for answer in proof.look(q, touching))
-    return PutTogether(solution.q.copy(), is_clear and off <= FAR * packed.scale)
+        # The boxes of whole bodies.
+        is_parted = all(proof.is_apart(k, q, 0.0, 1) for k in range(len(proof.pairs)))
+    return PutTogether(solution.q.copy(), is_clear and not is_parted)
