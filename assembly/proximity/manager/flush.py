@@ -20,6 +20,7 @@ from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, scale, sub
 from assembly.proximity.brep.records import EDGE_RECORD, edge_at, shell_at
 from assembly.proximity.bvh.tree import node_at, three_of, tree_at
+from assembly.proximity.features.holding import TILT
 from assembly.proximity.manager.extrema import LISTED, NEW, USELESS, extremum_at
 from assembly.proximity.manager.overlap import DEPTH, facets_cut, next_near, projection_at, seen_by_other
 from assembly.proximity.manager.records import HANDED_OFF, LOST
@@ -77,13 +78,13 @@ def has_free_edge(store, shell):
 
 
 @kernel(inner=True)
-def is_outside_solid(posed, side, c, stack, normals):
-    """Whether a point, in the axes of one body, is outside of it and no nearer to its faces than facets are off.
+def is_outside_solid(posed, side, c, distance, stack, normals):
+    """Whether a point, in the axes of one body, is outside of it, and its faces no nearer than a distance.
 
     By rays in three directions that no face is likely to lie along.
     """
     store = posed.store
-    if has_free_edge(store, posed.shells[side]) or faces_about(posed, side, c, posed.offsets[side], stack, normals) > 0:
+    if has_free_edge(store, posed.shells[side]) or faces_about(posed, side, c, distance, stack, normals) > 0:
         return False
     root = node_at(store.pool, tree_at(store.table, posed.trees[side]).node_pool)
     away = sub(c, three_of(root.center))
@@ -101,12 +102,16 @@ def is_outside_solid(posed, side, c, stack, normals):
 
 @kernel(inner=True)
 def is_in_one_alone(posed, extremum, stack, normals):
-    """Whether the middle of an extremum, with a negative gap, is outside of one of the bodies."""
+    """Whether the middle of an extremum, with a negative gap, is outside of one of the bodies.
+
+    That of a corner whose normal leans by TILT may be beside its body by that.
+    """
     if -0.5 * extremum.gap <= 2.0 * max(posed.offsets[0], posed.offsets[1]):
         return False
     c = scale(0.5, add(three_of(extremum.point_f), three_of(extremum.point_g)))
-    return is_outside_solid(posed, 0, c, stack, normals) or is_outside_solid(
-        posed, 1, seen_by_other(posed, 0, c), stack, normals
+    beside = -0.5 * TILT * extremum.gap
+    return is_outside_solid(posed, 0, c, max(posed.offsets[0], beside), stack, normals) or is_outside_solid(
+        posed, 1, seen_by_other(posed, 0, c), max(posed.offsets[1], beside), stack, normals
     )
 
 

@@ -166,11 +166,11 @@ def test_tilted_pins(play, cases):
 
 @pytest.mark.parametrize("play", [1e-3, 1e-5, 1e-7])
 def test_a_pin_goes_along_its_bore(play):
-    """Every step of the way is proven, and asks for a few hundred pairs of nodes at most."""
+    """Every step of the way is proven, and asks for few pairs of nodes: some cells are of two bores, and know one."""
     proof = proof_of(PLATES["two holes"], asm.shapes.solid_cylinder(RADIUS - play, 1.2))
     x, y = PLACES["two holes"]
     assert proof.look(poses(at(x, y, 0.5)), 0.0)[0].verdict is Verdict.CLEAR
-    assert proof.fronts.counts.count[0] < 300
+    assert proof.fronts.counts.count[0] < 1500
     for k in range(1, 31):
         q = poses(at(x + 0.5 * play * np.sin(k), y + 0.5 * play * np.cos(2.0 * k), 0.5 - 0.04 * k))
         assert proof.look(q, 0.0, swept=True)[0].verdict is Verdict.CLEAR
@@ -184,7 +184,7 @@ def test_round_holes_of_flat_faces():
     assert sorted(len(holes) for holes in flat) == [0, 0, 0, 0, 0, 0, 0, 3, 3]
     for holes in flat:
         assert sorted(hole.radius for hole in holes) in ([], pytest.approx([0.2, 0.3, RADIUS], abs=1e-13))
-    # The circle around a disc is no hole, and neither is an ellipse or what is nearly a circle.
+    # The circle around a disc is no hole, and neither is an ellipse.
     pin = faces_of(asm.shapes.solid_cylinder(0.3, 1.0))
     assert [round_holes(face) for face in pin] == [[]] * 3
     circle = asm.NurbsCurve(
@@ -196,9 +196,12 @@ def test_round_holes_of_flat_faces():
     assert hole.radius == pytest.approx(0.4, abs=1e-14) and not hole.outward
     assert len(round_holes(Face(plane, holes=[[circle.reversed()]], reversed=True))) == 1
     assert round_holes(Face(plane, outer=[circle])) == []
-    for change in (1.0 + 1e-9, 1.2):
-        off = asm.NurbsCurve(circle.control_points * [change, 1.0], circle.knots, 2, circle.weights)
-        assert round_holes(Face(plane, holes=[[off]])) == []
+    off = asm.NurbsCurve(circle.control_points * [1.2, 1.0], circle.knots, 2, circle.weights)
+    assert round_holes(Face(plane, holes=[[off]])) == []
+    # Of what is nearly a circle, as in files, a circle within it is the hole.
+    off = asm.NurbsCurve(circle.control_points * [1.0 + 1e-6, 1.0], circle.knots, 2, circle.weights)
+    (near,) = round_holes(Face(plane, holes=[[off]]))
+    assert 0.4 - 1e-6 < near.radius <= 0.4
     # The map from (u, v) to space need not keep angles: an ellipse there may be a circle here.
     skewed = asm.NurbsSurface(plane.control_points * [1.2, 1.0, 1.0], plane.knots, (1, 1))
     assert round_holes(Face(skewed, holes=[[circle]])) == []
