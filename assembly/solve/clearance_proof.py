@@ -21,6 +21,7 @@ from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
+from assembly.proximity.clearance.slimming import slim_answer
 from assembly.proximity.clearance.touching import left_open, move_apart
 from assembly.proximity.extrema.pairs import ContactPair
 from assembly.solve.contact_pairs import contact_pairs, listed_contacts
@@ -116,6 +117,11 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
             answer.verdict is Verdict.UNDECIDED and conforms(proof, k, solution.q, touching)
             for k, answer in enumerate(answers)
         ]
+        for k in np.flatnonzero(conforming).tolist():
+            i, j = proof.pairs[k]
+            slim = slim_answer(proof, k, solution.q, touching, (proof.faces[i], proof.faces[j]))
+            if slim is not None:
+                answers[k], conforming[k] = slim, False
     owned = _owned(packed)
     asked = [k for k, conform in enumerate(conforming) if conform]
     found_crossing = sampled(PosedBodies.of(solution), [owned[k][1] for k in asked], CTRL_C).crossing

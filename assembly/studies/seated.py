@@ -24,6 +24,7 @@ from assembly.geometry.recognition.elementary import elementary_form
 from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
+from assembly.proximity.clearance.round_faces import NEARLY
 from assembly.solve.clearance_proof import can_prove, lent_proof
 from assembly.solve.interruption import Interruption
 from assembly.studies.parting import is_stuck
@@ -62,7 +63,7 @@ def _elementary(faces: tuple[Face, ...]) -> tuple[tuple[Form, bool, Array], ...]
     """Faces that may conform to others, which of them look outward, along the normal of planes, and their boxes."""
     found: list[tuple[Form, bool, Array]] = []
     for face in faces:
-        form = elementary_form(face.surface)
+        form = elementary_form(face.surface, NEARLY * face.surface.size)
         if isinstance(form, Plane | Cylinder | Cone | Sphere):
             is_outward = (face.sign > 0) == (isinstance(form, Plane) or form.outward)
             found.append((form, is_outward, np.array(face.surface.bounding_box())))

@@ -17,6 +17,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.elementary import elementary_form
 from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere, Torus
 from assembly.proximity.clearance.proof import ClearanceProof
+from assembly.proximity.clearance.round_faces import NEARLY
 
 __all__ = ["conforms", "lie_on_each_other"]
 
@@ -57,7 +58,7 @@ def _elementary(faces: tuple[Face, ...]) -> tuple[tuple[Form, bool], ...]:
     """The faces that are planes, cylinders, cones, spheres or tori, and whether each looks outward."""
     found = []
     for face in faces:
-        form = elementary_form(face.surface)
+        form = elementary_form(face.surface, NEARLY * face.surface.size)
         if isinstance(form, Plane | Cylinder | Cone | Sphere | Torus):
             found.append((form, (face.sign > 0) == (isinstance(form, Plane) or form.outward)))
     return tuple(found)

@@ -17,11 +17,13 @@ from assembly.geometry.splines import bezier
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["Round", "round_holes", "round_of", "round_parts"]
+__all__ = ["NEARLY", "Round", "round_holes", "round_of", "round_parts"]
 
 Array = NDArray[np.float64]
 # A face that goes around less of a cylinder than about half is no round body.
 HALF = 0.95 * pi
+# [size of a face] Cylinders, balls and circles of files are off by some 1e-11; what they are off by is in their radii.
+NEARLY = 1e-10
 # [size of a face] A round hole of a file may be a curve through points of a circle, off by so much.
 HOLE = 1e-4
 # A ball of more than this part of a face's size is no ball that the face goes around.
@@ -115,7 +117,7 @@ def _disc(face: Face) -> Round | None:
     flat = _flat_map(face.surface)
     if flat is None or face.outer is None:
         return None
-    circle = flat.circle(face.boundary[: len(face.chains[0])])
+    circle = flat.circle(face.boundary[: len(face.chains[0])], NEARLY * face.surface.size)
     if circle is None:
         return None
     off = circle.deviation + flat.off
@@ -142,7 +144,7 @@ def round_holes(face: Face) -> list[Round]:
 
 def round_of(face: Face) -> Round | None:
     """What a face lies on, or None where that is no cylinder, ball or torus, and the face no disc."""
-    form = elementary_form(face.surface)
+    form = elementary_form(face.surface, NEARLY * face.surface.size)
     if isinstance(form, Plane):
         return _disc(face)
     if not isinstance(form, (Cylinder, Sphere, Torus)):
