@@ -84,7 +84,8 @@ def rims_of(face: Face, cells: BoundaryCells) -> Rims:
         row, k = np.nonzero((number >= 0) & (border.curve[np.maximum(number, 0)] == c))
         t = border.t[number[row, k]]
         found.curve[row, k], found.t[row, k] = c, t
-        found.second[row, k], found.hollow[row, k] = curve_bounds(curve, t), bends(curve, t)
+        if curve.degree > 1:
+            found.second[row, k], found.hollow[row, k] = curve_bounds(curve, t), bends(curve, t)
         apart = _displaced(face.surface, border.ends[number[row, k]], curve.evaluate(t.ravel()))
         np.maximum.at(found.beside, row, apart)
     return found
