@@ -24,7 +24,7 @@ from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.attempts.attempts import attempt, load
 from assembly.solve.attempts.postures import postures_from
 from assembly.solve.interruption import CTRL_C, Interruption
-from assembly.solve.loop.settings import ALLOWED_OVERLAP, ANY_POSE, GATHER, ITERATIONS, PLACES, STRAYS
+from assembly.solve.loop.settings import ALLOWED_OVERLAP, ANY_POSE, GATHER, ITERATIONS, NEVER, PLACES, STRAYS
 from assembly.solve.options import Options
 from assembly.solve.scene import Scene, Status
 from assembly.solve.solution import Solution
@@ -168,6 +168,8 @@ class Assembly(Contents):
         elif not warm:
             settings = settings.copy()
             settings[STRAYS] = 1.0
+        if options.get("keep_topology") and self.packed().clearance_rows:
+            settings[GATHER] = NEVER
         return interruption.settings(settings)
 
     def _given(self, q0: ArrayLike | None) -> Array:

@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.constraints.model.clearance import Clearance
+from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import can_prove, lent_proof
 from assembly.solve.interruption import Interruption
+from assembly.solve.loop.settings import GATHER, NEVER
 from assembly.solve.options import Options
 from assembly.studies.parting import is_stuck
 
@@ -39,11 +41,14 @@ class PutTogether:
     Attributes
     ----------
     poses : (n, 7)
+    turns : (n,)
+        The angles that are counted there.
     keeps_topology : bool
         Whether the start was near and clear, so that other ways come first.
     """
 
     poses: Array
+    turns: Array
     keeps_topology: bool
 
 
@@ -67,7 +72,9 @@ def put_together(
     inner.constrain(*others)
     for sign, objective in scene.objectives:
         (inner.minimize if sign > 0.0 else inner.maximize)(objective)
-    off = inner._from_start(q, starts, options | {"max_iterations": 0}, interruption).feasibility
+    as_it_is = inner._settings(options | {"max_iterations": 0}, interruption, warm=False)
+    as_it_is[GATHER] = NEVER
+    off = inner._solved(as_it_is, q, starts, interruption).feasibility
     if off <= HELD * packed.scale or interruption.is_over():
         return None
     solution = inner._from_start(q, starts, options, interruption)
@@ -76,4 +83,5 @@ def put_together(
     with lent_proof(packed, scene.bodies) as proof:
         touching = settings.touching * packed.scale
         is_clear = not any(is_stuck(answer, touching) for answer in proof.look(q, touching))
-    return PutTogether(solution.q.copy(), is_clear and off <= FAR * packed.scale)
+    turns = solution._state[solution._packed.angles_at : solution._packed.multipliers_at : TRACK].copy()
+    return PutTogether(solution.q.copy(), turns, is_clear and off <= FAR * packed.scale)
