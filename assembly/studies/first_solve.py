@@ -83,13 +83,23 @@ class _FirstSolve:
         """Whether one of the ways ends at a solution, or there is no time for another one."""
         return bool(ways) and (any(way.success for way in ways) or self.interruption.is_over())
 
-    def _from(self, poses: Array, turns: Array | None = None) -> Solution:
-        """A solve that begins at other poses than the user's, and with turns near others than zeros."""
-        return self.scene._solved(self.settings, poses, self.starts, self.interruption, self.q, turns)
+    def _from(self, poses: Array) -> Solution:
+        """A solve that begins at other poses than the user's."""
+        return self.scene._solved(self.settings, poses, self.starts, self.interruption, self.q)
+
+    def _where_it_fits(self, poses: Array, turns: Array | None = None) -> Solution:
+        """The same, where bodies fit each other but for little, with turns near others than zeros.
+
+        Where nothing is asked for and the least move from the user's poses is not found, any pose does that holds.
+        """
+        solution = self.scene._solved(self.settings, poses, self.starts, self.interruption, self.q, turns)
+        if solution.success or self.scene.objectives or self.interruption.is_over():
+            return solution
+        return self.scene._solved(self.settings, poses, self.starts, self.interruption, None, turns)
 
     def _put_together(self, together: PutTogether) -> Solution:
         """The same, from where bodies were put together without clearances."""
-        solution = self._from(together.poses, together.turns)
+        solution = self._where_it_fits(together.poses, together.turns)
         solution.put_together = True
         return solution
 
@@ -99,10 +109,7 @@ class _FirstSolve:
         ways = []
         seat = seated(self.scene, self.q, touching, self.interruption)
         if seat is not None:
-            ways.append(self._from(seat))
-            if not (is_solved or ways[-1].success or self.scene.objectives):
-                # Any pose does, if not the one with the least move.
-                ways.append(self.scene._solved(self.settings, seat, self.starts, self.interruption))
+            ways.append(self._from(seat) if is_solved else self._where_it_fits(seat))
         if self._is_done(ways):
             return ways
         apart = parted(self.scene, self.q, touching, self.interruption)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.model.contact import Contact
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import can_prove, lent_proof
 from assembly.solve.interruption import Interruption
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
 __all__ = ["PutTogether", "put_together"]
 
 Array = NDArray[np.float64]
-# [size of the scene] Constraints that are off by no more hold; those that are off by more are far from holding, and
-# what is clear there is no topology to keep.
+# [size of the scene] Constraints that are off by no more hold; where joints are off by more bodies are far away, and
+# what is clear there is no topology to keep. That a contact is open says nothing of it: rings that are to touch are.
 HELD, FAR = 1e-9, 0.1
 
 
@@ -74,8 +75,8 @@ def put_together(
         (inner.minimize if sign > 0.0 else inner.maximize)(objective)
     as_it_is = inner._settings(options | {"max_iterations": 0}, interruption, warm=False)
     as_it_is[GATHER] = NEVER
-    off = inner._solved(as_it_is, q, starts, interruption).feasibility
-    if off <= HELD * packed.scale or interruption.is_over():
+    start = inner._solved(as_it_is, q, starts, interruption)
+    if start.feasibility <= HELD * packed.scale or interruption.is_over():
         return None
     solution = inner._from_start(q, starts, options, interruption)
     if not solution.success:
@@ -83,5 +84,6 @@ def put_together(
     with lent_proof(packed, scene.bodies) as proof:
         touching = settings.touching * packed.scale
         is_clear = not any(is_stuck(answer, touching) for answer in proof.look(q, touching))
+    off = max((start.violations[item.name] for item in others if not isinstance(item, Contact)), default=0.0)
     turns = solution._state[solution._packed.angles_at : solution._packed.multipliers_at : TRACK].copy()
     return PutTogether(solution.q.copy(), turns, is_clear and off <= FAR * packed.scale)
