@@ -46,7 +46,7 @@ def test_a_solve_begins_again_with_four_times_as_many_places(attempts):
     solution = scene.solve()
     assert solution.success and np.array_equal(solution.q, scene.q)
     assert len(solution.contacts) > 4
-    # 4 and 16 are too few for eleven rims.
+    # Four places and sixteen are too few for eleven rims.
     assert scene._crowding == 16 and attempts == [1, 1, 1]
 
 
@@ -57,7 +57,7 @@ def test_with_places_enough_there_is_one_attempt(attempts):
 
 
 def test_steps_are_not_made_that_would_be_thrown_away(attempts):
-    scene = drawn(4)
+    scene = drawn(12)
     solution = scene.solve()
     assert solution.success and scene._crowding > 1
     assert solution.q[1, 2] == pytest.approx(5.0, abs=1e-8)
@@ -74,6 +74,6 @@ def test_what_grew_is_kept(attempts):
 
 
 def test_the_end_does_not_depend_on_how_many_places_it_began_with():
-    few, many = drawn(4).solve(), drawn(400).solve()
+    few, many = drawn(12).solve(), drawn(400).solve()
     assert few.success and many.success
     assert few.q[1] == pytest.approx(many.q[1], abs=1e-7)
