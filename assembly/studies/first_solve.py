@@ -87,19 +87,19 @@ class _FirstSolve:
         """A solve that begins at other poses than the user's."""
         return self.scene._solved(self.settings, poses, self.starts, self.interruption, self.q)
 
-    def _where_it_fits(self, poses: Array, turns: Array | None = None) -> Solution:
-        """The same, where bodies fit each other but for little, with turns near others than zeros.
+    def _where_it_fits(self, poses: Array) -> Solution:
+        """The same, where bodies fit each other but for little.
 
         Where nothing is asked for and the least move from the user's poses is not found, any pose does that holds.
         """
-        solution = self.scene._solved(self.settings, poses, self.starts, self.interruption, self.q, turns)
+        solution = self._from(poses)
         if solution.success or self.scene.objectives or self.interruption.is_over():
             return solution
-        return self.scene._solved(self.settings, poses, self.starts, self.interruption, None, turns)
+        return self.scene._solved(self.settings, poses, self.starts, self.interruption)
 
     def _put_together(self, together: PutTogether) -> Solution:
         """The same, from where bodies were put together without clearances."""
-        solution = self._where_it_fits(together.poses, together.turns)
+        solution = self._where_it_fits(together.poses)
         solution.put_together = True
         return solution
 

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import Contact
-from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import can_prove, lent_proof
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import GATHER, NEVER
@@ -42,14 +41,11 @@ class PutTogether:
     Attributes
     ----------
     poses : (n, 7)
-    turns : (n,)
-        The angles that are counted there.
     keeps_topology : bool
         Whether the start was near and clear, so that other ways come first.
     """
 
     poses: Array
-    turns: Array
     keeps_topology: bool
 
 
@@ -85,5 +81,4 @@ def put_together(
         touching = settings.touching * packed.scale
         is_clear = not any(is_stuck(answer, touching) for answer in proof.look(q, touching))
     off = max((start.violations[item.name] for item in others if not isinstance(item, Contact)), default=0.0)
-    turns = solution._state[solution._packed.angles_at : solution._packed.multipliers_at : TRACK].copy()
-    return PutTogether(solution.q.copy(), turns, is_clear and off <= FAR * packed.scale)
+    return PutTogether(solution.q.copy(), is_clear and off <= FAR * packed.scale)

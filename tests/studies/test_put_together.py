@@ -118,8 +118,12 @@ def test_it_is_tried_first_from_a_start_that_crosses():
     """Near, but in each other: there is no topology to keep."""
     scene = linked(0.05)
     q = np.array(scene.q)
-    q[1, 0] = 0.2
-    assert not put_together(scene, q, None, {}, CTRL_C).keeps_topology
+    for x, keeps in ((0.9, True), (1.85, False)):
+        q[1, 0] = x
+        a, b = scene.bodies
+        near = asm.Assembly([a, b])
+        near.constrain(asm.Spherical(a.point(x + 0.01, 0.0, 0.0), b.point(0, 0, 0), "lead"), asm.Clearance())
+        assert put_together(near, q, None, {}, CTRL_C).keeps_topology == keeps
 
 
 def test_there_is_none_where_joints_hold_or_cannot():

@@ -158,6 +158,15 @@ def test_surfaces_with_their_outsides_on_one_side_do_not(kind):
         assert not conforms(proof_between((outward, full)), 0, poses(rng), NEAR)
 
 
+def test_plates_whose_faces_are_reversed_lie_on_each_other():
+    """The bottom of a plate is a plane whose normal points up, the other way round."""
+    plate = asm.shapes.plate(3.0, 2.0, 1.0, [(0.5, 0.2, 0.3)])
+    assert {face.reversed for face in plate} == {False, True}
+    proof = proof_between((plate, plate))
+    assert conforms(proof, 0, poses(np.random.default_rng(11), shift=(0.3, 0.1, 1.0)), ROUNDED)
+    assert not conforms(proof, 0, poses(np.random.default_rng(11), shift=(0.3, 0.1, 1.0 + 2.0 * NEAR)), NEAR)
+
+
 def test_planes_that_look_the_same_way_do_not():
     """A plate on a plate of its own height, shifted: tops in one plane, bottoms in one plane."""
     box = asm.shapes.box(1.0, 1.0, 1.0)
