@@ -24,7 +24,16 @@ from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.attempts.attempts import attempt, load
 from assembly.solve.attempts.postures import postures_from
 from assembly.solve.interruption import CTRL_C, Interruption
-from assembly.solve.loop.settings import ALLOWED_OVERLAP, ANY_POSE, GATHER, ITERATIONS, PLACES, STRAYS
+from assembly.solve.loop.settings import (
+    ALLOWED_OVERLAP,
+    ANY_POSE,
+    FEASIBILITY,
+    GATHER,
+    ITERATIONS,
+    NEVER,
+    PLACES,
+    STRAYS,
+)
 from assembly.solve.options import Options
 from assembly.solve.scene import Scene, Status
 from assembly.solve.solution import Solution
@@ -168,6 +177,8 @@ class Assembly(Contents):
         elif not warm:
             settings = settings.copy()
             settings[STRAYS] = 1.0
+        if options.get("keep_topology") and self.packed().clearance_rows:
+            settings[GATHER] = NEVER
         return interruption.settings(settings)
 
     def _given(self, q0: ArrayLike | None) -> Array:
@@ -237,13 +248,16 @@ class Assembly(Contents):
                         continue
                 solution = Solution(self._scene, packed, state, status, spent, history, order, fit)
                 solution._touching = float(settings[ALLOWED_OVERLAP])
-                return self._proven(solution, interruption) if packed.clearance_rows else solution
+                return self._proven(solution, settings, interruption) if packed.clearance_rows else solution
             self._crowding *= MORE_PLACES
             self._packed = None
 
     @staticmethod
-    def _proven(solution: Solution, interruption: Interruption) -> Solution:
-        """A solution under clearances, STALLED where it is not known that its bodies are clear."""
+    def _proven(solution: Solution, settings: Array, interruption: Interruption) -> Solution:
+        """A solution under clearances, STALLED where it is not known that its bodies are clear.
+
+        Where any pose does, and the loop ended because of a crossing, one that holds is a solution if all is proven.
+        """
         from assembly.solve.clearance_proof import prove_end
 
         if solution._is_lost or (interruption.is_over() and not solution.success):
@@ -252,6 +266,13 @@ class Assembly(Contents):
         solution._clear = prove_end(solution)
         if solution.success and not all(pair.holds for pair in solution._clear):
             solution.status = Status.STALLED
+        elif (
+            solution.status is Status.STALLED
+            and settings[ANY_POSE] == 1.0
+            and all(pair.proved for pair in solution._clear)
+            and solution.feasibility <= settings[FEASIBILITY] * solution._packed.scale
+        ):
+            solution.status = Status.SOLVED
         solution.seconds += perf_counter() - begin
         return solution
 

@@ -84,7 +84,7 @@ def test_statuses_and_their_remedies():
 
 
 def test_options_and_their_defaults():
-    table = [(name, float(default)) for name, default, _ in rows(CONCEPTS, "option", "default")]
+    table = [(name, ast.literal_eval(default)) for name, default, _ in rows(CONCEPTS, "option", "default")]
     assert table == [(option.name, option.default) for option in fields(Options)]
 
 

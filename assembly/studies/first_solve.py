@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.solve.clearance_proof import can_prove
 from assembly.solve.interruption import Interruption
-from assembly.solve.loop.settings import ALLOWED_OVERLAP
+from assembly.solve.loop.settings import ALLOWED_OVERLAP, GATHER, NEVER
 from assembly.solve.solution import Solution
 from assembly.studies.parting import parted
-from assembly.studies.put_together import put_together
+from assembly.studies.put_together import PutTogether, put_together
 from assembly.studies.seated import seated
 from assembly.studies.separation import separated
 
@@ -41,6 +42,10 @@ def first_solve(
     interruption: Interruption,
 ) -> Solution:
     """The solution of a scene with clearances from poses q (n, 7), with settings made of options."""
+    settings = settings.copy()
+    if can_prove(scene.packed()):
+        # To where joints hold bodies are put together without clearances, or not at all.
+        settings[GATHER] = NEVER
     return _FirstSolve(scene, q, settings, starts, options, interruption).solution()
 
 
@@ -61,14 +66,14 @@ class _FirstSolve:
         together = put_together(self.scene, self.q, self.starts, self.options, self.interruption)
         ways = []
         if together is not None and not together.keeps_topology:
-            ways.append(self._put_together(together.poses))
+            ways.append(self._put_together(together))
         if not self._is_done(ways):
             ways.append(self.scene._solved(self.settings, self.q, self.starts, self.interruption))
             # What holds as it stands is not moved.
             if not (ways[-1].success and (ways[-1].q == self.q).all()) and not self.interruption.is_over():
                 ways += self._from_apart(ways[-1].success)
         if not self._is_done(ways) and together is not None and together.keeps_topology:
-            ways.append(self._put_together(together.poses))
+            ways.append(self._put_together(together))
         solution = min((way for way in ways if way.success), key=lambda way: way.objective, default=ways[-1])
         if len(ways) > 1:
             solution.seconds = perf_counter() - begin
@@ -82,9 +87,19 @@ class _FirstSolve:
         """A solve that begins at other poses than the user's."""
         return self.scene._solved(self.settings, poses, self.starts, self.interruption, self.q)
 
-    def _put_together(self, poses: Array) -> Solution:
-        """The same, from where bodies were put together without clearances."""
+    def _where_it_fits(self, poses: Array) -> Solution:
+        """The same, where bodies fit each other but for little.
+
+        Where nothing is asked for and the least move from the user's poses is not found, any pose does that holds.
+        """
         solution = self._from(poses)
+        if solution.success or self.scene.objectives or self.interruption.is_over():
+            return solution
+        return self.scene._solved(self.settings, poses, self.starts, self.interruption)
+
+    def _put_together(self, together: PutTogether) -> Solution:
+        """The same, from where bodies were put together without clearances."""
+        solution = self._where_it_fits(together.poses)
         solution.put_together = True
         return solution
 
@@ -94,10 +109,7 @@ class _FirstSolve:
         ways = []
         seat = seated(self.scene, self.q, touching, self.interruption)
         if seat is not None:
-            ways.append(self._from(seat))
-            if not (is_solved or ways[-1].success or self.scene.objectives):
-                # Any pose does, if not the one with the least move.
-                ways.append(self.scene._solved(self.settings, seat, self.starts, self.interruption))
+            ways.append(self._from(seat) if is_solved else self._where_it_fits(seat))
         if self._is_done(ways):
             return ways
         apart = parted(self.scene, self.q, touching, self.interruption)

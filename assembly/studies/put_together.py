@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.constraints.model.clearance import Clearance
 from assembly.solve.clearance_proof import can_prove, lent_proof
 from assembly.solve.interruption import Interruption
+from assembly.solve.loop.settings import GATHER, NEVER
 from assembly.solve.options import Options
 from assembly.studies.parting import is_stuck
 
@@ -67,8 +68,10 @@ def put_together(
     inner.constrain(*others)
     for sign, objective in scene.objectives:
         (inner.minimize if sign > 0.0 else inner.maximize)(objective)
-    off = inner._from_start(q, starts, options | {"max_iterations": 0}, interruption).feasibility
-    if off <= HELD * packed.scale or interruption.is_over():
+    as_it_is = inner._settings(options | {"max_iterations": 0}, interruption, warm=False)
+    as_it_is[GATHER] = NEVER
+    start = inner._solved(as_it_is, q, starts, interruption)
+    if start.feasibility <= HELD * packed.scale or interruption.is_over():
         return None
     solution = inner._from_start(q, starts, options, interruption)
     if not solution.success:

@@ -102,26 +102,48 @@ def _fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Itera
         for body, row in zip(bodies, rows, strict=True)
     )
     axes: list[tuple[Array, Array]] = []
+    flush: list[tuple[float, _Face, _Face]] = []
     for one in ones:
         for other in others:
             if not one.near(other, reach):
                 continue
             if isinstance(one.form, Plane) and isinstance(other.form, Plane):
-                yield from _flush(one, other, reach, names)
+                off = _off_plane(one, other)
+                if off <= reach:
+                    flush.append((off, one, other))
             elif one.is_outward != other.is_outward:
                 yield from _round(one, other, axes, names)
+    # The flank of a key is near both the flank of its slot and the wall beyond: it goes with the nearer one. Feet of
+    # a body all go with the one face that they stand on.
+    nearest: dict[_Face, float] = {}
+    for off, one, other in flush:
+        for face in (one, other):
+            nearest[face] = min(off, nearest.get(face, np.inf))
+    for off, one, other in flush:
+        if off <= max(nearest[one], nearest[other]):
+            yield _planar(one, other, next(names))
 
 
-def _flush(one: _Face, other: _Face, reach: float, names: Iterator[str]) -> Iterator[Constraint]:
-    assert isinstance(one.form, Plane) and isinstance(other.form, Plane)
-    m = one.form.normal if one.is_outward else -one.form.normal
-    n = other.form.normal if other.is_outward else -other.form.normal
+def _plane(face: _Face) -> tuple[Array, Array]:
+    """A point of a flat face and its outward normal, in its body's axes."""
+    assert isinstance(face.form, Plane)
+    return face.form.point, face.form.normal if face.is_outward else -face.form.normal
+
+
+def _off_plane(one: _Face, other: _Face) -> float:
+    """How far two flat faces are off each other, in the middle of where both are; infinite if they are not opposed."""
+    (p, m), (q, n) = _plane(one), _plane(other)
     up = one.turn @ m
-    # Opposed, and off by little where they are near each other.
+    if not up @ (other.turn @ n) < -np.cos(LEAN):
+        return float(np.inf)
     middle = 0.5 * (np.maximum(one.low, other.low) + np.minimum(one.high, other.high))
-    off = [abs((middle - face.at(face.form.point)) @ up) for face in (one, other) if isinstance(face.form, Plane)]
-    if up @ (other.turn @ n) < -np.cos(LEAN) and sum(off) <= reach:
-        yield Planar(one.body.frame(one.form.point, m), other.body.frame(other.form.point, -n), next(names))
+    return float(abs((middle - one.at(p)) @ up) + abs((middle - other.at(q)) @ up))
+
+
+def _planar(one: _Face, other: _Face, name: str) -> Constraint:
+    """The joint of two flat faces that are to be flush."""
+    (p, m), (q, n) = _plane(one), _plane(other)
+    return Planar(one.body.frame(p, m), other.body.frame(q, -n), name)
 
 
 def _round(one: _Face, other: _Face, axes: list[tuple[Array, Array]], names: Iterator[str]) -> Iterator[Constraint]:

@@ -55,7 +55,7 @@ class Clearance(Constraint):
         Contacts farther apart are all kept, also across a wire thinner than the radius.
     slots : int, optional
         How many contacts may be near at a time; by default six for one pair and two more for each further one, at most
-        eight and four a body. A solve that needs more doubles it.
+        eight and four a body. A solve that needs more begins again with four times as many.
     neglect, places
         Former names of `merge_radius` and `slots`; they warn.
 

@@ -19,7 +19,7 @@ SETTINGS_RECORD = record_dtype(
     penalty=1,  # mu of the first step
     penalty_floor=1,  # mu falls to this, and farther where rows need it
     radius=1,  # length of the first step at most
-    gather=1,  # whether scattered bodies are gathered: 0, GATHERS or ASSEMBLES
+    gather=1,  # whether scattered bodies are gathered: 0 (where all else fails), NEVER, GATHERS or ASSEMBLES
     lift_trims=1,  # 1: contacts of trims that count get their coordinates as unknowns
     final_update=1,  # 1: all pairs that moved are updated once more before a pose counts as solved
     tick=1,  # 1: ends at a pose that holds after so many iterations, else at the last one that held
@@ -57,7 +57,7 @@ SETTINGS = size_of(SETTINGS_RECORD)
 # Whether the end is tested for a minimum (TESTED: and saddles are left before they are reached to the last digit).
 TESTED, REACHED = 1.0, 2.0
 # Whether scattered bodies are gathered (ASSEMBLES: and the loop ends there).
-GATHERS, ASSEMBLES = 1.0, 2.0
+NEVER, GATHERS, ASSEMBLES = -1.0, 1.0, 2.0
 # Results at the end of the state.
 RESULTS_RECORD = record_dtype(
     "f8",

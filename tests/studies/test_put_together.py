@@ -1,0 +1,161 @@
+"""First solves under clearances from where joints do not hold: put together first or last, or never."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from assembly.solve.interruption import CTRL_C, Interruption
+from assembly.studies.put_together import put_together
+from tests.studies.machined import bolt, disturbed
+
+# [length] What holds to 1e-12 of some hundred.
+HOLDS = 1e-9
+ACROSS = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
+
+
+def bolted(rng=None):
+    """Two plates and a bolt, exploded, with joints; which body is where is known."""
+    plate = asm.shapes.plate(60, 40, 10, [(0, 0, 4.5)])
+    homes = {"lower": (0, 0, 0), "upper": (0, 0, 10), "bolt": (0, 0, 15)}
+    away = {"lower": (0, 0, 0), "upper": (20, 5, 60), "bolt": (-10, 0, -90)}
+    shapes = {"lower": plate, "upper": plate, "bolt": bolt(4, 30, 6.5, 8)}
+    bodies = {}
+    for name, home in homes.items():
+        pose = np.r_[np.add(home, away[name]), 1.0, 0.0, 0.0, 0.0]
+        if rng is not None and name != "lower":
+            pose = disturbed(rng, pose, 3.0, 0.15)
+        bodies[name] = asm.Body(name, shapes[name], pose[:3], pose[3:], fixed=name == "lower")
+    lower, upper, screw = bodies.values()
+    scene = asm.Assembly(list(bodies.values()))
+    scene.constrain(
+        asm.Planar(lower.frame((0, 0, 5)), upper.frame((0, 0, -5)), "flush"),
+        asm.Cylindrical(lower.frame(), screw.frame(), "axis"),
+        asm.Cylindrical(upper.frame(), screw.frame(), "upper axis"),
+        asm.Planar(upper.frame((0, 0, 5)), screw.frame(), "seat"),
+        asm.Clearance(),
+    )
+    return scene
+
+
+def linked(off, apart=False):
+    """Two rings of radius 1 and thickness 0.1, through each other; a joint leads one of them away."""
+    a = asm.Body("a", asm.shapes.torus(1.0, 0.1), fixed=True)
+    b = asm.Body("b", asm.shapes.torus(1.0, 0.1), (1.0, 0.0, 0.0), ACROSS)
+    scene = asm.Assembly([a, b])
+    to = (1.0 + off, 0.0, 0.0) if apart else (1.0, 0.0, off)
+    scene.constrain(asm.Spherical(a.point(*to), b.point(0, 0, 0), "lead"), asm.Clearance())
+    return scene
+
+
+def passes_through(solution):
+    """Whether the second ring's center line goes through the disc of the first one: linked, by crossings of a plane."""
+    turn, place = Rotation.from_quat(solution.q[1, 3:], scalar_first=True), solution.q[1, :3]
+    angle = np.linspace(0.0, 2.0 * np.pi, 4001)
+    line = turn.apply(np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])) + place
+    cuts = np.flatnonzero(np.sign(line[1:, 2]) != np.sign(line[:-1, 2]))
+    return sum(np.hypot(*line[k, :2]) < 1.0 for k in cuts) % 2 == 1
+
+
+def test_exploded_parts_with_joints_are_put_together(cases):
+    rng = np.random.default_rng(1)
+    for _ in range(cases(2, 20)):
+        scene = bolted(rng)
+        solution = scene.solve()
+        assert solution.success and solution.put_together, solution.message
+        for name, height in (("upper", 10.0), ("bolt", 15.0)):
+            pose = solution.pose(name)
+            up = Rotation.from_quat(pose.quaternion, scalar_first=True).apply([0.0, 0.0, 1.0])
+            assert pose.position == pytest.approx([0.0, 0.0, height], abs=HOLDS)
+            assert up == pytest.approx([0.0, 0.0, 1.0], abs=HOLDS)
+    assert np.array_equal(scene.solve().q, solution.q)
+
+
+def test_what_holds_is_returned_as_it_is():
+    scene = bolted()
+    home = scene.solve()
+    again = scene.solve(home.q)
+    assert again.success and not again.put_together
+    assert np.array_equal(again.q, home.q)
+
+
+def test_with_keep_topology_a_bolt_stays_on_its_side():
+    """Its joints are on the other side of both plates, whose holes its head does not fit: nothing leads there."""
+    solution = bolted().solve(keep_topology=True)
+    assert not solution.put_together and not solution.success
+
+
+@pytest.mark.parametrize("off", [0.05, 0.2])
+@pytest.mark.parametrize("keep_topology", [False, True])
+def test_rings_that_are_linked_stay_linked(off, keep_topology):
+    scene = linked(off)
+    solution = scene.solve(keep_topology=keep_topology)
+    assert solution.success and not solution.put_together
+    assert passes_through(solution)
+    assert solution.q[1, :3] == pytest.approx([1.0, 0.0, off], abs=HOLDS)
+
+
+@pytest.mark.parametrize("off", [1.5, 1.6, 2.5])
+def test_rings_come_apart_where_they_may_alone(off):
+    """Linked, the other ring's center is within 1.8 of this one's; 1.6 farther is where bodies count as scattered."""
+    free, kept = linked(off, True).solve(), linked(off, True).solve(keep_topology=True)
+    assert free.success and free.put_together and not passes_through(free)
+    assert not kept.success and not kept.put_together and passes_through(kept)
+
+
+def test_it_is_tried_last_from_a_start_that_is_near_and_clear():
+    near, far = linked(0.05), linked(2.0, True)
+    for scene, keeps in ((near, True), (far, False)):
+        together = put_together(scene, np.array(scene.q), None, {}, CTRL_C)
+        assert together.keeps_topology == keeps
+    assert put_together(near, np.array(near.q), None, {"keep_topology": True}, CTRL_C) is None
+    assert put_together(far, np.array(far.q), None, {"max_iterations": 0}, CTRL_C) is None
+
+
+def test_it_is_tried_first_from_a_start_that_crosses():
+    """Near, but in each other: there is no topology to keep."""
+    scene = linked(0.05)
+    q = np.array(scene.q)
+    for x, keeps in ((0.9, True), (1.85, False)):
+        q[1, 0] = x
+        a, b = scene.bodies
+        near = asm.Assembly([a, b])
+        near.constrain(asm.Spherical(a.point(x + 0.01, 0.0, 0.0), b.point(0, 0, 0), "lead"), asm.Clearance())
+        assert put_together(near, q, None, {}, CTRL_C).keeps_topology == keeps
+
+
+def test_there_is_none_where_joints_hold_or_cannot():
+    scene = linked(0.0)
+    assert put_together(scene, np.array(scene.q), None, {}, CTRL_C) is None
+    scene.constrain(asm.Distance(scene.bodies[0].point(0, 0, 0), scene.bodies[1].point(0, 0, 0), 3.0, "contradiction"))
+    assert put_together(scene, np.array(scene.q), None, {}, CTRL_C) is None
+    ball = asm.Body("ball", asm.shapes.sphere(0.1), (0.0, 0.0, 3.0))
+    alone = asm.Assembly([scene.bodies[0], ball])
+    alone.constrain(asm.Clearance())
+    assert put_together(alone, np.array(alone.q), None, {}, CTRL_C) is None
+
+
+def test_where_time_is_over_there_is_none():
+    scene = bolted()
+    assert put_together(scene, np.array(scene.q), None, {}, Interruption(1e-9)) is None
+
+
+@pytest.mark.parametrize("angle", [0.4, 7.0, -9.0])
+def test_turns_are_those_that_were_asked_for(angle):
+    """A rotor that is put into its bearing is at the angle itself, not at a copy of it."""
+    base = asm.Body("base", asm.shapes.plate(40, 40, 4, [(0, 0, 3.0)]), fixed=True)
+    turn = Rotation.from_rotvec([0.3, 0.1, 1.0]).as_quat(scalar_first=True)
+    rotor = asm.Body("rotor", asm.shapes.solid_cylinder(2.5, 20), (60.0, 20.0, 60.0), turn)
+    scene = asm.Assembly([base, rotor])
+    scene.constrain(asm.Revolute(base.frame(), rotor.frame(), "spin", angle=angle), asm.Clearance())
+    solution = scene.solve()
+    assert solution.success and solution.put_together
+    assert solution.values["spin.angle"] == pytest.approx(angle, abs=1e-9)
+
+
+@pytest.mark.parametrize("value", [1, 0.0, "yes", None])
+def test_keep_topology_is_true_or_false(value):
+    with pytest.raises(TypeError, match="keep_topology is .*; expected True or False"):
+        linked(0.05).solve(keep_topology=value)
