@@ -61,7 +61,7 @@ def passes_through(solution):
 
 def test_exploded_parts_with_joints_are_put_together(cases):
     rng = np.random.default_rng(1)
-    for _ in range(cases(2, 20)):
+    for _ in range(cases(1, 20)):
         scene = bolted(rng)
         solution = scene.solve()
         assert solution.success and solution.put_together, solution.message
@@ -97,7 +97,7 @@ def test_rings_that_are_linked_stay_linked(off, keep_topology):
     assert solution.q[1, :3] == pytest.approx([1.0, 0.0, off], abs=HOLDS)
 
 
-@pytest.mark.parametrize("off", [1.5, 1.6, 2.5])
+@pytest.mark.parametrize("off", [1.6, 2.5])
 def test_rings_come_apart_where_they_may_alone(off):
     """Linked, the other ring's center is within 1.8 of this one's; 1.6 farther is where bodies count as scattered."""
     free, kept = linked(off, True).solve(), linked(off, True).solve(keep_topology=True)

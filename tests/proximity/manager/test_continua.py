@@ -90,7 +90,7 @@ def test_rows_of_tilted_plates_miss_next_to_nothing(cases):
     """No sample of a rim or corner is lower than the lowest row by more than a rim is between two of its points."""
     rng = np.random.default_rng(1)
     radius = max(h[2] for h in LOWER + UPPER)
-    for _ in range(cases(12, 300)):
+    for _ in range(cases(5, 300)):
         tilt, angle = 10.0 ** rng.uniform(-9.0, -3.0), rng.uniform(0.0, 2.0 * np.pi)
         # Lifted, so that nothing is in the other one.
         solution = plates(tilt * np.array([np.cos(angle), np.sin(angle), 0.0]), 60.0 * tilt)
@@ -131,7 +131,7 @@ def inside(polygon, points):
 @pytest.mark.parametrize("gap", [0.0, 1e-3])
 def test_edges_of_polygons_cross_where_their_sides_do(gap, cases):
     rng = np.random.default_rng(2)
-    for _ in range(cases(6, 200)):
+    for _ in range(cases(3, 200)):
         one, other = convex_polygon(rng, 10.0), convex_polygon(rng, 8.0) + rng.uniform(-4.0, 4.0, 2)
         bodies = [
             asm.Body("one", prism([tuple(p) for p in one], 2.0), fixed=True),

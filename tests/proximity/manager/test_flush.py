@@ -29,8 +29,8 @@ def scene_of(*bodies):
     return scene
 
 
-@pytest.mark.parametrize("angle", [50.0, 60.0, 75.0])
-@pytest.mark.parametrize("slid", [0.0, 13.0, 40.0])
+@pytest.mark.parametrize("angle", [50.0, 70.0])
+@pytest.mark.parametrize("slid", [0.0, 40.0])
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_dovetail_stays_in_its_groove(angle, slid, order):
     scene = scene_of(*dovetail(np.radians(angle), slid)[::order])
