@@ -62,8 +62,8 @@ class Options:
         What bodies of a contact or a clearance may be in each other where the solve begins: so much is called touching,
         they need not be parted, and no contact of these goes deeper. For parts of files 1e-6 is right, say.
     keep_topology : bool
-        Under a clearance, whether bodies are never put together without it first, from a start at which joints or
-        contacts are far from holding: to there they may pass through each other (`Solution.put_together` tells).
+        Under a clearance, whether bodies are never put together without it, from a start at which joints or contacts
+        do not hold: to there they may pass through each other (`Solution.put_together` tells).
     verbose : int
         1 prints a table of the iterations after the solve; nothing is printed at 0.
     """

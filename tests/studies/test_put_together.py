@@ -105,9 +105,9 @@ def test_rings_come_apart_where_they_may_alone(off):
     assert not kept.success and not kept.put_together and passes_through(kept)
 
 
-def test_it_is_tried_last_from_a_start_that_is_near_and_clear():
-    near, far = linked(0.05), linked(2.0, True)
-    for scene, keeps in ((near, True), (far, False)):
+def test_it_is_tried_last_where_bodies_are_clear_and_not_all_parted_by_planes():
+    near, far = linked(0.05), bolted()
+    for scene, keeps in ((near, True), (linked(2.0, True), True), (far, False)):
         together = put_together(scene, np.array(scene.q), None, {}, CTRL_C)
         assert together.keeps_topology == keeps
     assert put_together(near, np.array(near.q), None, {"keep_topology": True}, CTRL_C) is None
