@@ -8,7 +8,6 @@ where their axes and planes coincide. A solve begins there as well.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
 from itertools import count
 from typing import TYPE_CHECKING
 
@@ -19,12 +18,10 @@ from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.contact import side_faces
 from assembly.constraints.model.joints import Cylindrical, Planar, Spherical
-from assembly.geometry.faces.face import Face
-from assembly.geometry.recognition.elementary import elementary_form
-from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere
+from assembly.geometry.recognition.forms import Cone, Cylinder, Plane, Sphere
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
-from assembly.proximity.clearance.round_faces import NEARLY
+from assembly.proximity.clearance.elementary_faces import ElementaryFace, elementary_faces
 from assembly.solve.clearance_proof import can_prove, lent_proof
 from assembly.solve.interruption import Interruption
 from assembly.studies.parting import is_stuck
@@ -43,10 +40,10 @@ LEAN, OFF, FILLS = 0.15, 0.1, 0.8
 class _Face:
     """A face of a body at a pose: what it is, which way it looks, its box; and the same face in the body's axes."""
 
-    def __init__(self, body: Body, row: Array, form: Form, is_outward: bool, box: Array) -> None:
-        self.body, self.form, self.is_outward = body, form, is_outward
+    def __init__(self, body: Body, row: Array, face: ElementaryFace) -> None:
+        self.body, self.form, self.is_outward = body, face.form, face.is_outward
         self.turn, self.shift = rotation_matrix(row[3:]), row[:3]
-        corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3) @ self.turn.T + self.shift
+        corners = np.stack(np.meshgrid(*face.box.T, indexing="ij"), axis=-1).reshape(-1, 3) @ self.turn.T + self.shift
         self.low, self.high = corners.min(axis=0), corners.max(axis=0)
 
     def at(self, point: Array) -> Array:
@@ -56,18 +53,6 @@ class _Face:
     def near(self, other: _Face, reach: float) -> bool:
         """Whether the boxes are within a reach of each other."""
         return bool((self.low <= other.high + reach).all() and (other.low <= self.high + reach).all())
-
-
-@lru_cache(maxsize=128)
-def _elementary(faces: tuple[Face, ...]) -> tuple[tuple[Form, bool, Array], ...]:
-    """Faces that may conform to others, which of them look outward, along the normal of planes, and their boxes."""
-    found: list[tuple[Form, bool, Array]] = []
-    for face in faces:
-        form = elementary_form(face.surface, NEARLY * face.surface.size)
-        if isinstance(form, Plane | Cylinder | Cone | Sphere):
-            is_outward = (face.sign > 0) == (isinstance(form, Plane) or form.outward)
-            found.append((form, is_outward, np.array(face.surface.bounding_box())))
-    return tuple(found)
 
 
 def seated(scene: Assembly, q: Array, touching: float, interruption: Interruption) -> Array | None:
@@ -98,7 +83,7 @@ def _fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Itera
     """Joints by which faces of two bodies would fit that nearly do at poses (2, 7)."""
     reach = OFF * min(body.size for body in bodies)
     ones, others = (
-        [_Face(body, row, *face) for face in _elementary(side_faces(body))]
+        [_Face(body, row, face) for face in elementary_faces(side_faces(body))]
         for body, row in zip(bodies, rows, strict=True)
     )
     axes: list[tuple[Array, Array]] = []

@@ -97,9 +97,9 @@ class ClearTicks:
         first: Solution,
         touching: float,
         proof: ClearanceProof | None = None,
-        limits: WayLimits = WayLimits(),  # noqa: B008
+        limits: WayLimits | None = None,
     ) -> None:
-        self._touching, self._limits = touching, limits
+        self._touching, self._limits = touching, limits or WayLimits()
         if proof is None:
             proof = new_proof(first._packed, first._scene.bodies)
             proof.fronts.counts.budget = BUDGET

@@ -8,16 +8,14 @@ No move opens all of what is touching there, so that nothing is proven. It is to
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache, singledispatch
+from functools import singledispatch
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.faces.face import Face
-from assembly.geometry.recognition.elementary import elementary_form
 from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere, Torus
+from assembly.proximity.clearance.elementary_faces import elementary_faces
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.proximity.clearance.round_faces import NEARLY
 
 __all__ = ["conforms", "lie_on_each_other"]
 
@@ -53,24 +51,13 @@ class _Posed:
         return np.asarray(self.turn @ x)
 
 
-@lru_cache(maxsize=128)
-def _elementary(faces: tuple[Face, ...]) -> tuple[tuple[Form, bool], ...]:
-    """The faces that are planes, cylinders, cones, spheres or tori, and whether each looks outward."""
-    found = []
-    for face in faces:
-        form = elementary_form(face.surface, NEARLY * face.surface.size)
-        if isinstance(form, Plane | Cylinder | Cone | Sphere | Torus):
-            found.append((form, (face.sign > 0) == (isinstance(form, Plane) or form.outward)))
-    return tuple(found)
-
-
 def conforms(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
     """Whether faces of the bodies of pair k lie on each other at poses q (n, 7), to within a length."""
     turn, shift = proof.relative(k, q)
     size = proof.size(k)
-    a, b = (_elementary(proof.faces[body]) for body in proof.pairs[k])
-    ones = [_Posed(*face, size, np.eye(3), np.zeros(3)) for face in a]
-    others = [_Posed(*face, size, turn, shift) for face in b]
+    a, b = (elementary_faces(proof.faces[body]) for body in proof.pairs[k])
+    ones = [_Posed(face.form, face.is_outward, size, np.eye(3), np.zeros(3)) for face in a]
+    others = [_Posed(face.form, face.is_outward, size, turn, shift) for face in b]
     return any(lie_on_each_other(one, other, touching) for one in ones for other in others)
 
 

@@ -6,7 +6,7 @@ import csv
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from os import PathLike
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,7 +136,7 @@ class Interference(ReadOnlyArrays):
             ).rstrip()
             for line in lines
         ]
-        counts = {kind: sum(row.kind == kind for row in self.rows) for kind in Kind.__args__}  # type: ignore[attr-defined]  # a Literal
+        counts = {kind: sum(row.kind == kind for row in self.rows) for kind in get_args(Kind)}
         found = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count) or "none"
         return "\n".join([f"{self.pairs} pairs, within {self.margin:g}: {found}", *(text if self.rows else [])])
 
