@@ -110,3 +110,17 @@ def test_what_opened_contacts_elsewhere_is_no_proof_of_more_than_touching():
     proof.moves[:] = [0.0, 0.0, 1e-3, 0.0, 0.0, 0.0]
     (pair,) = prove_end(solution)
     assert pair.proved and pair.answer.depth <= touching
+
+
+@pytest.mark.parametrize("thicker", [0.0, 1e-6])
+def test_a_shaft_that_fills_its_bore_is_proven_to_touch(thicker):
+    """No move opens the bore; made slimmer by what is called touching the shaft is clear. A thicker one is not."""
+    plate = asm.Body("plate", asm.shapes.plate(4.0, 3.0, 1.0, [(0.3, 0.1, 0.5)]), fixed=True)
+    pin = asm.Body("pin", asm.shapes.solid_cylinder(0.5 + thicker, 2.0), (0.3, 0.1, 0.2))
+    scene = asm.Assembly([plate, pin])
+    scene.constrain(asm.Clearance())
+    solution = scene.solve(max_iterations=0) if thicker else scene.solve()
+    assert solution.proved == (thicker == 0.0)
+    if not thicker:
+        assert solution.success and np.array_equal(solution.q, scene.q)
+        assert [pair.answer.verdict for pair in solution._clear] == [Verdict.TOUCHING]
