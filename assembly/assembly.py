@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.constraints.model.constraint import structure_changes
 from assembly.constraints.model.contact import lone_surfaces
 from assembly.constraints.model.contents import Contents
+from assembly.constraints.packing.corners import corners_of
+from assembly.constraints.packing.earlier import is_earlier, taken_over
 from assembly.constraints.packing.scene import Packed, structure_of
 from assembly.constraints.packing.scene_size import check_reach, scene_size
 from assembly.errors import InputError, vector
@@ -49,6 +51,8 @@ _SETTINGS = CTRL_C.fill(Options().settings())
 _WARM_SETTINGS = CTRL_C.fill(Options().settings(warm=True))
 # How many times as many places as they ask for a solve gives to clearances.
 MORE_PLACES, MOST_CROWDING = 4, 16
+# How a solve may end where solids come to lie on each other, and corners are not listed.
+AT_KINKS = (Status.STALLED, Status.ITERATION_LIMIT, Status.INFEASIBLE, Status.CONTACT_LOST)
 
 
 class Assembly(Contents):
@@ -68,12 +72,14 @@ class Assembly(Contents):
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._packed: Packed | None = None
         self._crowding = 1  # how many times as many places as clearances ask for
+        self._corners = False  # whether corners of contacts of solids are listed
         self._scene: Scene | None = None
         super().__init__(bodies)
 
     def _has_changed(self) -> None:
         # Packed anew: of copies what a solve of the one has changed there the other does not know.
         self._packed = self._scene = None
+        self._corners = False
 
     def __repr__(self) -> str:
         return f"Assembly({len(self._bodies)} bodies, {len(self._constraints)} constraints)"
@@ -94,13 +100,16 @@ class Assembly(Contents):
         if self._packed is None:
             if all(body.fixed for body in self._bodies):
                 raise InputError(f"bodies are {[body.name for body in self._bodies]}, none moving; expected one")
-            packed = Packed(self._bodies, self._constraints, self._objectives, self._crowding)
-            self._scene = Scene(
-                self.bodies, self.constraints, tuple(packed.contacts), tuple(packed.sides), packed.scale
-            )
-            packed.outgrown = before
-            self._packed = packed
+            return self._pack(before)
         return self._packed
+
+    def _pack(self, before: Packed | None) -> Packed:
+        """Pack the scene, which was packed otherwise before."""
+        packed = Packed(self._bodies, self._constraints, self._objectives, self._crowding, self._corners)
+        self._scene = Scene(self.bodies, self.constraints, tuple(packed.contacts), tuple(packed.sides), packed.scale)
+        packed.before = before
+        self._packed = packed
+        return packed
 
     def solve(
         self,
@@ -177,7 +186,7 @@ class Assembly(Contents):
         elif not warm:
             settings = settings.copy()
             settings[STRAYS] = 1.0
-        if options.get("keep_topology") and self.packed().clearance_rows:
+        if options.get("keep_topology") and self.packed().keeps_apart:
             settings[GATHER] = NEVER
         return interruption.settings(settings)
 
@@ -194,11 +203,34 @@ class Assembly(Contents):
     ) -> Solution:
         """A solve from this start and no other one."""
         settings = self._settings(options, interruption, isinstance(q0, Solution))
-        if isinstance(q0, Solution) or settings[ITERATIONS] == 0.0 or not self.packed().clearance_rows:
-            return self._solved(settings, q0, starts, interruption)
-        from assembly.studies.first_solve import first_solve
+        if isinstance(q0, Solution) or settings[ITERATIONS] == 0.0 or not self.packed().keeps_apart:
+            solution = self._solved(settings, q0, starts, interruption)
+        else:
+            from assembly.studies.first_solve import first_solve
 
-        return first_solve(self, self._given(q0), settings, starts, options, interruption)
+            solution = first_solve(self, self._given(q0), settings, starts, options, interruption)
+        if solution.status in AT_KINKS and not self._corners and settings[ITERATIONS] > 0.0:
+            return self._at_corners(solution, partial(self._from_start, q0, starts, options, interruption))
+        return solution
+
+    def _at_corners(self, ended: Solution, again: Callable[[], Solution]) -> Solution:
+        """A solve that begins again with the corners of contacts of solids listed; where it fails, what ended before.
+
+        Solids that come to lie on each other touch at several corners, and the gap of their contact has a kink there.
+        """
+        packed = self._packed
+        assert packed is not None
+        if not corners_of(packed.contacts, packed.whole, packed.clearances, packed.clearance_pairs):
+            return ended
+        scene, self._corners = self._scene, True
+        self._pack(packed)
+        solution = again()
+        if not solution.success:
+            # The scene is as it was: rows of corners cost time.
+            self._packed, self._scene, self._corners = packed, scene, False
+            return ended
+        solution.seconds += ended.seconds
+        return solution
 
     def _solved(
         self,
@@ -215,9 +247,11 @@ class Assembly(Contents):
         these start on a turn of their own.
         """
         spent = 0.0
-        apart = q0._fit.apart if isinstance(q0, Solution) and q0._fit is not None else None
         while True:
             packed = self.packed()
+            apart = None
+            if isinstance(q0, Solution) and q0._fit is not None and q0._packed.rows == packed.rows:
+                apart = q0._fit.apart
             may_grow = self._crowding < MOST_CROWDING and not isinstance(q0, Solution)
             if packed.clearance_rows and settings[PLACES] != may_grow:
                 settings = settings.copy()
@@ -248,9 +282,9 @@ class Assembly(Contents):
                         continue
                 solution = Solution(self._scene, packed, state, status, spent, history, order, fit)
                 solution._touching = float(settings[ALLOWED_OVERLAP])
-                return self._proven(solution, settings, interruption) if packed.clearance_rows else solution
+                return self._proven(solution, settings, interruption) if packed.keeps_apart else solution
             self._crowding *= MORE_PLACES
-            self._packed = None
+            self._pack(packed)
 
     @staticmethod
     def _proven(solution: Solution, settings: Array, interruption: Interruption) -> Solution:
@@ -333,8 +367,8 @@ class Assembly(Contents):
     def _state_of(name: str, packed: Packed, solution: Solution) -> Array:
         if solution._packed is packed:
             return solution._state
-        if packed.outgrown is not None and solution._packed is packed.outgrown:
-            return packed.taken_over(solution._state)
+        if is_earlier(solution._packed, packed):
+            return taken_over(solution._packed, packed, solution._state)
         raise InputError(f"{name} is a solution of another assembly, or of this one before a change; expected its own")
 
     def _place_starts(self, packed: Packed, state: Array, starts: Mapping[str, ArrayLike]) -> None:

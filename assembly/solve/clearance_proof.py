@@ -160,7 +160,9 @@ def _opened(proof: ClearanceProof, k: int, q: Array, near: Contacts | None, touc
 def _contacts(solution: Solution, rows: Sequence[tuple[int, int]]) -> Iterator[tuple[int, ContactPair, float]]:
     """Contacts of a solution between bodies that clearances keep apart: the pair, the contact, -1 if it is turned."""
     for number, _, contact in listed_contacts(solution):
-        yield number, contact, 1.0
+        # Behind them are corners of contacts, of which nothing is proven.
+        if number < len(rows):
+            yield number, contact, 1.0
     scene = solution._scene
     if not scene.contacts:
         return

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.model.clearance import Clearance
-from assembly.constraints.model.contact import side_faces
+from assembly.constraints.model.contact import side_face, side_faces
+from assembly.constraints.packing.corners import Kept, body_of
 from assembly.constraints.program.records import DEEPEST_AT, NEAREST_AT, ROW, ROW_TABLE, SHELL_F, SHELL_G
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.extrema.pairs import STATUSES, ContactPair, PairStatus, extremal_pair
@@ -43,36 +44,38 @@ def contact_pairs(solution: Solution) -> dict[str, ContactPair]:
     return pairs | _listed(solution)
 
 
-def listed_contacts(solution: Solution) -> Iterator[tuple[int, Clearance, ContactPair]]:
-    """The contacts that clearances have listed, the oldest first: the number of the pair of bodies, and the contact."""
+def listed_contacts(solution: Solution) -> Iterator[tuple[int, Kept, ContactPair]]:
+    """The contacts that a contact manager has listed, the oldest first: the number of the pair of bodies, and for whom
+    it is listed.
+    """
     packed, scene = solution._packed, solution._scene
-    owners = [(item, pair) for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True) for pair in own]
+    owners = [item for item, own in zip(packed.kept, packed.pairs_of_kept, strict=True) for _ in own]
     if solution._state.size <= packed.memory_at:
         return
     table = packed.table_at(solution._state)
     places = [(number, k, pair) for k, (pair, number) in enumerate(packed.listed(solution._state)) if pair >= 0]
     for _, k, pair in sorted(places):
-        clearance, bodies = owners[pair]
         r = len(packed.contacts) + k
         if np.isnan(solution._parameters[r, 0]):
             continue
-        f, g = bodies
+        sides = packed.kept_pairs[pair]
+        f, g = (scene.index(body_of(side)) for side in sides)
         if table[table[ROW_TABLE] + ROW * r + SHELL_F] >= 0:
-            contact = _solids(solution, table, r, [scene.index(f), scene.index(g)], bodies)
+            contact = _solids(solution, table, r, [f, g], sides)
         else:
-            q_f, q_g = solution.q[[scene.index(f), scene.index(g)]]
-            contact = extremal_pair(f.faces[0], q_f, g.faces[0], q_g, solution._parameters[r, :4])
-        yield pair, clearance, contact
+            q_f, q_g = solution.q[[f, g]]
+            face_f, face_g = (side_face(side) for side in sides)
+            contact = extremal_pair(face_f, q_f, face_g, q_g, solution._parameters[r, :4])
+        yield pair, owners[pair], contact
 
 
 def _listed(solution: Solution) -> dict[str, ContactPair]:
-    """The same by their names: "clearance: a-b", "clearance: a-b 2", ..."""
-    packed = solution._packed
-    pairs = [pair for own in packed.clearance_pairs for pair in own]
+    """The same by their names: "clearance: a-b", "clearance: a-b 2", ...; corners of a contact "touch: corner"."""
+    pairs = solution._packed.kept_pairs
     found: dict[str, ContactPair] = {}
-    for number, clearance, contact in listed_contacts(solution):
-        f, g = pairs[number]
-        base = f"{clearance.name}: {f.name}-{g.name}"
+    for number, kept, contact in listed_contacts(solution):
+        f, g = (body_of(side).name for side in pairs[number])
+        base = f"{kept.name}: {f}-{g}" if isinstance(kept, Clearance) else f"{kept.name}: corner"
         same = sum(name == base or name.startswith(f"{base} ") for name in found)
         found[base if same == 0 else f"{base} {same + 1}"] = contact
     return found

@@ -137,7 +137,7 @@ def _seen(packed: Packed, posed: PosedBodies, interruption: Interruption) -> Sam
     """What the update finds."""
     q, contacts = posed.q.copy(), len(posed.contacts)
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
-    count = manager_records.PAIR_MEMORY * len(packed.clearance_pairs[0])
+    count = manager_records.PAIR_MEMORY * len(packed.kept_pairs)
     record = packed.table[layout.MANAGER_RECORD]
     # Where there is no clock updates are not cut.
     packed.table[record + manager_records.CLOCK] = packed.table[layout.CLOCK_AT]

@@ -92,5 +92,5 @@ def _crosses(packed: Packed, state: Array, q: Array) -> bool:
     tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
     memory = state[packed.memory_at :]
     update(packed.table, packed.pool, packed.table[MANAGER_RECORD], memory, scaled, tracked, EVERYTHING)
-    pairs = memory[MEMORY_HEADER:][: PAIR_MEMORY * sum(map(len, packed.clearance_pairs))].reshape(-1, PAIR_MEMORY)
+    pairs = memory[MEMORY_HEADER:][: PAIR_MEMORY * len(packed.kept_pairs)].reshape(-1, PAIR_MEMORY)
     return bool((pairs[:, CROSSED] == 1.0).any())

@@ -86,7 +86,7 @@ def swept_solve(
     scene._state_of("q0", packed, start)
     if not (start.success or start.way is not None):
         raise InputError(f"q0 is {start.status.name} with swept=True; expected a solution at which constraints hold")
-    if not packed.clearance_rows:
+    if not packed.keeps_apart:
         raise InputError("swept is True where no clearance keeps bodies apart; expected one, asm.Clearance()")
     if not can_prove(packed):
         low, high = LEAST_SIZE, 1.0 / LEAST_SIZE

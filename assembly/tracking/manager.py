@@ -193,7 +193,7 @@ class Manager(OwnState):
     def _parts(packed: Packed, memory: Array) -> tuple[Array, Array, Array]:
         """Views of what a memory knows of pairs, of places, and of events."""
         pairs_at = manager_records.MEMORY_HEADER
-        places_at = pairs_at + manager_records.PAIR_MEMORY * len(packed.clearance_pairs[0])
+        places_at = pairs_at + manager_records.PAIR_MEMORY * len(packed.kept_pairs)
         events_at = places_at + manager_records.PLACE_MEMORY * packed.clearance_rows
         return (
             memory[pairs_at:places_at].reshape(-1, manager_records.PAIR_MEMORY),

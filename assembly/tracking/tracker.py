@@ -13,6 +13,7 @@ from assembly._read_only import read_only
 from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import structure_changes
 from assembly.constraints.model.objectives import FrameDistance, PointDistance
+from assembly.constraints.packing.corners import body_of
 from assembly.constraints.packing.scene import structure_of
 from assembly.constraints.program.records import CLOCK_AT, MANAGER_RECORD
 from assembly.errors import FARTHEST, InputError, integer, number, positive
@@ -227,7 +228,7 @@ class Tracker(InOneProcess):
         """What ticks work in, and what they read and write directly."""
         packed, budget = self._packed, self._budget
         self._history = np.zeros((1, HISTORY))
-        names = [(a.name, b.name) for pairs in packed.clearance_pairs for a, b in pairs]
+        names = [(body_of(a).name, body_of(b).name) for a, b in packed.kept_pairs]
         self._followed = Followed(self._scene, packed, names, self._hand, self._place, first.status)
         # At its end are the rows of the last tick; steps have no copy of those.
         self._size = packed.kept_at
@@ -238,7 +239,7 @@ class Tracker(InOneProcess):
         self._pose = self._state[: self._size]
         # Numbers are read from a view in half the time it takes to read them from the array.
         self._view: Any = self._state.data
-        proves = packed.clearance_rows and can_prove(packed)
+        proves = packed.keeps_apart and can_prove(packed)
         self._clear = ClearTicks(first, self._touching * packed.scale) if proves else None
         self._before = self._pose.copy()
         self._knobs: Any = self._settings.data

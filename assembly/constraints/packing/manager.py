@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from assembly._record import rows_of
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import Contact, side_faces
+from assembly.constraints.packing.corners import Kept, SidePair, body_of
 from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.program import records as layout
 from assembly.errors import InputError
 from assembly.geometry.faces.face import Face
 from assembly.geometry.shapes.centerline import spine_of
-from assembly.kinematics.body import Body, BodyFace
+from assembly.kinematics.body import Body
 from assembly.proximity.brep.solid import is_one_smooth
 from assembly.proximity.bvh.facet_tree import FacetTree
 from assembly.proximity.bvh.neighbor_list import LIST_INTS
@@ -31,9 +32,8 @@ __all__ = ["clearance_pairs", "is_of_surfaces", "pack_manager", "slot_count", "t
 
 Table = NDArray[np.int64]
 Pair = tuple[Body, Body]
-Side = Body | BodyFace
 # A contact of the scene, its sides, and whether it is one of their whole surfaces, without edges.
-GivenContact = tuple[Contact, tuple[Side, Side], bool]
+GivenContact = tuple[Contact, SidePair, bool]
 
 # How far bodies may go between updates where contacts may be born, in parts of the smallest radius of curvature of the
 # two; in parts of the scene's size, it is no less than this.
@@ -62,40 +62,40 @@ def clearance_pairs(clearances: Sequence[Clearance], bodies: Sequence[Body]) -> 
     return result
 
 
-def slot_count(clearance: Clearance, pairs: Sequence[Pair]) -> int:
+def slot_count(kept: Kept, pairs: Sequence[SidePair]) -> int:
     """How many contacts may be near at a time."""
     if not pairs:
         return 0
     bodies = len({id(body) for pair in pairs for body in pair})
-    return clearance.slots or min(4 + 2 * len(pairs), 8 + 4 * bodies)
+    return kept.slots or min(4 + 2 * len(pairs), 8 + 4 * bodies)
 
 
-def is_of_surfaces(pair: Pair) -> bool:
+def is_of_surfaces(pair: SidePair) -> bool:
     """Whether contacts of two bodies are of two surfaces; else they are of solids."""
-    return all(is_one_smooth(side_faces(body)) for body in pair)
+    return all(is_one_smooth(side_faces(side)) for side in pair)
 
 
 def pack_manager(
     writer: SceneWriter,
-    clearances: Sequence[Clearance],
-    pairs_of_clearances: Sequence[Sequence[Pair]],
+    kept: Sequence[Kept],
+    pairs_of_kept: Sequence[Sequence[SidePair]],
     places: Sequence[int],
     contacts: Sequence[GivenContact],
 ) -> int:
-    """Pack the contact manager of clearances, of which each has pairs and places; where its record begins.
+    """Pack the contact manager of what is kept apart, of which each has pairs and places; where its record begins.
 
     `contacts` are the given ones, in the order of their rows; the first place is behind them.
     """
-    pairs = _PairPacking(writer, [pair for own in pairs_of_clearances for pair in own], contacts)
+    pairs = _PairPacking(writer, [pair for own in pairs_of_kept for pair in own], contacts)
     first = 0
-    for clearance, own, count in zip(clearances, pairs_of_clearances, places, strict=True):
+    for item, own, count in zip(kept, pairs_of_kept, places, strict=True):
         for pair in own:
-            pairs.add(pair, clearance.minimum, [first, first + count])
+            pairs.add(pair, item.minimum, [first, first + count])
         first += count
     count, pair_table = pairs.write()
     block = np.zeros(manager_records.LENGTH_COUNT)
     lengths = manager_records.lengths_at(block, 0)
-    lengths.merge_radius = min(clearance.merge_radius for clearance in clearances)
+    lengths.merge_radius = min(item.merge_radius for item in kept)
     lengths.least_margin, lengths.largest_margin = LEAST_MARGIN, LARGEST_MARGIN
     row = np.zeros(manager_records.MANAGER_SIZE, dtype=np.int64)
     record = manager_records.manager_at(row, 0)
@@ -103,7 +103,7 @@ def pack_manager(
     _, record.lengths = writer.add(pool=block)
     record.lists = min(count, MOST_LISTS)
     record.list_table, _ = writer.add([-1] * (LIST_INTS * int(record.lists)))
-    record.corners = any(clearance.corners for clearance in clearances)
+    record.corners = any(item.corners for item in kept)
     # Where one is asked for, its address is written when the scene is ready.
     record.mark_address = pairs.any_in_place
     return writer.add(row)[0]
@@ -131,7 +131,7 @@ def table_with_clearances(table: Table, placed: Sequence[Sequence[int]]) -> Tabl
 class _PairPacking:
     """The pairs of a contact manager while they are packed; the trees of all their bodies come first."""
 
-    def __init__(self, writer: SceneWriter, pairs: Sequence[Pair], contacts: Sequence[GivenContact]) -> None:
+    def __init__(self, writer: SceneWriter, pairs: Sequence[SidePair], contacts: Sequence[GivenContact]) -> None:
         self._writer = writer
         self._contacts = contacts
         self._records: list[list[int]] = []
@@ -142,7 +142,7 @@ class _PairPacking:
         # Where the tree of faces is, the radius of a ball around it, how far from the body's origin it reaches, its
         # smallest radius of curvature and how far its facets are off; bodies of a shape share it.
         self._trees: dict[tuple[Face, ...], tuple[int, float, float, float, float]] = {}
-        for faces in dict.fromkeys(side_faces(body) for pair in pairs for body in pair):
+        for faces in dict.fromkeys(side_faces(side) for pair in pairs for side in pair):
             tree = FacetTree.of(faces)
             table, pool, at = pack_tree(tree, writer.scale, writer.table_at, writer.pool_at)
             writer.add(table, pool)
@@ -152,10 +152,11 @@ class _PairPacking:
             offset = (tree.offset + seams) / writer.scale
             self._trees[faces] = at, ball, far, tree.least_radius / writer.scale, offset
 
-    def add(self, pair: Pair, least: float, places: Sequence[int]) -> None:
+    def add(self, pair: SidePair, least: float, places: Sequence[int]) -> None:
         """Pack a pair with its least gap and where its places begin and end."""
         writer = self._writer
-        f, g = (side_faces(body) for body in pair)
+        f, g = (side_faces(side) for side in pair)
+        bodies = tuple(body_of(side) for side in pair)
         tree_f, ball_f, far_f, radius_f, offset_f = self._trees[f]
         tree_g, ball_g, far_g, radius_g, offset_g = self._trees[g]
         flank = max(FLANK * min(radius_f, radius_g), LEAST_FLANK)
@@ -168,12 +169,12 @@ class _PairPacking:
         else:
             shape = [-1, -1, writer.shell(f), writer.shell(g)]
         # Of bodies with edges a contact and a least gap of zero are both asked for.
-        given = self._contacts_of(pair) if is_of_surfaces(pair) or least > 0.0 else []
+        given = self._contacts_of(bodies) if is_of_surfaces(pair) or least > 0.0 else []
         if given and least > 0.0:
             self.any_in_place = True
             lengths += [0.0, *lengths[1:]]
         _, minimum = writer.add(pool=lengths)
-        fields = [*writer.places_of(pair), tree_f, tree_g, *shape, minimum, *places]
+        fields = [*writer.places_of(bodies), tree_f, tree_g, *shape, minimum, *places]
         many = len(given) // GIVEN_RECORD
         self._records.append([*fields, len(self._given), many, int(ball_g <= ball_f), *spines])
         self._given += given
@@ -191,7 +192,7 @@ class _PairPacking:
                 self._spines[face] = at
         return [self._spines[f], self._spines[g]]
 
-    def _contacts_of(self, pair: Pair) -> list[int]:
+    def _contacts_of(self, pair: tuple[Body, ...]) -> list[int]:
         """The records of given contacts between two bodies."""
         writer = self._writer
         fields: list[int] = []

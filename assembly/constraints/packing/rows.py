@@ -9,7 +9,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint, Equation
 from assembly.constraints.model.contact import Contact, side_faces
 from assembly.constraints.model.couplings import Coupling
@@ -79,13 +78,13 @@ class RowPacking:
                 row += [-1, -1, *(writer.shell(side_faces(side)) for side in pair), layout.ZERO]
             self._add(contact, row)
 
-    def add_clearance_rows(self, clearances: Sequence[Clearance], places: Sequence[int]) -> None:
-        """Idle rows, as many of each clearance as it has places."""
+    def add_clearance_rows(self, owners: Sequence[Constraint], places: Sequence[int]) -> None:
+        """Idle rows, as many of each clearance, or contact with corners, as it has places."""
         header = self._writer.header
         header[layout.FIRST_CLEARANCE_ROW], header[layout.CLEARANCE_ROWS] = len(self._rows), sum(places)
-        for clearance, count in zip(clearances, places, strict=True):
+        for owner, count in zip(owners, places, strict=True):
             for _ in range(count):
-                self._add(clearance, [layout.CONTACT_ROW, -1, -1, 1, 0, 1, -1, -1, -1, -1, layout.ZERO, 0])
+                self._add(owner, [layout.CONTACT_ROW, -1, -1, 1, 0, 1, -1, -1, -1, -1, layout.ZERO, 0])
 
     def add_trims(self, contacts: Sequence[Contact]) -> None:
         """Rows of trims, of contacts in the order of their rows."""

@@ -23,6 +23,7 @@ from assembly.constraints.model.trim_contact import TrimContact
 from assembly.constraints.packing import addresses
 from assembly.constraints.packing import manager as manager_packing
 from assembly.constraints.packing.asked import Asked
+from assembly.constraints.packing.corners import ContactCorners, Kept, SidePair, corners_of
 from assembly.constraints.packing.elimination_order import FEW, block_record
 from assembly.constraints.packing.numbering import number_bodies
 from assembly.constraints.packing.revolutions import Turns
@@ -68,6 +69,8 @@ class Packed:
         1 to minimize, -1 to maximize; a posture where there is none.
     places : int
         Clearances have so many times the places they ask for.
+    corners : bool
+        Whether the corners of contacts of solids are listed (`packing/corners.py`).
 
     Attributes
     ----------
@@ -85,8 +88,8 @@ class Packed:
         What the last solve was asked for.
     has_size : bool
         Whether the scene has a size.
-    outgrown : Packed or None
-        The same scene as it was packed before it had this size.
+    before : Packed or None
+        The same scene as it was packed before it had this size, or these rows of clearances.
     unit : float
         What one of the loop's objective counts in the user's units.
     sides : list of (Body or BodyFace, Body or BodyFace)
@@ -96,8 +99,16 @@ class Packed:
     clearances : list of Clearance
     clearance_pairs : list of list of (Body, Body)
         The pairs of bodies of every clearance.
+    corners : list of ContactCorners
+        Contacts whose corners are listed.
+    kept : list of Kept
+        Clearances, and then corners: what the contact manager lists contacts for.
+    pairs_of_kept : list of list of (side, side)
+        The pairs of each.
+    kept_pairs : list of (side, side)
+        All pairs that are kept apart, in the order of the contact manager.
     clearance_rows : int
-        Rows of clearances, behind those of contacts.
+        Rows of clearances and corners, behind those of contacts.
     spans : list of int arrays
         The rows of every constraint.
     owners : (m,) int
@@ -120,6 +131,7 @@ class Packed:
         constraints: Sequence[Constraint],
         objectives: Sequence[tuple[float, Objective]],
         places: int = 1,
+        corners: bool = False,
     ) -> None:
         self.count = len(bodies)
         self.stamp = structure_changes()
@@ -128,7 +140,7 @@ class Packed:
         self.has_size = size > 0.0
         self._has_no_extent = has_no_extent(bodies, constraints, objectives)
         self.scale = size if self.has_size else 1.0
-        self.outgrown: Packed | None = None
+        self.before: Packed | None = None
         self.reference = bodies[0].pose.position.copy()
         self._reference = self.reference.tolist()
         self.contacts = [constraint for constraint in constraints if isinstance(constraint, Contact)]
@@ -141,9 +153,14 @@ class Packed:
         ]
         self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
         self.clearance_pairs = manager_packing.clearance_pairs(self.clearances, bodies)
+        listed = corners_of(self.contacts, self.whole, self.clearances, self.clearance_pairs) if corners else []
+        self.corners: list[ContactCorners] = listed
+        self.kept: list[Kept] = [*self.clearances, *listed]
+        self.pairs_of_kept: list[Sequence[SidePair]] = [*self.clearance_pairs, *([item.pair] for item in listed)]
+        self.kept_pairs = [pair for own in self.pairs_of_kept for pair in own]
         self.places = [
-            places * manager_packing.slot_count(clearance, pairs)
-            for clearance, pairs in zip(self.clearances, self.clearance_pairs, strict=True)
+            places * manager_packing.slot_count(item, pairs)
+            for item, pairs in zip(self.kept, self.pairs_of_kept, strict=True)
         ]
         self.clearance_rows = sum(self.places)
         self._write(bodies, constraints, objectives)
@@ -158,7 +175,7 @@ class Packed:
         self._memory = np.empty(0)
         if self.clearance_rows:
             # The first update sees what crosses at the start as well, if it is no deeper than this.
-            self._memory = fresh_memory(sum(map(len, self.clearance_pairs)), self.clearance_rows, LARGEST_MARGIN)
+            self._memory = fresh_memory(len(self.kept_pairs), self.clearance_rows, LARGEST_MARGIN)
         self.asked: Asked = []
         self.workspaces: list[tuple[Array, Array, Table]] = []
         self.proofs: list[ClearanceProof] = []
@@ -227,12 +244,12 @@ class Packed:
         """Write rows, and keep what tells of them."""
         rows = RowPacking(writer, constraints)
         rows.add_contacts(self.contacts, self.sides, self.whole)
-        rows.add_clearance_rows(self.clearances, self.places)
+        rows.add_clearance_rows([*self.clearances, *(item.contact for item in self.corners)], self.places)
         writer.header[layout.MANAGER_RECORD] = -1
         if self.clearance_rows:
             given = list(zip(self.contacts, self.sides, self.whole, strict=True))
             writer.header[layout.MANAGER_RECORD] = manager_packing.pack_manager(
-                writer, self.clearances, self.clearance_pairs, self.places, given
+                writer, self.kept, self.pairs_of_kept, self.places, given
             )
         rows.add_trims(self.contacts)
         rows.add_joints(unknown_blocks)
@@ -255,6 +272,11 @@ class Packed:
         self.spans = [by_owner[first:last] for first, last in pairwise(ends)]
 
     @property
+    def keeps_apart(self) -> bool:
+        """Whether a clearance keeps two bodies apart, so that ends of solves are to be proven."""
+        return any(self.clearance_pairs)
+
+    @property
     def pair_rows(self) -> int:
         """Rows of contacts, given ones and those of clearances."""
         return len(self.contacts) + self.clearance_rows
@@ -272,8 +294,8 @@ class Packed:
     def pair_name(self, k: int) -> str:
         """The name of the contact, or the clearance, that row k is of."""
         names = [contact.name for contact in self.contacts]
-        for clearance, count in zip(self.clearances, self.places, strict=True):
-            names += [clearance.name] * count
+        for item, count in zip(self.kept, self.places, strict=True):
+            names += [item.name] * count
         return names[k]
 
     def table_at(self, state: Array) -> Table:
@@ -293,23 +315,13 @@ class Packed:
         near = self.has_size and self.scale <= OUTGROWN * length <= OUTGROWN**2 * self.scale
         return length > 0.0 and not near
 
-    def taken_over(self, state: Array) -> Array:
-        """A state of the scene as it was before it had this size, with multipliers in the units of this one."""
-        assert self.outgrown is not None
-        taken = state.copy()
-        taken[self.kept_at :] = 0.0
-        multipliers = taken[self.multipliers_at : self.residuals_at]
-        multipliers *= self.outgrown.unit / self.unit
-        multipliers[self.lengths] *= self.scale / self.outgrown.scale
-        return taken
-
     def listed(self, state: Array) -> list[tuple[int, int]]:
         """Of every place of a contact manager in a state: its pair of bodies, or -1, and the number of its contact."""
         return [(pair, number) for pair, number, _given in self._placed(state)]
 
     def _placed(self, state: Array) -> list[list[int]]:
         """The same, and whether it is in the place of a given contact."""
-        return listed_places(state[self.memory_at :], sum(map(len, self.clearance_pairs)), self.clearance_rows)
+        return listed_places(state[self.memory_at :], len(self.kept_pairs), self.clearance_rows)
 
     def _take_addresses(self) -> None:
         """Where the kernels are that only contacts, trims, clearances, expressions or many bodies ask for."""
@@ -320,9 +332,7 @@ class Packed:
             record[[FACTORIZE_AT, SOLVE_AT]] = addresses.blocks()
         if self.pair_rows:
             table[layout.CONTACT_ROWS_AT] = addresses.contacts()
-        if any(self.whole) or any(
-            manager_packing.is_of_surfaces(pair) for pairs in self.clearance_pairs for pair in pairs
-        ):
+        if any(self.whole) or any(manager_packing.is_of_surfaces(pair) for pair in self.kept_pairs):
             table[layout.START_AT : layout.EXTREMAL_AT + 1] = addresses.surfaces()
         if self.shells:
             table[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()

@@ -24,6 +24,7 @@ from assembly.proximity.manager.extrema import (
     is_alone,
     is_list_full,
 )
+from assembly.proximity.manager.flat_patches import are_flat, may_be_level
 from assembly.proximity.manager.motion_bounds import PairSearch, ball_about
 from assembly.proximity.manager.newton_regions import LEFT, half_widths, known_in_region, newton_way_at, stays
 from assembly.proximity.manager.overlap import is_outside
@@ -37,6 +38,16 @@ Progress = namedtuple("Progress", "folding visited slides")
 Limits = namedtuple("Limits", "curved_bound enough span merge_radius")
 
 
+@kernel(inline=True)
+def is_known(codes, extrema):
+    """Whether an extremum of two features is known."""
+    for k in range(extrema.count[0]):
+        extremum = extremum_at(extrema.rows, k)
+        if extremum.code_f == codes[0] and extremum.code_g == codes[1]:
+            return True
+    return False
+
+
 @kernel(inner=True)
 def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
     """Look for an extremum of the patches e of f and d of g that is not known.
@@ -46,9 +57,12 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
     folding, visited, slides = progress
     codes, start, inside, folds = known_in_region(posed, e, d, extrema)
     folding = folding or folds
-    if inside:
-        return -1, False, Progress(folding, visited, slides)
     smooth = posed.surfaces[0] >= 0
+    if inside or (not smooth and are_flat(posed, codes, e, d)):
+        return -1, False, Progress(folding, visited, slides)
+    if not smooth and not folding and not may_be_level(posed, codes, e, d) and is_known(codes, extrema):
+        # It would go to what is known of the two features, or past it.
+        return -1, False, Progress(folding, visited, slides)
     before = extrema.count[0]
     stayed, near, half, mine = True, start, (0.0, 0.0, 0.0, 0.0), visited
     if smooth:

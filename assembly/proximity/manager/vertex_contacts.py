@@ -29,6 +29,7 @@ from assembly.proximity.manager.continua import (
     next_in_socket,
 )
 from assembly.proximity.manager.extrema import NEW, NOTHING, add_extremum, extremum_at, is_list_full, solids_extremum
+from assembly.proximity.manager.flat_patches import may_be_level
 from assembly.proximity.manager.near_singular import into_near_singular
 from assembly.proximity.manager.near_singular_points import (
     features_of,
@@ -143,7 +144,8 @@ def add_vertex_contacts(posed, span, merge_radius, stack, candidates, extrema):
         if kinds[0] == EDGE and kinds[1] == EDGE and not may_cross(posed, codes, f, g):
             continue
         before = extrema.count[0]
-        add_vertex_contact(posed, codes, start, span, merge_radius, extrema, FEATURES)
+        if may_be_level(posed, codes, candidates[c, 0], candidates[c, 1]):
+            add_vertex_contact(posed, codes, start, span, merge_radius, extrema, FEATURES)
         side = 0 if kinds[0] == EDGE else 1
         if kinds[side] != EDGE or kinds[1 - side] != FACE:
             continue

@@ -12,6 +12,7 @@ from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program.records import DEEPEST_AT
 from assembly.solve.attempts.assembled import run_gathered
 from assembly.solve.attempts.balance import balanced
+from assembly.solve.attempts.corners import corners_first
 from assembly.solve.attempts.fit import Loop, fitted, fitted_again
 from assembly.solve.attempts.postures import following_none
 from assembly.solve.interruption import Interruption
@@ -25,6 +26,8 @@ from assembly.solve.loop.settings import (
     HISTORY,
     LIFT_TRIMS,
     OBJECTIVE,
+    PENALTY,
+    PENALTY_FLOOR,
     PLACES,
     SCATTER,
     SOLVED,
@@ -79,6 +82,25 @@ def attempt(
         known = fitted_again(packed, settings, start(), apart, _loop(interruption, turns))
         if known is not None:
             return known
+    is_cold = bool(settings[PENALTY] > settings[PENALTY_FLOOR])
+    kinks = partial(
+        corners_first, packed, settings, start, partial(_run, packed, interruption), _loop(interruption, turns).go_on
+    )
+    # Corners that a contact has for itself are those of a kink that a solve has met.
+    found = kinks() if packed.corners and is_cold else None
+    if found is not None:
+        return found
+    outcome = _attempt(packed, settings, start, interruption, turns)
+    ended = outcome.code == SOLVED or interruption.is_over() or (packed.corners and is_cold)
+    if ended or (settings[PLACES] == 1.0 and packed.is_crowded(outcome.state)):
+        return outcome
+    return kinks() or outcome
+
+
+def _attempt(
+    packed: Packed, settings: Array, start: Callable[[], Array], interruption: Interruption, turns: Array | None
+) -> Outcome:
+    """The same, with contacts at once."""
     # The loop writes contacts of clearances into its table: every solve has its own, also in another thread.
     table = packed.table.copy() if packed.clearance_rows else packed.table
     outcome = begin(packed, interruption, table, settings, start(), turns)

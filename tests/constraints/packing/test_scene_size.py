@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.constraints.packing.earlier import taken_over
 from assembly.constraints.packing.scene_size import scene_size
 from assembly.errors import InputError
 from assembly.kinematics.pose import length, multiply, rotation_matrix
@@ -311,8 +312,8 @@ def test_forces_of_a_scene_that_got_its_size_go_on_from_where_they_were():
     forces = np.arange(1.0, 7.0) * packed.unit / np.where(packed.lengths, packed.scale, 1.0)
     joint.slide = 1e-3
     sized = scene.packed()
-    assert sized.outgrown is packed and sized.scale == 1e-3
-    taken = sized.taken_over(state)[sized.multipliers_at : sized.residuals_at]
+    assert sized.before is packed and sized.scale == 1e-3
+    taken = taken_over(packed, sized, state)[sized.multipliers_at : sized.residuals_at]
     np.testing.assert_allclose(taken * sized.unit / np.where(sized.lengths, sized.scale, 1.0), forces, rtol=1e-15)
 
 

@@ -1,0 +1,46 @@
+"""States of a scene as it was packed before: of another size, or with fewer places for contacts of clearances."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.proximity.features.solid_contact import TRACK
+
+if TYPE_CHECKING:
+    from assembly.constraints.packing.scene import Packed
+
+__all__ = ["is_earlier", "taken_over"]
+
+Array = NDArray[np.float64]
+
+
+def is_earlier(earlier: Packed, packed: Packed) -> bool:
+    """Whether a scene was packed as `earlier` before it was packed as it is now."""
+    before = packed.before
+    while before is not None and before is not earlier:
+        before = before.before
+    return before is not None
+
+
+def taken_over(earlier: Packed, packed: Packed, state: Array) -> Array:
+    """A state of an earlier packing in the one of now: poses, tracked values, and multipliers in its units.
+
+    Contacts that clearances had listed are left out; the contact manager finds those that are near anew.
+    """
+    taken = packed.new_state()
+    taken[: packed.contacts_at] = state[: earlier.contacts_at]
+    given = len(packed.contacts)
+    pairs = slice(packed.contacts_at, packed.contacts_at + TRACK * given)
+    taken[pairs] = state[pairs]
+    taken[packed.angles_at : packed.multipliers_at] = state[earlier.angles_at : earlier.multipliers_at]
+    # Rows: of contacts, of clearances, of all the rest.
+    before, now = given + earlier.clearance_rows, given + packed.clearance_rows
+    multipliers = taken[packed.multipliers_at : packed.residuals_at]
+    multipliers[:given] = state[earlier.multipliers_at :][:given]
+    multipliers[now:] = state[earlier.multipliers_at + before : earlier.residuals_at]
+    multipliers *= earlier.unit / packed.unit
+    multipliers[packed.lengths] *= packed.scale / earlier.scale
+    return taken

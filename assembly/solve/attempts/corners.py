@@ -1,0 +1,112 @@
+"""Contacts of solids that come to lie on each other: their corners first, then that they touch.
+
+The gap of a contact is the least of the gaps at its corners (`constraints/packing/corners.py`), and has a kink where
+several are the least. The loop first keeps all corners from crossing, each a smooth row g_i >= 0, and leaves the
+contacts themselves alone. From where that ends it goes on with them: where bodies are pressed together they touch
+there already, and where they are not, min g_i = 0 draws them to each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.packing.scene import Packed
+from assembly.constraints.program.records import BODY_F, BODY_G, ONE_SIDED, ROW, ROW_TABLE
+from assembly.proximity.features.solid_contact import ALLOWED, IDLE, STAYS, TRACK
+from assembly.solve.loop.settings import FIT, GATHER, PLACES, SOLVED, UNSURE
+from assembly.solve.second_order.leave import Fit, Outcome
+
+__all__ = ["corners_first", "with_corners"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+
+
+def with_corners(packed: Packed) -> list[int]:
+    """The rows of contacts whose corners are listed, for themselves or by a clearance of the same two bodies."""
+    if not packed.clearance_rows:
+        return []
+    own = {id(item.contact) for item in packed.corners}
+    kept = {
+        frozenset(map(id, pair))
+        for clearance, pairs in zip(packed.clearances, packed.clearance_pairs, strict=True)
+        for pair in pairs
+        if clearance.corners
+    }
+    return [
+        row
+        for row, (contact, is_whole) in enumerate(zip(packed.contacts, packed.whole, strict=True))
+        if id(contact) in own or (not is_whole and frozenset(map(id, contact.bodies)) in kept)
+    ]
+
+
+def corners_first(
+    packed: Packed,
+    settings: Array,
+    start: Callable[[], Array],
+    run: Callable[[Table, Array, Array], Outcome],
+    go_on: Callable[[Packed, Array, Array], Outcome],
+) -> Outcome | None:
+    """The outcome of a solve that keeps corners apart before it asks for contacts; None where it does not hold.
+
+    Parameters
+    ----------
+    packed : Packed
+    settings : array
+    start : callable
+        Makes the state of the solve's start.
+    run, go_on : callables
+        The loop with a table, settings and a state; and from a state that a solve has led to.
+    """
+    rows = with_corners(packed)
+    if not rows:
+        return None
+    state = start()
+    # Where contacts are is found anew once bodies are there.
+    state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[rows] = np.nan
+    state[packed.multipliers_at : packed.residuals_at][rows] = 0.0
+    outcome = run(_left_alone(packed.table, rows), settings, state)
+    if settings[PLACES] == 1.0 and packed.is_crowded(outcome.state):
+        return outcome
+    if outcome.code not in (SOLVED, UNSURE):
+        return None
+    settings = settings.copy()
+    settings[GATHER] = 0.0
+    state = outcome.state.copy()
+    for row in rows:
+        _take_nearest(packed, state, row)
+    outcome = go_on(packed, settings, state)
+    if outcome.code != SOLVED and not (settings[PLACES] == 1.0 and packed.is_crowded(outcome.state)):
+        return None
+    return outcome._replace(fit=outcome.fit or Fit(float(settings[FIT])))
+
+
+def _left_alone(table: Table, rows: Sequence[int]) -> Table:
+    """A table in which rows of contacts are idle: without bodies, and one-sided, so that they ask for nothing."""
+    table = table.copy()
+    for row in rows:
+        contact = table[table[ROW_TABLE] + ROW * row :]
+        contact[[BODY_F, BODY_G]], contact[ONE_SIDED] = -1, 1
+    return table
+
+
+def _take_nearest(packed: Packed, state: Array, row: int) -> None:
+    """Let a contact begin with the pair of the corner that is nearest, where one is listed for it.
+
+    Of solids that touch a search from nothing finds points that they have in common, and no pair.
+    """
+    tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
+    gaps = state[packed.residuals_at :]
+    sides = packed.sides[row]
+    first, nearest = len(packed.contacts), -1
+    for k, (pair, _) in enumerate(packed.listed(state)):
+        known = pair >= 0 and all(one is other for one, other in zip(packed.kept_pairs[pair], sides, strict=True))
+        if known and (nearest < 0 or gaps[first + k] < gaps[first + nearest]):
+            nearest = k
+    if nearest >= 0:
+        tracked[row] = tracked[first + nearest]
+        # Its features may switch, and nothing is allowed to it yet.
+        tracked[row, [STAYS, IDLE, ALLOWED]] = 0.0
