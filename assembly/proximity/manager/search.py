@@ -60,9 +60,9 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
     smooth = posed.surfaces[0] >= 0
     if inside or (not smooth and are_flat(posed, codes, e, d)):
         return -1, False, Progress(folding, visited, slides)
-    if not smooth and not folding and not may_be_level(posed, codes, e, d) and is_known(codes, extrema):
+    if not smooth and not may_be_level(posed, codes, e, d) and is_known(codes, extrema):
         # It would go to what is known of the two features, or past it.
-        return -1, False, Progress(folding, visited, slides)
+        return -1, folding, Progress(folding, visited, slides)
     before = extrema.count[0]
     stayed, near, half, mine = True, start, (0.0, 0.0, 0.0, 0.0), visited
     if smooth:
