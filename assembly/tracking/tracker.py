@@ -81,7 +81,9 @@ def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
     """
     record = packed.table[MANAGER_RECORD]
     packed.table[record + CLOCK] = packed.table[CLOCK_AT] if keeps_time else 0
-    state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, STAYS] = 0.0
+    first, count = len(packed.contacts), sum(packed.places[: len(packed.clearances)])
+    # Corners of contacts, which are listed behind, carry bodies that lie on each other: they stay.
+    state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[first : first + count, STAYS] = 0.0
     if packed.table[record + MARK_AT]:
         pairs = state[packed.memory_at + MEMORY_HEADER :][: PAIR_MEMORY * int(packed.table[record + PAIRS])]
         pairs.reshape(-1, PAIR_MEMORY)[:, PAIR_TURN] = np.nan
@@ -118,6 +120,8 @@ def _with_hand(scene: Assembly, hand: PointDistance | FrameDistance) -> Assembly
     for sign, objective in scene.objectives:
         (inner.minimize if sign > 0.0 else inner.maximize)(objective)
     inner.minimize(hand)
+    # Solids that lie on each other go on doing so.
+    inner._corners = scene._corners
     return inner
 
 

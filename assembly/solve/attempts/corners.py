@@ -4,6 +4,10 @@ The gap of a contact is the least of the gaps at its corners (`constraints/packi
 several are the least. The loop first keeps all corners from crossing, each a smooth row g_i >= 0, and leaves the
 contacts themselves alone. From where that ends it goes on with them: where bodies are pressed together they touch
 there already, and where they are not, min g_i = 0 draws them to each other.
+
+A contact's row is then held at the corner that is nearest, g_k = 0, and does not switch from corner to corner while
+bodies slide on each other. With all others one-sided that is min g_i = 0 as long as corner k pushes. Where it would have
+to pull, another one might open less, and the row is that of the nearest features, whichever these are.
 """
 
 from __future__ import annotations
@@ -23,6 +27,8 @@ __all__ = ["corners_first", "with_corners"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
+# Multipliers that are less than this part of the largest are rounding: stationarity is asked for to 1e-9.
+PULLS = 1e-8
 
 
 def with_corners(packed: Packed) -> list[int]:
@@ -75,13 +81,24 @@ def corners_first(
         return None
     settings = settings.copy()
     settings[GATHER] = 0.0
-    state = outcome.state.copy()
-    for row in rows:
-        _take_nearest(packed, state, row)
-    outcome = go_on(packed, settings, state)
-    if outcome.code != SOLVED and not (settings[PLACES] == 1.0 and packed.is_crowded(outcome.state)):
-        return None
-    return outcome._replace(fit=outcome.fit or Fit(float(settings[FIT])))
+    for holds in (True, False):
+        state = outcome.state.copy()
+        # Rows that the loop left there are without the contacts.
+        state[packed.kept_at :] = 0.0
+        for row in rows:
+            _take_nearest(packed, state, row, holds)
+        found = go_on(packed, settings, state)
+        if settings[PLACES] == 1.0 and packed.is_crowded(found.state):
+            return found
+        if found.code == SOLVED and not (holds and _pulls(packed, found.state, rows)):
+            return found._replace(fit=found.fit or Fit(float(settings[FIT])))
+    return None
+
+
+def _pulls(packed: Packed, state: Array, rows: Sequence[int]) -> bool:
+    """Whether a contact has a multiplier of a row >= 0 that is broken, and not only by rounding."""
+    multipliers = state[packed.multipliers_at : packed.residuals_at]
+    return bool(multipliers[rows].max() > PULLS * np.abs(multipliers).max())
 
 
 def _left_alone(table: Table, rows: Sequence[int]) -> Table:
@@ -93,8 +110,8 @@ def _left_alone(table: Table, rows: Sequence[int]) -> Table:
     return table
 
 
-def _take_nearest(packed: Packed, state: Array, row: int) -> None:
-    """Let a contact begin with the pair of the corner that is nearest, where one is listed for it.
+def _take_nearest(packed: Packed, state: Array, row: int, holds: bool) -> None:
+    """Let a contact begin with the pair of the corner that is nearest, where one is listed for it; whether it holds it.
 
     Of solids that touch a search from nothing finds points that they have in common, and no pair.
     """
@@ -108,5 +125,7 @@ def _take_nearest(packed: Packed, state: Array, row: int) -> None:
             nearest = k
     if nearest >= 0:
         tracked[row] = tracked[first + nearest]
-        # Its features may switch, and nothing is allowed to it yet.
-        tracked[row, [STAYS, IDLE, ALLOWED]] = 0.0
+        # Nothing is allowed to it yet.
+        tracked[row, [IDLE, ALLOWED]] = 0.0
+        if not holds:
+            tracked[row, STAYS] = 0.0
