@@ -40,7 +40,7 @@ def are_flat(posed, codes, e, d):
 
 @kernel(inner=True)
 def may_be_level(posed, codes, e, d):
-    """Whether an edge may be level over a flat face near its element; True for all other features.
+    """Whether an edge may be level over a flat face near its element, or all along it; True for all other features.
 
     Elements e and d are of features codes.
     """
@@ -55,4 +55,5 @@ def may_be_level(posed, codes, e, d):
     n = three_of(node_of(posed.store, posed.trees[1 - side], other).axis)
     turn = posed.pose.rotation
     n = matvec(turn, n) if side == 0 else matvec_t(turn, n)
-    return abs(dot(along, n)) <= BEYOND * part.half[0] * abs(dot(bent, n))
+    lean = abs(dot(along, n))
+    return lean <= BEYOND * part.half[0] * abs(dot(bent, n)) or lean * lean <= FLAT * FLAT * dot(along, along)
