@@ -194,7 +194,16 @@ class Assembly(Contents):
     ) -> Solution:
         """A solve from this start and no other one."""
         settings = self._settings(options, interruption, isinstance(q0, Solution))
-        if isinstance(q0, Solution) or settings[ITERATIONS] == 0.0 or not self.packed().clearance_rows:
+        if settings[ITERATIONS] == 0.0 or not self.packed().clearance_rows:
+            return self._solved(settings, q0, starts, interruption)
+        if not self._objectives and not (isinstance(q0, Solution) and q0._lists is None):
+            from assembly.studies.standing_start import standing_start
+
+            # Nothing asks to move: where all holds at the start, that is the solution.
+            solution = standing_start(self, q0, settings, starts, interruption)
+            if solution is not None:
+                return solution
+        if isinstance(q0, Solution):
             return self._solved(settings, q0, starts, interruption)
         from assembly.studies.first_solve import first_solve
 
@@ -215,10 +224,13 @@ class Assembly(Contents):
         these start on a turn of their own.
         """
         spent = 0.0
+        if isinstance(q0, Solution):
+            # It may take more places, and another packed scene.
+            q0._list_contacts()
         apart = q0._fit.apart if isinstance(q0, Solution) and q0._fit is not None else None
         while True:
             packed = self.packed()
-            may_grow = self._crowding < MOST_CROWDING and not isinstance(q0, Solution)
+            may_grow = self._may_grow and not isinstance(q0, Solution)
             if packed.clearance_rows and settings[PLACES] != may_grow:
                 settings = settings.copy()
                 settings[PLACES] = float(may_grow)
@@ -249,8 +261,27 @@ class Assembly(Contents):
                 solution = Solution(self._scene, packed, state, status, spent, history, order, fit)
                 solution._touching = float(settings[ALLOWED_OVERLAP])
                 return self._proven(solution, settings, interruption) if packed.clearance_rows else solution
-            self._crowding *= MORE_PLACES
-            self._packed = None
+            self._pack_with_more_places()
+
+    @property
+    def _may_grow(self) -> bool:
+        """Whether the scene may be packed with more places."""
+        return self._crowding < MOST_CROWDING
+
+    def _pack_with_more_places(self) -> Packed:
+        """The scene packed again, with more places for contacts of clearances. What is proven of its pairs stays."""
+        before = self.packed()
+        self._crowding *= MORE_PLACES
+        self._packed = None
+        packed = self.packed()
+        packed.origin, packed.proofs, packed.stood = before.origin, before.proofs, before.stood
+        return packed
+
+    def _packed_as(self, packed: Packed) -> Packed | None:
+        """The scene as it is packed now, if nothing but values and places are others than in an earlier one."""
+        mine = self._packed
+        is_same = mine is not None and mine.origin is packed.origin and mine.structure == structure_of(self._constraints)
+        return mine if is_same else None
 
     @staticmethod
     def _proven(solution: Solution, settings: Array, interruption: Interruption) -> Solution:
@@ -331,10 +362,10 @@ class Assembly(Contents):
 
     @staticmethod
     def _state_of(name: str, packed: Packed, solution: Solution) -> Array:
-        if solution._packed is packed:
-            return solution._state
-        if packed.outgrown is not None and solution._packed is packed.outgrown:
-            return packed.taken_over(solution._state)
+        if solution._ended.packed is packed:
+            return solution._ended.state
+        if packed.outgrown is not None and solution._ended.packed is packed.outgrown:
+            return packed.taken_over(solution._ended.state)
         raise InputError(f"{name} is a solution of another assembly, or of this one before a change; expected its own")
 
     def _place_starts(self, packed: Packed, state: Array, starts: Mapping[str, ArrayLike]) -> None:
@@ -408,6 +439,8 @@ class Assembly(Contents):
 
         if not isinstance(drives, (bool, np.bool_)):
             raise InputError(f"drives is {drives!r}; expected True or False")
+        if isinstance(q, Solution):
+            q._list_contacts()
         packed = self.packed()
         assert self._scene is not None
         solved = isinstance(q, Solution)

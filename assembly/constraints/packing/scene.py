@@ -54,6 +54,8 @@ LEAST_UNIT = 1e-305
 # A size that rests on values alone is another one where they have grown or shrunk by this factor.
 OUTGROWN = 1e4
 
+# Poses, what touching is, and what was proven there.
+Stood = tuple[bytes, float, list[Any]]
 # Numbers of pools that are not as they were packed (0).
 _versions = itertools.count(1)
 
@@ -72,7 +74,12 @@ class Packed:
     Attributes
     ----------
     table, pool : arrays
-        See `constraints/program/records.py`. Lengths in the pool are divided by `scale`.
+        See `constraints/program/records.py`. Lengths in the pool are divided by `scale`. Whoever asks for them has the
+        contact manager of clearances as well, behind all else.
+    rows_table, rows_pool : arrays
+        The same, perhaps without that.
+    origin : object
+        The same of a scene that is packed again with more places, and of no other one.
     scale : float
         The scene's size (`scene_size`), 1 where it has none.
     kept_at, kept_size : int
@@ -81,6 +88,8 @@ class Packed:
         What solves that are over worked in, for the next ones (`solve/attempts/attempts.py`).
     proofs : list of ClearanceProof
         Of the pairs that clearances keep apart, of solves that have ended.
+    stood : (bytes, float, list) or None
+        Poses that were proven to hold as they stand, what was called touching there, and what was proven.
     asked : Asked
         What the last solve was asked for.
     has_size : bool
@@ -146,7 +155,8 @@ class Packed:
             for clearance, pairs in zip(self.clearances, self.clearance_pairs, strict=True)
         ]
         self.clearance_rows = sum(self.places)
-        self._write(bodies, constraints, objectives)
+        self.origin = object()
+        self._writer = self._write(bodies, constraints, objectives)
         self._take_addresses()
         # Where the parts of a state begin: tracked values, multipliers, residuals, results.
         self.contacts_at = 7 * self.count
@@ -162,16 +172,57 @@ class Packed:
         self.asked: Asked = []
         self.workspaces: list[tuple[Array, Array, Table]] = []
         self.proofs: list[ClearanceProof] = []
+        self.stood: Stood | None = None
         self.kept_at = self.memory_at + self._memory.size
-        self.table[layout.KEPT] = self.kept_at
-        self.kept_size = int(kept_size(self.table))
+        self.rows_table[layout.KEPT] = self.kept_at
+        self.kept_size = int(kept_size(self.rows_table))
         # Without a factor, to copy what a solution keeps takes longer than to evaluate it anew.
-        self._state_size = self.kept_at + (self.kept_size if kept_unknowns(self.table) > 0 else 0)
+        self._state_size = self.kept_at + (self.kept_size if kept_unknowns(self.rows_table) > 0 else 0)
+
+    @property
+    def table(self) -> Table:
+        """The table with the contact manager of clearances, which is packed when it is first asked for."""
+        if self._writer is not None:
+            self._pack_manager()
+        return self.rows_table
+
+    @property
+    def pool(self) -> Array:
+        """The pool with the contact manager of clearances."""
+        if self._writer is not None:
+            self._pack_manager()
+        return self.rows_pool
+
+    def _pack_manager(self) -> None:
+        """Write the contact manager of clearances behind all else, and take the addresses of its kernels."""
+        writer = self._writer
+        assert writer is not None
+        begin = writer.table_at, writer.pool_at
+        given = list(zip(self.contacts, self.sides, self.whole, strict=True))
+        manager = manager_packing.pack_manager(writer, self.clearances, self.clearance_pairs, self.places, given)
+        table, pool = writer.arrays()
+        table = np.concatenate([self.rows_table, table[begin[0] :]])
+        table[layout.MANAGER_RECORD] = manager
+        self.rows_table, self.rows_pool = table, np.concatenate([self.rows_pool, pool[begin[1] :]])
+        self._writer = None
+        self._take_addresses()
+
+    def without_manager(self) -> Table:
+        """A table of its own in which no clearance has contacts, and nothing finds any."""
+        table = self.rows_table.copy()
+        table[layout.MANAGER_RECORD] = -1
+        return table
 
     def _write(
         self, bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
-    ) -> None:
-        """Write table and pool, part by part, and keep what tells of them."""
+    ) -> SceneWriter | None:
+        """Write table and pool, part by part, and keep what tells of them.
+
+        Returns
+        -------
+        SceneWriter or None
+            What the contact manager of clearances is still to be written with.
+        """
         goals = objectives or [(1.0, Posture())]
         self.unit = max(term.weight * natural_unit(term, self.scale) for _, term in goals)
         if not LEAST_UNIT <= self.unit <= 1.0 / LEAST_UNIT:
@@ -199,7 +250,7 @@ class Packed:
             groups += [writer.places_of(term.bodies) for _, term in goals if isinstance(term, Expression)]
             record = block_record(int(header[layout.MOVING]), [unknown_blocks[group].tolist() for group in groups])
             header[layout.BLOCK_RECORD], header[layout.BLOCK_LENGTH] = writer.add(record)[0], record.size
-        self.table, self.pool = writer.arrays()
+        self.rows_table, self.rows_pool = writer.arrays()
         # What the loop is compiled for: None without a dexterity.
         self.end_effectors = 1 if header[layout.DEXTERITIES] else None
         self.tracked = self.pair_rows + len(writer.angles)
@@ -213,6 +264,7 @@ class Packed:
             [(self._frames[item.frames], item.kind, item.component) for item in told], dtype=np.int64
         ).reshape(-1, 3)
         self._standing_units = np.array([1.0 if item.is_angle else self.scale for item in told])
+        return writer if self.clearance_rows else None
 
     def _pool_header(self) -> Array:
         pool = np.zeros(layout.POOL_HEADER)
@@ -229,11 +281,6 @@ class Packed:
         rows.add_contacts(self.contacts, self.sides, self.whole)
         rows.add_clearance_rows(self.clearances, self.places)
         writer.header[layout.MANAGER_RECORD] = -1
-        if self.clearance_rows:
-            given = list(zip(self.contacts, self.sides, self.whole, strict=True))
-            writer.header[layout.MANAGER_RECORD] = manager_packing.pack_manager(
-                writer, self.clearances, self.clearance_pairs, self.places, given
-            )
         rows.add_trims(self.contacts)
         rows.add_joints(unknown_blocks)
         rows.add_expressions()
@@ -313,22 +360,23 @@ class Packed:
 
     def _take_addresses(self) -> None:
         """Where the kernels are that only contacts, trims, clearances, expressions or many bodies ask for."""
-        table = self.table
+        table = self.rows_table
+        watched = table[layout.MANAGER_RECORD] >= 0
         table[layout.CLOCK_AT] = clock_address()
         if table[layout.BLOCK_RECORD]:
             record = table[table[layout.BLOCK_RECORD] :]
             record[[FACTORIZE_AT, SOLVE_AT]] = addresses.blocks()
         if self.pair_rows:
             table[layout.CONTACT_ROWS_AT] = addresses.contacts()
-        if any(self.whole) or any(
-            manager_packing.is_of_surfaces(pair) for pairs in self.clearance_pairs for pair in pairs
+        if any(self.whole) or (
+            watched and any(manager_packing.is_of_surfaces(pair) for pairs in self.clearance_pairs for pair in pairs)
         ):
             table[layout.START_AT : layout.EXTREMAL_AT + 1] = addresses.surfaces()
         if self.shells:
             table[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
         if self.trims:
             table[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
-        if self.clearance_rows:
+        if watched:
             table[[layout.UPDATE_AT, layout.STAYED_AT, layout.PARTS_AT, layout.WENT_AT]] = addresses.manager()
             manager = manager_records.manager_at(table, table[layout.MANAGER_RECORD])
             manager.track_solids = table[layout.TRACK_AT]
@@ -337,13 +385,16 @@ class Packed:
             table[layout.RUN_TAPE_AT] = addresses.tapes()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "workspaces": [], "proofs": []}
+        if self._writer is not None:
+            # What is behind the rest is written once, in the same place of every copy.
+            self._pack_manager()
+        return {**self.__dict__, "workspaces": [], "proofs": [], "stood": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # Addresses are those of one process; a copy, or what another process wrote, takes its own.
         self.__dict__.update(state)
-        self.table = self.table.copy()
-        self.table[layout.DEEPEST_AT] = 0
+        self.rows_table = self.rows_table.copy()
+        self.rows_table[layout.DEEPEST_AT] = 0
         self._take_addresses()
 
     def seek_penetration(self) -> bool:
@@ -351,15 +402,15 @@ class Packed:
 
         The kernel for it is large, and few scenes need it.
         """
-        if not self.shells or self.table[layout.DEEPEST_AT]:
+        if not self.shells or self.rows_table[layout.DEEPEST_AT]:
             return False
-        self.table[layout.DEEPEST_AT] = addresses.deepest()
+        self.rows_table[layout.DEEPEST_AT] = addresses.deepest()
         return True
 
     @property
     def is_implicit(self) -> bool:
         """Whether nobody asked for the objective, which is the least move then."""
-        return bool(self.table[layout.IMPLICIT] == 1)
+        return bool(self.rows_table[layout.IMPLICIT] == 1)
 
     def start_angles(self, state: Array, warm: bool) -> None:
         """Write the turns that angles start on at the poses of a state into it."""
@@ -367,7 +418,7 @@ class Packed:
             return
         near = state[self.angles_at : self.multipliers_at : TRACK]
         if warm and not self._turned.coupled:
-            self._turned.follow_drives(self.pool, near)
+            self._turned.follow_drives(self.rows_pool, near)
             return
 
         def measure() -> Array:
@@ -376,16 +427,16 @@ class Packed:
                 q = state[: self.contacts_at].reshape(-1, 7)
                 scaled = q.copy()
                 scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
-                coordinates_at(self.table, self.pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values)
+                coordinates_at(self.rows_table, self.rows_pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values)
             values *= self._standing_units
             return values
 
-        self._turned.start(self.pool, near, warm, measure)
+        self._turned.start(self.rows_pool, near, warm, measure)
 
     def twin(self) -> Packed:
         """The same with a pool of its own, of which anything may be changed."""
         other = copy(self)
-        other.pool = self.pool.copy()
+        other.rows_pool = self.rows_pool.copy()
         other.pool[layout.VERSION] = float(next(_versions))
         # Solves of the one and of the other work in the same memory, one after another.
         other.workspaces, other.proofs = self.workspaces, self.proofs
@@ -416,7 +467,7 @@ class Packed:
 
     def refresh(self) -> None:
         """Write what may have changed since the last solve: values and targets."""
-        pool, scale, far = self.pool, self.scale, FARTHEST * self.scale
+        pool, scale, far = self.rows_pool, self.scale, FARTHEST * self.scale
         x, y, z = self._reference
         asked: Asked = []
         self.asked = asked

@@ -123,17 +123,21 @@ def _in_bore(outer: Recognized, inner: Recognized, pose: tuple[Array, Array], to
 
 
 def _flush(proof: ClearanceProof, k: int, q: Array, touching: float) -> tuple[Array, Array]:
-    """Where flat faces of pair k lie on each other: normals of those of the first body, in its axes, and the gaps."""
+    """Where flat faces of pair k lie on each other: normals of those of the first body, in its axes, and the gaps.
+
+    So do those that are apart by the least gap, over which gaps are counted.
+    """
+    least = float(proof.minimum[k])
     a, b = map(recognized, proof.cells_of_both(k))
     turn, shift = proof.relative(k, q)
     opposed = np.linalg.norm(a.normals[:, None] + b.normals @ turn.T, axis=2) * proof.size(k) <= touching
     i, j = np.nonzero(opposed)
-    gaps = ((b.points[j] @ turn.T + shift - a.points[i]) * a.normals[i]).sum(axis=1)
+    gaps = ((b.points[j] @ turn.T + shift - a.points[i]) * a.normals[i]).sum(axis=1) - least
     found = [
         row
         for row in np.flatnonzero(np.abs(gaps) <= touching).tolist()
         if _are_beside(
-            (a.centers[i[row]], a.radii[i[row]]), (b.centers[j[row]] @ turn.T + shift, b.radii[j[row]]), touching
+            (a.centers[i[row]], a.radii[i[row]]), (b.centers[j[row]] @ turn.T + shift, b.radii[j[row]]), least + touching
         )
     ]
     return a.normals[i[found]], gaps[found]
