@@ -83,6 +83,7 @@ def _answers(proof: ClearanceProof, q: Array, touching: float) -> tuple[list[Ans
     for k in asked:
         if not is_proven(answers[k]):
             answers[k] = _off_what_is_open(proof, k, q, moves, touching)
+        proof.moves[k] = moves[k] if is_proven(answers[k]) else 0.0
     left = []
     for k, answer in enumerate(answers):
         if is_proven(answer):
@@ -100,9 +101,14 @@ def _answers(proof: ClearanceProof, q: Array, touching: float) -> tuple[list[Ans
 
 
 def _opening(proof: ClearanceProof, q: Array, touching: float) -> tuple[Array, set[int]]:
-    """Of every pair a move (6) that opens it where flat faces touch, and the pairs that none opens."""
-    moves, hopeless = np.zeros((len(proof.pairs), 6)), set()
+    """Of every pair a move (6) that opens it where flat faces touch, and the pairs that none opens.
+
+    What opened contacts before may do so here.
+    """
+    moves, hopeless = proof.moves.copy(), set()
     for k in proof.near_pairs(q, touching):
+        if moves[k].any():
+            continue
         off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, _unknown)
         if off is None:
             hopeless.add(k)
@@ -117,7 +123,9 @@ def _unknown() -> None:
 
 
 def _off_what_is_open(proof: ClearanceProof, k: int, q: Array, moves: Array, touching: float) -> Answer:
-    """What is proven of a pair that is moved off what looks leave open."""
+    """What is proven of a pair that is moved off what is recognized to touch here, or off what looks leave open."""
+    off = off_contacts(proof, k, q, touching, _unknown)
+    moves[k] = 0.0 if off is None else off
     (answer,) = proof.look(q, touching, moves, which=[k])
     for _ in range(TRIES):
         move = left_open(proof, k, q, touching) if answer.verdict is Verdict.UNDECIDED else None

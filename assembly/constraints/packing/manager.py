@@ -15,6 +15,7 @@ from assembly.constraints.model.contact import Contact, side_faces
 from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.program import records as layout
 from assembly.errors import InputError
+from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.geometry.shapes.centerline import spine_of
 from assembly.kinematics.body import Body, BodyFace
@@ -143,7 +144,7 @@ class _PairPacking:
         # smallest radius of curvature and how far its facets are off; bodies of a shape share it.
         self._trees: dict[tuple[Face, ...], tuple[int, float, float, float, float]] = {}
         for faces in dict.fromkeys(side_faces(body) for pair in pairs for body in pair):
-            tree = FacetTree.of(faces)
+            tree = FacetTree.of(first_equal(faces))
             table, pool, at = pack_tree(tree, writer.scale, writer.table_at, writer.pool_at)
             writer.add(table, pool)
             seams = SEAMS * tree.topology.tolerance if tree.topology.edges else 0.0

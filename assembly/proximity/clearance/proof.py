@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import rows_of
+from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Answer, Verdict
@@ -66,7 +67,7 @@ class ClearanceProof:
         minimum: Sequence[float],
     ) -> None:
         self.pairs = list(pairs)
-        self.faces = list(shapes)
+        self.faces = shapes = [first_equal(faces) for faces in shapes]
         used = sorted({body for pair in pairs for body in pair})
         self._number = {body: k for k, body in enumerate(used)}
         self.forest = PackedForest([shapes[body] for body in used])
