@@ -280,7 +280,9 @@ class Assembly(Contents):
     def _packed_as(self, packed: Packed) -> Packed | None:
         """The scene as it is packed now, if nothing but values and places are others than in an earlier one."""
         mine = self._packed
-        is_same = mine is not None and mine.origin is packed.origin and mine.structure == structure_of(self._constraints)
+        is_same = (
+            mine is not None and mine.origin is packed.origin and mine.structure == structure_of(self._constraints)
+        )
         return mine if is_same else None
 
     @staticmethod

@@ -114,7 +114,9 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
     packed, scene = solution._packed, solution._scene
     if not can_prove(packed):
         unknown = Answer(Verdict.UNDECIDED)
-        return [PairAnswer(item.name, (a.name, b.name), unknown, True, False) for item, (a, b), _ in owned_pairs(packed)]
+        return [
+            PairAnswer(item.name, (a.name, b.name), unknown, True, False) for item, (a, b), _ in owned_pairs(packed)
+        ]
     touching = solution._touching * packed.scale
     with lent_proof(packed, scene.bodies) as proof:
         # What opened contacts at the last solve may do so here, if no more was called touching there.

@@ -5,6 +5,7 @@ time.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +29,16 @@ from assembly.proximity.manager.centerlines.packing import pack_centerline
 from assembly.proximity.manager.extrema import GIVEN_RECORD
 from assembly.proximity.manager.parameters import LARGEST_MARGIN, LEAST_MARGIN
 
-__all__ = ["clearance_pairs", "is_of_surfaces", "pack_manager", "slot_count", "table_with_clearances"]
+__all__ = [
+    "WatchedPairs",
+    "clearance_pairs",
+    "is_of_surfaces",
+    "slot_count",
+    "table_with_clearances",
+    "with_manager",
+]
 
+Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 Pair = tuple[Body, Body]
 Side = Body | BodyFace
@@ -76,20 +85,34 @@ def is_of_surfaces(pair: Pair) -> bool:
     return all(is_one_smooth(side_faces(body)) for body in pair)
 
 
-def pack_manager(
-    writer: SceneWriter,
-    clearances: Sequence[Clearance],
-    pairs_of_clearances: Sequence[Sequence[Pair]],
-    places: Sequence[int],
-    contacts: Sequence[GivenContact],
-) -> int:
+class WatchedPairs(NamedTuple):
+    """Clearances, the pairs and the places of each, and the given contacts in the order of their rows."""
+
+    clearances: Sequence[Clearance]
+    pairs: Sequence[Sequence[Pair]]
+    places: Sequence[int]
+    contacts: Sequence[GivenContact]
+
+
+def with_manager(arrays: tuple[Table, Array], writer: SceneWriter, watched: WatchedPairs) -> tuple[Table, Array]:
+    """Table and pool that a writer wrote, with a contact manager behind all else."""
+    begin = writer.table_at, writer.pool_at
+    manager = _pack_manager(writer, watched)
+    table, pool = writer.arrays()
+    table = np.concatenate([arrays[0], table[begin[0] :]])
+    table[layout.MANAGER_RECORD] = manager
+    return table, np.concatenate([arrays[1], pool[begin[1] :]])
+
+
+def _pack_manager(writer: SceneWriter, watched: WatchedPairs) -> int:
     """Pack the contact manager of clearances, of which each has pairs and places; where its record begins.
 
-    `contacts` are the given ones, in the order of their rows; the first place is behind them.
+    The first place is behind the given contacts.
     """
-    pairs = _PairPacking(writer, [pair for own in pairs_of_clearances for pair in own], contacts)
+    clearances, contacts = watched.clearances, watched.contacts
+    pairs = _PairPacking(writer, [pair for own in watched.pairs for pair in own], contacts)
     first = 0
-    for clearance, own, count in zip(clearances, pairs_of_clearances, places, strict=True):
+    for clearance, own, count in zip(clearances, watched.pairs, watched.places, strict=True):
         for pair in own:
             pairs.add(pair, clearance.minimum, [first, first + count])
         first += count

@@ -24,6 +24,8 @@ from assembly.constraints.packing import addresses
 from assembly.constraints.packing import manager as manager_packing
 from assembly.constraints.packing.asked import Asked
 from assembly.constraints.packing.elimination_order import FEW, block_record
+from assembly.constraints.packing.manager import WatchedPairs
+from assembly.constraints.packing.manager_last import ManagerLast
 from assembly.constraints.packing.numbering import number_bodies
 from assembly.constraints.packing.revolutions import Turns
 from assembly.constraints.packing.rows import RowPacking
@@ -60,7 +62,7 @@ Stood = tuple[bytes, float, list[Any]]
 _versions = itertools.count(1)
 
 
-class Packed:
+class Packed(ManagerLast):
     """A packed scene: arrays for the loop, and what is needed to refresh them between solves.
 
     Parameters
@@ -74,10 +76,7 @@ class Packed:
     Attributes
     ----------
     table, pool : arrays
-        See `constraints/program/records.py`. Lengths in the pool are divided by `scale`. Whoever asks for them has the
-        contact manager of clearances as well, behind all else.
-    rows_table, rows_pool : arrays
-        The same, perhaps without that.
+        See `constraints/program/records.py`. Lengths in the pool are divided by `scale`.
     origin : object
         The same of a scene that is packed again with more places, and of no other one.
     scale : float
@@ -156,7 +155,7 @@ class Packed:
         ]
         self.clearance_rows = sum(self.places)
         self.origin = object()
-        self._writer = self._write(bodies, constraints, objectives)
+        self._write(bodies, constraints, objectives)
         self._take_addresses()
         # Where the parts of a state begin: tracked values, multipliers, residuals, results.
         self.contacts_at = 7 * self.count
@@ -179,50 +178,10 @@ class Packed:
         # Without a factor, to copy what a solution keeps takes longer than to evaluate it anew.
         self._state_size = self.kept_at + (self.kept_size if kept_unknowns(self.rows_table) > 0 else 0)
 
-    @property
-    def table(self) -> Table:
-        """The table with the contact manager of clearances, which is packed when it is first asked for."""
-        if self._writer is not None:
-            self._pack_manager()
-        return self.rows_table
-
-    @property
-    def pool(self) -> Array:
-        """The pool with the contact manager of clearances."""
-        if self._writer is not None:
-            self._pack_manager()
-        return self.rows_pool
-
-    def _pack_manager(self) -> None:
-        """Write the contact manager of clearances behind all else, and take the addresses of its kernels."""
-        writer = self._writer
-        assert writer is not None
-        begin = writer.table_at, writer.pool_at
-        given = list(zip(self.contacts, self.sides, self.whole, strict=True))
-        manager = manager_packing.pack_manager(writer, self.clearances, self.clearance_pairs, self.places, given)
-        table, pool = writer.arrays()
-        table = np.concatenate([self.rows_table, table[begin[0] :]])
-        table[layout.MANAGER_RECORD] = manager
-        self.rows_table, self.rows_pool = table, np.concatenate([self.rows_pool, pool[begin[1] :]])
-        self._writer = None
-        self._take_addresses()
-
-    def without_manager(self) -> Table:
-        """A table of its own in which no clearance has contacts, and nothing finds any."""
-        table = self.rows_table.copy()
-        table[layout.MANAGER_RECORD] = -1
-        return table
-
     def _write(
         self, bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
-    ) -> SceneWriter | None:
-        """Write table and pool, part by part, and keep what tells of them.
-
-        Returns
-        -------
-        SceneWriter or None
-            What the contact manager of clearances is still to be written with.
-        """
+    ) -> None:
+        """Write table and pool, part by part, and keep what tells of them."""
         goals = objectives or [(1.0, Posture())]
         self.unit = max(term.weight * natural_unit(term, self.scale) for _, term in goals)
         if not LEAST_UNIT <= self.unit <= 1.0 / LEAST_UNIT:
@@ -264,7 +223,10 @@ class Packed:
             [(self._frames[item.frames], item.kind, item.component) for item in told], dtype=np.int64
         ).reshape(-1, 3)
         self._standing_units = np.array([1.0 if item.is_angle else self.scale for item in told])
-        return writer if self.clearance_rows else None
+        if self.clearance_rows:
+            given = list(zip(self.contacts, self.sides, self.whole, strict=True))
+            watched = WatchedPairs(self.clearances, self.clearance_pairs, self.places, given)
+            self._unwritten = writer, watched
 
     def _pool_header(self) -> Array:
         pool = np.zeros(layout.POOL_HEADER)
@@ -385,9 +347,8 @@ class Packed:
             table[layout.RUN_TAPE_AT] = addresses.tapes()
 
     def __getstate__(self) -> dict[str, Any]:
-        if self._writer is not None:
-            # What is behind the rest is written once, in the same place of every copy.
-            self._pack_manager()
+        # In copies it is in the same place.
+        self._write_manager()
         return {**self.__dict__, "workspaces": [], "proofs": [], "stood": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -427,7 +388,9 @@ class Packed:
                 q = state[: self.contacts_at].reshape(-1, 7)
                 scaled = q.copy()
                 scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
-                coordinates_at(self.rows_table, self.rows_pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values)
+                coordinates_at(
+                    self.rows_table, self.rows_pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values
+                )
             values *= self._standing_units
             return values
 

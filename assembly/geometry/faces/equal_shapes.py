@@ -41,9 +41,10 @@ class _Content:
 
 def _parts(face: Face) -> Iterator[bytes]:
     """All that a face is made of, numbers and names, each behind its size."""
-    surface, curves = face.surface, face.boundary
-    chains = [(chain.start, chain.stop) for chain in face.chains]
-    has_loops = face.outer is not None, len(face.holes)
+    surface, has_loops = face.surface, (face.outer is not None, len(face.holes))
+    # Without loops the boundary is the edge of the surface, which nobody may have asked for yet.
+    curves = face.boundary if any(has_loops) else ()
+    chains = [(chain.start, chain.stop) for chain in face.chains] if any(has_loops) else []
     yield repr((face.name, face.reversed, surface.degree, has_loops, chains, [c.degree for c in curves])).encode()
     arrays: list[NDArray[np.float64]] = [surface.control_points, surface.weights, *surface.knots]
     for curve in curves:

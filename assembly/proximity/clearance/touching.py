@@ -137,7 +137,9 @@ def _flush(proof: ClearanceProof, k: int, q: Array, touching: float) -> tuple[Ar
         row
         for row in np.flatnonzero(np.abs(gaps) <= touching).tolist()
         if _are_beside(
-            (a.centers[i[row]], a.radii[i[row]]), (b.centers[j[row]] @ turn.T + shift, b.radii[j[row]]), least + touching
+            (a.centers[i[row]], a.radii[i[row]]),
+            (b.centers[j[row]] @ turn.T + shift, b.radii[j[row]]),
+            least + touching,
         )
     ]
     return a.normals[i[found]], gaps[found]
@@ -154,9 +156,7 @@ def _tangent(proof: ClearanceProof, k: int, q: Array, touching: float) -> tuple[
     return np.concatenate([on_a[0], -on_b[0] @ turn.T]), np.concatenate([on_a[1], on_b[1]])
 
 
-def _on_flat_faces(
-    flat: Recognized, rounds: tuple[Array, Array], lengths: tuple[float, float]
-) -> tuple[Array, Array]:
+def _on_flat_faces(flat: Recognized, rounds: tuple[Array, Array], lengths: tuple[float, float]) -> tuple[Array, Array]:
     """Normals of flat faces on which rounds, of these ends and radii, lie but for a least gap; gaps over that."""
     ends, radii = rounds
     least, touching = lengths
@@ -167,7 +167,9 @@ def _on_flat_faces(
         row
         for row in range(len(i))
         if _are_beside(
-            (flat.centers[i[row]], flat.radii[i[row]]), _balls_along(ends[j[row]], float(radii[j[row]])), least + touching
+            (flat.centers[i[row]], flat.radii[i[row]]),
+            _balls_along(ends[j[row]], float(radii[j[row]])),
+            least + touching,
         )
     ]
     return flat.normals[i[found]], gaps[i[found], j[found]].min(axis=1)
@@ -200,7 +202,7 @@ def off_contacts(
     q : (n, 7)
     touching : float
     known : callable
-        Of bodies that are not recognized to lie on each other with flat faces, what gives the normal (3,) from the first body to the
+        Of bodies that are not recognized to lie on flat faces, what gives the normal (3,) from the first body to the
         second where they touch, in the world, or None.
     """
     flush, tangent = _flush(proof, k, q, touching), _tangent(proof, k, q, touching)
