@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.constraints.model.constraint import structure_changes
 from assembly.constraints.model.contact import lone_surfaces
 from assembly.constraints.model.contents import Contents
-from assembly.constraints.packing.scene import Packed, structure_of
+from assembly.constraints.packing.scene import MORE_PLACES, MOST_CROWDING, Packed, structure_of
 from assembly.constraints.packing.scene_size import check_reach, scene_size
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body, Frame, Point
@@ -47,8 +47,6 @@ __all__ = ["Assembly"]
 Array = NDArray[np.float64]
 _SETTINGS = CTRL_C.fill(Options().settings())
 _WARM_SETTINGS = CTRL_C.fill(Options().settings(warm=True))
-# How many times as many places as they ask for a solve gives to clearances.
-MORE_PLACES, MOST_CROWDING = 4, 16
 
 
 class Assembly(Contents):
@@ -230,7 +228,7 @@ class Assembly(Contents):
         apart = q0._fit.apart if isinstance(q0, Solution) and q0._fit is not None else None
         while True:
             packed = self.packed()
-            may_grow = self._may_grow and not isinstance(q0, Solution)
+            may_grow = self._crowding < MOST_CROWDING and not isinstance(q0, Solution)
             if packed.clearance_rows and settings[PLACES] != may_grow:
                 settings = settings.copy()
                 settings[PLACES] = float(may_grow)
@@ -262,11 +260,6 @@ class Assembly(Contents):
                 solution._touching = float(settings[ALLOWED_OVERLAP])
                 return self._proven(solution, settings, interruption) if packed.clearance_rows else solution
             self._pack_with_more_places()
-
-    @property
-    def _may_grow(self) -> bool:
-        """Whether the scene may be packed with more places."""
-        return self._crowding < MOST_CROWDING
 
     def _pack_with_more_places(self) -> Packed:
         """The scene packed again, with more places for contacts of clearances. What is proven of its pairs stays."""

@@ -50,8 +50,8 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
         What bodies may be in each other and still touch, in parts of the scene's size.
     """
     q = state[: packed.contacts_at].reshape(-1, 7)
-    poses = q.tobytes()
-    if packed.stood is not None and packed.stood[:2] == (poses, touching):
+    asked = state[: packed.contacts_at + TRACK * len(packed.contacts)].tobytes()
+    if packed.stood is not None and packed.stood[:2] == (asked, touching):
         return packed.stood[2]
     with lent_proof(packed, bodies) as proof:
         answers, conforming = _answers(proof, q, touching * packed.scale)
@@ -67,7 +67,7 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
         PairAnswer(item.name, (a.name, b.name), answer, True, is_proven(answer))
         for (item, (a, b), _), answer in zip(owned, answers, strict=True)
     ]
-    packed.stood = poses, touching, found
+    packed.stood = asked, touching, found
     return found
 
 

@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.constraints.packing.scene import Packed
+from assembly.constraints.packing.scene import MORE_PLACES, MOST_CROWDING, Packed
 from assembly.constraints.program.records import RESULTS
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.attempts.attempts import as_it_stands, load, with_listed
 from assembly.solve.clearance_proof import can_prove
 from assembly.solve.interruption import CTRL_C, Interruption
-from assembly.solve.loop.settings import ALLOWED_OVERLAP, COUNT, FIT, SOLVED
+from assembly.solve.loop.settings import ALLOWED_OVERLAP, COUNT, FIT, PLACES, SOLVED
 from assembly.solve.options import Options
 from assembly.solve.result import Ended, Result
 from assembly.solve.scene import Status
@@ -85,19 +85,30 @@ def standing_start(
 def _with_contacts(scene: Assembly, solution: Result) -> Ended:
     """What a start that was returned as it is ended with, and with the contacts of clearances listed.
 
-    Where these take more places the scene is packed with more, unless it is another one by now.
+    Where these take more places the scene is packed with more, unless its rows are others by now.
     """
     ended = solution._ended
     settings = CTRL_C.settings(CTRL_C.fill(Options(touching=solution._touching).settings()))
+    packed = scene._packed_as(ended.packed) or ended.packed
+    grows = packed.crowding < MOST_CROWDING
     while True:
-        mine = scene._packed_as(ended.packed)
-        packed = ended.packed if mine is None else mine
-        may_grow = mine is not None and scene._may_grow
+        settings[PLACES] = float(grows)
         outcome = with_listed(packed.as_asked(solution._asked), CTRL_C, settings, _start_of(packed, ended))
         CTRL_C.is_over()
-        if not (may_grow and packed.is_crowded(outcome.state)):
+        if not (grows and packed.is_crowded(outcome.state)):
             return Ended(packed, _same_results(packed, outcome.state, ended))
-        scene._pack_with_more_places()
+        more = _with_more_places(scene, packed, solution)
+        grows = more is not None and more.crowding < MOST_CROWDING
+        packed = more or packed
+
+
+def _with_more_places(scene: Assembly, packed: Packed, solution: Result) -> Packed | None:
+    """The scene of a solution packed with more places, if it still has the same rows."""
+    if scene._packed_as(packed) is packed:
+        return scene._pack_with_more_places()
+    there = solution._scene
+    more = Packed(there.bodies, there.constraints, (), packed.crowding * MORE_PLACES)
+    return more if more.has_rows_of(packed) else None
 
 
 def _start_of(packed: Packed, ended: Ended) -> Array:

@@ -47,7 +47,7 @@ from assembly.proximity.manager.parameters import LARGEST_MARGIN
 if TYPE_CHECKING:
     from assembly.proximity.clearance.proof import ClearanceProof
 
-__all__ = ["Packed", "structure_of"]
+__all__ = ["MORE_PLACES", "MOST_CROWDING", "Packed", "structure_of"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -56,8 +56,10 @@ LEAST_UNIT = 1e-305
 # A size that rests on values alone is another one where they have grown or shrunk by this factor.
 OUTGROWN = 1e4
 
-# Poses, what touching is, and what was proven there.
+# Bytes of a state, what touching is, and what was proven there.
 Stood = tuple[bytes, float, list[Any]]
+# How many times as many places as they ask for a solve gives to clearances.
+MORE_PLACES, MOST_CROWDING = 4, 16
 # Numbers of pools that are not as they were packed (0).
 _versions = itertools.count(1)
 
@@ -77,6 +79,8 @@ class Packed(ManagerLast):
     ----------
     table, pool : arrays
         See `constraints/program/records.py`. Lengths in the pool are divided by `scale`.
+    crowding : int
+        How many times as many places as they ask for clearances have.
     origin : object
         The same of a scene that is packed again with more places, and of no other one.
     scale : float
@@ -88,7 +92,7 @@ class Packed(ManagerLast):
     proofs : list of ClearanceProof
         Of the pairs that clearances keep apart, of solves that have ended.
     stood : (bytes, float, list) or None
-        Poses that were proven to hold as they stand, what was called touching there, and what was proven.
+        Poses, with pairs of contacts, that were proven to hold as they stand; what touching was; what was proven.
     asked : Asked
         What the last solve was asked for.
     has_size : bool
@@ -154,7 +158,7 @@ class Packed(ManagerLast):
             for clearance, pairs in zip(self.clearances, self.clearance_pairs, strict=True)
         ]
         self.clearance_rows = sum(self.places)
-        self.origin = object()
+        self.origin, self.crowding = object(), places
         self._write(bodies, constraints, objectives)
         self._take_addresses()
         # Where the parts of a state begin: tracked values, multipliers, residuals, results.
@@ -277,6 +281,18 @@ class Packed(ManagerLast):
         state = np.zeros(self._state_size)
         state[self.memory_at : self.kept_at] = self._memory
         return state
+
+    def has_rows_of(self, other: Packed) -> bool:
+        """Whether another scene has the same rows, but for those of clearances."""
+        kinds = [
+            np.column_stack([packed.owners, packed.one_sided, packed.lengths, packed.drives, packed.pairs >= 0])
+            for packed in (self, other)
+        ]
+        one, two = (
+            np.delete(kind, np.arange(packed.clearance_rows) + len(packed.contacts), axis=0)
+            for kind, packed in zip(kinds, (self, other), strict=True)
+        )
+        return len(self.contacts) == len(other.contacts) and np.array_equal(one, two)
 
     def pair_name(self, k: int) -> str:
         """The name of the contact, or the clearance, that row k is of."""
@@ -408,6 +424,8 @@ class Packed(ManagerLast):
     def as_asked(self, asked: Asked) -> Packed:
         """The same with a pool of its own, in which rows have the values that a solve was asked for."""
         other = self.twin()
+        # Versions differ in more than values.
+        other.pool[layout.VERSION] = self.pool[layout.VERSION]
         for (_, at, unit), value in zip(self._sources, asked, strict=False):
             other.pool[at] = value / unit
         return other

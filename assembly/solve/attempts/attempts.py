@@ -156,7 +156,10 @@ def as_it_stands(packed: Packed, interruption: Interruption, settings: Array, st
 
 
 def with_listed(packed: Packed, interruption: Interruption, settings: Array, state: Array) -> Outcome:
-    """The same with the contacts of clearances listed, whatever the rows of these say."""
+    """The same with the contacts of clearances listed, whatever the rows of these say.
+
+    Where the settings ask for it, it ends where these find no place.
+    """
     settings = settings.copy()
     settings[ITERATIONS], settings[GATHER], settings[FEASIBILITY] = 0.0, NEVER, ANYTHING
     return _run(packed, interruption, packed.table.copy(), settings, state)
