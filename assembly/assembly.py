@@ -16,7 +16,7 @@ from assembly.constraints.model.contact import lone_surfaces
 from assembly.constraints.model.contents import Contents
 from assembly.constraints.packing.corners import corners_of
 from assembly.constraints.packing.earlier import is_earlier, taken_over
-from assembly.constraints.packing.scene import Packed, structure_of
+from assembly.constraints.packing.scene import MORE_PLACES, MOST_CROWDING, Packed, structure_of
 from assembly.constraints.packing.scene_size import check_reach, scene_size
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body, Frame, Point
@@ -49,8 +49,6 @@ __all__ = ["Assembly"]
 Array = NDArray[np.float64]
 _SETTINGS = CTRL_C.fill(Options().settings())
 _WARM_SETTINGS = CTRL_C.fill(Options().settings(warm=True))
-# How many times as many places as they ask for a solve gives to clearances.
-MORE_PLACES, MOST_CROWDING = 4, 16
 # How a solve may end where solids come to lie on each other, and corners are not listed.
 AT_KINKS = (Status.STALLED, Status.ITERATION_LIMIT, Status.INFEASIBLE, Status.CONTACT_LOST)
 
@@ -203,15 +201,34 @@ class Assembly(Contents):
     ) -> Solution:
         """A solve from this start and no other one."""
         settings = self._settings(options, interruption, isinstance(q0, Solution))
-        if isinstance(q0, Solution) or settings[ITERATIONS] == 0.0 or not self.packed().keeps_apart:
-            solution = self._solved(settings, q0, starts, interruption)
-        else:
-            from assembly.studies.first_solve import first_solve
-
-            solution = first_solve(self, self._given(q0), settings, starts, options, interruption)
+        solution = self._solved_or_standing(q0, settings, starts, options, interruption)
         if solution.status in AT_KINKS and not self._corners and settings[ITERATIONS] > 0.0:
             return self._at_corners(solution, partial(self._from_start, q0, starts, options, interruption))
         return solution
+
+    def _solved_or_standing(
+        self,
+        q0: ArrayLike | Solution | None,
+        settings: Array,
+        starts: Mapping[str, ArrayLike] | None,
+        options: dict[str, Any],
+        interruption: Interruption,
+    ) -> Solution:
+        """The same, without corners of contacts."""
+        if settings[ITERATIONS] == 0.0 or not self.packed().keeps_apart:
+            return self._solved(settings, q0, starts, interruption)
+        if not self._objectives and not (isinstance(q0, Solution) and q0._lists is None):
+            from assembly.studies.standing_start import standing_start
+
+            # Nothing asks to move: where all holds at the start, that is the solution.
+            solution = standing_start(self, q0, settings, starts, interruption)
+            if solution is not None:
+                return solution
+        if isinstance(q0, Solution):
+            return self._solved(settings, q0, starts, interruption)
+        from assembly.studies.first_solve import first_solve
+
+        return first_solve(self, self._given(q0), settings, starts, options, interruption)
 
     def _at_corners(self, ended: Solution, again: Callable[[], Solution]) -> Solution:
         """A solve that begins again with the corners of contacts of solids listed; where it fails, what ended before.
@@ -247,6 +264,9 @@ class Assembly(Contents):
         these start on a turn of their own.
         """
         spent = 0.0
+        if isinstance(q0, Solution):
+            # It may take more places, and another packed scene.
+            q0._list_contacts()
         while True:
             packed = self.packed()
             apart = None
@@ -283,8 +303,23 @@ class Assembly(Contents):
                 solution = Solution(self._scene, packed, state, status, spent, history, order, fit)
                 solution._touching = float(settings[ALLOWED_OVERLAP])
                 return self._proven(solution, settings, interruption) if packed.keeps_apart else solution
-            self._crowding *= MORE_PLACES
-            self._pack(packed)
+            self._pack_with_more_places()
+
+    def _pack_with_more_places(self) -> Packed:
+        """The scene packed again, with more places for contacts of clearances. What is proven of its pairs stays."""
+        before = self.packed()
+        self._crowding *= MORE_PLACES
+        packed = self._pack(before)
+        packed.origin, packed.proofs, packed.stood = before.origin, before.proofs, before.stood
+        return packed
+
+    def _packed_as(self, packed: Packed) -> Packed | None:
+        """The scene as it is packed now, if nothing but values and places are others than in an earlier one."""
+        mine = self._packed
+        is_same = (
+            mine is not None and mine.origin is packed.origin and mine.structure == structure_of(self._constraints)
+        )
+        return mine if is_same else None
 
     @staticmethod
     def _proven(solution: Solution, settings: Array, interruption: Interruption) -> Solution:
@@ -365,10 +400,10 @@ class Assembly(Contents):
 
     @staticmethod
     def _state_of(name: str, packed: Packed, solution: Solution) -> Array:
-        if solution._packed is packed:
-            return solution._state
-        if is_earlier(solution._packed, packed):
-            return taken_over(solution._packed, packed, solution._state)
+        if solution._ended.packed is packed:
+            return solution._ended.state
+        if is_earlier(solution._ended.packed, packed):
+            return taken_over(solution._ended.packed, packed, solution._ended.state)
         raise InputError(f"{name} is a solution of another assembly, or of this one before a change; expected its own")
 
     def _place_starts(self, packed: Packed, state: Array, starts: Mapping[str, ArrayLike]) -> None:
@@ -442,6 +477,8 @@ class Assembly(Contents):
 
         if not isinstance(drives, (bool, np.bool_)):
             raise InputError(f"drives is {drives!r}; expected True or False")
+        if isinstance(q, Solution):
+            q._list_contacts()
         packed = self.packed()
         assert self._scene is not None
         solved = isinstance(q, Solution)

@@ -31,7 +31,17 @@ from assembly.solve.samples import PosedBodies, sampled
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
 
-__all__ = ["PairAnswer", "can_prove", "lent_proof", "near_contacts", "new_proof", "opening_move", "prove_end"]
+__all__ = [
+    "TRIES",
+    "PairAnswer",
+    "can_prove",
+    "lent_proof",
+    "near_contacts",
+    "new_proof",
+    "opening_move",
+    "owned_pairs",
+    "prove_end",
+]
 
 Array = NDArray[np.float64]
 # Contacts that are open by less than so many times how far a body may be moved are in its way.
@@ -62,7 +72,7 @@ class PairAnswer:
     proved: bool
 
 
-def _owned(packed: Packed) -> list[tuple[Clearance, tuple[Body, Body], bool]]:
+def owned_pairs(packed: Packed) -> list[tuple[Clearance, tuple[Body, Body], bool]]:
     """Clearances and the pairs that they keep apart, in the order of a proof; and whether a contact is between the two.
 
     What is in the place of a contact is asked for no gap, but it may not cross.
@@ -78,7 +88,7 @@ def _owned(packed: Packed) -> list[tuple[Clearance, tuple[Body, Body], bool]]:
 def new_proof(packed: Packed, bodies: Sequence[Body]) -> ClearanceProof:
     """A proof of all pairs that the clearances of a packed scene keep apart."""
     number = {id(body): k for k, body in enumerate(bodies)}
-    owned = _owned(packed)
+    owned = owned_pairs(packed)
     rows = [(number[id(a)], number[id(b)]) for _, (a, b), _ in owned]
     minimum = [0.0 if touched else item.minimum for item, _, touched in owned]
     return ClearanceProof([side_faces(body) for body in bodies], rows, minimum)
@@ -104,7 +114,9 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
     packed, scene = solution._packed, solution._scene
     if not can_prove(packed):
         unknown = Answer(Verdict.UNDECIDED)
-        return [PairAnswer(item.name, (a.name, b.name), unknown, True, False) for item, (a, b), _ in _owned(packed)]
+        return [
+            PairAnswer(item.name, (a.name, b.name), unknown, True, False) for item, (a, b), _ in owned_pairs(packed)
+        ]
     touching = solution._touching * packed.scale
     with lent_proof(packed, scene.bodies) as proof:
         # What opened contacts at the last solve may do so here, if no more was called touching there.
@@ -122,7 +134,7 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
             slim = slim_answer(proof, k, solution.q, touching, (proof.faces[i], proof.faces[j]))
             if slim is not None:
                 answers[k], conforming[k] = slim, False
-    owned = _owned(packed)
+    owned = owned_pairs(packed)
     asked = [k for k, conform in enumerate(conforming) if conform]
     found_crossing = sampled(PosedBodies.of(solution), [owned[k][1] for k in asked], CTRL_C).crossing
     clear = {k for place, k in enumerate(asked) if place not in found_crossing}

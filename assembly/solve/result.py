@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +26,18 @@ if TYPE_CHECKING:
     from assembly.solve.second_order.leave import Fit
     from assembly.solve.way import Way
 
-__all__ = ["Iteration", "Result"]
+__all__ = ["Ended", "Iteration", "Result"]
 
 Array = NDArray[np.float64]
 # A constraint that is off by less than this part of the worst is not one of those that disagree.
 IDLE = 1e-3
+
+
+class Ended(NamedTuple):
+    """A packed scene, and the state of the loop that a solve of it ended with."""
+
+    packed: Packed
+    state: Array
 
 
 class Iteration(tuple[float, ...]):
@@ -55,8 +63,9 @@ class Result(ReadOnlyArrays):
         fit: Fit | None = None,
     ) -> None:
         self._scene = scene
-        self._packed = packed
-        self._state = state
+        self._ended = Ended(packed, state)
+        # Of a start that was returned as it is: what lists the contacts of clearances there.
+        self._lists: Callable[[Result], Ended] | None = None
         self._rows = history
         self.status = status
         self.seconds = seconds
@@ -72,12 +81,29 @@ class Result(ReadOnlyArrays):
         # What bodies may be in each other and still touch, in parts of the scene's size.
         self._touching = Options.touching
         # Flat contacts alone need it again, for the center of their pressure.
-        self._wishes = packed.pool[scene.wished(packed)] if scene.contacts else None
+        self._wishes = packed.rows_pool[scene.wished(packed)] if scene.contacts else None
+
+    def _list_contacts(self) -> None:
+        """List the contacts of clearances, unless they are: a start that holds is returned before any is looked for."""
+        if self._lists is not None:
+            self._ended = self._lists(self)
+            self._lists = None
+
+    @property
+    def _packed(self) -> Packed:
+        self._list_contacts()
+        return self._ended.packed
+
+    @property
+    def _state(self) -> Array:
+        self._list_contacts()
+        return self._ended.state
 
     @cached_property
     def q(self) -> Array:
         """Configuration, (n, 7)."""
-        return read_only(self._state[: self._packed.contacts_at].reshape(-1, 7).copy())
+        packed, state = self._ended
+        return read_only(state[: packed.contacts_at].reshape(-1, 7).copy())
 
     @property
     def proved(self) -> bool:
@@ -97,7 +123,8 @@ class Result(ReadOnlyArrays):
         return self._state[self._packed.residuals_at : self._packed.results_at]
 
     def _result(self, place: int) -> float:
-        return float(self._state[self._packed.results_at + place])
+        packed, state = self._ended
+        return float(state[packed.results_at + place])
 
     @property
     def iterations(self) -> int:
@@ -167,10 +194,8 @@ class Result(ReadOnlyArrays):
     @cached_property
     def values(self) -> dict[str, float]:
         """Every freedom of every joint, "joint.freedom": lengths in the user's unit, angles in radians."""
-        packed = self._packed
-        near = dict(
-            zip(map(id, packed._angles), self._state[packed.angles_at : packed.multipliers_at : TRACK], strict=True)
-        )
+        packed, state = self._ended
+        near = dict(zip(map(id, packed._angles), state[packed.angles_at : packed.multipliers_at : TRACK], strict=True))
         values = {}
         for joint in self._scene.constraints:
             for name, freedom in joint.freedoms.items() if isinstance(joint, Joint) else ():

@@ -58,7 +58,8 @@ class Scene:
     def wished(self, packed: Packed) -> NDArray[np.int64]:
         """Where the pool has what the objective asks for and may change between solves: targets and postures."""
         if self._wished is None:
-            records = packed.table[packed.table[TERM_TABLE] :][: TERM * packed.table[TERMS]].reshape(-1, TERM)
+            table = packed.rows_table
+            records = table[table[TERM_TABLE] :][: TERM * table[TERMS]].reshape(-1, TERM)
             sizes = {POINT_DISTANCE: 7, POSTURE: POSTURE_PARAMETERS}
             places = [np.arange(sizes.get(kind, 0)) + at for kind, _, at, *_ in records.tolist()]
             self._wished = np.concatenate([*places, np.empty(0, dtype=np.int64)]).astype(np.int64)

@@ -96,7 +96,7 @@ class Solution(Result):
         """Value of the objective, in the user's units."""
         value = self._result(OBJECTIVE)
         if np.isfinite(value) or not self._is_lost:
-            return value * self._packed.unit
+            return value * self._ended.packed.unit
         from assembly.solve.diagnosis.lost import goal
 
         return goal(self)[0]

@@ -78,11 +78,12 @@ def swept_solve(
 ) -> Solution:
     """See `Assembly.solve`."""
     begin = perf_counter()
-    packed = scene.packed()
     if starts is not None:
         raise InputError(f"starts is {starts!r} with swept=True; expected None, contacts go on from q0")
     if not isinstance(start, Solution):
         raise InputError(f"q0 is {type(start).__name__!r} with swept=True; expected a Solution, where the way begins")
+    start._list_contacts()
+    packed = scene.packed()
     scene._state_of("q0", packed, start)
     if not (start.success or start.way is not None):
         raise InputError(f"q0 is {start.status.name} with swept=True; expected a solution at which constraints hold")

@@ -5,6 +5,7 @@ time.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from assembly.constraints.packing.corners import Kept, SidePair, body_of
 from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.program import records as layout
 from assembly.errors import InputError
+from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.geometry.shapes.centerline import spine_of
 from assembly.kinematics.body import Body
@@ -28,8 +30,16 @@ from assembly.proximity.manager.centerlines.packing import pack_centerline
 from assembly.proximity.manager.extrema import GIVEN_RECORD
 from assembly.proximity.manager.parameters import LARGEST_MARGIN, LEAST_MARGIN
 
-__all__ = ["clearance_pairs", "is_of_surfaces", "pack_manager", "slot_count", "table_with_clearances"]
+__all__ = [
+    "WatchedPairs",
+    "clearance_pairs",
+    "is_of_surfaces",
+    "slot_count",
+    "table_with_clearances",
+    "with_manager",
+]
 
+Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 Pair = tuple[Body, Body]
 # A contact of the scene, its sides, and whether it is one of their whole surfaces, without edges.
@@ -75,20 +85,34 @@ def is_of_surfaces(pair: SidePair) -> bool:
     return all(is_one_smooth(side_faces(side)) for side in pair)
 
 
-def pack_manager(
-    writer: SceneWriter,
-    kept: Sequence[Kept],
-    pairs_of_kept: Sequence[Sequence[SidePair]],
-    places: Sequence[int],
-    contacts: Sequence[GivenContact],
-) -> int:
+class WatchedPairs(NamedTuple):
+    """What is kept apart, the pairs and the places of each, and the given contacts in the order of their rows."""
+
+    kept: Sequence[Kept]
+    pairs: Sequence[Sequence[SidePair]]
+    places: Sequence[int]
+    contacts: Sequence[GivenContact]
+
+
+def with_manager(arrays: tuple[Table, Array], writer: SceneWriter, watched: WatchedPairs) -> tuple[Table, Array]:
+    """Table and pool that a writer wrote, with a contact manager behind all else."""
+    begin = writer.table_at, writer.pool_at
+    manager = _pack_manager(writer, watched)
+    table, pool = writer.arrays()
+    table = np.concatenate([arrays[0], table[begin[0] :]])
+    table[layout.MANAGER_RECORD] = manager
+    return table, np.concatenate([arrays[1], pool[begin[1] :]])
+
+
+def _pack_manager(writer: SceneWriter, watched: WatchedPairs) -> int:
     """Pack the contact manager of what is kept apart, of which each has pairs and places; where its record begins.
 
-    `contacts` are the given ones, in the order of their rows; the first place is behind them.
+    The first place is behind the given contacts.
     """
-    pairs = _PairPacking(writer, [pair for own in pairs_of_kept for pair in own], contacts)
+    kept, contacts = watched.kept, watched.contacts
+    pairs = _PairPacking(writer, [pair for own in watched.pairs for pair in own], contacts)
     first = 0
-    for item, own, count in zip(kept, pairs_of_kept, places, strict=True):
+    for item, own, count in zip(kept, watched.pairs, watched.places, strict=True):
         for pair in own:
             pairs.add(pair, item.minimum, [first, first + count])
         first += count
@@ -143,7 +167,7 @@ class _PairPacking:
         # smallest radius of curvature and how far its facets are off; bodies of a shape share it.
         self._trees: dict[tuple[Face, ...], tuple[int, float, float, float, float]] = {}
         for faces in dict.fromkeys(side_faces(side) for pair in pairs for side in pair):
-            tree = FacetTree.of(faces)
+            tree = FacetTree.of(first_equal(faces))
             table, pool, at = pack_tree(tree, writer.scale, writer.table_at, writer.pool_at)
             writer.add(table, pool)
             seams = SEAMS * tree.topology.tolerance if tree.topology.edges else 0.0

@@ -25,6 +25,8 @@ from assembly.constraints.packing import manager as manager_packing
 from assembly.constraints.packing.asked import Asked
 from assembly.constraints.packing.corners import ContactCorners, Kept, SidePair, corners_of
 from assembly.constraints.packing.elimination_order import FEW, block_record
+from assembly.constraints.packing.manager import WatchedPairs
+from assembly.constraints.packing.manager_last import ManagerLast
 from assembly.constraints.packing.numbering import number_bodies
 from assembly.constraints.packing.revolutions import Turns
 from assembly.constraints.packing.rows import RowPacking
@@ -46,7 +48,7 @@ from assembly.proximity.manager.parameters import LARGEST_MARGIN
 if TYPE_CHECKING:
     from assembly.proximity.clearance.proof import ClearanceProof
 
-__all__ = ["Packed", "structure_of"]
+__all__ = ["MORE_PLACES", "MOST_CROWDING", "Packed", "structure_of"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -55,11 +57,15 @@ LEAST_UNIT = 1e-305
 # A size that rests on values alone is another one where they have grown or shrunk by this factor.
 OUTGROWN = 1e4
 
+# Bytes of a state, what touching is, and what was proven there.
+Stood = tuple[bytes, float, list[Any]]
+# How many times as many places as they ask for a solve gives to clearances.
+MORE_PLACES, MOST_CROWDING = 4, 16
 # Numbers of pools that are not as they were packed (0).
 _versions = itertools.count(1)
 
 
-class Packed:
+class Packed(ManagerLast):
     """A packed scene: arrays for the loop, and what is needed to refresh them between solves.
 
     Parameters
@@ -76,6 +82,10 @@ class Packed:
     ----------
     table, pool : arrays
         See `constraints/program/records.py`. Lengths in the pool are divided by `scale`.
+    crowding : int
+        How many times as many places as they ask for clearances have.
+    origin : object
+        The same of a scene that is packed again with more places, and of no other one.
     scale : float
         The scene's size (`scene_size`), 1 where it has none.
     kept_at, kept_size : int
@@ -84,6 +94,8 @@ class Packed:
         What solves that are over worked in, for the next ones (`solve/attempts/attempts.py`).
     proofs : list of ClearanceProof
         Of the pairs that clearances keep apart, of solves that have ended.
+    stood : (bytes, float, list) or None
+        Poses, with pairs of contacts, that were proven to hold as they stand; what touching was; what was proven.
     asked : Asked
         What the last solve was asked for.
     has_size : bool
@@ -163,6 +175,7 @@ class Packed:
             for item, pairs in zip(self.kept, self.pairs_of_kept, strict=True)
         ]
         self.clearance_rows = sum(self.places)
+        self.origin, self.crowding = object(), places
         self._write(bodies, constraints, objectives)
         self._take_addresses()
         # Where the parts of a state begin: tracked values, multipliers, residuals, results.
@@ -179,11 +192,12 @@ class Packed:
         self.asked: Asked = []
         self.workspaces: list[tuple[Array, Array, Table]] = []
         self.proofs: list[ClearanceProof] = []
+        self.stood: Stood | None = None
         self.kept_at = self.memory_at + self._memory.size
-        self.table[layout.KEPT] = self.kept_at
-        self.kept_size = int(kept_size(self.table))
+        self.rows_table[layout.KEPT] = self.kept_at
+        self.kept_size = int(kept_size(self.rows_table))
         # Without a factor, to copy what a solution keeps takes longer than to evaluate it anew.
-        self._state_size = self.kept_at + (self.kept_size if kept_unknowns(self.table) > 0 else 0)
+        self._state_size = self.kept_at + (self.kept_size if kept_unknowns(self.rows_table) > 0 else 0)
 
     def _write(
         self, bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
@@ -216,7 +230,7 @@ class Packed:
             groups += [writer.places_of(term.bodies) for _, term in goals if isinstance(term, Expression)]
             record = block_record(int(header[layout.MOVING]), [unknown_blocks[group].tolist() for group in groups])
             header[layout.BLOCK_RECORD], header[layout.BLOCK_LENGTH] = writer.add(record)[0], record.size
-        self.table, self.pool = writer.arrays()
+        self.rows_table, self.rows_pool = writer.arrays()
         # What the loop is compiled for: None without a dexterity.
         self.end_effectors = 1 if header[layout.DEXTERITIES] else None
         self.tracked = self.pair_rows + len(writer.angles)
@@ -230,6 +244,10 @@ class Packed:
             [(self._frames[item.frames], item.kind, item.component) for item in told], dtype=np.int64
         ).reshape(-1, 3)
         self._standing_units = np.array([1.0 if item.is_angle else self.scale for item in told])
+        if self.clearance_rows:
+            given = list(zip(self.contacts, self.sides, self.whole, strict=True))
+            watched = WatchedPairs(self.kept, self.pairs_of_kept, self.places, given)
+            self._unwritten = writer, watched
 
     def _pool_header(self) -> Array:
         pool = np.zeros(layout.POOL_HEADER)
@@ -246,11 +264,6 @@ class Packed:
         rows.add_contacts(self.contacts, self.sides, self.whole)
         rows.add_clearance_rows([*self.clearances, *(item.contact for item in self.corners)], self.places)
         writer.header[layout.MANAGER_RECORD] = -1
-        if self.clearance_rows:
-            given = list(zip(self.contacts, self.sides, self.whole, strict=True))
-            writer.header[layout.MANAGER_RECORD] = manager_packing.pack_manager(
-                writer, self.kept, self.pairs_of_kept, self.places, given
-            )
         rows.add_trims(self.contacts)
         rows.add_joints(unknown_blocks)
         rows.add_expressions()
@@ -291,6 +304,18 @@ class Packed:
         state[self.memory_at : self.kept_at] = self._memory
         return state
 
+    def has_rows_of(self, other: Packed) -> bool:
+        """Whether another scene has the same rows, but for those of clearances."""
+        kinds = [
+            np.column_stack([packed.owners, packed.one_sided, packed.lengths, packed.drives, packed.pairs >= 0])
+            for packed in (self, other)
+        ]
+        one, two = (
+            np.delete(kind, np.arange(packed.clearance_rows) + len(packed.contacts), axis=0)
+            for kind, packed in zip(kinds, (self, other), strict=True)
+        )
+        return len(self.contacts) == len(other.contacts) and np.array_equal(one, two)
+
     def pair_name(self, k: int) -> str:
         """The name of the contact, or the clearance, that row k is of."""
         names = [contact.name for contact in self.contacts]
@@ -325,20 +350,21 @@ class Packed:
 
     def _take_addresses(self) -> None:
         """Where the kernels are that only contacts, trims, clearances, expressions or many bodies ask for."""
-        table = self.table
+        table = self.rows_table
+        watched = table[layout.MANAGER_RECORD] >= 0
         table[layout.CLOCK_AT] = clock_address()
         if table[layout.BLOCK_RECORD]:
             record = table[table[layout.BLOCK_RECORD] :]
             record[[FACTORIZE_AT, SOLVE_AT]] = addresses.blocks()
         if self.pair_rows:
             table[layout.CONTACT_ROWS_AT] = addresses.contacts()
-        if any(self.whole) or any(manager_packing.is_of_surfaces(pair) for pair in self.kept_pairs):
+        if any(self.whole) or (watched and any(map(manager_packing.is_of_surfaces, self.kept_pairs))):
             table[layout.START_AT : layout.EXTREMAL_AT + 1] = addresses.surfaces()
         if self.shells:
             table[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
         if self.trims:
             table[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
-        if self.clearance_rows:
+        if watched:
             table[[layout.UPDATE_AT, layout.STAYED_AT, layout.PARTS_AT, layout.WENT_AT]] = addresses.manager()
             manager = manager_records.manager_at(table, table[layout.MANAGER_RECORD])
             manager.track_solids = table[layout.TRACK_AT]
@@ -347,13 +373,15 @@ class Packed:
             table[layout.RUN_TAPE_AT] = addresses.tapes()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "workspaces": [], "proofs": []}
+        # In copies it is in the same place.
+        self._write_manager()
+        return {**self.__dict__, "workspaces": [], "proofs": [], "stood": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # Addresses are those of one process; a copy, or what another process wrote, takes its own.
         self.__dict__.update(state)
-        self.table = self.table.copy()
-        self.table[layout.DEEPEST_AT] = 0
+        self.rows_table = self.rows_table.copy()
+        self.rows_table[layout.DEEPEST_AT] = 0
         self._take_addresses()
 
     def seek_penetration(self) -> bool:
@@ -361,15 +389,15 @@ class Packed:
 
         The kernel for it is large, and few scenes need it.
         """
-        if not self.shells or self.table[layout.DEEPEST_AT]:
+        if not self.shells or self.rows_table[layout.DEEPEST_AT]:
             return False
-        self.table[layout.DEEPEST_AT] = addresses.deepest()
+        self.rows_table[layout.DEEPEST_AT] = addresses.deepest()
         return True
 
     @property
     def is_implicit(self) -> bool:
         """Whether nobody asked for the objective, which is the least move then."""
-        return bool(self.table[layout.IMPLICIT] == 1)
+        return bool(self.rows_table[layout.IMPLICIT] == 1)
 
     def start_angles(self, state: Array, warm: bool) -> None:
         """Write the turns that angles start on at the poses of a state into it."""
@@ -377,7 +405,7 @@ class Packed:
             return
         near = state[self.angles_at : self.multipliers_at : TRACK]
         if warm and not self._turned.coupled:
-            self._turned.follow_drives(self.pool, near)
+            self._turned.follow_drives(self.rows_pool, near)
             return
 
         def measure() -> Array:
@@ -386,16 +414,18 @@ class Packed:
                 q = state[: self.contacts_at].reshape(-1, 7)
                 scaled = q.copy()
                 scaled[:, :3] = (q[:, :3] - self.reference) / self.scale
-                coordinates_at(self.table, self.pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values)
+                coordinates_at(
+                    self.rows_table, self.rows_pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values
+                )
             values *= self._standing_units
             return values
 
-        self._turned.start(self.pool, near, warm, measure)
+        self._turned.start(self.rows_pool, near, warm, measure)
 
     def twin(self) -> Packed:
         """The same with a pool of its own, of which anything may be changed."""
         other = copy(self)
-        other.pool = self.pool.copy()
+        other.rows_pool = self.rows_pool.copy()
         other.pool[layout.VERSION] = float(next(_versions))
         # Solves of the one and of the other work in the same memory, one after another.
         other.workspaces, other.proofs = self.workspaces, self.proofs
@@ -404,6 +434,8 @@ class Packed:
     def as_asked(self, asked: Asked) -> Packed:
         """The same with a pool of its own, in which rows have the values that a solve was asked for."""
         other = self.twin()
+        # Versions differ in more than values.
+        other.pool[layout.VERSION] = self.pool[layout.VERSION]
         for (_, at, unit), value in zip(self._sources, asked, strict=False):
             other.pool[at] = value / unit
         return other
@@ -426,7 +458,7 @@ class Packed:
 
     def refresh(self) -> None:
         """Write what may have changed since the last solve: values and targets."""
-        pool, scale, far = self.pool, self.scale, FARTHEST * self.scale
+        pool, scale, far = self.rows_pool, self.scale, FARTHEST * self.scale
         x, y, z = self._reference
         asked: Asked = []
         self.asked = asked

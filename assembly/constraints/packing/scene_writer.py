@@ -14,6 +14,7 @@ from assembly.constraints.model.expression import Expression
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.primitives import AZIMUTH, TURN
 from assembly.geometry.expression import tape
+from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import OFFSETS, SURFACE_RECORD
 from assembly.kinematics.body import Body
@@ -81,6 +82,7 @@ class SceneWriter(Writer):
 
     def shell(self, faces: tuple[Face, ...]) -> int:
         """Offset of the shell of a solid."""
+        faces = first_equal(faces)
         if faces not in self.shells:
             table, pool, shell = pack_shell(solid_of(faces), self.scale, self.table_at, self.pool_at)
             self.add(table, pool)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from assembly._record import rows_of
 from assembly.errors import InputError
+from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import spline_curve_at, surface_at
 from assembly.proximity.brep.solid import solid_of
@@ -89,9 +90,13 @@ class BodyCells:
         return root
 
 
-@lru_cache(maxsize=128)
 def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
-    """The tree of a body's faces."""
+    """The tree of a body's faces; equal shapes share one."""
+    return _made_of(first_equal(faces))
+
+
+@lru_cache(maxsize=128)
+def _made_of(faces: tuple[Face, ...]) -> BodyCells:
     topology = solid_of(faces)
     boxes = np.array([face.surface.bounding_box() for face in topology.faces])
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)

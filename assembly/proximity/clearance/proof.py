@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import rows_of
+from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Answer, Verdict
@@ -66,7 +67,7 @@ class ClearanceProof:
         minimum: Sequence[float],
     ) -> None:
         self.pairs = list(pairs)
-        self.faces = list(shapes)
+        self.faces = shapes = [first_equal(faces) for faces in shapes]
         used = sorted({body for pair in pairs for body in pair})
         self._number = {body: k for k, body in enumerate(used)}
         self.forest = PackedForest([shapes[body] for body in used])
@@ -180,6 +181,18 @@ class ClearanceProof:
             # What is in the front already stays there.
             kept = np.where(waiting == BEGUN_ANEW, AT_POSE, waiting)
             waiting = np.where(short, kept, PASSED_BY)
+
+    def near_pairs(self, q: Array, distance: float) -> list[int]:
+        """The pairs whose balls around all of a body are no farther apart than a distance over their least gaps."""
+        a, b = np.array(self.pairs, dtype=np.int64).reshape(-1, 2).T
+        roots = {body: self.forest.cells[k].root for body, k in self._number.items()}
+        middle, radius = np.zeros((len(q), 3)), np.zeros(len(q))
+        for body, root in roots.items():
+            middle[body] = rotation_matrix(q[body, 3:]) @ root.center + q[body, :3]
+            radius[body] = root.radius
+        apart = np.linalg.norm(middle[b] - middle[a], axis=1) - radius[a] - radius[b]
+        found: list[int] = np.flatnonzero(apart <= self.minimum + distance).tolist()
+        return found
 
     def cells_of(self, k: int) -> BodyCells:
         """The tree of the second body of pair k."""

@@ -123,20 +123,64 @@ def _in_bore(outer: Recognized, inner: Recognized, pose: tuple[Array, Array], to
 
 
 def _flush(proof: ClearanceProof, k: int, q: Array, touching: float) -> tuple[Array, Array]:
-    """Where flat faces of pair k lie on each other: normals of those of the first body, in its axes, and the gaps."""
+    """Where flat faces of pair k lie on each other: normals of those of the first body, in its axes, and the gaps.
+
+    So do those that are apart by the least gap, over which gaps are counted.
+    """
+    least = float(proof.minimum[k])
     a, b = map(recognized, proof.cells_of_both(k))
     turn, shift = proof.relative(k, q)
     opposed = np.linalg.norm(a.normals[:, None] + b.normals @ turn.T, axis=2) * proof.size(k) <= touching
     i, j = np.nonzero(opposed)
-    gaps = ((b.points[j] @ turn.T + shift - a.points[i]) * a.normals[i]).sum(axis=1)
+    gaps = ((b.points[j] @ turn.T + shift - a.points[i]) * a.normals[i]).sum(axis=1) - least
     found = [
         row
         for row in np.flatnonzero(np.abs(gaps) <= touching).tolist()
         if _are_beside(
-            (a.centers[i[row]], a.radii[i[row]]), (b.centers[j[row]] @ turn.T + shift, b.radii[j[row]]), touching
+            (a.centers[i[row]], a.radii[i[row]]),
+            (b.centers[j[row]] @ turn.T + shift, b.radii[j[row]]),
+            least + touching,
         )
     ]
     return a.normals[i[found]], gaps[found]
+
+
+def _tangent(proof: ClearanceProof, k: int, q: Array, touching: float) -> tuple[Array, Array]:
+    """Where a cylinder that lies on a flat face of pair k, or a ball, touches it: as `_flush` has it."""
+    a, b = map(recognized, proof.cells_of_both(k))
+    turn, shift = proof.relative(k, q)
+    least = float(proof.minimum[k])
+    on_a = _on_flat_faces(a, (b.ends @ turn.T + shift, b.round_radii), (least, touching))
+    # Seen from the second body: its faces have the normals from it to the first.
+    on_b = _on_flat_faces(b, ((a.ends - shift) @ turn, a.round_radii), (least, touching))
+    return np.concatenate([on_a[0], -on_b[0] @ turn.T]), np.concatenate([on_a[1], on_b[1]])
+
+
+def _on_flat_faces(flat: Recognized, rounds: tuple[Array, Array], lengths: tuple[float, float]) -> tuple[Array, Array]:
+    """Normals of flat faces on which rounds, of these ends and radii, lie but for a least gap; gaps over that."""
+    ends, radii = rounds
+    least, touching = lengths
+    heights = ((ends[None] - flat.points[:, None, None]) * flat.normals[:, None, None]).sum(axis=3)
+    gaps = heights - radii[:, None] - least
+    i, j = np.nonzero(np.abs(gaps).max(axis=2) <= touching)
+    found = [
+        row
+        for row in range(len(i))
+        if _are_beside(
+            (flat.centers[i[row]], flat.radii[i[row]]),
+            _balls_along(ends[j[row]], float(radii[j[row]])),
+            least + touching,
+        )
+    ]
+    return flat.normals[i[found]], gaps[i[found], j[found]].min(axis=1)
+
+
+def _balls_along(ends: Array, radius: float) -> tuple[Array, Array]:
+    """Centers and radii of balls that hold all of a cylinder between the ends of its axis, or of a ball."""
+    length = float(np.linalg.norm(ends[1] - ends[0]))
+    count = 1 + int(length / (2.0 * radius))
+    middles = ends[0] + (np.arange(count) + 0.5)[:, None] / count * (ends[1] - ends[0])
+    return middles, np.full(count, np.hypot(radius, 0.5 * length / count))
 
 
 def _are_beside(a: tuple[Array, Array], b: tuple[Array, Array], touching: float) -> bool:
@@ -158,10 +202,11 @@ def off_contacts(
     q : (n, 7)
     touching : float
     known : callable
-        Of bodies that have no flat faces which lie on each other, what gives the normal (3,) from the first body to the
+        Of bodies that are not recognized to lie on flat faces, what gives the normal (3,) from the first body to the
         second where they touch, in the world, or None.
     """
-    normals, gaps = _flush(proof, k, q, touching)
+    flush, tangent = _flush(proof, k, q, touching), _tangent(proof, k, q, touching)
+    normals, gaps = (np.concatenate(both) for both in zip(flush, tangent, strict=True))
     if len(normals):
         normals = normals @ rotation_matrix(q[proof.pairs[k][0], 3:]).T
     else:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.packing.scene import Packed
-from assembly.constraints.program.records import DEEPEST_AT
+from assembly.constraints.program.records import DEEPEST_AT, MANAGER_RECORD
 from assembly.solve.attempts.assembled import run_gathered
 from assembly.solve.attempts.balance import balanced
 from assembly.solve.attempts.corners import corners_first
@@ -19,12 +19,16 @@ from assembly.solve.interruption import Interruption
 from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.settings import (
     ALLOWED_OVERLAP,
+    ANY_POSE,
     CONTACT_LOST,
     COUNT,
+    FEASIBILITY,
     FIT,
     GATHER,
     HISTORY,
+    ITERATIONS,
     LIFT_TRIMS,
+    NEVER,
     OBJECTIVE,
     PENALTY,
     PENALTY_FLOOR,
@@ -38,12 +42,14 @@ from assembly.solve.loop.workspace import workspace_needed
 from assembly.solve.options import Options
 from assembly.solve.second_order.leave import Fit, Outcome, leave_saddles
 
-__all__ = ["attempt", "begin", "go_on_once", "load", "new_workspace"]
+__all__ = ["as_it_stands", "attempt", "begin", "go_on_once", "load", "new_workspace", "with_listed"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 # Rows of history that are kept, beside the first.
 MOST_HISTORY = 1000
+# A violation that no scene has.
+ANYTHING = 1e6
 _LOADING = Options(max_iterations=0).settings()
 _loaded: set[int | None] = set()
 
@@ -53,15 +59,15 @@ def new_workspace(packed: Packed) -> tuple[Array, Array, Table]:
 
     Zeros, because a solve leaves whole records in its state, also what their kind has no use for.
     """
-    doubles, integers = workspace_needed(packed.table)
+    doubles, integers = workspace_needed(packed.rows_table)
     return np.zeros((MOST_HISTORY + 1, HISTORY)), np.zeros(int(doubles)), np.zeros(int(integers), dtype=np.int64)
 
 
 def load(packed: Packed, start: Callable[[], Array]) -> None:
     """Have the loop for such a scene in this process: loading it, or compiling it, is no part of a solve's time."""
     if packed.end_effectors not in _loaded:
-        table, workspace = packed.table.copy(), new_workspace(packed)
-        solve_program(table, packed.pool, _LOADING, start(), *workspace, packed.end_effectors)
+        table, workspace = packed.without_manager(), new_workspace(packed)
+        solve_program(table, packed.rows_pool, _LOADING, start(), *workspace, packed.end_effectors)
         _loaded.add(packed.end_effectors)
 
 
@@ -164,6 +170,23 @@ def _holds(outcome: Outcome) -> bool:
     return outcome.code in (SOLVED, UNSURE)
 
 
+def as_it_stands(packed: Packed, interruption: Interruption, settings: Array, state: Array) -> Outcome:
+    """The outcome of the loop where nothing is moved, nor any contact of a clearance looked for."""
+    settings = settings.copy()
+    settings[ITERATIONS], settings[GATHER], settings[PLACES], settings[ANY_POSE] = 0.0, NEVER, 0.0, 0.0
+    return _run(packed, interruption, packed.without_manager(), settings, state)
+
+
+def with_listed(packed: Packed, interruption: Interruption, settings: Array, state: Array) -> Outcome:
+    """The same with the contacts of clearances listed, whatever the rows of these say.
+
+    Where the settings ask for it, it ends where these find no place.
+    """
+    settings = settings.copy()
+    settings[ITERATIONS], settings[GATHER], settings[FEASIBILITY] = 0.0, NEVER, ANYTHING
+    return _run(packed, interruption, packed.table.copy(), settings, state)
+
+
 def _run(packed: Packed, interruption: Interruption, table: Table, settings: Array, state: Array) -> Outcome:
     if interruption.callback is not None:
         state[packed.results_at + OBJECTIVE], state[packed.results_at + VIOLATION] = np.nan, np.inf
@@ -172,7 +195,8 @@ def _run(packed: Packed, interruption: Interruption, table: Table, settings: Arr
     spare = packed.workspaces
     workspace = spare.pop() if spare else new_workspace(packed)
     try:
-        code = solve_program(table, packed.pool, settings, state, *workspace, packed.end_effectors)
+        pool = packed.pool if table[MANAGER_RECORD] >= 0 else packed.rows_pool
+        code = solve_program(table, pool, settings, state, *workspace, packed.end_effectors)
         # A solution keeps the rows that there are: memory that nobody wrote to yet is slow to come by.
         history = workspace[0][: int(state[packed.results_at + COUNT]) + 1].copy()
     finally:

@@ -6,8 +6,8 @@ contacts themselves alone. From where that ends it goes on with them: where bodi
 there already, and where they are not, min g_i = 0 draws them to each other.
 
 A contact's row is then held at the corner that is nearest, g_k = 0, and does not switch from corner to corner while
-bodies slide on each other. With all others one-sided that is min g_i = 0 as long as corner k pushes. Where it would have
-to pull, another one might open less, and the row is that of the nearest features, whichever these are.
+bodies slide on each other. With all others one-sided that is min g_i = 0 as long as corner k pushes. Where it would
+have to pull, another one might open less, and the row is that of the nearest features, whichever these are.
 """
 
 from __future__ import annotations

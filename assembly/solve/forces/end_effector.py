@@ -161,6 +161,8 @@ def _evaluated(scene: Assembly, objective: Dexterity, q: ArrayLike | Solution | 
             if not any(other is body for other in scene.bodies):
                 known = ", ".join(repr(other.name) for other in scene.bodies)
                 raise InputError(f"{what} is on body {body.name!r}; expected bodies of this assembly: {known}")
+    if isinstance(q, Result):
+        q._list_contacts()
     packed = scene.packed()
     state = _state(scene, packed, q)
     table, pool, term = _with_term(packed, objective)

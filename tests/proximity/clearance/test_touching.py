@@ -14,7 +14,7 @@ import assembly as asm
 from assembly.proximity.clearance.answers import Contacts, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.proximity.clearance.touching import left_open, move_apart
+from assembly.proximity.clearance.touching import left_open, move_apart, off_contacts
 from tests.proximity.clearance.scenes import at, direction, faces_of, poses, proof_of
 
 TOUCHING = 1e-9
@@ -211,3 +211,49 @@ def test_cells_that_no_front_has_are_forgotten():
     crossing[1, 0] = 0.7
     fresh = ClearanceProof([box, ball, ball], [(0, 1), (1, 2), (2, 0)], [0.0] * 3).look(crossing, 0.0)
     assert [a.verdict for a in proof.look(crossing, 0.0)] == [a.verdict for a in fresh]
+
+
+def nothing_known():
+    return None
+
+
+# Shapes with flat faces on which what is round lies: the second shape, and where it is over the top, z = 0.25.
+ON_TOP = {
+    "a ball": (asm.shapes.sphere(0.4), lambda x, y, gap: at(x, y, 0.65 + gap)),
+    "a cylinder": (
+        asm.shapes.solid_cylinder(0.2, 1.4),
+        lambda x, y, gap: at(x, y, 0.45 + gap, Rotation.from_rotvec([0.0, 0.5 * np.pi, 0.0])),
+    ),
+    "a box": (asm.shapes.box(0.5, 0.4, 0.6), lambda x, y, gap: at(x, y, 0.55 + gap)),
+}
+
+
+@pytest.mark.parametrize("name", ON_TOP)
+@pytest.mark.parametrize("gap", [0.0, 0.2])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_what_is_recognized_to_lie_on_a_flat_face_is_opened(name, gap, swapped):
+    """Anywhere on the top of a block, both turned any way: by less than what touching is, over a least gap."""
+    rng = np.random.default_rng(3)
+    part, place = ON_TOP[name]
+    for _ in range(4):
+        turn = Rotation.from_rotvec(rng.normal(size=3))
+        row = place(*rng.uniform(-0.8, 0.8, 2), gap)
+        there = np.r_[
+            turn.apply(row[:3]), (turn * Rotation.from_quat(row[3:], scalar_first=True)).as_quat(scalar_first=True)
+        ]
+        block = at(0.0, 0.0, 0.0, turn)
+        shapes = (asm.shapes.box(3.0, 3.0, 0.5), part)
+        proof = proof_of(*(shapes[::-1] if swapped else shapes), minimum=gap)
+        q = poses(block, there) if swapped else poses(there, block)
+        move = off_contacts(proof, 0, q, TOUCHING, nothing_known)
+        assert 0.0 < proof.move_length(0, q, move) <= TOUCHING
+        (answer,) = proof.look(q, TOUCHING, move[None])
+        assert answer.verdict is Verdict.TOUCHING
+
+
+@pytest.mark.parametrize("name", ON_TOP)
+@pytest.mark.parametrize("place", [(6.0, 0.0, 0.0), (0.0, 0.3, 1e-6), (0.0, 0.3, -1e-6)])
+def test_what_is_beside_a_face_or_off_its_plane_does_not_lie_on_it(name, place):
+    part, over = ON_TOP[name]
+    proof = proof_of(asm.shapes.box(3.0, 3.0, 0.5), part)
+    assert not off_contacts(proof, 0, poses(over(*place)), TOUCHING, nothing_known).any()

@@ -1,0 +1,136 @@
+"""Proof that bodies are clear, or only touch, where a solve begins: no contact is known there, and none is looked for.
+
+What opens faces that touch is told by what is recognized of them: flat faces that lie on each other, a body that fills
+a bore; else by what a look leaves open. Where all that tells nothing, contacts of the loop may (`clearance_proof.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.packing.scene import Packed
+from assembly.kinematics.body import Body
+from assembly.proximity.clearance.answers import Answer, Verdict, is_proven
+from assembly.proximity.clearance.conforming import conforms
+from assembly.proximity.clearance.proof import ClearanceProof
+from assembly.proximity.clearance.slimming import slim_answer
+from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.solve.clearance_proof import TRIES, PairAnswer, lent_proof, owned_pairs
+from assembly.solve.interruption import CTRL_C
+from assembly.solve.samples import PosedBodies, sampled
+
+__all__ = ["is_for_proofs", "prove_start"]
+
+Array = NDArray[np.float64]
+# Verdicts at which a start does not hold.
+CROSSED = (Verdict.CROSSING, Verdict.ENCLOSED)
+
+
+def is_for_proofs(packed: Packed) -> bool:
+    """Whether proofs alone tell that clearances hold: beside a contact a least gap is kept by rows."""
+    return not any(touched and item.minimum > 0.0 for item, _, touched in owned_pairs(packed))
+
+
+def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: float) -> list[PairAnswer] | None:
+    """What is proven of all pairs that clearances keep apart; None where that is not all that is to hold.
+
+    The same poses once more are looked at no more.
+
+    Parameters
+    ----------
+    packed : Packed
+    bodies : sequence of Body
+    state : array
+        Poses, and pairs of the given contacts.
+    touching : float
+        What bodies may be in each other and still touch, in parts of the scene's size.
+    """
+    q = state[: packed.contacts_at].reshape(-1, 7)
+    asked = state[: packed.contacts_at + TRACK * len(packed.contacts)].tobytes()
+    if packed.stood is not None and packed.stood[:2] == (asked, touching):
+        return packed.stood[2]
+    with lent_proof(packed, bodies) as proof:
+        answers, conforming = _answers(proof, q, touching * packed.scale)
+    if answers is None:
+        return None
+    owned = owned_pairs(packed)
+    if conforming:
+        given = state[packed.contacts_at :][: TRACK * len(packed.contacts)].reshape(-1, TRACK)
+        posed = PosedBodies(bodies, q, touching, packed.contacts, given)
+        if sampled(posed, [owned[k][1] for k in conforming], CTRL_C).crossing:
+            return None
+    found = [
+        PairAnswer(item.name, (a.name, b.name), answer, True, is_proven(answer))
+        for (item, (a, b), _), answer in zip(owned, answers, strict=True)
+    ]
+    packed.stood = asked, touching, found
+    return found
+
+
+def _answers(proof: ClearanceProof, q: Array, touching: float) -> tuple[list[Answer] | None, list[int]]:
+    """What is proven of all pairs, and those which samples are to tell of; None where any crosses, or may."""
+    moves, conforming = _opening(proof, q, touching)
+    asked = [k for k in range(len(proof.pairs)) if k not in conforming]
+    answers = [Answer(Verdict.UNDECIDED)] * len(proof.pairs)
+    for k, answer in zip(asked, proof.look(q, touching, moves, which=asked), strict=True):
+        answers[k] = answer
+    if any(answer.verdict in CROSSED for answer in answers):
+        return None, []
+    for k in asked:
+        if not is_proven(answers[k]):
+            answers[k] = _off_what_is_open(proof, k, q, moves, touching)
+        proof.moves[k] = moves[k] if is_proven(answers[k]) else 0.0
+    left = []
+    for k, answer in enumerate(answers):
+        if is_proven(answer):
+            continue
+        # Of bodies that lie on each other without play a least gap is none.
+        if proof.minimum[k] > 0.0 or not conforms(proof, k, q, touching):
+            return None, []
+        i, j = proof.pairs[k]
+        slim = slim_answer(proof, k, q, touching, (proof.faces[i], proof.faces[j]))
+        if slim is None:
+            left.append(k)
+        else:
+            answers[k] = slim
+    return answers, left
+
+
+def _opening(proof: ClearanceProof, q: Array, touching: float) -> tuple[Array, set[int]]:
+    """Of every pair a move (6) that opens it where flat faces touch, and the pairs that none opens.
+
+    What opened contacts before may do so here.
+    """
+    moves, hopeless = proof.moves.copy(), set()
+    for k in proof.near_pairs(q, touching):
+        if moves[k].any():
+            continue
+        off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, _unknown)
+        if off is None:
+            hopeless.add(k)
+        else:
+            moves[k] = off
+    return moves, hopeless
+
+
+def _unknown() -> None:
+    """Nothing is known of where bodies touch."""
+    return None
+
+
+def _off_what_is_open(proof: ClearanceProof, k: int, q: Array, moves: Array, touching: float) -> Answer:
+    """What is proven of a pair that is moved off what is recognized to touch here, or off what looks leave open."""
+    off = off_contacts(proof, k, q, touching, _unknown)
+    moves[k] = 0.0 if off is None else off
+    (answer,) = proof.look(q, touching, moves, which=[k])
+    for _ in range(TRIES):
+        move = left_open(proof, k, q, touching) if answer.verdict is Verdict.UNDECIDED else None
+        if move is None:
+            break
+        moves[k] = move
+        (answer,) = proof.look(q, touching, moves, which=[k])
+    return answer
