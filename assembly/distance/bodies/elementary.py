@@ -11,7 +11,7 @@ from assembly.distance.bodies.spines import CYLINDER, PLANE, SPHERE, TORUS
 from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.curves import Circle, Line, curve_form
 from assembly.geometry.recognition.elementary import elementary_form
-from assembly.geometry.recognition.forms import Cylinder, Form, Plane, Sphere, Torus
+from assembly.geometry.recognition.forms import Cylinder, Form, Freeform, Plane, Sphere, Torus
 from assembly.geometry.splines.bezier_pieces import UNIT
 
 __all__ = ["spine_row"]
@@ -31,15 +31,18 @@ def spine_row(block: PatchBlock, face: Face, center: Array) -> Array | None:
     center : (3,)
         What was subtracted from its points.
     """
+    surface_form = elementary_form(face.surface) if block.curve == NONE else None
+    if isinstance(surface_form, Freeform):
+        return None
     row = np.zeros(SPINE_SIZE)
     spine = spine_at(row, 0)
     points = (block.nets[..., :3] / block.nets[..., 3:]).reshape(-1, 3)
-    if block.curve != NONE:
+    if surface_form is None:
         form = curve_form([block.nets[:, :, 0]])
         if form is None:
             return None
         _write_curve(spine, form, points)
-    elif not _write_surface(spine, elementary_form(face.surface), center, points):
+    elif not _write_surface(spine, surface_form, center, points):
         return None
     spine.off += block.error
     return row

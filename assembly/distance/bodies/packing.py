@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
+from itertools import accumulate
 from math import comb
 from threading import RLock
 
@@ -161,8 +162,8 @@ def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int, center:
     tables = [_tables(degree) for degree in degrees]
     spans = np.concatenate([block.spans for block in blocks]).ravel()
     parts = [np.zeros(_HEAD), *tables, spans]
-    at = dict(zip(degrees, np.cumsum([_HEAD, *(part.size for part in tables)]).tolist(), strict=False))
-    span_at = _HEAD + sum(part.size for part in tables)
+    *starts, span_at = accumulate((part.size for part in tables), initial=_HEAD)
+    at = dict(zip(degrees, starts, strict=True))
     pool_at = span_at + spans.size
     table = np.empty((count, PATCH_SIZE), dtype=np.int64)
     more: list[Ints] = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -282,7 +282,9 @@ class Face:
         return record, pool
 
 
-@lru_cache(maxsize=256)
 def whole_face(surface: NurbsSurface) -> Face:
-    """All of a surface as a face, the same whenever it is asked for: what is known of it is kept with it."""
-    return Face(surface)
+    """All of a surface as a face, the same as long as the surface is there: what is known of it is kept with it."""
+    kept: Face | None = surface.__dict__.get("_whole_face")
+    if kept is None:
+        kept = surface.__dict__["_whole_face"] = Face(surface)
+    return kept
