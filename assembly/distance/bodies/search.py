@@ -34,14 +34,12 @@ from assembly.distance.bodies.trims import is_outside
 from assembly.distance.patches.pair import patch_work_at
 from assembly.distance.piece_search import CROWDED, ended
 from assembly.geometry.splines.bezier_pieces import UNIT
-from assembly.geometry.vec import add, matvec, matvec_t, sub
+from assembly.geometry.vec import add, matvec, sub
 from assembly.kinematics.motion import relative_pose, rotation
 
 # Halvings after which a node is let go.
 DEEPEST = 50
 _START_DEPTH = 3
-# How often the start crosses sides of patches: a quarter of a turn each, on both bodies.
-_CROSSINGS = 4
 # Pairs taken from the heap before the first descent from one; the next ones come after more and more.
 _FIRST_DESCENT = 16.0
 # A group is split before a part of a patch that is not so many times as long.
@@ -187,56 +185,6 @@ def start_from_corners(search):
 
 
 @kernel(inline=True)
-def is_on_side(x, y):
-    """Whether a place is on a side of its patch, beyond which a neighbor may go on."""
-    return x == 0.0 or x == 1.0 or y == 0.0 or y == 1.0
-
-
-@kernel(inner=True)
-def cross_sides(search, of_a):
-    """Down from the nearest points known to patches of a or b that may begin where the one of it ends."""
-    state, x = body_search_at(search.state, 0), patch_work_at(search.w, 0).place
-    side = 0 if of_a else 1
-    at = 2 * side
-    if not is_on_side(state.places[at], state.places[at + 1]):
-        return
-    tree = search.a if of_a else search.b
-    point = (state.points[3 * side], state.points[3 * side + 1], state.points[3 * side + 2])
-    if not of_a:
-        point = matvec_t(search.pose.turn, sub(point, search.pose.shift))
-    here, other = int(state.patches[side]), int(state.patches[1 - side])
-    u, v = state.places[2 - at], state.places[3 - at]
-    for k in range(int(body_head_at(tree.pool, 0).patches)):
-        node = node_of(tree, patch_of(tree, k).node)
-        middle = (node.middle[0], node.middle[1], node.middle[2])
-        if k != here and patch_of(tree, k).curve == NONE and norm(sub(middle, point)) <= node.radius:
-            x[at] = x[at + 1] = 0.5
-            x[2 - at], x[3 - at] = u, v
-            descend_on_patches(search, k if of_a else other, other if of_a else k)
-
-
-@kernel(inner=True)
-def start_across_sides(search):
-    """On to neighbors of patches on elementary surfaces, until the distance of these is reached or none is nearer.
-
-    Where that is the distance of the bodies, it ends the search as soon as its points are known, and no pair is nearer
-    than another one before: all would be looked at.
-    """
-    a, b, state = search.a, search.b, body_search_at(search.state, 0)
-    for _ in range(_CROSSINGS):
-        first, second = patch_of(a, int(state.patches[0])).spine, patch_of(b, int(state.patches[1])).spine
-        if first == NONE or second == NONE:
-            return
-        least, upper = spine_bound(a, first, b, second, search.pose), state.upper
-        if not 0.0 < least < state.limit:
-            return
-        cross_sides(search, True)
-        cross_sides(search, False)
-        if not state.upper < upper:
-            return
-
-
-@kernel(inline=True)
 def relative_pose_of(a, b, q):
     """b seen from a, both about their centers, from two poses."""
     turn_a = rotation(q, 0)
@@ -259,8 +207,6 @@ def start(search):
     start_from_nearest_middles(search)
     if state.upper == math.inf:
         start_from_corners(search)
-    if state.upper < math.inf:
-        start_across_sides(search)
     state.key_way[0], state.key_way[1], state.key_way[2] = state.way[0], state.way[1], state.way[2]
 
 
