@@ -5,7 +5,8 @@ A turn, a slide or a screw that takes a surface along itself moves its points p 
     n.(a x p + d) = (p x n).a + n.d = 0        for all points, with one a and one d, not both zero.
 
 So the rows (p x n, n) of samples of a plane, a cylinder, a cone, a sphere, a torus, an extrusion or a revolution have a
-rank of five or less. Where their sixth singular value is not small the surface is none of these.
+rank of five or less. Where their sixth singular value is not small the surface is none of these. It is told from the
+squares of singular values, whose rounding hides what is below 1e-7 of the largest one.
 """
 
 from __future__ import annotations
@@ -93,11 +94,11 @@ def moves_nowhere(pieces, shape, chosen, basis, frame, loose, gram):
     chosen : (array, array)
         The pieces that are sampled, along u and v.
     basis : (array, array, array, array)
-        Values and slopes of the Bernstein polynomials at the places of samples, of u, and of v: (places, m), (places, n).
+        Values and slopes of the Bernstein polynomials at the places of samples: of u (places, m), and of v (places, n).
     frame : ((float, float, float), float)
         The middle of the surface, and one over its size.
     loose : float
-        The part of the largest singular value below which the sixth one counts as none.
+        The part of the largest singular value below which the sixth one counts as none; 1e-6 or more.
     gram : (GRAM,)
         For work.
     """

@@ -87,9 +87,9 @@ def breaks(knots: Array, degree: int) -> Array:
     """The distinct knots of the domain."""
     inside = knots[degree : knots.size - degree]
     if inside.size == 2:
-        return inside.copy()
+        return np.array(inside)
     # Knots are sorted.
-    return inside[np.concatenate([_FIRST, inside[1:] != inside[:-1]])]
+    return np.asarray(inside[np.concatenate([_FIRST, inside[1:] != inside[:-1]])])
 
 
 def _span_indices(knots: Array, degree: int) -> NDArray[np.intp]:
