@@ -66,11 +66,12 @@ def _recognized(surface: NurbsSurface, tolerance: float | None) -> Form:
     size = surface.size
     if not size > 0.0:
         return Freeform()
+    low, high = surface.bounding_box()
     if tolerance is None:
-        tolerance = exactness(size, float(np.abs(surface.control_points).max()))
+        tolerance = exactness(size, float(np.maximum(-low, high).max()))
     allowed = tolerance / size
     # Most of what is none of these is told by that, at a tenth of the time.
-    if has_no_motion(surface, loose_of(allowed)):
+    if has_no_motion(surface.bezier_pieces(), 0.5 * low + 0.5 * high, size, loose_of(allowed)):
         return Freeform()
     net = net_of(surface)
     samples = samples_of(net)

@@ -67,23 +67,26 @@ def exactness(size: float, far: float) -> float:
     return _EXACT * size + _COORDINATES * far
 
 
-def has_no_motion(surface: NurbsSurface, loose: float) -> bool:
+def has_no_motion(pieces: Array, middle: Array, size: float, loose: float) -> bool:
     """Whether samples of a surface, which is no point, tell that no rigid motion takes it along itself.
 
     Then it is neither a plane nor anything round or swept (`motions.py`).
 
     Parameters
     ----------
-    surface : NurbsSurface
+    pieces : (spans_u, spans_v, p + 1, q + 1, 4)
+        Homogeneous Bezier points.
+    middle : (3,)
+        Of the box around them.
+    size : float
+        The diagonal of that box.
     loose : float
         Singular values of normals and moments below this part of the largest one count as none.
     """
-    pieces = surface.bezier_pieces()
     shape = pieces.shape[:4]
-    low, high = surface.bounding_box()
-    x, y, z = (0.5 * low + 0.5 * high).tolist()
+    x, y, z = middle.tolist()
     chosen, basis = (_chosen(shape[0]), _chosen(shape[1])), (*_basis(shape[2] - 1), *_basis(shape[3] - 1))
-    frame = (x, y, z), 1.0 / surface.size
+    frame = (x, y, z), 1.0 / size
     return bool(moves_nowhere(pieces.flatten(), shape, chosen, basis, frame, loose, np.empty(GRAM)))
 
 
