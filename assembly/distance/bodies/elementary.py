@@ -53,7 +53,7 @@ def spine_row(block: PatchBlock, face: Face, center: Array) -> Array | None:
 
 
 def _is_free(block: PatchBlock, face: Face, center: Array) -> bool:
-    """Whether the patches of a face tell that it is no elementary surface: they are there, its Bezier points are not."""
+    """Whether the patches of a face tell that it is no elementary surface."""
     surface = face.surface
     size = surface.size
     if not size > 0.0:
