@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import hypot
+from math import hypot, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -125,10 +125,19 @@ def multiply(a: ArrayLike, b: ArrayLike) -> Array:
 def rotation_matrix(quaternion: ArrayLike) -> Array:
     """Rotation (3, 3) of the normalized quaternion."""
     e = nonzero_quaternion("quaternion", quaternion)
-    e = e / np.linalg.norm(e)
-    w, u = e[0], e[1:]
-    rotation: Array = (w * w - u @ u) * np.eye(3) + 2.0 * (w * skew(u) + np.outer(u, u))
-    return rotation
+    e /= sqrt(e @ e)
+    u = e[1:]
+    w, x, y, z = e.tolist()
+    # (w^2 - |u|^2) I + 2 (w [u]x + u u^T) in plain floats: arrays this small take three times the time.
+    s = w * w - float(u @ u)
+    zero = s * 0.0
+    return np.array(
+        [
+            [s + 2.0 * (x * x), zero + 2.0 * (x * y - w * z), zero + 2.0 * (w * y + x * z)],
+            [zero + 2.0 * (w * z + x * y), s + 2.0 * (y * y), zero + 2.0 * (y * z - w * x)],
+            [zero + 2.0 * (x * z - w * y), zero + 2.0 * (w * x + y * z), s + 2.0 * (z * z)],
+        ]
+    )
 
 
 def rotate(quaternion: ArrayLike, v: ArrayLike) -> Array:

@@ -16,6 +16,7 @@ from assembly._record import Store, record_dtype, record_view, size_of
 from assembly.distance.bodies.nodes import links_of, node_of, patch_of
 from assembly.distance.bodies.pair import pair_work_at
 from assembly.distance.bodies.records import NONE, body_head_at, patch_span_at
+from assembly.distance.bodies.spines import norm, spine_bound
 from assembly.distance.patches.newton import fill_basis, newton_direction
 from assembly.distance.patches.pair import (
     BASIS,
@@ -68,6 +69,8 @@ SEARCH_DOUBLES = size_of(BODY_SEARCH)
 BodyQuery = namedtuple("BodyQuery", "search i j")
 BodyMerit = namedtuple("BodyMerit", "merit")
 _STEPS = 30
+# How often a descent crosses sides of patches: a quarter of a turn each, on both bodies.
+_CROSSINGS = 4
 
 
 @kernel(inner=True)
@@ -251,6 +254,56 @@ def take_from_nodes(search, i, j):
     take_points(search, patch_a, patch_b, math.sqrt(vector_dot(search.w, D, D)))
 
 
+@kernel(inline=True)
+def is_on_side(x, y):
+    """Whether a place is on a side of its patch, beyond which a neighbor may go on."""
+    return x == 0.0 or x == 1.0 or y == 0.0 or y == 1.0
+
+
+@kernel(inner=True)
+def cross_sides(search, of_a):
+    """Down from the nearest points known to patches of a or b that may begin where the one of it ends."""
+    state, x = body_search_at(search.state, 0), patch_work_at(search.w, 0).place
+    side = 0 if of_a else 1
+    at = 2 * side
+    if not is_on_side(state.places[at], state.places[at + 1]):
+        return
+    tree = search.a if of_a else search.b
+    point = (state.points[3 * side], state.points[3 * side + 1], state.points[3 * side + 2])
+    if not of_a:
+        point = matvec_t(search.pose.turn, sub(point, search.pose.shift))
+    here, other = int(state.patches[side]), int(state.patches[1 - side])
+    u, v = state.places[2 - at], state.places[3 - at]
+    for k in range(int(body_head_at(tree.pool, 0).patches)):
+        node = node_of(tree, patch_of(tree, k).node)
+        middle = (node.middle[0], node.middle[1], node.middle[2])
+        if k != here and patch_of(tree, k).curve == NONE and norm(sub(middle, point)) <= node.radius:
+            x[at] = x[at + 1] = 0.5
+            x[2 - at], x[3 - at] = u, v
+            descend_on_patches(search, k if of_a else other, other if of_a else k)
+
+
+@kernel(inner=True)
+def descend_across_sides(search):
+    """On to neighbors of patches on elementary surfaces, until the distance of these is reached or none is nearer.
+
+    Where that is the distance of the bodies, it ends the search as soon as its points are known, and no pair is nearer
+    than another one before: all would be looked at.
+    """
+    a, b, state = search.a, search.b, body_search_at(search.state, 0)
+    for _ in range(_CROSSINGS):
+        first, second = patch_of(a, int(state.patches[0])).spine, patch_of(b, int(state.patches[1])).spine
+        if first == NONE or second == NONE:
+            return
+        least, upper = spine_bound(a, first, b, second, search.pose), state.upper
+        if not 0.0 < least < state.limit:
+            return
+        cross_sides(search, True)
+        cross_sides(search, False)
+        if not state.upper < upper:
+            return
+
+
 @kernel(inner=True)
 def nearest_boundary(tree, face, point):
     """The part of the boundary of a face whose ball is nearest to a point, from the center of the body; its patch."""
@@ -291,6 +344,8 @@ def descend_from_nodes(search, i, j):
     start, upper = (x[0], x[1], x[2], x[3]), state.upper
     place_on_patches(search, i, j)
     descend_on_patches(search, patch_a, patch_b)
+    if state.upper < upper:
+        descend_across_sides(search)
     trimmed = patch_of(search.a, patch_a).trim != NONE or patch_of(search.b, patch_b).trim != NONE
     if trimmed and state.upper == upper:
         descend_on_boundary(search, patch_a, patch_b)

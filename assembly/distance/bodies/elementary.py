@@ -11,7 +11,9 @@ from assembly.distance.bodies.spines import CYLINDER, PLANE, SPHERE, TORUS
 from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.curves import Circle, Line, curve_form
 from assembly.geometry.recognition.elementary import elementary_form
-from assembly.geometry.recognition.forms import Cylinder, Form, Plane, Sphere, Torus
+from assembly.geometry.recognition.fits import loose_of
+from assembly.geometry.recognition.forms import Cylinder, Form, Freeform, Plane, Sphere, Torus
+from assembly.geometry.recognition.nets import exactness, has_no_motion
 from assembly.geometry.splines.bezier_pieces import UNIT
 
 __all__ = ["spine_row"]
@@ -31,18 +33,36 @@ def spine_row(block: PatchBlock, face: Face, center: Array) -> Array | None:
     center : (3,)
         What was subtracted from its points.
     """
+    if block.curve == NONE and _is_free(block, face, center):
+        return None
+    surface_form = elementary_form(face.surface) if block.curve == NONE else None
+    if isinstance(surface_form, Freeform):
+        return None
     row = np.zeros(SPINE_SIZE)
     spine = spine_at(row, 0)
     points = (block.nets[..., :3] / block.nets[..., 3:]).reshape(-1, 3)
-    if block.curve != NONE:
+    if surface_form is None:
         form = curve_form([block.nets[:, :, 0]])
         if form is None:
             return None
         _write_curve(spine, form, points)
-    elif not _write_surface(spine, elementary_form(face.surface), center, points):
+    elif not _write_surface(spine, surface_form, center, points):
         return None
     spine.off += block.error
     return row
+
+
+def _is_free(block: PatchBlock, face: Face, center: Array) -> bool:
+    """Whether the patches of a face tell that it is no elementary surface."""
+    surface = face.surface
+    size = surface.size
+    if not size > 0.0:
+        return True
+    low, high = surface.bounding_box()
+    loose = loose_of(exactness(size, float(np.maximum(-low, high).max())) / size)
+    at_u, at_v = surface.breaks()
+    pieces = block.nets.reshape(at_u.size - 1, at_v.size - 1, *block.nets.shape[1:])
+    return has_no_motion(pieces, 0.5 * low + 0.5 * high - center, size, loose)
 
 
 def _write_curve(spine: np.record, form: Line | Circle, points: Array) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
+from itertools import accumulate
 from math import comb
 from threading import RLock
 
@@ -24,8 +25,8 @@ from assembly.distance.bodies.records import (
     PATCH,
     PATCH_SIZE,
     SPAN,
+    TREE_STATE,
     USED,
-    tree_state_at,
 )
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.bezier_packing import degree_tables
@@ -37,6 +38,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Arrays = tuple[Ints, Array, Ints, Array, Array]
 _HEAD = size_of(BODY_HEAD)
+_USED_NETS = place_of(TREE_STATE, "nets")
 _PATCH_FIELDS: tuple[str, ...] = PATCH.names or ()
 _SPAN_AT, _NET_AT, _FACE_AT = (place_of(PATCH, name) for name in ("span", "net", "face"))
 # Nodes for which there is room at first, beside the whole patches.
@@ -98,8 +100,10 @@ def _tables(degree: int) -> Array:
 @lru_cache(maxsize=256)
 def tree_of(faces: tuple[Face, ...]) -> KeptTree:
     """The tree of a body with these faces."""
-    boxes = [face.surface.bounding_box() for face in faces]
-    low, high = np.minimum.reduce([box[0] for box in boxes]), np.maximum.reduce([box[1] for box in boxes])
+    low, high = faces[0].surface.bounding_box()
+    for face in faces[1:]:
+        lower, upper = face.surface.bounding_box()
+        low, high = np.minimum(low, lower), np.maximum(high, upper)
     center = 0.5 * low + 0.5 * high
     blocks = [patches_of(face, number, center) for number, face in enumerate(faces)]
     blocks += [curves for block in blocks if block.trimmed for curves in boundary_patches(faces[block.face], block)]
@@ -124,7 +128,7 @@ def _planted(faces: Sequence[Face], blocks: list[PatchBlock], center: Array, hal
         first, place = first + n, end
     room = 3 * count + _SPARE
     links, nodes = np.empty(USED + LINKS * room, dtype=np.int64), np.empty(NODE * room)
-    tree_state_at(links, 0).nets = used
+    links[_USED_NETS] = used
     plant_tree((table, links), (pool, nodes, nets), np.empty(5 * count, dtype=np.int64))
     of_faces = table[: PATCH_SIZE * count].reshape(-1, PATCH_SIZE)[:, _FACE_AT : _FACE_AT + 2]
     spans = np.concatenate([block.spans for block in blocks])
@@ -138,7 +142,7 @@ def _head(blocks: list[PatchBlock], count: int, center: Array, half: Array) -> l
     farthest = max((float((points**2).sum(axis=-1).max()) for points in curves), default=0.0)
     lightest = min(float(block.nets[..., 3].min()) for block in blocks)
     values: dict[str, list[float]] = {
-        "reach": [max(float(np.linalg.norm(half)), farthest**0.5) * (1.0 + 8.0 * UNIT)],
+        "reach": [max(float(half @ half), farthest) ** 0.5 * (1.0 + 8.0 * UNIT)],
         "error": [max(block.error for block in blocks)],
         "weight_ratio": [(1.0 + 4.0 * UNIT) / lightest],
         "rational": [float(lightest != 1.0)],
@@ -161,8 +165,8 @@ def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int, center:
     tables = [_tables(degree) for degree in degrees]
     spans = np.concatenate([block.spans for block in blocks]).ravel()
     parts = [np.zeros(_HEAD), *tables, spans]
-    at = dict(zip(degrees, np.cumsum([_HEAD, *(part.size for part in tables)]).tolist(), strict=False))
-    span_at = _HEAD + sum(part.size for part in tables)
+    *starts, span_at = accumulate((part.size for part in tables), initial=_HEAD)
+    at = dict(zip(degrees, starts, strict=True))
     pool_at = span_at + spans.size
     table = np.empty((count, PATCH_SIZE), dtype=np.int64)
     more: list[Ints] = []

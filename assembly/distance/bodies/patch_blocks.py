@@ -92,7 +92,7 @@ def patches_of(face: Face, number: int, center: Array) -> PatchBlock:
         points[..., 3] = 1.0
     at_u, at_v = surface.breaks()
     spans_u, spans_v = at_u.size - 1, at_v.size - 1
-    if spans_u == spans_v == 1 and (n, m) == (p + 1, q + 1) and _is_clamped(surface.knots, (p, q)):
+    if spans_u == spans_v == 1 and (n, m) == (p + 1, q + 1) and surface._is_clamped:
         nets = points[None]
     else:
         flat = np.empty(4 * (spans_u * spans_v * (p + 1) + 1) * (q + 1))
@@ -106,8 +106,3 @@ def patches_of(face: Face, number: int, center: Array) -> PatchBlock:
     spans[..., 2], spans[..., 3] = at_v[:-1], at_v[1:]
     error = (1.0 if lightest == heaviest else 2.0) * 16.0 * (p + q + 4) * UNIT * 2.0 * reach
     return PatchBlock(nets, spans.reshape(-1, 4), number, NONE, face.sign, is_trimmed(face), error)
-
-
-def _is_clamped(knots: tuple[Array, Array], degree: tuple[int, int]) -> bool:
-    """Whether the control points of one span are its Bezier points."""
-    return all(bool(row[0] == row[p] and row[-1] == row[-1 - p]) for row, p in zip(knots, degree, strict=True))

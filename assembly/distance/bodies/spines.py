@@ -114,15 +114,29 @@ def of_cylinders(s, t):
 
 
 @kernel(inline=True)
+def circle_of(ring):
+    """The cylinder of no length that goes through the middle of the tube of a torus."""
+    return Spine(CYLINDER, ring.center, ring.axis, ring.major, 0.0, 0.0)
+
+
+@kernel(inline=True)
+def beside_torus(s, ring):
+    """A cylinder or a torus, and a torus, as if their axes were parallel: tubes are within their radii of a circle."""
+    if s.kind == CYLINDER:
+        return of_cylinders(s, circle_of(ring)) - ring.radius
+    return of_cylinders(circle_of(s), circle_of(ring)) - s.radius - ring.radius
+
+
+@kernel(inline=True)
 def of_torus(s, ring):
-    """A cylinder or a torus, and a torus, as if their axes were one."""
+    """A cylinder or a torus, and a torus, as if their axes were one, or parallel."""
     at = turned_parallel(s, ring)
     if s.kind == CYLINDER:
         beyond = max(0.0, abs(at.along) - s.half)
         gap = math.hypot(s.radius - ring.major, beyond) - ring.radius
     else:
         gap = ring_gap(math.hypot(s.major - ring.major, at.along), s.radius, ring.radius)
-    return gap - at.off - at.beside
+    return max(gap - at.off - at.beside, beside_torus(s, ring))
 
 
 @kernel(inline=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -141,7 +141,9 @@ class Face:
         for name, at in (("u", at_u), ("v", at_v)):
             if not np.isfinite(at).all():
                 raise InputError(f"{name} is {at[~np.isfinite(at)].flat[0]}; expected finite parameters")
-        return flat(np.broadcast_to(at_u, shape)), flat(np.broadcast_to(at_v, shape)), shape
+        if at_u.shape != at_v.shape:
+            at_u, at_v = np.broadcast_to(at_u, shape), np.broadcast_to(at_v, shape)
+        return flat(at_u), flat(at_v), shape
 
     def locate(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.int64]:
         """On which side of the boundary points are, decided on its true curves.
@@ -228,20 +230,17 @@ class Face:
             A parameter that is not finite.
         """
         at_u, at_v, shape = self._at(u, v)
+        table, pool, trim_at = self._packed_whole
+        out = np.empty((at_u.size, 3))
+        nearest_in_space(table, pool, 0, trim_at, self._derivative_bounds, at_u, at_v, out)
+        return np.where(self.locate(at_u, at_v) < 0, -out[:, 0], out[:, 0]).reshape(shape)
+
+    @cached_property
+    def _packed_whole(self) -> tuple[NDArray[np.int64], NDArray[np.float64], int]:
+        """Table and pool of the surface and the boundary behind it, and where that begins in the table."""
         record, surface_pool = self.surface.packed()
         table, pool = self.packed_trim(record.size, surface_pool.size)
-        out = np.empty((at_u.size, 3))
-        nearest_in_space(
-            np.concatenate([record, table]),
-            np.concatenate([surface_pool, pool]),
-            0,
-            record.size,
-            self._derivative_bounds,
-            at_u,
-            at_v,
-            out,
-        )
-        return np.where(self.locate(at_u, at_v) < 0, -out[:, 0], out[:, 0]).reshape(shape)
+        return np.concatenate([record, table]), np.concatenate([surface_pool, pool]), record.size
 
     @cached_property
     def _derivative_bounds(self) -> NDArray[np.float64]:
@@ -282,7 +281,9 @@ class Face:
         return record, pool
 
 
-@lru_cache(maxsize=256)
 def whole_face(surface: NurbsSurface) -> Face:
-    """All of a surface as a face, the same whenever it is asked for: what is known of it is kept with it."""
-    return Face(surface)
+    """All of a surface as a face, the same as long as the surface is there: what is known of it is kept with it."""
+    kept: Face | None = surface.__dict__.get("_whole_face")
+    if kept is None:
+        kept = surface.__dict__["_whole_face"] = Face(surface)
+    return kept

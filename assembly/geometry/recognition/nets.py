@@ -10,11 +10,12 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from assembly.geometry.recognition.motions import GRAM, moves_nowhere
 from assembly.geometry.splines import bezier
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["Net", "Samples", "bezier_dot", "exactness", "net_of", "samples_of"]
+__all__ = ["Net", "Samples", "bezier_dot", "exactness", "has_no_motion", "net_of", "samples_of"]
 
 Array = NDArray[np.float64]
 # Parameters of samples in a piece: inside of it, where poles are not.
@@ -66,12 +67,33 @@ def exactness(size: float, far: float) -> float:
     return _EXACT * size + _COORDINATES * far
 
 
-def net_of(surface: NurbsSurface) -> Net | None:
-    """The net of a surface; None where it is one point."""
+def has_no_motion(pieces: Array, middle: Array, size: float, loose: float) -> bool:
+    """Whether samples of a surface, which is no point, tell that no rigid motion takes it along itself.
+
+    Then it is neither a plane nor anything round or swept (`motions.py`).
+
+    Parameters
+    ----------
+    pieces : (spans_u, spans_v, p + 1, q + 1, 4)
+        Homogeneous Bezier points.
+    middle : (3,)
+        Of the box around them.
+    size : float
+        The diagonal of that box.
+    loose : float
+        Singular values of normals and moments below this part of the largest one count as none.
+    """
+    shape = pieces.shape[:4]
+    x, y, z = middle.tolist()
+    chosen, basis = (_chosen(shape[0]), _chosen(shape[1])), (*_basis(shape[2] - 1), *_basis(shape[3] - 1))
+    frame = (x, y, z), 1.0 / size
+    return bool(moves_nowhere(pieces.flatten(), shape, chosen, basis, frame, loose, np.empty(GRAM)))
+
+
+def net_of(surface: NurbsSurface) -> Net:
+    """The net of a surface that is not one point."""
     low, high = surface.bounding_box()
     size = surface.size
-    if not size > 0.0:
-        return None
     middle = 0.5 * low + 0.5 * high
     pieces = surface.bezier_pieces().copy()
     # One factor for all weights changes no point.

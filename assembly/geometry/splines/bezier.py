@@ -24,6 +24,7 @@ MAX_DEGREE = 15
 MAX_CURVE_DEGREE = 50
 # Distinct knots closer than this part of the domain would make a span that doubles cannot resolve.
 _MIN_SPAN = 1e-14
+_FIRST = np.ones(1, dtype=bool)
 
 Array = NDArray[np.float64]
 
@@ -85,7 +86,10 @@ def checked_degree(name: str, value: int, count: int, highest: int = MAX_DEGREE)
 def breaks(knots: Array, degree: int) -> Array:
     """The distinct knots of the domain."""
     inside = knots[degree : knots.size - degree]
-    return np.unique(inside)
+    if inside.size == 2:
+        return np.array(inside)
+    # Knots are sorted.
+    return np.asarray(inside[np.concatenate([_FIRST, inside[1:] != inside[:-1]])])
 
 
 def _span_indices(knots: Array, degree: int) -> NDArray[np.intp]:
@@ -103,8 +107,16 @@ def extraction(knots: Array, degree: int) -> tuple[Array, NDArray[np.intp]]:
         Bezier points of span i are `matrices[i] @ control_points[first[i] : first[i] + degree + 1]`.
     first : (spans,)
         Index of the first control point that a span uses.
+
+    Both are read-only.
     """
-    p = degree
+    return _extraction(knots.tobytes(), degree)
+
+
+@lru_cache(maxsize=256)
+def _extraction(row: bytes, degree: int) -> tuple[Array, NDArray[np.intp]]:
+    """`extraction` of the knots with these bytes: circles, lines and faces of one kind share their knots."""
+    knots, p = np.frombuffer(row), degree
     j = _span_indices(knots, p)
     a, b = knots[j], knots[j + 1]
     matrices = np.empty((j.size, p + 1, p + 1))
@@ -118,11 +130,16 @@ def extraction(knots: Array, degree: int) -> tuple[Array, NDArray[np.intp]]:
             alpha = ((t[:, None] - left) / (right - left))[:, :, None]
             d = (1.0 - alpha) * d[:, :-1] + alpha * d[:, 1:]
         matrices[:, k] = d[:, 0]
-    return matrices, j - p
+    first = j - p
+    matrices.flags.writeable = first.flags.writeable = False
+    return matrices, first
 
 
 def pieces(points: Array, knots: Array, degree: int) -> Array:
     """Bezier points of every span along the first axis: (n, ...) to (spans, degree + 1, ...)."""
+    if len(points) == degree + 1 and knots[0] == knots[degree] and knots[degree + 1] == knots[-1]:
+        # A clamped spline of one span has them for control points. A negative zero becomes positive, as in any sum.
+        return np.asarray(points[None] + 0.0)
     matrices, first = extraction(knots, degree)
     windows = points[first[:, None] + np.arange(degree + 1)]
     flat = windows.reshape(first.size, degree + 1, -1)
@@ -232,10 +249,15 @@ def centered_powers(bezier: Array, at: Array, axis: int) -> Array:
     return np.moveaxis(turned, -1, axis)
 
 
+@lru_cache(maxsize=64)
+def _binomials(degree: int) -> tuple[NDArray[np.intp], Array]:
+    """0 to the degree, and the binomials of that."""
+    return np.arange(degree + 1), np.array([comb(degree, k) for k in range(degree + 1)], dtype=float)
+
+
 def bernstein(degree: int, x: Array) -> Array:
     """Bernstein polynomials at x in [0, 1]: (len(x), degree + 1)."""
-    k = np.arange(degree + 1)
-    binomials = np.array([comb(degree, int(i)) for i in k], dtype=float)
+    k, binomials = _binomials(degree)
     return np.asarray(binomials * x[:, None] ** k * (1.0 - x[:, None]) ** (degree - k))
 
 

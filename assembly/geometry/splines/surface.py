@@ -109,7 +109,8 @@ class NurbsSurface(ReadOnlyArrays):
     @cached_property
     def size(self) -> float:
         """Diagonal of the box around the control points."""
-        return float(np.linalg.norm(np.ptp(self.control_points, axis=(0, 1))))
+        low, high = self._box
+        return float(np.linalg.norm(high - low))
 
     @cached_property
     def closed(self) -> tuple[bool, bool]:
@@ -162,7 +163,14 @@ class NurbsSurface(ReadOnlyArrays):
 
     def bounding_box(self) -> tuple[Array, Array]:
         """Lower and upper corner, (3,) each, of the control points and so of the surface."""
-        return self.control_points.min(axis=(0, 1)), self.control_points.max(axis=(0, 1))
+        low, high = self._box
+        return low.copy(), high.copy()
+
+    @cached_property
+    def _box(self) -> tuple[Array, Array]:
+        """The corners of the bounding box, found once."""
+        rows = self.control_points.reshape(-1, 3)
+        return rows.min(axis=0), rows.max(axis=0)
 
     def bounding_sphere(self) -> tuple[Array, float]:
         """Center (3,) and radius of a sphere around the control points and so around the surface."""
@@ -176,8 +184,19 @@ class NurbsSurface(ReadOnlyArrays):
         """The distinct knots of the domain in u and in v."""
         return bezier.breaks(self.knots[0], self.degree[0]), bezier.breaks(self.knots[1], self.degree[1])
 
+    @property
+    def _is_clamped(self) -> bool:
+        """Whether the domain ends where the knots do, in u and in v."""
+        ends = zip(self.knots, self.degree, strict=True)
+        return all(bool(row[0] == row[p] and row[-1] == row[-1 - p]) for row, p in ends)
+
     @cached_property
     def _pieces(self) -> Array:
+        if self.weights.shape == (self.degree[0] + 1, self.degree[1] + 1) and self._is_clamped:
+            # One span: its control points, a negative zero positive, as in the sums below.
+            single = self._homogeneous[None, None] + 0.0
+            single.flags.writeable = False
+            return single
         in_u = bezier.pieces(self._homogeneous, self.knots[0], self.degree[0])  # (spans_u, p+1, n_v, 4)
         in_v = bezier.pieces(np.moveaxis(in_u, 2, 0), self.knots[1], self.degree[1])  # (spans_v, q+1, spans_u, p+1, 4)
         pieces = np.ascontiguousarray(np.transpose(in_v, (2, 0, 3, 1, 4)))

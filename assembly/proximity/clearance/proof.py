@@ -252,6 +252,8 @@ class ClearanceProof:
         """How far a move takes points of the second body of pair k, at most."""
         if not move.any():
             return 0.0
+        if not move[3:].any():
+            return float(np.linalg.norm(move[:3]))
         root = self.cells_of(k).root
         way = move[:3] + np.cross(move[3:], rotation_matrix(q[self.pairs[k][1], 3:]) @ root.center)
         return float(np.linalg.norm(way) + root.radius * np.linalg.norm(move[3:]))

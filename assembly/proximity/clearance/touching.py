@@ -236,7 +236,9 @@ def move_apart(proof: ClearanceProof, k: int, q: Array, contacts: Contacts, touc
     arm, radius = rotation_matrix(row[3:]) @ root.center, float(root.radius)
     guides = proof.fronts.pair.guides[k]
     guides[:] = 0.0
-    few = normals[np.linspace(0, len(normals) - 1, min(len(normals), GUIDES)).astype(int)]
+    few = normals
+    if len(normals) > GUIDES:
+        few = normals[np.linspace(0, len(normals) - 1, GUIDES).astype(int)]
     guides[: len(few)] = few @ rotation_matrix(q[proof.pairs[k][0], 3:])
     for part in OPENED if touching > 0.0 else ():
         # Contacts between which a body is wedged open by less than it is moved.
@@ -248,7 +250,8 @@ def move_apart(proof: ClearanceProof, k: int, q: Array, contacts: Contacts, touc
     else:
         return None
     # About the origin of the body instead of its middle.
-    move[:3] -= np.cross(move[3:], arm)
+    if move[3:].any():
+        move[:3] -= np.cross(move[3:], arm)
     return move
 
 

@@ -154,7 +154,8 @@ def distance(
     faces = faces_of("a", a), faces_of("b", b)
     if not isinstance(poses, (tuple, list, np.ndarray)) or len(poses) != 2:
         raise InputError(f"poses is {poses!r}; expected a pair, one pose for a and one for b")
-    q = np.stack([pose_of("poses[0]", a, poses[0]), pose_of("poses[1]", b, poses[1])])
+    q = np.empty((2, 7))
+    q[0], q[1] = pose_of("poses[0]", a, poses[0]), pose_of("poses[1]", b, poses[1])
     tolerance = positive("tolerance", tolerance)
     pairs = _BUDGET if budget is None else integer("budget", budget, 1, 2**40)
     found = bodies_apart(body_tree(faces[0]), body_tree(faces[1]), q, tolerance, pairs)

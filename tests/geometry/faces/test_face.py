@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
 from assembly.geometry import shapes
-from assembly.geometry.faces.face import Face
+from assembly.geometry.faces.face import Face, whole_face
 from assembly.geometry.splines import evaluate as spline
 
 
@@ -25,6 +27,20 @@ def test_a_reversed_face_differs_from_its_surface_in_the_sign_alone():
     assert pool is plain_pool
     assert plain[spline.SIGN] == 1 and record[spline.SIGN] == -1
     assert np.flatnonzero(record != plain).tolist() == [spline.SIGN]
+
+
+def test_all_of_a_surface_is_one_face_however_many_others_are_asked_for():
+    surfaces = [shapes.plane(1.0, 1.0) for _ in range(600)]
+    faces = [whole_face(surface) for surface in surfaces]
+    assert all(whole_face(surface) is face for surface, face in zip(surfaces, faces, strict=True))
+    assert all(face.surface is surface for surface, face in zip(surfaces, faces, strict=True))
+
+
+def test_a_copy_of_a_surface_has_a_face_of_its_own():
+    surface = shapes.plane(1.0, 1.0)
+    face = whole_face(surface)
+    twin = pickle.loads(pickle.dumps(surface))
+    assert whole_face(twin) is not face and whole_face(twin).surface is twin
 
 
 @pytest.mark.parametrize(
