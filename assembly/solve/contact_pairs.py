@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.model.clearance import Clearance
-from assembly.constraints.model.contact import side_faces
+from assembly.constraints.model.contact import side_face, side_faces
 from assembly.constraints.program.records import DEEPEST_AT, NEAREST_AT, ROW, ROW_TABLE, SHELL_F, SHELL_G
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.extrema.pairs import STATUSES, ContactPair, PairStatus, extremal_pair
@@ -40,6 +40,10 @@ def contact_pairs(solution: Solution) -> dict[str, ContactPair]:
             start = solution._parameters[k, :4]
             q_f, q_g = solution.q[places]
             pairs[contact.name] = extremal_pair(f, q_f, g, q_g, None if np.isnan(start).any() else start)
+    for contact in scene.seats:
+        f, g = side_face(contact.a), side_face(contact.b)
+        q_f, q_g = solution.q[[scene.index(body) for body in contact.bodies]]
+        pairs[contact.name] = extremal_pair(f, q_f, g, q_g)
     return pairs | _listed(solution)
 
 
