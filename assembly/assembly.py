@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.constraints.model.constraint import structure_changes
-from assembly.constraints.model.contact import lone_surfaces
+from assembly.constraints.model.constraint import Constraint, structure_changes
+from assembly.constraints.model.contact import Contact, lone_surfaces
 from assembly.constraints.model.contents import Contents
+from assembly.constraints.model.joint import Joint
 from assembly.constraints.packing.corners import corners_of
-from assembly.constraints.packing.earlier import is_earlier, taken_over
+from assembly.constraints.packing.earlier import is_earlier, is_same_scene, taken_over
+from assembly.constraints.packing.lower_pairs import LowerPair, lower_pairs
 from assembly.constraints.packing.scene import MORE_PLACES, MOST_CROWDING, Packed, structure_of
 from assembly.constraints.packing.scene_size import check_reach, scene_size
 from assembly.errors import InputError, vector
@@ -78,6 +80,9 @@ class Assembly(Contents):
         # Packed anew: of copies what a solve of the one has changed there the other does not know.
         self._packed = self._scene = None
         self._corners = False
+        self._lower_pairs: list[LowerPair] | None = None
+        self._seats: tuple[tuple[int, Joint], ...] = ()  # contacts that are joints where the last solve began
+        self._packings: dict[tuple[tuple[int, Joint], ...], tuple[Packed | None, Scene | None]] = {}
 
     def __repr__(self) -> str:
         return f"Assembly({len(self._bodies)} bodies, {len(self._constraints)} constraints)"
@@ -86,7 +91,7 @@ class Assembly(Contents):
         """The scene as the compiled loop reads it; made at first use."""
         if self._packed is not None and self._packed.stamp != structure_changes():
             # A row came or went somewhere; perhaps in another scene.
-            if self._packed.structure == structure_of(self._constraints):
+            if self._packed.structure == structure_of(self._seated_constraints()):
                 self._packed.stamp = structure_changes()
             else:
                 self._packed = None
@@ -103,11 +108,50 @@ class Assembly(Contents):
 
     def _pack(self, before: Packed | None) -> Packed:
         """Pack the scene, which was packed otherwise before."""
-        packed = Packed(self._bodies, self._constraints, self._objectives, self._crowding, self._corners)
-        self._scene = Scene(self.bodies, self.constraints, tuple(packed.contacts), tuple(packed.sides), packed.scale)
+        constraints = self._seated_constraints()
+        packed = Packed(self._bodies, constraints, self._objectives, self._crowding, self._corners)
+        seats = tuple(item for number, _ in self._seats if isinstance(item := self._constraints[number], Contact))
+        self._scene = Scene(
+            self.bodies, tuple(constraints), tuple(packed.contacts), tuple(packed.sides), packed.scale, seats
+        )
         packed.before = before
         self._packed = packed
         return packed
+
+    def _seated_constraints(self) -> list[Constraint]:
+        """The constraints, and joints in place of contacts that are lower pairs where the last solve began."""
+        constraints = self._constraints.copy()
+        for number, joint in self._seats:
+            constraints[number] = joint
+        return constraints
+
+    def _take_seats(self, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None = None) -> None:
+        """Make those contacts joints that are lower pairs at a start, or were where a solution began.
+
+        One whose pair the user starts is none of them. What was packed for others is kept for their solutions.
+        """
+        if isinstance(q0, Solution):
+            packed = q0._ended.packed
+            if self._packed is not None and is_same_scene(packed, self._packed):
+                return
+            kept = self._packings.items()
+            known = (key for key, (other, _) in kept if other is not None and is_same_scene(packed, other))
+            seats = next(known, self._seats)
+        else:
+            if self._lower_pairs is None:
+                self._lower_pairs = lower_pairs(self._constraints)
+            if not self._lower_pairs:
+                return
+            poses = dict(zip(self._bodies, self._given(q0), strict=True))
+            named = starts if isinstance(starts, Mapping) else {}
+            found = [(pair.number, pair.at(poses)) for pair in self._lower_pairs]
+            seats = tuple(
+                (k, joint) for k, joint in found if joint is not None and self._constraints[k].name not in named
+            )
+        if seats != self._seats:
+            self._packings[self._seats] = self._packed, self._scene
+            self._packed, self._scene = self._packings.pop(seats, (None, None))
+            self._seats = seats
 
     def solve(
         self,
@@ -200,6 +244,7 @@ class Assembly(Contents):
         interruption: Interruption,
     ) -> Solution:
         """A solve from this start and no other one."""
+        self._take_seats(q0, starts)
         settings = self._settings(options, interruption, isinstance(q0, Solution))
         solution = self._solved_or_standing(q0, settings, starts, options, interruption)
         if solution.status in AT_KINKS and not self._corners and settings[ITERATIONS] > 0.0:
@@ -317,7 +362,7 @@ class Assembly(Contents):
         """The scene as it is packed now, if nothing but values and places are others than in an earlier one."""
         mine = self._packed
         is_same = (
-            mine is not None and mine.origin is packed.origin and mine.structure == structure_of(self._constraints)
+            mine is not None and mine.origin is packed.origin and mine.structure == structure_of(self._seated_constraints())
         )
         return mine if is_same else None
 
@@ -477,6 +522,7 @@ class Assembly(Contents):
 
         if not isinstance(drives, (bool, np.bool_)):
             raise InputError(f"drives is {drives!r}; expected True or False")
+        self._take_seats(q)
         if isinstance(q, Solution):
             q._list_contacts()
         packed = self.packed()

@@ -41,6 +41,10 @@ def contact_pairs(solution: Solution) -> dict[str, ContactPair]:
             start = solution._parameters[k, :4]
             q_f, q_g = solution.q[places]
             pairs[contact.name] = extremal_pair(f, q_f, g, q_g, None if np.isnan(start).any() else start)
+    for contact in scene.seats:
+        f, g = side_face(contact.a), side_face(contact.b)
+        q_f, q_g = solution.q[[scene.index(body) for body in contact.bodies]]
+        pairs[contact.name] = extremal_pair(f, q_f, g, q_g)
     return pairs | _listed(solution)
 
 

@@ -47,12 +47,15 @@ class Scene:
         contacts: tuple[Contact, ...],
         sides: tuple[tuple[Body | BodyFace, Body | BodyFace], ...],
         scale: float,
+        seats: tuple[Contact, ...] = (),
     ) -> None:
         self.bodies = bodies
         self.constraints = constraints
         self.contacts = contacts
         self.sides = sides
         self.scale = scale
+        # Contacts that are lower pairs: of each a joint of its name is among the constraints.
+        self.seats = seats
         self._wished: NDArray[np.int64] | None = None
 
     def wished(self, packed: Packed) -> NDArray[np.int64]:

@@ -2,8 +2,9 @@
 
 Rows of clearances lead bodies that are in each other by a little. From a start at which bodies are stuck in each other,
 or joints far from holding, they may lead nowhere, and a solve begins where bodies are put together
-(`put_together.py`), seated (`seated.py`), parted (`parting.py`) or separated (`separation.py`) as well. Every way is
-measured from where the user's bodies were.
+(`put_together.py`), seated (`seated.py`), parted (`parting.py`) or separated (`separation.py`) as well. Where all of
+these fail, and bodies cross at the end, it begins where that end is parted. Every way is measured from where the user's
+bodies were.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 __all__ = ["first_solve"]
 
 Array = NDArray[np.float64]
+# How often an end at which bodies cross is parted: of the random scenes that a third time would help none is known.
+PARTED_ENDS = 2
 
 
 def first_solve(
@@ -74,7 +77,10 @@ class _FirstSolve:
                 ways += self._from_apart(ways[-1].success)
         if not self._is_done(ways) and together is not None and together.keeps_topology:
             ways.append(self._put_together(together))
-        solution = min((way for way in ways if way.success), key=lambda way: way.objective, default=ways[-1])
+        failed = ways[-1]
+        if not self._is_done(ways) and not self.options.get("keep_topology"):
+            ways += self._from_parted_end(failed)
+        solution = min((way for way in ways if way.success), key=lambda way: way.objective, default=failed)
         if len(ways) > 1:
             solution.seconds = perf_counter() - begin
         return solution
@@ -117,4 +123,21 @@ class _FirstSolve:
             ways.append(self._from(apart))
         if not is_solved and not self._is_done(ways):
             ways += [self._from(poses) for poses in separated(self.scene, self.q, self.options, self.interruption)]
+        return ways
+
+    def _from_parted_end(self, end: Solution) -> list[Solution]:
+        """Solves from where the end of one whose bodies cross there is parted, and the end of that one, if it must be.
+
+        An objective leads bodies through a thin one in a step. Beside where it leads, steps are short.
+        """
+        touching = float(self.settings[ALLOWED_OVERLAP]) * self.scene.packed().scale
+        ways: list[Solution] = []
+        for _ in range(PARTED_ENDS):
+            apart = parted(self.scene, end.q.copy(), touching, self.interruption)
+            if apart is None:
+                break
+            end = self._from(apart)
+            ways.append(end)
+            if self._is_done(ways):
+                break
         return ways

@@ -20,7 +20,9 @@ class Contact(Constraint):
 
     The gap is that of the pair of points the solve tracks from its start; where it lies on the faces is free. With
     edges the pair is one of features, faces, edges or vertices, and switches between them as the bodies move; without,
-    it is one of two surfaces, flush where both are flat.
+    it is one of two surfaces, flush where both are flat. A bore and a pin of its radius, or a socket and a ball, that
+    are in each other at the start touch all over or nowhere: a contact of these two faces that is not one-sided is the
+    joint that puts axis on axis, or center on center.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from assembly.proximity.features.solid_contact import TRACK
 if TYPE_CHECKING:
     from assembly.constraints.packing.scene import Packed
 
-__all__ = ["is_earlier", "taken_over"]
+__all__ = ["is_earlier", "is_same_scene", "taken_over"]
 
 Array = NDArray[np.float64]
 
@@ -23,6 +23,11 @@ def is_earlier(earlier: Packed, packed: Packed) -> bool:
     while before is not None and before is not earlier:
         before = before.before
     return before is not None
+
+
+def is_same_scene(one: Packed, packed: Packed) -> bool:
+    """Whether one is how a scene is packed now, or was before."""
+    return one is packed or is_earlier(one, packed)
 
 
 def taken_over(earlier: Packed, packed: Packed, state: Array) -> Array:

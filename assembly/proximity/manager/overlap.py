@@ -18,7 +18,7 @@ from assembly.geometry.splines.evaluate import surface_at, surface_point
 from assembly.geometry.vec import add, cross, matvec, matvec_t, scale, sub
 from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import feature_at
-from assembly.proximity.brep.records import FACE_RECORD, face_at, shell_at
+from assembly.proximity.brep.records import EDGE_RECORD, FACE_RECORD, edge_at, face_at, shell_at
 from assembly.proximity.bvh.tree import (
     ELEMENT,
     NODE,
@@ -326,17 +326,39 @@ def crosses(posed, stack, candidates, margin):
 
 
 @kernel(inner=True)
+def is_sheet(store, shell):
+    """Whether a body is a sheet: an edge of it has no other side."""
+    solid = shell_at(store.table, shell)
+    for k in range(solid.edges):
+        if edge_at(store.table, solid.edge_table + EDGE_RECORD * k).face_b < 0:
+            return True
+    return False
+
+
+@kernel(inner=True)
+def is_cut(posed, side, extremum):
+    """Whether facets of one body cut the segment between the points of an extremum with a negative gap.
+
+    Gaps of no more than facets are beside their surfaces are cut by none.
+    """
+    a, b = three_of(extremum.point_f), three_of(extremum.point_g)
+    if side == 1:
+        a, b = seen_by_other(posed, 0, a), seen_by_other(posed, 0, b)
+    end = posed.offsets[side] / -extremum.gap
+    return end < 0.5 and facets_cut(posed, side, a, sub(b, a), end, BETWEEN)[0] > 0
+
+
+@kernel(inner=True)
 def is_outside(posed, extremum):
     """Whether an extremum with a negative gap is one of far sides: then a surface is between its points.
 
-    Gaps of no more than facets are beside their surfaces are taken for true.
+    A corner or a point of an edge is in the other body where nothing of that is between the two, though the way out may
+    leave its own body, a thin plate, at once.
     """
-    depth = -extremum.gap
-    a, b = three_of(extremum.point_f), three_of(extremum.point_g)
-    for side in range(2):
-        end = posed.offsets[side] / depth
-        if side == 1:
-            a, b = seen_by_other(posed, 0, a), seen_by_other(posed, 0, b)
-        if end < 0.5 and facets_cut(posed, side, a, sub(b, a), end, BETWEEN)[0] > 0:
-            return True
-    return False
+    store, shells = posed.store, posed.shells
+    cut = (is_cut(posed, 0, extremum), is_cut(posed, 1, extremum))
+    if cut[0] == cut[1] or shells[0] < 0:
+        return cut[0]
+    own = 0 if cut[0] else 1
+    code = extremum.code_f if own == 0 else extremum.code_g
+    return code < shell_at(store.table, shells[own]).faces or is_sheet(store, shells[1 - own])

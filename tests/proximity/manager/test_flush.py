@@ -77,3 +77,23 @@ def test_bodies_that_are_in_each_other_through_both_are_not_left():
     solution = scene.solve()
     assert solution.success
     assert solution.q[1, 0] == pytest.approx(10.0, abs=1e-8)
+
+
+@pytest.mark.parametrize("thick", [1e-1, 1e-2, 1e-4])
+@pytest.mark.parametrize("order", [1, -1])
+def test_the_corner_of_a_thin_plate_is_not_drawn_into_a_block(thick, order):
+    """It points down onto the block, and on the way out of it leaves the plate at once."""
+    block = asm.Body("block", asm.shapes.box(4.0, 3.0, 1.0), fixed=True)
+    turn = Rotation.from_euler("zyx", [45.0, 10.0, 20.0], degrees=True) * Rotation.from_euler("x", 90.0, degrees=True)
+    corners = np.array([[x, y, z] for x in (-0.8, 0.8) for y in (-0.6, 0.6) for z in (-0.5 * thick, 0.5 * thick)])
+    low = turn.apply(corners)[:, 2].min()
+    plate = asm.Body(
+        "plate", asm.shapes.box(1.6, 1.2, thick), (0.1, 0.2, 0.5 - low + 1e-3), turn.as_quat(scalar_first=True)
+    )
+    scene = scene_of(*(block, plate)[::order])
+    scene.minimize(asm.PointDistance(plate.point(0, 0, 0), (0.1, 0.2, 0.3)))
+    solution = scene.solve()
+    assert solution.success, solution.message
+    row = solution.q[0 if order < 0 else 1]
+    lowest = Rotation.from_quat(row[3:], scalar_first=True).apply(corners)[:, 2].min() + row[2]
+    assert lowest > 0.5 - 1e-9
