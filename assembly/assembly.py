@@ -322,7 +322,7 @@ class Assembly(Contents):
             check_reach("a coordinate of the start", float(np.abs(q[:, :3]).max()), packed.scale)
             state[packed.contacts_at : packed.angles_at] = np.nan
             if turns is not None:
-                state[packed.angles_at : packed.multipliers_at : TRACK] = turns
+                state[packed.angles] = turns
         if starts is not None:
             self._place_starts(packed, state, starts)
         packed.refresh()

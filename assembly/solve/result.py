@@ -169,7 +169,7 @@ class Result(ReadOnlyArrays):
         """Every freedom of every joint, "joint.freedom": lengths in the user's unit, angles in radians."""
         packed = self._packed
         near = dict(
-            zip(map(id, packed._angles), self._state[packed.angles_at : packed.multipliers_at : TRACK], strict=True)
+            zip(map(id, packed._angles), self._state[packed.angles], strict=True)
         )
         values = {}
         for joint in self._scene.constraints:

@@ -69,7 +69,7 @@ def restarted(
     """
     if isinstance(given, Solution):
         packed = given._packed
-        reference, turns = given.q, given._state[packed.angles_at : packed.multipliers_at : TRACK]
+        reference, turns = given.q, given._state[packed.angles]
     else:
         reference, turns = given, None
     settings = settings.copy()

@@ -194,7 +194,7 @@ class _Walk:
     @property
     def _angles(self) -> slice:
         """Where a state has the angles that are counted on past whole turns."""
-        return slice(self._packed.angles_at, self._packed.multipliers_at, TRACK)
+        return self._packed.angles
 
     def _in_the_way(self, at: Solution, done: float) -> dict[int, Answer]:
         """The pairs of bodies that are in the way, and what is proven of them a little beyond."""

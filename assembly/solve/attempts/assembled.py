@@ -46,12 +46,12 @@ def _has_turns_of_its_pose(packed: Packed, state: Array, turns: Array | None) ->
     """Whether the turns in a state are those that a start from its poses has."""
     fresh = state.copy()
     _choose_turns(packed, fresh, turns)
-    angles = slice(packed.angles_at, packed.multipliers_at, TRACK)
+    angles = packed.angles
     return bool((np.abs(fresh[angles] - state[angles]) < np.pi).all())
 
 
 def _choose_turns(packed: Packed, state: Array, turns: Array | None) -> None:
-    state[packed.angles_at : packed.multipliers_at : TRACK] = 0.0 if turns is None else turns
+    state[packed.angles] = 0.0 if turns is None else turns
     packed.start_angles(state, warm=False)
 
 

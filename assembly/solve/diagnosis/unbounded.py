@@ -91,7 +91,7 @@ class Place:
     def of(cls, packed: Packed, state: Array) -> Place:
         """Where a state is."""
         q = state[: packed.contacts_at].reshape(-1, 7).copy()
-        angles = state[packed.angles_at : packed.multipliers_at : TRACK].tolist()
+        angles = state[packed.angles].tolist()
         return cls(q, dict(zip(map(id, packed._angles), angles, strict=True)))
 
     def state(self, packed: Packed) -> Array:
@@ -99,7 +99,7 @@ class Place:
         state = packed.new_state()
         state[: packed.contacts_at] = self.q.ravel()
         state[packed.contacts_at : packed.angles_at] = np.nan
-        state[packed.angles_at : packed.multipliers_at : TRACK] = [self.angles[id(angle)] for angle in packed._angles]
+        state[packed.angles] = [self.angles[id(angle)] for angle in packed._angles]
         return state
 
 
