@@ -21,7 +21,6 @@ from assembly.constraints.packing.asked import asked_between, asked_change
 from assembly.errors import InputError
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
-from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import can_prove, lent_proof, near_contacts
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import OUT_OF_TIME

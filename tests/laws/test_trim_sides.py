@@ -75,9 +75,7 @@ def test_gradients_where_the_contact_is_free(place, form):
 
         def rows(steps, x=x, lengths=point.lengths):
             d = ways @ steps
-            return FreePoint(
-                made, moved(made.scene, made.q, d[:12]), x + d[12:] / lengths[0], lengths, sides
-            ).residual
+            return FreePoint(made, moved(made.scene, made.q, d[:12]), x + d[12:] / lengths[0], lengths, sides).residual
 
         # At the corner the second derivative jumps: a difference is of first order.
         step, allowed = (1e-4, 1e-7) if off else (1e-6, 2e-5)
@@ -103,8 +101,9 @@ def test_hessians_of_both_rows(place):
     expected = differences(slopes, 16, 1e-4) @ ways.T
     found = point.row_terms(y, np.zeros(point.rows))
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
-    # Straight sides, and extensions.
-    assert np.abs(found).max() == 0.0 if loop == "polygon" else True
+    if loop == "polygon":
+        # Straight, and so are extensions.
+        assert np.abs(found).max() == 0.0
 
 
 LOOPS = {
@@ -125,18 +124,23 @@ LOOPS = {
 }
 
 
+def length_of(points):
+    """Of a line through points."""
+    return np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+
+
 @pytest.mark.parametrize("name", LOOPS)
 def test_sides_are_the_loop(name):
     """Between corners: on the loop point by point, at each end straight on, turning as the loop does."""
     face = asm.Face(asm.shapes.plane(20.0, 20.0), LOOPS[name])
     sides, stretches = loop_sides(face.boundary, face.chains, (0.0, 0.0))
     assert len(sides) >= 2
-    total = sum(np.linalg.norm(np.diff(c.evaluate(np.linspace(*c.domain, 4001)), axis=0), axis=1).sum() for c in face.boundary)
+    total = sum(length_of(curve.evaluate(np.linspace(*curve.domain, 4001))) for curve in face.boundary)
     lengths = 0.0
     for k, side in enumerate(sides):
         t = np.linspace(side.start, side.end, 4001)
         points = side.curve.evaluate(t)
-        lengths += np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+        lengths += length_of(points)
         assert np.abs(face.trim_distance(points[::50, 0], points[::50, 1])).max() < 1e-14 * 4e1
         assert sides[side.after].before == k and sides[side.after].turn_before == side.turn_after
         eps = 1e-9 * (side.end - side.start)

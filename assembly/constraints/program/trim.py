@@ -41,7 +41,7 @@ from assembly.constraints.program.records import (
     trim_row_at,
 )
 from assembly.constraints.program.row_terms import add_gram
-from assembly.constraints.program.trim_sides import OPEN, trim_place
+from assembly.constraints.program.trim_sides import OPEN, part_of, trim_place
 from assembly.geometry.faces.trim_nearest import trim_nearest
 from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.evaluate import curve_point, surface_point
@@ -342,24 +342,6 @@ def trim_rows(scene, pairs, at):
             vector_rows(store, r, lifted, point)
         r += row.count
     return 0
-
-
-@kernel(inner=True)
-def part_of(jacobian, r, rates, k):
-    """The number a with row r = a rates + b row k, by least squares."""
-    ss = 0.0
-    sg = 0.0
-    gg = 0.0
-    rs = 0.0
-    rg = 0.0
-    for j in range(FREE_COLUMN + 4):
-        ss += rates[0, j] * rates[0, j]
-        sg += rates[0, j] * jacobian[k, j]
-        gg += jacobian[k, j] * jacobian[k, j]
-        rs += jacobian[r, j] * rates[0, j]
-        rg += jacobian[r, j] * jacobian[k, j]
-    det = ss * gg - sg * sg
-    return (rs * gg - rg * sg) / det if det > 1e-12 * ss * gg else 0.0
 
 
 @kernel(

@@ -28,8 +28,8 @@ from assembly.constraints.program.records import (
     loop_sides_at,
     stretch_at,
 )
-from assembly.constraints.program.trim import add_coordinate_rate, part_of, trim_of
-from assembly.constraints.program.trim_sides import side_number, trim_place
+from assembly.constraints.program.trim import add_coordinate_rate, trim_of
+from assembly.constraints.program.trim_sides import part_of, side_number, trim_place
 from assembly.geometry.faces.trim_nearest import trim_nearest
 from assembly.geometry.faces.trim_pieces import trim_at, trim_frame_at
 from assembly.proximity.features.trim_distance import trim_distance
@@ -37,8 +37,8 @@ from assembly.proximity.features.trim_distance import trim_distance
 # A distance in (u, v) is another one if it differs by more than this part of the loop's extent: the rounding of nearest
 # points. Only rows that are far from binding are left out by it.
 DIFFERENT = 1e-9
-# The sides of a trim's rows: number of that of slot 0 (-1: not known yet); the corner, with the number of the other side
-# plus one, positive where the loop turns left, and zero where there is none.
+# The sides of a trim's rows: the number of that of slot 0 (-1: not known yet); the corner, which is the number of the
+# other side plus one, positive where the loop turns left, and zero where there is none.
 Corner = namedtuple("Corner", "side corner")
 
 
@@ -129,7 +129,13 @@ def chosen_sides(store, row, before, found, at):
     stays = row.one_sided == 0 and (near == before.side or near == other)
     side = before.side if stays and before.side >= 0 else near
     corner = corner_next_to(store, row, sides, side, at, found.distance)
-    if row.one_sided == 1 and before.corner != 0 and corner != 0 and side == other and other_side(corner) == before.side:
+    if (
+        row.one_sided == 1
+        and before.corner != 0
+        and corner != 0
+        and side == other
+        and other_side(corner) == before.side
+    ):
         # The same two rows.
         return before
     return Corner(side, corner)

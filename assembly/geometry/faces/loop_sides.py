@@ -190,7 +190,9 @@ def _extended(pieces: Sequence[_Piece], longest: float) -> tuple[NurbsCurve, flo
         way = pieces[-1].direction(True) if at_end else -pieces[0].direction(False)
         length = _free_length(samples, end[:2] / end[2], way, size)
         part, step = (points[-1], steps[-1]) if at_end else (points[0][::-1], steps[0])
-        rate = degree * part[-2, 2] / part[-1, 2] * np.linalg.norm(np.diff(part[-2:, :2] / part[-2:, 2:], axis=0)) / step
+        rate = (
+            degree * part[-2, 2] / part[-1, 2] * np.linalg.norm(np.diff(part[-2:, :2] / part[-2:, 2:], axis=0)) / step
+        )
         share = np.linspace(0.0, 1.0, degree + 1)[:, None]
         places = end[:2] / end[2] + share * length * way
         line = np.column_stack([places * end[2], np.full(degree + 1, end[2])])

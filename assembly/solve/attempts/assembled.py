@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.packing.scene import Packed
-from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.attempts.postures import following_none, postures_from
 from assembly.solve.loop.settings import ASSEMBLES, GATHER, ITERATIONS, OBJECTIVE, SCATTER, SOLVED
 from assembly.solve.second_order.leave import Outcome

@@ -34,7 +34,6 @@ from assembly.constraints.packing.scene import Packed
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import multiply, rotation_matrix
-from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.attempts.attempts import attempt
 from assembly.solve.dense.jacobian import rows_of
 from assembly.solve.dense.row_table import gradient_at

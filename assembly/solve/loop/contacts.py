@@ -1,4 +1,4 @@
-"""The loop's contacts: where their pairs start, which get their coordinates as unknowns, and which sides they are on."""
+"""The loop's contacts: where their pairs start, which get coordinates as unknowns, which sides of loops they are on."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ from assembly.solve.loop.workspace import rows_in
 
 @kernel(inline=True)
 def observe(task, current, rows):
-    """Choose sides of loops, update the contact manager, place rows of clearances, weigh rows, and count the pairs that are to be lifted."""
+    """Choose sides of loops, update the contact manager, place clearance rows, weigh rows, count pairs to be lifted."""
     loop, limits, lifted = task.loop, task.limits, task.program.lifted
     table, one_sided = task.program.store.table, task.program.structure.one_sided
     if loop.iteration > 0:
