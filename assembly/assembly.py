@@ -362,7 +362,9 @@ class Assembly(Contents):
         """The scene as it is packed now, if nothing but values and places are others than in an earlier one."""
         mine = self._packed
         is_same = (
-            mine is not None and mine.origin is packed.origin and mine.structure == structure_of(self._seated_constraints())
+            mine is not None
+            and mine.origin is packed.origin
+            and mine.structure == structure_of(self._seated_constraints())
         )
         return mine if is_same else None
 
@@ -436,7 +438,7 @@ class Assembly(Contents):
             check_reach("a coordinate of the start", float(np.abs(q[:, :3]).max()), packed.scale)
             state[packed.contacts_at : packed.angles_at] = np.nan
             if turns is not None:
-                state[packed.angles_at : packed.multipliers_at : TRACK] = turns
+                state[packed.angles] = turns
         if starts is not None:
             self._place_starts(packed, state, starts)
         packed.refresh()

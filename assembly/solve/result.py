@@ -195,7 +195,7 @@ class Result(ReadOnlyArrays):
     def values(self) -> dict[str, float]:
         """Every freedom of every joint, "joint.freedom": lengths in the user's unit, angles in radians."""
         packed, state = self._ended
-        near = dict(zip(map(id, packed._angles), state[packed.angles_at : packed.multipliers_at : TRACK], strict=True))
+        near = dict(zip(map(id, packed._angles), state[packed.angles], strict=True))
         values = {}
         for joint in self._scene.constraints:
             for name, freedom in joint.freedoms.items() if isinstance(joint, Joint) else ():

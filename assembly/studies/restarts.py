@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.attempts.starts import Spread, far_starts, near_starts
 from assembly.solve.diagnosis.contradiction import is_certain
 from assembly.solve.interruption import Interruption
@@ -69,7 +68,7 @@ def restarted(
     """
     if isinstance(given, Solution):
         packed = given._packed
-        reference, turns = given.q, given._state[packed.angles_at : packed.multipliers_at : TRACK]
+        reference, turns = given.q, given._state[packed.angles]
     else:
         reference, turns = given, None
     settings = settings.copy()

@@ -21,7 +21,6 @@ from assembly.constraints.packing.asked import asked_between, asked_change
 from assembly.errors import InputError
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
-from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import can_prove, lent_proof, near_contacts
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import OUT_OF_TIME
@@ -195,7 +194,7 @@ class _Walk:
     @property
     def _angles(self) -> slice:
         """Where a state has the angles that are counted on past whole turns."""
-        return slice(self._packed.angles_at, self._packed.multipliers_at, TRACK)
+        return self._packed.angles
 
     def _in_the_way(self, at: Solution, done: float) -> dict[int, Answer]:
         """The pairs of bodies that are in the way, and what is proven of them a little beyond."""

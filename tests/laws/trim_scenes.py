@@ -38,6 +38,19 @@ def polygon(points):
     return [NurbsCurve([a, b], [0.0, 0.0, 1.0, 1.0], 1) for a, b in zip(points, ends, strict=True)]
 
 
+def arcs(points, bulge):
+    """Arcs from corner to corner, outward by this part of each chord; inward where it is negative."""
+    points = np.asarray(points, float)
+    curves = []
+    for a, b in zip(points, np.roll(points, -1, axis=0), strict=True):
+        out = bulge * np.array([b[1] - a[1], a[0] - b[0]])
+        # Of a quadratic with weights 1, w, 1 the middle is w / (1 + w) of the way to its inner point.
+        half = 2.0 * np.arctan(2.0 * abs(bulge))
+        w = np.cos(half)
+        curves.append(NurbsCurve([a, 0.5 * (a + b) + out * (1.0 + w) / w, b], [0, 0, 0, 1, 1, 1], 2, [1.0, w, 1.0]))
+    return curves
+
+
 def spline(rng, center, radius, count=7):
     """A closed cubic spline, continuous in curvature, around a center."""
     turns = 2.0 * np.pi * np.arange(count) / count
@@ -49,14 +62,15 @@ def loop_beside(rng, kind, uv, radius, inside, corner=False):
     """A loop whose nearest point is about a tenth of its radius from uv, or whose nearest point is a corner."""
     angle = rng.uniform(0.0, 2.0 * np.pi)
     way = np.array([np.cos(angle), np.sin(angle)])
-    if kind == "polygon":
+    if kind in ("polygon", "arcs"):
         turns = angle + (0.0 if corner else 0.2 * np.pi) + 0.4 * np.pi * np.arange(5)
         reach = radius if corner else radius * np.cos(0.2 * np.pi)
         center = np.asarray(uv) - (reach + (-0.1 if inside else 0.1) * radius) * way
         # A fifth of an edge aside, so that nothing is symmetric.
         if not corner:
             center = center + 0.2 * radius * np.array([-way[1], way[0]])
-        return polygon(center + radius * np.stack([np.cos(turns), np.sin(turns)], 1))
+        points = center + radius * np.stack([np.cos(turns), np.sin(turns)], 1)
+        return polygon(points) if kind == "polygon" else arcs(points, 0.08)
     if kind == "circle":
         return circle(np.asarray(uv) - (0.9 if inside else 1.1) * radius * way, radius)
     curve = spline(rng, np.zeros(2), radius)
@@ -88,13 +102,16 @@ class TrimScene:
     def uv(self):
         return self.x[2 * self.side : 2 * self.side + 2]
 
-    def tracked(self, x=None):
-        """The solve's values of the contact: coordinates, no features, no normal."""
-        return np.concatenate([self.x if x is None else x, np.zeros(TRACK - 4)])[None]
+    def tracked(self, x=None, sides=()):
+        """The solve's values of the contact: coordinates, no features, no normal; the sides of a loop with corners."""
+        tracked = np.zeros((int(self.scene.packed().table[layout.TRACKED]), TRACK))
+        tracked[0, :4] = self.x if x is None else x
+        tracked[len(tracked) - len(sides) :, 0] = sides
+        return tracked
 
-    def at(self, q, x=None):
+    def at(self, q, x=None, sides=()):
         """A point of the solve with the contact tracked from x."""
-        return LoopPoint(self.scene, q, self.tracked(x))
+        return LoopPoint(self.scene, q, self.tracked(x, sides))
 
 
 def _surface(rng, kind):
@@ -136,7 +153,7 @@ def trim_scene(seed, surface, loop, side, form, keep="on", gap=0.0, inside=True,
 class FreePoint:
     """The rows at poses and contact coordinates x (4,), which are unknowns of their own."""
 
-    def __init__(self, case, q, x, lengths=None):
+    def __init__(self, case, q, x, lengths=None, sides=()):
         base = case.at(case.q)
         self.table, self.pool, packed = base.table, base.pool, base.packed
         rows, moving = int(self.table[layout.ROWS]), int(self.table[layout.MOVING])
@@ -159,7 +176,7 @@ class FreePoint:
         self.loose = base.loose._replace(free=np.zeros(1, dtype=np.int64), lengths=lengths)
         self.shape = room_of_shape(self.table, self.rows, self.n, self.table[:0])
         arrange(self.table, self.loose.free, self.shape, self.rows, self.n)
-        start = case.tracked(x)
+        start = case.tracked(x, sides)
         self.program = base.program._replace(structure=self.shape, lifted=self.loose)
         assert evaluate(self.program, start, np.inf, self.point) < 0
 

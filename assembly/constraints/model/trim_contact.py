@@ -43,6 +43,8 @@ class TrimContact(Constraint):
         loop's own extremum against the other surface: u_f - c, f(u_f) - f(c) and g(u_g) - f(c). The first two count
         by their length, negative on the wrong side: the first row; their others are zero. "between" contains the gap
         and is for "on" alone; its three rows depend on one another at a solution, which slows a solve.
+        Of a loop with corners these are rows of the smooth side that the contact is on; one more, the last, is that of
+        the side which this meets at the corner next to the contact: its signed distance, one-sided.
     side : "a" or "b", optional
         Which of the contact's faces the loop is on; by default the one that has it, else "a".
     name : str, optional

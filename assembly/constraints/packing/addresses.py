@@ -8,6 +8,7 @@ from assembly.constraints.program.contact import contact_rows
 from assembly.constraints.program.lifted_contact import free_row, free_terms
 from assembly.constraints.program.tapes import run_scene_tape
 from assembly.constraints.program.trim import trim_rows, trim_terms
+from assembly.constraints.program.trim_corners import trim_sides
 from assembly.proximity.extrema.global_start import start_surfaces
 from assembly.proximity.extrema.lifted_pair import coordinate_lengths, has_stayed, is_extremal
 from assembly.proximity.features.nearest_query import find_deepest, find_nearest
@@ -16,7 +17,7 @@ from assembly.proximity.manager.contact_place import mark_places
 from assembly.proximity.manager.motion_bounds import measure_parts, went_beyond
 from assembly.proximity.manager.update import update
 
-__all__ = ["blocks", "contacts", "deepest", "places", "solids", "surfaces", "tapes", "trims", "manager"]
+__all__ = ["blocks", "contacts", "deepest", "places", "sides", "solids", "surfaces", "tapes", "trims", "manager"]
 
 
 def blocks() -> tuple[int, int]:
@@ -57,6 +58,11 @@ def places() -> int:
 def trims() -> tuple[int, int]:
     """Of `trim_rows` and `trim_terms`."""
     return address_of(trim_rows), address_of(trim_terms)
+
+
+def sides() -> int:
+    """Of `trim_sides`."""
+    return address_of(trim_sides)
 
 
 def manager() -> tuple[int, int, int, int]:

@@ -18,7 +18,10 @@ from assembly.constraints.model.trim_contact import FORMS, TrimContact
 from assembly.constraints.packing.numbering import gathering_order
 from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.program import records as layout
+from assembly.geometry.faces.loop_sides import loop_sides
 from assembly.geometry.faces.trim_pieces import trim_at
+from assembly.geometry.faces.trim_table import build
+from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.evaluate import CURVE_RECORD
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.brep.writer import edge_over
@@ -103,22 +106,49 @@ class RowPacking:
         _, at = writer.add(pool=[-factor if trim.keep == "outside" else factor])
         form = FORMS.index(trim.form)
         count = (1, 2, 3, 3)[form]
-        edges = -1
+        surface, edges = -1, -1
         if form > 0:
             writer.header[layout.VECTOR_TRIMS] = 1
             surface = self._rows[pair][layout.SURFACE_F + trim.side]
-            edges = self._loop_edges(trim, int(trim_at(table, 0).first), surface)
+            edges = self._edges(table, trim.region.boundary, surface)
+        sides = self._sides(trim, count, surface)
         row = [layout.TRIM_ROW, *writer.places_of(trim.bodies), int(trim.unilateral), 0, 1, pair, trim.side, loop, at]
-        row += [form, count, edges, int(trim.form in ("parametric", "cartesian"))]
         for _ in range(count):
-            self._add(trim, row)
+            self._add(trim, [*row, form, count, edges, int(trim.form in ("parametric", "cartesian")), sides, 0])
+        if sides >= 0:
+            row[layout.ONE_SIDED] = 1
+            self._add(trim, [*row, FORMS.index("signed"), 1, -1, 0, sides, 1])
 
-    def _loop_edges(self, trim: TrimContact, first: int, surface: int) -> int:
-        """Records of the curves of a trim's loop as edges on its surface; where they begin."""
-        edges = [
-            edge_over(surface, first + CURVE_RECORD * k, curve.closed) for k, curve in enumerate(trim.region.boundary)
-        ]
+    def _edges(self, loop: Table, curves: Sequence[NurbsCurve], surface: int) -> int:
+        """Records of the curves of a packed loop as edges on a surface; where they begin."""
+        first = int(trim_at(loop, 0).first)
+        edges = [edge_over(surface, first + CURVE_RECORD * k, curve.closed) for k, curve in enumerate(curves)]
         return self._writer.add(np.concatenate(edges))[0]
+
+    def _sides(self, trim: TrimContact, neighbor: int, surface: int) -> int:
+        """The sides of a trim's loop, whose second slot is `neighbor` rows behind the first; -1 if it has no corners.
+
+        `surface` is where the surface's record is, for forms that need edges, or -1.
+        """
+        writer, region = self._writer, trim.region
+        periods = region.surface._periods
+        sides, stretches = loop_sides(region.boundary, region.chains, periods)
+        if not sides:
+            return -1
+        fields: list[int] = []
+        for side in sides:
+            made = build((side.curve,), (range(1),), (False,), (), region.surface.domain, periods)
+            table, pool = made.at(writer.table_at, writer.pool_at)
+            loop, _ = writer.add(table, pool)
+            edges = self._edges(table, (side.curve,), surface) if surface >= 0 else -1
+            _, at = writer.add(pool=[side.start, side.end])
+            fields += [loop, edges, side.before, side.after, side.turn_before, side.turn_after, at]
+        first, _ = writer.add(fields)
+        ranges = [writer.add(pool=[stretch.start, stretch.end])[1] for stretch in stretches]
+        parts = [(stretch.curve, stretch.side, at) for stretch, at in zip(stretches, ranges, strict=True)]
+        stretch_table, _ = writer.add(np.array(parts, dtype=np.int64))
+        writer.sides += 2
+        return writer.add([len(sides), first, len(parts), stretch_table, writer.sides - 2, neighbor])[0]
 
     def add_joints(self, unknown_blocks: Table) -> None:
         """Rows of joints and couplings, whose bodies have these blocks of unknowns."""

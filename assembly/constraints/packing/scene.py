@@ -178,9 +178,10 @@ class Packed(ManagerLast):
         self.origin, self.crowding = object(), places
         self._write(bodies, constraints, objectives)
         self._take_addresses()
-        # Where the parts of a state begin: tracked values, multipliers, residuals, results.
+        # Where the parts of a state begin: tracked values (contacts, angles, sides), multipliers, residuals, results.
         self.contacts_at = 7 * self.count
         self.angles_at = self.contacts_at + TRACK * self.pair_rows
+        self.angles = slice(self.angles_at, self.angles_at + TRACK * len(self._angles), TRACK)
         self.multipliers_at = self.contacts_at + TRACK * self.tracked
         self.residuals_at = self.multipliers_at + self.rows
         self.results_at = self.residuals_at + self.rows
@@ -233,7 +234,7 @@ class Packed(ManagerLast):
         self.rows_table, self.rows_pool = writer.arrays()
         # What the loop is compiled for: None without a dexterity.
         self.end_effectors = 1 if header[layout.DEXTERITIES] else None
-        self.tracked = self.pair_rows + len(writer.angles)
+        self.tracked = int(header[layout.TRACKED])
         self.shells, self._angles = writer.shells, writer.angles
         self._places, self._frames = writer.places, writer.frames
         self._targets, self._turns = terms.targets, terms.turns
@@ -364,6 +365,8 @@ class Packed(ManagerLast):
             table[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
         if self.trims:
             table[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
+        if table[layout.FIRST_SIDE] < table[layout.TRACKED]:
+            table[layout.TRIM_SIDES_AT] = addresses.sides()
         if watched:
             table[[layout.UPDATE_AT, layout.STAYED_AT, layout.PARTS_AT, layout.WENT_AT]] = addresses.manager()
             manager = manager_records.manager_at(table, table[layout.MANAGER_RECORD])
@@ -403,7 +406,7 @@ class Packed(ManagerLast):
         """Write the turns that angles start on at the poses of a state into it."""
         if not self._angles:
             return
-        near = state[self.angles_at : self.multipliers_at : TRACK]
+        near = state[self.angles]
         if warm and not self._turned.coupled:
             self._turned.follow_drives(self.rows_pool, near)
             return

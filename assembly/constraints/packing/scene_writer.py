@@ -61,6 +61,7 @@ class SceneWriter(Writer):
         self.shells: dict[tuple[Face, ...], int] = {}
         self.frames: dict[FramePair, int] = {}
         self.angles: list[Coordinate] = []
+        self.sides = 0
         self._pair_rows = pair_rows
         self._angle_places: dict[Coordinate, int] = {}
         self._tape_room = [0, 0, 0]
@@ -130,5 +131,6 @@ class SceneWriter(Writer):
         header = self.header
         header[layout.JOINT_TABLE], _ = self.add(fields)
         header[layout.JOINTS] = len(self.frames)
-        header[layout.TRACKED] = self._pair_rows + len(self.angles)
+        header[layout.FIRST_SIDE] = self._pair_rows + len(self.angles)
+        header[layout.TRACKED] = header[layout.FIRST_SIDE] + self.sides
         header[layout.TAPE_WORKSPACE], _ = self.add(self._tape_room)

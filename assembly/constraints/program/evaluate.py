@@ -74,11 +74,11 @@ def evaluate(program, start, patience, point):
         lost = call_address(header.contact_rows_address, (store, start, patience, lifted.free, point))
         if lost >= 0:
             return lost
+    for k in range(pairs, header.tracked):
+        # Of an angle that no row has, only an input of a dexterity, and of sides of loops this is all that is known.
+        copy_tracked(start, k, point.tracked)
     if header.trims > 0:
         call_address(header.trim_rows_address, (store, lifted, point))
-    for k in range(pairs, header.tracked):
-        # Of an angle that no row has, only an input of a dexterity, this is all that is known.
-        copy_tracked(start, k, point.tracked)
     for k in range(header.joints):
         joint = joint_at(store.table, header.joint_table + JOINT_RECORD * k)
         place_frames(store.pool, joint.frames, point.q, joint.body_f, joint.body_g, point.records, pairs + k)

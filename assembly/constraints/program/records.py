@@ -6,7 +6,8 @@ iterates (`Iterate`), of
 
     q              (n, 7)       poses, scaled, positions relative to a reference
     tracked        (k, TRACK)   a `TRACKED_PAIR` of every contact (`proximity/features/solid_contact.py`), then angles
-                                of joints, counted on past whole turns, in the first column
+                                of joints, counted on past whole turns, in the first column, then there the sides
+                                that rows of trims are of (`trim_sides.py`)
     records        (k + j, R)   what the derivatives of gaps need (see `track_contact`), then frames of joints, then
                                 one of trims that are vectors
     residual       (m,)         rows: contacts, trims, joints, tapes; behind them four for every free pair
@@ -26,7 +27,7 @@ HEADER_RECORD = record_dtype(
     bodies=1,  # how many
     moving=1,  # bodies that are not fixed
     contacts=1,  # rows of contacts, given ones and those of clearances; they come first
-    tracked=1,  # rows of tracked values: contacts, then angles
+    tracked=1,  # rows of tracked values: contacts, then angles, then sides of loops with corners
     joints=1,
     rows=1,  # constraint residuals in all
     tapes=1,  # users' expressions that are constraints
@@ -49,6 +50,8 @@ HEADER_RECORD = record_dtype(
     deepest_address=1,  # the same of solids that are in each other; 0: not needed yet
     trim_rows_address=1,  # rows of trims
     trim_terms_address=1,  # their second derivatives
+    trim_sides_address=1,  # chooses the sides of loops with corners; 0: no loop has any
+    first_side=1,  # first row of tracked values that has sides of loops, behind those of angles
     first_clearance_row=1,  # first row of a clearance, among those of contacts; one without bodies is idle
     clearance_rows=1,  # how many rows clearances have
     manager_record=1,  # the contact manager (`proximity/manager/update.py`); -1: no clearance
@@ -95,6 +98,8 @@ NEAREST_AT = place_of(HEADER_RECORD, "nearest_address")
 DEEPEST_AT = place_of(HEADER_RECORD, "deepest_address")
 TRIM_ROWS_AT = place_of(HEADER_RECORD, "trim_rows_address")
 TRIM_TERMS_AT = place_of(HEADER_RECORD, "trim_terms_address")
+TRIM_SIDES_AT = place_of(HEADER_RECORD, "trim_sides_address")
+FIRST_SIDE = place_of(HEADER_RECORD, "first_side")
 FIRST_CLEARANCE_ROW = place_of(HEADER_RECORD, "first_clearance_row")
 CLEARANCE_ROWS = place_of(HEADER_RECORD, "clearance_rows")
 MANAGER_RECORD = place_of(HEADER_RECORD, "manager_record")
@@ -112,7 +117,7 @@ RUN_TAPE_AT = place_of(HEADER_RECORD, "run_tape_address")
 KEPT = place_of(HEADER_RECORD, "kept")
 HEADER = size_of(HEADER_RECORD)
 # A row, of any kind. Row k is that of contact k. Fields of its kind stand behind these.
-ROW = 14
+ROW = 16
 EVERY_ROW: dict[str, int | tuple[int, ...]] = dict(
     kind=1,  # CONTACT_ROW, ...
     body_f=1,  # -1: none
@@ -160,12 +165,47 @@ TRIM_ROW_RECORD = record_dtype(
     count=1,  # rows that the trim has; its first one says
     edges=1,  # records of the loop's curves as edges
     by_length=1,  # 1: a vector counts by its signed length
+    sides=1,  # a `LOOP_SIDES` of a loop with corners; -1: it has none
+    slot=1,  # 0: of the side that the contact is on, 1: of the one that this meets at the corner next to it
 )
 trim_row_at = record_view(TRIM_ROW_RECORD)
 TRIM_PAIR = place_of(TRIM_ROW_RECORD, "contact")
 TRIM_LENGTH = place_of(TRIM_ROW_RECORD, "by_length")
 # Forms of trims (`trim.py`).
 SIGNED, PARAMETRIC, CARTESIAN, BETWEEN = 0, 1, 2, 3
+# The sides of a loop with corners, which two rows are of: see `trim_sides.py`.
+LOOP_SIDES = record_dtype(
+    "i8",
+    count=1,
+    sides=1,  # where records of sides begin
+    stretches=1,  # how many parts of boundary curves there are, each on one side
+    stretch_table=1,  # where their records begin
+    place=1,  # behind the first row of tracked sides: the row that has the side of slot 0, the next that of slot 1
+    neighbor=1,  # where the row of slot 1 is, behind the first one of the trim
+)
+loop_sides_at = record_view(LOOP_SIDES)
+# A side: a smooth part of a loop, with a straight extension at each end.
+SIDE_FIELDS = record_dtype(
+    "i8",
+    loop=1,  # a trim of the side alone
+    edges=1,  # its curve as an edge; -1 where the form has no use for it
+    before=1,  # the side that it meets at its start
+    after=1,  # and at its end
+    turn_before=1,  # how the loop turns there: 1 to the left, -1 to the right, 0: it is smooth
+    turn_after=1,
+    range=1,  # where in the pool the two parameters are between which it is the loop's
+)
+side_at = record_view(SIDE_FIELDS)
+SIDE = size_of(SIDE_FIELDS)
+# The part of a boundary curve that is on a side.
+STRETCH_FIELDS = record_dtype(
+    "i8",
+    curve=1,  # number of the curve
+    side=1,
+    range=1,  # where in the pool its two parameters are
+)
+stretch_at = record_view(STRETCH_FIELDS)
+STRETCH = size_of(STRETCH_FIELDS)
 # A row of a joint: factor * coordinate + factor' * second coordinate - value.
 JOINT_ROW_RECORD = record_dtype(
     "i8",

@@ -14,6 +14,7 @@ another (the loop's extremum is then the contact's), each a multiple of s; so ar
 be. Off the loop the vector u - c = s n has two independent rates, n s_q and s n_q, of which the second forbids what the
 loop allows, to slide along it: the closer to the loop, the larger the multiplier that says so. So the first two forms
 count by their signed length, one row that is zero where the vector is. The third contains the gap and has no such sign.
+A row of a loop with corners is of one of its sides (`trim_sides.py`).
 The loop of a solve calls `trim_rows` and `trim_terms` by their addresses.
 """
 
@@ -40,6 +41,7 @@ from assembly.constraints.program.records import (
     trim_row_at,
 )
 from assembly.constraints.program.row_terms import add_gram
+from assembly.constraints.program.trim_sides import OPEN, part_of, trim_place
 from assembly.geometry.faces.trim_nearest import trim_nearest
 from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.evaluate import curve_point, surface_point
@@ -96,23 +98,27 @@ def signed_row(store, r, lifted, point):
     row = trim_of(store.table, r)
     k = row.contact
     o = 2 * row.side
-    factor = store.pool[row.factor]
-    s, n, _bend = trim_distance(store, row.loop, tracked[k, o], tracked[k, o + 1])
-    residual[r] = factor * s
     clear(jacobian, r)
+    place = trim_place(store, row, tracked)
+    if place.loop < 0:
+        residual[r] = OPEN
+        return
+    factor = place.factor
+    s, n, _bend = trim_distance(store, place.loop, tracked[k, o], tracked[k, o + 1])
+    residual[r] = factor * s
     add_coordinate_rate(lifted, records, k, o, factor * n[0], jacobian, r)
     add_coordinate_rate(lifted, records, k, o + 1, factor * n[1], jacobian, r)
 
 
 @kernel(inner=True)
-def loop_extremum(store, trim, x, o, turn, pose, records, scratch):
+def loop_extremum(store, trim, place, x, turn, pose, records, scratch):
     """The loop's point that is extremal against the other surface: found near the contact x, its record in `scratch`.
 
     Returns the curve, its parameter, whether it moves (it does not at a corner), and the signed distance of x.
     """
-    loop = trim.loop
+    loop, o = place.loop, 2 * trim.side
     s, number, t, _cu, _cv, _nu, _nv = trim_nearest(store, loop, 0, trim_at(store.table, loop).curves, x[o], x[o + 1])
-    edge = trim.edges + EDGE_RECORD * number
+    edge = place.edges + EDGE_RECORD * number
     on_loop = Feature(EDGE, edge)
     on_face = Feature(FACE, trimmed_surface(store.table, trim, 1 - trim.side))
     none = (0.0, 0.0, 0.0)
@@ -181,8 +187,9 @@ def vector_rows(store, first, lifted, point):
     turn_g = rotation(q, j)
     pose = relative_pose(q, i, turn_f, j, turn_g)
     scratch = header.contacts + header.joints
-    curve, t, moves, s = loop_extremum(store, trim, x, o, turn_f, pose, records, scratch)
-    factor = store.pool[trim.factor]
+    place = trim_place(store, trim, tracked)
+    curve, t, moves, s = loop_extremum(store, trim, place, x, turn_f, pose, records, scratch)
+    factor = place.factor
     kept = 1.0 if factor >= 0.0 else -1.0
     factor = abs(factor)
     turn = turn_f if side == 0 else turn_g
@@ -299,8 +306,8 @@ def growth(store, r, j, lifted, point):
     k = row.contact
     derivatives = derivatives_at(records, k)
     o = 2 * row.side
-    factor = store.pool[row.factor]
-    _s, n, _bend = trim_distance(store, row.loop, tracked[k, o], tracked[k, o + 1])
+    place = trim_place(store, row, tracked)
+    _s, n, _bend = trim_distance(store, place.loop, tracked[k, o], tracked[k, o + 1])
     value = 0.0
     for i in range(2):
         if lifted.free[k] >= 0:
@@ -308,7 +315,7 @@ def growth(store, r, j, lifted, point):
         elif j < FREE_COLUMN:
             for l in range(4):
                 value += n[i] * derivatives.rates[o + i, l] * derivatives.zed[l, j]
-    return factor * value
+    return place.factor * value
 
 
 @kernel(
@@ -337,24 +344,6 @@ def trim_rows(scene, pairs, at):
     return 0
 
 
-@kernel(inner=True)
-def part_of(jacobian, r, rates, k):
-    """The number a with row r = a rates + b row k, by least squares."""
-    ss = 0.0
-    sg = 0.0
-    gg = 0.0
-    rs = 0.0
-    rg = 0.0
-    for j in range(FREE_COLUMN + 4):
-        ss += rates[0, j] * rates[0, j]
-        sg += rates[0, j] * jacobian[k, j]
-        gg += jacobian[k, j] * jacobian[k, j]
-        rs += jacobian[r, j] * rates[0, j]
-        rg += jacobian[r, j] * jacobian[k, j]
-    det = ss * gg - sg * sg
-    return (rs * gg - rg * sg) / det if det > 1e-12 * ss * gg else 0.0
-
-
 @kernel(
     signatures=(
         "(Tuple((i8[::1], f8[::1])), i8, "
@@ -376,12 +365,15 @@ def trim_terms(scene, r, pairs, bases, point, y, hessian):
     row = trim_of(table, r)
     k = row.contact
     o = 2 * row.side
-    _s, n, bend = trim_distance(Store(table, pool), row.loop, tracked[k, o], tracked[k, o + 1])
+    place = trim_place(Store(table, pool), row, tracked)
+    if place.loop < 0:
+        return 0
+    _s, n, bend = trim_distance(Store(table, pool), place.loop, tracked[k, o], tracked[k, o + 1])
     places = np.empty((1, bases.shape[1]), np.int64)
     for b in range(bases.shape[1]):
         places[0, b] = bases[r, b]
     rates = np.zeros((1, jacobian.shape[1]))
-    factor = pool[row.factor]
+    factor = place.factor
     if row.form != SIGNED:
         add_coordinate_rate(lifted, records, k, o, n[0], rates, 0)
         add_coordinate_rate(lifted, records, k, o + 1, n[1], rates, 0)

@@ -27,7 +27,7 @@ from assembly.geometry.faces.trim_pieces import (
 )
 
 # Neighbors whose directions differ by less [rad] are one smooth curve.
-_SMOOTH = 1e-6
+SMOOTH = 1e-6
 # A foot this near to the end of a piece is at the end if the point is beyond it by more than the second, both parts of
 # the boundary's size.
 _AT_END, _BEYOND = 1e-9, 1e-13
@@ -192,7 +192,7 @@ def _foot(store, trim, span, piece, t, point, q):
         # Positive for a corner that is convex: only points outside have it nearest.
         turn = dx * ay - dy * ax if end > 0 else ax * dy - ay * dx
         same_way = dx * ax + dy * ay > 0.0
-        if same_way and abs(turn) <= _SMOOTH:
+        if same_way and abs(turn) <= SMOOTH:
             smooth = True
         elif same_way or abs(turn) > 1e-9:
             sign = -1.0 if turn > 0.0 else 1.0

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.packing.scene import Packed
-from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.attempts.postures import following_none, postures_from
 from assembly.solve.loop.settings import ASSEMBLES, GATHER, ITERATIONS, OBJECTIVE, SCATTER, SOLVED
 from assembly.solve.second_order.leave import Outcome
@@ -46,12 +45,12 @@ def _has_turns_of_its_pose(packed: Packed, state: Array, turns: Array | None) ->
     """Whether the turns in a state are those that a start from its poses has."""
     fresh = state.copy()
     _choose_turns(packed, fresh, turns)
-    angles = slice(packed.angles_at, packed.multipliers_at, TRACK)
+    angles = packed.angles
     return bool((np.abs(fresh[angles] - state[angles]) < np.pi).all())
 
 
 def _choose_turns(packed: Packed, state: Array, turns: Array | None) -> None:
-    state[packed.angles_at : packed.multipliers_at : TRACK] = 0.0 if turns is None else turns
+    state[packed.angles] = 0.0 if turns is None else turns
     packed.start_angles(state, warm=False)
 
 

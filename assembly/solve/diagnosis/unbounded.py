@@ -34,7 +34,6 @@ from assembly.constraints.packing.scene import Packed
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import multiply, rotation_matrix
-from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.attempts.attempts import attempt
 from assembly.solve.dense.jacobian import rows_of
 from assembly.solve.dense.row_table import gradient_at
@@ -91,7 +90,7 @@ class Place:
     def of(cls, packed: Packed, state: Array) -> Place:
         """Where a state is."""
         q = state[: packed.contacts_at].reshape(-1, 7).copy()
-        angles = state[packed.angles_at : packed.multipliers_at : TRACK].tolist()
+        angles = state[packed.angles].tolist()
         return cls(q, dict(zip(map(id, packed._angles), angles, strict=True)))
 
     def state(self, packed: Packed) -> Array:
@@ -99,7 +98,7 @@ class Place:
         state = packed.new_state()
         state[: packed.contacts_at] = self.q.ravel()
         state[packed.contacts_at : packed.angles_at] = np.nan
-        state[packed.angles_at : packed.multipliers_at : TRACK] = [self.angles[id(angle)] for angle in packed._angles]
+        state[packed.angles] = [self.angles[id(angle)] for angle in packed._angles]
         return state
 
 

@@ -1,4 +1,4 @@
-"""The loop's contacts: where their pairs start, and which of them get their coordinates as unknowns."""
+"""The loop's contacts: where their pairs start, which get coordinates as unknowns, which sides of loops they are on."""
 
 from __future__ import annotations
 
@@ -120,4 +120,20 @@ def lifted_pairs_hold(store, q, contacts, free, tolerance):
         bodies = (contact.body_f, contact.body_g)
         if call_address(header.extremal_address, (store, surfaces, bodies, q, contacts, k, tolerance)) == 0:
             return False
+    return True
+
+
+@kernel(inner=True)
+def choose_sides(program, current, rows, least):
+    """Choose the sides of loops that rows of trims are of at the iterate, and evaluate these. Whether some are others.
+
+    Multipliers that are proposed tell whether a contact goes on around a corner, if they are above `least`.
+    """
+    store, lifted = program.store, program.lifted
+    header = header_at(store.table, 0)
+    if header.trim_sides_address == 0:
+        return False
+    if call_address(header.trim_sides_address, (store, lifted, current, least, rows.y, rows.better_y)) == 0:
+        return False
+    call_address(header.trim_rows_address, (store, lifted, current))
     return True

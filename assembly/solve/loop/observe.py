@@ -11,7 +11,7 @@ from assembly.proximity.manager.records import memory_header_at
 from assembly.proximity.manager.update import AS_NEEDED, CAREFUL, DOUBTFUL, IN_TURNS, MEASURED, SPARING
 from assembly.solve.loop.begin import let_touch, overlap_allowed, rearrange
 from assembly.solve.loop.clearances import place_clearance_rows, update_again
-from assembly.solve.loop.contacts import lift_folds
+from assembly.solve.loop.contacts import choose_sides, lift_folds
 from assembly.solve.loop.deadline import is_cut, may_end, set_deadline
 from assembly.solve.loop.line_search import goal
 from assembly.solve.loop.multipliers import choose_multipliers, weigh_rows
@@ -26,12 +26,13 @@ from assembly.solve.loop.workspace import rows_in
 
 @kernel(inline=True)
 def observe(task, current, rows):
-    """Update the contact manager, place rows of clearances, weigh rows, and count the pairs that are to be lifted."""
+    """Choose sides of loops, update the contact manager, place clearance rows, weigh rows, count pairs to be lifted."""
     loop, limits, lifted = task.loop, task.limits, task.program.lifted
     table, one_sided = task.program.store.table, task.program.structure.one_sided
     if loop.iteration > 0:
         set_deadline(table, task.settings, lifted.memory, loop.begin)
     loop.late = is_cut(table, lifted.memory)
+    choose_sides(task.program, current, rows, 0.0)
     if task.watched and not loop.changed:
         enough = loop.feasible if task.tick else TOUCHING
         holds = off_rows(table, lifted, one_sided, current, task.tick) <= enough

@@ -10,6 +10,7 @@ from assembly.constraints.program.records import header_at
 from assembly.proximity.manager.update import EVERYTHING, any_crossed
 from assembly.solve.loop.arrival import has_arrived, is_rounding, reach_of
 from assembly.solve.loop.clearances import numbers_of, update_again
+from assembly.solve.loop.contacts import choose_sides
 from assembly.solve.loop.deadline import is_spent
 from assembly.solve.loop.loop_state import lead_back
 from assembly.solve.loop.parameters import GAIN, HALF, LINGERS, LONGER, SHORT, STANDS, STRAYING
@@ -31,6 +32,8 @@ def terminate(task, held, current, rows, system):
     arrived = is_solution(task, current, rows, system)
     final_update = task.watched and task.limits.final_update == 1.0
     # Where every final update finds other contacts, the limit ends it.
+    if arrived and goes_around(task, current, rows):
+        return True
     if arrived and not goes_back and not (final_update and loop.iteration > loop.limit):
         arrive(task, final_update, current)
         return True
@@ -59,6 +62,19 @@ def is_solution(task, current, rows, system):
     dual = 0.0 if rounded else loop.dual
     table = task.program.store.table
     return has_arrived(table, task.settings, task.results, loop.violation, loop.feasible, dual)
+
+
+@kernel(inline=True)
+def goes_around(task, current, rows):
+    """Whether a contact on a loop goes on around a corner, by the multipliers of the iterate: then that is no end."""
+    loop = task.loop
+    if header_at(task.program.store.table, 0).trim_sides_address == 0:
+        return False
+    for r in range(rows.count):
+        rows.better_y[r] = rows.y[r]
+    goes = choose_sides(task.program, current, rows, task.limits.stationarity)
+    loop.iteration += 1 if goes else 0
+    return goes
 
 
 @kernel(inline=True)

@@ -171,7 +171,7 @@ class ReferenceSolver:
         state = self._scene._start(packed, q0, starts)
         q = state[: packed.contacts_at].reshape(-1, 7).copy()
         parameters = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[:, :4]
-        near = dict(zip(packed._angles, state[packed.angles_at : packed.multipliers_at : TRACK].tolist(), strict=True))
+        near = dict(zip(packed._angles, state[packed.angles].tolist(), strict=True))
         p = self._given(q)
         found = [
             pair.find(q, None if np.isnan(at).any() else at) for pair, at in zip(self._pairs, parameters, strict=True)
@@ -293,7 +293,7 @@ class ReferenceSolver:
         state[: packed.contacts_at] = q.ravel()
         tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
         tracked[:, :4], tracked[:, FEATURE_F:] = found.parameters, 0.0
-        state[packed.angles_at : packed.multipliers_at : TRACK] = [angles[angle] for angle in packed._angles]
+        state[packed.angles] = [angles[angle] for angle in packed._angles]
         state[packed.multipliers_at : packed.residuals_at] = forces[self._places]
         state[packed.residuals_at : packed.results_at] = np.where(packed.lengths, packed.scale, 1.0) * found.residuals
         results = state[packed.results_at :]
