@@ -1,0 +1,190 @@
+"""A scene as it is packed for the compiled loop: once after a change, and again where a solve needs more of it.
+
+More places for contacts of clearances, rows for the corners of contacts, joints for contacts that are lower pairs: what
+a solve has found to need stays with the scene, and states of solutions of before are taken over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.constraints.model.constraint import Constraint, structure_changes
+from assembly.constraints.model.contact import Contact, lone_surfaces
+from assembly.constraints.model.contents import Contents
+from assembly.constraints.model.joint import Joint
+from assembly.constraints.packing.earlier import is_earlier, is_same_scene, taken_over
+from assembly.constraints.packing.lower_pairs import LowerPair, lower_pairs
+from assembly.constraints.packing.scene import MORE_PLACES, Packed, structure_of
+from assembly.constraints.packing.scene_size import check_reach, scene_size
+from assembly.errors import InputError, vector
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import pose_rows
+from assembly.proximity.extrema.pairs import inside
+from assembly.proximity.features.solid_contact import TRACK
+from assembly.solve.scene import Scene
+from assembly.solve.solution import Solution
+
+__all__ = ["PackedContents"]
+
+Array = NDArray[np.float64]
+
+
+class PackedContents(Contents):
+    """Bodies, constraints and terms, and how they are packed; see `Assembly`."""
+
+    def __init__(self, bodies: Iterable[Body] = ()) -> None:
+        self._packed: Packed | None = None
+        self._crowding = 1  # how many times as many places as clearances ask for
+        self._corners = False  # whether corners of contacts of solids are listed
+        self._scene: Scene | None = None
+        super().__init__(bodies)
+
+    def _has_changed(self) -> None:
+        # Packed anew: of copies what a solve of the one has changed there the other does not know.
+        self._packed = self._scene = None
+        self._corners = False
+        self._lower_pairs: list[LowerPair] | None = None
+        self._seats: tuple[tuple[int, Joint], ...] = ()  # contacts that are joints where the last solve began
+        self._packings: dict[tuple[tuple[int, Joint], ...], tuple[Packed | None, Scene | None]] = {}
+
+    def packed(self) -> Packed:
+        """The scene as the compiled loop reads it; made at first use."""
+        if self._packed is not None and self._packed.stamp != structure_changes():
+            # A row came or went somewhere; perhaps in another scene.
+            if self._packed.structure == structure_of(self._seated_constraints()):
+                self._packed.stamp = structure_changes()
+            else:
+                self._packed = None
+        before = self._packed
+        if before is not None and before.may_have_outgrown():
+            # Nothing was a length then, a slide driven to 0 say, or only one that was rounding.
+            if before.is_outgrown(scene_size(self._bodies, self._constraints, self._objectives)):
+                self._packed = None
+        if self._packed is None:
+            if all(body.fixed for body in self._bodies):
+                raise InputError(f"bodies are {[body.name for body in self._bodies]}, none moving; expected one")
+            return self._pack(before)
+        return self._packed
+
+    def _pack(self, before: Packed | None) -> Packed:
+        """Pack the scene, which was packed otherwise before."""
+        constraints = self._seated_constraints()
+        packed = Packed(self._bodies, constraints, self._objectives, self._crowding, self._corners)
+        seats = tuple(item for number, _ in self._seats if isinstance(item := self._constraints[number], Contact))
+        self._scene = Scene(
+            self.bodies, tuple(constraints), tuple(packed.contacts), tuple(packed.sides), packed.scale, seats
+        )
+        packed.before = before
+        self._packed = packed
+        return packed
+
+    def _pack_with_more_places(self) -> Packed:
+        """The scene packed again, with more places for contacts of clearances. What is proven of its pairs stays."""
+        before = self.packed()
+        self._crowding *= MORE_PLACES
+        packed = self._pack(before)
+        packed.origin, packed.proofs, packed.stood = before.origin, before.proofs, before.stood
+        return packed
+
+    def _packed_as(self, packed: Packed) -> Packed | None:
+        """The scene as it is packed now, if nothing but values and places are others than in an earlier one."""
+        mine = self._packed
+        is_same = (
+            mine is not None
+            and mine.origin is packed.origin
+            and mine.structure == structure_of(self._seated_constraints())
+        )
+        return mine if is_same else None
+
+    def _seated_constraints(self) -> list[Constraint]:
+        """The constraints, and joints in place of contacts that are lower pairs where the last solve began."""
+        constraints = self._constraints.copy()
+        for number, joint in self._seats:
+            constraints[number] = joint
+        return constraints
+
+    def _take_seats(self, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None = None) -> None:
+        """Make those contacts joints that are lower pairs at a start, or were where a solution began.
+
+        One whose pair the user starts is none of them. What was packed for others is kept for their solutions.
+        """
+        if isinstance(q0, Solution):
+            packed = q0._ended.packed
+            if self._packed is not None and is_same_scene(packed, self._packed):
+                return
+            kept = self._packings.items()
+            known = (key for key, (other, _) in kept if other is not None and is_same_scene(packed, other))
+            seats = next(known, self._seats)
+        else:
+            if self._lower_pairs is None:
+                self._lower_pairs = lower_pairs(self._constraints)
+            if not self._lower_pairs:
+                return
+            poses = dict(zip(self._bodies, self._given(q0), strict=True))
+            named = starts if isinstance(starts, Mapping) else {}
+            found = [(pair.number, pair.at(poses)) for pair in self._lower_pairs]
+            seats = tuple(
+                (k, joint) for k, joint in found if joint is not None and self._constraints[k].name not in named
+            )
+        if seats != self._seats:
+            self._packings[self._seats] = self._packed, self._scene
+            self._packed, self._scene = self._packings.pop(seats, (None, None))
+            self._seats = seats
+
+    def _given(self, q0: ArrayLike | None) -> Array:
+        """Poses (n, 7) of a start."""
+        return self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
+
+    def _start(
+        self,
+        packed: Packed,
+        q0: ArrayLike | Solution | None,
+        starts: Mapping[str, ArrayLike] | None,
+        turns: Array | None = None,
+    ) -> Array:
+        """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
+        if isinstance(q0, Solution):
+            state = self._state_of("q0", packed, q0).copy()
+        else:
+            state = packed.new_state()
+            q = state[: packed.contacts_at].reshape(-1, 7)
+            q[:] = self.q if q0 is None else pose_rows("q0", q0, len(self._bodies))
+            check_reach("a coordinate of the start", float(np.abs(q[:, :3]).max()), packed.scale)
+            state[packed.contacts_at : packed.angles_at] = np.nan
+            if turns is not None:
+                state[packed.angles] = turns
+        if starts is not None:
+            self._place_starts(packed, state, starts)
+        packed.refresh()
+        packed.start_angles(state, isinstance(q0, Solution))
+        return state
+
+    @staticmethod
+    def _state_of(name: str, packed: Packed, solution: Solution) -> Array:
+        if solution._ended.packed is packed:
+            return solution._ended.state
+        if is_earlier(solution._ended.packed, packed):
+            return taken_over(solution._ended.packed, packed, solution._ended.state)
+        raise InputError(f"{name} is a solution of another assembly, or of this one before a change; expected its own")
+
+    def _place_starts(self, packed: Packed, state: Array, starts: Mapping[str, ArrayLike]) -> None:
+        if not isinstance(starts, Mapping):
+            raise TypeError(f"starts is {starts!r}; expected a mapping of constraint name to parameters")
+        names = [contact.name for contact in packed.contacts]
+        for name, value in starts.items():
+            if name not in names:
+                known = ", ".join(map(repr, names)) or "none, the assembly has no contacts"
+                raise InputError(f"starts names {name!r}; expected a contact: {known}")
+            k = names.index(name)
+            at = packed.contacts_at + TRACK * k
+            what = f"starts[{name!r}]"
+            surfaces = lone_surfaces(packed.sides[k])
+            if surfaces is None:
+                raise InputError(f"{what} is of solids with several faces; expected a contact of two faces")
+            state[at : at + 4] = inside(what, vector(what, value, 4), surfaces)
+            state[at + 4 : at + TRACK] = 0.0
+            # Rows that the last solve left are of other pairs.
+            state[packed.kept_at :] = 0.0
