@@ -141,13 +141,15 @@ def test_a_hand_leads_around_corners(name, keep):
     tracker = case.scene.tracker(case.ball.point(0.0, 0.0, 0.0))
     for angle in np.linspace(0.0, 2.0 * np.pi, 200):
         target = 4.0 * np.array([np.cos(angle), np.sin(angle)])
+        # The scene's own wish goes with the hand: it would hold the ball back.
+        case.wish.target = np.array([*target, 1.0])
         step = tracker.step((*target, 1.0))
         assert step.status.name in ("FOLLOWED", "APPROACHING"), (angle, step.status)
         place = step.q[1, :2]
         distance = float(trim.region.trim_distance(*place))
         assert (abs(distance) if keep == "on" else -distance) < 1e-7
         if name == "square":
-            assert np.linalg.norm(place - np.clip(target, -2.0, 2.0)) < 0.4
+            assert np.linalg.norm(place - np.clip(target, -2.0, 2.0)) < 0.1
 
 
 def test_a_corner_on_a_cylinder():

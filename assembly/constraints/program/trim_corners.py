@@ -97,9 +97,13 @@ def corner_next_to(store, row, sides, number, at, distance):
 
 @kernel(inner=True, allocates=True)
 def side_multiplier(store, r, lifted, point, y):
-    """The multiplier of the signed row of slot 0 that pushes as the rows of its trim do, from r on."""
+    """The multiplier of the signed row of slot 0 that pushes as the rows of its trim do, from r on.
+
+    A length is a positive multiple of the signed distance; its multiplier stands for that one's. Components that contain
+    the gap are taken apart (of a contact whose coordinates are unknowns, by these alone: to first order in them).
+    """
     row = trim_of(store.table, r)
-    if row.form == SIGNED:
+    if row.form == SIGNED or row.by_length == 1:
         return y[r]
     k, o = row.contact, 2 * row.side
     place = trim_place(store, row, point.tracked)
