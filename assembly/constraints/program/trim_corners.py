@@ -99,8 +99,8 @@ def corner_next_to(store, row, sides, number, at, distance):
 def side_multiplier(store, r, lifted, point, y):
     """The multiplier of the signed row of slot 0 that pushes as the rows of its trim do, from r on.
 
-    A length is a positive multiple of the signed distance; its multiplier stands for that one's. Components that contain
-    the gap are taken apart (of a contact whose coordinates are unknowns, by these alone: to first order in them).
+    A length is a positive multiple of the signed distance; its multiplier stands for that one's. Components that
+    contain the gap are a combination of both, which is found by their gradients over the twists of a tracked pair.
     """
     row = trim_of(store.table, r)
     if row.form == SIGNED or row.by_length == 1:
