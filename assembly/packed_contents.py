@@ -38,14 +38,14 @@ class PackedContents(Contents):
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._packed: Packed | None = None
         self._crowding = 1  # how many times as many places as clearances ask for
-        self._corners = False  # whether corners of contacts of solids are listed
-        self._scene: Scene | None = None
+        self._has_changed()
         super().__init__(bodies)
 
     def _has_changed(self) -> None:
         # Packed anew: of copies what a solve of the one has changed there the other does not know.
-        self._packed = self._scene = None
-        self._corners = False
+        self._packed = None
+        self._scene: Scene | None = None
+        self._corners = False  # whether corners of contacts of solids are listed
         self._lower_pairs: list[LowerPair] | None = None
         self._seats: tuple[tuple[int, Joint], ...] = ()  # contacts that are joints where the last solve began
         self._packings: dict[tuple[tuple[int, Joint], ...], tuple[Packed | None, Scene | None]] = {}
@@ -113,7 +113,7 @@ class PackedContents(Contents):
         """
         if isinstance(q0, Solution):
             packed = q0._ended.packed
-            if self._packed is not None and is_same_scene(packed, self._packed):
+            if packed is self._packed or (self._packed is not None and is_same_scene(packed, self._packed)):
                 return
             kept = self._packings.items()
             known = (key for key, (other, _) in kept if other is not None and is_same_scene(packed, other))

@@ -91,12 +91,14 @@ class Result(ReadOnlyArrays):
 
     @property
     def _packed(self) -> Packed:
-        self._list_contacts()
+        if self._lists is not None:
+            self._list_contacts()
         return self._ended.packed
 
     @property
     def _state(self) -> Array:
-        self._list_contacts()
+        if self._lists is not None:
+            self._list_contacts()
         return self._ended.state
 
     @cached_property

@@ -36,13 +36,15 @@ class ManagerLast:
     @property
     def table(self) -> Table:
         """The table with the contact manager of clearances."""
-        self._write_manager()
+        if self._unwritten is not None:
+            self._write_manager()
         return self.rows_table
 
     @property
     def pool(self) -> Array:
         """The pool with the contact manager of clearances."""
-        self._write_manager()
+        if self._unwritten is not None:
+            self._write_manager()
         return self.rows_pool
 
     def _write_manager(self) -> None:

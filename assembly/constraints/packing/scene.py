@@ -111,6 +111,8 @@ class Packed(ManagerLast):
     clearances : list of Clearance
     clearance_pairs : list of list of (Body, Body)
         The pairs of bodies of every clearance.
+    keeps_apart : bool
+        Whether a clearance keeps two bodies apart, so that ends of solves are to be proven.
     corners : list of ContactCorners
         Contacts whose corners are listed.
     kept : list of Kept
@@ -165,6 +167,7 @@ class Packed(ManagerLast):
         ]
         self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
         self.clearance_pairs = manager_packing.clearance_pairs(self.clearances, bodies)
+        self.keeps_apart = any(self.clearance_pairs)
         listed = corners_of(self.contacts, self.whole, self.clearances, self.clearance_pairs) if corners else []
         self.corners: list[ContactCorners] = listed
         self.kept: list[Kept] = [*self.clearances, *listed]
@@ -284,11 +287,6 @@ class Packed(ManagerLast):
         by_owner = np.argsort(self.owners, kind="stable")
         ends = np.searchsorted(self.owners[by_owner], np.arange(len(constraints) + 1))
         self.spans = [by_owner[first:last] for first, last in pairwise(ends)]
-
-    @property
-    def keeps_apart(self) -> bool:
-        """Whether a clearance keeps two bodies apart, so that ends of solves are to be proven."""
-        return any(self.clearance_pairs)
 
     @property
     def pair_rows(self) -> int:

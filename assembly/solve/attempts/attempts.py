@@ -88,19 +88,23 @@ def attempt(
         known = fitted_again(packed, settings, start(), apart, _loop(interruption, turns))
         if known is not None:
             return known
-    is_cold = bool(settings[PENALTY] > settings[PENALTY_FLOOR])
-    kinks = partial(
-        corners_first, packed, settings, start, partial(_run, packed, interruption), _loop(interruption, turns).go_on
-    )
     # Corners that a contact has for itself are those of a kink that a solve has met.
-    found = kinks() if packed.corners and is_cold else None
-    if found is not None:
-        return found
+    if packed.corners and settings[PENALTY] > settings[PENALTY_FLOOR]:
+        found = _with_corners_first(packed, settings, start, interruption, turns)
+        return _attempt(packed, settings, start, interruption, turns) if found is None else found
     outcome = _attempt(packed, settings, start, interruption, turns)
-    ended = outcome.code == SOLVED or interruption.is_over() or (packed.corners and is_cold)
-    if ended or (settings[PLACES] == 1.0 and packed.is_crowded(outcome.state)):
+    is_crowded = settings[PLACES] == 1.0 and packed.is_crowded(outcome.state)
+    if outcome.code == SOLVED or not packed.clearance_rows or is_crowded or interruption.is_over():
         return outcome
-    return kinks() or outcome
+    return _with_corners_first(packed, settings, start, interruption, turns) or outcome
+
+
+def _with_corners_first(
+    packed: Packed, settings: Array, start: Callable[[], Array], interruption: Interruption, turns: Array | None
+) -> Outcome | None:
+    """The same, with corners of contacts before the contacts; None where that does not hold."""
+    run, go_on = partial(_run, packed, interruption), _loop(interruption, turns).go_on
+    return corners_first(packed, settings, start, run, go_on)
 
 
 def _attempt(
