@@ -55,8 +55,10 @@ def test_a_chain_that_a_hand_drags_never_freezes(cases):
         log = tracker.run(hand_of(module, begin + shift, 12_000), stride=100)
         assert log.count(TrackStatus.VIOLATED) == 0
         # Motions that differ by rounding part after some seconds: some ticks may be stopped at a fold. Of 24 motions,
-        # 1e-7 apart, 18 had none and the worst 210; two seconds of standing still were 2,039.
-        assert log.count(TrackStatus.HELD) <= 400
+        # 1e-7 apart, 18 had none and the worst 210; another processor's rounding has 625. Standing still is more than
+        # half a second of 1,000 ticks in a row, and was two of them.
+        held = np.flatnonzero(np.append(np.insert(log.status != log.statuses.index("HELD"), 0, True), True))
+        assert np.diff(held).max() <= 500
         # The tolerance is 1.25e-12 of the scene's 34 mm.
         assert log.feasibility.max() < 5e-11
         assert min(judge.deepest(q) for q in log.q) > -1e-10
