@@ -154,7 +154,8 @@ class Assembly(PackedContents):
         self._take_seats(q0, starts)
         settings = self._settings(options, interruption, isinstance(q0, Solution))
         solution = self._solved_or_standing(q0, settings, starts, options, interruption)
-        if solution.status in AT_KINKS and not self._corners and settings[ITERATIONS] > 0.0:
+        may_go_on = settings[ITERATIONS] > 0.0 and not interruption.is_over()
+        if solution.status in AT_KINKS and not self._corners and may_go_on:
             return self._at_corners(solution, partial(self._from_start, q0, starts, options, interruption))
         return solution
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program.records import BODY_F, BODY_G, ONE_SIDED, ROW, ROW_TABLE
 from assembly.proximity.features.solid_contact import ALLOWED, IDLE, STAYS, TRACK
-from assembly.solve.loop.settings import FIT, GATHER, PLACES, SOLVED, UNSURE
+from assembly.solve.loop.settings import FIT, GATHER, PENALTY, PENALTY_FLOOR, PLACES, SOLVED, UNSURE
 from assembly.solve.second_order.leave import Fit, Outcome
 
 __all__ = ["corners_first", "with_corners"]
@@ -68,12 +68,16 @@ def corners_first(
         The loop with a table, settings and a state; and from a state that a solve has led to.
     """
     rows = with_corners(packed)
+    state = start()
+    tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
+    if settings[PENALTY] > settings[PENALTY_FLOOR]:
+        # Of a first solve a pair is known only where the user has said where it begins: that contact keeps it.
+        rows = [row for row in rows if np.isnan(tracked[row, 0])]
+    # Where the others are is found anew once bodies are there.
+    tracked[rows] = np.nan
+    state[packed.multipliers_at : packed.residuals_at][rows] = 0.0
     if not rows:
         return None
-    state = start()
-    # Where contacts are is found anew once bodies are there.
-    state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[rows] = np.nan
-    state[packed.multipliers_at : packed.residuals_at][rows] = 0.0
     outcome = run(_left_alone(packed.table, rows), settings, state)
     if settings[PLACES] == 1.0 and packed.is_crowded(outcome.state):
         return outcome

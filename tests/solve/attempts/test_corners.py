@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import pickle
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,6 +12,11 @@ from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from assembly.constraints.packing.earlier import is_earlier, taken_over
+from assembly.proximity.features.solid_contact import STAYS, TRACK
+from assembly.solve.attempts.corners import corners_first
+from assembly.solve.interruption import CTRL_C
+from assembly.solve.loop.settings import SOLVED
+from assembly.solve.second_order.leave import Outcome
 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 # The upper side of the box that all others come to lie on.
@@ -166,3 +172,53 @@ def test_contacts_of_surfaces_have_no_corners():
     scene.constrain(asm.Contact(a, b, "touch"))
     scene.minimize(asm.PointDistance(b.point(0, 0, 0), (0.3, 0.2, 0.0)))
     assert scene.solve().success and not scene.packed().corners
+
+
+def test_a_pair_that_the_user_starts_is_kept():
+    """Of a contact whose place is given corners are listed, but no nearer pair takes its place."""
+    plane = asm.Body("plane", asm.Face(asm.shapes.plane(6.0, 6.0)), fixed=True)
+    other = asm.Body("other", asm.Face(asm.shapes.plane(2.0, 2.0)), (0.0, 0.0, 1.0), (0.99, 0.1, 0.0, 0.0))
+    scene = asm.Assembly([plane, other])
+    scene.constrain(asm.Contact(plane, other, "touch", edges=True))
+    scene._corners = True
+    packed = scene.packed()
+    assert packed.corners
+    seen = []
+
+    def run(_table, _settings, state):
+        seen.append(state)
+        raise AssertionError("nothing is left to keep apart first")
+
+    for starts, is_asked in ((None, True), ({"touch": (0.5, 0.5, 0.5, 0.5)}, False)):
+        settings = scene._settings({}, CTRL_C, warm=False)
+        start = partial(scene._start, packed, None, starts)
+        if is_asked:
+            with pytest.raises(AssertionError):
+                corners_first(packed, settings, start, run, run)
+        else:
+            assert corners_first(packed, settings, start, run, run) is None
+    assert len(seen) == 1
+
+
+@pytest.mark.parametrize("pull", [-1.0, 1.0], ids=["pushes", "pulls"])
+def test_a_corner_that_would_have_to_pull_is_not_held(pull):
+    """A solve that ends with the contact held at a corner is taken if that pushes; else features may switch."""
+    scene, *_ = drawn_down(np.random.default_rng(4), np.array([4.0, 4.0, 2.0]))
+    solution = scene.solve()
+    packed, begun = scene.packed(), []
+
+    def run(_table, _settings, state):
+        state[:] = solution._state
+        return Outcome(SOLVED, state, np.zeros((1, 7)))
+
+    def go_on(_packed, _settings, state):
+        begun.append(state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[0, STAYS])
+        ended = state.copy()
+        ended[packed.multipliers_at : packed.residuals_at][0] = pull
+        return Outcome(SOLVED, ended, np.zeros((1, 7)))
+
+    settings = scene._settings({}, CTRL_C, warm=False)
+    found = corners_first(packed, settings, partial(scene._start, packed, None, None), run, go_on)
+    assert found is not None and found.code == SOLVED
+    # First it is held, with its features; then it may switch.
+    assert begun[0] > 0.0 and begun[1:] == ([0.0] if pull > 0.0 else [])
