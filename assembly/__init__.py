@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from assembly.constraints.model.objectives import FrameDistance as FrameDistance
     from assembly.constraints.model.objectives import PointDistance as PointDistance
     from assembly.constraints.model.objectives import Posture as Posture
+    from assembly.constraints.model.objectives import Weight as Weight
     from assembly.constraints.model.placements import Angle as Angle
     from assembly.constraints.model.placements import Distance as Distance
     from assembly.constraints.model.placements import PointOnLine as PointOnLine
@@ -129,6 +130,7 @@ else:
             "TrimContact": "assembly.constraints.model.trim_contact",
             "Universal": "assembly.constraints.model.joints",
             "Way": "assembly.solve.way",
+            "Weight": "assembly.constraints.model.objectives",
             "Wrench": "assembly.solve.forces.statics",
             "curves": "assembly.geometry.shapes.curves",
             "dexterity_ellipsoid": "assembly.solve.forces.end_effector",

@@ -37,7 +37,7 @@ def bodies_in_space():
     ball = asm.shapes.sphere(THIRD)
     return (
         asm.Body("ground", ball, fixed=True),
-        asm.Body('crank "1"\n', ball, (0.3, -0.0, 1e-3), (0.99, 0.1, 0.05, 0.02)),
+        asm.Body('crank "1"\n', ball, (0.3, -0.0, 1e-3), (0.99, 0.1, 0.05, 0.02), density=0.1),
         asm.Body("wheel \N{SNOWMAN}", None, (1.0, 2.0, THIRD), (0.5, -0.5, 0.5, 0.5)),
     )
 
@@ -89,6 +89,7 @@ def every_constraint():
         asm.FrameDistance(there, asm.Pose((0.1, 0.2, THIRD), (0.3, 0.5, -0.7, 0.41)), weight=0.1),
         asm.FrameDistance(wheel, asm.Pose(), length=THIRD),
         asm.PointDistance(point, (0.1, 0.2, 0.3)),
+        asm.Weight([crank, ground], (0.1, -0.2, THIRD), 9.81),
         asm.Expression(mixed(2), [crank, wheel], "bent", weight=0.1),
     )
     scene.maximize(

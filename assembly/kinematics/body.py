@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import ReadOnlyArrays
-from assembly.errors import InputError, KnownSettings, check_coordinates, checked_color, text, vector
+from assembly.errors import InputError, KnownSettings, check_coordinates, checked_color, positive, text, vector
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.pose import Pose, direction, length
+
+if TYPE_CHECKING:
+    from assembly.proximity.brep.mass import MassProperties
 
 __all__ = ["Body", "BodyFace", "Frame", "Point", "Shape"]
 
@@ -81,6 +84,8 @@ class Body(KnownSettings):
         A fixed body does not move in a solve and costs no unknowns.
     color : (red, green, blue), optional
         0 to 1 each, for pictures and files; settable.
+    density : float
+        Mass a volume, positive; for life, as faces are.
 
     Raises
     ------
@@ -96,6 +101,7 @@ class Body(KnownSettings):
         quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0),
         fixed: bool = False,
         color: Sequence[float] | None = None,
+        density: float = 1.0,
     ) -> None:
         if not isinstance(fixed, (bool, np.bool_)):
             raise InputError(f"fixed is {fixed!r}; expected True or False")
@@ -106,6 +112,7 @@ class Body(KnownSettings):
         check_coordinates("position", self._pose.position.tolist())
         self._faces = self._named(shape)
         self.color = color
+        self._density = positive("density", density)
 
     def __copy__(self) -> Self:
         """A body of the same name, with faces of its own that stand on the same surfaces."""
@@ -128,6 +135,49 @@ class Body(KnownSettings):
     def faces(self) -> tuple[BodyFace, ...]:
         """Faces in the order they were given."""
         return self._faces
+
+    @property
+    def density(self) -> float:
+        """Mass a volume."""
+        return self._density
+
+    @property
+    def mass_properties(self) -> MassProperties:
+        """Volume, area, mass, center of mass and inertia at once, and how wrong the volume may be.
+
+        Raises
+        ------
+        InputError
+            A body whose faces enclose nothing: without a shape, open, or with normals that look inward.
+        """
+        from assembly.proximity.brep.mass import mass_properties
+
+        return mass_properties(self.name, tuple(side.face for side in self._faces), self._density)
+
+    @property
+    def area(self) -> float:
+        """Area of all faces; of an open body as well."""
+        return float(sum(side.face.area() for side in self._faces))
+
+    @property
+    def volume(self) -> float:
+        """What the faces enclose; see `mass_properties`."""
+        return self.mass_properties.volume
+
+    @property
+    def mass(self) -> float:
+        """Density times volume; see `mass_properties`."""
+        return self.mass_properties.mass
+
+    @property
+    def center_of_mass(self) -> Array:
+        """Center of mass in body coordinates, (3,); see `mass_properties`."""
+        return self.mass_properties.center_of_mass
+
+    @property
+    def inertia(self) -> Array:
+        """Inertia about the center of mass along the body's axes, (3, 3); see `mass_properties`."""
+        return self.mass_properties.inertia
 
     @property
     def pose(self) -> Pose:

@@ -3,10 +3,11 @@
 A file is one object, and every field must be there:
 
     format       "assembly-scene"
-    version      2
+    version      3
     surfaces     [{name, degree [p, q], knots [U, V], control_points [n_u][n_v][3], weights [n_u][n_v]}]
     faces        [{surface, name, reversed, color [red, green, blue], outer (a loop), holes [loops]}]
-    bodies       [{name, fixed, position [3], quaternion [w, x, y, z], color [red, green, blue], shape [faces]}]
+    bodies       [{name, fixed, position [3], quaternion [w, x, y, z], color [red, green, blue], density,
+                  shape [faces]}]
     constraints  [{type, name, and the fields of the type}]
     objective    [{type, sign, and the fields of the type}]
 
@@ -37,6 +38,7 @@ Fields of a term of the objective by its type:
 
     point_distance  weight, body, point [3], target [3]
     frame_distance  weight, frame, target {position [3], quaternion [w, x, y, z]}, length
+    weight          weight, bodies [names], direction [3]
     dexterity       weight, tip (a frame), inputs [{joint, freedom}], measure, task, length, direction [3 or 6] or null
     posture         weight, reference [n][7] or null
     expression      name, bodies [names], function [lines], unilateral, scale, weight
@@ -53,7 +55,8 @@ without limits; angles are in radians. A coupling refers to joints of the same f
 `function` of an expression is the text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers
 are the shortest decimals that give back the same doubles.
 
-Version 1, which is read, too, had no faces, colors, loops, edges and trims; a `shape` was [{surface, name, reversed}].
+Older versions are read, too. Version 2 had no densities; version 1 had no faces, colors, loops, edges and trims
+either, and a `shape` was [{surface, name, reversed}].
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from assembly.constraints.model.joints import (
     Spherical,
     Universal,
 )
-from assembly.constraints.model.objectives import FrameDistance, PointDistance, Posture
+from assembly.constraints.model.objectives import FrameDistance, PointDistance, Posture, Weight
 from assembly.constraints.model.placements import Angle, Distance, PointOnLine, PointOnPlane
 from assembly.constraints.model.trim_contact import TrimContact, single_face
 from assembly.errors import InputError
@@ -214,6 +214,7 @@ BODY = Record(
     Field("position", NUMBERS, "pose.position"),
     Field("quaternion", NUMBERS, "pose.quaternion"),
     COLOR,
+    Field("density", NUMBER, since=3),
     Field("shape", Listed(_BodyFace("faces")), lambda body: [side.face for side in body.faces]),
     make=lambda shape, **others: Body(shape=shape or None, **others),
 )
@@ -309,6 +310,9 @@ OBJECTIVES = OneOf(
             Posture,
             WEIGHT,
             Field("reference", Plain(or_null(table(2)), lambda rows: None if rows is None else rows.tolist())),
+        ),
+        "weight": Record(
+            Weight, WEIGHT, Field("bodies", Listed(BODY_NAME)), Field("direction", NUMBERS)
         ),
         "dexterity": Record(
             Dexterity,

@@ -191,6 +191,47 @@ def test_objectives_and_their_derivatives():
             assert direction @ hessian @ direction == pytest.approx(bend, abs=1e-9)
 
 
+def test_a_weight_and_its_derivatives():
+    """-mass direction . center, in a scene whose reference is not the origin, of two bodies."""
+    rng = np.random.default_rng(51)
+    for _ in range(5):
+        direction, place = rng.normal(size=3), 0.1 * rng.normal(size=3)
+        shape = [asm.Face(face.surface.transformed(translation=place)) for face in asm.shapes.box(0.4, 0.5, 0.6)]
+        ground = asm.Body("ground", shape, position=rng.normal(size=3), fixed=True, density=3.0)
+        body = asm.Body("body", shape, density=2.0)
+        scene = asm.Assembly([ground, body])
+        term = asm.Weight([ground, body], direction, 9.81)
+        scene.minimize(term)
+        packed = scene.packed()
+        q = retract(np.array([[0.0, 0, 0, 1, 0, 0, 0]]), rng.normal(size=(1, 6)))
+        down = direction / np.linalg.norm(direction)
+
+        def energy(row, body=body, ground=ground, down=down, place=place):
+            lifted = rotation_matrix(row[3:]) @ place + row[:3]
+            return -9.81 * (body.mass * down @ lifted + ground.mass * down @ ground.pose.apply(place))
+
+        def at(row, packed=packed, ground=ground):
+            gradient, hessian = np.empty(6), np.empty((6, 6))
+            room = (np.empty(0), np.empty(0), np.empty(0))
+            places = np.stack([np.full(6, 5), np.arange(6), np.full(6, 5)])
+            whole = Sparsity(places, np.zeros((1, 2), np.int64), np.empty((1, 6)), np.zeros(0, np.int64))
+            poses = np.stack([ground.q, row])
+            poses[:, :3] = (poses[:, :3] - packed.reference) / packed.scale
+            value = objective(Store(packed.table, packed.pool), poses, 1, room, whole, gradient, hessian)
+            return value * packed.unit, gradient * packed.unit, np.triu(hessian) + np.triu(hessian, 1).T
+
+        value, gradient, hessian = at(q[0])
+        # Of the order of 10; the gradient counts scaled lengths.
+        assert value == pytest.approx(energy(q[0]), rel=1e-13, abs=1e-12)
+        units = np.repeat([packed.scale, 1.0], 3)
+        direction = rng.normal(size=6) / 2.0
+        slope = slope_of(lambda t, q=q, d=direction: energy(retract(q[0], t * d)), 1e-2)
+        assert gradient @ (direction / units) == pytest.approx(slope, abs=1e-9)
+        bend = slope_of(lambda t, q=q, d=direction, u=units: at(retract(q[0], t * d))[1] @ (d / u), 1e-2)
+        scaled = direction / units
+        assert scaled @ hessian @ scaled * packed.unit == pytest.approx(bend, abs=1e-9)
+
+
 def step_problem(rng, n=8, m=4):
     """H, J, gradient, residual, y, mu of one step; two rows of J are the same."""
     h = rng.normal(size=(n, n))

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import read_only
-from assembly.errors import KnownSettings, check_coordinates, extent, positive, vector
+from assembly.errors import InputError, KnownSettings, check_coordinates, extent, items, positive, vector
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, multiply, pose_rows
+from assembly.kinematics.pose import direction as unit_direction
 
-__all__ = ["FrameDistance", "Objective", "PointDistance", "Posture"]
+__all__ = ["FrameDistance", "Objective", "PointDistance", "Posture", "Weight"]
 
 Array = NDArray[np.float64]
 
@@ -165,3 +168,56 @@ class FrameDistance(Objective):
 
     def __repr__(self) -> str:
         return f"FrameDistance({self._frame!r}, target={self._pose!r}, length={self._length:g}, weight={self.weight:g})"
+
+
+class Weight(Objective):
+    """-weight sum_b mass_b (direction . center_b): the potential energy of bodies that are pulled one way.
+
+    Where it is minimized, bodies come to rest as low as joints, contacts and clearances let them.
+
+    Parameters
+    ----------
+    bodies : Body or iterable of Body
+        Distinct and closed; their masses are `body.mass`.
+    direction : (3,)
+        Where they are pulled, in the axes of the world; any length.
+    weight : float
+        Positive: what a unit of mass is pulled with, 9.81 say.
+
+    Raises
+    ------
+    InputError, TypeError
+        No body, a body twice, one that encloses nothing, or a direction of no length.
+    """
+
+    def __init__(
+        self, bodies: Body | Iterable[Body], direction: ArrayLike = (0.0, 0.0, -1.0), weight: float = 1.0
+    ) -> None:
+        pulled = items("bodies", bodies, "a Body or several") if not isinstance(bodies, Body) else (bodies,)
+        for body in pulled:
+            if not isinstance(body, Body):
+                raise TypeError(f"bodies holds {body!r}; expected Body")
+        if not pulled or len(set(map(id, pulled))) < len(pulled):
+            raise InputError(f"bodies are {[body.name for body in pulled]}; expected distinct bodies, one at least")
+        super().__init__(tuple(pulled), weight)
+        self._direction = unit_direction("direction", direction)
+        self._points = tuple((body.mass, body.center_of_mass) for body in pulled)
+
+    @property
+    def direction(self) -> Array:
+        """Where bodies are pulled, a unit vector (3,), read-only."""
+        return read_only(self._direction)
+
+    @property
+    def points(self) -> tuple[tuple[float, Array], ...]:
+        """Mass and center of mass, in body coordinates, of every body."""
+        return self._points
+
+    @property
+    def mass(self) -> float:
+        """Of all bodies."""
+        return sum(mass for mass, _ in self._points)
+
+    def __repr__(self) -> str:
+        names = ", ".join(body.name for body in self.bodies)
+        return f"Weight([{names}], direction={self._direction.tolist()}, weight={self.weight:g})"

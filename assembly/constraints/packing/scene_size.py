@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.constraint import Constraint, Equation
 from assembly.constraints.model.dexterity import Dexterity
-from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance, Posture
+from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance, Posture, Weight
 from assembly.errors import FARTHEST, InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import length
@@ -86,6 +86,9 @@ def _marks(
             marks[term.point.body].append(term.point.coordinates)
         elif isinstance(term, FrameDistance):
             marks[term.frame.body].append(term.frame.origin)
+        elif isinstance(term, Weight):
+            for body, (_, center) in zip(term.bodies, term.points, strict=True):
+                marks[body].append(center)
         elif isinstance(term, Dexterity):
             marks[term.tip_task.tip.body].append(term.tip_task.origin)
     return marks

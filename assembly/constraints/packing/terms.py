@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.dexterity import MEASURES, TASKS, Dexterity
 from assembly.constraints.model.expression import Expression
-from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance, Posture
+from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance, Posture, Weight
 from assembly.constraints.packing.scene_size import check_reach
 from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.program import objective_terms as terms
@@ -64,6 +64,8 @@ class TermPacking:
         elif isinstance(term, FrameDistance):
             self._add_target(weight, term, term.frame.body, term.frame.origin)
             self._add_turn(weight, term)
+        elif isinstance(term, Weight):
+            self._add_weight(weight, term)
         elif isinstance(term, Dexterity):
             self._add_dexterity(weight, term)
         elif isinstance(term, Expression):
@@ -101,6 +103,15 @@ class TermPacking:
                 _, at = self._writer.add(pool=[weight, *place, *row[3:], weight * lever**2])
                 self._records.append([terms.POSTURE, k, at, 0, int(term.reference is None)])
 
+    def _add_weight(self, weight: float, term: Weight) -> None:
+        """A force on every body; `weight` is that of all bodies together."""
+        scale = self._writer.scale
+        for body, (mass, center) in zip(term.bodies, term.points, strict=True):
+            force = weight * (mass / term.mass) * term.direction
+            offset = -float(force @ self._reference) / scale
+            _, at = self._writer.add(pool=[*force, *(center / scale), offset])
+            self._records.append([terms.POTENTIAL, self._writer.places[body], at])
+
     def _add_dexterity(self, weight: float, term: Dexterity) -> None:
         """The record is that of `solve/loop/dexterity.py`."""
         writer, task = self._writer, term.tip_task
@@ -128,6 +139,8 @@ def natural_unit(term: Objective, scale: float) -> float:
     """What a term of order one in scaled lengths counts in the user's units."""
     if isinstance(term, Expression):
         return 1.0
+    if isinstance(term, Weight):
+        return scale * term.mass
     if not isinstance(term, Dexterity):
         return scale**2
     task = term.tip_task

@@ -2,6 +2,7 @@
 
 point distance   weight |p - target|^2
 posture          weight |x - x0|^2 + lever 4 sin^2(angle / 2), from a pose (x0, e0)
+potential        -force . p, p a point of a body
 tape             weight times a user's expression
 """
 
@@ -31,7 +32,7 @@ TERM_RECORD = record_dtype(
 )
 term_at = record_view(TERM_RECORD)
 TERM = size_of(TERM_RECORD)
-POINT_DISTANCE, POSTURE, TAPE_TERM, DEXTERITY = 0, 1, 2, 3
+POINT_DISTANCE, POSTURE, TAPE_TERM, DEXTERITY, POTENTIAL = 0, 1, 2, 3, 4
 # Parameters of a point distance.
 POINT_DISTANCE_FIELDS = record_dtype(
     "f8",
@@ -49,6 +50,14 @@ POSTURE_FIELDS = record_dtype(
     lever=1,  # of 4 sin^2(angle / 2)
 )
 posture_at = record_view(POSTURE_FIELDS)
+# Parameters of a potential.
+POTENTIAL_FIELDS = record_dtype(
+    "f8",
+    force=3,  # in the axes of the world
+    point=3,  # where it acts, in the axes of its body
+    offset=1,  # value at the origin
+)
+potential_at = record_view(POTENTIAL_FIELDS)
 POSTURE_QUATERNION = place_of(POSTURE_FIELDS, "quaternion")
 POSTURE_PARAMETERS = size_of(POSTURE_FIELDS)
 
@@ -112,6 +121,26 @@ def posture(pool, o, q, body, s, order, gradient, hessian):
 
 
 @kernel(inner=True)
+def potential(pool, o, q, body, s, order, gradient, hessian):
+    """-force . p, with p = x + R a: its gradient is -force and force x R a, its Hessian in turns is that of R a."""
+    term = potential_at(pool, o)
+    force = (term.force[0], term.force[1], term.force[2])
+    arm = matvec(rotation(q, body), (term.point[0], term.point[1], term.point[2]))
+    value = term.offset - dot(force, add(position(q, body), arm))
+    if s < 0 or order == 0:
+        return value
+    turn = cross(force, arm)
+    along = dot(force, arm)
+    for k in range(3):
+        gradient[s + k] -= force[k]
+        gradient[s + 3 + k] += turn[k]
+        hessian[s + 3 + k, s + 3 + k] += along
+        for l in range(k, 3):
+            hessian[s + 3 + k, s + 3 + l] -= 0.5 * (force[k] * arm[l] + arm[k] * force[l])
+    return value
+
+
+@kernel(inner=True)
 def tape_term(store, term, q, order, workspace, entries, gradient, hessian):
     """Weight times the one value of a tape."""
     header = header_at(store.table, 0)
@@ -153,9 +182,11 @@ def tape_term(store, term, q, order, workspace, entries, gradient, hessian):
 
 @kernel(inner=True)
 def body_term(pool, term, q, order, s, gradient, hessian):
-    """A term of one body, whose derivatives are added at s: a point distance or a posture."""
+    """A term of one body, whose derivatives are added at s: a point distance, a potential or a posture."""
     if term.kind == POINT_DISTANCE:
         return point_distance(pool, term.parameters, q, term.body, s, order, gradient, hessian)
+    if term.kind == POTENTIAL:
+        return potential(pool, term.parameters, q, term.body, s, order, gradient, hessian)
     return posture(pool, term.parameters, q, term.body, s, order, gradient, hessian)
 
 
@@ -189,7 +220,7 @@ def objective(store, q, order, workspace, entries, gradient, hessian):
     for t in range(header.terms):
         at = header.term_table + TERM * t
         term = term_at(store.table, at)
-        if term.kind == POINT_DISTANCE or term.kind == POSTURE:
+        if term.kind == POINT_DISTANCE or term.kind == POSTURE or term.kind == POTENTIAL:
             s = 6 * store.table[header.unknown_blocks + term.body]
             if blocked and s >= 0:
                 block = block_row(entries.blocks, s, s)

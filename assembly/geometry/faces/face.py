@@ -13,7 +13,7 @@ from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, checked_color, items
 from assembly.geometry.faces.boundary import Boundary, LoopLike, make_boundary
 from assembly.geometry.faces.loop import Loop
-from assembly.geometry.faces.measures import area_and_volume
+from assembly.geometry.faces.measures import face_integrals
 from assembly.geometry.faces.space_nearest import nearest_in_space
 from assembly.geometry.faces.trim import locate_points
 from assembly.geometry.faces.trim_nearest import nearest_points
@@ -246,17 +246,21 @@ class Face:
     def _derivative_bounds(self) -> NDArray[np.float64]:
         return derivative_bounds(self.surface)
 
+    def integrals(self, center: NDArray[np.float64]) -> tuple[np.recarray, np.recarray]:
+        """Integrals of area, volume and moments about a center, with Su x Sv; see `face_integrals`."""
+        return face_integrals(self.surface, self._boundary.table, center)
+
     @cached_property
-    def _integrals(self) -> NDArray[np.float64]:
-        return area_and_volume(self.surface, self._boundary.table)
+    def _integrals(self) -> np.recarray:
+        return self.integrals(np.zeros(3))[0]
 
     def area(self) -> float:
         """Area of the face, to 1e-10 of itself."""
-        return float(self._integrals[0])
+        return float(self._integrals.area)
 
     def volume_integral(self) -> float:
         """One third of the integral of S.n over the face, n outward: summed over a closed body, its volume."""
-        return self.sign * float(self._integrals[1])
+        return self.sign * float(self._integrals.flux.sum()) / 3.0
 
     def __repr__(self) -> str:
         label = "" if self.name is None else f"{self.name!r}, "

@@ -11,36 +11,55 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._record import Store
+from assembly._record import Store, record_dtype, record_view
 from assembly.geometry.faces.trim_pieces import Piece, piece_line
 from assembly.geometry.splines.evaluate import into_domain, surface_at, surface_point
-from assembly.geometry.vec import cross, dot
+from assembly.geometry.vec import cross, dot, sub
+
+
+# Integrals over a face: its area, and for a body that faces enclose (p = S - center, N = Su x Sv, by Gauss' theorem):
+FACE_INTEGRALS = record_dtype(
+    "f8",
+    area=1,  # of |N|
+    flux=3,  # of p_x N_x, p_y N_y, p_z N_z: each is the volume
+    first=3,  # of p (p . N): four times the first moments
+    second=6,  # of p_i p_j (p . N) for xx, yy, zz, xy, xz, yz: five times the second moments
+)
+integrals_at = record_view(FACE_INTEGRALS)
 
 
 @kernel(inner=True)
-def _column(store, u, v, levels, nodes, weights):
-    """Integrals over a column from v to the top of |Su x Sv| and of S.(Su x Sv) / 3."""
+def _add_column(store, u, v, levels, rule, center, factor, out):
+    """Add `factor` times the integrals over a column from v to the top. `rule` holds nodes and weights of Gauss."""
     patch = surface_at(store.table, 0)
-    area = 0.0
-    volume = 0.0
+    total = integrals_at(out, 0)
     x, _fits = into_domain(store.pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
     for k in range(levels.size - 1):
         low = max(v, levels[k])
         half = 0.5 * (levels[k + 1] - low)
         if not half > 0.0:
             continue
-        for n in range(nodes.size):
-            y = low + half * (1.0 + nodes[n])
-            y, _fits = into_domain(store.pool, patch.breaks_v, patch.spans_v, patch.closed_v, y)
+        for n in range(rule.shape[1]):
+            y, _fits = into_domain(
+                store.pool, patch.breaks_v, patch.spans_v, patch.closed_v, low + half * (1.0 + rule[0, n])
+            )
             s, su, sv, _suu, _suv, _svv = surface_point(store.table, store.pool, 0, x, y)
             normal = cross(su, sv)
-            area += half * weights[n] * np.sqrt(dot(normal, normal))
-            volume += half * weights[n] * dot(s, normal) / 3.0
-    return area, volume
+            p = sub(s, (center[0], center[1], center[2]))
+            share = factor * half * rule[1, n]
+            total.area += share * np.sqrt(dot(normal, normal))
+            outward = share * dot(p, normal)
+            for i in range(3):
+                total.flux[i] += share * p[i] * normal[i]
+                total.first[i] += outward * p[i]
+                total.second[i] += outward * p[i] * p[i]
+            total.second[3] += outward * p[0] * p[1]
+            total.second[4] += outward * p[0] * p[2]
+            total.second[5] += outward * p[1] * p[2]
 
 
-@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], i8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])")
-def along_pieces(table, pool, rows, places, levels, nodes, weights, out):
+@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], i8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1])")
+def along_pieces(table, pool, rows, places, levels, rule, center, out):
     """Integrals of u' G over parts of pieces.
 
     A row of `rows` holds t0, t1, the middle of the span, and what moves the curve into the cell, one of
@@ -49,28 +68,20 @@ def along_pieces(table, pool, rows, places, levels, nodes, weights, out):
     for k in range(rows.shape[0]):
         piece = Piece(places[k, 0], places[k, 1], rows[k, 2], rows[k, 0], rows[k, 1])
         half = 0.5 * (piece.t1 - piece.t0)
-        area = 0.0
-        volume = 0.0
-        for n in range(nodes.size):
-            u, v, du, _dv = piece_line(pool, piece, piece.t0 + half * (1.0 + nodes[n]))
-            a, b = _column(Store(table, pool), u + rows[k, 3], v + rows[k, 4], levels, nodes, weights)
-            area += half * weights[n] * du * a
-            volume += half * weights[n] * du * b
-        out[k, 0] = area
-        out[k, 1] = volume
+        out[k] = 0.0
+        for n in range(rule.shape[1]):
+            u, v, du, _dv = piece_line(pool, piece, piece.t0 + half * (1.0 + rule[0, n]))
+            factor = half * rule[1, n] * du
+            _add_column(Store(table, pool), u + rows[k, 3], v + rows[k, 4], levels, rule, center, factor, out[k])
 
 
-@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])")
-def along_bottom(table, pool, stretches, levels, nodes, weights, out):
+@kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1])")
+def along_bottom(table, pool, stretches, levels, rule, center, out):
     """Integrals of G over stretches (u0, u1) of the bottom."""
     for k in range(stretches.shape[0]):
         u0 = stretches[k, 0]
         half = 0.5 * (stretches[k, 1] - u0)
-        area = 0.0
-        volume = 0.0
-        for n in range(nodes.size):
-            a, b = _column(Store(table, pool), u0 + half * (1.0 + nodes[n]), levels[0], levels, nodes, weights)
-            area += half * weights[n] * a
-            volume += half * weights[n] * b
-        out[k, 0] = area
-        out[k, 1] = volume
+        out[k] = 0.0
+        for n in range(rule.shape[1]):
+            u = u0 + half * (1.0 + rule[0, n])
+            _add_column(Store(table, pool), u, levels[0], levels, rule, center, half * rule[1, n], out[k])

@@ -1,7 +1,7 @@
-"""Areas of faces, and the volumes that faces enclose.
+"""Areas of faces, and the volumes and moments of what faces enclose.
 
-The volume of a body is the integral of S.n / 3 over its faces (divergence theorem). Both integrands are integrated
-by Gauss quadrature, exactly as far as doubles go: `geometry/faces/integrals.py` has the formula.
+The volume of a body is the integral of S.n / 3 over its faces (divergence theorem), and so are its moments. All
+integrands are integrated by Gauss quadrature, exactly as far as doubles go: `geometry/faces/integrals.py` has them.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.faces.integrals import along_bottom, along_pieces
+from assembly.geometry.faces.integrals import FACE_INTEGRALS, along_bottom, along_pieces
 from assembly.geometry.faces.trim_pieces import cut_of_piece, trim_at, trim_frame_at
 from assembly.geometry.faces.trim_table import TrimTable
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["area_and_volume"]
+__all__ = ["face_integrals"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -26,9 +26,9 @@ _AGREE = 1e-13
 
 
 @cache
-def _gauss(count: int) -> tuple[Array, Array]:
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    return nodes, weights
+def _gauss(count: int) -> Array:
+    """Nodes and weights in (-1, 1), (2, count)."""
+    return np.array(np.polynomial.legendre.leggauss(count))
 
 
 def _levels(knots: Array, low: float, high: float, period: float) -> Array:
@@ -65,8 +65,13 @@ def _rows(table: TrimTable, levels: tuple[Array, Array]) -> tuple[Array, NDArray
     return np.array(rows).reshape(-1, 5), places.reshape(-1, 2)
 
 
-def area_and_volume(surface: NurbsSurface, table: TrimTable) -> Array:
-    """Area, and integral of S.(Su x Sv) / 3, of the part of a surface that a trim leaves: (2,)."""
+def face_integrals(surface: NurbsSurface, table: TrimTable, center: Array) -> tuple[np.recarray, np.recarray]:
+    """Integrals over the part of a surface that a trim leaves, about a center (3,), with N = Su x Sv.
+
+    Returns
+    -------
+    The integrals, and by how much two numbers of nodes disagree about each: records of `FACE_INTEGRALS`.
+    """
     trim = trim_at(table.table, 0)
     frame = trim_frame_at(table.pool, trim.frame)
     low, high = (frame.low_u, frame.low_v), (frame.high_u, frame.high_v)
@@ -84,25 +89,36 @@ def area_and_volume(surface: NurbsSurface, table: TrimTable) -> Array:
     places[:, 0] += surface_pool.size
     pool = np.concatenate([surface_pool, table.pool])
 
+    far = np.abs(np.stack(surface.bounding_box()) - center).max(axis=0)
+    reach = float(np.linalg.norm(far))
+    # A length to the power of what each integral has more than an area.
+    powers = np.repeat([1.0, reach, reach**2, reach**3], [1, 3, 3, 6])
+
     def sides(count: int, pieces: Indices, bottom: Indices) -> tuple[Array, Array]:
-        out, low = np.empty((len(pieces), 2)), np.empty((len(bottom), 2))
-        gauss = _gauss(count)
+        out, low = np.empty((len(pieces), powers.size)), np.empty((len(bottom), powers.size))
+        rule = _gauss(count)
         if len(pieces):
-            along_pieces(record, pool, rows[pieces], places[pieces], levels[1], *gauss, out)
+            along_pieces(record, pool, rows[pieces], places[pieces], levels[1], rule, center, out)
         if len(bottom):
-            along_bottom(record, pool, stretches[bottom], levels[1], *gauss, low)
+            along_bottom(record, pool, stretches[bottom], levels[1], rule, center, low)
         return out, low * w[bottom, None]
 
     # Only what two numbers of nodes disagree on is done again with more.
     pieces, bottom = np.arange(len(rows), dtype=np.intp), np.arange(len(stretches), dtype=np.intp)
     along, below = sides(_NODES[0], pieces, bottom)
+    change, change_below = np.full_like(along, np.inf), np.full_like(below, np.inf)
     for count in _NODES[1:]:
         more, more_below = sides(count, pieces, bottom)
-        change = np.abs(more - along[pieces]), np.abs(more_below - below[bottom])
+        change[pieces], change_below[bottom] = np.abs(more - along[pieces]), np.abs(more_below - below[bottom])
         along[pieces], below[bottom] = more, more_below
-        size = np.maximum(np.abs(along).sum(axis=0) + np.abs(below).sum(axis=0), 1e-300)
-        pieces = pieces[(change[0] > _AGREE * size).any(axis=1)]
-        bottom = bottom[(change[1] > _AGREE * size).any(axis=1)]
+        area = max(float(np.abs(along[:, 0]).sum() + np.abs(below[:, 0]).sum()), 1e-300)
+        pieces = pieces[(change[pieces] > _AGREE * area * powers).any(axis=1)]
+        bottom = bottom[(change_below[bottom] > _AGREE * area * powers).any(axis=1)]
         if not len(pieces) and not len(bottom):
             break
-    return np.asarray(along.sum(axis=0) + below.sum(axis=0))
+    total, doubt = along.sum(axis=0) + below.sum(axis=0), change.sum(axis=0) + change_below.sum(axis=0)
+    return _record(total), _record(doubt)
+
+
+def _record(values: Array) -> np.recarray:
+    return values.view(FACE_INTEGRALS).view(np.recarray)[0]

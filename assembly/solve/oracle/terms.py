@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.model.expression import Expression
-from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance, Posture
+from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance, Posture, Weight
 from assembly.constraints.packing.scene import Packed
+from assembly.constraints.packing.terms import natural_unit
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
@@ -43,7 +44,7 @@ class Terms:
         self._symbols: list[ca.MX] = []
         self.value = ca.MX(0)
         for sign, term in objectives or ((1.0, Posture()),):
-            natural = 1.0 if isinstance(term, Expression) else packed.scale**2
+            natural = natural_unit(term, packed.scale)
             self.value += sign * term.weight * natural / packed.unit * self._term(term)
         self.p = ca.vertcat(ca.MX(0, 1), *self._symbols)
 
@@ -72,9 +73,17 @@ class Terms:
         if isinstance(term, Posture):
             moving = [k for k, body in enumerate(self._bodies) if not body.fixed]
             return ca.sum1(ca.vertcat(*(self._posture(term, k) for k in moving)))
+        if isinstance(term, Weight):
+            masses = [mass for mass, _ in term.points]
+            places = [self._places[id(body)] for body in term.bodies]
+            centers = [
+                self._poses.point(k, center) + self._packed.reference / self._packed.scale
+                for k, (_, center) in zip(places, term.points, strict=True)
+            ]
+            return -sum(mass / term.mass * ca.dot(term.direction, p) for mass, p in zip(masses, centers, strict=True))
         raise InputError(
-            f"objective is {term!r}; expected what the reference solver takes: PointDistance, FrameDistance, Posture "
-            "or Expression"
+            f"objective is {term!r}; expected what the reference solver takes: PointDistance, FrameDistance, Posture, "
+            "Weight or Expression"
         )
 
     def _target(self, target: Callable[[], Array]) -> ca.MX:

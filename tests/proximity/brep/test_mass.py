@@ -1,0 +1,113 @@
+"""Volumes, centers and inertias against closed forms; what encloses nothing; gaps that are told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from assembly.errors import InputError
+
+PI = np.pi
+# Sums over some ten faces of what is exact to rounding.
+RIGHT = 1e-12
+
+
+def diagonal(body):
+    """The moments of inertia of a body whose products of inertia are rounding."""
+    inertia = body.inertia
+    assert np.abs(inertia - np.diag(np.diag(inertia))).max() < RIGHT * np.abs(inertia).max()
+    return np.diag(inertia)
+
+
+def test_shapes_with_closed_forms():
+    a, b, c = 2.0, 3.0, 5.0
+    r, h, ring = 1.5, 4.0, 3.0
+    ball, tube = 4.0 / 3.0 * PI * r**3, 2.0 * PI**2 * ring * r**2
+    around, across = ring**2 + 0.75 * r**2, 0.5 * ring**2 + 0.625 * r**2
+    rod = PI * r**2 * h
+    for shape, volume, moments in (
+        (asm.shapes.box(a, b, c), a * b * c, np.array([b * b + c * c, a * a + c * c, a * a + b * b]) / 12.0),
+        (asm.shapes.sphere(r), ball, np.full(3, 0.4 * r**2)),
+        (asm.shapes.torus(ring, r), tube, np.array([across, across, around])),
+        (asm.shapes.solid_cylinder(r, h), rod, np.array([r**2 / 4 + h**2 / 12, r**2 / 4 + h**2 / 12, r**2 / 2])),
+    ):
+        body = asm.Body("body", shape, density=0.7)
+        assert body.volume == pytest.approx(volume, rel=RIGHT)
+        assert body.mass == pytest.approx(0.7 * volume, rel=RIGHT)
+        np.testing.assert_allclose(body.center_of_mass, 0.0, atol=RIGHT)
+        np.testing.assert_allclose(diagonal(body), 0.7 * volume * moments, rtol=RIGHT)
+        assert body.mass_properties.volume_error < 1e-12 * volume
+
+
+def test_moved_and_turned_shapes():
+    """A shape that is moved far and turned: the center goes with it, and inertia by its rotation."""
+    rng = np.random.default_rng(3)
+    for k in range(5):
+        shape = asm.shapes.plate(4.0, 3.0, 1.0, [(1.0, 0.5, 0.4)])
+        turn = Rotation.random(random_state=rng).as_matrix() if k else np.eye(3)
+        shift = 100.0 * rng.normal(size=3)
+        moved = [
+            asm.Face(face.surface.transformed(turn, shift), face.outer, face.holes, reversed=face.reversed)
+            for face in shape
+        ]
+        one, other = asm.Body("one", shape), asm.Body("other", moved)
+        assert other.volume == pytest.approx(one.volume, rel=RIGHT)
+        np.testing.assert_allclose(other.center_of_mass, turn @ one.center_of_mass + shift, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(other.inertia, turn @ one.inertia @ turn.T, rtol=0, atol=1e-10)
+
+
+def test_a_plate_with_a_hole():
+    x, y, r, t = 1.0, 0.5, 0.4, 1.0
+    body = asm.Body("plate", asm.shapes.plate(4.0, 3.0, t, [(x, y, r)]))
+    hole = PI * r * r * t
+    volume = 12.0 * t - hole
+    assert body.volume == pytest.approx(volume, rel=RIGHT)
+    assert body.area == pytest.approx(2.0 * (12.0 - PI * r * r) + 14.0 * t + 2.0 * PI * r * t, rel=RIGHT)
+    center = -hole * np.array([x, y, 0.0]) / volume
+    np.testing.assert_allclose(body.center_of_mass, center, atol=RIGHT)
+    second = 12.0 * t * 9.0 / 12.0 - hole * (r * r / 4.0 + y * y) - volume * center[1] ** 2
+    third = 12.0 * t**3 / 12.0 - hole * t * t / 12.0
+    assert body.inertia[0, 0] == pytest.approx(second + third, rel=RIGHT)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_scales(size):
+    body = asm.Body("body", asm.shapes.box(size, 2.0 * size, 3.0 * size), density=size)
+    assert body.volume == pytest.approx(6.0 * size**3, rel=RIGHT)
+    assert body.inertia[2, 2] == pytest.approx(6.0 * size**4 * 5.0 * size**2 / 12.0, rel=RIGHT)
+
+
+def test_gaps_between_faces_are_told():
+    """A cap that is too small by 1e-7: the volume is wrong by less than what is told, which is not much more."""
+    faces = list(asm.shapes.box(1.0, 1.0, 1.0))
+    lifted = 1e-7
+    top = max(range(len(faces)), key=lambda k: faces[k].surface.bounding_box()[0][2])
+    faces[top] = asm.Face(faces[top].surface.transformed(translation=(0, 0, lifted)), name=faces[top].name)
+    found = asm.Body("body", faces).mass_properties
+    wrong = abs(found.volume - 1.0)
+    assert 0.1 * lifted < wrong < found.volume_error < 10.0 * lifted
+
+
+def test_what_encloses_nothing_raises():
+    with pytest.raises(InputError, match="'bare' has no shape; expected faces that enclose a volume"):
+        _ = asm.Body("bare").volume
+    with pytest.raises(InputError, match="'tube' is open: an edge of .* has no other face; expected a closed body"):
+        _ = asm.Body("tube", asm.shapes.cylinder(1.0, 2.0)).inertia
+    # Its flux along the axis is zero, and yet it is open.
+    assert asm.Body("tube", asm.shapes.cylinder(1.0, 2.0)).area == pytest.approx(4.0 * PI, rel=RIGHT)
+    inward = asm.Face(asm.shapes.sphere(1.0), reversed=True)
+    with pytest.raises(InputError, match="'hollow' has a volume of -4.18879; expected a positive one, by normals"):
+        _ = asm.Body("hollow", inward).mass
+    for density in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(InputError, match="density is"):
+            asm.Body("ball", asm.shapes.sphere(1.0), density=density)
+
+
+def test_results_are_for_reading():
+    body = asm.Body("ball", asm.shapes.sphere(1.0))
+    with pytest.raises(ValueError, match="read-only"):
+        body.inertia[0, 0] = 1.0
+    with pytest.raises(AttributeError):
+        body.volume = 2.0  # type: ignore[misc]
