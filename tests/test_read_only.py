@@ -40,7 +40,10 @@ def arrays_of(value: Any, path: str, seen: dict[int, Any]) -> Iterator[tuple[str
         for name in sorted(fields | set(dir(value))):
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", DeprecationWarning)  # of attributes that have another name now
-                got = getattr(value, name) if name[0] != "_" else None
+                try:
+                    got = getattr(value, name) if name[0] != "_" else None
+                except asm.errors.InputError:
+                    continue  # what there is not, as the volume of an open body
             if not callable(got):
                 yield from arrays_of(got, f"{path}.{name}", seen)
 

@@ -89,7 +89,6 @@ def every_constraint():
         asm.FrameDistance(there, asm.Pose((0.1, 0.2, THIRD), (0.3, 0.5, -0.7, 0.41)), weight=0.1),
         asm.FrameDistance(wheel, asm.Pose(), length=THIRD),
         asm.PointDistance(point, (0.1, 0.2, 0.3)),
-        asm.Weight([crank, ground], (0.1, -0.2, THIRD), 9.81),
         asm.Expression(mixed(2), [crank, wheel], "bent", weight=0.1),
     )
     scene.maximize(
@@ -97,6 +96,7 @@ def every_constraint():
         asm.Expression(mixed(1), [wheel], scale=2.0),
         asm.Dexterity(point, [hinge, shaft.freedom("slide")], "isotropy"),
         asm.Dexterity(there, [hinge], "force_transmission", direction=(0, 0, 1, THIRD, 0, 0), length=0.3, weight=0.1),
+        asm.Weight([crank, ground], (0.1, -0.2, THIRD), 9.81),
     )
     return scene
 
@@ -419,7 +419,7 @@ def test_what_is_wrong_is_named_by_its_path(key, case, document, load_document, 
 def test_expressions_of_several_values_are_no_terms(document, load_document):
     changed = copy.deepcopy(document)
     changed["objective"].append({"sign": 1, **changed["constraints"][CURVE]})
-    with pytest.raises(InputError, match=r"objective\[8\]: objective '.*' has 2 values; expected one"):
+    with pytest.raises(InputError, match=r"objective\[9\]: objective '.*' has 2 values; expected one"):
         load_document(changed)
 
 

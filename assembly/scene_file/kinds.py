@@ -311,9 +311,7 @@ OBJECTIVES = OneOf(
             WEIGHT,
             Field("reference", Plain(or_null(table(2)), lambda rows: None if rows is None else rows.tolist())),
         ),
-        "weight": Record(
-            Weight, WEIGHT, Field("bodies", Listed(BODY_NAME)), Field("direction", NUMBERS)
-        ),
+        "weight": Record(Weight, WEIGHT, Field("bodies", Listed(BODY_NAME)), Field("direction", NUMBERS)),
         "dexterity": Record(
             Dexterity,
             WEIGHT,

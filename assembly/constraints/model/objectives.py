@@ -201,7 +201,7 @@ class Weight(Objective):
             raise InputError(f"bodies are {[body.name for body in pulled]}; expected distinct bodies, one at least")
         super().__init__(tuple(pulled), weight)
         self._direction = unit_direction("direction", direction)
-        self._points = tuple((body.mass, body.center_of_mass) for body in pulled)
+        self._points = tuple((body.mass, read_only(body.center_of_mass)) for body in pulled)
 
     @property
     def direction(self) -> Array:
@@ -216,7 +216,7 @@ class Weight(Objective):
     @property
     def mass(self) -> float:
         """Of all bodies."""
-        return sum(mass for mass, _ in self._points)
+        return float(sum(mass for mass, _ in self._points))
 
     def __repr__(self) -> str:
         names = ", ".join(body.name for body in self.bodies)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -246,12 +247,12 @@ class Face:
     def _derivative_bounds(self) -> NDArray[np.float64]:
         return derivative_bounds(self.surface)
 
-    def integrals(self, center: NDArray[np.float64]) -> tuple[np.recarray, np.recarray]:
+    def integrals(self, center: NDArray[np.float64]) -> tuple[Any, Any]:
         """Integrals of area, volume and moments about a center, with Su x Sv; see `face_integrals`."""
         return face_integrals(self.surface, self._boundary.table, center)
 
     @cached_property
-    def _integrals(self) -> np.recarray:
+    def _integrals(self) -> Any:
         return self.integrals(np.zeros(3))[0]
 
     def area(self) -> float:

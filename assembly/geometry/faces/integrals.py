@@ -16,7 +16,6 @@ from assembly.geometry.faces.trim_pieces import Piece, piece_line
 from assembly.geometry.splines.evaluate import into_domain, surface_at, surface_point
 from assembly.geometry.vec import cross, dot, sub
 
-
 # Integrals over a face: its area, and for a body that faces enclose (p = S - center, N = Su x Sv, by Gauss' theorem):
 FACE_INTEGRALS = record_dtype(
     "f8",

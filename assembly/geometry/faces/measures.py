@@ -7,10 +7,12 @@ integrands are integrated by Gauss quadrature, exactly as far as doubles go: `ge
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import rows_of
 from assembly.geometry.faces.integrals import FACE_INTEGRALS, along_bottom, along_pieces
 from assembly.geometry.faces.trim_pieces import cut_of_piece, trim_at, trim_frame_at
 from assembly.geometry.faces.trim_table import TrimTable
@@ -65,7 +67,7 @@ def _rows(table: TrimTable, levels: tuple[Array, Array]) -> tuple[Array, NDArray
     return np.array(rows).reshape(-1, 5), places.reshape(-1, 2)
 
 
-def face_integrals(surface: NurbsSurface, table: TrimTable, center: Array) -> tuple[np.recarray, np.recarray]:
+def face_integrals(surface: NurbsSurface, table: TrimTable, center: Array) -> tuple[Any, Any]:
     """Integrals over the part of a surface that a trim leaves, about a center (3,), with N = Su x Sv.
 
     Returns
@@ -120,5 +122,5 @@ def face_integrals(surface: NurbsSurface, table: TrimTable, center: Array) -> tu
     return _record(total), _record(doubt)
 
 
-def _record(values: Array) -> np.recarray:
-    return values.view(FACE_INTEGRALS).view(np.recarray)[0]
+def _record(values: Array) -> Any:
+    return rows_of(FACE_INTEGRALS, values[None])[0]

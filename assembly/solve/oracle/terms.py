@@ -80,7 +80,8 @@ class Terms:
                 self._poses.point(k, center) + self._packed.reference / self._packed.scale
                 for k, (_, center) in zip(places, term.points, strict=True)
             ]
-            return -sum(mass / term.mass * ca.dot(term.direction, p) for mass, p in zip(masses, centers, strict=True))
+            parts = [mass / term.mass * ca.dot(term.direction, p) for mass, p in zip(masses, centers, strict=True)]
+            return -ca.sum1(ca.vertcat(*parts))
         raise InputError(
             f"objective is {term!r}; expected what the reference solver takes: PointDistance, FrameDistance, Posture, "
             "Weight or Expression"
