@@ -41,6 +41,11 @@ if TYPE_CHECKING:
     from assembly.constraints.model.placements import PointOnLine as PointOnLine
     from assembly.constraints.model.placements import PointOnPlane as PointOnPlane
     from assembly.constraints.model.trim_contact import TrimContact as TrimContact
+    from assembly.files.gltf import write_gltf as write_gltf
+    from assembly.files.robot import Robot as Robot
+    from assembly.files.stl import write_stl as write_stl
+    from assembly.files.urdf_reader import read_urdf as read_urdf
+    from assembly.files.urdf_writer import write_urdf as write_urdf
     from assembly.geometry import shapes as shapes
     from assembly.geometry.faces.face import Face as Face
     from assembly.geometry.faces.loop import Loop as Loop
@@ -117,6 +122,7 @@ else:
             "Prismatic": "assembly.constraints.model.joints",
             "RackPinion": "assembly.constraints.model.couplings",
             "Revolute": "assembly.constraints.model.joints",
+            "Robot": "assembly.files.robot",
             "Screw": "assembly.constraints.model.joints",
             "SecondOrder": "assembly.solve.second_order.classification",
             "Solution": "assembly.solve.solution",
@@ -140,11 +146,15 @@ else:
             "load": "assembly.scene_file",
             "proximity": "assembly.proximity",
             "read_step": "assembly.step",
+            "read_urdf": "assembly.files.urdf_reader",
             "reference": "assembly.solve.oracle.reference",
             "shapes": "assembly.geometry.shapes",
             "statics": "assembly.solve.forces.statics",
             "tip_jacobian": "assembly.solve.forces.end_effector",
             "view": "assembly.view",
+            "write_gltf": "assembly.files.gltf",
             "write_step": "assembly.step",
+            "write_stl": "assembly.files.stl",
+            "write_urdf": "assembly.files.urdf_writer",
         },
     )

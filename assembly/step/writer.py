@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from assembly.errors import AssemblyError, InputError
+from assembly.errors import AssemblyError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.solve.solution import Solution
 from assembly.step.occt import occt, quiet, settings
+from assembly.step.placed import placed_bodies
 from assembly.step.reader import StepError, StepWarning, checked_unit, unique
 from assembly.step.solids import sewn
 from assembly.step.tree import Color
@@ -21,22 +22,6 @@ if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
 __all__ = ["write_step"]
-
-
-def _placed(what: Any) -> list[tuple[Body, Pose]]:
-    """Bodies and where they stand."""
-    if isinstance(what, Solution):
-        return [(body, what.pose(body)) for body in what._scene.bodies]
-    bodies = [what] if isinstance(what, Body) else getattr(what, "bodies", what)
-    if not isinstance(bodies, Iterable) or isinstance(bodies, str):
-        raise TypeError(f"what is {what!r}; expected an Assembly, a Solution, a Body or several")
-    rows = list(bodies)
-    for body in rows:
-        if not isinstance(body, Body):
-            raise TypeError(f"what holds {body!r}; expected bodies")
-    if not rows:
-        raise InputError("what has no bodies; expected at least one")
-    return [(body, body.pose) for body in rows]
 
 
 def _named(label: Any, name: str) -> None:
@@ -119,7 +104,7 @@ def write_step(
         OCCT is not installed: pip install "assembly-solver[step]".
     """
     scale = checked_unit(unit)
-    placed = _placed(what)
+    placed = placed_bodies(what)
     file = Path(fspath(path))
     o = occt()
     # Settings exist once there is a writer.

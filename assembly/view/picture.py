@@ -83,7 +83,7 @@ _ROOM = 1.15
 _OUTLOOKS = 200
 
 
-def _colors(bodies: Sequence[Body]) -> Iterator[Color]:
+def body_colors(bodies: Sequence[Body]) -> Iterator[Color]:
     """Colors of their own, or by name, or in turn with those that no name has taken."""
     names = [body.name.strip().lower() for body in bodies]
     free = [color for color in _PALETTE if color not in [_NAMED.get(name) for name in names]]
@@ -111,7 +111,7 @@ def _bodies(
     interference: Interference | None,
 ) -> Iterator[Item]:
     styles = {} if interference is None else shown_as(interference)
-    for (body, mesh), own in zip(meshes.items(), _colors(scene.bodies), strict=True):
+    for (body, mesh), own in zip(meshes.items(), body_colors(scene.bodies), strict=True):
         path, rotation = ("bodies", body.name), stations.rotation(body)
         color, opacity = styles.get(body.name, (own, 1.0))
         if mesh is None and not len(held[body]):
