@@ -20,7 +20,8 @@ ARM = """<robot name="arm">
   </link>
   <link name="fore"/>
   <link name="finger">
-    <collision name="pad"><origin xyz="0 0 0.01" rpy="0.1 0.2 0.3"/><geometry><box size="0.02 0.03 0.1"/></geometry></collision>
+    <collision name="pad"><origin xyz="0 0 0.01" rpy="0.1 0.2 0.3"/>
+      <geometry><box size="0.02 0.03 0.1"/></geometry></collision>
   </link>
   <link name="thumb"/>
   <link name="nail"/>

@@ -157,9 +157,13 @@ BAD = {
     "no links": ('<robot name="r"/>', "it has no links; expected a robot"),
     "two of a name": ('<robot name="r"><link name="a"/><link name="a"/></robot>', "two links have one name"),
     "no name": ('<robot name="r"><link name=" "/></robot>', "a link has the name ' '; expected a nonempty string"),
-    "two roots": ('<robot name="r"><link name="a"/><link name="b"/></robot>', r"links without a parent are \['a', 'b'\]"),
+    "two roots": (
+        '<robot name="r"><link name="a"/><link name="b"/></robot>',
+        r"links without a parent are \['a', 'b'\]",
+    ),
     "no such link": (
-        '<robot name="r"><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>',
+        '<robot name="r"><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>'
+        "</robot>",
         "joint 'j' is on link 'b'; expected one of a",
     ),
     "two parents": (
@@ -195,7 +199,8 @@ BAD = {
         "joint 'j': limits",
     ),
     "radius": (
-        '<robot name="r"><link name="a"><collision><geometry><sphere radius="-1"/></geometry></collision></link></robot>',
+        '<robot name="r"><link name="a"><collision><geometry><sphere radius="-1"/></geometry></collision></link>'
+        "</robot>",
         "link 'a': radius is",
     ),
     "not finite": (
