@@ -18,7 +18,8 @@ import assembly as asm
 
 def link(name: str, length: float, radius: float) -> str:
     """A rod along x from a ball at its joint, in meters as the file has it."""
-    rod = f'<origin xyz="{length / 2} 0 0" rpy="0 {np.pi / 2} 0"/><geometry><cylinder radius="{radius}" length="{length}"/>'
+    place = f'<origin xyz="{length / 2} 0 0" rpy="0 {np.pi / 2} 0"/>'
+    rod = f'{place}<geometry><cylinder radius="{radius}" length="{length}"/>'
     ball = f'<geometry><sphere radius="{1.5 * radius}"/>'
     shapes = "".join(f"<collision>{shape}</geometry></collision>" for shape in (rod, ball))
     return f'<link name="{name}">{shapes}</link>'
@@ -33,8 +34,8 @@ def joint(name: str, parent: str, child: str, place: str, axis: str, limits: tup
 
 def robot_text() -> str:
     parts = [
-        '<link name="base"><collision><origin xyz="0 0 0.1"/><geometry><cylinder radius="0.06" length="0.2"/></geometry>'
-        "</collision></link>",
+        '<link name="base"><collision><origin xyz="0 0 0.1"/>'
+        '<geometry><cylinder radius="0.06" length="0.2"/></geometry></collision></link>',
         '<link name="turret"/>',
         link("upper arm", 0.5, 0.03),
         link("forearm", 0.4, 0.025),
