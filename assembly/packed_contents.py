@@ -7,6 +7,7 @@ a solve has found to need stays with the scene, and states of solutions of befor
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.constraints.model.constraint import Constraint, structure_changes
 from assembly.constraints.model.contact import Contact, lone_surfaces
 from assembly.constraints.model.contents import Contents
-from assembly.constraints.model.joint import Joint
+from assembly.constraints.model.joint import Joint, Sense
 from assembly.constraints.packing.earlier import is_earlier, is_same_scene, taken_over
 from assembly.constraints.packing.lower_pairs import LowerPair, lower_pairs
 from assembly.constraints.packing.scene import MORE_PLACES, Packed, structure_of
@@ -30,6 +31,8 @@ from assembly.solve.solution import Solution
 __all__ = ["PackedContents"]
 
 Array = NDArray[np.float64]
+# What a constraint is where a solve begins: a contact a joint, a joint of nearest axes one of either sense.
+Seat = Joint | Sense
 
 
 class PackedContents(Contents):
@@ -47,8 +50,9 @@ class PackedContents(Contents):
         self._scene: Scene | None = None
         self._corners = False  # whether corners of contacts of solids are listed
         self._lower_pairs: list[LowerPair] | None = None
-        self._seats: tuple[tuple[int, Joint], ...] = ()  # contacts that are joints where the last solve began
-        self._packings: dict[tuple[tuple[int, Joint], ...], tuple[Packed | None, Scene | None]] = {}
+        self._nearest: dict[int, Joint] = {}  # joints whose axes are aligned or opposed as they are where solves begin
+        self._seats: tuple[tuple[int, Seat], ...] = ()  # where the last solve began
+        self._packings: dict[tuple[tuple[int, Seat], ...], tuple[Packed | None, Scene | None]] = {}
 
     def packed(self) -> Packed:
         """The scene as the compiled loop reads it; made at first use."""
@@ -77,6 +81,7 @@ class PackedContents(Contents):
         self._scene = Scene(
             self.bodies, tuple(constraints), tuple(packed.contacts), tuple(packed.sides), packed.scale, seats
         )
+        self._scene.axes = {item.name: item.axes for item in constraints if _takes_nearest(item)}
         packed.before = before
         self._packed = packed
         return packed
@@ -100,10 +105,16 @@ class PackedContents(Contents):
         return mine if is_same else None
 
     def _seated_constraints(self) -> list[Constraint]:
-        """The constraints, and joints in place of contacts that are lower pairs where the last solve began."""
+        """The constraints, and joints in place of contacts that are lower pairs where the last solve began.
+
+        Joints of nearest axes take those of that start: another scene with the same joint may have turned it.
+        """
         constraints = self._constraints.copy()
-        for number, joint in self._seats:
-            constraints[number] = joint
+        for number, seat in self._seats:
+            if isinstance(seat, Joint):
+                constraints[number] = seat
+            else:
+                self._nearest[number]._take_axes(seat)
         return constraints
 
     def _take_seats(self, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None = None) -> None:
@@ -117,11 +128,12 @@ class PackedContents(Contents):
                 return
             kept = self._packings.items()
             known = (key for key, (other, _) in kept if other is not None and is_same_scene(packed, other))
-            seats = next(known, self._seats)
+            seats: tuple[tuple[int, Seat], ...] = next(known, self._seats)
         else:
             if self._lower_pairs is None:
                 self._lower_pairs = lower_pairs(self._constraints)
-            if not self._lower_pairs:
+                self._nearest = {k: item for k, item in enumerate(self._constraints) if _takes_nearest(item)}
+            if not self._lower_pairs and not self._nearest:
                 return
             poses = dict(zip(self._bodies, self._given(q0), strict=True))
             named = starts if isinstance(starts, Mapping) else {}
@@ -129,6 +141,7 @@ class PackedContents(Contents):
             seats = tuple(
                 (k, joint) for k, joint in found if joint is not None and self._constraints[k].name not in named
             )
+            seats += tuple((k, joint._nearest_at(poses)) for k, joint in self._nearest.items())
         if seats != self._seats:
             self._packings[self._seats] = self._packed, self._scene
             self._packed, self._scene = self._packings.pop(seats, (None, None))
@@ -188,3 +201,8 @@ class PackedContents(Contents):
             state[at + 4 : at + TRACK] = 0.0
             # Rows that the last solve left are of other pairs.
             state[packed.kept_at :] = 0.0
+
+
+def _takes_nearest(item: Constraint) -> TypeGuard[Joint]:
+    """Whether a constraint is a joint whose axes are aligned or opposed as they are where a solve begins."""
+    return isinstance(item, Joint) and item.asked_axes == "nearest"

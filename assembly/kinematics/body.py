@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,13 @@ from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, KnownSettings, check_coordinates, checked_color, text, vector
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.kinematics.body_face import BodyFace
 from assembly.kinematics.pose import Pose, direction, length
+
+if TYPE_CHECKING:
+    from assembly.selection.edges import Edges
+    from assembly.selection.faces import Faces
+    from assembly.selection.vertices import Vertices
 
 __all__ = ["Body", "BodyFace", "Frame", "Point", "Shape"]
 
@@ -54,18 +60,6 @@ class Frame(ReadOnlyArrays):
     axes: Array
 
 
-@dataclass(frozen=True, eq=False)
-class BodyFace:
-    """One face of a body."""
-
-    body: Body
-    face: Face
-    name: str
-
-    def __repr__(self) -> str:
-        return f"{self.body.name}.face({self.name!r})"
-
-
 class Body(KnownSettings):
     """A rigid body. Its pose may be set anew; its name, its faces and whether it is fixed are for life.
 
@@ -104,14 +98,14 @@ class Body(KnownSettings):
         # Pose takes what is like an array, which its fields do not say: they are tuples once it is made.
         self._pose = Pose(position, quaternion)  # type: ignore[arg-type]  # Pose converts them
         check_coordinates("position", self._pose.position.tolist())
-        self._faces = self._named(shape)
+        self._faces = self._selectable(self._named(shape))
         self.color = color
 
     def __copy__(self) -> Self:
         """A body of the same name, with faces of its own that stand on the same surfaces."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
-        other._faces = tuple(BodyFace(other, side.face, side.name) for side in self._faces)
+        other._faces = other._selectable(BodyFace(other, side.face, side.name) for side in self._faces)
         return other
 
     @property
@@ -125,9 +119,23 @@ class Body(KnownSettings):
         return self._fixed
 
     @property
-    def faces(self) -> tuple[BodyFace, ...]:
-        """Faces in the order they were given."""
+    def faces(self) -> Faces:
+        """Faces in the order they were given: a tuple, of which `faces.planes(...)`, `faces(">Z")` ... select some."""
         return self._faces
+
+    @property
+    def edges(self) -> Edges:
+        """Edges: where faces meet, or end; `edges.circles(...)`, `edges("|Z")` ... select some."""
+        from assembly.selection.edges import edges_of
+
+        return edges_of(self)
+
+    @property
+    def vertices(self) -> Vertices:
+        """Vertices: where edges end."""
+        from assembly.selection.vertices import vertices_of
+
+        return vertices_of(self)
 
     @property
     def pose(self) -> Pose:
@@ -149,6 +157,11 @@ class Body(KnownSettings):
     @color.setter
     def color(self, value: Sequence[float] | None) -> None:
         self._color = checked_color(value)
+
+    def _selectable(self, faces: Iterable[BodyFace]) -> Faces:
+        from assembly.selection.faces import Faces
+
+        return Faces(faces, f"{self._name}.faces")
 
     def _named(self, shape: Shape | None) -> tuple[BodyFace, ...]:
         if shape is None:

@@ -13,7 +13,7 @@ from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, checked_color, items
 from assembly.geometry.faces.boundary import Boundary, LoopLike, make_boundary
 from assembly.geometry.faces.loop import Loop
-from assembly.geometry.faces.measures import area_and_volume
+from assembly.geometry.faces.measures import area_and_moments, area_and_volume
 from assembly.geometry.faces.space_nearest import nearest_in_space
 from assembly.geometry.faces.trim import locate_points
 from assembly.geometry.faces.trim_nearest import nearest_points
@@ -253,6 +253,15 @@ class Face:
     def area(self) -> float:
         """Area of the face, to 1e-10 of itself."""
         return float(self._integrals[0])
+
+    @cached_property
+    def _centroid(self) -> NDArray[np.float64]:
+        area, *moments = area_and_moments(self.surface, self._boundary.table).tolist()
+        return np.asarray(np.array(moments) / area)
+
+    def centroid(self) -> NDArray[np.float64]:
+        """Center of the face's area (3,), to 1e-10 of its extent."""
+        return np.array(self._centroid)
 
     def volume_integral(self) -> float:
         """One third of the integral of S.n over the face, n outward: summed over a closed body, its volume."""

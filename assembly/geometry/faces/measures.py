@@ -6,17 +6,19 @@ by Gauss quadrature, exactly as far as doubles go: `geometry/faces/integrals.py`
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.integrals import along_bottom, along_pieces
+from assembly.geometry.faces.moments import moments_along_bottom, moments_along_pieces
 from assembly.geometry.faces.trim_pieces import cut_of_piece, trim_at, trim_frame_at
 from assembly.geometry.faces.trim_table import TrimTable
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["area_and_volume"]
+__all__ = ["area_and_moments", "area_and_volume"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -67,6 +69,22 @@ def _rows(table: TrimTable, levels: tuple[Array, Array]) -> tuple[Array, NDArray
 
 def area_and_volume(surface: NurbsSurface, table: TrimTable) -> Array:
     """Area, and integral of S.(Su x Sv) / 3, of the part of a surface that a trim leaves: (2,)."""
+    return _integrated(surface, table, along_pieces, along_bottom, 2)
+
+
+def area_and_moments(surface: NurbsSurface, table: TrimTable) -> Array:
+    """Area, and integrals of x, y and z, of the part of a surface that a trim leaves: (4,)."""
+    return _integrated(surface, table, moments_along_pieces, moments_along_bottom, 4)
+
+
+def _integrated(
+    surface: NurbsSurface,
+    table: TrimTable,
+    pieces_kernel: Callable[..., None],
+    bottom_kernel: Callable[..., None],
+    width: int,
+) -> Array:
+    """Integrals of this many integrands, by kernels that sum along pieces of the boundary and along the bottom."""
     trim = trim_at(table.table, 0)
     frame = trim_frame_at(table.pool, trim.frame)
     low, high = (frame.low_u, frame.low_v), (frame.high_u, frame.high_v)
@@ -85,12 +103,12 @@ def area_and_volume(surface: NurbsSurface, table: TrimTable) -> Array:
     pool = np.concatenate([surface_pool, table.pool])
 
     def sides(count: int, pieces: Indices, bottom: Indices) -> tuple[Array, Array]:
-        out, low = np.empty((len(pieces), 2)), np.empty((len(bottom), 2))
+        out, low = np.empty((len(pieces), width)), np.empty((len(bottom), width))
         gauss = _gauss(count)
         if len(pieces):
-            along_pieces(record, pool, rows[pieces], places[pieces], levels[1], *gauss, out)
+            pieces_kernel(record, pool, rows[pieces], places[pieces], levels[1], *gauss, out)
         if len(bottom):
-            along_bottom(record, pool, stretches[bottom], levels[1], *gauss, low)
+            bottom_kernel(record, pool, stretches[bottom], levels[1], *gauss, low)
         return out, low * w[bottom, None]
 
     # Only what two numbers of nodes disagree on is done again with more.

@@ -247,7 +247,7 @@ def test_opposed_turns_frame_b_about_its_x_axis(joint):
 @pytest.mark.parametrize("axes", ["Aligned", "", None, 1, ["aligned"]])
 @pytest.mark.parametrize("joint", OPPOSABLE)
 def test_axes_are_one_of_two_words(joint, axes):
-    with pytest.raises(InputError, match="axes is .*; expected 'aligned' or 'opposed'"):
+    with pytest.raises(InputError, match="axes is .*; expected 'aligned', 'opposed' or 'nearest'"):
         make(joint, axes=axes)
 
 
