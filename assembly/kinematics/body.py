@@ -179,7 +179,10 @@ class Body(KnownSettings):
             # Names of surfaces and faces may be set anew.
             name = text(f"shape[{k}].name", face.name or ("surface" if len(parts) == 1 else f"face {k + 1}"))
             if any(name == other.name for other in faces):
-                raise InputError(f"shape of body {self.name!r} has two faces named {name!r}; expected distinct names")
+                raise InputError(
+                    f"shape of body {self.name!r} has two faces named {name!r}; expected distinct names, as "
+                    "asm.shapes.joined(...) makes them"
+                )
             faces.append(BodyFace(self, face, name))
         return tuple(faces)
 
