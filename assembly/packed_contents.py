@@ -16,6 +16,7 @@ from assembly.constraints.model.constraint import Constraint, structure_changes
 from assembly.constraints.model.contact import Contact, lone_surfaces
 from assembly.constraints.model.contents import Contents
 from assembly.constraints.model.joint import Joint, Sense
+from assembly.constraints.model.tangent import Tangent
 from assembly.constraints.packing.earlier import is_earlier, is_same_scene, taken_over
 from assembly.constraints.packing.lower_pairs import LowerPair, lower_pairs
 from assembly.constraints.packing.scene import MORE_PLACES, Packed, structure_of
@@ -169,6 +170,7 @@ class PackedContents(Contents):
             state[packed.contacts_at : packed.angles_at] = np.nan
             if turns is not None:
                 state[packed.angles] = turns
+            self._place_tangents(packed, state)
         if starts is not None:
             self._place_starts(packed, state, starts)
         packed.refresh()
@@ -182,6 +184,19 @@ class PackedContents(Contents):
         if is_earlier(solution._ended.packed, packed):
             return taken_over(solution._ended.packed, packed, solution._ended.state)
         raise InputError(f"{name} is a solution of another assembly, or of this one before a change; expected its own")
+
+    def _place_tangents(self, packed: Packed, state: Array) -> None:
+        """Start tangents at pairs on the side that they ask for."""
+        q = state[: packed.contacts_at].reshape(-1, 7)
+        places = {id(body): k for k, body in enumerate(self._bodies)}
+        for k, contact in enumerate(packed.contacts):
+            if isinstance(contact, Tangent) and not contact.edges:
+                rows = (q[places[id(body)]].copy() for body in (contact.body_a, contact.body_b))
+                start = contact.start_at(*rows)
+                if start is not None:
+                    at = packed.contacts_at + TRACK * k
+                    state[at : at + 4] = start
+                    state[at + 4 : at + TRACK] = 0.0
 
     def _place_starts(self, packed: Packed, state: Array, starts: Mapping[str, ArrayLike]) -> None:
         if not isinstance(starts, Mapping):
