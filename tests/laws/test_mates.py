@@ -15,7 +15,7 @@ import assembly as asm
 from assembly.kinematics.pose import rotation_matrix
 
 SEEDS = range(8)
-# Residuals over the parts' sizes, some 10; solves hold to 2e-13 of the scene's size, frames of faces add their rounding.
+# Residuals of parts of some 10: solves hold to 2e-13 of the scene's size, and frames of faces add their rounding.
 HELD = 1e-11
 
 
@@ -74,8 +74,7 @@ def test_flush(seed, axes):
     rng = np.random.default_rng(seed)
     a, b = plate(rng, seed % 2 == 0), box(rng)
     offset = rng.uniform(-2, 2)
-    mate = asm.Flush(a.body.faces(a_top := selector(a, (0, 0, 1))), b.body.face("right"), offset=offset, axes=axes)
-    assert a_top
+    mate = asm.Flush(a.body.faces(selector(a, (0, 0, 1))), b.body.face("right"), offset=offset, axes=axes)
     solution = solved([a, b], mate)
     n, m = a.direction(solution, 0, 0, 1), b.direction(solution, 1, 0, 0)
     sense = 1.0 if mate.axes == "aligned" else -1.0
@@ -166,7 +165,11 @@ def test_a_sphere_in_a_cone_touches_all_around(seed):
     sides = [ball.body.faces, cone.body.faces]
     solution = solved([ball, cone], asm.Concentric(*sides[:: 1 if seed % 2 else -1]))
     # The cone's apex is at z = 2, its lines lean by atan(3 / 4).
-    center, apex, down = ball.point(solution, 0, 0, 0), cone.point(solution, 0, 0, 2), cone.direction(solution, 0, 0, -1)
+    center, apex, down = (
+        ball.point(solution, 0, 0, 0),
+        cone.point(solution, 0, 0, 2),
+        cone.direction(solution, 0, 0, -1),
+    )
     height = down @ (center - apex)
     assert np.linalg.norm(center - apex - height * down) < HELD
     assert abs(height * sin(atan(3 / 4)) - 0.8) < HELD  # the distance from a point of the axis to the lines
