@@ -6,7 +6,8 @@ a solve has found to need stays with the scene, and states of solutions of befor
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import TypeGuard
 
 import numpy as np
@@ -53,6 +54,7 @@ class PackedContents(Contents):
         self._lower_pairs: list[LowerPair] | None = None
         self._nearest: dict[int, Joint] = {}  # joints whose axes are aligned or opposed as they are where solves begin
         self._seats: tuple[tuple[int, Seat], ...] = ()  # where the last solve began
+        self._axes_at: Array | None = None  # where axes are nearest, if that is not where a solve begins
         self._packings: dict[tuple[tuple[int, Seat], ...], tuple[Packed | None, Scene | None]] = {}
 
     def packed(self) -> Packed:
@@ -142,11 +144,22 @@ class PackedContents(Contents):
             seats = tuple(
                 (k, joint) for k, joint in found if joint is not None and self._constraints[k].name not in named
             )
+            if self._axes_at is not None:
+                poses = dict(zip(self._bodies, self._axes_at, strict=True))
             seats += tuple((k, joint._nearest_at(poses)) for k, joint in self._nearest.items())
         if seats != self._seats:
             self._packings[self._seats] = self._packed, self._scene
             self._packed, self._scene = self._packings.pop(seats, (None, None))
             self._seats = seats
+
+    @contextmanager
+    def _axes_as_at(self, q: Array) -> Iterator[None]:
+        """Have nearest axes as they are at poses (n, 7), wherever solves begin."""
+        self._axes_at = q
+        try:
+            yield
+        finally:
+            self._axes_at = None
 
     def _given(self, q0: ArrayLike | None) -> Array:
         """Poses (n, 7) of a start."""

@@ -311,3 +311,20 @@ def test_a_driven_freedom_follows_axes_that_turn():
         z = rotation_matrix(solution.pose(arm).q[3:])[:, 2]
         assert z[2] == pytest.approx(1.0 if sense == "aligned" else -1.0)
         assert hypot(z[0], z[1]) < 1e-12
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_axes_that_the_start_gets_wrong_are_those_where_the_rest_holds(seed):
+    """Parts that lie about: what axes are nearest to there may contradict what is flush."""
+    rng = np.random.default_rng(seed)
+    a, b = plate(rng), Part(rng, "upper", asm.shapes.plate(10, 8, 2, [(1, -2, 1.5)]))
+    flush = asm.Flush(a.body.face("top"), b.body.face("bottom"))
+    # The axis of an edge is outward of its face, so that "aligned" is what the flush faces ask for.
+    rim = b.body.edges.of(b.body.face("top")).circles()
+    mouth = a.body.edges.of(a.body.face("top")).circles()
+    mate = asm.Coaxial(mouth, rim, "mate")
+    scene = asm.Assembly([a.body, b.body])
+    scene.constrain(flush, mate)
+    solution = scene.solve()
+    assert solution.success and solution.axes == {"mate": "aligned"}
+    assert np.linalg.norm(b.point(solution, 1, -2, -1) - a.point(solution, 1, -2, 1)) < HELD

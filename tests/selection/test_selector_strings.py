@@ -117,7 +117,7 @@ def test_senses_of_planes(axis):
 
 @pytest.mark.parametrize("seed", range(40))
 def test_words_and_parentheses(seed):
-    """Random expressions, against Python's own sets. "and" binds first, then "or", then "exc"; "not" takes all of it."""
+    """Random expressions, against Python's own sets. "and" binds first, then "or", "exc"; "not" takes it all."""
     rng = np.random.default_rng(seed)
     what = ("faces", "edges")[seed % 2]
     things = THINGS[what]

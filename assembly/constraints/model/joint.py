@@ -43,8 +43,10 @@ SidePoint = Point | Frame | Body
 SAME_POINT = ((COINCIDENT, 0), (COINCIDENT, 1), (COINCIDENT, 2))
 SAME_AXIS = ((SWING, 0), (SWING, 1))
 ON_AXIS = ((SLIDE, 0), (SLIDE, 1))
-# Axes that are perpendicular at a start, to this cosine, are nearest to aligned.
+# Where axes are perpendicular at a start, to this cosine, one body counts as turned by a thousandth about a direction
+# that is nobody's: so the joints of two bodies choose alike, and none by rounding.
 _ACROSS = 1e-9
+_LEAN = rotation_matrix(np.array([1.0, 0.00024, 0.0003, 0.00032]))
 
 
 def _frame(name: str, side: Any, takes_point: bool) -> Frame:
@@ -186,7 +188,10 @@ class Joint(OwnState, RowConstraint):
     def _nearest_at(self, poses: Mapping[Body, Array]) -> Sense:
         """Whether z axes are nearer to aligned or to opposed where bodies are at these poses (7,)."""
         z_a, z_b = (rotation_matrix(poses[f.body][3:]) @ f.axes[:, 2] for f in (self._frame_a, self._frame_b))
-        return "opposed" if z_a @ z_b < -_ACROSS else "aligned"
+        cosine = float(z_a @ z_b)
+        if abs(cosine) <= _ACROSS:
+            cosine = float(z_a @ _LEAN @ z_b)
+        return "opposed" if cosine < 0.0 else "aligned"
 
     def _take_axes(self, axes: Sense) -> None:
         """Have the axes aligned or opposed from now on: rows and freedoms are of other frames."""

@@ -106,7 +106,8 @@ def center_of_ball(name: str, value: Any, other: Any) -> Frame:
             if value.is_hole == other.is_hole:
                 both = "hollow" if value.is_hole else "full"
                 raise InputError(
-                    f"{name} is {value!r}, a cone, and the sphere is {other!r}, both {both}; expected one hollow, one full"
+                    f"{name} is {value!r}, a cone, and the sphere is {other!r}, both {both}; "
+                    "expected one hollow, one full"
                 )
             return value.body.frame(form.apex + other.radius / sin(form.half_angle) * form.axis, form.axis)
     refused(name, value, "a sphere, or a cone with a sphere on the other side")
