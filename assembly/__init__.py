@@ -19,9 +19,13 @@ if TYPE_CHECKING:
     from assembly.constraints.model.clearance import Clearance as Clearance
     from assembly.constraints.model.contact import Contact as Contact
     from assembly.constraints.model.couplings import Gear as Gear
+    from assembly.constraints.model.couplings import Linear as Linear
     from assembly.constraints.model.couplings import RackPinion as RackPinion
     from assembly.constraints.model.dexterity import Dexterity as Dexterity
     from assembly.constraints.model.expression import Expression as Expression
+    from assembly.constraints.model.groups import Group as Group
+    from assembly.constraints.model.groups import Symmetric as Symmetric
+    from assembly.constraints.model.joints import ConstantVelocity as ConstantVelocity
     from assembly.constraints.model.joints import Cylindrical as Cylindrical
     from assembly.constraints.model.joints import Fixed as Fixed
     from assembly.constraints.model.joints import Parallel as Parallel
@@ -32,6 +36,11 @@ if TYPE_CHECKING:
     from assembly.constraints.model.joints import Screw as Screw
     from assembly.constraints.model.joints import Spherical as Spherical
     from assembly.constraints.model.joints import Universal as Universal
+    from assembly.constraints.model.mates import Coaxial as Coaxial
+    from assembly.constraints.model.mates import Concentric as Concentric
+    from assembly.constraints.model.mates import Flush as Flush
+    from assembly.constraints.model.mates import Insert as Insert
+    from assembly.constraints.model.mates import Width as Width
     from assembly.constraints.model.objectives import FrameDistance as FrameDistance
     from assembly.constraints.model.objectives import PointDistance as PointDistance
     from assembly.constraints.model.objectives import Posture as Posture
@@ -40,6 +49,7 @@ if TYPE_CHECKING:
     from assembly.constraints.model.placements import Distance as Distance
     from assembly.constraints.model.placements import PointOnLine as PointOnLine
     from assembly.constraints.model.placements import PointOnPlane as PointOnPlane
+    from assembly.constraints.model.tangent import Tangent as Tangent
     from assembly.constraints.model.trim_contact import TrimContact as TrimContact
     from assembly.files.gltf import write_gltf as write_gltf
     from assembly.files.robot import Robot as Robot
@@ -91,6 +101,9 @@ else:
             "Body": "assembly.kinematics.body",
             "Clash": "assembly.studies.interference.clash",
             "Clearance": "assembly.constraints.model.clearance",
+            "Coaxial": "assembly.constraints.model.mates",
+            "Concentric": "assembly.constraints.model.mates",
+            "ConstantVelocity": "assembly.constraints.model.joints",
             "Contact": "assembly.constraints.model.contact",
             "ContactPair": "assembly.proximity.extrema.pairs",
             "Crossings": "assembly.solve.crossings",
@@ -102,10 +115,14 @@ else:
             "Expression": "assembly.constraints.model.expression",
             "Face": "assembly.geometry.faces.face",
             "Fixed": "assembly.constraints.model.joints",
+            "Flush": "assembly.constraints.model.mates",
             "FormulaCurve": "assembly.geometry.splines.formula_curve",
             "FrameDistance": "assembly.constraints.model.objectives",
             "Gear": "assembly.constraints.model.couplings",
+            "Group": "assembly.constraints.model.groups",
+            "Insert": "assembly.constraints.model.mates",
             "Interference": "assembly.studies.interference.clash",
+            "Linear": "assembly.constraints.model.couplings",
             "Loop": "assembly.geometry.faces.loop",
             "Manager": "assembly.tracking.manager",
             "Mobility": "assembly.solve.diagnosis.mobility",
@@ -129,6 +146,8 @@ else:
             "Spherical": "assembly.constraints.model.joints",
             "Status": "assembly.solve.scene",
             "Step": "assembly.tracking.tick",
+            "Symmetric": "assembly.constraints.model.groups",
+            "Tangent": "assembly.constraints.model.tangent",
             "Trace": "assembly.tracking.trace",
             "TrackLog": "assembly.tracking.log",
             "TrackStatus": "assembly.tracking.tick",
@@ -137,6 +156,7 @@ else:
             "Universal": "assembly.constraints.model.joints",
             "Way": "assembly.solve.way",
             "Weight": "assembly.constraints.model.objectives",
+            "Width": "assembly.constraints.model.mates",
             "Wrench": "assembly.solve.forces.statics",
             "curves": "assembly.geometry.shapes.curves",
             "dexterity_ellipsoid": "assembly.solve.forces.end_effector",

@@ -116,6 +116,10 @@ class Assembly(PackedContents):
             solution = swept_solve(self, q0, starts, options, interruption)
         else:
             solution = self._from_start(q0, starts, options, interruption)
+        if not solution.success and solution.axes and not isinstance(q0, Solution) and not swept:
+            from assembly.studies.nearest_axes import with_axes_of_the_rest
+
+            solution = with_axes_of_the_rest(self, solution, self._given(q0), starts, options, interruption)
         if not solution.success:
             from assembly.studies.restarts import may_hold_elsewhere, restarted
 

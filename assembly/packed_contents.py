@@ -6,7 +6,9 @@ a solve has found to need stays with the scene, and states of solutions of befor
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.constraints.model.constraint import Constraint, structure_changes
 from assembly.constraints.model.contact import Contact, lone_surfaces
 from assembly.constraints.model.contents import Contents
-from assembly.constraints.model.joint import Joint
+from assembly.constraints.model.joint import Joint, Sense
+from assembly.constraints.model.tangent import Tangent
 from assembly.constraints.packing.earlier import is_earlier, is_same_scene, taken_over
 from assembly.constraints.packing.lower_pairs import LowerPair, lower_pairs
 from assembly.constraints.packing.scene import MORE_PLACES, Packed, structure_of
@@ -30,6 +33,8 @@ from assembly.solve.solution import Solution
 __all__ = ["PackedContents"]
 
 Array = NDArray[np.float64]
+# What a constraint is where a solve begins: a contact a joint, a joint of nearest axes one of either sense.
+Seat = Joint | Sense
 
 
 class PackedContents(Contents):
@@ -47,8 +52,10 @@ class PackedContents(Contents):
         self._scene: Scene | None = None
         self._corners = False  # whether corners of contacts of solids are listed
         self._lower_pairs: list[LowerPair] | None = None
-        self._seats: tuple[tuple[int, Joint], ...] = ()  # contacts that are joints where the last solve began
-        self._packings: dict[tuple[tuple[int, Joint], ...], tuple[Packed | None, Scene | None]] = {}
+        self._nearest: dict[int, Joint] = {}  # joints whose axes are aligned or opposed as they are where solves begin
+        self._seats: tuple[tuple[int, Seat], ...] = ()  # where the last solve began
+        self._axes_at: Array | None = None  # where axes are nearest, if that is not where a solve begins
+        self._packings: dict[tuple[tuple[int, Seat], ...], tuple[Packed | None, Scene | None]] = {}
 
     def packed(self) -> Packed:
         """The scene as the compiled loop reads it; made at first use."""
@@ -77,6 +84,7 @@ class PackedContents(Contents):
         self._scene = Scene(
             self.bodies, tuple(constraints), tuple(packed.contacts), tuple(packed.sides), packed.scale, seats
         )
+        self._scene.axes = {item.name: item.axes for item in constraints if _takes_nearest(item)}
         packed.before = before
         self._packed = packed
         return packed
@@ -100,10 +108,16 @@ class PackedContents(Contents):
         return mine if is_same else None
 
     def _seated_constraints(self) -> list[Constraint]:
-        """The constraints, and joints in place of contacts that are lower pairs where the last solve began."""
+        """The constraints, and joints in place of contacts that are lower pairs where the last solve began.
+
+        Joints of nearest axes take those of that start: another scene with the same joint may have turned it.
+        """
         constraints = self._constraints.copy()
-        for number, joint in self._seats:
-            constraints[number] = joint
+        for number, seat in self._seats:
+            if isinstance(seat, Joint):
+                constraints[number] = seat
+            else:
+                self._nearest[number]._take_axes(seat)
         return constraints
 
     def _take_seats(self, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None = None) -> None:
@@ -117,11 +131,12 @@ class PackedContents(Contents):
                 return
             kept = self._packings.items()
             known = (key for key, (other, _) in kept if other is not None and is_same_scene(packed, other))
-            seats = next(known, self._seats)
+            seats: tuple[tuple[int, Seat], ...] = next(known, self._seats)
         else:
             if self._lower_pairs is None:
                 self._lower_pairs = lower_pairs(self._constraints)
-            if not self._lower_pairs:
+                self._nearest = {k: item for k, item in enumerate(self._constraints) if _takes_nearest(item)}
+            if not self._lower_pairs and not self._nearest:
                 return
             poses = dict(zip(self._bodies, self._given(q0), strict=True))
             named = starts if isinstance(starts, Mapping) else {}
@@ -129,10 +144,22 @@ class PackedContents(Contents):
             seats = tuple(
                 (k, joint) for k, joint in found if joint is not None and self._constraints[k].name not in named
             )
+            if self._axes_at is not None:
+                poses = dict(zip(self._bodies, self._axes_at, strict=True))
+            seats += tuple((k, joint._nearest_at(poses)) for k, joint in self._nearest.items())
         if seats != self._seats:
             self._packings[self._seats] = self._packed, self._scene
             self._packed, self._scene = self._packings.pop(seats, (None, None))
             self._seats = seats
+
+    @contextmanager
+    def _axes_as_at(self, q: Array) -> Iterator[None]:
+        """Have nearest axes as they are at poses (n, 7), wherever solves begin."""
+        self._axes_at = q
+        try:
+            yield
+        finally:
+            self._axes_at = None
 
     def _given(self, q0: ArrayLike | None) -> Array:
         """Poses (n, 7) of a start."""
@@ -156,6 +183,7 @@ class PackedContents(Contents):
             state[packed.contacts_at : packed.angles_at] = np.nan
             if turns is not None:
                 state[packed.angles] = turns
+            self._place_tangents(packed, state)
         if starts is not None:
             self._place_starts(packed, state, starts)
         packed.refresh()
@@ -169,6 +197,19 @@ class PackedContents(Contents):
         if is_earlier(solution._ended.packed, packed):
             return taken_over(solution._ended.packed, packed, solution._ended.state)
         raise InputError(f"{name} is a solution of another assembly, or of this one before a change; expected its own")
+
+    def _place_tangents(self, packed: Packed, state: Array) -> None:
+        """Start tangents at pairs on the side that they ask for."""
+        q = state[: packed.contacts_at].reshape(-1, 7)
+        places = {id(body): k for k, body in enumerate(self._bodies)}
+        for k, contact in enumerate(packed.contacts):
+            if isinstance(contact, Tangent) and not contact.edges:
+                rows = (q[places[id(body)]].copy() for body in (contact.body_a, contact.body_b))
+                start = contact.start_at(*rows)
+                if start is not None:
+                    at = packed.contacts_at + TRACK * k
+                    state[at : at + 4] = start
+                    state[at + 4 : at + TRACK] = 0.0
 
     def _place_starts(self, packed: Packed, state: Array, starts: Mapping[str, ArrayLike]) -> None:
         if not isinstance(starts, Mapping):
@@ -188,3 +229,8 @@ class PackedContents(Contents):
             state[at + 4 : at + TRACK] = 0.0
             # Rows that the last solve left are of other pairs.
             state[packed.kept_at :] = 0.0
+
+
+def _takes_nearest(item: Constraint) -> TypeGuard[Joint]:
+    """Whether a constraint is a joint whose axes are aligned or opposed as they are where a solve begins."""
+    return isinstance(item, Joint) and item.asked_axes == "nearest"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import json
 import re
 from dataclasses import fields
@@ -14,7 +15,11 @@ import assembly as asm
 from assembly.constraints.model import joints as joints_of_frames
 from assembly.constraints.model import placements as joints_of_points
 from assembly.constraints.model.dexterity import MEASURES
+from assembly.kinematics.body import BodyFace
 from assembly.proximity.extrema.pairs import PairStatus
+from assembly.selection.edges import Edges
+from assembly.selection.faces import Faces
+from assembly.selection.vertices import Vertices
 from assembly.solve.options import Options
 from benchmarks import counts, report
 
@@ -22,6 +27,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 CONCEPTS = (ROOT / "docs" / "concepts.md").read_text()
 MECHANISMS = (ROOT / "docs" / "mechanisms.md").read_text()
+PARTS = (ROOT / "docs" / "parts.md").read_text()
 README = (ROOT / "README.md").read_text()
 
 
@@ -97,6 +103,78 @@ def test_joints_with_their_rows_and_freedoms():
         joint = getattr(asm, name)(asm.Body("a"), asm.Body("b"), **settings.get(name, {}))
         assert len(joint.equations) == int(count), name
         assert freedoms.replace("`", "").split(", ") == (list(joint.freedoms) or [""]), name
+
+
+def made_shapes():
+    """What the table of makers has, by its first cells."""
+    shapes, curves = asm.shapes, asm.curves
+    square = curves.polygon([(1, 0), (2, 0), (2, 1), (1, 1)])
+    line = asm.NurbsCurve([[1, 0], [2, 1]], [0, 0, 1, 1], 1)
+    wire = asm.NurbsCurve([[0, 0, 0], [1, 0, 0]], [0, 0, 1, 1], 1)
+    box, ball, plate = shapes.box(1, 1, 1), shapes.sphere(1), shapes.plate(4, 4, 1)
+    return {
+        "plane(width, height)": shapes.plane(1, 1),
+        "sphere(radius)": ball,
+        "ellipsoid(a, b, c)": shapes.ellipsoid(1, 2, 3),
+        "cylinder(radius, height)": shapes.cylinder(1, 1),
+        "cone(radius, height, top_radius=0)": shapes.cone(1, 1),
+        "torus(major_radius, minor_radius)": shapes.torus(2, 1),
+        "pipe(path, radius)": shapes.pipe(shapes.Path().line(3), 1),
+        "paper_clip()": shapes.paper_clip(),
+        "loft(curves)": shapes.loft([wire, wire.transformed(translation=(0, 1, 0))]),
+        "revolution(curve)` of an open curve": shapes.revolution(line),
+        "revolution(profile)": shapes.revolution(square),
+        "revolution(profile, angle)": shapes.revolution(square, 1.0),
+        "trimmed_plane(outer, holes)": shapes.trimmed_plane(square),
+        "box(x, y, z)": box,
+        "solid_cylinder(radius, height)": shapes.solid_cylinder(1, 1),
+        "plate(x, y, z, holes)": shapes.plate(9, 9, 1, [(0, 0, 1), (3, 0, 1)]),
+        "plate_with_slot(x, y, z, length, width)": shapes.plate_with_slot(9, 9, 1, 3, 1),
+        "cam(radii, height, bore)": shapes.cam([2, 2, 2, 3], 1, 1),
+        "extrusion(profile, height)": shapes.extrusion(square, 1),
+        "extrusion(profile, height, holes)`, two round holes": shapes.extrusion(
+            curves.polygon([(-9, -9), (9, -9), (9, 9), (-9, 9)]), 1, [curves.circle(1), curves.circle(1, (4, 0))]
+        ),
+        "joined(plate, ball)": shapes.joined(plate, ball),
+        "joined(box, box)": shapes.joined(box, box),
+        "joined(base=box, boss=ball)": shapes.joined(base=box, boss=ball),
+    }
+
+
+def test_makers_and_their_face_names():
+    table = {maker: names for maker, names in rows(PARTS, "maker in `asm.shapes", "faces")}
+    made = made_shapes()
+    assert table == {maker: ", ".join(f.name for f in asm.Body("part", shape).faces) for maker, shape in made.items()}
+    assert {maker.partition("(")[0] for maker in table} == {*asm.shapes.__all__} - {"Path"}
+
+
+def test_mates_and_what_they_take_away():
+    table = rows(PARTS, "mate", "takes away")
+    public = {name for name in asm.__all__ if isinstance(kind := getattr(asm, name), type) and hasattr(kind, "removes")}
+    assert {row[0] for row in table} == public
+    for name, count, _, axes in table:
+        kind = getattr(asm, name)
+        assert f"takes away {count.split()[0]} degree" in kind.__doc__
+        default = inspect.signature(kind).parameters.get("axes")
+        assert axes == ({None: "as it sits"}.get(default.default, default.default) if default else ""), name
+
+
+def test_what_selects():
+    kinds = {"body.faces": Faces, "body.edges": Edges, "all, and `body.vertices": Vertices}
+    table = {row[0]: re.findall(r"(\w+)\(([^)]*)\)", row[1]) for row in rows(PARTS, "of", "methods")}
+    assert table.keys() == kinds.keys()
+    for what, methods in table.items():
+        for name, arguments in methods:
+            if name == "faces":
+                continue
+            had = [p for p in inspect.signature(getattr(kinds[what], name)).parameters if p != "self"]
+            named = [a for a in arguments.split(", ") if a and a not in ("face", "...") and '"' not in a]
+            assert had == named or '"' in arguments or "face" in arguments, name
+    kinds_of_faces = [row[0] for row in rows(PARTS, "kind")]
+    assert kinds_of_faces == [*Faces._kinds]
+    for kind, has, _ in rows(PARTS, "kind"):
+        for name in re.findall(r"`(\w+)`", f"`{has}`"):
+            assert hasattr(BodyFace, name), (kind, name)
 
 
 def test_measures_of_dexterity():

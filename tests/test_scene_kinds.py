@@ -42,6 +42,23 @@ def bodies_in_space():
     )
 
 
+def every_mate(ground, crank, wheel, plate, pin):
+    hole, shank = plate.faces.cylinders(hole=True), pin.faces.cylinders()
+    return (
+        asm.Flush(plate.faces(">Z"), pin.faces("<Z"), offset=THIRD, axes="nearest", x=0.1, angle_limits=(None, 0.2)),
+        asm.Coaxial(hole, shank, axes="opposed", slide_limits=(-THIRD, None)),
+        asm.Coaxial(plate.edges("|Z and >X and >Y"), wheel.frame((0.1, THIRD, 0)), angle=0.1),
+        asm.Insert(hole, shank, offset=THIRD, limits=(0.0, THIRD)),
+        asm.Insert(plate.edges.circles()[1:], pin.edges.circles()[:1], "edges", axes="nearest", angle=0.1),
+        asm.Concentric(ground.faces, crank.face(), "balls", twist=0.1),
+        asm.Width(plate.faces("|X"), pin.faces("|Z"), y_limits=(None, 1.0)),
+        asm.Tangent(ground.face(), shank, side="inside", unilateral=True),
+        asm.Symmetric(crank.face(), wheel.point(THIRD, 0, 0), plate.faces("<Y")),
+        asm.Symmetric(pin.edges.circles()[:1], plate.vertices(">X and >Y and >Z"), ground.frame(), "corners"),
+        asm.Group([wheel, plate, pin]),
+    )
+
+
 def every_constraint():
     """A scene with every kind of constraint, couplings before their joints, and numbers that have no short decimals."""
     ground, crank, wheel = bodies_in_space()
@@ -76,13 +93,18 @@ def every_constraint():
     touch = asm.Contact(ground, crank, "touch", edges=True)
     corners = np.array([[0.1, 0.2], [THIRD, 0.2], [0.3, 0.7], [0.1, 0.2]])
     loop = asm.NurbsCurve(corners, [0, 0, 1, 2, 3, 3], 1)
-    scene = asm.Assembly([ground, crank, wheel])
+    plate = asm.Body("plate", asm.shapes.plate(3, 2, 1, [(THIRD, 0.1, 0.2)]), (4.0, THIRD, 0.0))
+    pin = asm.Body("pin", asm.shapes.solid_cylinder(0.2, 3.0), (5.0, 1.0, THIRD), (0.6, 0.0, 0.8, 0.0))
+    scene = asm.Assembly([ground, crank, wheel, plate, pin])
     scene.constrain(
         *couplings,
         touch,
         *joints,
         asm.TrimContact(touch, loop, "inside", "cartesian", side="b", name="kept"),
         asm.Clearance([ground, crank], THIRD, merge_radius=0.1, slots=3, exclude=[(crank, ground)]),
+        *every_mate(ground, crank, wheel, plate, pin),
+        asm.Linear(slider, shaft, -THIRD, "slides", offset=0.1),
+        asm.ConstantVelocity(here, there, axes="nearest", swing=0.3, azimuth_limits=(None, 0.1)),
         asm.Expression(mixed(3, 2), [wheel, ground, crank], unilateral=True, scale=0.1, weight=THIRD),
     )
     scene.minimize(
@@ -157,7 +179,7 @@ def test_every_kind_is_tried():
 def test_every_joint_that_is_public_has_a_kind():
     public = {getattr(asm, name) for name in asm.__all__ if isinstance(getattr(asm, name), type)}
     joints = {cls for cls in public if issubclass(cls, Joint)}
-    assert len(joints) == 14 and joints <= {record.kind for record in CONSTRAINTS.kinds.values()}
+    assert len(joints) == 20 and joints <= {record.kind for record in CONSTRAINTS.kinds.values()}
 
 
 @pytest.mark.parametrize(("kinds", "heading"), [(CONSTRAINTS, "constraint"), (OBJECTIVES, "term")])
@@ -332,7 +354,7 @@ CASES = {
     "type": (
         [HINGE, "type"],
         "hinge",
-        r'.type is "hinge"; expected one of contact, fixed, .*, rack_pinion, trim_contact, clearance, expression$',
+        r'.type is "hinge"; expected one of contact, fixed, .*, rack_pinion, trim_contact, .*, clearance, expression$',
     ),
     "type of a term": ([HINGE, "type"], "posture", r'.type is "posture"; expected one of contact'),
     "missing": ([HINGE, "limits"], MISSING, " has no field 'limits'; expected the fields type, name, frame_a, frame_b"),
@@ -349,7 +371,7 @@ CASES = {
     "axes huge": ([HINGE, "frame_b", "axes", 0, 0], 1e308, r".frame_b.axes is \[\[1e\+308.*; expected unit vectors"),
     "axes almost": ([HINGE, "frame_b", "axes", 0, 0], 1 + 1e-6, r".frame_b.axes is .*; expected unit vectors x, y, z"),
     "axes left": ([HINGE, "frame_b", "axes"], LEFT, ".frame_b.axes is .*, left-handed; expected z = x cross y"),
-    "axes word": ([HINGE, "axes"], "along", ".axes is 'along'; expected 'aligned' or 'opposed'"),
+    "axes word": ([HINGE, "axes"], "along", ".axes is 'along'; expected 'aligned', 'opposed' or 'nearest'"),
     "axes null": ([HINGE, "axes"], None, ".axes is null; expected a string"),
     "driven": ([HINGE, "angle"], "1", '.angle is "1"; expected a finite number'),
     "driven true": ([HINGE, "angle"], True, ".angle is true; expected a finite number"),

@@ -170,9 +170,9 @@ class _Reader:
         before = part.name or (label if len(link.collisions) == 1 else f"{label} {number + 1}")
         for item in faces:
             face = item if isinstance(item, Face) else Face(item)
-            surface = face.surface.transformed(place.matrix[:3, :3], place.position)
-            name = f"{before} {face.name}" if face.name else before
-            yield Face(surface, face.outer, face.holes, name=name, reversed=face.reversed)
+            moved = face.transformed(place.matrix[:3, :3], place.position)
+            moved.name = f"{before} {face.name}" if face.name else before
+            yield moved
 
     def _joint(self, joint: Any, bodies: dict[str, Body]) -> Joint | None:
         place = self._origin(joint)

@@ -13,10 +13,14 @@ from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, KnownSettings, check_coordinates, checked_color, positive, text, vector
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.kinematics.body_face import BodyFace
 from assembly.kinematics.pose import Pose, direction, length
 
 if TYPE_CHECKING:
     from assembly.proximity.brep.mass import MassProperties
+    from assembly.selection.edges import Edges
+    from assembly.selection.faces import Faces
+    from assembly.selection.vertices import Vertices
 
 __all__ = ["Body", "BodyFace", "Frame", "Point", "Shape"]
 
@@ -55,18 +59,6 @@ class Frame(ReadOnlyArrays):
     body: Body
     origin: Array
     axes: Array
-
-
-@dataclass(frozen=True, eq=False)
-class BodyFace:
-    """One face of a body."""
-
-    body: Body
-    face: Face
-    name: str
-
-    def __repr__(self) -> str:
-        return f"{self.body.name}.face({self.name!r})"
 
 
 class Body(KnownSettings):
@@ -110,7 +102,7 @@ class Body(KnownSettings):
         # Pose takes what is like an array, which its fields do not say: they are tuples once it is made.
         self._pose = Pose(position, quaternion)  # type: ignore[arg-type]  # Pose converts them
         check_coordinates("position", self._pose.position.tolist())
-        self._faces = self._named(shape)
+        self._faces = self._selectable(self._named(shape))
         self.color = color
         self._density = positive("density", density)
 
@@ -118,7 +110,7 @@ class Body(KnownSettings):
         """A body of the same name, with faces of its own that stand on the same surfaces."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
-        other._faces = tuple(BodyFace(other, side.face, side.name) for side in self._faces)
+        other._faces = other._selectable(BodyFace(other, side.face, side.name) for side in self._faces)
         return other
 
     @property
@@ -132,8 +124,8 @@ class Body(KnownSettings):
         return self._fixed
 
     @property
-    def faces(self) -> tuple[BodyFace, ...]:
-        """Faces in the order they were given."""
+    def faces(self) -> Faces:
+        """Faces in the order they were given: a tuple, of which `faces.planes(...)`, `faces(">Z")` ... select some."""
         return self._faces
 
     @property
@@ -180,6 +172,20 @@ class Body(KnownSettings):
         return self.mass_properties.inertia
 
     @property
+    def edges(self) -> Edges:
+        """Edges: where faces meet, or end; `edges.circles(...)`, `edges("|Z")` ... select some."""
+        from assembly.selection.edges import edges_of
+
+        return edges_of(self)
+
+    @property
+    def vertices(self) -> Vertices:
+        """Vertices: where edges end."""
+        from assembly.selection.vertices import vertices_of
+
+        return vertices_of(self)
+
+    @property
     def pose(self) -> Pose:
         """Where the body stands; settable. A solve starts here and does not change it."""
         return self._pose
@@ -200,6 +206,11 @@ class Body(KnownSettings):
     def color(self, value: Sequence[float] | None) -> None:
         self._color = checked_color(value)
 
+    def _selectable(self, faces: Iterable[BodyFace]) -> Faces:
+        from assembly.selection.faces import Faces
+
+        return Faces(faces, f"{self._name}.faces")
+
     def _named(self, shape: Shape | None) -> tuple[BodyFace, ...]:
         if shape is None:
             return ()
@@ -216,7 +227,10 @@ class Body(KnownSettings):
             # Names of surfaces and faces may be set anew.
             name = text(f"shape[{k}].name", face.name or ("surface" if len(parts) == 1 else f"face {k + 1}"))
             if any(name == other.name for other in faces):
-                raise InputError(f"shape of body {self.name!r} has two faces named {name!r}; expected distinct names")
+                raise InputError(
+                    f"shape of body {self.name!r} has two faces named {name!r}; expected distinct names, as "
+                    "asm.shapes.joined(...) makes them"
+                )
             faces.append(BodyFace(self, face, name))
         return tuple(faces)
 

@@ -30,6 +30,16 @@ Fields of a constraint by its type:
     angle           frame_a, frame_b, value, limits
     gear            a {joint, freedom}, b {joint, freedom}, ratio, offset
     rack_pinion     pinion {joint, freedom}, rack {joint, freedom}, radius, offset
+    constant_velocity  frame_a, frame_b, axes, swing, swing_limits, azimuth, azimuth_limits
+    linear          a {joint, freedom}, b {joint, freedom}, ratio, offset
+    flush           face_a, face_b, axes, offset, x, x_limits, y, y_limits, angle, angle_limits
+    coaxial         a, b, axes, angle, angle_limits, slide, slide_limits
+    insert          hole, shank, seats, axes, offset, angle, limits
+    concentric      a, b, swing, swing_limits, azimuth, azimuth_limits, twist, twist_limits
+    width           slot, tab, axes, offset, x, x_limits, y, y_limits, angle, angle_limits
+    tangent         a, b, side, unilateral
+    symmetric       a, b, plane
+    group           bodies [names], poses [poses]
     trim_contact    contact, side, loop, keep, form
     clearance       bodies [names] or null for all, minimum, exclude [[name, name]], neglect, places or null
     expression      bodies [names], function [lines], unilateral, scale, weight
@@ -48,12 +58,14 @@ face's `surface` is an index into `surfaces`, and a body's `shape` are indices i
 share is there once. Names of surfaces, faces and curves, and colors, are null where none were given, `outer` where the
 edge of the surface is meant; the face of a contact's side is null where the nearest is to be found. A trim refers to a
 contact of the same file that stands before it; its `side` is "a" or "b", its `loop` "outer" or the index of a hole of
-that side's face, or a loop of its own. Frames, and the points of joints, are {body, origin [3], axes [x, y, z]} in
-body coordinates, the axes unit vectors at right angles. The `axes` of a joint are "aligned" or "opposed". A driven
-value is a number, or null where the freedom is free; limits are [lower, upper], null for a side without limit, or null
-without limits; angles are in radians. A coupling refers to joints of the same file, which may stand after it. The
-`function` of an expression is the text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers
-are the shortest decimals that give back the same doubles.
+that side's face, or a loop of its own. Frames, and the points of joints, are {body, origin [3], axes [x, y, z]} in body
+coordinates, the axes unit vectors at right angles. The `axes` of a joint are "aligned", "opposed" or "nearest". What a
+mate ties (`seats`, `slot` and `tab`: two each) is {body, face}, {body, edge}, {body, vertex} or {body, point [3]}, or a
+frame: faces by name, edges and vertices by their number in `body.edges` and `body.vertices`. A driven value is a
+number, or null where the freedom is free; limits are [lower, upper], null for a side without limit, or null without
+limits; angles are in radians. A coupling refers to joints of the same file, which may stand after it. The `function` of
+an expression is the text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers are the
+shortest decimals that give back the same doubles.
 
 Older versions are read, too. Version 2 had no densities; version 1 had no faces, colors, loops, edges and trims
 either, and a `shape` was [{surface, name, reversed}].

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from operator import methodcaller
 from typing import Any
 
@@ -11,10 +12,12 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import Contact
-from assembly.constraints.model.couplings import Gear, RackPinion
+from assembly.constraints.model.couplings import Gear, Linear, RackPinion
 from assembly.constraints.model.dexterity import Dexterity
 from assembly.constraints.model.expression import Expression
+from assembly.constraints.model.groups import Group, Symmetric
 from assembly.constraints.model.joints import (
+    ConstantVelocity,
     Cylindrical,
     Fixed,
     Parallel,
@@ -26,8 +29,11 @@ from assembly.constraints.model.joints import (
     Spherical,
     Universal,
 )
+from assembly.constraints.model.mate_features import Mate
+from assembly.constraints.model.mates import Coaxial, Concentric, Flush, Insert, Width
 from assembly.constraints.model.objectives import FrameDistance, PointDistance, Posture, Weight
 from assembly.constraints.model.placements import Angle, Distance, PointOnLine, PointOnPlane
+from assembly.constraints.model.tangent import Tangent
 from assembly.constraints.model.trim_contact import TrimContact, single_face
 from assembly.errors import InputError
 from assembly.geometry.faces.face import Face
@@ -36,6 +42,7 @@ from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose
+from assembly.scene_file.features import Feature
 from assembly.scene_file.fields import bad, each, flag, number, or_null, table, text, vector, whole
 from assembly.scene_file.records import Field, Listed, OneOf, OrNull, Parts, Plain, Record
 from assembly.scene_file.references import BODY_NAME, CONTACT_NAME, FREEDOM, SIDE, Index
@@ -131,6 +138,15 @@ def _free(*names: str) -> tuple[Field, ...]:
     )
 
 
+def _features(*names: str) -> tuple[Field, ...]:
+    """What a mate ties, by the names of its arguments."""
+    return tuple(Field(name, FEATURE, partial(_given, name)) for name in names)
+
+
+def _given(name: str, mate: Mate) -> Any:
+    return mate._given[name]
+
+
 def _clearance(neglect: float, places: int | None, **others: Any) -> Clearance:
     """Files have the former names of two options."""
     return Clearance(merge_radius=neglect, slots=places, **others)
@@ -165,8 +181,9 @@ FRAMES = (Field("frame_a", FRAME), Field("frame_b", FRAME))
 POINTS = (Field("point_a", FRAME, "frame_a"), Field("point_b", FRAME, "frame_b"))
 # Of a point on a line or a plane, frame a is that of the line or the plane.
 POINT_AND_FRAME = (Field("point", FRAME, "frame_b"), Field("frame", FRAME, "frame_a"))
-AXES = Field("axes", Plain(text))
+AXES = Field("axes", Plain(text), "asked_axes")
 OFFSET = Field("offset", NUMBER)
+FEATURE = Feature(FRAME)
 HELD = (Field("value", DRIVEN), Field("limits", LIMITS))
 
 SURFACE = Record(
@@ -241,6 +258,7 @@ CONSTRAINTS = OneOf(
         "cylindrical": Record(Cylindrical, NAME, *FRAMES, AXES, *_free("angle", "slide")),
         "screw": Record(Screw, NAME, *FRAMES, Field("pitch", NUMBER), AXES, *_free("angle", "slide")),
         "planar": Record(Planar, NAME, *FRAMES, AXES, OFFSET, *_free("x", "y", "angle")),
+        "constant_velocity": Record(ConstantVelocity, NAME, *FRAMES, AXES, *_free("swing", "azimuth")),
         "spherical": Record(Spherical, NAME, *FRAMES, *_free("swing", "azimuth", "twist")),
         "universal": Record(Universal, NAME, *FRAMES, *_free("angle_a", "angle_b")),
         "parallel": Record(Parallel, NAME, *FRAMES, AXES, *_free("angle")),
@@ -251,6 +269,9 @@ CONSTRAINTS = OneOf(
         "angle": Record(Angle, NAME, *FRAMES, *HELD),
         "gear": Record(
             Gear, NAME, Field("a", FREEDOM, "leader"), Field("b", FREEDOM, "follower"), Field("ratio", NUMBER), OFFSET
+        ),
+        "linear": Record(
+            Linear, NAME, Field("a", FREEDOM, "leader"), Field("b", FREEDOM, "follower"), Field("ratio", NUMBER), OFFSET
         ),
         "rack_pinion": Record(
             RackPinion,
@@ -270,6 +291,37 @@ CONSTRAINTS = OneOf(
             Field("form", Plain(text)),
             make=_trim,
         ),
+        "flush": Record(Flush, NAME, *_features("face_a", "face_b"), AXES, OFFSET, *_free("x", "y", "angle")),
+        "coaxial": Record(Coaxial, NAME, *_features("a", "b"), AXES, *_free("angle", "slide")),
+        "insert": Record(
+            Insert,
+            NAME,
+            *_features("hole", "shank"),
+            Field("seats", Listed(FEATURE), lambda mate: mate.seats[:2]),
+            AXES,
+            OFFSET,
+            *_free("angle"),
+        ),
+        "concentric": Record(Concentric, NAME, *_features("a", "b"), *_free("swing", "azimuth", "twist")),
+        "width": Record(
+            Width,
+            NAME,
+            Field("slot", Listed(FEATURE), lambda mate: mate.features[0]),
+            Field("tab", Listed(FEATURE), lambda mate: mate.features[1]),
+            AXES,
+            OFFSET,
+            *_free("x", "y", "angle"),
+        ),
+        "tangent": Record(
+            Tangent,
+            NAME,
+            Field("a", FEATURE, lambda mate: mate.faces[0]),
+            Field("b", FEATURE, lambda mate: mate.faces[1]),
+            Field("side", Plain(text)),
+            UNILATERAL,
+        ),
+        "symmetric": Record(Symmetric, NAME, *_features("a", "b", "plane")),
+        "group": Record(Group, NAME, Field("bodies", Listed(BODY_NAME)), Field("poses", Listed(POSE))),
         "clearance": Record(
             Clearance,
             NAME,

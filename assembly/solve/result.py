@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._read_only import ReadOnlyArrays, read_only
-from assembly.constraints.model.joint import Joint
+from assembly.constraints.model.joint import Joint, Sense
 from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
@@ -193,6 +193,11 @@ class Result(ReadOnlyArrays):
             for constraint, rows in zip(self._scene.constraints, packed.spans, strict=True)
         }
 
+    @property
+    def axes(self) -> dict[str, Sense]:
+        """Of joints that take nearest axes, by name, whether these are aligned or opposed here."""
+        return self._scene.axes.copy()
+
     @cached_property
     def values(self) -> dict[str, float]:
         """Every freedom of every joint, "joint.freedom": lengths in the user's unit, angles in radians."""
@@ -200,8 +205,10 @@ class Result(ReadOnlyArrays):
         near = dict(zip(map(id, packed._angles), state[packed.angles], strict=True))
         values = {}
         for joint in self._scene.constraints:
-            for name, freedom in joint.freedoms.items() if isinstance(joint, Joint) else ():
-                coordinate = freedom.coordinate
+            if not isinstance(joint, Joint):
+                continue
+            for name in joint.freedoms:
+                coordinate = joint._coordinate_in(name, self._scene.axes.get(joint.name))
                 pair = coordinate.frames
                 frames = standing(
                     coordinate, self.q, (self._scene.index(pair.frame_a.body), self._scene.index(pair.frame_b.body))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.contact import Contact
+from assembly.constraints.model.joint import Sense
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program.objective_terms import POINT_DISTANCE, POSTURE, POSTURE_PARAMETERS, TERM
 from assembly.constraints.program.records import TERM_TABLE, TERMS
@@ -56,6 +57,8 @@ class Scene:
         self.scale = scale
         # Contacts that are lower pairs: of each a joint of its name is among the constraints.
         self.seats = seats
+        # Joints of nearest axes: what these were where the solve began.
+        self.axes: dict[str, Sense] = {}
         self._wished: NDArray[np.int64] | None = None
 
     def wished(self, packed: Packed) -> NDArray[np.int64]:

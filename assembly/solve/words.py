@@ -91,6 +91,7 @@ def table(solution: Solution) -> str:
             pass
         else:
             lines[1] += f"   {freedoms} degree{'' if freedoms == 1 else 's'} of freedom"
+    lines += [f"  {name:<24} axes {sense}, which was nearest" for name, sense in solution.axes.items()]
     lines += _crossing_lines(solution)
     worst = sorted(solution.violations.items(), key=lambda item: -item[1])[:5]
     lines += [f"  {name:<24} violation {value:.1e}" for name, value in worst]

@@ -21,7 +21,18 @@ from assembly.kinematics.body import Body, Frame
 if TYPE_CHECKING:
     from assembly.constraints.model.joint import Joint
 
-__all__ = ["Bounds", "Constraint", "Coordinate", "Equation", "FramePair", "Freedom", "structure_changes", "words"]
+__all__ = [
+    "Bounds",
+    "Constraint",
+    "Coordinate",
+    "Equation",
+    "FramePair",
+    "Freedom",
+    "RowConstraint",
+    "count_change",
+    "structure_changes",
+    "words",
+]
 
 Bounds = tuple[float | None, float | None]
 
@@ -44,7 +55,8 @@ def structure_changes() -> int:
     return _changes
 
 
-def _count_change() -> None:
+def count_change() -> None:
+    """Say that a constraint has other rows now."""
     global _changes
     _changes += 1
 
@@ -88,6 +100,15 @@ class Constraint(KnownSettings):
     def bodies(self) -> tuple[Body, ...]:
         """Bodies that the constraint names, distinct."""
         return self._bodies
+
+
+class RowConstraint(Constraint):
+    """A constraint of rows that are sums of coordinates: a joint, a coupling, a group, a symmetry."""
+
+    @property
+    def equations(self) -> tuple[Equation, ...]:
+        """Its rows now."""
+        raise NotImplementedError  # every kind has them
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,4 +334,4 @@ class Freedom:
         before = self._rows
         self._value, (self._lower, self._upper) = self._checked(value, lower, upper)
         if self._rows != before:
-            _count_change()
+            count_change()

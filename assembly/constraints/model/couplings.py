@@ -5,13 +5,13 @@ from __future__ import annotations
 from itertools import product
 from typing import Any
 
-from assembly.constraints.model.constraint import Constraint, Coordinate, Equation, Freedom, words
+from assembly.constraints.model.constraint import Coordinate, Equation, Freedom, RowConstraint, words
 from assembly.constraints.model.joint import Joint, Offset
 from assembly.constraints.program.primitives import SLIDE
 from assembly.errors import InputError, bounded, number
 from assembly.kinematics.body import Body
 
-__all__ = ["Coupling", "Gear", "RackPinion"]
+__all__ = ["Coupling", "Gear", "Linear", "RackPinion"]
 
 
 def _turns(coordinate: Coordinate) -> bool:
@@ -38,7 +38,7 @@ def _freedom(name: str, value: Any, slides: bool) -> Freedom:
     return fitting[0]
 
 
-class Coupling(Constraint):
+class Coupling(RowConstraint):
     """follower = ratio * leader + offset, between freedoms of joints; see its subclasses.
 
     A joint of the coupling need not be in the scene, its bodies must.
@@ -126,6 +126,42 @@ class Gear(Coupling):
     @property
     def ratio(self) -> float:
         """Turns of b a turn of a."""
+        return self._factor
+
+
+class Linear(Coupling):
+    """Two slides keep a ratio: 1 row, takes away 1 degree of freedom, slide_b = ratio * slide_a + offset.
+
+    Parameters
+    ----------
+    a, b : Joint or Freedom
+        Joints with one freedom that slides, or such freedoms, `joint.freedom(name)`.
+    ratio : float
+        Travel of b for a travel of a of one, not zero; negative where they go against each other.
+    name : str, optional
+        "linear" and the bodies' names by default.
+    offset : float
+        slide_b where slide_a is zero.
+
+    Raises
+    ------
+    InputError, TypeError
+        A joint with no such freedom or with several, the same freedom twice, ratio 0.
+    """
+
+    offset = Offset("slide_b where slide_a is zero.")
+
+    def __init__(
+        self, a: Joint | Freedom, b: Joint | Freedom, ratio: float, name: str | None = None, offset: float = 0.0
+    ) -> None:
+        factor = number("ratio", ratio)
+        if factor == 0.0:
+            raise InputError("ratio is 0; expected the travel of b for a travel of a of one, not zero")
+        super().__init__(_freedom("a", a, slides=True), _freedom("b", b, slides=True), factor, name, offset)
+
+    @property
+    def ratio(self) -> float:
+        """Travel of b for a travel of a of one."""
         return self._factor
 
 

@@ -1,32 +1,52 @@
 """What all joints have: two frames, rows between them, and freedoms by name.
 
 The z axes of the frames are the joint's axes. "aligned" lets them point the same way, "opposed" against each other,
-as the outward normals of two faces do that lie on each other.
+as the outward normals of two faces do that lie on each other; "nearest" is the one of the two that they are nearer to
+where a solve starts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, Self, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assembly._copies import OwnState
-from assembly.constraints.model.constraint import Bounds, Constraint, Coordinate, Equation, FramePair, Freedom, words
+from assembly.constraints.model.constraint import (
+    Bounds,
+    Constraint,
+    Coordinate,
+    Equation,
+    FramePair,
+    Freedom,
+    RowConstraint,
+    count_change,
+    words,
+)
 from assembly.constraints.program.primitives import COINCIDENT, SLIDE, SWING
 from assembly.errors import InputError, bounded
 from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.pose import rotation_matrix
 
-__all__ = ["Axes", "Driven", "Joint", "Limits", "Offset", "Side", "SidePoint"]
+__all__ = ["Axes", "Driven", "Joint", "Limits", "Offset", "Sense", "Side", "SidePoint"]
 
-Axes = Literal["aligned", "opposed"]
+Array = NDArray[np.float64]
+Axes = Literal["aligned", "opposed", "nearest"]
+Sense = Literal["aligned", "opposed"]
 Side = Frame | Body
 SidePoint = Point | Frame | Body
 
 SAME_POINT = ((COINCIDENT, 0), (COINCIDENT, 1), (COINCIDENT, 2))
 SAME_AXIS = ((SWING, 0), (SWING, 1))
 ON_AXIS = ((SLIDE, 0), (SLIDE, 1))
+# Where axes are perpendicular at a start, to this cosine, one body counts as turned by a thousandth about a direction
+# that is nobody's: so the joints of two bodies choose alike, and none by rounding.
+_ACROSS = 1e-9
+_LEAN = rotation_matrix(np.array([1.0, 0.00024, 0.0003, 0.00032]))
 
 
 def _frame(name: str, side: Any, takes_point: bool) -> Frame:
@@ -46,7 +66,7 @@ def _opposed(frame: Frame) -> Frame:
     return Frame(frame.body, frame.origin, axes)
 
 
-class Joint(OwnState, Constraint):
+class Joint(OwnState, RowConstraint):
     """A joint between two bodies; see its subclasses.
 
     What it asks for is in `equations`, what it leaves free in `freedoms`. A freedom is driven where it has a value,
@@ -58,8 +78,9 @@ class Joint(OwnState, Constraint):
         `body.frame(at, z, x)`; of a body the frame at its origin.
     name : str, optional
         The kind and the bodies' names by default, as in "revolute ground-crank".
-    axes : "aligned" or "opposed"
-        Whether the z axes point the same way or against each other, of joints that ask for either.
+    axes : "aligned", "opposed" or "nearest"
+        Whether the z axes point the same way or against each other, of joints that ask for either; or whichever is
+        nearer where a solve starts, which `Solution.axes` tells.
     settings : (value, limits) by freedom
         Driven value or None; limits (lower, upper) or None.
 
@@ -91,11 +112,17 @@ class Joint(OwnState, Constraint):
         if self._frame_a.body is self._frame_b.body:
             a, b = self._sides
             raise InputError(f"{a} and {b} are both on body {self._frame_a.body.name!r}; expected two bodies")
-        if not isinstance(axes, str) or axes not in ("aligned", "opposed"):
-            raise InputError(f"axes is {axes!r}; expected 'aligned' or 'opposed'")
+        if not isinstance(axes, str) or axes not in ("aligned", "opposed", "nearest"):
+            raise InputError(f"axes is {axes!r}; expected 'aligned', 'opposed' or 'nearest'")
         super().__init__((self._frame_a.body, self._frame_b.body), name, words(type(self)))
-        self._axes = axes
-        self._frames = FramePair(self._frame_a, self._frame_b if axes == "aligned" else _opposed(self._frame_b))
+        self._asked_axes = axes
+        bodies = self._frame_a.body, self._frame_b.body
+        self._axes: Sense = self._nearest_at({body: body.q for body in bodies}) if axes == "nearest" else axes
+        pairs = FramePair(self._frame_a, self._frame_b), FramePair(self._frame_a, _opposed(self._frame_b))
+        self._senses: Mapping[Sense, FramePair] = {"aligned": pairs[0], "opposed": pairs[1]}
+        # Coordinates of the one sense and of the other, of what "nearest" may turn around.
+        self._twins: dict[Coordinate, Coordinate] = {}
+        self._frames = self._senses[self._axes]
         self._own = tuple(Equation(((1.0, self._coordinate(*which)),)) for which in self._zero)
         limits_names = ["limits"] if len(self._free) == 1 else [f"{freedom}_limits" for freedom in self._free]
         self._freedoms = {
@@ -119,9 +146,18 @@ class Joint(OwnState, Constraint):
         return self._frame_b
 
     @property
-    def axes(self) -> Axes:
-        """Whether the z axes are aligned or opposed, where the joint asks for either."""
+    def axes(self) -> Sense:
+        """Whether the z axes are aligned or opposed, where the joint asks for either.
+
+        Of a joint that takes what is nearest: what it was where the last solve began, before that where bodies stood
+        when it was made.
+        """
         return self._axes
+
+    @property
+    def asked_axes(self) -> Axes:
+        """The same as it was asked for: "nearest" where a start decides."""
+        return self._asked_axes
 
     @property
     def freedoms(self) -> Mapping[str, Freedom]:
@@ -149,6 +185,38 @@ class Joint(OwnState, Constraint):
         asked = [row for freedom in self._freedoms.values() for row in freedom.equations]
         return (*self._own, *(row for row in asked if not row.one_sided), *(row for row in asked if row.one_sided))
 
+    def _nearest_at(self, poses: Mapping[Body, Array]) -> Sense:
+        """Whether z axes are nearer to aligned or to opposed where bodies are at these poses (7,)."""
+        z_a, z_b = (rotation_matrix(poses[f.body][3:]) @ f.axes[:, 2] for f in (self._frame_a, self._frame_b))
+        cosine = float(z_a @ z_b)
+        if abs(cosine) <= _ACROSS:
+            cosine = float(z_a @ _LEAN @ z_b)
+        return "opposed" if cosine < 0.0 else "aligned"
+
+    def _take_axes(self, axes: Sense) -> None:
+        """Have the axes aligned or opposed from now on: rows and freedoms are of other frames."""
+        if axes == self._axes:
+            return
+        self._axes, self._frames = axes, self._senses[axes]
+        self._own = tuple(
+            replace(row, terms=tuple((factor, self._twin(each)) for factor, each in row.terms)) for row in self._own
+        )
+        for freedom in self._freedoms.values():
+            freedom._coordinate = self._twin(freedom.coordinate)
+        count_change()
+
+    def _twin(self, coordinate: Coordinate) -> Coordinate:
+        """A coordinate of the other sense, always the same one."""
+        if coordinate not in self._twins:
+            other = Coordinate(coordinate.kind, coordinate.component, self._frames)
+            self._twins[coordinate], self._twins[other] = other, coordinate
+        return self._twins[coordinate]
+
+    def _coordinate_in(self, name: str, axes: Sense | None) -> Coordinate:
+        """The coordinate of a freedom where the axes are aligned or opposed."""
+        coordinate = self._freedoms[name].coordinate
+        return coordinate if axes is None or axes == self._axes else self._twins[coordinate]
+
     def _coordinate(self, kind: int, component: int) -> Coordinate:
         return Coordinate(kind, component, self._frames)
 
@@ -157,7 +225,7 @@ class Joint(OwnState, Constraint):
 
     def __repr__(self) -> str:
         a, b = self._bodies
-        axes = ", axes='opposed'" if self._axes == "opposed" else ""
+        axes = f", axes={self._asked_axes!r}" if self._asked_axes != "aligned" else ""
         settings = "".join(freedom.settings() for freedom in self._freedoms.values())
         return f"{type(self).__name__}({a.name!r}, {b.name!r}, name={self.name!r}{axes}{settings})"
 

@@ -35,6 +35,7 @@ from assembly.constraints.program.primitives import ANGLE, AZIMUTH, DOT, SLIDE, 
 from assembly.errors import InputError, bounded
 
 __all__ = [
+    "ConstantVelocity",
     "Cylindrical",
     "Fixed",
     "Parallel",
@@ -301,6 +302,36 @@ class Universal(Joint):
     def _free_coordinate(self, freedom: str) -> Coordinate:
         frames = self._frames if freedom == "angle_a" else FramePair(self._frames.frame_b, self._frames.frame_a)
         return Coordinate(*self._free[freedom], frames)
+
+
+class ConstantVelocity(Joint):
+    """A constant-velocity joint, as ball bearings in grooves make one: 4 rows, free to bend every way.
+
+    Origins coincide (3), and the one shaft turns about its axis as the other does about its own (1), however far the
+    axes are bent: the twist is zero. Free: `swing`, the angle between the z axes, and `azimuth`, the direction of z_b
+    about z_a from x_a, which has no value where the swing is 0.
+    """
+
+    _zero = (*SAME_POINT, TWIST)
+    _free = {"swing": (ANGLE, 0), "azimuth": Z_AZIMUTH}
+    swing = Driven("swing", "angle between the z axes [rad]")
+    azimuth = Driven("azimuth", "direction of z_b about z_a, from x_a [rad]")
+    swing_limits = Limits("swing")
+    azimuth_limits = Limits("azimuth")
+
+    def __init__(
+        self,
+        frame_a: Side,
+        frame_b: Side,
+        name: str | None = None,
+        *,
+        axes: Axes = "aligned",
+        swing: Number = None,
+        azimuth: Number = None,
+        swing_limits: Range = None,
+        azimuth_limits: Range = None,
+    ) -> None:
+        super().__init__(frame_a, frame_b, name, axes, swing=(swing, swing_limits), azimuth=(azimuth, azimuth_limits))
 
 
 class Parallel(Joint):

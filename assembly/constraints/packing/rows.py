@@ -9,11 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.model.constraint import Constraint, Equation
+from assembly.constraints.model.constraint import Constraint, Equation, RowConstraint
 from assembly.constraints.model.contact import Contact, side_faces
-from assembly.constraints.model.couplings import Coupling
 from assembly.constraints.model.expression import Expression
-from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.trim_contact import FORMS, TrimContact
 from assembly.constraints.packing.numbering import gathering_order
 from assembly.constraints.packing.scene_writer import SceneWriter
@@ -153,7 +151,7 @@ class RowPacking:
     def add_joints(self, unknown_blocks: Table) -> None:
         """Rows of joints and couplings, whose bodies have these blocks of unknowns."""
         # In the order of their bodies: then the envelope of J J^T is narrow, too.
-        joints = [item for item in self._constraints if isinstance(item, (Joint, Coupling))]
+        joints = [item for item in self._constraints if isinstance(item, RowConstraint)]
         joints.sort(key=lambda item: max(unknown_blocks[self._writer.places_of(item.bodies)]))
         for joint in joints:
             for equation in joint.equations:

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 
 from assembly._address import clock_address
 from assembly.constraints.model.clearance import Clearance
-from assembly.constraints.model.constraint import Constraint, structure_changes
+from assembly.constraints.model.constraint import Constraint, RowConstraint, structure_changes
 from assembly.constraints.model.contact import Contact, side_face
-from assembly.constraints.model.couplings import Coupling
 from assembly.constraints.model.expression import Expression
-from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.objectives import Objective, Posture
 from assembly.constraints.model.trim_contact import TrimContact
 from assembly.constraints.packing import addresses
@@ -501,6 +499,6 @@ def structure_of(constraints: Sequence[Constraint]) -> tuple[tuple[object, ...],
     return tuple(
         (id(item), id(equation.terms[0][1]), equation.terms[0][0], equation.source and equation.source[1])
         for item in constraints
-        if isinstance(item, (Joint, Coupling))
+        if isinstance(item, RowConstraint)
         for equation in item.equations
     )

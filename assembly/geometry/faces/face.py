@@ -126,6 +126,40 @@ class Face:
         """Which boundary curves follow one another."""
         return self._boundary.chains
 
+    def transformed(
+        self,
+        rotation: ArrayLike | None = None,
+        translation: ArrayLike = (0.0, 0.0, 0.0),
+        scale: float = 1.0,
+        *,
+        name: str | None = None,
+    ) -> Face:
+        """The face moved by x -> scale rotation x + translation; its loops, which are in (u, v), stay as they are.
+
+        Parameters
+        ----------
+        rotation : (3, 3), optional
+        translation : (3,)
+        scale : float
+            Above zero.
+        name : str, optional
+            Its own by default.
+
+        Raises
+        ------
+        InputError
+            A matrix that is no rotation, a scale that is not positive.
+        """
+        moved = object.__new__(Face)
+        moved.surface = self.surface.transformed(rotation, translation, scale)
+        moved.name = self.name if name is None else checked_name(name)
+        moved.reversed, moved.color = self.reversed, self.color
+        moved._outer, moved._holes = self._outer, self._holes
+        if "_boundary" in self.__dict__:
+            # What it is in (u, v) does not change.
+            moved.__dict__["_boundary"] = self._boundary
+        return moved
+
     def packed_trim(self, table_at: int = 0, pool_at: int = 0) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Table and pool of the boundary as kernels read it, for being appended at these places."""
         return self._boundary.table.at(table_at, pool_at)
@@ -258,6 +292,14 @@ class Face:
     def area(self) -> float:
         """Area of the face, to 1e-10 of itself."""
         return float(self._integrals.area)
+
+    @cached_property
+    def _centroid(self) -> NDArray[np.float64]:
+        return np.asarray(self._integrals.moment / self._integrals.area)
+
+    def centroid(self) -> NDArray[np.float64]:
+        """Center of the face's area (3,), to 1e-10 of its extent."""
+        return np.array(self._centroid)
 
     def volume_integral(self) -> float:
         """One third of the integral of S.n over the face, n outward: summed over a closed body, its volume."""

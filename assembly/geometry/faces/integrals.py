@@ -20,6 +20,7 @@ from assembly.geometry.vec import cross, dot, sub
 FACE_INTEGRALS = record_dtype(
     "f8",
     area=1,  # of |N|
+    moment=3,  # of p |N|
     flux=3,  # of p_x N_x, p_y N_y, p_z N_z: each is the volume
     first=3,  # of p (p . N): four times the first moments
     second=6,  # of p_i p_j (p . N) for xx, yy, zz, xy, xz, yz: five times the second moments
@@ -46,9 +47,11 @@ def _add_column(store, u, v, levels, rule, center, factor, out):
             normal = cross(su, sv)
             p = sub(s, (center[0], center[1], center[2]))
             share = factor * half * rule[1, n]
-            total.area += share * np.sqrt(dot(normal, normal))
+            patch_area = share * np.sqrt(dot(normal, normal))
+            total.area += patch_area
             outward = share * dot(p, normal)
             for i in range(3):
+                total.moment[i] += patch_area * p[i]
                 total.flux[i] += share * p[i] * normal[i]
                 total.first[i] += outward * p[i]
                 total.second[i] += outward * p[i] * p[i]

@@ -94,7 +94,7 @@ def face_integrals(surface: NurbsSurface, table: TrimTable, center: Array) -> tu
     far = np.abs(np.stack(surface.bounding_box()) - center).max(axis=0)
     reach = float(np.linalg.norm(far))
     # A length to the power of what each integral has more than an area.
-    powers = np.repeat([1.0, reach, reach**2, reach**3], [1, 3, 3, 6])
+    powers = np.repeat([1.0, reach, reach**2, reach**3], [1, 6, 3, 6])
 
     def sides(count: int, pieces: Indices, bottom: Indices) -> tuple[Array, Array]:
         out, low = np.empty((len(pieces), powers.size)), np.empty((len(bottom), powers.size))

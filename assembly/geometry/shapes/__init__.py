@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from assembly.geometry.shapes.surfaces import plane as plane
     from assembly.geometry.shapes.surfaces import sphere as sphere
     from assembly.geometry.shapes.surfaces import torus as torus
+    from assembly.geometry.shapes.swept import joined as joined
+    from assembly.geometry.shapes.swept import loft as loft
+    from assembly.geometry.shapes.swept import revolution as revolution
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
@@ -34,11 +37,14 @@ else:
             "cylinder": "assembly.geometry.shapes.surfaces",
             "ellipsoid": "assembly.geometry.shapes.surfaces",
             "extrusion": "assembly.geometry.shapes.solids",
+            "joined": "assembly.geometry.shapes.swept",
+            "loft": "assembly.geometry.shapes.swept",
             "paper_clip": "assembly.geometry.shapes.surfaces",
             "pipe": "assembly.geometry.shapes.surfaces",
             "plane": "assembly.geometry.shapes.surfaces",
             "plate": "assembly.geometry.shapes.solids",
             "plate_with_slot": "assembly.geometry.shapes.solids",
+            "revolution": "assembly.geometry.shapes.swept",
             "solid_cylinder": "assembly.geometry.shapes.solids",
             "sphere": "assembly.geometry.shapes.surfaces",
             "torus": "assembly.geometry.shapes.surfaces",

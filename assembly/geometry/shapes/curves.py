@@ -4,7 +4,7 @@ With u the bound of Lakshmanan et al. (003, lemma 1),
 
     length of arc from t0 to t1  <=  u(t0, t1) = sqrt((t1 - t0) (A(t1) - A(t0))),      A' = |C'|^2.
 
-CasADi is loaded when a curve is made.
+CasADi is loaded when a curve is made. Circles, arcs and polygons are NURBS and need none: `arc`, `circle`, `polygon`.
 """
 
 from __future__ import annotations
@@ -17,12 +17,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from assembly.errors import InputError, extent, integer, number, positive, vector
+from assembly.geometry.shapes.plane_curves import arc, circle, polygon
 from assembly.geometry.splines.formula_curve import FormulaCurve
 
 if TYPE_CHECKING:
     import casadi as ca
 
-__all__ = ["ellipse", "epicycloid", "euler_spiral", "fish", "heart", "helix", "involute", "lissajous", "ranunculoid"]
+__all__ = [
+    "arc",
+    "circle",
+    "ellipse",
+    "epicycloid",
+    "euler_spiral",
+    "fish",
+    "heart",
+    "helix",
+    "involute",
+    "lissajous",
+    "polygon",
+    "ranunculoid",
+]
 
 # What Fresnel's integrals may be off by quadrature and rounding, over the parameter (tests/geometry).
 _FRESNEL = 2e-14

@@ -16,12 +16,22 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.errors import InputError, extent, number, real_array, vector
 from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.loop import TOLERANCE, Loop
-from assembly.geometry.splines.bezier import full_knots
+from assembly.geometry.shapes.plane_curves import arc_through, circle, segment
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import smooth_parts
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["cam", "extrusion", "plate", "plate_with_slot", "solid_cylinder", "trimmed_plane"]
+__all__ = [
+    "Profile",
+    "cam",
+    "closed_profile",
+    "extrusion",
+    "plane_around",
+    "plate",
+    "plate_with_slot",
+    "solid_cylinder",
+    "trimmed_plane",
+]
 
 Array = NDArray[np.float64]
 Profile = Loop | NurbsCurve | Sequence[NurbsCurve]
@@ -30,34 +40,10 @@ Profile = Loop | NurbsCurve | Sequence[NurbsCurve]
 _MARGIN = 0.0625
 
 
-def _segment(start: ArrayLike, end: ArrayLike) -> NurbsCurve:
-    """A straight line in the plane; its parameter is the length."""
-    points = np.array([start, end], dtype=float)
-    length = hypot(*(points[1] - points[0]).tolist())
-    return NurbsCurve(points, [0.0, 0.0, length, length], 1)
-
-
-def _arc(center: ArrayLike, radius: float, start: float, sweep: float) -> NurbsCurve:
-    """A circular arc in the plane, in quarters; its parameter runs over the length (exact at its breaks)."""
-    quarters = max(1, round(abs(sweep) / (0.5 * pi)))
-    step = sweep / quarters
-    angles = start + 0.5 * step * np.arange(2 * quarters + 1)
-    weights = np.where(np.arange(angles.size) % 2, cos(0.5 * step), 1.0)
-    points = np.column_stack([np.cos(angles), np.sin(angles)]) / weights[:, None]
-    if abs(sweep) == 2.0 * pi:
-        points[-1] = points[0]
-    knots = full_knots(np.linspace(0.0, radius * abs(sweep), quarters + 1), 2)
-    return NurbsCurve(radius * points + np.asarray(center, dtype=float), knots, 2, weights)
-
-
-def _circle(center: ArrayLike, radius: float) -> NurbsCurve:
-    return _arc(center, radius, 0.0, 2.0 * pi)
-
-
 def _rectangle(x: float, y: float) -> list[NurbsCurve]:
     """Counterclockwise around the origin from the corner (-x/2, -y/2): front, right, back, left."""
     corners = [(-0.5 * x, -0.5 * y), (0.5 * x, -0.5 * y), (0.5 * x, 0.5 * y), (-0.5 * x, 0.5 * y)]
-    return [_segment(corners[k], corners[(k + 1) % 4]) for k in range(4)]
+    return [segment(corners[k], corners[(k + 1) % 4]) for k in range(4)]
 
 
 def _loop(name: str, curves: NurbsCurve | Iterable[NurbsCurve]) -> Loop:
@@ -65,7 +51,7 @@ def _loop(name: str, curves: NurbsCurve | Iterable[NurbsCurve]) -> Loop:
     return Loop.unchecked(curves, TOLERANCE, (0.0, 0.0), name)
 
 
-def _profile(name: str, profile: Any) -> list[NurbsCurve]:
+def closed_profile(name: str, profile: Any) -> list[NurbsCurve]:
     """The curves of a closed plane profile, cut at corners inside them."""
     if not isinstance(profile, (Loop, NurbsCurve, Iterable)) or isinstance(profile, (str, bytes)):
         raise TypeError(f"{name} is {profile!r}; expected a Loop, a closed NurbsCurve, or several that close")
@@ -76,10 +62,10 @@ def _profile(name: str, profile: Any) -> list[NurbsCurve]:
 def _several(name: str, profiles: Any) -> list[list[NurbsCurve]]:
     if isinstance(profiles, (Loop, NurbsCurve)) or not isinstance(profiles, Iterable):
         raise TypeError(f"{name} is {profiles!r}; expected a sequence of closed profiles")
-    return [_profile(f"{name}[{k}]", profile) for k, profile in enumerate(profiles)]
+    return [closed_profile(f"{name}[{k}]", profile) for k, profile in enumerate(profiles)]
 
 
-def _plane_around(curves: Iterable[NurbsCurve], z: float) -> NurbsSurface:
+def plane_around(curves: Iterable[NurbsCurve], z: float) -> NurbsSurface:
     """The plane S(u, v) = (u, v, z) over the box of some curves and a margin."""
     boxes = [curve.bounding_box() for curve in curves]
     low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
@@ -106,11 +92,11 @@ def trimmed_plane(outer: Profile, holes: Iterable[Profile] = (), *, name: str | 
     ValueError
         Profiles that do not close, cross themselves or each other, or curves in space.
     """
-    return _cap(_profile("outer", outer), _several("holes", holes), 0.0, name, False)
+    return _cap(closed_profile("outer", outer), _several("holes", holes), 0.0, name, False)
 
 
 def _cap(outer: list[NurbsCurve], holes: list[list[NurbsCurve]], z: float, name: str | None, reversed: bool) -> Face:
-    return Face(_plane_around(outer, z), outer, holes, name=name, reversed=reversed)
+    return Face(plane_around(outer, z), outer, holes, name=name, reversed=reversed)
 
 
 def _wall(curve: NurbsCurve, height: float, name: str) -> Face:
@@ -167,7 +153,7 @@ def extrusion(profile: Profile, height: float, holes: Iterable[Profile] = ()) ->
     ValueError
         A height that is not positive, or profiles that do not close, cross themselves or each other.
     """
-    outer, inner = _profile("profile", profile), _several("holes", holes)
+    outer, inner = closed_profile("profile", profile), _several("holes", holes)
     hole_names = []
     for k, hole in enumerate(inner):
         label = "hole" if len(inner) == 1 else f"hole {k + 1}"
@@ -180,7 +166,7 @@ def solid_cylinder(radius: float, height: float) -> tuple[Face, ...]:
 
     The wall is that of `cylinder`; the ends are planes trimmed by circles.
     """
-    return extrusion(_circle((0.0, 0.0), extent("radius", radius)), height)
+    return extrusion(circle(extent("radius", radius), (0.0, 0.0)), height)
 
 
 def plate(x: float, y: float, z: float, holes: Iterable[ArrayLike] = ()) -> tuple[Face, ...]:
@@ -214,7 +200,7 @@ def plate(x: float, y: float, z: float, holes: Iterable[ArrayLike] = ()) -> tupl
             if hypot(cx - ox, cy - oy) <= r + other:
                 raise InputError(f"holes[{k}] is ({cx:g}, {cy:g}, {r:g}); expected a circle clear of holes[{j}]")
         circles.append((cx, cy, r))
-    inner = [[_circle((cx, cy), r)] for cx, cy, r in circles]
+    inner = [[circle(r, (cx, cy))] for cx, cy, r in circles]
     names = [[f"hole {k + 1}"] for k in range(len(inner))]
     return _extruded(_rectangle(*extents), inner, height, ("front", "right", "back", "left"), names)
 
@@ -262,10 +248,10 @@ def plate_with_slot(
     # Clockwise, with the material of the plate on the left: the left side ahead, around, the right side back.
     start = atan2(across[1], across[0])
     slot = [
-        _segment(behind + r * across, ahead + r * across),
-        _arc(ahead, r, start, -pi),
-        _segment(ahead - r * across, behind - r * across),
-        _arc(behind, r, start + pi, -pi),
+        segment(behind + r * across, ahead + r * across),
+        arc_through(ahead, r, start, -pi),
+        segment(ahead - r * across, behind - r * across),
+        arc_through(behind, r, start + pi, -pi),
     ]
     names = [["slot left", "slot end", "slot right", "slot start"]]
     return _extruded(_rectangle(*extents), [slot], height, ("front", "right", "back", "left"), names)
@@ -311,4 +297,4 @@ def cam(radii: ArrayLike, height: float, bore: float) -> tuple[Face, ...]:
     nearest = float(np.linalg.norm(profile.evaluate(np.linspace(*profile.domain, 16 * count)), axis=1).min())
     if r >= nearest:
         raise InputError(f"bore is {r:g}; expected less than the least radius of the profile, {nearest:g}")
-    return _extruded([profile], [[_circle((0.0, 0.0), r)]], extent("height", height), ("cam",), [["bore"]])
+    return _extruded([profile], [[circle(r, (0.0, 0.0))]], extent("height", height), ("cam",), [["bore"]])

@@ -25,11 +25,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.model.constraint import Constraint, Coordinate
+from assembly.constraints.model.constraint import Constraint, Coordinate, RowConstraint
 from assembly.constraints.model.contact import Contact
-from assembly.constraints.model.couplings import Coupling
 from assembly.constraints.model.expression import Expression
-from assembly.constraints.model.joint import Joint
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program.primitives import ANGLE, AZIMUTH, COINCIDENT, DISTANCE, DOT, SLIDE, SWING, TURN
 from assembly.errors import InputError
@@ -158,7 +156,7 @@ class Rows:
         places = {id(body): k for k, body in enumerate(bodies)}
         joints: list[tuple[int, JointRow]] = []
         for span, item in zip(packed.spans, constraints, strict=True):
-            if isinstance(item, (Joint, Coupling)):
+            if isinstance(item, RowConstraint):
                 for row, equation in zip(span, item.equations, strict=True):
                     pairs = [coordinate.frames for _, coordinate in equation.terms]
                     at = tuple((places[id(p.frame_a.body)], places[id(p.frame_b.body)]) for p in pairs)

@@ -9,6 +9,7 @@ import pytest
 import assembly as asm
 from assembly.constraints.model.constraint import Constraint, structure_changes
 from assembly.constraints.model.joint import Driven, Joint
+from assembly.constraints.model.mate_features import Mate
 from assembly.constraints.program.primitives import ANGLE, AZIMUTH, COINCIDENT, DISTANCE, DOT, SLIDE, SWING, TURN
 from assembly.errors import InputError
 
@@ -27,6 +28,7 @@ JOINTS = {
     asm.Planar: ([*AXIS, ALONG], {"x": (SLIDE, 0), "y": (SLIDE, 1), "angle": TWIST}),
     asm.Spherical: (POINT, {"swing": (ANGLE, 0), "azimuth": AROUND, "twist": TWIST}),
     asm.Universal: ([*POINT, ZZ], {"angle_a": AROUND, "angle_b": AROUND}),
+    asm.ConstantVelocity: ([*POINT, TWIST], {"swing": (ANGLE, 0), "azimuth": AROUND}),
     asm.Parallel: (AXIS, {"angle": TWIST}),
     asm.Perpendicular: ([ZZ], {}),
     asm.PointOnLine: (LINE, {"slide": ALONG}),
@@ -38,6 +40,7 @@ JOINTS = {
 NEEDED = {asm.Screw: {"pitch": 3.0}, asm.Distance: {"value": 2.0}, asm.Angle: {"value": 1.0}}
 DRIVES = [(joint, name) for joint, (_, free) in JOINTS.items() if joint not in NEEDED for name in free]
 OPPOSABLE = [asm.Fixed, asm.Revolute, asm.Prismatic, asm.Cylindrical, asm.Screw, asm.Planar, asm.Parallel]
+OPPOSABLE.append(asm.ConstantVelocity)
 POINTED = [asm.PointOnLine, asm.PointOnPlane]
 
 
@@ -71,14 +74,14 @@ def test_what_a_joint_asks_and_leaves_free(joint):
 
 
 def test_every_joint_is_public():
-    public = {getattr(asm, name) for name in asm.__all__}
-    assert {kind for kind in public if isinstance(kind, type) and issubclass(kind, Joint)} == set(JOINTS)
+    public = {kind for name in asm.__all__ if isinstance(kind := getattr(asm, name), type)}
+    assert {kind for kind in public if issubclass(kind, Joint) and not issubclass(kind, Mate)} == set(JOINTS)
     assert issubclass(asm.Contact, Constraint) and issubclass(asm.Gear, Constraint)
 
 
 @pytest.mark.parametrize("joint", JOINTS)
 def test_names(joint):
-    words = {"PointOnLine": "point-on-line", "PointOnPlane": "point-on-plane"}
+    words = {"PointOnLine": "point-on-line", "PointOnPlane": "point-on-plane", "ConstantVelocity": "constant-velocity"}
     kind = words.get(joint.__name__, joint.__name__.lower())
     a, b = ("crank", "ground") if joint in POINTED else ("ground", "crank")
     made = make(joint)
@@ -247,7 +250,7 @@ def test_opposed_turns_frame_b_about_its_x_axis(joint):
 @pytest.mark.parametrize("axes", ["Aligned", "", None, 1, ["aligned"]])
 @pytest.mark.parametrize("joint", OPPOSABLE)
 def test_axes_are_one_of_two_words(joint, axes):
-    with pytest.raises(InputError, match="axes is .*; expected 'aligned' or 'opposed'"):
+    with pytest.raises(InputError, match="axes is .*; expected 'aligned', 'opposed' or 'nearest'"):
         make(joint, axes=axes)
 
 
