@@ -16,7 +16,8 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.evaluate import CELL_SIZE, CELLS, COEFFICIENTS, CURVE_RECORD, OFFSETS
 from assembly.proximity.brep import records as shell
-from assembly.proximity.brep.edge_cells import edge_cells, outside_cells
+from assembly.proximity.brep.body_nets import BodyNets, nets_of
+from assembly.proximity.brep.edge_cells import edge_cells
 from assembly.proximity.brep.topology import Topology
 from assembly.proximity.brep.writer import Writer
 
@@ -115,28 +116,23 @@ _KNOWN: WeakKeyDictionary[Topology, _Parts] = WeakKeyDictionary()
 def _parts(topology: Topology) -> _Parts:
     known = _KNOWN.get(topology)
     if known is None:
-        known = _KNOWN[topology] = _Parts([_flags(face) for face in topology.faces], _cells(topology))
+        nets = nets_of(topology.faces)
+        flags = [_flags(nets, k, face) for k, face in enumerate(topology.faces)]
+        known = _KNOWN[topology] = _Parts(flags, _cells(nets, topology))
     return known
 
 
-def _flags(face: Face) -> Array:
-    """1 for every cell that may hold material of the face."""
+def _flags(nets: BodyNets, number: int, face: Face) -> Array:
+    """1 for every cell that may hold material of the face (`geometry/splines/cells.py`)."""
     record, pool = face.packed()
     rows = pool[record[CELLS] :].reshape(-1, CELL_SIZE)
-    return np.where(outside_cells(face, rows), 0.0, 1.0)
+    middle, half = rows[:, :2], rows[:, 9:11]
+    boxes = np.stack([middle - half, middle + half], axis=2).reshape(-1, 4)
+    return np.where(nets.outside(number, boxes), 0.0, 1.0)
 
 
-def _cells(topology: Topology) -> list[Array]:
-    """The cells of every edge, face by face."""
-    result: list[Array] = [np.empty((0, shell.EDGE_CELL_SIZE))] * len(topology.edges)
-    groups: list[list[int]] = [[] for _ in topology.faces]
-    for k, edge in enumerate(topology.edges):
-        groups[edge.face_a].append(k)
-    for face, group in zip(topology.faces, groups, strict=True):
-        if group:
-            edges = [topology.edges[k] for k in group]
-            curves = [face.boundary[edge.curve_a] for edge in edges]
-            lengths = [edge.length for edge in edges]
-            for k, rows in zip(group, edge_cells(face.surface, curves, lengths), strict=True):
-                result[k] = rows
-    return result
+def _cells(nets: BodyNets, topology: Topology) -> list[Array]:
+    """The cells of every edge."""
+    faces = np.array([edge.face_a for edge in topology.edges], dtype=np.int64)
+    curves = nets.first_curve[faces] + np.array([edge.curve_a for edge in topology.edges], dtype=np.int64)
+    return edge_cells(nets, faces, curves, np.array([edge.length for edge in topology.edges]))
