@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from assembly._record import rows_of
 from assembly.proximity.brep.body_nets import nets_of
-from assembly.proximity.brep.boundary_curves import Batch, Rim, Survey
+from assembly.proximity.brep.boundary_curves import Batch, Rim, survey_of
 from assembly.proximity.brep.topology import Topology
 from assembly.proximity.bvh.edge_measures import (
     EDGE_PART,
@@ -80,7 +80,7 @@ class _Edges:
         self.nets = nets_of(faces)
         places = np.array(sides)
         self.curve_a, self.curve_b = self.nets.first_curve[places[..., 0]] + places[..., 1]
-        survey = Survey(faces, topology.tolerance)
+        survey = survey_of(faces, topology.tolerance)
         self.batch_a, self.batch_b = (
             Batch(survey, [Rim(*place, curve, topology.tolerance) for place, curve in zip(side, row, strict=True)])
             for side, row in zip(sides, curves, strict=True)
