@@ -97,6 +97,41 @@ def restrict_net(pool, first, shape, box, work, at):
                     work[target + m] += work[weights + j] * work[source + j * components + m]
 
 
+@kernel(inner=True, exact=True)
+def _blossom(block, line, ends, work, at):
+    """The blossom of numbers (place, count, stride) of a block: `ends` tells how often the lower end is an argument,
+    and both ends.
+    """
+    first, count, stride = line
+    low_times, low, high = ends
+    for i in range(count):
+        work[at + i] = block[first + stride * i]
+    for r in range(count - 1):
+        x = low if r < low_times else high
+        for i in range(count - 1 - r):
+            work[at + i] = (1.0 - x) * work[at + i] + x * work[at + i + 1]
+    return work[at]
+
+
+@kernel(inner=True)
+def restrict_points(pool, first, shape, box, work, at):
+    """As `restrict_net` for homogeneous points (rows, columns), by repeated means: points in a plane stay in it."""
+    rows, columns = shape
+    line = 4 * columns
+    middle = at + rows * line
+    spare = middle + rows * line
+    for k in range(rows):
+        ends = rows - 1 - k, box[0], box[1]
+        for j in range(line):
+            work[middle + k * line + j] = _blossom(pool, (first + j, rows, line), ends, work, spare)
+    for k in range(rows):
+        for l in range(columns):
+            ends = columns - 1 - l, box[2], box[3]
+            for m in range(4):
+                source = middle + k * line + m
+                work[at + k * line + 4 * l + m] = _blossom(work, (source, columns, 4), ends, work, spare)
+
+
 @kernel(inner=True)
 def curve_box(pool, curve, cut, work, at):
     """Box around a part (span, low, high) of a plane curve: u from and to, v from and to."""
@@ -190,7 +225,7 @@ def write_hull(pool, face, box, work):
     for i in range(count_u):
         for j in range(count_v):
             piece, inside = piece_of_cuts(face, work, i, j, count_u)
-            restrict_net(pool, face.points + 4 * points * piece, (face.rows, face.columns, 4), inside, work, at)
+            restrict_points(pool, face.points + 4 * points * piece, (face.rows, face.columns), inside, work, at)
             for k in range(points):
                 w = work[at + 4 * k + 3]
                 x, y, z = work[at + 4 * k] / w, work[at + 4 * k + 1] / w, work[at + 4 * k + 2] / w

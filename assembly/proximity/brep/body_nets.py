@@ -133,7 +133,7 @@ def pack_nets(faces: Sequence[SurfaceParts]) -> BodyNets:
     sides = int(max(records.normal_rows.max(initial=1), records.normal_columns.max(initial=1)))
     parts = int((records.spans_u + records.spans_v).max(initial=1)) + int(spans.max(initial=1)) + 8
     degrees = max((row[0] for row in rows), default=0)
-    size = 20 * points + 6 * normals + sides + layout.CUT * parts + degrees + 1
+    size = 40 * points + 9 * normals + sides + layout.CUT * parts + degrees + 1
     table, doubles = np.concatenate(tables), np.concatenate([*pool.parts, np.empty(0)])
     own = np.column_stack([first_curve[:-1], first_curve[1:]])
     complete_nets(table, doubles, own, count, BOUNDARY_PARTS, np.empty(size))

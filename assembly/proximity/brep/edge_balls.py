@@ -11,7 +11,7 @@ from assembly.proximity.brep.bezier_nets import (
     curve_net_at,
     face_nets_at,
     piece_of_cuts,
-    restrict_net,
+    restrict_points,
     write_box_cuts,
     write_hull,
 )
@@ -29,7 +29,7 @@ def _reach(pool, face, box, center, work):
     for i in range(count_u):
         for j in range(count_v):
             piece, inside = piece_of_cuts(face, work, i, j, count_u)
-            restrict_net(pool, face.points + 4 * points * piece, (face.rows, face.columns, 4), inside, work, at)
+            restrict_points(pool, face.points + 4 * points * piece, (face.rows, face.columns), inside, work, at)
             for k in range(points):
                 w = work[at + 4 * k + 3]
                 x = work[at + 4 * k] / w - center[0]

@@ -9,23 +9,22 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import cross
 from assembly.proximity.brep.bezier_nets import CURVE_NET, FACE_NETS, curve_box, curve_net_at, face_nets_at
 
 UNIT_ROUNDING = 2.3e-16
 
 
-@kernel(inner=True)
-def _times_binomials(work, net, components, inverse):
+@kernel(inner=True, exact=True)
+def times_binomials(work, net, components, inverse):
     """Multiply Bezier points (place, rows, columns) by the binomials of both degrees, or divide them."""
     at, rows, columns = net
     c = 1.0
     for i in range(rows):
         d = c
         for j in range(columns):
-            factor = 1.0 / d if inverse else d
             for m in range(components):
-                work[at + (i * columns + j) * components + m] *= factor
+                x = work[at + (i * columns + j) * components + m]
+                work[at + (i * columns + j) * components + m] = x / d if inverse else x * d
             d = d * (columns - 1 - j) / (j + 1)
         c = c * (rows - 1 - i) / (i + 1)
 
@@ -36,7 +35,7 @@ def _three(work, at):
     return work[at], work[at + 1], work[at + 2]
 
 
-@kernel(inner=True)
+@kernel(inner=True, exact=True)
 def _write_rates(work, net, components, out):
     """Derivatives over the unit square in u and in v, to two places; the largest of each."""
     at, rows, columns = net
@@ -58,7 +57,7 @@ def _write_rates(work, net, components, out):
     return math.sqrt(most_u), math.sqrt(most_v)
 
 
-@kernel(inner=True)
+@kernel(inner=True, exact=True)
 def _write_cross(work, one, other, at):
     """The cross product of two nets of vectors (place, rows, columns), times binomials all three."""
     a, m, n = one
@@ -71,30 +70,49 @@ def _write_cross(work, one, other, at):
             left = _three(work, a + 3 * (i * n + j))
             for k in range(r):
                 for l in range(s):
-                    c = cross(left, _three(work, b + 3 * (k * s + l)))
+                    x, y, z = _three(work, b + 3 * (k * s + l))
                     target = at + 3 * ((i + k) * columns + j + l)
-                    for e in range(3):
-                        work[target + e] += c[e]
+                    work[target] += left[1] * z - left[2] * y
+                    work[target + 1] += left[2] * x - left[0] * z
+                    work[target + 2] += left[0] * y - left[1] * x
     return at, rows, columns
 
 
-@kernel(inner=True)
-def _add_product(work, one, other, sign, at):
-    """Add sign times the product of a net of numbers and one of vectors, times binomials all of them."""
+@kernel(inner=True, exact=True)
+def _add_product(work, one, other, sign, total):
+    """Add sign times the product of a net of numbers, times binomials, and one of vectors, times binomials as well.
+
+    Behind the total there is room for as many numbers more.
+    """
     a, m, n = one
     b, r, s = other
-    columns = n + s - 1
+    rows, columns = m + r - 1, n + s - 1
+    product = total + 3 * rows * columns
+    for k in range(3 * rows * columns):
+        work[product + k] = 0.0
     for i in range(m):
         for j in range(n):
-            left = sign * work[a + i * n + j]
+            left = work[a + i * n + j]
             for k in range(r):
                 for l in range(s):
-                    target = at + 3 * ((i + k) * columns + j + l)
+                    target = product + 3 * ((i + k) * columns + j + l)
                     for e in range(3):
                         work[target + e] += left * work[b + 3 * (k * s + l) + e]
+    times_binomials(work, (product, rows, columns), 3, True)
+    for k in range(3 * rows * columns):
+        work[total + k] += sign * work[product + k]
 
 
-@kernel(inner=True)
+@kernel(inner=True, exact=True)
+def _cross_of(work, one, other, at):
+    """`_write_cross`, rounded as the product is."""
+    net = _write_cross(work, one, other, at)
+    times_binomials(work, net, 3, True)
+    times_binomials(work, net, 3, False)
+    return net
+
+
+@kernel(inner=True, exact=True)
 def _write_centered(pool, face, piece, work, at):
     """A about the middle of a piece, where products are smaller, and behind it w; the largest of both, and |S|."""
     points = face.rows * face.columns
@@ -119,7 +137,7 @@ def _write_centered(pool, face, piece, work, at):
     return math.sqrt(most_a), most_w, extent
 
 
-@kernel(inner=True)
+@kernel(inner=True, exact=True)
 def _write_piece(pool, face, piece, extent, work):
     """The normals of one piece, and their slack."""
     rows, columns = face.rows, face.columns
@@ -135,26 +153,25 @@ def _write_piece(pool, face, piece, extent, work):
     size_u, size_v = _write_rates(work, (a, rows, columns), 3, (au, av))
     rate_u, rate_v = _write_rates(work, (w, rows, columns), 1, (wu, wv))
     net_u, net_v = (au, p, columns), (av, rows, q)
-    _times_binomials(work, net_u, 3, False)
-    _times_binomials(work, net_v, 3, False)
+    times_binomials(work, net_u, 3, False)
+    times_binomials(work, net_v, 3, False)
     if face.is_rational == 0:
-        _write_cross(work, net_u, net_v, total)
+        times_binomials(work, _write_cross(work, net_u, net_v, total), 3, True)
         rate_u, rate_v, weight = 0.0, 0.0, 1.0
         size = size_u * size_v
     else:
         net_a = (a, rows, columns)
-        _times_binomials(work, net_a, 3, False)
-        _times_binomials(work, (w, rows, columns), 1, False)
-        _times_binomials(work, (wu, p, columns), 1, False)
-        _times_binomials(work, (wv, rows, q), 1, False)
+        times_binomials(work, net_a, 3, False)
+        times_binomials(work, (w, rows, columns), 1, False)
+        times_binomials(work, (wu, p, columns), 1, False)
+        times_binomials(work, (wv, rows, q), 1, False)
         for k in range(3 * normals):
             work[total + k] = 0.0
-        _add_product(work, (w, rows, columns), _write_cross(work, net_u, net_v, product), 1.0, total)
-        _add_product(work, (wv, rows, q), _write_cross(work, net_u, net_a, product), -1.0, total)
-        _add_product(work, (wu, p, columns), _write_cross(work, net_a, net_v, product), -1.0, total)
+        _add_product(work, (w, rows, columns), _cross_of(work, net_u, net_v, product), 1.0, total)
+        _add_product(work, (wv, rows, q), _cross_of(work, net_u, net_a, product), -1.0, total)
+        _add_product(work, (wu, p, columns), _cross_of(work, net_a, net_v, product), -1.0, total)
         weight = size_w
         size = weight * size_u * size_v + size_a * (rate_v * size_u + rate_u * size_v)
-    _times_binomials(work, (total, face.normal_rows, face.normal_columns), 3, True)
     sign = -1.0 if face.reversed == 1 else 1.0
     for k in range(3 * normals):
         pool[face.normals + 3 * normals * piece + k] = sign * work[total + k]

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, dot, scale, sub
 
 # All directions.
 FULL = math.pi
@@ -20,18 +19,23 @@ MARGIN = 1e-14
 _STEPS = 8
 
 
-@kernel(inline=True)
+@kernel(inline=True, exact=True)
+def exact_length(x, y, z):
+    """The length of a vector, the same on all processors."""
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@kernel(inline=True, exact=True)
 def angle_between(a, b):
     """The angle between unit vectors, accurate for small ones too."""
-    d = sub(a, b)
-    return 2.0 * math.asin(min(0.5 * math.sqrt(dot(d, d)), 1.0))
+    return 2.0 * math.asin(min(0.5 * exact_length(a[0] - b[0], a[1] - b[1], a[2] - b[2]), 1.0))
 
 
-@kernel(inline=True)
-def _unit(a):
+@kernel(inline=True, exact=True)
+def _unit(x, y, z):
     """A unit vector; (0, 0, 1) for what is nearly zero."""
-    length = math.sqrt(dot(a, a))
-    return scale(1.0 / length, a) if length > 1e-3 else (0.0, 0.0, 1.0)
+    length = exact_length(x, y, z)
+    return (x / length, y / length, z / length) if length > 1e-3 else (0.0, 0.0, 1.0)
 
 
 @kernel(inline=True)
@@ -46,14 +50,14 @@ def _axis_of(cones, i):
     return cones[i, 0], cones[i, 1], cones[i, 2]
 
 
-@kernel(inner=True)
+@kernel(inner=True, exact=True)
 def cone_of_vectors(vectors, first, count, slack, vanish):
     """The cone around vectors (count, 3) of a block and so their positive combinations, see `cones.around_vectors`."""
     low, high = (1.0, 1.0, 1.0), (-1.0, -1.0, -1.0)
     smallest = math.inf
     for k in range(count):
         a = _three(vectors, first + 3 * k)
-        length = math.sqrt(dot(a, a))
+        length = exact_length(a[0], a[1], a[2])
         if length == 0.0:
             if vanish:
                 continue
@@ -62,13 +66,13 @@ def cone_of_vectors(vectors, first, count, slack, vanish):
         smallest = min(smallest, length)
         low = (min(low[0], a[0]), min(low[1], a[1]), min(low[2], a[2]))
         high = (max(high[0], a[0]), max(high[1], a[1]), max(high[2], a[2]))
-    axis = _unit(scale(0.5, add(low, high)))
+    axis = _unit(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]))
     if smallest == math.inf:
         return axis, FULL
     half = 0.0
     for k in range(count):
         a = _three(vectors, first + 3 * k)
-        length = math.sqrt(dot(a, a))
+        length = exact_length(a[0], a[1], a[2])
         if length > 0.0:
             # How far the direction is off the axis, and how far the vector's own may be.
             off = angle_between((a[0] / length, a[1] / length, a[2] / length), axis)
@@ -77,7 +81,7 @@ def cone_of_vectors(vectors, first, count, slack, vanish):
     return axis, half if half < CONVEX else FULL
 
 
-@kernel(inner=True)
+@kernel(inner=True, exact=True)
 def cone_of_cones(cones, order, first, stop):
     """The cone around those cones (n, 4), axis and half angle, that stand in the order from first to stop."""
     low, high = (math.inf, math.inf, math.inf), (-math.inf, -math.inf, -math.inf)
@@ -85,7 +89,7 @@ def cone_of_cones(cones, order, first, stop):
         a = _axis_of(cones, order[k])
         low = (min(low[0], a[0]), min(low[1], a[1]), min(low[2], a[2]))
         high = (max(high[0], a[0]), max(high[1], a[1]), max(high[2], a[2]))
-    middle = _unit(scale(0.5, add(low, high)))
+    middle = _unit(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]))
     best, least = middle, math.inf
     for step in range(_STEPS):
         wide, far = -math.inf, order[first]
@@ -96,7 +100,13 @@ def cone_of_cones(cones, order, first, stop):
                 wide, far = reach, i
         if wide < least:
             best, least = middle, wide
-        middle = _unit(add(middle, scale(1.0 / (step + 3.0), sub(_axis_of(cones, far), middle))))
+        x, y, z = _axis_of(cones, far)
+        parts = step + 3.0
+        middle = _unit(
+            middle[0] + (x - middle[0]) / parts,
+            middle[1] + (y - middle[1]) / parts,
+            middle[2] + (z - middle[2]) / parts,
+        )
     return best, min(least + 2.0 * MARGIN, FULL)
 
 

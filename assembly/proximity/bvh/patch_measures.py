@@ -12,9 +12,9 @@ import math
 
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
-from assembly.geometry.vec import add, blend, dot, scale, sub
 from assembly.proximity.brep.bezier_nets import FACE_NETS, face_nets_at, restrict_net
-from assembly.proximity.bvh.normal_cones import MARGIN, cone_of_vectors
+from assembly.proximity.brep.net_normals import times_binomials
+from assembly.proximity.bvh.normal_cones import MARGIN, cone_of_vectors, exact_length
 
 # What is known of a patch, see `facet_patches.Patches`.
 PATCH_DTYPE = record_dtype(
@@ -33,11 +33,17 @@ def _three(block, at):
 @kernel(inline=True)
 def _distance(a, b):
     """How far two points are from each other."""
-    d = sub(a, b)
-    return math.sqrt(dot(d, d))
+    return exact_length(a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@kernel(inner=True)
+@kernel(inline=True, exact=True)
+def _between(x, a, b):
+    """The point x of the way from one to another."""
+    y = 1.0 - x
+    return y * a[0] + x * b[0], y * a[1] + x * b[1], y * a[2] + x * b[2]
+
+
+@kernel(inner=True, exact=True)
 def _length(points, at, count, step):
     """Of the polygon through points of a block so far apart in it."""
     total = 0.0
@@ -46,60 +52,98 @@ def _length(points, at, count, step):
     return total
 
 
-@kernel(inner=True)
+@kernel(inner=True, exact=True)
 def _turn(units, at, count, step):
     """How far directions of a block turn; those that are zero count for nothing."""
     total = 0.0
     for k in range(1, count):
         a, b = _three(units, at + step * k), _three(units, at + step * (k - 1))
-        if dot(a, a) > 0.0 and dot(b, b) > 0.0:
+        if exact_length(a[0], a[1], a[2]) > 0.0 and exact_length(b[0], b[1], b[2]) > 0.0:
             total += _distance(a, b)
     return total
 
 
-@kernel(inner=True)
+@kernel(inner=True, exact=True)
 def _bulge(points, at, count, step):
     """How far points are off the straight line between the first and the last, at most."""
     most = 0.0
     first, last = _three(points, at), _three(points, at + step * (count - 1))
     for k in range(1, count - 1):
         x = k / (count - 1)
-        most = max(most, _distance(_three(points, at + step * k), blend(1.0 - x, first, x, last)))
+        most = max(most, _distance(_three(points, at + step * k), _between(x, first, last)))
     return most
 
 
 @kernel(inner=True)
-def _chord_error(points, at, rows, columns, corners):
-    """How far the patch is off the bilinear interpolant of its corners: Bezier points of both, one degree higher."""
-    origin = corners[0]
-    edge_u, edge_v, across = sub(corners[1], origin), sub(corners[3], origin), sub(corners[2], origin)
-    none = (0.0, 0.0, 0.0)
-    most = 0.0
+def _raise_degree(work, rows, columns, source, target):
+    """Write homogeneous Bezier points one degree higher in u and in v; behind them as many numbers more."""
+    line = 4 * columns
+    middle = target + 4 * (rows + 1) * (columns + 1)
+    for i in range(rows + 1):
+        for j in range(line):
+            total = 0.0
+            # A point of the higher degree is between those of the lower one before and behind.
+            for k in range(max(i - 1, 0), min(i + 1, rows)):
+                part = (rows - i) / rows if k == i else i / rows
+                total += part * work[source + line * k + j]
+            work[middle + line * i + j] = total
+        for j in range(columns + 1):
+            for m in range(4):
+                total = 0.0
+                for l in range(max(j - 1, 0), min(j + 1, columns)):
+                    part = (columns - j) / columns if l == j else j / columns
+                    total += part * work[middle + line * i + 4 * l + m]
+                work[target + 4 * ((columns + 1) * i + j) + m] = total
+
+
+@kernel(inner=True, exact=True)
+def _times_square(work, weights, corners, at):
+    """Write Bezier points of the product of weights (place, rows, columns), times binomials, and the bilinear
+    interpolant of the corners about the first of them.
+    """
+    first, rows, columns = weights
+    a, b, c, d = corners
     for i in range(rows + 1):
         for j in range(columns + 1):
-            off, weight = none, 0.0
-            for k in range(2):
-                # A point of the higher degree is between those of the lower one before and behind.
-                part_u = i / rows if k == 1 else 1.0 - i / rows
-                row = i - k
-                if row < 0 or row >= rows:
-                    continue
-                for l in range(2):
-                    part = part_u * (j / columns if l == 1 else 1.0 - j / columns)
-                    column = j - l
-                    if column < 0 or column >= columns:
-                        continue
-                    here = at + 4 * (row * columns + column)
-                    w = points[here + 3]
-                    end = (across if l == 1 else edge_u) if k == 1 else (edge_v if l == 1 else none)
-                    shifted = sub(_three(points, here), scale(w, origin))
-                    off = add(off, scale(part, sub(shifted, scale(w, end))))
-                    weight += part * w
-            most = max(most, math.sqrt(dot(off, off)) / weight)
+            here = at + 3 * ((columns + 1) * i + j)
+            for m in range(3):
+                total = 0.0
+                for row in range(max(i - 1, 0), min(i + 1, rows)):
+                    for column in range(max(j - 1, 0), min(j + 1, columns)):
+                        corner = (c if column < j else b) if row < i else (d if column < j else a)
+                        total += work[first + columns * row + column] * (corner[m] - a[m])
+                work[here + m] = total
+    times_binomials(work, (at, rows + 1, columns + 1), 3, True)
+
+
+@kernel(inner=True, exact=True)
+def _chord_error(work, rows, columns, corners, at):
+    """How far the patch is off the bilinear interpolant of its corners: Bezier points of both, one degree higher.
+
+    The patch's points begin the workspace, `at` is free.
+    """
+    count, more = rows * columns, (rows + 1) * (columns + 1)
+    weights, raised = at + 4 * count, at + 5 * count
+    product = raised + 8 * more
+    for k in range(count):
+        w = work[4 * k + 3]
+        for m in range(3):
+            work[at + 4 * k + m] = work[4 * k + m] - corners[0][m] * w
+        work[at + 4 * k + 3] = w
+        work[weights + k] = w
+    _raise_degree(work, rows, columns, at, raised)
+    times_binomials(work, (weights, rows, columns), 1, False)
+    _times_square(work, (weights, rows, columns), corners, product)
+    most = 0.0
+    for k in range(more):
+        x = work[raised + 4 * k] - work[product + 3 * k]
+        y = work[raised + 4 * k + 1] - work[product + 3 * k + 1]
+        z = work[raised + 4 * k + 2] - work[product + 3 * k + 2]
+        most = max(most, exact_length(x, y, z) / work[raised + 4 * k + 3])
     return most
 
 
-@kernel(inner=True)
+@kernel(inner=True, exact=True)
 def _measure_points(face, work, pad, patch):
     """What is told by the Bezier points of a patch, which begin the workspace."""
     rows, columns = face.rows, face.columns
@@ -124,9 +168,9 @@ def _measure_points(face, work, pad, patch):
         patch.low[m], patch.high[m] = low[m] - pad, high[m] + pad
         for k in range(4):
             patch.corners[k, m] = corners[k][m]
-    twist = sub(add(corners[0], corners[2]), add(corners[1], corners[3]))
-    error = _chord_error(work, 0, rows, columns, corners)
-    patch.chord_error = error + 0.25 * math.sqrt(dot(twist, twist)) + pad
+    a, b, c, d = corners
+    twist = exact_length(a[0] - b[0] + c[0] - d[0], a[1] - b[1] + c[1] - d[1], a[2] - b[2] + c[2] - d[2])
+    patch.chord_error = _chord_error(work, rows, columns, corners, last + 3) + 0.25 * twist + pad
     length_u, length_v, bulge_u, bulge_v = 0.0, 0.0, 0.0, 0.0
     for j in range(columns):
         length_u = max(length_u, _length(work, xyz + 3 * j, rows, line))
@@ -138,7 +182,7 @@ def _measure_points(face, work, pad, patch):
     patch.bulges[0], patch.bulges[1] = bulge_u, bulge_v
 
 
-@kernel(inner=True)
+@kernel(inner=True, exact=True)
 def _measure_normals(face, work, slack, vanish, patch):
     """What is told by the Bezier points of a patch's normals, which begin the workspace; they become unit vectors."""
     rows, columns = face.normal_rows, face.normal_columns
@@ -147,7 +191,7 @@ def _measure_normals(face, work, slack, vanish, patch):
     patch.half_angle = half
     for k in range(rows * columns):
         a = _three(work, 3 * k)
-        length = math.sqrt(dot(a, a))
+        length = exact_length(a[0], a[1], a[2])
         if length > 0.0:
             work[3 * k], work[3 * k + 1], work[3 * k + 2] = a[0] / length, a[1] / length, a[2] / length
     turn_u, turn_v = 0.0, 0.0

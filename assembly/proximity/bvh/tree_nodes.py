@@ -6,8 +6,7 @@ import math
 
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
-from assembly.geometry.vec import dot, scale, sub
-from assembly.proximity.bvh.normal_cones import FULL, cone_of_cones
+from assembly.proximity.bvh.normal_cones import FULL, cone_of_cones, exact_length
 
 # What nodes are made of, an element a row.
 LEAF_DTYPE = record_dtype(
@@ -27,7 +26,7 @@ node_row_at = record_view(NODE_ROW_DTYPE)
 NODE_ROW = size_of(NODE_ROW_DTYPE)
 
 
-@kernel(inner=True)
+@kernel(inner=True, exact=True)
 def _measure_node(leaves, items, first, stop, node):
     """Box, ball and cone around the items from first to stop; along which axis their middles extend most."""
     low, high = (math.inf, math.inf, math.inf), (-math.inf, -math.inf, -math.inf)
@@ -39,18 +38,18 @@ def _measure_node(leaves, items, first, stop, node):
         high = (max(high[0], b[0]), max(high[1], b[1]), max(high[2], b[2]))
         least = (min(least[0], c[0]), min(least[1], c[1]), min(least[2], c[2]))
         most = (max(most[0], c[0]), max(most[1], c[1]), max(most[2], c[2]))
-    middle = scale(0.5, (low[0] + high[0], low[1] + high[1], low[2] + high[2]))
+    middle = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
     reach = 0.0
     for k in range(first, stop):
         leaf = leaf_at(leaves, items[k])
-        square = 0.0
+        p = leaf.points
+        farthest = 0.0
         for i in range(4):
-            p = leaf.points
-            d = sub((p[i, 0], p[i, 1], p[i, 2]), middle)
-            square = max(square, dot(d, d))
-        reach = max(reach, math.sqrt(square) + leaf.beyond)
-    extent = sub(high, low)
-    node.radius = min(reach, 0.5 * math.sqrt(dot(extent, extent))) * (1.0 + 1e-14)
+            d = exact_length(p[i, 0] - middle[0], p[i, 1] - middle[1], p[i, 2] - middle[2])
+            farthest = max(farthest, d)
+        reach = max(reach, farthest + leaf.beyond)
+    size = exact_length(high[0] - low[0], high[1] - low[1], high[2] - low[2])
+    node.radius = min(reach, 0.5 * size) * (1.0 + 1e-14)
     if stop - first == 1:
         cone = leaf_at(leaves, items[first]).cone
         axis, half = (cone[0], cone[1], cone[2]), cone[3]
@@ -59,7 +58,7 @@ def _measure_node(leaves, items, first, stop, node):
     for m in range(3):
         node.low[m], node.high[m], node.axis[m] = low[m], high[m], axis[m]
     node.half_angle = min(half, FULL)
-    spread = sub(most, least)
+    spread = most[0] - least[0], most[1] - least[1], most[2] - least[2]
     if spread[1] > spread[0]:
         return 2 if spread[2] > spread[1] else 1
     return 2 if spread[2] > spread[0] else 0
