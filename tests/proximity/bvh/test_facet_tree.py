@@ -102,12 +102,12 @@ def test_concave_edges_have_no_elements():
 
 
 def test_a_part_of_an_edge_over_many_pieces():
-    """The wall of a cylinder in some 100 pieces around: a part of its edges runs through 25 of them at first."""
+    """The wall of a cylinder in some 400 pieces around: a part of its edges runs through 25 of them."""
     faces = shapes.solid_cylinder(1.0, 3.0)
     (number,) = (k for k, face in enumerate(faces) if any(face.surface.closed))
     surface = faces[number].surface
     around = surface.closed.index(True)
-    for value in np.linspace(*surface.domain[around], 102)[1:-1].tolist():
+    for value in np.linspace(*surface.domain[around], 402)[1:-1].tolist():
         surface = surface.insert_knot(around, value)
     tree = FacetTree.of((*faces[:number], Face(surface), *faces[number + 1 :]))
     assert tree.check_enclosure(1000) <= 0.0
