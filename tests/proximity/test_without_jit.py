@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from functools import partial
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import assembly as asm
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.proximity import contact_jacobian, extremal_pair, gap_gradient, gap_hessian
+from assembly.proximity.bvh.facet_tree import FacetTree
 from benchmarks.watching import Watch
 
 
@@ -44,7 +47,9 @@ def looks():
         ([clip, clip], [[0.3, 1.1, -20.0, 0.9, 0.2, 0.3, 0.1], [0.4, 1.2, 0.3, 1.0, 0.02, 0.0, 0.01]]),
         ([ring, ring], [[0.3, 0.1, 1.2, 1.0, 0.01, 0.05, 0.0], [4.2, 0.1, 0.3, 0.7, 0.7, 0.0, 0.1]]),
     ):
-        watch = Watch(wires)
+        # Coarse trees: plain Python takes some milliseconds for each patch.
+        with mock.patch.object(FacetTree, "of", partial(FacetTree.of, angle=0.7)):
+            watch = Watch(wires)
         for row in poses:
             q = np.array([here, row])
             q[1, 3:] /= np.linalg.norm(q[1, 3:])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,8 @@ __all__ = ["Boundary", "LoopLike", "make_boundary"]
 
 Array = NDArray[np.float64]
 LoopLike = NurbsCurve | Iterable[NurbsCurve] | Loop
+# Curves that follow one another, and the way in (u, v) once around; NaN: they do not close.
+_Chain = tuple[list[NurbsCurve], Array]
 # How far beyond the domain, or off a pole edge or a seam, a curve may be, as a part of the domain.
 SLACK = 1e-9
 
@@ -45,12 +49,24 @@ def _pole_edges(surface: NurbsSurface) -> list[tuple[int, float]]:
     return [end for k, end in enumerate(ends) if surface._pole_bits >> k & 1]
 
 
-def _natural(surface: NurbsSurface) -> tuple[list[list[NurbsCurve]], list[NurbsCurve]]:
+class _Sheet(NamedTuple):
+    """What a boundary needs to know of a surface: its domain, which parameters are closed, which edges are points."""
+
+    domain: tuple[tuple[float, float], tuple[float, float]]
+    closed: tuple[bool, bool]
+    poles: int
+
+    @property
+    def periods(self) -> tuple[float, float]:
+        """Periods of both parameters, 0 where one is not closed."""
+        (a, b), (c, d) = self.domain
+        return (b - a if self.closed[0] else 0.0, d - c if self.closed[1] else 0.0)
+
+
+def _natural(sheet: _Sheet) -> tuple[list[list[NurbsCurve]], list[NurbsCurve]]:
     """Chains of the edges of the domain, counterclockwise, and the pole edges."""
-    (a, b), (c, d) = surface.domain
+    ((a, b), (c, d)), closed, poles = sheet
     corners = np.array([[a, c], [b, c], [b, d], [a, d]])
-    closed = surface.closed
-    poles = surface._pole_bits
     chains: list[list[NurbsCurve]] = []
     silent = []
     last = -2
@@ -224,13 +240,13 @@ def _check_apart(table: TrimTable, chains: Sequence[range], names: Sequence[str]
     raise InputError(f"{names[m]} crosses or touches {names[k]} {place}; expected loops that are apart")
 
 
-def _check_ended(surface: NurbsSurface, table: TrimTable, names: Sequence[str]) -> None:
+def _check_ended(sheet: _Sheet, table: TrimTable, names: Sequence[str]) -> None:
     """Raise where a face would reach an end of the domain without a boundary there."""
-    poles = surface._pole_bits
+    domain, closed, poles = sheet
     for axis, (bit_low, bit_high) in ((1, (4, 8)), (0, (1, 2))):
-        if surface.closed[axis] or not surface.closed[1 - axis]:
+        if closed[axis] or not closed[1 - axis]:
             continue
-        for bit, w, end in zip((bit_low, bit_high), table.beyond[axis], surface.domain[axis], strict=True):
+        for bit, w, end in zip((bit_low, bit_high), table.beyond[axis], domain[axis], strict=True):
             if w != 0.0 and not poles & bit:
                 raise InputError(
                     f"{names[0]} has material up to the end of the domain at {'uv'[axis]} = {end:g}; expected a "
@@ -238,20 +254,32 @@ def _check_ended(surface: NurbsSurface, table: TrimTable, names: Sequence[str]) 
                 )
 
 
+@lru_cache(maxsize=256)
+def _natural_boundary(sheet: _Sheet) -> Boundary:
+    """The boundary of whole surfaces; many of a body are the same in their parameters."""
+    chains, names, silent = _natural_chains(sheet)
+    return _bounded(sheet, None, (), chains, names, silent)
+
+
+def _natural_chains(sheet: _Sheet) -> tuple[list[_Chain], list[str], list[NurbsCurve]]:
+    """Chains of the edges of the domain, with the way once around, their names, and the pole edges."""
+    edges, silent = _natural(sheet)
+    chains: list[_Chain] = []
+    for chain in edges:
+        jump = curve_ends(chain[-1])[1] - curve_ends(chain[0])[0]
+        closes = [x == 0.0 or abs(x) == p for x, p in zip(jump, sheet.periods, strict=True)]
+        chains.append((chain, jump if all(closes) else np.full(2, np.nan)))
+    return chains, ["the edge of the domain"] * len(chains), silent
+
+
 def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence[LoopLike]) -> Boundary:
     """Check loops and turn them; see `Face`."""
-    chains: list[tuple[list[NurbsCurve], Array]] = []
-    names: list[str] = []
-    silent: list[NurbsCurve] = []
-    period = surface._periods
+    sheet = _Sheet(surface.domain, surface.closed, surface._pole_bits)
+    if outer is None and not holes:
+        return _natural_boundary(sheet)
+    outer_loop = None
     if outer is None:
-        edges, silent = _natural(surface)
-        for chain in edges:
-            jump = curve_ends(chain[-1])[1] - curve_ends(chain[0])[0]
-            closes = [x == 0.0 or abs(x) == p for x, p in zip(jump, period, strict=True)]
-            chains.append((chain, jump if all(closes) else np.full(2, np.nan)))
-            names.append("the edge of the domain")
-        outer_loop = None
+        chains, names, silent = _natural_chains(sheet)
     else:
         outer_loop = _as_loop(outer, "outer", surface)
         if not outer_loop.turn.any() and outer_loop.area < 0.0:
@@ -268,12 +296,24 @@ def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence
         chains += more
         silent += points
         names += [f"holes[{k}]"] * len(more)
+    return _bounded(sheet, outer_loop, tuple(hole_loops), chains, names, silent)
+
+
+def _bounded(
+    sheet: _Sheet,
+    outer: Loop | None,
+    holes: tuple[Loop, ...],
+    chains: Sequence[_Chain],
+    names: Sequence[str],
+    silent: Sequence[NurbsCurve],
+) -> Boundary:
+    """The boundary of chains with names, checked."""
     curves = tuple(curve for chain, _ in chains for curve in chain)
     stops = np.cumsum([0] + [len(chain) for chain, _ in chains]).tolist()
     ranges = tuple(range(a, b) for a, b in zip(stops[:-1], stops[1:], strict=True))
     closing = [bool(np.isfinite(turn).all()) for _, turn in chains]
-    table = build(curves, ranges, closing, silent if curves else (), surface.domain, period)
-    if outer_loop is not None or hole_loops:
+    table = build(curves, ranges, closing, silent if curves else (), sheet.domain, sheet.periods)
+    if outer is not None or holes:
         _check_apart(table, ranges, names)
     for k, name in enumerate(names):
         if table.left[k] != 1.0 or table.right[k] != 0.0:
@@ -282,5 +322,5 @@ def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence
                 f"{table.left[k]:g} times, on its right {table.right[k]:g} times; expected holes inside the outer "
                 "loop, none inside another, and rings with material on their left"
             )
-    _check_ended(surface, table, names)
-    return Boundary(outer_loop, tuple(hole_loops), curves, ranges, table)
+    _check_ended(sheet, table, names)
+    return Boundary(outer, holes, curves, ranges, table)

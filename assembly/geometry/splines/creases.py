@@ -31,8 +31,12 @@ _POINT_ROUNDING = 8e-15
 def crease_lines(surface: NurbsSurface) -> tuple[Array, Array]:
     """Parameters of creases in u and v, increasing; the low end of the domain for a seam that is one."""
     result = []
+    breaks = surface.breaks()
     for axis in (0, 1):
-        at, degree, knots = surface.breaks()[axis], surface.degree[axis], surface.knots[axis]
+        at, degree, knots = breaks[axis], surface.degree[axis], surface.knots[axis]
+        if at.size == 2 and not surface.closed[axis]:
+            result.append(np.empty(0))
+            continue
         # Across a knot that is there less often than the degree, the derivative has no jump.
         lines = np.flatnonzero(np.searchsorted(knots, at, "right") - np.searchsorted(knots, at, "left") >= degree)
         lines = lines[(lines > 0) & (lines < len(at) - 1)]

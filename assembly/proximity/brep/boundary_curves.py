@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from math import sqrt
 
 import numpy as np
@@ -15,7 +16,7 @@ from assembly.geometry.splines.curve_parts import CORNER, between, crease_knots
 from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, COEFFICIENTS, CURVE_RECORD, SPANS_U, SPANS_V
 from assembly.proximity.brep.boundary_points import along_boundaries, nearest_on_boundaries
 
-__all__ = ["Batch", "Rim", "Survey", "cross", "turn"]
+__all__ = ["Batch", "Rim", "Survey", "cross", "survey_of", "turn"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -195,6 +196,12 @@ class Survey:
         _, starts, _ = batch.along(rows, domains[:, 0])
         _, ends, _ = batch.along(rows, domains[:, 1])
         return np.asarray(turn(ends, starts) > CORNER)
+
+
+@lru_cache(maxsize=16)
+def survey_of(faces: tuple[Face, ...], tolerance: float) -> Survey:
+    """The survey of a body's faces, which several look at one after the other."""
+    return Survey(faces, tolerance)
 
 
 class Batch:

@@ -63,6 +63,7 @@ def _compared(pairs: list[tuple[Rim, Rim]], signs: Array, survey: Survey) -> lis
     )
     opposite = (along_a * along_b).sum(axis=(1, 2)) < 0.0
     at_b = at_b.reshape(count, stations)
+    bends = _bends(normal_a, along_a, normal_b)
     result = []
     for k, (a, b) in enumerate(pairs):
         if not opposite[k] or furthest[k] > survey.tolerance * (_LOOSE if a.anchored else 1.0):
@@ -72,26 +73,24 @@ def _compared(pairs: list[tuple[Rim, Rim]], signs: Array, survey: Survey) -> lis
         centered = t[k] - t[k].mean()
         slope = float(centered @ there / (centered @ centered))
         shift = float(there.mean() - slope * t[k].mean())
-        convex = _bend(normal_a[k], along_a[k], normal_b[k])
-        result.append(Match(float(furthest[k]), a, b, (shift, slope), convex))
+        result.append(Match(float(furthest[k]), a, b, (shift, slope), bends[k]))
     return result
 
 
-def _bend(normals_a: Array, along_a: Array, normals_b: Array) -> bool | None:
-    """Whether two faces make a convex edge: from their normals and the first one's tangent at some points."""
+def _bends(normals_a: Array, along_a: Array, normals_b: Array) -> list[bool | None]:
+    """Whether two faces each make a convex edge: from their normals and the first one's tangents (n, stations, 3)."""
     inward = cross(normals_a, along_a)
-    size_a, size_b = np.linalg.norm(normals_a, axis=1), np.linalg.norm(normals_b, axis=1)
-    size = np.linalg.norm(inward, axis=1) * size_b
+    size_a, size_b = np.linalg.norm(normals_a, axis=2), np.linalg.norm(normals_b, axis=2)
+    size = np.linalg.norm(inward, axis=2) * size_b
     regular = (size > 0.0) & (size_a > 0.0)
-    if not regular.any():
-        return None
-    sine = -(inward * normals_b).sum(axis=1)[regular] / size[regular]
-    cosine = (normals_a * normals_b).sum(axis=1)[regular] / (size_a * size_b)[regular]
-    angle = np.arctan2(sine, cosine)
+    sine = -(inward * normals_b).sum(axis=2) / np.where(regular, size, 1.0)
+    cosine = (normals_a * normals_b).sum(axis=2) / np.where(regular, size_a * size_b, 1.0)
+    angle = np.where(regular, np.arctan2(sine, cosine), 0.0)
     # Folded back on itself, an edge is a blade whichever way rounding turns it.
-    if angle.max() > CORNER or (np.abs(angle) > pi - CORNER).any():
-        return True
-    return False if angle.min() < -CORNER else None
+    largest, least = angle.max(axis=1), angle.min(axis=1)
+    convex = (largest > CORNER) | (least < CORNER - pi)
+    bends = np.where(convex, 1, np.where(least < -CORNER, -1, 0))
+    return [None if bend == 0 else bend > 0 for bend in bends.tolist()]
 
 
 def matches_of(

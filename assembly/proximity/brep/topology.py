@@ -20,7 +20,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.smooth_faces import smooth_faces
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import CORNER
-from assembly.proximity.brep.boundary_curves import Rim, Survey, turn
+from assembly.proximity.brep.boundary_curves import Rim, Survey, survey_of, turn
 from assembly.proximity.brep.boundary_cutting import all_live, cut_at_vertices, live_boundaries, merged
 from assembly.proximity.brep.coedge_matching import STATIONS, matches_of
 from assembly.proximity.brep.recut import with_cuts
@@ -146,7 +146,7 @@ def topology_of(faces: Iterable[Face], tolerance: float | None = None) -> Topolo
     else:
         tolerance = positive("tolerance", tolerance)
     chains = [_chains(face, number, tolerance) for number, face in enumerate(given)]
-    survey = Survey(given, tolerance)
+    survey = survey_of(tuple(given), tolerance)
     survey.measure(boundary for loops in chains for loop in loops for boundary in loop)
     for number in cut_at_vertices(chains, survey):
         parts: list[list[NurbsCurve]] = [[] for _ in given[number].boundary]

@@ -8,19 +8,23 @@ edge is found by Newton's method at its ends, and made a little wider.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.geometry.splines.curve import NurbsCurve
-from assembly.proximity.brep.boundary_curves import Batch, Rim, Survey
-from assembly.proximity.brep.edge_cells import box_hulls, box_parts, interval_parts
+from assembly._record import rows_of
+from assembly.proximity.brep.body_nets import nets_of
+from assembly.proximity.brep.boundary_curves import Batch, Rim, survey_of
 from assembly.proximity.brep.topology import Topology
-from assembly.proximity.bvh.cones import CONVEX, FULL, MARGIN, around_cones, around_vectors, between
+from assembly.proximity.bvh.edge_measures import (
+    EDGE_PART,
+    EDGE_PART_DTYPE,
+    EDGE_PLACE,
+    EDGE_PLACE_DTYPE,
+    measure_edge_parts,
+)
 from assembly.proximity.bvh.facet_elements import Elements
-from assembly.proximity.bvh.normal_nets import Nets, nets_of, restricted, restriction
 
 __all__ = ["edge_elements"]
 
@@ -29,41 +33,10 @@ Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 # Parts of an edge are no longer than this part of its face; every edge has so many at first, halved so often at most.
 _PART, _FIRST, _HALVINGS = 0.25, 4, 6
+# Cones around normals along a part for which there is room at first.
+_CONES = 16
 # How much wider parts are made that are found by Newton's method on the other face.
 _WIDER = 0.05
-
-
-class _Curves:
-    """Plane curves as Bezier pieces, all spans of all curves in a row."""
-
-    def __init__(self, curves: Sequence[NurbsCurve]) -> None:
-        self.breaks = [curve.breaks() for curve in curves]
-        counts = np.array([at.size - 1 for at in self.breaks], dtype=np.int64)
-        self.first = np.cumsum(counts) - counts
-        self.start = np.concatenate([at[:-1] for at in self.breaks])
-        self.stop = np.concatenate([at[1:] for at in self.breaks])
-        sizes = np.array([np.abs(curve.control_points).max(axis=0) for curve in curves])
-        self.slack = MARGIN * np.repeat(sizes, counts, axis=0)
-        degrees = np.repeat([curve.degree for curve in curves], counts)
-        pieces = [piece for curve in curves for piece in curve.bezier_pieces()]
-        self.groups = [
-            (degrees == degree, np.stack([pieces[k] for k in np.flatnonzero(degrees == degree)]))
-            for degree in np.unique(degrees)
-        ]
-
-    def boxes(self, span: Indices, low: Array, high: Array) -> Array:
-        """Boxes (n, 4) in (u, v) around parts from low to high of the unit intervals of spans."""
-        result = np.empty((len(span), 4))
-        for members, pieces in self.groups:
-            rows = np.flatnonzero(members[span])
-            if rows.size:
-                place = (np.cumsum(members) - 1)[span[rows]]
-                points = restriction(pieces.shape[1] - 1, low[rows], high[rows]) @ pieces[place]
-                plane = points[..., :2] / points[..., 2:]
-                slack = self.slack[span[rows]]
-                result[rows, ::2] = plane.min(axis=1) - slack
-                result[rows, 1::2] = plane.max(axis=1) + slack
-        return result
 
 
 class _Parts(NamedTuple):
@@ -104,8 +77,10 @@ class _Edges:
             ],
         ]
         curves = [[faces[face].boundary[index] for face, index in side] for side in sides]
-        self.curves_a, self.curves_b = _Curves(curves[0]), _Curves(curves[1])
-        survey = Survey(faces, topology.tolerance)
+        self.nets = nets_of(faces)
+        places = np.array(sides)
+        self.curve_a, self.curve_b = self.nets.first_curve[places[..., 0]] + places[..., 1]
+        survey = survey_of(faces, topology.tolerance)
         self.batch_a, self.batch_b = (
             Batch(survey, [Rim(*place, curve, topology.tolerance) for place, curve in zip(side, row, strict=True)])
             for side, row in zip(sides, curves, strict=True)
@@ -115,64 +90,76 @@ class _Edges:
         self.domain_b = np.array([curve.domain for curve in curves[1]]).reshape(-1, 2)
         self.closed = np.array([edge.start is None for edge in edges])
         self.map_b = np.array([edge.map_b for edge in edges]).reshape(-1, 2)
-        self.sign = np.array([faces[face].sign for face in self.face_a], dtype=float)
-        boxes = [faces[face].surface.bounding_box() for face in self.face_a]
-        self.longest = _PART * np.array([np.linalg.norm(high - low) for low, high in boxes])
-        self.nets: dict[int, Nets] = {
-            face: nets_of(faces[face]) for face in np.unique([*self.face_a, *self.face_b]).tolist() if face >= 0
-        }
+        boxes = np.array([faces[face].surface.bounding_box() for face in self.face_a])
+        self.longest = _PART * np.linalg.norm(boxes[:, 1] - boxes[:, 0], axis=1)
+        # Ends of the spans of the first faces' curves, those of all edges in a row.
+        self.breaks = [self.nets.breaks[curve] for curve in self.curve_a]
+        spans = np.array([at.size - 1 for at in self.breaks])
+        self.first_span = np.cumsum(spans) - spans
+        self.start = np.concatenate([at[:-1] for at in self.breaks])
+        self.stop = np.concatenate([at[1:] for at in self.breaks])
 
     def first(self) -> _Parts:
         """The spans of all edges in equal parts."""
         edge, span, low, high = [], [], [], []
-        for k, at in enumerate(self.curves_a.breaks):
+        for k, at in enumerate(self.breaks):
             count = -(-_FIRST // (at.size - 1))
             x = np.arange(count + 1) / count
             edge.append(np.full(count * (at.size - 1), k))
-            span.append(np.repeat(self.curves_a.first[k] + np.arange(at.size - 1), count))
+            span.append(np.repeat(self.first_span[k] + np.arange(at.size - 1), count))
             low.append(np.tile(x[:-1], at.size - 1))
             high.append(np.tile(x[1:], at.size - 1))
         return _Parts(*(np.concatenate(column) for column in (edge, span, low, high)))
 
     def parameters(self, parts: _Parts) -> Array:
         """t from and to, (n, 2)."""
-        curves = self.curves_a
-        start, stop = curves.start[parts.span], curves.stop[parts.span]
+        start, stop = self.start[parts.span], self.stop[parts.span]
         ends = [np.where(x == 1.0, stop, start + x * (stop - start)) for x in (parts.low, parts.high)]
         return np.stack(ends, axis=1)
 
     def measured(self, parts: _Parts) -> tuple[Elements, Array, Mask]:
         """Parts as elements; how far a face's normals turn over each, and which of them are concave."""
         t = self.parameters(parts)
-        edge, paired = parts.edge, self.face_b[parts.edge] >= 0
-        count = len(edge)
-        boxes = self.curves_a.boxes(parts.span, parts.low, parts.high)
-        owner, other_boxes = self._others(edge[paired], t[paired])
-        both = np.flatnonzero(paired)
-        axis, half = self._normals(
-            np.concatenate([self.face_a[edge], self.face_b[edge[both][owner]]]),
-            np.concatenate([boxes, other_boxes]),
-            np.concatenate([2 * np.arange(count), 2 * both[owner] + 1]),
+        edge, nets = parts.edge, self.nets
+        paired = self.face_b[edge] >= 0
+        sides = np.column_stack(
+            [
+                self.face_a[edge],
+                nets.curve_records(self.curve_a[edge]),
+                parts.span - self.first_span[edge],
+                self.face_b[edge],
+                nets.curve_records(self.curve_b[edge]),
+                self.closed[edge],
+            ]
         )
-        # One cone a part, or two where there is another face.
-        sides = 1 + paired
-        begins = np.cumsum(sides) - sides
-        turn = np.maximum.reduceat(half, begins)
-        concave = np.zeros(count, dtype=bool)
-        one, other = begins[paired], begins[paired] + 1
-        concave[paired] = self._concave(edge[paired], t[paired], (axis[one], half[one]), (axis[other], half[other]))
-        axis, half = around_cones(axis, half, begins)
-        half = np.where(paired & (half < CONVEX), half, FULL)
-        low, high = self._hulls(edge, boxes)
+        rows = np.zeros((len(edge), EDGE_PLACE))
+        places = rows_of(EDGE_PLACE_DTYPE, rows)
+        places.low, places.high = parts.low, parts.high
+        places.low_b[paired], places.high_b[paired] = self._on_second(edge[paired], t[paired])
+        places.along = self.batch_a.along(edge, t.mean(axis=1))[1]
+        found = rows_of(EDGE_PART_DTYPE, self._measured(sides, rows))
         # Points of the second face's curve are as far off as two points that are one.
         pad = np.where(paired, self.topology.tolerance, 0.0)[:, None]
-        low, high = low - pad, high + pad
         feature = len(self.topology.faces) + edge
-        elements = Elements(feature, np.concatenate([t, np.zeros_like(t)], axis=1), low, high, axis, half)
-        return elements, turn, concave
+        parameters = np.concatenate([t, np.zeros_like(t)], axis=1)
+        cone = np.array(found.axis), np.array(found.half_angle)
+        elements = Elements(feature, parameters, found.low - pad, found.high + pad, *cone)
+        return elements, found.turn, found.concave == 1.0
 
-    def _others(self, edge: Indices, t: Array) -> tuple[Indices, Array]:
-        """Boxes around the second face's curve over parts of edges, and the part each belongs to."""
+    def _measured(self, sides: Indices, places: Array) -> Array:
+        """Rows EDGE_PART of rows EDGE_SIDES and EDGE_PLACE."""
+        nets = self.nets
+        out = np.empty((len(sides), EDGE_PART))
+        room, need = 0, _CONES
+        # Once more where a part runs through more pieces than there was room for.
+        while need > room:
+            room = need
+            memory = np.empty((room, 4)), np.arange(room), nets.workspace()
+            need = measure_edge_parts((nets.table, nets.pool), sides, places, *memory, out)
+        return out
+
+    def _on_second(self, edge: Indices, t: Array) -> tuple[Array, Array]:
+        """From where to where parts of edges go on their second faces' curves, a little wider."""
         row = np.repeat(np.arange(len(edge)), 2)
         points, _, _ = self.batch_a.along(edge[row], t.ravel())
         ends = self._at_points(edge[row], t.ravel(), points).reshape(-1, 2)
@@ -182,18 +169,7 @@ class _Edges:
         held = ~self.closed[edge]
         low = np.where(held, np.maximum(low, self.domain_b[edge, 0]), low)
         high = np.where(held, np.minimum(high, self.domain_b[edge, 1]), high)
-        owners, spans, starts, stops = [], [], [], []
-        for k in np.unique(edge).tolist():
-            mine = np.flatnonzero(edge == k)
-            owner, span, x0, x1 = interval_parts(low[mine], high[mine], self.curves_b.breaks[k], bool(self.closed[k]))
-            owners.append(mine[owner])
-            spans.append(self.curves_b.first[k] + span)
-            starts.append(x0)
-            stops.append(x1)
-        if not owners:
-            return np.empty(0, dtype=np.int64), np.empty((0, 4))
-        boxes = self.curves_b.boxes(np.concatenate(spans), np.concatenate(starts), np.concatenate(stops))
-        return np.concatenate(owners), boxes
+        return low, high
 
     def _at_points(self, edge: Indices, t: Array, points: Array) -> Array:
         """Where edges are at the same points on their second faces; beyond the domain of closed ones."""
@@ -203,44 +179,6 @@ class _Edges:
         turns = np.where(self.wraps_b[edge], np.round((guess - found) / (high - low)), 0.0)
         found = found + turns * (high - low)
         return np.asarray(np.where(self.closed[edge], found, np.clip(found, low, high)))
-
-    def _normals(self, face: Indices, boxes: Array, owner: Indices) -> tuple[Array, Array]:
-        """Cones around outward normals over boxes (n, 4) in (u, v) of faces; one an owner, in the order of owners."""
-        axes, halves, owners = [], [], []
-        for number in np.unique(face).tolist():
-            mine = np.flatnonzero(face == number)
-            nets = self.nets[number]
-            parts = box_parts(self.topology.faces[number].surface, boxes[mine])
-            at = parts.span_u, parts.span_v
-            net = restricted(nets.normals[at], parts.box)
-            axis, half = around_vectors(net.reshape(len(net), -1, 3), nets.slack[at], nets.poles[at])
-            axes.append(axis)
-            halves.append(half)
-            owners.append(owner[mine[parts.owner]])
-        whose = np.concatenate(owners)
-        order = np.argsort(whose, kind="stable")
-        begins = np.flatnonzero(np.diff(whose[order], prepend=-1))
-        return around_cones(np.concatenate(axes)[order], np.concatenate(halves)[order], begins)
-
-    def _hulls(self, edge: Indices, boxes: Array) -> tuple[Array, Array]:
-        """Boxes in space around the first faces' surfaces over boxes (n, 4) in (u, v)."""
-        low, high = np.empty((len(edge), 3)), np.empty((len(edge), 3))
-        face = self.face_a[edge]
-        for number in np.unique(face).tolist():
-            mine = np.flatnonzero(face == number)
-            xyz, owner = box_hulls(self.topology.faces[number].surface, boxes[mine])
-            begins = np.flatnonzero(np.diff(owner, prepend=-1))
-            pad = MARGIN * self.nets[number].extent
-            low[mine] = np.minimum.reduceat(xyz.min(axis=1), begins) - pad
-            high[mine] = np.maximum.reduceat(xyz.max(axis=1), begins) + pad
-        return low, high
-
-    def _concave(self, edge: Indices, t: Array, a: tuple[Array, Array], b: tuple[Array, Array]) -> Mask:
-        """Parts where the faces' normals are never parallel, and material bends toward the outside at the middle."""
-        _, along, _ = self.batch_a.along(edge, t.mean(axis=1))
-        angle = between(a[0], b[0])
-        apart = (angle > a[1] + b[1]) & (angle < np.pi - a[1] - b[1])
-        return np.asarray(apart & (self.sign[edge] * (np.cross(a[0], b[0]) * along).sum(axis=1) < 0.0))
 
 
 def edge_elements(topology: Topology, angle: float) -> Elements:

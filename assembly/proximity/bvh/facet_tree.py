@@ -18,16 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._read_only import ReadOnlyArrays, read_only
+from assembly._record import rows_of
 from assembly.errors import InputError, integer, positive
 from assembly.geometry.faces.face import Face
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.topology import Topology
-from assembly.proximity.bvh.cones import FULL, around_cones
 from assembly.proximity.bvh.facet_check import largest_excess
 from assembly.proximity.bvh.facet_edges import edge_elements
 from assembly.proximity.bvh.facet_elements import Elements
 from assembly.proximity.bvh.facet_patches import patches_by_angle, patches_by_count
 from assembly.proximity.bvh.facet_vertices import vertex_elements
+from assembly.proximity.bvh.tree_nodes import LEAF, LEAF_DTYPE, NODE_ROW, NODE_ROW_DTYPE, write_nodes
 
 __all__ = ["FacetTree", "Nodes"]
 
@@ -169,70 +170,35 @@ class FacetTree(ReadOnlyArrays):
 @lru_cache(maxsize=128)
 def _tree_of(faces: tuple[Face, ...], angle: float, count: int | None) -> FacetTree:
     topology = solid_of(faces)
-    if count is None:
-        patches = [patches_by_angle(face, angle) for face in topology.faces]
-    else:
-        patches = patches_by_count(topology.faces, count)
-    parts = [
-        Elements(np.full(len(box), k), box, patch.low, patch.high, patch.axis, patch.half_angle)
-        for k, (patch, box) in enumerate(patches)
-    ]
+    patches = patches_by_angle(topology.faces, angle) if count is None else patches_by_count(topology.faces, count)
+    measures = patches.measures
+    of_patches = Elements(
+        patches.face, patches.parameters, measures.low, measures.high, measures.axis, measures.half_angle
+    )
     edges = edge_elements(topology, angle)
-    parts += [edges, vertex_elements(topology, edges)]
-    elements = Elements.joined(parts)
-    corners = np.concatenate([patch.corners for patch, _ in patches])
-    chord_error = np.concatenate([patch.chord_error for patch, _ in patches])
-    nodes = _Builder(elements, corners, chord_error).nodes()
+    elements = Elements.joined([of_patches, edges, vertex_elements(topology, edges)])
+    corners, chord_error = np.array(measures.corners), np.array(measures.chord_error)
+    nodes = _nodes_of(elements, corners, chord_error)
     for array in (*elements, corners, chord_error, *nodes):
         array.flags.writeable = False
     return FacetTree(topology, *elements, corners, chord_error, nodes)
 
 
-class _Builder:
-    """Makes nodes a level at a time: all of a level with several elements are halved at once."""
-
-    def __init__(self, elements: Elements, corners: Array, chord_error: Array) -> None:
-        self.elements = elements
-        self.middle = 0.5 * (elements.low + elements.high)
-        # Every element is within a distance of the hull of four points: its corners, or its middle.
-        self.points = np.repeat(self.middle[:, None], 4, axis=1)
-        self.points[: len(corners)] = corners
-        self.beyond = 0.5 * np.linalg.norm(elements.high - elements.low, axis=1)
-        self.beyond[: len(corners)] = chord_error
-
-    def nodes(self) -> Nodes:
-        """All nodes."""
-        items = np.arange(len(self.middle))
-        sizes = np.array([len(items)])
-        made = [self.level(items, sizes)]
-        count = 1
-        while sizes.max(initial=0) > 1:
-            # What is a leaf is done.
-            inner = sizes > 1
-            items = items[np.repeat(inner, sizes)]
-            sizes = sizes[inner]
-            made[-1].child[inner] = count + 2 * np.arange(len(sizes))
-            begins = np.cumsum(sizes) - sizes
-            points = self.middle[items]
-            extent = np.maximum.reduceat(points, begins) - np.minimum.reduceat(points, begins)
-            owner = np.repeat(np.arange(len(sizes)), sizes)
-            along = points[np.arange(len(items)), extent.argmax(axis=1)[owner]]
-            items = items[np.lexsort((along, owner))]
-            sizes = np.stack([sizes // 2, sizes - sizes // 2], axis=1).ravel()
-            made.append(self.level(items, sizes))
-            count += len(sizes)
-        return Nodes(*(np.concatenate(columns) for columns in zip(*made, strict=True)))
-
-    def level(self, items: Indices, sizes: Indices) -> Nodes:
-        """Nodes over so many of the items each; all of them leaves at first."""
-        elements, begins = self.elements, np.cumsum(sizes) - sizes
-        first, single = items[begins], sizes == 1
-        low = np.minimum.reduceat(elements.low[items], begins)
-        high = np.maximum.reduceat(elements.high[items], begins)
-        middle = np.repeat(0.5 * (low + high), sizes, axis=0)
-        reach = np.linalg.norm(self.points[items] - middle[:, None], axis=2).max(axis=1) + self.beyond[items]
-        radius = np.minimum(np.maximum.reduceat(reach, begins), 0.5 * np.linalg.norm(high - low, axis=1))
-        axis, half = around_cones(elements.axis[items], elements.half_angle[items], begins)
-        axis = np.where(single[:, None], elements.axis[first], axis)
-        half = np.where(single, elements.half_angle[first], np.minimum(half, FULL))
-        return Nodes(-1 - first, low, high, radius * (1.0 + 1e-14), axis, half)
+def _nodes_of(elements: Elements, corners: Array, chord_error: Array) -> Nodes:
+    """Nodes over elements, of which the first have corners."""
+    count, patches = len(elements.low), len(corners)
+    rows = np.empty((count, LEAF))
+    leaves = rows_of(LEAF_DTYPE, rows)
+    leaves.cone[:, :3], leaves.cone[:, 3] = elements.axis, elements.half_angle
+    leaves.low, leaves.high = elements.low, elements.high
+    leaves.middle = 0.5 * (elements.low + elements.high)
+    # Every element is within a distance of the hull of four points: its corners, or its middle.
+    leaves.points = leaves.middle[:, None]
+    leaves.points[:patches] = corners
+    leaves.beyond = 0.5 * np.linalg.norm(elements.high - elements.low, axis=1)
+    leaves.beyond[:patches] = chord_error
+    total = 2 * count - 1
+    child, out = np.empty(total, dtype=np.int64), np.empty((total, NODE_ROW))
+    write_nodes(rows, np.empty((2, count), dtype=np.int64), np.empty((total, 2), dtype=np.int64), child, out)
+    nodes = rows_of(NODE_ROW_DTYPE, out)
+    return Nodes(child, *(np.array(nodes[name]) for name in ("low", "high", "radius", "axis", "half_angle")))

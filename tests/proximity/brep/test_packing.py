@@ -24,7 +24,8 @@ from assembly.geometry.splines.evaluate import (
     surface_point,
 )
 from assembly.proximity.brep import records as shell
-from assembly.proximity.brep.edge_cells import curve_boxes, edge_cells, first_cells
+from assembly.proximity.brep.body_nets import SurfaceParts, pack_nets
+from assembly.proximity.brep.edge_cells import edge_cells
 from assembly.proximity.brep.packing import pack_shell
 from assembly.proximity.brep.topology import topology_of
 from tests.geometry.splines.test_surface import random_surface
@@ -243,6 +244,13 @@ def wild_curve(rng, domain):
     return NurbsCurve(points, knots, degree, rng.uniform(0.3, 3.0, count))
 
 
+def cells_of(surface, curves, lengths):
+    """The cells of edges on one surface."""
+    count = len(curves)
+    nets = pack_nets([SurfaceParts(surface, curves)])
+    return edge_cells(nets, np.zeros(count, dtype=np.int64), np.arange(count), np.asarray(lengths))
+
+
 @pytest.mark.parametrize("seed", range(30))
 def test_balls_on_any_surface(seed):
     rng = np.random.default_rng(seed)
@@ -255,7 +263,7 @@ def test_balls_on_any_surface(seed):
     ][seed % 5]
     curves = [wild_curve(rng, surface.domain) for _ in range(3)]
     lengths = rng.uniform(0.1, 30.0, 3)
-    for curve, length, rows in zip(curves, lengths, edge_cells(surface, curves, lengths), strict=True):
+    for curve, length, rows in zip(curves, lengths, cells_of(surface, curves, lengths), strict=True):
         assert (rows[1:, 0] == rows[:-1, 1]).all() and (rows[0, 0], rows[-1, 1]) == curve.domain
         assert rows[:, 5].max() <= 0.0625 * length or len(rows) == 256
         t = rows[:, :1] + (rows[:, 1:2] - rows[:, :1]) * np.linspace(0, 1, 40)
@@ -264,10 +272,6 @@ def test_balls_on_any_surface(seed):
         # The evaluated points are off by some roundings of their coordinates.
         slack = 4e-15 * np.abs(surface.control_points).max()
         assert (np.linalg.norm(points - rows[:, None, 2:5], axis=2) <= rows[:, 5:] + slack).all()
-        boxes = curve_boxes(curve, first_cells(curve))
-        cells = first_cells(curve)
-        uv = curve.evaluate(np.clip(cells[:, :1] + np.diff(cells) * np.linspace(0, 1, 40), *curve.domain))
-        assert ((boxes[:, None, ::2] <= uv) & (uv <= boxes[:, None, 1::2])).all()
 
 
 def test_balls_across_seams():
@@ -278,7 +282,7 @@ def test_balls_across_seams():
         start = np.array([a + shift_u * (b - a), c + shift_v * (d - c)])
         for turns in ((1, 0), (0, 1), (1, 1), (0.3, 0.6), (-1, 1)):
             curve = line(start, start + np.array(turns) * [b - a, d - c])
-            (rows,) = edge_cells(torus, [curve], [50.0])
+            (rows,) = cells_of(torus, [curve], [50.0])
             t = rows[:, :1] + np.diff(rows[:, :2]) * np.linspace(0, 1, 30)
             uv = curve.evaluate(np.clip(t, *curve.domain))
             points = torus.evaluate(uv[..., 0], uv[..., 1])
@@ -288,5 +292,5 @@ def test_balls_across_seams():
 
 
 def test_a_straight_edge_has_the_smallest_balls():
-    (rows,) = edge_cells(shapes.plane(4.0, 4.0), [line((-1, -1), (1, 1))], [8**0.5])
+    (rows,) = cells_of(shapes.plane(4.0, 4.0), [line((-1, -1), (1, 1))], [8**0.5])
     np.testing.assert_allclose(rows[:, 5], 8**0.5 / 32, rtol=1e-11)

@@ -101,6 +101,21 @@ def test_concave_edges_have_no_elements():
     assert tree.check_enclosure(500) <= 0.0
 
 
+def test_a_part_of_an_edge_over_many_pieces():
+    """The wall of a cylinder in some 400 pieces around: a part of its edges runs through 25 of them."""
+    faces = shapes.solid_cylinder(1.0, 3.0)
+    (number,) = (k for k, face in enumerate(faces) if any(face.surface.closed))
+    surface = faces[number].surface
+    around = surface.closed.index(True)
+    for value in np.linspace(*surface.domain[around], 402)[1:-1].tolist():
+        surface = surface.insert_knot(around, value)
+    tree = FacetTree.of((*faces[:number], Face(surface), *faces[number + 1 :]))
+    assert tree.check_enclosure(1000) <= 0.0
+    edges = (tree.feature >= 3) & (tree.feature < 5)
+    # Between the normals of the wall and of an end there is a right angle, and what the wall's turn along a part.
+    assert edges.any() and (np.abs(tree.half_angle[edges] - np.pi / 4.0) < 0.2).all()
+
+
 def test_a_free_edge_has_all_directions():
     face = Face(shapes.plane(2.0, 1.0))
     tree = FacetTree.of((face,))
