@@ -58,8 +58,16 @@ def elementary_form(surface: NurbsSurface, tolerance: float | None = None) -> Fo
         tolerance = positive("tolerance", tolerance)
     known = _known.setdefault(surface, {})
     if tolerance not in known:
-        known[tolerance] = _recognized(surface, tolerance)
+        # Planes come first: what is one to within less is the same one.
+        exact = known.get(None) if tolerance is not None and tolerance >= _exactness(surface) else None
+        known[tolerance] = exact if isinstance(exact, Plane) else _recognized(surface, tolerance)
     return known[tolerance]
+
+
+def _exactness(surface: NurbsSurface) -> float:
+    """How far a surface may be off by its own rounding."""
+    low, high = surface.bounding_box()
+    return exactness(surface.size, float(np.maximum(-low, high).max()))
 
 
 def _recognized(surface: NurbsSurface, tolerance: float | None) -> Form:
@@ -68,7 +76,7 @@ def _recognized(surface: NurbsSurface, tolerance: float | None) -> Form:
         return Freeform()
     low, high = surface.bounding_box()
     if tolerance is None:
-        tolerance = exactness(size, float(np.maximum(-low, high).max()))
+        tolerance = _exactness(surface)
     allowed = tolerance / size
     # Most of what is none of these is told by that, at a tenth of the time.
     if has_no_motion(surface.bezier_pieces(), 0.5 * low + 0.5 * high, size, loose_of(allowed)):

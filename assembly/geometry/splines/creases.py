@@ -32,6 +32,9 @@ def crease_lines(surface: NurbsSurface) -> tuple[Array, Array]:
     """Parameters of creases in u and v, increasing; the low end of the domain for a seam that is one."""
     result = []
     for axis in (0, 1):
+        if surface.bezier_pieces().shape[axis] == 1 and not surface.closed[axis]:
+            result.append(np.empty(0))
+            continue
         at, degree, knots = surface.breaks()[axis], surface.degree[axis], surface.knots[axis]
         # Across a knot that is there less often than the degree, the derivative has no jump.
         lines = np.flatnonzero(np.searchsorted(knots, at, "right") - np.searchsorted(knots, at, "left") >= degree)

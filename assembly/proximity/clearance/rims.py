@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
-from assembly.geometry.meshing.polygon import BoundaryCells
+from assembly.geometry.meshing.trimmed_cells import BoundaryCells
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.proximity.clearance.derivative_nets import bends, curve_bounds
+from assembly.proximity.clearance.derivative_nets import chord_bounds
 from assembly.proximity.clearance.records import NONE
 
-__all__ = ["Rims", "no_rims", "rims_of", "spilling"]
+__all__ = ["Rims", "no_rims", "rims_of"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -85,15 +85,10 @@ def rims_of(face: Face, cells: BoundaryCells) -> Rims:
         t = border.t[number[row, k]]
         found.curve[row, k], found.t[row, k] = c, t
         if curve.degree > 1:
-            found.second[row, k], found.hollow[row, k] = curve_bounds(curve, t), bends(curve, t)
+            found.second[row, k], found.hollow[row, k] = chord_bounds(curve, t)
         apart = _displaced(face.surface, border.ends[number[row, k]], curve.evaluate(t.ravel()))
         np.maximum.at(found.beside, row, apart)
     return found
-
-
-def spilling(face: Face, cells: BoundaryCells) -> Indices:
-    """The segments of the border whose curves may leave their triangles."""
-    return np.unique(cells.segments[rims_of(face, cells).spills(cells.parameters)])
 
 
 def _displaced(surface: NurbsSurface, ends: Array, true: Array) -> Array:
