@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,8 @@ __all__ = ["Boundary", "LoopLike", "make_boundary"]
 
 Array = NDArray[np.float64]
 LoopLike = NurbsCurve | Iterable[NurbsCurve] | Loop
+# Chains, with the way from the start of each to its end if that is whole periods; their names; edges that are points.
+_Chains = tuple[list[tuple[list[NurbsCurve], Array]], list[str], list[NurbsCurve]]
 # How far beyond the domain, or off a pole edge or a seam, a curve may be, as a part of the domain.
 SLACK = 1e-9
 
@@ -45,12 +49,20 @@ def _pole_edges(surface: NurbsSurface) -> list[tuple[int, float]]:
     return [end for k, end in enumerate(ends) if surface._pole_bits >> k & 1]
 
 
-def _natural(surface: NurbsSurface) -> tuple[list[list[NurbsCurve]], list[NurbsCurve]]:
+class _Domain(NamedTuple):
+    """What the boundary of a whole surface depends on: its domain, closed directions, periods and bits of poles."""
+
+    ends: tuple[tuple[float, float], tuple[float, float]]
+    closed: tuple[bool, bool]
+    periods: tuple[float, float]
+    poles: int
+
+
+def _natural(domain: _Domain) -> tuple[list[list[NurbsCurve]], list[NurbsCurve]]:
     """Chains of the edges of the domain, counterclockwise, and the pole edges."""
-    (a, b), (c, d) = surface.domain
+    (a, b), (c, d) = domain.ends
     corners = np.array([[a, c], [b, c], [b, d], [a, d]])
-    closed = surface.closed
-    poles = surface._pole_bits
+    closed, poles = domain.closed, domain.poles
     chains: list[list[NurbsCurve]] = []
     silent = []
     last = -2
@@ -224,14 +236,13 @@ def _check_apart(table: TrimTable, chains: Sequence[range], names: Sequence[str]
     raise InputError(f"{names[m]} crosses or touches {names[k]} {place}; expected loops that are apart")
 
 
-def _check_ended(surface: NurbsSurface, table: TrimTable, names: Sequence[str]) -> None:
+def _check_ended(domain: _Domain, table: TrimTable, names: Sequence[str]) -> None:
     """Raise where a face would reach an end of the domain without a boundary there."""
-    poles = surface._pole_bits
     for axis, (bit_low, bit_high) in ((1, (4, 8)), (0, (1, 2))):
-        if surface.closed[axis] or not surface.closed[1 - axis]:
+        if domain.closed[axis] or not domain.closed[1 - axis]:
             continue
-        for bit, w, end in zip((bit_low, bit_high), table.beyond[axis], surface.domain[axis], strict=True):
-            if w != 0.0 and not poles & bit:
+        for bit, w, end in zip((bit_low, bit_high), table.beyond[axis], domain.ends[axis], strict=True):
+            if w != 0.0 and not domain.poles & bit:
                 raise InputError(
                     f"{names[0]} has material up to the end of the domain at {'uv'[axis]} = {end:g}; expected a "
                     f"second loop around, or a loop along {'uv'[axis]} = {end:g}"
@@ -240,17 +251,11 @@ def _check_ended(surface: NurbsSurface, table: TrimTable, names: Sequence[str]) 
 
 def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence[LoopLike]) -> Boundary:
     """Check loops and turn them; see `Face`."""
-    chains: list[tuple[list[NurbsCurve], Array]] = []
-    names: list[str] = []
-    silent: list[NurbsCurve] = []
-    period = surface._periods
+    domain = _Domain(surface.domain, surface.closed, surface._periods, surface._pole_bits)
+    if outer is None and not holes:
+        return _boundary_of(domain)
     if outer is None:
-        edges, silent = _natural(surface)
-        for chain in edges:
-            jump = curve_ends(chain[-1])[1] - curve_ends(chain[0])[0]
-            closes = [x == 0.0 or abs(x) == p for x, p in zip(jump, period, strict=True)]
-            chains.append((chain, jump if all(closes) else np.full(2, np.nan)))
-            names.append("the edge of the domain")
+        chains, names, silent = _edges(domain)
         outer_loop = None
     else:
         outer_loop = _as_loop(outer, "outer", surface)
@@ -268,11 +273,34 @@ def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence
         chains += more
         silent += points
         names += [f"holes[{k}]"] * len(more)
+    return _joined(domain, (chains, names, silent), outer_loop, hole_loops)
+
+
+def _edges(domain: _Domain) -> _Chains:
+    """The edge of a domain."""
+    chains = []
+    edges, silent = _natural(domain)
+    for chain in edges:
+        jump = curve_ends(chain[-1])[1] - curve_ends(chain[0])[0]
+        closes = [x == 0.0 or abs(x) == p for x, p in zip(jump, domain.periods, strict=True)]
+        chains.append((chain, jump if all(closes) else np.full(2, np.nan)))
+    return chains, ["the edge of the domain"] * len(chains), silent
+
+
+@lru_cache(maxsize=256)
+def _boundary_of(domain: _Domain) -> Boundary:
+    """That of a whole surface: walls of one size have the same."""
+    return _joined(domain, _edges(domain), None, [])
+
+
+def _joined(domain: _Domain, found: _Chains, outer_loop: Loop | None, hole_loops: list[Loop]) -> Boundary:
+    """The boundary of chains, checked to bound one face."""
+    chains, names, silent = found
     curves = tuple(curve for chain, _ in chains for curve in chain)
     stops = np.cumsum([0] + [len(chain) for chain, _ in chains]).tolist()
     ranges = tuple(range(a, b) for a, b in zip(stops[:-1], stops[1:], strict=True))
     closing = [bool(np.isfinite(turn).all()) for _, turn in chains]
-    table = build(curves, ranges, closing, silent if curves else (), surface.domain, period)
+    table = build(curves, ranges, closing, silent if curves else (), domain.ends, domain.periods)
     if outer_loop is not None or hole_loops:
         _check_apart(table, ranges, names)
     for k, name in enumerate(names):
@@ -282,5 +310,5 @@ def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence
                 f"{table.left[k]:g} times, on its right {table.right[k]:g} times; expected holes inside the outer "
                 "loop, none inside another, and rings with material on their left"
             )
-    _check_ended(surface, table, names)
+    _check_ended(domain, table, names)
     return Boundary(outer_loop, tuple(hole_loops), curves, ranges, table)

@@ -291,28 +291,36 @@ class TrimmedMesh:
         self.rim = self.rim.split(np.unique(segment[known & (segment < k)]))
 
     def mesh(self) -> tuple[Vertices, Array, Indices]:
-        """Corners, where they are in space, and triangles."""
+        """Corners, where they are in space, and triangles, of which those at poles may have sides of no length."""
         for _ in range(_ROUNDS):
             found, triangles, edges, owner = self._triangles()
             if len(found.parameters) > _MOST_POINTS:
                 raise _too_many(self.tolerance)
             points = self._points(found.parameters)
-            corners = points[triangles]
-            sides = np.abs(corners - np.roll(corners, 1, axis=1)).max(axis=2)
-            triangles = triangles[(sides > 0.0).all(axis=1)]
             if self.face.surface.is_parallelogram:
                 # Facets are in it.
                 break
-            apart = measured(self.face, found.parameters, points, triangles, self.tolerance, self.angle)
+            solid = _solid(points, triangles)
+            apart = measured(self.face, found.parameters, points, solid, self.tolerance, self.angle)
             if not len(apart.edges) and not len(apart.triangles):
                 break
             self._divide(found, apart.edges, edges, owner)
-            self.inner = np.concatenate([self.inner, found.parameters[triangles[apart.triangles]].mean(axis=1)])
+            self.inner = np.concatenate([self.inner, found.parameters[solid[apart.triangles]].mean(axis=1)])
         return found, points, triangles
 
     def facets(self) -> Facets:
+        """The facets with normals."""
         found, points, triangles = self.mesh()
+        triangles = _solid(points, triangles)
         return _finished(self.face, found.parameters, points, triangles, any(len(a.creases) for a in self.grid))
+
+
+def _solid(points: Array, triangles: Indices) -> Indices:
+    """Those triangles whose corners are three points."""
+    corners = points[triangles]
+    sides = np.abs(corners - np.roll(corners, 1, axis=1)).max(axis=2)
+    solid: Indices = triangles[(sides > 0.0).all(axis=1)]
+    return solid
 
 
 def _finished(face: Face, parameters: Array, points: Array, triangles: Indices, creased: bool) -> Facets:

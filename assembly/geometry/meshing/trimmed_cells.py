@@ -13,7 +13,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.meshing.border import Border
 from assembly.geometry.meshing.polygon import TrimmedMesh
 
-__all__ = ["BoundaryCells", "TrimmedCells"]
+__all__ = ["BoundaryCells", "TrimmedCells", "parallelogram_cells"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -37,6 +37,18 @@ class BoundaryCells:
     border: Border
 
 
+def parallelogram_cells(face: Face) -> BoundaryCells | None:
+    """The two triangles of a face that is all of a parallelogram, as `TrimmedCells` makes them, or None."""
+    if not face.surface.is_parallelogram or face.outer is not None or face.holes or len(face.boundary) != 4:
+        return None
+    (u0, u1), (v0, v1) = face.surface.domain
+    corners = np.array([[u0, v0], [u1, v0], [u1, v1], [u0, v1]])
+    t = np.array([curve.domain for curve in face.boundary])
+    ends = np.stack([corners, corners[[1, 2, 3, 0]]], axis=1)
+    border = Border(face, np.arange(4), np.zeros(4, dtype=np.int64), t, ends)
+    return BoundaryCells(corners[[[1, 3, 0], [3, 1, 2]]], np.array([[-1, 3, 0], [-1, 1, 2]]), border)
+
+
 class TrimmedCells:
     """Triangles of a face that has a boundary, whose chords of it can be cut.
 
@@ -52,6 +64,9 @@ class TrimmedCells:
 
     def made(self) -> BoundaryCells:
         """The triangles and their chords.
+
+        At a pole there are some with two corners in it: they are beside others in (u, v), and what is over them is
+        over no other.
 
         Raises
         ------
@@ -76,10 +91,8 @@ class TrimmedCells:
             segments = np.where(keys[place] == edges, rows[place], -1)
         missing = len(np.unique(keys)) - np.count_nonzero(segments >= 0)
         if missing:
-            face = self._mesh.face
-            raise InputError(
-                f"{missing} chords of the boundary of {face!r} are edges of no facet; expected loops apart"
-            )
+            chords = f"{missing} chords of the boundary of {self._mesh.face!r}"
+            raise InputError(f"{chords} are edges of no facet; expected loops apart")
         return BoundaryCells(found.parameters[triangles], segments, border)
 
     def cut(self, segments: Indices) -> None:

@@ -23,13 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
-from assembly.geometry.meshing.trimmed_cells import BoundaryCells, TrimmedCells
+from assembly.geometry.meshing.trimmed_cells import BoundaryCells, TrimmedCells, parallelogram_cells
 from assembly.geometry.recognition.elementary import elementary_form
 from assembly.geometry.recognition.forms import Cylinder, Extrusion, Plane
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.clearance.derivative_nets import surface_bounds
 from assembly.proximity.clearance.records import FLAT, ROUNDED, RULED
-from assembly.proximity.clearance.rims import Rims, no_rims, rims_of
+from assembly.proximity.clearance.rims import Rims, no_rims, rims_of, straight_rims
 
 __all__ = ["CellTable", "cells_of"]
 
@@ -143,6 +143,9 @@ def _divided(at: Array, many: Indices) -> Array:
 
 def _trimmed(face: Face, tolerance: float, angle: float) -> tuple[BoundaryCells, Rims]:
     """Triangles of a face that has a boundary, whose chords are cut in two as long as curves may leave triangles."""
+    whole = parallelogram_cells(face)
+    if whole is not None:
+        return whole, straight_rims(whole)
     made = TrimmedCells(face, tolerance, angle)
     for _ in range(SPILLS):
         cells = made.made()

@@ -172,6 +172,7 @@ def part_of(low, high, begin, width):
 
 @kernel(inline=True)
 def not_narrow(low, high):
+    """Parts of a span that are not all but empty."""
     low = min(low, max(high - NARROWEST, 0.0))
     return low, max(high, low + NARROWEST)
 

@@ -22,7 +22,7 @@ from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.clearance.derivative_nets import chord_bounds
 from assembly.proximity.clearance.records import NONE
 
-__all__ = ["Rims", "no_rims", "rims_of"]
+__all__ = ["Rims", "no_rims", "rims_of", "straight_rims"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -57,6 +57,8 @@ class Rims:
 
     def spills(self, uv: Array) -> NDArray[np.bool_]:
         """Which curves (n, 3), but those that bend towards the material, may leave their triangles (n, 3, 2)."""
+        if not self.second.any():
+            return np.zeros(self.curve.shape, dtype=bool)
         p, q, r = (np.roll(uv, -k, axis=1) for k in range(3))
         area = np.abs((q - p)[..., 0] * (r - p)[..., 1] - (q - p)[..., 1] * (r - p)[..., 0])
         sides = np.abs(np.stack([r - q, r - p]))[..., ::-1]
@@ -73,6 +75,15 @@ def no_rims(count: int) -> Rims:
         np.zeros((count, 3), dtype=np.int64),
         np.zeros((count, 2)),
     )
+
+
+def straight_rims(cells: BoundaryCells) -> Rims:
+    """The chords of triangles whose boundary curves are lines along these chords."""
+    number, border = cells.segments, cells.border
+    found = no_rims(len(number))
+    row, k = np.nonzero(number >= 0)
+    found.curve[row, k], found.t[row, k] = border.curve[number[row, k]], border.t[number[row, k]]
+    return found
 
 
 def rims_of(face: Face, cells: BoundaryCells) -> Rims:
