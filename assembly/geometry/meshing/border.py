@@ -142,15 +142,17 @@ def _parts(curve: NurbsCurve) -> tuple[Array, list[int]]:
     """Ends of short parts of a curve, and which of them begin a smooth stretch, or end the last."""
     breaks = curve.breaks()
     parts = max(_PARTS // (len(breaks) - 1), _LEAST)
-    t = np.linspace(breaks[:-1], breaks[1:], parts, endpoint=False, axis=1)
-    corners = []
-    for k in range(1, len(breaks) - 1):
-        if np.count_nonzero(curve.knots == breaks[k]) >= curve.degree:
-            before = breaks[k] - 1e-9 * (breaks[k] - breaks[k - 1])
-            way = curve.evaluate(np.array([before, breaks[k]]), 1)[1]
-            cross, dot = way[0, 0] * way[1, 1] - way[0, 1] * way[1, 0], way[0] @ way[1]
-            if abs(np.arctan2(cross, dot)) > _KINK:
-                corners.append(k * parts)
+    t = breaks[:-1, None] + np.arange(parts) * ((breaks[1:] - breaks[:-1]) / parts)[:, None]
+    inner = breaks[1:-1]
+    times = np.searchsorted(curve.knots, inner, "right") - np.searchsorted(curve.knots, inner, "left")
+    full = np.flatnonzero(times >= curve.degree) + 1
+    corners: list[int] = []
+    if len(full):
+        before = breaks[full] - 1e-9 * (breaks[full] - breaks[full - 1])
+        way = curve.evaluate(np.stack([before, breaks[full]]), 1)[1]
+        cross = way[0, :, 0] * way[1, :, 1] - way[0, :, 1] * way[1, :, 0]
+        turned = np.abs(np.arctan2(cross, (way[0] * way[1]).sum(axis=1))) > _KINK
+        corners = (parts * full[turned]).tolist()
     return np.append(t.ravel(), curve.domain[1]), [0, *corners, parts * (len(breaks) - 1)]
 
 

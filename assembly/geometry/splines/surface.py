@@ -285,7 +285,8 @@ class NurbsSurface(ReadOnlyArrays):
         p, q = self.degree
         if p <= 3 and q <= 3:
             # Small degrees share the unrolled bicubic path of the evaluator.
-            powers = np.pad(powers, ((0, 0), (0, 0), (0, 3 - p), (0, 3 - q), (0, 0)))
+            few, powers = powers, np.zeros((*powers.shape[:2], 4, 4, 4))
+            powers[:, :, : p + 1, : q + 1] = few
             p, q = 3, 3
         pool = np.concatenate([at_u, at_v, powers.ravel()])
         if not np.isfinite(pool).all():

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
-from assembly.geometry.meshing.trimmed_cells import BoundaryCells, TrimmedCells, parallelogram_cells
+from assembly.geometry.meshing.trimmed_cells import BoundaryCells, TrimmedCells, parallelogram_cells, tube_cells
 from assembly.geometry.recognition.elementary import elementary_form
 from assembly.geometry.recognition.forms import Cylinder, Extrusion, Plane
 from assembly.geometry.splines.surface import NurbsSurface
@@ -141,9 +141,9 @@ def _divided(at: Array, many: Indices) -> Array:
     return np.concatenate([*parts, at[-1:]])
 
 
-def _trimmed(face: Face, tolerance: float, angle: float) -> tuple[BoundaryCells, Rims]:
+def _trimmed(face: Face, form: int, tolerance: float, angle: float) -> tuple[BoundaryCells, Rims]:
     """Triangles of a face that has a boundary, whose chords are cut in two as long as curves may leave triangles."""
-    whole = parallelogram_cells(face)
+    whole = tube_cells(face, tolerance, angle) if form == RULED else parallelogram_cells(face)
     if whole is not None:
         return whole, straight_rims(whole)
     made = TrimmedCells(face, tolerance, angle)
@@ -171,7 +171,7 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
     surface = face.surface
     form, ruling, off = _sweep(surface)
     if face.boundary:
-        cells, rims = _trimmed(face, tolerance, angle)
+        cells, rims = _trimmed(face, form, tolerance, angle)
         uv = np.concatenate([cells.parameters, cells.parameters[:, 2:]], axis=1)
     else:
         uv = _grid(surface, tolerance)
