@@ -103,10 +103,11 @@ class Border:
         """Points (n, 2) in (u, v) of the true boundary at parameters of segments."""
         part = ((t - self.t[rows, 0]) / (self.t[rows, 1] - self.t[rows, 0]))[:, None]
         points: Array = (1.0 - part) * self.ends[rows, 0] + part * self.ends[rows, 1]
-        for k in np.unique(self.curve[rows]):
-            if k >= 0:
-                own = self.curve[rows] == k
-                points[own] = self.face.boundary[k].evaluate(t[own])
+        curves = self.curve[rows]
+        for k, curve in enumerate(self.face.boundary):
+            own = np.flatnonzero(curves == k)
+            if len(own):
+                points[own] = curve.evaluate(t[own])
         return points
 
     def split(self, rows: Indices, t: Array | None = None) -> Border:

@@ -24,6 +24,10 @@ Indices = NDArray[np.int64]
 Point = tuple[float, float]
 # A frame around all points, in parts of their extents: no given segment is on the hull, where rounding decides.
 _FRAME = 0.75
+# Twelve points around the unit square.
+_THIRDS = np.linspace(0.0, 1.0, 4)[:-1]
+_SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
+_RING = (_SQUARE[:, None] + _THIRDS[:, None] * (np.roll(_SQUARE, -1, axis=0) - _SQUARE)[:, None]).reshape(-1, 2)
 # Of every corner of a triangle the next one.
 _NEXT = [1, 2, 0]
 
@@ -161,11 +165,7 @@ def _framed(points: Array) -> Array:
     low, high = points.min(axis=0), points.max(axis=0)
     reach = _FRAME * max(float((high - low).max()), np.finfo(float).tiny)
     low, high = low - reach, high + reach
-    part = np.linspace(0.0, 1.0, 4)[:-1]
-    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
-    ways = np.roll(corners, -1, axis=0) - corners
-    ring = (corners[:, None] + part[:, None] * ways[:, None]).reshape(-1, 2)
-    return np.concatenate([points, low + ring * (high - low)])
+    return np.concatenate([points, low + _RING * (high - low)])
 
 
 def triangulated(points: Array, segments: Indices, soft: Sequence[int] = ()) -> Triangulation:
@@ -181,7 +181,8 @@ def triangulated(points: Array, segments: Indices, soft: Sequence[int] = ()) -> 
     n = len(every)
     keys = (triangles * n + triangles[:, _NEXT]).ravel()
     wanted = segments[:, 0] * n + segments[:, 1]
-    found = np.isin(wanted, keys)
+    ordered = np.sort(keys)
+    found = ordered[np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)] == wanted
     if found.all():
         return Triangulation(triangles, segments, np.arange(len(segments)), [])
     mesh = _Mesh(every, triangles, np.unique(segments[~found]))

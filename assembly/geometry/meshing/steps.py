@@ -65,7 +65,8 @@ def _parts(breaks: Array, closed: bool, low: float, high: float) -> Array:
     width = 1e-9 * (high - low)
     ends = np.concatenate([[low], breaks[(breaks > low + width) & (breaks < high - width)], [high]])
     parts = int(np.clip(3 * _MOST // (len(ends) - 1), _LEAST, _MOST))
-    return np.append(np.linspace(ends[:-1], ends[1:], parts, endpoint=False, axis=1).ravel(), high)
+    inner = ends[:-1, None] + np.arange(parts) * (np.diff(ends) / parts)[:, None]
+    return np.append(inner.ravel(), high)
 
 
 def _some(values: Array) -> Array:

@@ -141,20 +141,25 @@ def _divided(at: Array, many: Indices) -> Array:
     return np.concatenate([*parts, at[-1:]])
 
 
-def _trimmed(face: Face, form: int, tolerance: float, angle: float) -> tuple[BoundaryCells, Rims]:
-    """Triangles of a face that has a boundary, whose chords are cut in two as long as curves may leave triangles."""
+def _trimmed(
+    face: Face, form: int, tolerance: float, angle: float
+) -> tuple[BoundaryCells, Rims, NDArray[np.bool_] | None]:
+    """Triangles of a face that has a boundary, whose chords are cut in two as long as curves may leave triangles.
+
+    Those curves that may leave theirs in the end come last.
+    """
     whole = tube_cells(face, tolerance, angle) if form == RULED else parallelogram_cells(face)
     if whole is not None:
-        return whole, straight_rims(whole)
+        return whole, straight_rims(whole), None
     made = TrimmedCells(face, tolerance, angle)
     for _ in range(SPILLS):
         cells = made.made()
         rims = rims_of(face, cells)
         wrong = rims.spills(cells.parameters)
         if not wrong.any():
-            break
+            return cells, rims, None
         made.cut(np.unique(cells.segments[wrong]))
-    return cells, rims
+    return cells, rims, wrong
 
 
 def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
@@ -171,11 +176,11 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
     surface = face.surface
     form, ruling, off = _sweep(surface)
     if face.boundary:
-        cells, rims = _trimmed(face, form, tolerance, angle)
+        cells, rims, wrong = _trimmed(face, form, tolerance, angle)
         uv = np.concatenate([cells.parameters, cells.parameters[:, 2:]], axis=1)
     else:
         uv = _grid(surface, tolerance)
-        rims = no_rims(len(uv))
+        rims, wrong = no_rims(len(uv)), None
     reach = rims.sag.max(axis=1) + rims.beside
     low, high = uv.min(axis=1) - reach, uv.max(axis=1) + reach
     for d in range(2):
@@ -191,8 +196,7 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
         first, second = np.tile(speeds, (len(uv), 1)), np.zeros((len(uv), 3))
     far = float(np.abs(surface.control_points).max())
     pad = ROUNDING * far + off + (first * rims.beside).sum(axis=1)
-    wrong = rims.spills(uv[:, :3])
-    if wrong.any():
+    if wrong is not None:
         # What is cut off there is of other triangles: no farther from their borders than curves from chords.
         pad += (first[:, None] * rims.sag).sum(axis=2)[wrong].max()
     return CellTable(uv, second, first, rims, pad, form, ruling)

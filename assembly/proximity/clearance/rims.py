@@ -12,6 +12,7 @@ and so for the other side.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +51,7 @@ class Rims:
     hollow: Indices
     beside: Array
 
-    @property
+    @cached_property
     def sag(self) -> Array:
         """How far curves are from their chords in (u, v), at most (n, 3, 2)."""
         return np.asarray(0.125 * np.diff(self.t, axis=2) ** 2 * self.second)
@@ -59,7 +60,7 @@ class Rims:
         """Which curves (n, 3), but those that bend towards the material, may leave their triangles (n, 3, 2)."""
         if not self.second.any():
             return np.zeros(self.curve.shape, dtype=bool)
-        p, q, r = (np.roll(uv, -k, axis=1) for k in range(3))
+        p, q, r = uv, uv[:, [1, 2, 0]], uv[:, [2, 0, 1]]
         area = np.abs((q - p)[..., 0] * (r - p)[..., 1] - (q - p)[..., 1] * (r - p)[..., 0])
         sides = np.abs(np.stack([r - q, r - p]))[..., ::-1]
         asked = 4.0 * (sides * self.sag).sum(axis=-1).max(axis=0)
@@ -90,9 +91,13 @@ def rims_of(face: Face, cells: BoundaryCells) -> Rims:
     """The chords of a face's triangles."""
     number, border = cells.segments, cells.border
     found = no_rims(len(number))
-    for c in np.unique(border.curve[border.curve >= 0]):
-        curve = face.boundary[c]
-        row, k = np.nonzero((number >= 0) & (border.curve[np.maximum(number, 0)] == c))
+    rows, edges = np.nonzero(number >= 0)
+    curves = border.curve[number[rows, edges]]
+    for c, curve in enumerate(face.boundary):
+        own = curves == c
+        row, k = rows[own], edges[own]
+        if not len(row):
+            continue
         t = border.t[number[row, k]]
         found.curve[row, k], found.t[row, k] = c, t
         if curve.degree > 1:
