@@ -60,12 +60,7 @@ def elementary_form(surface: NurbsSurface, tolerance: float | None = None) -> Fo
         tolerance = positive("tolerance", tolerance)
     known = _known.setdefault(surface, {})
     if tolerance not in known:
-        exact = None
-        if tolerance is not None and tolerance >= _exactness(surface):
-            # What is round or flat exactly is the same to within more.
-            exact = elementary_form(surface)
-        is_found = isinstance(exact, Plane | Cylinder | Cone | Sphere | Torus)
-        known[tolerance] = exact if exact is not None and is_found else _recognized(surface, tolerance)
+        known[tolerance] = _recognized(surface, tolerance)
     return known[tolerance]
 
 

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.curves import Circle, curve_form
 from assembly.geometry.recognition.elementary import elementary_form
-from assembly.geometry.recognition.forms import Cylinder, Plane, Sphere, Torus
+from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere, Torus
 from assembly.geometry.splines import bezier
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["NEARLY", "Round", "round_holes", "round_of", "round_parts"]
+__all__ = ["Round", "nearly_elementary", "round_holes", "round_of", "round_parts"]
 
 Array = NDArray[np.float64]
 # A face that goes around less of a cylinder than about half is no round body.
@@ -142,9 +142,17 @@ def round_holes(face: Face) -> list[Round]:
     return found
 
 
+def nearly_elementary(surface: NurbsSurface) -> Form:
+    """What a surface is exactly if that is elementary, else what it is to within `NEARLY` of its size."""
+    exact = elementary_form(surface)
+    if isinstance(exact, Plane | Cylinder | Cone | Sphere | Torus):
+        return exact
+    return elementary_form(surface, NEARLY * surface.size)
+
+
 def round_of(face: Face) -> Round | None:
     """What a face lies on, or None where that is no cylinder, ball or torus, and the face no disc."""
-    form = elementary_form(face.surface, NEARLY * face.surface.size)
+    form = nearly_elementary(face.surface)
     if isinstance(form, Plane):
         return _disc(face)
     if not isinstance(form, (Cylinder, Sphere, Torus)):
