@@ -31,8 +31,6 @@ LARGEST_BALL = 0.7
 ROUNDED_UP = 1.0 + 1e-15
 # How far the corners of a flat face may be from a parallelogram, in parts of their largest coordinate.
 FLAT = 1e-12
-# Samples of a boundary curve that tell how often it goes around a point.
-SAMPLES = 33
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,15 +87,6 @@ class _FlatMap:
         circle = curve_form(parts, tolerance)
         return circle if isinstance(circle, Circle) else None
 
-    def turns_around(self, point: Array, curves: Sequence[NurbsCurve]) -> int:
-        """How often closed curves go around a point, counterclockwise in (u, v)."""
-        uv = np.concatenate([curve.evaluate(np.linspace(*curve.domain, SAMPLES)) for curve in curves])
-        x = self.along / np.linalg.norm(self.along)
-        y = self.across - (self.across @ x) * x
-        off = self.origin - point + uv[:, :1] * self.along + uv[:, 1:] * self.across
-        z = off @ x + 1.0j * (off @ y) / np.linalg.norm(y)
-        return round(float(np.angle(np.roll(z, -1) * z.conj()).sum()) / (2.0 * pi))
-
 
 def _flat_map(surface: NurbsSurface) -> _FlatMap | None:
     """The map of a flat surface whose parameters are lengths along two directions."""
@@ -130,11 +119,10 @@ def round_holes(face: Face) -> list[Round]:
     if flat is None:
         return []
     found = []
-    for chain in face.chains:
-        curves = [face.boundary[k] for k in chain]
-        circle = flat.circle(curves, HOLE * face.surface.size)
-        # Clockwise around its center: material is outside.
-        if circle is None or flat.turns_around(circle.center, curves) != -1:
+    # The first chain goes around the face; others are clockwise, with material outside.
+    for chain in face.chains[1:]:
+        circle = flat.circle([face.boundary[k] for k in chain], HOLE * face.surface.size)
+        if circle is None:
             continue
         off = circle.deviation + flat.off
         if off < circle.radius:
