@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
-from assembly.geometry.splines.curve import COINCIDENT, NurbsCurve
+from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 
 __all__ = ["Border", "border", "cross", "on_surface", "pole_sides"]
@@ -60,21 +60,7 @@ def cross(a: Array, b: Array) -> Array:
 
 def pole_sides(surface: NurbsSurface) -> list[int]:
     """Sides of the domain that are one point in space: 0 and 1 for the low and high end of u, 2 and 3 for v."""
-    found = []
-    (u0, u1), (v0, v1) = surface.domain
-    corners = surface.evaluate(np.array([u0, u0, u1, u1]), np.array([v0, v1, v0, v1])).reshape(2, 2, 3)
-    reach = COINCIDENT * surface.size
-    for side in range(4):
-        d, end = divmod(side, 2)
-        first, last = corners[end] if d == 0 else corners[:, end]
-        if np.abs(first - last).max() > reach:
-            continue
-        along = np.linspace(*surface.domain[1 - d], 2 * len(surface.breaks()[1 - d]) + 1)
-        grid = np.column_stack([np.full_like(along, surface.domain[d][end]), along])
-        points = on_surface(surface, grid if d == 0 else grid[:, ::-1])[0]
-        if np.ptp(points, axis=0).max() <= reach:
-            found.append(side)
-    return found
+    return [side for side in range(4) if surface._pole_bits >> side & 1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +103,11 @@ class Border:
         """Points (n, 2) in (u, v) of the true boundary at parameters of segments."""
         part = ((t - self.t[rows, 0]) / (self.t[rows, 1] - self.t[rows, 0]))[:, None]
         points: Array = (1.0 - part) * self.ends[rows, 0] + part * self.ends[rows, 1]
-        for k in np.unique(self.curve[rows]):
-            if k >= 0:
-                own = self.curve[rows] == k
-                points[own] = self.face.boundary[k].evaluate(t[own])
+        curves = self.curve[rows]
+        for k, curve in enumerate(self.face.boundary):
+            own = np.flatnonzero(curves == k)
+            if len(own):
+                points[own] = curve.evaluate(t[own])
         return points
 
     def split(self, rows: Indices, t: Array | None = None) -> Border:
@@ -156,23 +143,25 @@ def _parts(curve: NurbsCurve) -> tuple[Array, list[int]]:
     """Ends of short parts of a curve, and which of them begin a smooth stretch, or end the last."""
     breaks = curve.breaks()
     parts = max(_PARTS // (len(breaks) - 1), _LEAST)
-    t = np.linspace(breaks[:-1], breaks[1:], parts, endpoint=False, axis=1)
-    corners = []
-    for k in range(1, len(breaks) - 1):
-        if np.count_nonzero(curve.knots == breaks[k]) >= curve.degree:
-            before = breaks[k] - 1e-9 * (breaks[k] - breaks[k - 1])
-            way = curve.evaluate(np.array([before, breaks[k]]), 1)[1]
-            cross, dot = way[0, 0] * way[1, 1] - way[0, 1] * way[1, 0], way[0] @ way[1]
-            if abs(np.arctan2(cross, dot)) > _KINK:
-                corners.append(k * parts)
+    t = breaks[:-1, None] + np.arange(parts) * ((breaks[1:] - breaks[:-1]) / parts)[:, None]
+    inner = breaks[1:-1]
+    times = np.searchsorted(curve.knots, inner, "right") - np.searchsorted(curve.knots, inner, "left")
+    full = np.flatnonzero(times >= curve.degree) + 1
+    corners: list[int] = []
+    if len(full):
+        before = breaks[full] - 1e-9 * (breaks[full] - breaks[full - 1])
+        way = curve.evaluate(np.stack([before, breaks[full]]), 1)[1]
+        cross = way[0, :, 0] * way[1, :, 1] - way[0, :, 1] * way[1, :, 0]
+        turned = np.abs(np.arctan2(cross, (way[0] * way[1]).sum(axis=1))) > _KINK
+        corners = (parts * full[turned]).tolist()
     return np.append(t.ravel(), curve.domain[1]), [0, *corners, parts * (len(breaks) - 1)]
 
 
-def _curvature(face: Face, places: list[Array]) -> tuple[Array, Array]:
+def _curvature(surface: NurbsSurface, curves: list[NurbsCurve], places: list[Array]) -> tuple[Array, Array]:
     """Speed and curvature in space of boundary curves, each at its parameters."""
-    rows = [curve.evaluate(t, 2) for curve, t in zip(face.boundary, places, strict=True)]
+    rows = [curve.evaluate(t, 2) for curve, t in zip(curves, places, strict=True)]
     at, first, second = (np.concatenate(parts) for parts in zip(*rows, strict=True))
-    _, su, sv, suu, suv, svv = on_surface(face.surface, at, 2)
+    _, su, sv, suu, suv, svv = on_surface(surface, at, 2)
     (a, b), (c, d) = first.T[..., None], second.T[..., None]
     velocity = su * a + sv * b
     change = suu * a * a + 2.0 * suv * a * b + svv * b * b + su * c + sv * d
@@ -183,23 +172,33 @@ def _curvature(face: Face, places: list[Array]) -> tuple[Array, Array]:
 
 def _steps(face: Face, tolerance: float, angle: float) -> list[Array]:
     """Parameters of the corners on each boundary curve."""
-    parts = [_parts(curve) for curve in face.boundary]
-    speed, curvature = _curvature(face, [0.5 * (t[:-1] + t[1:]) for t, _ in parts])
+    is_flat = face.surface.is_parallelogram
+    # A line of a parallelogram is one step, which nothing need be measured of.
+    bent = [curve for curve in face.boundary if not (is_flat and _is_segment(curve))]
+    if not bent:
+        return [np.array(curve.domain) for curve in face.boundary]
+    parts = [_parts(curve) for curve in bent]
+    speed, curvature = _curvature(face.surface, bent, [0.5 * (t[:-1] + t[1:]) for t, _ in parts])
     density = speed * np.maximum(np.sqrt(curvature / (8.0 * _AIM * tolerance)), curvature / angle)
-    steps, begin = [], 0
+    found, begin = [], 0
     for t, stretches in parts:
         width = np.diff(t)
         own = density[begin : begin + len(width)] * width
         begin += len(width)
-        found = [t[:1]]
+        at = [t[:1]]
         for low, high in pairwise(stretches):
             # The last term makes it increase where the boundary is straight.
             grown = np.concatenate([[0.0], np.cumsum(own[low:high])]) + 1e-9 * np.arange(high - low + 1)
             count = max(int(np.ceil(grown[-1] - SPARE)), 1)
-            at = np.interp(np.linspace(0.0, grown[-1], count + 1), grown, t[low : high + 1])
-            found.append(np.append(at[1:-1], t[high]))
-        steps.append(np.concatenate(found))
-    return steps
+            reached = np.interp(np.linspace(0.0, grown[-1], count + 1), grown, t[low : high + 1])
+            at.append(np.append(reached[1:-1], t[high]))
+        found.append(np.concatenate(at))
+    steps = iter(found)
+    return [np.array(curve.domain) if is_flat and _is_segment(curve) else next(steps) for curve in face.boundary]
+
+
+def _is_segment(curve: NurbsCurve) -> bool:
+    return len(curve.control_points) == 2
 
 
 def border(face: Face, tolerance: float, angle: float) -> Border:
@@ -238,6 +237,8 @@ def border(face: Face, tolerance: float, angle: float) -> Border:
             spans.append(span)
             ends.append(segments)
     found = Border(face, np.concatenate(curves), np.concatenate(chains), np.concatenate(spans), np.concatenate(ends))
+    if all(face.surface.is_parallelogram and _is_segment(curve) for curve in face.boundary):
+        return found
     for _ in range(_HALVINGS):
         rows = found.sagging(tolerance)
         if not len(rows):

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay
+
+from assembly.geometry.meshing.connected import mark_inside
 
 __all__ = ["Triangulation", "inside", "triangulated"]
 
@@ -24,6 +24,12 @@ Indices = NDArray[np.int64]
 Point = tuple[float, float]
 # A frame around all points, in parts of their extents: no given segment is on the hull, where rounding decides.
 _FRAME = 0.75
+# Twelve points around the unit square.
+_THIRDS = np.linspace(0.0, 1.0, 4)[:-1]
+_SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
+_RING = (_SQUARE[:, None] + _THIRDS[:, None] * (np.roll(_SQUARE, -1, axis=0) - _SQUARE)[:, None]).reshape(-1, 2)
+# Of every corner of a triangle the next one.
+_NEXT = [1, 2, 0]
 
 
 class Triangulation(NamedTuple):
@@ -159,11 +165,7 @@ def _framed(points: Array) -> Array:
     low, high = points.min(axis=0), points.max(axis=0)
     reach = _FRAME * max(float((high - low).max()), np.finfo(float).tiny)
     low, high = low - reach, high + reach
-    part = np.linspace(0.0, 1.0, 4)[:-1]
-    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
-    ways = np.roll(corners, -1, axis=0) - corners
-    ring = (corners[:, None] + part[:, None] * ways[:, None]).reshape(-1, 2)
-    return np.concatenate([points, low + ring * (high - low)])
+    return np.concatenate([points, low + _RING * (high - low)])
 
 
 def triangulated(points: Array, segments: Indices, soft: Sequence[int] = ()) -> Triangulation:
@@ -177,9 +179,10 @@ def triangulated(points: Array, segments: Indices, soft: Sequence[int] = ()) -> 
     every = _framed(points)
     triangles = Delaunay(every).simplices.astype(np.int64)
     n = len(every)
-    keys = (triangles * n + np.roll(triangles, -1, axis=1)).ravel()
+    keys = (triangles * n + triangles[:, _NEXT]).ravel()
     wanted = segments[:, 0] * n + segments[:, 1]
-    found = np.isin(wanted, keys)
+    ordered = np.sort(keys)
+    found = ordered[np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)] == wanted
     if found.all():
         return Triangulation(triangles, segments, np.arange(len(segments)), [])
     mesh = _Mesh(every, triangles, np.unique(segments[~found]))
@@ -219,28 +222,10 @@ def inside(triangles: Indices, count: int, border: Indices, hull: Indices) -> ND
     hull : (h, 2)
         Directed edges with nothing inside on their right; on the left, the border decides.
     """
-    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
-    keys = edges @ [count, 1]
+    triangles = np.ascontiguousarray(triangles)
+    keys = (triangles * count + triangles[:, _NEXT]).ravel()
     order = np.argsort(keys)
-    ordered = keys[order]
-
-    def found(rows: Indices) -> tuple[Indices, NDArray[np.bool_]]:
-        """Where directed edges are, if they are."""
-        wanted = rows @ [count, 1]
-        place = np.minimum(np.searchsorted(ordered, wanted), len(keys) - 1)
-        return order[place], ordered[place] == wanted
-
-    other, joined = found(edges[:, ::-1])
-    left, right, beyond = (rows[known] for rows, known in map(found, (border, border[:, ::-1], hull[:, ::-1])))
-    for fence in (left, right, beyond):
-        joined[fence] = False
-    # An edge of the hull is passed from neither side.
-    joined[other[beyond]] = False
-    links = coo_matrix((joined[joined], (np.flatnonzero(joined) // 3, other[joined] // 3)), shape=(len(triangles),) * 2)
-    parts, part = connected_components(links, directed=False)
-    votes = np.zeros(parts)
-    # Right of the hull nothing is inside, whatever a border that runs along it says.
-    for fence, weight in ((left, 1.0), (right, -1.0), (beyond, -float(len(keys)))):
-        np.add.at(votes, part[fence // 3], weight)
-    result: NDArray[np.bool_] = votes[part] > 0.0
+    result = np.empty(len(triangles), dtype=bool)
+    sides = np.ascontiguousarray(border), np.ascontiguousarray(hull)
+    mark_inside(triangles, count, *sides, keys[order], order, result)
     return result

@@ -9,7 +9,6 @@ against the facet, along the surface's normal. Points go where it is too far, un
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi
 from typing import NamedTuple
@@ -26,14 +25,12 @@ from assembly.geometry.meshing.facet_gaps import Apart, measured
 from assembly.geometry.meshing.steps import Axis, axes
 from assembly.geometry.meshing.unroll import Sheet, crossed, unrolled
 
-__all__ = ["BoundaryCells", "Facets", "facets", "trimmed_cells"]
+__all__ = ["Facets", "TrimmedMesh", "facets"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 # Rounds of measuring, and of parting chords that cross each other.
 _ROUNDS, _PARTINGS = 30, 12
-# Rounds of cutting segments in two whose curves leave their triangles.
-_SPILLS = 12
 _MOST_POINTS = 4_000_000
 # Points of the grid nearer to the boundary than this part of a step are left out.
 _NEAR = 0.4
@@ -69,75 +66,6 @@ class Facets:
         return float(0.5 * np.linalg.norm(cross(b - a, c - a), axis=1).sum())
 
 
-@dataclass(frozen=True, eq=False)
-class BoundaryCells:
-    """Triangles of a trimmed face in (u, v), and which of their edges are chords of its boundary.
-
-    Attributes
-    ----------
-    parameters : (m, 3, 2)
-        Of the corners; beyond the domain of a closed direction where the face goes over a seam.
-    segments : (m, 3)
-        The segment of the border that an edge (corner k to k + 1) is, or -1.
-    border : Border
-    """
-
-    parameters: Array
-    segments: Indices
-    border: Border
-
-
-def trimmed_cells(
-    face: Face, tolerance: float, angle: float, spilling: Callable[[BoundaryCells], Indices]
-) -> BoundaryCells:
-    """Triangles of a face that has a boundary, and their chords of it; see `facets`.
-
-    Parameters
-    ----------
-    face : Face
-    tolerance, angle : float
-    spilling : callable
-        Of triangles the segments that are still to be cut in two. There may be some in the end.
-
-    Raises
-    ------
-    InputError
-        Chords of the boundary that are edges of no triangle: loops that cross or touch each other.
-    """
-    made = _Trimmed(face, positive("tolerance", tolerance), min(positive("angle", angle), 0.25 * pi))
-    for _ in range(_SPILLS):
-        cells = _cells_of(made)
-        wrong = spilling(cells)
-        if not len(wrong):
-            break
-        made.rim = made.rim.split(wrong)
-    return cells
-
-
-def _cells_of(made: _Trimmed) -> BoundaryCells:
-    """The triangles and their chords."""
-    face = made.face
-    found = made.facets()
-    border = made.rim
-    corners = found.triangles[:, :: face.sign]
-    place = {tuple(p): k for k, p in enumerate(found.parameters.tolist())}
-    # Corners at one place of (u, v) may be several: of each the first stands for all.
-    same = np.array([place[tuple(p)] for p in found.parameters.tolist()])
-    edges = {}
-    for k, (start, end) in enumerate(border.ends.tolist()):
-        a, b = place.get(tuple(start)), place.get(tuple(end))
-        if a is not None and b is not None and a != b and border.curve[k] >= 0:
-            edges[same[a], same[b]] = k
-    segments = np.full((len(corners), 3), -1)
-    for row, triangle in enumerate(same[corners].tolist()):
-        for k in range(3):
-            segments[row, k] = edges.get((triangle[k], triangle[(k + 1) % 3]), -1)
-    missing = len(set(edges.values()) - set(segments.ravel().tolist()))
-    if missing:
-        raise InputError(f"{missing} chords of the boundary of {face!r} are edges of no facet; expected loops apart")
-    return BoundaryCells(found.parameters[corners], segments, border)
-
-
 def facets(face: Face, tolerance: float, *, angle: float = 0.25 * pi) -> Facets:
     """Triangles within the trim of a face.
 
@@ -162,7 +90,7 @@ def facets(face: Face, tolerance: float, *, angle: float = 0.25 * pi) -> Facets:
     # A closed surface within a loop along its seam is whole, too.
     if (face.outer is None and not face.holes) or not face.boundary:
         return _untrimmed(face, reach, turn)
-    return _Trimmed(face, reach, turn).facets()
+    return TrimmedMesh(face, reach, turn).facets()
 
 
 def _too_many(tolerance: float) -> InputError:
@@ -238,7 +166,7 @@ def _clear(points: Array, segments: Array) -> NDArray[np.bool_]:
     return clear
 
 
-class _Vertices(NamedTuple):
+class Vertices(NamedTuple):
     """Corners of all kinds, and the segments that are to be edges: of the border first, then of lines."""
 
     parameters: Array
@@ -246,7 +174,7 @@ class _Vertices(NamedTuple):
     line: Indices  # of each segment after the border's, the number of its line
 
 
-class _Trimmed:
+class TrimmedMesh:
     """A triangulation of a trimmed face that becomes finer."""
 
     def __init__(self, face: Face, tolerance: float, angle: float) -> None:
@@ -267,13 +195,18 @@ class _Trimmed:
         return np.stack([self.grid[d].steps(parameters[..., d]) for d in (0, 1)], axis=-1)
 
     def _grid_points(self) -> Array:
-        u, v = (axis.lines[1:-1][~np.isin(axis.lines[1:-1], axis.creases)] for axis in self.grid)
+        u, v = (
+            lines[~np.isin(lines, creases)] if len(lines) and len(creases) else lines
+            for lines, creases in ((axis.lines[1:-1], axis.creases) for axis in self.grid)
+        )
         if u.size * v.size > _MOST_POINTS:
             raise _too_many(self.tolerance)
+        if not u.size * v.size:
+            return np.empty((0, 2))
         points = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
         return points[_clear(self._steps(points), self._steps(self.rim.ends))]
 
-    def _vertices(self) -> _Vertices:
+    def _vertices(self) -> Vertices:
         ends = self.rim.ends
         on_lines = []
         for line in self.lines:
@@ -299,9 +232,9 @@ class _Trimmed:
         parts.append(self.inner)
         points, place = np.unique(np.concatenate(parts), axis=0, return_inverse=True)
         joined = place.reshape(-1)[np.concatenate(segments)]
-        return _Vertices(points, joined, np.concatenate([np.empty(0, dtype=np.int64), *owners]))
+        return Vertices(points, joined, np.concatenate([np.empty(0, dtype=np.int64), *owners]))
 
-    def _triangles(self) -> tuple[_Vertices, Indices, Indices, Indices]:
+    def _triangles(self) -> tuple[Vertices, Indices, Indices, Indices]:
         """Corners, triangles inside, and edges of the border and of lines with their owners."""
         for parting in range(_PARTINGS + 1):
             found = self._vertices()
@@ -340,7 +273,7 @@ class _Trimmed:
                 points[on] = points[np.argmax(on)]
         return points
 
-    def _divide(self, found: _Vertices, apart: Indices, edges: Indices, owner: Indices) -> None:
+    def _divide(self, found: Vertices, apart: Indices, edges: Indices, owner: Indices) -> None:
         """Put a corner on each of some edges."""
         n = len(found.parameters)
         keys = np.sort(edges, axis=1) @ np.array([n + 12, 1])
@@ -357,21 +290,37 @@ class _Trimmed:
             line.corners = np.union1d(line.corners, at[1 - line.direction])
         self.rim = self.rim.split(np.unique(segment[known & (segment < k)]))
 
-    def facets(self) -> Facets:
+    def mesh(self) -> tuple[Vertices, Array, Indices]:
+        """Corners, where they are in space, and triangles, of which those at poles may have sides of no length."""
         for _ in range(_ROUNDS):
             found, triangles, edges, owner = self._triangles()
             if len(found.parameters) > _MOST_POINTS:
                 raise _too_many(self.tolerance)
             points = self._points(found.parameters)
-            corners = points[triangles]
-            sides = np.abs(corners - np.roll(corners, 1, axis=1)).max(axis=2)
-            triangles = triangles[(sides > 0.0).all(axis=1)]
-            apart = measured(self.face, found.parameters, points, triangles, self.tolerance, self.angle)
+            if self.face.surface.is_parallelogram:
+                # Facets are in it.
+                break
+            solid = _solid(points, triangles)
+            apart = measured(self.face, found.parameters, points, solid, self.tolerance, self.angle)
             if not len(apart.edges) and not len(apart.triangles):
                 break
             self._divide(found, apart.edges, edges, owner)
-            self.inner = np.concatenate([self.inner, found.parameters[triangles[apart.triangles]].mean(axis=1)])
+            self.inner = np.concatenate([self.inner, found.parameters[solid[apart.triangles]].mean(axis=1)])
+        return found, points, triangles
+
+    def facets(self) -> Facets:
+        """The facets with normals."""
+        found, points, triangles = self.mesh()
+        triangles = _solid(points, triangles)
         return _finished(self.face, found.parameters, points, triangles, any(len(a.creases) for a in self.grid))
+
+
+def _solid(points: Array, triangles: Indices) -> Indices:
+    """Those triangles whose corners are three points."""
+    corners = points[triangles]
+    sides = np.abs(corners - np.roll(corners, 1, axis=1)).max(axis=2)
+    solid: Indices = triangles[(sides > 0.0).all(axis=1)]
+    return solid
 
 
 def _finished(face: Face, parameters: Array, points: Array, triangles: Indices, creased: bool) -> Facets:

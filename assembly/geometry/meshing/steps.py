@@ -65,7 +65,8 @@ def _parts(breaks: Array, closed: bool, low: float, high: float) -> Array:
     width = 1e-9 * (high - low)
     ends = np.concatenate([[low], breaks[(breaks > low + width) & (breaks < high - width)], [high]])
     parts = int(np.clip(3 * _MOST // (len(ends) - 1), _LEAST, _MOST))
-    return np.append(np.linspace(ends[:-1], ends[1:], parts, endpoint=False, axis=1).ravel(), high)
+    inner = ends[:-1, None] + np.arange(parts) * (np.diff(ends) / parts)[:, None]
+    return np.append(inner.ravel(), high)
 
 
 def _some(values: Array) -> Array:
@@ -101,6 +102,18 @@ def _creases(surface: NurbsSurface, direction: int, low: float, high: float, acr
     return result
 
 
+def _even_axes(surface: NurbsSurface, ends: list[Array]) -> tuple[Axis, Axis]:
+    """Those of a parallelogram, which has no lines but its sides."""
+    first = on_surface(surface, np.array([[0.5 * (t[0] + t[1]) for t in ends]]), 1)[1:]
+    speeds = [float(np.linalg.norm(way)) for way in first]
+    extent = max(float((speed * np.diff(t)).sum()) for speed, t in zip(speeds, ends, strict=True))
+    u, v = (
+        Axis(t, np.concatenate([[0.0], np.cumsum(speed / extent * np.diff(t))]), t[[0, -1]], np.empty(0))
+        for speed, t in zip(speeds, ends, strict=True)
+    )
+    return u, v
+
+
 def axes(surface: NurbsSurface, box: Array, tolerance: float, angle: float) -> tuple[Axis, Axis]:
     """Both directions of a rectangle.
 
@@ -116,6 +129,8 @@ def axes(surface: NurbsSurface, box: Array, tolerance: float, angle: float) -> t
     """
     breaks = surface.breaks()
     ends = [_parts(breaks[d], surface.closed[d], box[0, d], box[1, d]) for d in (0, 1)]
+    if surface.is_parallelogram:
+        return _even_axes(surface, ends)
     middles = [0.5 * (t[:-1] + t[1:]) for t in ends]
     bends, speeds = [], []
     for d in (0, 1):

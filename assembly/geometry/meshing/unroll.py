@@ -114,6 +114,8 @@ def _outer(border: Border) -> int:
 
 def _beside(border: Border, outer: int, periods: Array) -> Border:
     """Holes moved by whole periods to where they are holes of the outer chain."""
+    if not periods.any():
+        return border
     ends = border.ends.copy()
     polygon = ends[border.chain == outer]
     ways_in_turns = sorted(product(range(-3, 4), repeat=2), key=lambda way: abs(way[0]) + abs(way[1]))

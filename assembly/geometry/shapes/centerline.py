@@ -88,7 +88,7 @@ class Spine:
 @lru_cache(maxsize=256)
 def spine_of(face: Face) -> Spine | None:
     """The spine of a face that is a whole round wire of lines and arcs, or None."""
-    if face.outer is not None or face.holes:
+    if not any(face.surface.closed) or face.outer is not None or face.holes:
         return None
     for along, surface in enumerate((face.surface, face.surface.transposed())):
         spine = _Candidate(surface, along).spine()

@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import rows_of
+from assembly.geometry.splines.cell_splitting import BOUNDS, BOUNDS_SIZE, put_neighbors_together, split_cells
+
 if TYPE_CHECKING:
     from assembly.geometry.splines.surface import NurbsSurface
 
@@ -24,51 +27,6 @@ GROUP = 8
 # A round halves every cell whose sphere is larger than this part of the largest: halves are seldom larger,
 # so that rounds of many cells give what halving one at a time gives.
 _ROUND = 0.7
-
-
-def _halves(points: Array, axis: int) -> tuple[Array, Array]:
-    """De Casteljau's algorithm at the middle, along axis 1 or 2 of (cells, p + 1, q + 1, 4)."""
-    row = np.moveaxis(points, axis, 1)
-    left, right = np.empty_like(row), np.empty_like(row)
-    last = row.shape[1] - 1
-    for k in range(last + 1):
-        left[:, k] = row[:, 0]
-        right[:, last - k] = row[:, -1]
-        row = 0.5 * (row[:, :-1] + row[:, 1:])
-    return np.moveaxis(left, 1, axis), np.moveaxis(right, 1, axis)
-
-
-def _measures(points: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Sphere centers (cells, 3), radii (cells,) and whether u is the longer direction."""
-    xyz = points[..., :3] / points[..., 3:]
-    center = 0.5 * (xyz.min(axis=(1, 2)) + xyz.max(axis=(1, 2)))
-    radius = np.sqrt(((xyz - center[:, None, None]) ** 2).sum(axis=3).max(axis=(1, 2)))
-    # Rounding of the coordinates and of the halving: the sphere must contain, not nearly contain.
-    radius += 1e-14 * (radius + np.abs(center).max(axis=1))
-    long_u = np.sqrt((np.diff(xyz, axis=1) ** 2).sum(axis=3)).sum(axis=1).mean(axis=1)
-    long_v = np.sqrt((np.diff(xyz, axis=2) ** 2).sum(axis=3)).sum(axis=2).mean(axis=1)
-    return center, radius, long_u >= long_v
-
-
-def _neighborly(center: Array) -> NDArray[np.int64]:
-    """An order in which cells that follow one another lie close together.
-
-    Ranges are halved at the median along the direction in which their centers spread most, a level at a time, down to
-    `GROUP` of them.
-    """
-    count = len(center)
-    levels = max(0, int(np.ceil(np.log2(count / GROUP))))
-    # Padded to equal ranges by copies of the last cell, which are dropped in the end.
-    order = np.minimum(np.arange(GROUP << levels), count - 1)
-    for level in range(levels):
-        order = order.reshape(1 << level, -1)
-        points = center[order]
-        axis = np.ptp(points, axis=1).argmax(axis=1)
-        along = np.take_along_axis(points, axis[:, None, None], axis=2)[:, :, 0]
-        order = np.take_along_axis(order, np.argsort(along, axis=1, kind="stable"), axis=1)
-    order = order.ravel()
-    first = np.unique(order, return_index=True)[1]
-    return order[np.sort(first)]
 
 
 def split(surface: NurbsSurface, count: int = COUNT) -> tuple[Array, Array, Array]:
@@ -89,36 +47,22 @@ def split(surface: NurbsSurface, count: int = COUNT) -> tuple[Array, Array, Arra
     radii : (cells,)
     """
     pieces = surface.bezier_pieces()
-    points = pieces.reshape((-1,) + pieces.shape[2:])
+    spans = pieces.shape[0] * pieces.shape[1]
+    count = max(count, spans)
+    nets = np.empty((2, count, *pieces.shape[2:]))
+    boxes, measured = np.empty((2, count, 4)), np.empty((2, count, BOUNDS_SIZE))
+    nets[0, :spans] = pieces.reshape(-1, *pieces.shape[2:])
     at_u, at_v = surface.breaks()
-    low = np.meshgrid(at_u[:-1], at_v[:-1], indexing="ij")
-    high = np.meshgrid(at_u[1:], at_v[1:], indexing="ij")
-    box = np.stack([low[0].ravel(), high[0].ravel(), low[1].ravel(), high[1].ravel()], axis=1)
-    center, radius, along_u = _measures(points)
-    while len(points) < count:
-        order = np.argsort(-radius, kind="stable")
-        large = order[radius[order] >= _ROUND * radius[order[0]]][: count - len(points)]
-        kept = np.ones(len(points), dtype=bool)
-        kept[large] = False
-        new_points: list[Array] = []
-        new_box: list[Array] = []
-        for axis, chosen in ((1, large[along_u[large]]), (2, large[~along_u[large]])):
-            new_points += _halves(points[chosen], axis)
-            lower, upper = box[chosen].copy(), box[chosen].copy()
-            first = 2 * (axis - 1)
-            middle = 0.5 * (box[chosen, first] + box[chosen, first + 1])
-            lower[:, first + 1] = middle
-            upper[:, first] = middle
-            new_box += [lower, upper]
-        fresh = np.concatenate(new_points)
-        measured = _measures(fresh)
-        points = np.concatenate([points[kept], fresh])
-        box = np.concatenate([box[kept], *new_box])
-        center = np.concatenate([center[kept], measured[0]])
-        radius = np.concatenate([radius[kept], measured[1]])
-        along_u = np.concatenate([along_u[kept], measured[2]])
-    order = _neighborly(center)
-    return box[order], center[order], radius[order]
+    many_u, many_v = at_u.size - 1, at_v.size - 1
+    boxes[0, :spans, :2] = np.repeat(np.column_stack([at_u[:-1], at_u[1:]]), many_v, axis=0)
+    boxes[0, :spans, 2:] = np.tile(np.column_stack([at_v[:-1], at_v[1:]]), (many_u, 1))
+    last = split_cells(nets, boxes, measured, spans, _ROUND, np.empty(count, dtype=np.int64))
+    levels = max(0, int(np.ceil(np.log2(count / GROUP))))
+    order, along = np.empty(GROUP << levels, dtype=np.int64), np.empty(GROUP << levels)
+    put_neighbors_together(measured[last], GROUP, order, along)
+    order = order[:count]
+    found = rows_of(BOUNDS, measured[last][order])
+    return boxes[last][order], np.asarray(found.center), np.asarray(found.radius)
 
 
 def surface_cells(surface: NurbsSurface) -> Array:

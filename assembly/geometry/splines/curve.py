@@ -188,10 +188,18 @@ class NurbsCurve(ReadOnlyArrays):
 
     def breaks(self) -> Array:
         """The distinct knots of the domain."""
+        return self._breaks.copy()
+
+    @cached_property
+    def _breaks(self) -> Array:
         return bezier.breaks(self.knots, self.degree)
 
     def bezier_pieces(self) -> Array:
         """Homogeneous Bezier points (w x, w y[, w z], w) of every span: (spans, degree + 1, d + 1)."""
+        return self._pieces.copy()
+
+    @cached_property
+    def _pieces(self) -> Array:
         return bezier.pieces(self._homogeneous, self.knots, self.degree)
 
     def insert_knot(self, value: float, times: int = 1) -> NurbsCurve:

@@ -31,6 +31,8 @@ Domain = tuple[float, float]
 _QUANTITIES = (1, 3, 6)
 # Below this part of the domain from a pole, the limit of the normal is nearer than the quotient.
 _POLE = 1e-8
+# How far a net of two by two points may be from a parallelogram, in parts of its largest coordinate.
+_LINEAR = 1e-13
 
 
 def _pair(name: str, value: Any) -> tuple[Any, Any]:
@@ -128,12 +130,15 @@ class NurbsSurface(ReadOnlyArrays):
 
     def _same_edge(self, first: Array, last: Array) -> bool:
         """Whether two edges (spans, degree + 1, 4), homogeneous, are one curve and not one point."""
+        tolerance = COINCIDENT * self.size
+        start, other = first[0, 0, :3] / first[0, 0, 3], last[0, 0, :3] / last[0, 0, 3]
+        if float(np.linalg.norm(start - other)) > 2.0 * tolerance:
+            return False
         # Two rational pieces of degree q that agree at 2 q + 1 points are equal.
         degree = first.shape[1] - 1
         basis = bezier.bernstein(degree, np.linspace(0.0, 1.0, 2 * degree + 1))
         a, b = basis @ first, basis @ last
         a, b = a[..., :3] / a[..., 3:], b[..., :3] / b[..., 3:]
-        tolerance = COINCIDENT * self.size
         is_point = float(np.ptp(a, axis=(0, 1)).max()) <= tolerance
         return not is_point and float(np.linalg.norm(a - b, axis=-1).max()) <= tolerance
 
@@ -148,6 +153,15 @@ class NurbsSurface(ReadOnlyArrays):
             for bit, edge in zip((1, 2, 4, 8), points, strict=True)
             if float(np.ptp(edge, axis=(0, 1)).max()) <= COINCIDENT * self.size
         )
+
+    @cached_property
+    def is_parallelogram(self) -> bool:
+        """Whether (u, v) -> S is linear but for rounding: then lengths in (u, v) are those in space, scaled."""
+        net = self.control_points
+        if net.shape[:2] != (2, 2) or np.ptp(self.weights) != 0.0:
+            return False
+        twist = float(np.abs(net[0, 0] - net[1, 0] - net[0, 1] + net[1, 1]).max())
+        return twist <= _LINEAR * float(np.abs(net).max())
 
     @cached_property
     def _creases(self) -> tuple[Array, Array]:
@@ -271,7 +285,8 @@ class NurbsSurface(ReadOnlyArrays):
         p, q = self.degree
         if p <= 3 and q <= 3:
             # Small degrees share the unrolled bicubic path of the evaluator.
-            powers = np.pad(powers, ((0, 0), (0, 0), (0, 3 - p), (0, 3 - q), (0, 0)))
+            few, powers = powers, np.zeros((*powers.shape[:2], 4, 4, 4))
+            powers[:, :, : p + 1, : q + 1] = few
             p, q = 3, 3
         pool = np.concatenate([at_u, at_v, powers.ravel()])
         if not np.isfinite(pool).all():

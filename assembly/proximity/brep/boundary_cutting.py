@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from assembly.proximity.brep.boundary_curves import Batch, Rim, Survey
 
-__all__ = ["all_live", "cut_at_vertices", "live_boundaries", "merged"]
+__all__ = ["Ends", "all_live", "cut_at_vertices", "live_boundaries"]
 
 Array = NDArray[np.float64]
+Ends = dict[Rim, tuple[int, int]]
 
 
 def live_boundaries(boundaries: Iterable[Rim]) -> list[Rim]:
@@ -32,8 +33,11 @@ def _replaced(loops: list[list[Rim]], cuts: dict[Rim, Array], survey: Survey) ->
         loops[k] = [part for boundary in loop for part in parts.get(boundary, [boundary])]
 
 
-def cut_at_vertices(chains: list[list[list[Rim]]], survey: Survey) -> set[int]:
-    """Cut rims at corners and where other rims end, in place; the numbers of the faces that changed."""
+def cut_at_vertices(chains: list[list[list[Rim]]], survey: Survey) -> tuple[set[int], Array, Ends]:
+    """Cut rims at corners and where other rims end, in place.
+
+    The numbers of the faces that changed come back, the vertices (n, 3) of the end, and the pair of them of every rim.
+    """
     changed = set()
 
     def cut(found: dict[Rim, Array]) -> None:
@@ -51,27 +55,24 @@ def cut_at_vertices(chains: list[list[list[Rim]]], survey: Survey) -> set[int]:
         boundary.anchored = corner
     while True:
         boundaries = all_live(chains)
-        points, ends = merged(boundaries, survey.tolerance)
+        points, ends = _merged(boundaries, survey.tolerance)
         found = _crossings(boundaries, points, ends, survey)
         if not found:
-            return changed
+            return changed, points, ends
         cut(found)
 
 
-def merged(boundaries: Sequence[Rim], tolerance: float) -> tuple[Array, dict[Rim, tuple[int, int]]]:
+def _merged(boundaries: Sequence[Rim], tolerance: float) -> tuple[Array, Ends]:
     """Vertices (n, 3) where anchored rims end, and the pair of them of every such rim."""
     anchored = [boundary for boundary in boundaries if boundary.anchored]
     if not anchored:
         return np.empty((0, 3)), {}
     # Loaded only here: it takes a tenth of a second, and bodies without edges do without.
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     ends = np.concatenate([boundary.ends for boundary in anchored])
-    pairs = cKDTree(ends).query_pairs(tolerance, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(ends), len(ends)))
-    count, labels = connected_components(links, directed=False)
+    labels = _joined(len(ends), cKDTree(ends).query_pairs(tolerance))
+    count = int(labels.max()) + 1
     points = np.zeros((count, 3))
     np.add.at(points, labels, ends)
     points /= np.bincount(labels, minlength=count)[:, None]
@@ -79,9 +80,24 @@ def merged(boundaries: Sequence[Rim], tolerance: float) -> tuple[Array, dict[Rim
     return points, {boundary: (start, end) for boundary, (start, end) in zip(anchored, numbers, strict=True)}
 
 
-def _crossings(
-    boundaries: Sequence[Rim], points: Array, ends: dict[Rim, tuple[int, int]], survey: Survey
-) -> dict[Rim, Array]:
+def _joined(count: int, pairs: Iterable[tuple[int, int]]) -> NDArray[np.int64]:
+    """Of so many things, some of which are joined in pairs, the numbers of what they are joined to, in their order."""
+    first = list(range(count))
+
+    def root(k: int) -> int:
+        while first[k] != k:
+            first[k] = first[first[k]]
+            k = first[k]
+        return k
+
+    for i, j in pairs:
+        a, b = root(i), root(j)
+        first[max(a, b)] = min(a, b)
+    numbers: dict[int, int] = {}
+    return np.array([numbers.setdefault(root(k), len(numbers)) for k in range(count)], dtype=np.int64)
+
+
+def _crossings(boundaries: Sequence[Rim], points: Array, ends: Ends, survey: Survey) -> dict[Rim, Array]:
     """Where rims run through vertices that they do not end at: increasing parameters.
 
     A closed rim with a vertex at the point where it closes is anchored there; it comes with no parameters.

@@ -19,6 +19,7 @@ from assembly.proximity.clearance.bores import Bores, bores_of
 from assembly.proximity.clearance.boxes import ROUNDED_UP, Groups, boxes_around
 from assembly.proximity.clearance.cells import CellTable, cells_of
 from assembly.proximity.clearance.halve import place_cells
+from assembly.proximity.clearance.halved_groups import GROUP, GROUP_SIZE, halve_groups
 from assembly.proximity.clearance.records import (
     CELL_FACE,
     CELL_FACE_SIZE,
@@ -247,61 +248,40 @@ class _Builder:
         self.cells = rows_of(NODE, cell_nodes)
         self.rounds = rounds
         count = len(cell_links)
-        self.whole = np.bincount(self.part, minlength=len(rounds))
         self.links = np.zeros((2 * count - 1, LINKS_SIZE), dtype=np.int64)
         self.nodes = np.zeros((2 * count - 1, NODE_SIZE))
         self.child = np.full(2 * count - 1, NONE)
         self.first = np.full(count, NONE)
-        self.used = 1
 
     def build(self) -> None:
         """All nodes, the root first."""
-        groups = [np.flatnonzero(self.part == k) for k in range(len(self.rounds))]
-        waiting, boxed = [(groups, 0)], []
-        while waiting:
-            groups, k = waiting.pop()
-            items = np.concatenate(groups)
-            if len(items) == 1:
-                self.first[items[0]] = k
-                continue
-            found = self._hull_of(items)
-            if found is None:
-                boxed.append((k, items))
-            else:
+        count = len(self.part)
+        table, order = np.empty((2 * count - 1, GROUP_SIZE), dtype=np.int64), np.empty(count, dtype=np.int64)
+        part = np.ascontiguousarray(self.part)
+        halve_groups(np.ascontiguousarray(self.cells.center), part, len(self.rounds), order, table)
+        halved = rows_of(GROUP, table)
+        self.child, begin, end = np.array(halved.child), np.array(halved.begin), np.array(halved.end)
+        single = np.flatnonzero(self.child == NONE)
+        self.first[order[begin[single]]] = single
+        is_round = np.zeros(len(table), dtype=bool)
+        for k in np.flatnonzero((halved.whole >= 0) & (self.child != NONE)).tolist():
+            found = self.rounds[halved.whole[k]]
+            if found is not None and found.outward:
+                # All that lies on a cylinder, a ball or a torus from inside of it.
                 _write_round(rows_of(NODE, self.nodes[k : k + 1])[0], found)
-            child, self.used = self.used, self.used + 2
-            self.child[k] = child
-            one, other = self._halves(groups, k)
-            waiting += [(other, child + 1), (one, child)]
-        self._write(boxed)
+                is_round[k] = True
+        boxed = np.flatnonzero((self.child != NONE) & ~is_round)
+        many = (end - begin)[boxed]
+        starts = np.cumsum(many) - many
+        members = order[np.repeat(begin[boxed] - starts, many) + np.arange(many.sum())]
+        self._write(boxed, Groups(members, starts))
 
-    def _halves(self, groups: list[Table], k: int) -> tuple[list[Table], list[Table]]:
-        if len(groups) > 1:
-            middles = np.array([self.cells.center[g].mean(axis=0) for g in groups])
-            order = np.argsort(middles[:, np.ptp(middles, axis=0).argmax()], kind="stable")
-            half = len(order) // 2
-            return [groups[i] for i in order[:half]], [groups[i] for i in order[half:]]
-        (items,) = groups
-        centers = self.cells.center[items]
-        along = np.linalg.svd(centers - centers.mean(axis=0), full_matrices=False)[2][0]
-        order = items[np.argsort(centers @ along, kind="stable")]
-        return [order[: len(order) // 2]], [order[len(order) // 2 :]]
-
-    def _hull_of(self, items: Table) -> Round | None:
-        """What a node's cells, if they are all of one part, lie on from outside."""
-        part = self.part[items[0]]
-        found = self.rounds[part]
-        is_part = len(items) == self.whole[part] and bool((self.part[items] == part).all())
-        return found if is_part and found is not None and found.outward else None
-
-    def _write(self, boxed: list[tuple[int, Table]]) -> None:
+    def _write(self, rows: Table, groups: Groups) -> None:
         """Links, cells, boxes around cells, and the bores that all these are outside of."""
         links, nodes = rows_of(LINKS, self.links), rows_of(NODE, self.nodes)
         links.face, links.child = NONE, self.child
         self.links[self.first], self.nodes[self.first] = self.cell_links, self.cell_nodes
-        if boxed:
-            groups = Groups.of([items for _, items in boxed])
-            rows = np.array([k for k, _ in boxed])
+        if len(rows):
             boxes = boxes_around(self.cells.corner, self.cells.rho + self.cells.disc, groups)
             nodes.center[rows], nodes.axes[rows], nodes.half[rows], nodes.radius[rows] = boxes
             if self.bores is not None:

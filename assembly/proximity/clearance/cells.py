@@ -18,19 +18,18 @@ Where the face ends before a chord, what lies between is of that one triangle (`
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
-from assembly.geometry.meshing.polygon import trimmed_cells
+from assembly.geometry.meshing.trimmed_cells import BoundaryCells, TrimmedCells, parallelogram_cells, tube_cells
 from assembly.geometry.recognition.elementary import elementary_form
 from assembly.geometry.recognition.forms import Cylinder, Extrusion, Plane
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.clearance.derivative_nets import surface_bounds
 from assembly.proximity.clearance.records import FLAT, ROUNDED, RULED
-from assembly.proximity.clearance.rims import Rims, no_rims, rims_of, spilling
+from assembly.proximity.clearance.rims import Rims, no_rims, rims_of, straight_rims
 
 __all__ = ["CellTable", "cells_of"]
 
@@ -43,6 +42,8 @@ ROUNDING = 4e-15
 # coordinate; it is added to the radius.
 EXACT = 1e-13
 ROUNDED_UP = 1.0 + 1e-14
+# Rounds of cutting chords in two whose curves may leave their triangles.
+SPILLS = 12
 # Rounds in which a grid of rectangles becomes finer.
 ROUNDS = 12
 
@@ -140,6 +141,27 @@ def _divided(at: Array, many: Indices) -> Array:
     return np.concatenate([*parts, at[-1:]])
 
 
+def _trimmed(
+    face: Face, form: int, tolerance: float, angle: float
+) -> tuple[BoundaryCells, Rims, NDArray[np.bool_] | None]:
+    """Triangles of a face that has a boundary, whose chords are cut in two as long as curves may leave triangles.
+
+    Those curves that may leave theirs in the end come last.
+    """
+    whole = tube_cells(face, tolerance, angle) if form == RULED else parallelogram_cells(face)
+    if whole is not None:
+        return whole, straight_rims(whole), None
+    made = TrimmedCells(face, tolerance, angle)
+    for _ in range(SPILLS):
+        cells = made.made()
+        rims = rims_of(face, cells)
+        wrong = rims.spills(cells.parameters)
+        if not wrong.any():
+            return cells, rims, None
+        made.cut(np.unique(cells.segments[wrong]))
+    return cells, rims, wrong
+
+
 def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
     """The first cells of a face.
 
@@ -154,12 +176,11 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
     surface = face.surface
     form, ruling, off = _sweep(surface)
     if face.boundary:
-        cells = trimmed_cells(face, tolerance, angle, partial(spilling, face))
+        cells, rims, wrong = _trimmed(face, form, tolerance, angle)
         uv = np.concatenate([cells.parameters, cells.parameters[:, 2:]], axis=1)
-        rims = rims_of(face, cells)
     else:
         uv = _grid(surface, tolerance)
-        rims = no_rims(len(uv))
+        rims, wrong = no_rims(len(uv)), None
     reach = rims.sag.max(axis=1) + rims.beside
     low, high = uv.min(axis=1) - reach, uv.max(axis=1) + reach
     for d in range(2):
@@ -175,8 +196,7 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
         first, second = np.tile(speeds, (len(uv), 1)), np.zeros((len(uv), 3))
     far = float(np.abs(surface.control_points).max())
     pad = ROUNDING * far + off + (first * rims.beside).sum(axis=1)
-    wrong = rims.spills(uv[:, :3])
-    if wrong.any():
+    if wrong is not None:
         # What is cut off there is of other triangles: no farther from their borders than curves from chords.
         pad += (first[:, None] * rims.sag).sum(axis=2)[wrong].max()
     return CellTable(uv, second, first, rims, pad, form, ruling)
@@ -184,11 +204,9 @@ def cells_of(face: Face, tolerance: float, angle: float) -> CellTable:
 
 def _even_speeds(surface: NurbsSurface) -> Array | None:
     """|S_u| and |S_v| of a parallelogram, bounded from above; None of what is none."""
+    if not surface.is_parallelogram:
+        return None
     net = surface.control_points
-    if net.shape[:2] != (2, 2) or np.ptp(surface.weights) != 0.0:
-        return None
-    if np.abs(net[0, 0] - net[1, 0] - net[0, 1] + net[1, 1]).max() > EXACT * np.abs(net).max():
-        return None
     lengths = [np.linalg.norm(np.diff(net, axis=d), axis=-1).max() for d in (0, 1)]
     speeds: Array = np.array(lengths) / np.ptp(surface.domain, axis=1) * ROUNDED_UP
     return speeds

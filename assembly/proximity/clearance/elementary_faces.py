@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from assembly._read_only import ReadOnlyArrays
 from assembly.geometry.faces.face import Face
-from assembly.geometry.recognition.elementary import elementary_form
 from assembly.geometry.recognition.forms import Cone, Cylinder, Plane, Sphere, Torus
-from assembly.proximity.clearance.round_faces import NEARLY
+from assembly.proximity.clearance.round_faces import nearly_elementary
 
 __all__ = ["ElementaryFace", "elementary_faces"]
 
@@ -43,7 +42,7 @@ def elementary_faces(faces: tuple[Face, ...]) -> tuple[ElementaryFace, ...]:
     """Those of a body's faces that lie on elementary surfaces."""
     found = []
     for face in faces:
-        form = elementary_form(face.surface, NEARLY * face.surface.size)
+        form = nearly_elementary(face.surface)
         if isinstance(form, Plane | Cylinder | Cone | Sphere | Torus):
             is_outward = (face.sign > 0) == (isinstance(form, Plane) or form.outward)
             found.append(ElementaryFace(form, is_outward, np.array(face.surface.bounding_box())))

@@ -12,17 +12,18 @@ and so for the other side.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
-from assembly.geometry.meshing.polygon import BoundaryCells
+from assembly.geometry.meshing.trimmed_cells import BoundaryCells
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.proximity.clearance.derivative_nets import bends, curve_bounds
+from assembly.proximity.clearance.derivative_nets import chord_bounds
 from assembly.proximity.clearance.records import NONE
 
-__all__ = ["Rims", "no_rims", "rims_of", "spilling"]
+__all__ = ["Rims", "no_rims", "rims_of", "straight_rims"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -50,14 +51,16 @@ class Rims:
     hollow: Indices
     beside: Array
 
-    @property
+    @cached_property
     def sag(self) -> Array:
         """How far curves are from their chords in (u, v), at most (n, 3, 2)."""
         return np.asarray(0.125 * np.diff(self.t, axis=2) ** 2 * self.second)
 
     def spills(self, uv: Array) -> NDArray[np.bool_]:
         """Which curves (n, 3), but those that bend towards the material, may leave their triangles (n, 3, 2)."""
-        p, q, r = (np.roll(uv, -k, axis=1) for k in range(3))
+        if not self.second.any():
+            return np.zeros(self.curve.shape, dtype=bool)
+        p, q, r = uv, uv[:, [1, 2, 0]], uv[:, [2, 0, 1]]
         area = np.abs((q - p)[..., 0] * (r - p)[..., 1] - (q - p)[..., 1] * (r - p)[..., 0])
         sides = np.abs(np.stack([r - q, r - p]))[..., ::-1]
         asked = 4.0 * (sides * self.sag).sum(axis=-1).max(axis=0)
@@ -75,25 +78,33 @@ def no_rims(count: int) -> Rims:
     )
 
 
+def straight_rims(cells: BoundaryCells) -> Rims:
+    """The chords of triangles whose boundary curves are lines along these chords."""
+    number, border = cells.segments, cells.border
+    found = no_rims(len(number))
+    row, k = np.nonzero(number >= 0)
+    found.curve[row, k], found.t[row, k] = border.curve[number[row, k]], border.t[number[row, k]]
+    return found
+
+
 def rims_of(face: Face, cells: BoundaryCells) -> Rims:
     """The chords of a face's triangles."""
     number, border = cells.segments, cells.border
     found = no_rims(len(number))
-    for c in np.unique(border.curve[border.curve >= 0]):
-        curve = face.boundary[c]
-        row, k = np.nonzero((number >= 0) & (border.curve[np.maximum(number, 0)] == c))
+    rows, edges = np.nonzero(number >= 0)
+    curves = border.curve[number[rows, edges]]
+    for c, curve in enumerate(face.boundary):
+        own = curves == c
+        row, k = rows[own], edges[own]
+        if not len(row):
+            continue
         t = border.t[number[row, k]]
         found.curve[row, k], found.t[row, k] = c, t
         if curve.degree > 1:
-            found.second[row, k], found.hollow[row, k] = curve_bounds(curve, t), bends(curve, t)
+            found.second[row, k], found.hollow[row, k] = chord_bounds(curve, t)
         apart = _displaced(face.surface, border.ends[number[row, k]], curve.evaluate(t.ravel()))
         np.maximum.at(found.beside, row, apart)
     return found
-
-
-def spilling(face: Face, cells: BoundaryCells) -> Indices:
-    """The segments of the border whose curves may leave their triangles."""
-    return np.unique(cells.segments[rims_of(face, cells).spills(cells.parameters)])
 
 
 def _displaced(surface: NurbsSurface, ends: Array, true: Array) -> Array:

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.curves import Circle, curve_form
 from assembly.geometry.recognition.elementary import elementary_form
-from assembly.geometry.recognition.forms import Cylinder, Plane, Sphere, Torus
+from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere, Torus
 from assembly.geometry.splines import bezier
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["NEARLY", "Round", "round_holes", "round_of", "round_parts"]
+__all__ = ["Round", "nearly_elementary", "round_holes", "round_of", "round_parts"]
 
 Array = NDArray[np.float64]
 # A face that goes around less of a cylinder than about half is no round body.
@@ -31,8 +31,6 @@ LARGEST_BALL = 0.7
 ROUNDED_UP = 1.0 + 1e-15
 # How far the corners of a flat face may be from a parallelogram, in parts of their largest coordinate.
 FLAT = 1e-12
-# Samples of a boundary curve that tell how often it goes around a point.
-SAMPLES = 33
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,15 +87,6 @@ class _FlatMap:
         circle = curve_form(parts, tolerance)
         return circle if isinstance(circle, Circle) else None
 
-    def turns_around(self, point: Array, curves: Sequence[NurbsCurve]) -> int:
-        """How often closed curves go around a point, counterclockwise in (u, v)."""
-        uv = np.concatenate([curve.evaluate(np.linspace(*curve.domain, SAMPLES)) for curve in curves])
-        x = self.along / np.linalg.norm(self.along)
-        y = self.across - (self.across @ x) * x
-        off = self.origin - point + uv[:, :1] * self.along + uv[:, 1:] * self.across
-        z = off @ x + 1.0j * (off @ y) / np.linalg.norm(y)
-        return round(float(np.angle(np.roll(z, -1) * z.conj()).sum()) / (2.0 * pi))
-
 
 def _flat_map(surface: NurbsSurface) -> _FlatMap | None:
     """The map of a flat surface whose parameters are lengths along two directions."""
@@ -130,11 +119,10 @@ def round_holes(face: Face) -> list[Round]:
     if flat is None:
         return []
     found = []
-    for chain in face.chains:
-        curves = [face.boundary[k] for k in chain]
-        circle = flat.circle(curves, HOLE * face.surface.size)
-        # Clockwise around its center: material is outside.
-        if circle is None or flat.turns_around(circle.center, curves) != -1:
+    # The first chain goes around the face; others are clockwise, with material outside.
+    for chain in face.chains[1:]:
+        circle = flat.circle([face.boundary[k] for k in chain], HOLE * face.surface.size)
+        if circle is None:
             continue
         off = circle.deviation + flat.off
         if off < circle.radius:
@@ -142,9 +130,17 @@ def round_holes(face: Face) -> list[Round]:
     return found
 
 
+def nearly_elementary(surface: NurbsSurface) -> Form:
+    """What a surface is exactly if that is elementary, else what it is to within `NEARLY` of its size."""
+    exact = elementary_form(surface)
+    if isinstance(exact, Plane | Cylinder | Cone | Sphere | Torus):
+        return exact
+    return elementary_form(surface, NEARLY * surface.size)
+
+
 def round_of(face: Face) -> Round | None:
     """What a face lies on, or None where that is no cylinder, ball or torus, and the face no disc."""
-    form = elementary_form(face.surface, NEARLY * face.surface.size)
+    form = nearly_elementary(face.surface)
     if isinstance(form, Plane):
         return _disc(face)
     if not isinstance(form, (Cylinder, Sphere, Torus)):

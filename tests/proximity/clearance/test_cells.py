@@ -33,6 +33,16 @@ def test_points_are_within_cells(name, cases):
         halve_all(forest, rng, 0.7)
 
 
+def test_points_beside_an_apex_are_within_cells(cases):
+    """Triangles with two corners in the apex have no area in space, but what is over them is over no other one."""
+    for seed in range(cases(8, 100)):
+        rng, forest = np.random.default_rng(seed), forest_of(faces_of(SHAPES["cone"]))
+        points = points_of(SHAPES["cone"], 60, rng)
+        for _ in range(5):
+            assert outside(forest, leaves(forest), points).max() <= OFF * np.abs(points).max()
+            halve_all(forest, rng, 0.7)
+
+
 def test_points_of_random_surfaces_are_within_cells(cases):
     rng = np.random.default_rng(1)
     for number in range(cases(6, 400)):

@@ -11,7 +11,7 @@ import pytest
 
 import assembly as asm
 from assembly.proximity.clearance.cells import ROUNDING
-from assembly.proximity.clearance.derivative_nets import bends, curve_bounds, surface_bounds
+from assembly.proximity.clearance.derivative_nets import chord_bounds, surface_bounds
 from tests.proximity.clearance.splines import random_curve, random_surface
 
 # What samples of derivatives may be off by rounding, in parts of themselves.
@@ -89,7 +89,7 @@ def test_curves(cases):
     for _ in range(cases(40, 2000)):
         curve = random_curve(rng)
         t = intervals(rng, *curve.domain, 6)
-        bound = curve_bounds(curve, t)
+        bound = chord_bounds(curve, t)[0]
         for k, (a, b) in enumerate(t):
             bend = np.abs(curve.evaluate(np.r_[a, rng.uniform(a, b, 40), b], order=2)[2]).max(axis=0)
             wide = min(b - a, 1.0) ** 2
@@ -110,7 +110,7 @@ def test_what_bends_to_one_side_is_there_of_all_chords(cases):
         begin, end = curve.domain
         t = np.sort(rng.uniform(begin, end, (8, 2)), axis=1)
         t[4:, 1] = np.minimum(t[4:, 0] + 0.1, end)
-        told = bends(curve, t)
+        told = chord_bounds(curve, t)[1]
         for (a, b), side in zip(t, told.tolist(), strict=True):
             found[side] += 1
             if side != 0:
@@ -126,5 +126,5 @@ def test_arcs_bend_away_from_the_inside_of_holes_alone():
     """Material is left of a boundary: of a circle that is run through clockwise it is outside of it."""
     arc = asm.NurbsCurve([[1, 0], [1, 1], [0, 1]], [0, 0, 0, 1, 1, 1], 2, [1, np.sqrt(0.5), 1])
     t = np.array([[0.05, 0.95], [0.2, 0.4]])
-    assert (bends(arc.reversed(), t) == 1).all()
-    assert (bends(arc, t) == -1).all()
+    assert (chord_bounds(arc.reversed(), t)[1] == 1).all()
+    assert (chord_bounds(arc, t)[1] == -1).all()
