@@ -53,8 +53,13 @@ def _tags(thing: Any) -> list[Label]:
     """Faces that a workplane's tags are of; of several the first has the name alone, and others a number."""
     if not is_of("cadquery", "Workplane", thing):
         return []
+    wholes = []
+    before = thing.parent
+    while before is not None:
+        wholes += [value.wrapped for value in before.vals() if is_of("cadquery", "Shape", value)]
+        before = before.parent
     return [
-        Label(value.wrapped, name)
+        Label(value.wrapped, name, None, wholes)
         for name, tagged in thing.ctx.tags.items()
         for value in tagged.vals()
         if is_of("cadquery", "Face", value)
@@ -86,8 +91,8 @@ def from_cadquery(thing: Any, name: str = "part", *, fixed: Iterable[str] = (), 
 
     Faces are called "face 1", "face 2" in CadQuery's order, or by the tags of the workplane that are of faces, and by
     the names of `Assembly.addSubshape`, which come first. A tag is of the same face wherever it is in, also in a copy
-    of the part or in one that was moved; what an operation has changed since is another face. Objects that are used
-    several times share their faces.
+    of the part or in one that was moved, and of what later operations have left of it: several faces are "top" and
+    "top 2". Objects that are used several times share their faces.
 
     Parameters
     ----------

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assembly.cad.libraries import shown
 from assembly.cad.locations import pose_of
@@ -16,25 +17,27 @@ from assembly.errors import InputError, items, text
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
-from assembly.step.faces import read_face
 from assembly.step.occt import occt, parts
-from assembly.step.profiles import Unreadable
 from assembly.step.reader import StepWarning, read_shape, solids_in, unique
 from assembly.step.tree import Color
 
 __all__ = ["Bodies", "Label", "color_of", "from_occt"]
 
-# Faces of a copy have the same numbers, up to a rounding of those where it has been moved.
-SAME = 1e-12
+# Rounding of points of copies, and of distances of points that were moved, over their coordinates.
+SAME, MOVED = 1e-12, 1e-10
+# Parts of a surface's domain at which it is compared with another, and where OCCT's numbers mean "without end".
+AT, FAR = ((0.1, 0.2), (0.7, 0.4), (0.3, 0.9)), 1e50
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Label:
-    """What a face is called, and its color: either may be None."""
+    """What a face is called, and its color, either of which may be None; and shapes that the face was in."""
 
     face: Any
     name: str | None = None
     color: Color | None = None
+    wholes: Sequence[Any] = ()
 
 
 @dataclass
@@ -119,7 +122,7 @@ class Bodies:
             warnings.warn(told, StepWarning, stacklevel=4)
         said: dict[int, Label] = {}
         for label in labels:
-            for k in _places(read, label.face):
+            for k in _places(read, label):
                 before = said.get(k, Label(None))
                 said[k] = Label(None, before.name or label.name, before.color or label.color)
         key = tuple((k, label.name, label.color) for k, label in sorted(said.items()))
@@ -172,27 +175,67 @@ def _distinct(faces: Sequence[Face]) -> list[Face]:
     return found
 
 
-def _places(read: _Read, wanted: Any) -> list[int]:
-    """Which faces of a shape a face is: the same, the same elsewhere, or one of the same numbers, as copies have."""
+def _places(read: _Read, label: Label) -> list[int]:
+    """Which faces of a shape a label is of."""
+    places = _places_in(read.theirs, label.face)
+    if places:
+        return places
+    for whole in label.wholes:
+        o = occt()
+        before = [o.as_face(face) for face in parts(whole, o.TopAbs_FACE)]
+        places = _places_in(before, label.face)
+        if places and _is_moved(before, read.theirs):
+            return places
+    return []
+
+
+def _places_in(faces: Sequence[Any], wanted: Any) -> list[int]:
+    """Which of the faces a face is: the same, the same elsewhere, what is left of it, or a copy of that.
+
+    Operations that cut a face leave its surface to what remains; that of a copy has the same numbers.
+    """
     for same in ("IsSame", "IsPartner"):
-        places = [k for k, face in enumerate(read.theirs) if getattr(face, same)(wanted)]
+        places = [k for k, face in enumerate(faces) if getattr(face, same)(wanted)]
         if places:
             return places
-    edges = occt().ShapeMap()
-    try:
-        copied = read_face(wanted, edges, None).face
-    except Unreadable:
-        return []
-    return [k for k, face in enumerate(read.ours) if face is not None and _is_copy(face, copied)]
+    o = occt()
+    bare = o.TopLoc_Location()
+    surface = o.BRep_Tool.Surface_s(o.as_face(wanted), bare)
+    # One object stands for a surface as long as it is kept.
+    places = [k for k, face in enumerate(faces) if o.BRep_Tool.Surface_s(face, o.TopLoc_Location()) is surface]
+    if places:
+        return places
+    points = _points(o.as_face(wanted))
+    scale = max(1.0, float(np.abs(points).max()))
+    return [k for k, face in enumerate(faces) if np.abs(_points(face) - points).max() <= SAME * scale]
 
 
-def _is_copy(a: Face, b: Face) -> bool:
-    """Whether two faces have the same numbers."""
-    arrays = [[face.surface.control_points, *(curve.control_points for curve in face.boundary)] for face in (a, b)]
-    scale = max(1.0, float(np.abs(a.surface.control_points).max()))
-    return len(arrays[0]) == len(arrays[1]) and all(
-        x.shape == y.shape and np.abs(x - y).max() <= SAME * scale for x, y in zip(*arrays, strict=True)
-    )
+def _is_moved(before: Sequence[Any], after: Sequence[Any]) -> bool:
+    """Whether the second faces are the first ones, in their order, moved as one: distances are the same."""
+    if len(before) != len(after):
+        return False
+    rows = [np.concatenate([_points(face) for face in faces]) for faces in (before, after)]
+    scale = max(1.0, float(np.abs(rows[0]).max()), float(np.abs(rows[1]).max()))
+    apart = [np.linalg.norm(points[:, None] - points[None, :4], axis=2) for points in rows]
+    return bool(np.abs(apart[0] - apart[1]).max() <= MOVED * scale)
+
+
+def _points(face: Any) -> Array:
+    """Points of the surface that a face is a part of, (n, 3), at parameters that do not depend on the face."""
+    surface = occt().BRep_Tool.Surface_s(face)
+    u0, u1, v0, v1 = surface.Bounds()
+    found = []
+    for s, t in AT:
+        point = surface.Value(_between(u0, u1, s), _between(v0, v1, t))
+        found.append((point.X(), point.Y(), point.Z()))
+    return np.array(found)
+
+
+def _between(low: float, high: float, part: float) -> float:
+    """A parameter between two, of which either may be infinite."""
+    if low > -FAR:
+        return low + part * (high - low if high < FAR else 1.0)
+    return high - part if high < FAR else part
 
 
 def color_of(color: Any) -> Color | None:
