@@ -94,9 +94,9 @@ def what_lacks() -> str:
     if len(found) == 2:
         return (
             f"{' and '.join(found)} are installed, whose files overwrite each other: "
-            f"pip uninstall {' '.join(PACKAGES)}, then pip install --force-reinstall the one that is needed, cadquery-ocp "
-            "for CadQuery, cadquery-ocp-novtk "
-            "for build123d or neither; the two libraries need an environment each"
+            f"pip uninstall {' '.join(PACKAGES)}, then pip install --force-reinstall the one that is needed, "
+            "cadquery-ocp for CadQuery, cadquery-ocp-novtk for build123d or neither; the two libraries need an "
+            "environment each"
         )
     return (
         'OCCT is not installed: pip install "assembly-solver[step]"; beside CadQuery or build123d, which bring it, '
