@@ -12,6 +12,7 @@ from assembly._lazy import lazy_names
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from assembly import cad as cad
     from assembly import errors as errors
     from assembly import proximity as proximity
     from assembly import view as view
@@ -158,6 +159,7 @@ else:
             "Weight": "assembly.constraints.model.objectives",
             "Width": "assembly.constraints.model.mates",
             "Wrench": "assembly.solve.forces.statics",
+            "cad": "assembly.cad",
             "curves": "assembly.geometry.shapes.curves",
             "dexterity_ellipsoid": "assembly.solve.forces.end_effector",
             "dexterity_value": "assembly.solve.forces.end_effector",

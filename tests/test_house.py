@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import assembly
+import assembly.cad
 import assembly.proximity
 import assembly.view
 from assembly._kernel.decorator import Entry
@@ -21,7 +22,7 @@ from assembly.kernels.listing import all_items
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "assembly"
 HEAVY = ("casadi", "matplotlib", "meshcat", "numba", "numpy", "scipy")
-LAZY = [assembly, assembly.proximity, assembly.view]
+LAZY = [assembly, assembly.cad, assembly.proximity, assembly.view]
 
 
 def label(value: object) -> str:

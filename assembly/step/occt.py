@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
 from types import SimpleNamespace
 from typing import Any
 
@@ -38,6 +39,8 @@ _MODULES = (
     "XCAFDoc",
     "gp",
 )
+# Wheels of OCCT: CadQuery's, and build123d's and our own.
+PACKAGES = ("cadquery-ocp", "cadquery-ocp-novtk")
 # Our name, and what it is called in OCCT 8 (all in one module) and in OCCT 7.
 _CONTAINERS = {
     "Points": ("Array1_gp_Pnt", "TColgp", "TColgp_Array1OfPnt"),
@@ -63,7 +66,7 @@ def occt() -> Any:
     try:
         import_module("OCP")
     except ImportError as error:
-        raise ImportError('STEP files are read and written by OCCT: pip install "assembly-solver[step]"') from error
+        raise ImportError(what_lacks()) from error
     names: dict[str, Any] = {}
     for module in _MODULES:
         names.update(vars(import_module(f"OCP.{module}")))
@@ -77,6 +80,28 @@ def occt() -> Any:
     for kind in ("Edge", "Face", "Shell", "Solid", "Wire"):
         names[f"as_{kind.lower()}"] = getattr(names["TopoDS"], f"{kind}_s", None) or getattr(names["TopoDS"], kind)
     return SimpleNamespace(**names)
+
+
+def what_lacks() -> str:
+    """What to do where OCCT cannot be imported.
+
+    CadQuery and build123d bring it in one of two packages with the same files, of which a third one would break both.
+    """
+    found = []
+    for package in PACKAGES:
+        with suppress(PackageNotFoundError):
+            found.append(f"{package} {version(package)}")
+    if len(found) == 2:
+        return (
+            f"{' and '.join(found)} are installed, whose files overwrite each other: "
+            f"pip uninstall {' '.join(PACKAGES)}, then pip install --force-reinstall the one that is needed, "
+            "cadquery-ocp for CadQuery, cadquery-ocp-novtk for build123d or neither; the two libraries need an "
+            "environment each"
+        )
+    return (
+        'OCCT is not installed: pip install "assembly-solver[step]"; beside CadQuery or build123d, which bring it, '
+        "install assembly-solver without extras"
+    )
 
 
 @contextmanager

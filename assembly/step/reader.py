@@ -7,7 +7,7 @@ import pickle
 import subprocess
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
@@ -71,7 +71,7 @@ class _Malformed(_Damaged):
 
 
 @dataclass
-class _Shape:
+class Shape:
     """Faces of one solid, or of one sheet, in the part's own coordinates."""
 
     faces: list[Face]
@@ -188,23 +188,43 @@ def solids_of(path: str) -> Iterator[Any]:
 
 
 def _shapes(part: Part) -> Iterator[Any]:
-    """Solids of a part, and then its shells and faces that are in no solid."""
+    """What becomes bodies of a part."""
+    return solids_in(part.shape)
+
+
+def solids_in(shape: Any) -> Iterator[Any]:
+    """Solids of a shape, and then its shells and faces that are in no solid."""
     o = occt()
-    yield from parts(part.shape, o.TopAbs_SOLID)
-    yield from parts(part.shape, o.TopAbs_SHELL, o.TopAbs_SOLID)
-    yield from parts(part.shape, o.TopAbs_FACE, o.TopAbs_SHELL)
+    yield from parts(shape, o.TopAbs_SOLID)
+    yield from parts(shape, o.TopAbs_SHELL, o.TopAbs_SOLID)
+    yield from parts(shape, o.TopAbs_FACE, o.TopAbs_SHELL)
 
 
-def _read(shape: Any, part: Part, scale: float) -> _Shape:
+def read_shape(
+    shape: Any, said: Callable[[Any], tuple[str | None, Color | None]], color: Color | None, scale: float
+) -> Shape:
+    """The faces of a shape, those that cannot be read left out and told.
+
+    Parameters
+    ----------
+    shape
+        TopoDS_Shape.
+    said
+        Name and color of the shape and of its faces, None where there is none.
+    color
+        Of the shape if it says none.
+    scale : float
+        Our unit of length in a millimeter.
+    """
     o = occt()
     edges = o.ShapeMap()
     o.TopExp.MapShapes_s(shape, o.TopAbs_EDGE, edges)
-    name, color = part.said(shape)
-    made = _Shape([], color or part.color, name, [], [])
+    name, own_color = said(shape)
+    made = Shape([], own_color or color, name, [], [])
     taken: set[str] = set()
     for k, face in enumerate(parts(shape, o.TopAbs_FACE), 1):
         face = o.as_face(face)
-        own, tint = part.said(face)
+        own, tint = said(face)
         label = unique(own or f"face {k}", taken)
         try:
             read = read_face(face, edges, label, scale)
@@ -314,7 +334,7 @@ def bodies_of(path: str, unit: str, strict: bool, folder: str | None = None) -> 
         inexact: list[str] = []
         built = 0
         taken: set[str] = set()
-        read: dict[str, list[_Shape]] = {}
+        read: dict[str, list[Shape]] = {}
         for label in free_labels(root):
             for leaf in leaves(label, o.TopLoc_Location(), file.stem, None):
                 entry = o.TCollection_AsciiString()
@@ -322,7 +342,7 @@ def bodies_of(path: str, unit: str, strict: bool, folder: str | None = None) -> 
                 key = entry.ToCString()
                 if key not in read:
                     part = Part(leaf.label)
-                    read[key] = [_read(shape, part, scale) for shape in _shapes(part)]
+                    read[key] = [read_shape(shape, part.said, part.color, scale) for shape in _shapes(part)]
                     for shape in read[key]:
                         built += len(shape.faces) + len(shape.missing)
                         missing += [f"{leaf.name!r}, {text}" for text in shape.missing]

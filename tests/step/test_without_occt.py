@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from assembly.step import occt
+
 
 def test_what_lacks_is_said(run_python, tmp_path):
     code = f"""
@@ -18,7 +20,19 @@ for call in (
         print(error)
 """
     said = [line for line in run_python(code).splitlines() if "pip" in line]
-    assert said == 2 * ['STEP files are read and written by OCCT: pip install "assembly-solver[step]"']
+    assert said == 2 * [
+        'OCCT is not installed: pip install "assembly-solver[step]"; beside CadQuery or build123d, which bring it, '
+        "install assembly-solver without extras"
+    ]
+
+
+def test_two_packages_of_occt_are_told(monkeypatch):
+    monkeypatch.setattr(
+        occt, "version", lambda package: {"cadquery-ocp": "7.9.3", "cadquery-ocp-novtk": "8.0"}[package]
+    )
+    said = occt.what_lacks()
+    assert said.startswith("cadquery-ocp 7.9.3 and cadquery-ocp-novtk 8.0 are installed")
+    assert "pip uninstall cadquery-ocp cadquery-ocp-novtk" in said
 
 
 def test_names_do_not_load_occt(run_python):
