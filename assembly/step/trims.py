@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from assembly.geometry.splines import bezier
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
 from assembly.step.occt import occt
@@ -27,6 +28,8 @@ Array = NDArray[np.float64]
 FOLLOWED = 1e-10
 # Curves that leave a coordinate line by less, over the side of the domain, run along it.
 LEVEL = 1e-9
+# A curve whose end is moved bends over a stretch so many times as long as the way: by some hundredths of a radian.
+BENT = 20.0
 
 
 @dataclass(frozen=True)
@@ -62,11 +65,12 @@ class Edge:
 
     def moved(self, points: Array) -> Edge:
         """The curve with its two ends at the points (2, 2); what is level stays so."""
-        made = self.curve.points.copy()
+        curve = self.curve if any(self.level) else _bendable(self.curve, points)
+        made = curve.points.copy()
         for axis in np.flatnonzero(self.level):
             made[:, axis] = points[0, axis] * made[:, 2]
         made[[0, -1], :2] = points * made[[0, -1], 2:]
-        return replace(self, curve=Spline(made, self.curve.knots, self.curve.degree))
+        return replace(self, curve=Spline(made, curve.knots, curve.degree))
 
     def shifted(self, by: Array) -> Edge:
         """The curve moved by a vector of (u, v)."""
@@ -78,6 +82,29 @@ class Edge:
         """As the loops of a face take it, its u and v multiplied."""
         points, weights = self.curve.cartesian
         return NurbsCurve(points * scales, self.curve.knots, self.curve.degree, weights, name=self.name)
+
+
+def _bendable(curve: Spline, ends: Array) -> Spline:
+    """The same curve with knots near to ends that are to be moved, so that nothing else of it moves with them."""
+    flat = curve.cartesian[0]
+    length = float(np.linalg.norm(np.diff(flat, axis=0), axis=1).sum())
+    gaps = np.linalg.norm(ends - flat[[0, -1]], axis=1)
+    # What is less makes no difference, and leaves lines what they are.
+    if not gaps.max() > 1e-6 * length:
+        return curve
+    points, knots, degree = curve.points, curve.knots, curve.degree
+    if degree == 1:
+        pieces = np.einsum("ka,ian->ikn", bezier.elevation(1, 2), bezier.pieces(points, knots, 1))
+        points, knots, degree = bezier.joined(pieces), bezier.full_knots(bezier.breaks(knots, 1), 2), 2
+    low, high = float(knots[0]), float(knots[-1])
+    for k, gap in zip((0, -1), gaps.tolist(), strict=True):
+        part = (high - low) * BENT * gap / length
+        at = low + part if k == 0 else high - part
+        beside = knots[degree + 1] if k == 0 else knots[-degree - 2]
+        # Where the last span is that short it may as well move.
+        if 0.0 < part < 0.5 * abs(beside - (low if k == 0 else high)):
+            points, knots = bezier.insert(points, knots, degree, at, 1)
+    return Spline(points, knots, degree)
 
 
 def crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:
@@ -161,7 +188,8 @@ def edge_curve(edge: Any, face: Any, patch: Patch, name: str) -> Edge:
     for vertex in (o.TopExp.FirstVertex_s(edge), o.TopExp.LastVertex_s(edge)):
         if not vertex.IsNull():
             tolerance = max(tolerance, o.BRep_Tool.Tolerance_s(vertex))
-    return Edge(made, (bool(level[0]), bool(level[1])), tolerance, name, deviation, o.BRep_Tool.IsClosed_s(edge, face))
+    is_level = (bool(level[0]), bool(level[1]))
+    return Edge(made, is_level, tolerance, name, deviation, o.BRep_Tool.IsClosed_s(edge, face))
 
 
 def _period(patch: Patch) -> Array:
@@ -177,6 +205,14 @@ def _meeting(last: Edge, first: Edge, a: Array, b: Array) -> Array:
         if last.level[axis] != first.level[axis]:
             at[axis] = (a if last.level[axis] else b)[axis]
     return at
+
+
+def _within(at: Array, patch: Patch) -> Array:
+    """(u, v), which may lie beyond the domain, in it."""
+    moved = at.copy()
+    for axis, ((low, high), closed) in enumerate(zip(patch.surface.domain, patch.surface.closed, strict=True)):
+        moved[..., axis] = low + np.mod(at[..., axis] - low, high - low) if closed else np.clip(at[..., axis], low, high)
+    return moved
 
 
 def head_to_tail(edges: list[Edge], patch: Patch) -> list[Edge]:
@@ -238,9 +274,7 @@ def chained(edges: list[Edge], patch: Patch) -> tuple[list[Edge], float]:
 
 def _apart(a: Array, b: Array, patch: Patch) -> float:
     """Distance in space of two points of (u, v), which may lie beyond the domain."""
-    at = np.array([a, b])
-    for axis, ((low, high), closed) in enumerate(zip(patch.surface.domain, patch.surface.closed, strict=True)):
-        at[:, axis] = low + np.mod(at[:, axis] - low, high - low) if closed else np.clip(at[:, axis], low, high)
+    at = _within(np.array([a, b]), patch)
     points = patch.surface.evaluate(at[:, 0], at[:, 1])
     return float(np.linalg.norm(points[0] - points[1]))
 
