@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from assembly.geometry.splines import bezier
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
 from assembly.step.occt import occt
@@ -28,8 +27,6 @@ Array = NDArray[np.float64]
 FOLLOWED = 1e-10
 # Curves that leave a coordinate line by less, over the side of the domain, run along it.
 LEVEL = 1e-9
-# A curve whose end is moved bends over a stretch so many times as long as the way: by some hundredths of a radian.
-BENT = 20.0
 
 
 @dataclass(frozen=True)
@@ -65,12 +62,11 @@ class Edge:
 
     def moved(self, points: Array) -> Edge:
         """The curve with its two ends at the points (2, 2); what is level stays so."""
-        curve = self.curve if any(self.level) else _bendable(self.curve, points)
-        made = curve.points.copy()
+        made = self.curve.points.copy()
         for axis in np.flatnonzero(self.level):
             made[:, axis] = points[0, axis] * made[:, 2]
         made[[0, -1], :2] = points * made[[0, -1], 2:]
-        return replace(self, curve=Spline(made, curve.knots, curve.degree))
+        return replace(self, curve=Spline(made, self.curve.knots, self.curve.degree))
 
     def shifted(self, by: Array) -> Edge:
         """The curve moved by a vector of (u, v)."""
@@ -82,29 +78,6 @@ class Edge:
         """As the loops of a face take it, its u and v multiplied."""
         points, weights = self.curve.cartesian
         return NurbsCurve(points * scales, self.curve.knots, self.curve.degree, weights, name=self.name)
-
-
-def _bendable(curve: Spline, ends: Array) -> Spline:
-    """The same curve with knots near to ends that are to be moved, so that nothing else of it moves with them."""
-    flat = curve.cartesian[0]
-    length = float(np.linalg.norm(np.diff(flat, axis=0), axis=1).sum())
-    gaps = np.linalg.norm(ends - flat[[0, -1]], axis=1)
-    # What is less makes no difference, and leaves lines what they are.
-    if not gaps.max() > 1e-6 * length:
-        return curve
-    points, knots, degree = curve.points, curve.knots, curve.degree
-    if degree == 1:
-        pieces = np.einsum("ka,ian->ikn", bezier.elevation(1, 2), bezier.pieces(points, knots, 1))
-        points, knots, degree = bezier.joined(pieces), bezier.full_knots(bezier.breaks(knots, 1), 2), 2
-    low, high = float(knots[0]), float(knots[-1])
-    for k, gap in zip((0, -1), gaps.tolist(), strict=True):
-        part = (high - low) * BENT * gap / length
-        at = low + part if k == 0 else high - part
-        beside = knots[degree + 1] if k == 0 else knots[-degree - 2]
-        # Where the last span is that short it may as well move.
-        if 0.0 < part < 0.5 * abs(beside - (low if k == 0 else high)):
-            points, knots = bezier.insert(points, knots, degree, at, 1)
-    return Spline(points, knots, degree)
 
 
 def crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:
