@@ -203,7 +203,7 @@ class _FaceBuilder:
             else:
                 other = self._line(partner.curve)
                 assert other is not None and other[4] != backwards, "the two sides of a seam run against each other"
-                pair = (other[0], flat) if backwards else (flat, other[0])
+                pair = (other[0], flat) if backwards != self.carrier.turned else (flat, other[0])
                 self.build.UpdateEdge(edge, *pair, self.made, EDGE_TOLERANCE)
         self.build.Range(edge, low, high)
         first, last = (ends[1], ends[0]) if backwards else (ends[0], ends[1])
