@@ -304,6 +304,8 @@ def _extrusion(surface: NurbsSurface, form: Extrusion) -> Carrier | None:
     o = occt()
     along = form.along
     lines = _Lines(surface)
+    if _winds(lines.sampled(1 - along)[1], form.direction):
+        return None
     start = lines.along(along, np.array([lines.ends[along, 0]]))[0]
     geometry = o.Geom_SurfaceOfLinearExtrusion(_edge_curve(surface, along), o.gp_Dir(*form.direction.tolist()))
 
@@ -312,6 +314,18 @@ def _extrusion(surface: NurbsSurface, form: Extrusion) -> Carrier | None:
 
     # OCCT's first parameter is that of the curve.
     return _proven(surface, geometry, (_same, rise) if along == 1 else (rise, _same), 1 - along)
+
+
+def _winds(points: Array, direction: Array) -> bool:
+    """Whether a curve goes round more than once, seen along a direction.
+
+    What is extruded of it may lie over itself, as a helix's band does, and OCCT would take one turn for another.
+    """
+    steps = np.diff(points, axis=0)
+    across = np.linalg.svd(direction[None])[2][1:]
+    x, y = (steps @ across.T).T
+    turns = np.unwrap(np.arctan2(y, x))
+    return bool(np.ptp(turns) > 2.0 * pi * (1.0 + 2.0 / _PLACES))
 
 
 def _revolution(surface: NurbsSurface, form: Revolution) -> Carrier | None:

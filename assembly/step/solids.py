@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.curves import Circle, Line, curve_form
-from assembly.geometry.seams.region_cuts import cut_open
-from assembly.geometry.seams.region_pieces import POLE, SEAM, Piece
+from assembly.geometry.seams.region_cuts import cut_in_two, cut_open
+from assembly.geometry.seams.region_pieces import EDGE, POLE, SEAM, Piece
+from assembly.geometry.seams.region_strips import area_of, corners_of, strip, winds
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
 from assembly.step.carriers import carrier_of, spline_curve
@@ -33,6 +34,8 @@ Array = NDArray[np.float64]
 FOLLOWED = 1e-10
 # Tolerances of edges and of sewing, the latter over the size of the body.
 EDGE_TOLERANCE, SEWING = 1e-7, (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
+# Faces that go on over more than so many turns are cut.
+ONCE = 1.0 + 1e-6
 # How far a bilinear surface may be from an affine one, over its size.
 LINEAR = 1e-13
 
@@ -40,10 +43,10 @@ LINEAR = 1e-13
 class _FaceBuilder:
     """One face on its way to OCCT."""
 
-    def __init__(self, face: Face) -> None:
+    def __init__(self, face: Face, surface: NurbsSurface, chains: list[list[Piece]]) -> None:
         o = occt()
         self.face = face
-        self.surface, self.chains = cut_open(face)
+        self.surface, self.chains = surface, chains
         self.build = o.BRep_Builder()
         self.carrier = carrier_of(self.surface)
         self.geometry = self.carrier.geometry
@@ -250,10 +253,54 @@ class _FaceBuilder:
 
 
 class Sewn:
-    """A body as a shape of OCCT, and what became of its faces."""
+    """A body as a shape of OCCT, and what became of each of its faces: several where it winds around its surface."""
 
-    def __init__(self, shape: Any, faces: list[Any], closed: bool) -> None:
+    def __init__(self, shape: Any, faces: list[list[Any]], closed: bool) -> None:
         self.shape, self.faces, self.closed = shape, faces, closed
+
+
+def _parts_of(face: Face) -> list[tuple[NurbsSurface, list[list[Piece]]]]:
+    """A face on a surface that is cut open; in parts of half a turn where it goes round more than once.
+
+    A surface of OCCT has its parameters once around, and points of a second turn would be taken for the first.
+    """
+    surface, chains = cut_open(face)
+    found = [(surface, chains)]
+    for axis in (0, 1):
+        period = face.surface._periods[axis]
+        if not period or surface.closed[axis]:
+            continue
+        low, high = surface.domain[axis]
+        points = [piece.curve.control_points[:, axis] for chain in chains for piece in chain]
+        if np.ptp(np.concatenate(points)) <= period * ONCE:
+            continue
+        count = int(np.ceil((high - low) / (0.5 * period)))
+        at = np.linspace(low, high, count + 1)
+        cut = []
+        for whole, rest in found:
+            for k, begin in enumerate(at[:-1].tolist()):
+                below = rest
+                if k < count - 1:
+                    below, rest = cut_in_two(rest, whole, axis, float(at[k + 1]))
+                part = strip(whole, axis, begin, float(at[k + 1]))
+                for piece in (piece for chain in below for piece in chain if piece.kind == SEAM):
+                    if piece.ends[0, axis] == piece.ends[1, axis]:
+                        piece.kind = EDGE
+                cut += [(part, group) for group in _grouped(below)]
+        found = cut
+    return found
+
+
+def _grouped(chains: list[list[Piece]]) -> list[list[list[Piece]]]:
+    """Outer chains, each with the holes in it."""
+    corners = [corners_of(chain) for chain in chains]
+    outer = [area_of(each) > 0.0 for each in corners]
+    groups = []
+    for k, chain in enumerate(chains):
+        if outer[k]:
+            holes = (h for h in range(len(chains)) if not outer[h] and winds(corners[k], corners[h][0]))
+            groups.append([chain, *(chains[h] for h in holes)])
+    return groups
 
 
 def sewn(faces: Sequence[Face], scale: float) -> Sewn:
@@ -267,7 +314,12 @@ def sewn(faces: Sequence[Face], scale: float) -> Sewn:
         Millimeters in our unit of length.
     """
     o = occt()
-    made = [_FaceBuilder(_in_millimeters(face, scale)).result() for face in faces]
+    made: list[Any] = []
+    owner: list[int] = []
+    for k, face in enumerate(faces):
+        for surface, chains in _parts_of(_in_millimeters(face, scale)):
+            made.append(_FaceBuilder(face, surface, chains).result())
+            owner.append(k)
     size = scale * max(face.surface.size for face in faces)
     for part in SEWING:
         sewing = o.BRepBuilderAPI_Sewing(max(part * size, EDGE_TOLERANCE))
@@ -295,7 +347,9 @@ def sewn(faces: Sequence[Face], scale: float) -> Sewn:
         build.MakeCompound(shape)
         for shell in shells:
             build.Add(shape, shell)
-    images = [sewing.Modified(face) if sewing.IsModified(face) else face for face in made]
+    images: list[list[Any]] = [[] for _ in faces]
+    for k, face in zip(owner, made, strict=True):
+        images[k].append(sewing.Modified(face) if sewing.IsModified(face) else face)
     return Sewn(shape, images, closed)
 
 

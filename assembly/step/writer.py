@@ -70,12 +70,13 @@ class _Document:
         _named(label, body.name)
         if body.color is not None:
             self.colors.SetColor(label, _color(body.color), o.XCAFDoc_ColorSurf)
-        for side, image in zip(body.faces, made.faces, strict=True):
-            sub = self.shapes.AddSubShape(label, image)
-            if not sub.IsNull():
-                _named(sub, side.name)
-                if side.face.color is not None:
-                    self.colors.SetColor(sub, _color(side.face.color), o.XCAFDoc_ColorSurf)
+        for side, images in zip(body.faces, made.faces, strict=True):
+            for image in images:
+                sub = self.shapes.AddSubShape(label, image)
+                if not sub.IsNull():
+                    _named(sub, side.name)
+                    if side.face.color is not None:
+                        self.colors.SetColor(sub, _color(side.face.color), o.XCAFDoc_ColorSurf)
         return label, made.closed
 
     def place(self, part: Any, name: str, pose: Pose, scale: float, color: Color | None) -> None:
