@@ -1,7 +1,7 @@
 """Surfaces as OCCT has them: planes, cylinders, cones, spheres, tori, extrusions and revolutions as such.
 
-OCCT's parameters of those are lengths and angles. Where each of ours is a function of one of theirs, that is found along
-two lines of the surface and proven on a grid; where it is not, the surface is written as a B-spline, with our own.
+OCCT's parameters of those are lengths and angles. Where each of ours is a function of one of theirs, that is found
+along two lines of the surface and proven on a grid; where it is not, the surface is written as a B-spline, with ours.
 """
 
 from __future__ import annotations
@@ -173,7 +173,8 @@ class _Lines:
 
     def sampled(self, axis: int) -> tuple[Array, Array]:
         """Places along a parameter, and their points."""
-        x = np.linspace(*self.ends[axis], _PLACES)
+        low, high = self.ends[axis].tolist()
+        x = np.linspace(low, high, _PLACES)
         return x, self.along(axis, x)
 
 
@@ -195,7 +196,8 @@ def _proven(
 ) -> Carrier | None:
     """A carrier whose points are ours on a grid; which way its normal goes is found there."""
     ends = np.array(surface.domain)
-    u, v = (np.repeat(np.linspace(*ends[0], 9), 9), np.tile(np.linspace(*ends[1], 9), 9))
+    (u0, u1), (v0, v1) = ends.tolist()
+    u, v = np.repeat(np.linspace(u0, u1, 9), 9), np.tile(np.linspace(v0, v1, 9), 9)
     first = Carrier(geometry, maps, around == 1, False)
     there = first.at(np.column_stack([u, v]))
     points = surface.evaluate(u, v)
@@ -255,7 +257,7 @@ def _round(surface: NurbsSurface, form: Cylinder | Cone | Sphere | Torus) -> Car
     y = np.cross(axis, x)
 
     def heading(points: Array) -> Array:
-        return np.arctan2((points - origin) @ y, (points - origin) @ x)
+        return np.asarray(np.arctan2((points - origin) @ y, (points - origin) @ x))
 
     turn = _angle(lines, around, heading)
     other = 1 - around
@@ -286,9 +288,13 @@ def _round(surface: NurbsSurface, form: Cylinder | Cone | Sphere | Torus) -> Car
         def latitude(points: Array) -> Array:
             up = (points - origin) @ axis
             out = np.linalg.norm(points - origin - up[:, None] * axis, axis=1)
-            return np.arctan2(up, out - major)
+            return np.asarray(np.arctan2(up, out - major))
 
-        rise = _angle(lines, other, latitude)
+        followed = _angle(lines, other, latitude)
+
+        def rise(at: Array) -> Array:
+            return followed(at)
+
     maps = (turn, rise) if around == 0 else (rise, turn)
     return _proven(surface, geometry, maps, around)
 

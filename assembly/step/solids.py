@@ -22,6 +22,7 @@ from assembly.geometry.seams.region_pieces import EDGE, POLE, SEAM, Piece
 from assembly.geometry.seams.region_strips import area_of, corners_of, strip, winds
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
+from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.carriers import carrier_of, spline_curve
 from assembly.step.occt import occt, parts
 from assembly.step.profiles import approximated
@@ -178,9 +179,7 @@ class _FaceBuilder:
         origin, axes = plane[0], plane[1:]
         x, center = start / np.linalg.norm(start), form.center[:2]
         sense = 1.0 if left else -1.0
-        flat = o.Geom2d_Circle(
-            o.gp_Ax2d(o.gp_Pnt2d(*center.tolist()), o.gp_Dir2d(*x.tolist())), form.radius, left
-        )
+        flat = o.Geom2d_Circle(o.gp_Ax2d(o.gp_Pnt2d(*center.tolist()), o.gp_Dir2d(*x.tolist())), form.radius, left)
         place = o.gp_Ax2(
             o.gp_Pnt(*(origin + center @ axes).tolist()),
             o.gp_Dir(*(sense * np.cross(*axes)).tolist()),

@@ -184,7 +184,9 @@ def _within(at: Array, patch: Patch) -> Array:
     """(u, v), which may lie beyond the domain, in it."""
     moved = at.copy()
     for axis, ((low, high), closed) in enumerate(zip(patch.surface.domain, patch.surface.closed, strict=True)):
-        moved[..., axis] = low + np.mod(at[..., axis] - low, high - low) if closed else np.clip(at[..., axis], low, high)
+        moved[..., axis] = (
+            low + np.mod(at[..., axis] - low, high - low) if closed else np.clip(at[..., axis], low, high)
+        )
     return moved
 
 

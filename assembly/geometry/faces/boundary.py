@@ -28,7 +28,7 @@ OVERSHOOT = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """A surface that holds the loops, these (turned), all boundary curves, which of them make a chain, and the table."""
+    """A surface that holds the loops, these (turned), all boundary curves, which make a chain, and the table."""
 
     surface: NurbsSurface
     outer: Loop | None
@@ -230,7 +230,8 @@ def _check_ended(surface: NurbsSurface, table: TrimTable, names: Sequence[str]) 
 def _tolerances(surface: NurbsSurface, tolerance: float | None) -> Array:
     """What a tolerance in space is in u and in v."""
     length = OVERSHOOT * surface.size if tolerance is None else tolerance
-    return np.maximum(length / np.maximum(rates(surface), 1e-300), SLACK * np.ptp(np.array(surface.domain), axis=1))
+    least = SLACK * np.ptp(np.array(surface.domain), axis=1)
+    return np.asarray(np.maximum(length / np.maximum(rates(surface), 1e-300), least))
 
 
 def make_boundary(

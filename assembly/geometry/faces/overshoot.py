@@ -110,7 +110,7 @@ def _blossom(span: Array, values: Array) -> Array:
     row = span
     for value in values.tolist():
         row = (1.0 - value) * row[:-1] + value * row[1:]
-    return row[0]
+    return np.asarray(row[0])
 
 
 def _goes_on(surface: NurbsSurface, made: NurbsSurface, axis: int, high: bool) -> bool:

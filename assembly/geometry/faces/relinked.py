@@ -1,4 +1,4 @@
-"""Loops that touch, or go into each other by no more than a tolerance, cut where they meet and linked to loops that do not.
+"""Loops that touch, or go into each other by no more than a tolerance, cut where they meet and linked anew.
 
 Curves are cut at their meetings. A part of one is boundary if there is material once on its left and none on its right;
 what is left over lies between loops that go into each other, and has to be within the tolerance of what is kept.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,7 +105,9 @@ class _Pair:
         a, b = self.a, self.b
         low, high = b.low + self.move, b.high + self.move
         near = self.tolerance
-        over = (a.low[:, None] <= high[None] + near).all(axis=2) & (low[None] <= a.high[:, None] + near).all(axis=2)
+        over: Any = (a.low[:, None] <= high[None] + near).all(axis=2) & (low[None] <= a.high[:, None] + near).all(
+            axis=2
+        )
         if self.own:
             first, second = np.indices(over.shape)
             over &= second > first + 1

@@ -246,7 +246,7 @@ def border(face: Face, tolerance: float, angle: float) -> Border:
 
 
 def _linked_at_poles(face: Face, places: list[Array], reach: float) -> list[list[int]]:
-    """Curves of chains that close; a chain that ends at a pole goes on with the next one there, material to the left."""
+    """Curves of chains that close; one that ends at a pole goes on with the next one there, material to the left."""
     closed: list[list[int]] = []
     broken: list[list[int]] = []
     for members in map(list, face.chains):

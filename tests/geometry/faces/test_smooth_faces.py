@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from assembly.errors import InputError
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.smooth_faces import has_creases, smooth_faces
