@@ -23,6 +23,7 @@ from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.step.faces import read_face
 from assembly.step.occt import occt, parts, quiet, settings
 from assembly.step.profiles import Unreadable
+from assembly.step.references import references_of
 from assembly.step.syntax import first_fault, is_step, mended
 from assembly.step.tree import Color, Part, free_labels, leaves
 
@@ -34,6 +35,12 @@ UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}
 EXACT = 1e-7
 # Seconds that a damaged file may take, kernels that are compiled for the first time included.
 PATIENCE = 240.0
+# Beginnings of OCCT's names of entities that say nothing of shapes.
+_BESIDE = (
+    "StepBasic_Approval", "StepBasic_Date", "StepBasic_Person", "StepBasic_Organization", "StepBasic_Security",
+    "StepBasic_Certification", "StepBasic_Contract", "StepBasic_CalendarDate", "StepBasic_LocalTime",
+    "StepBasic_Address", "StepBasic_Action", "StepAP214_Applied", "StepAP203_Cc", "StepDimTol_",
+)  # fmt: skip
 # Exit codes from which on Windows means a crash; elsewhere they are negative.
 ENDED = 0xC0000000
 # What is raised in this one is raised again in the process that asked. It ends without OCCT's taking anything down.
@@ -88,27 +95,39 @@ def checked_unit(unit: str) -> float:
     return UNITS[unit]
 
 
-def document_of(path: str, folder: str | None = None) -> tuple[Any, int]:
-    """The file as a document of OCCT, in millimeters, and the number of its faces.
+def document_of(path: str, folder: str | None = None) -> tuple[Any, int, list[str]]:
+    """The file as a document of OCCT, in millimeters, the number of its faces, and files that it needs and are missing.
 
     Entities that OCCT cannot load may end the process when it makes shapes of them, or some later time, and text that
     is no STEP file's may hold up its parser for good: a file that has such is refused, unless there is a folder. Then
     OCCT is given what is whole of the text, from there.
     """
-    text = Path(path).read_bytes()
+    # OCCT looks for files that this one refers to beside it only by a whole path.
+    file = Path(path).absolute()
+    text = file.read_bytes()
     if not is_step(text):
         raise StepError(f"path is {path!r}; expected a STEP file, which begins with ISO-10303-21")
+    others = references_of(text, file.parent)
+    whole = _whole(path, text, folder)
+    for other in others.files:
+        _whole(str(other), other.read_bytes(), folder, other.relative_to(file.parent))
+    del text
+    return (*_loaded(path, str(file) if folder is None else whole, folder is not None), others.missing)
+
+
+def _whole(path: str, text: bytes, folder: str | None, name: Path = Path("whole.step")) -> str:
+    """Where what is whole of a text is: in the folder, by a name."""
     fault = first_fault(text)
-    if fault is not None and folder is None:
+    if folder is None:
+        if fault is None:
+            return path
         if fault.is_lost:
             raise _Damaged(f"path is {path!r}; a reference in line {fault.line} leads nowhere")
         raise _Malformed(f"path is {path!r}; its text is damaged in line {fault.line}")
-    file = path
-    if fault is not None:
-        file = os.path.join(str(folder), "whole.step")
-        Path(file).write_bytes(mended(text))
-    del text
-    return _loaded(path, file, folder is not None)
+    file = Path(folder) / name
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(text if fault is None else mended(text))
+    return str(file)
 
 
 def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
@@ -136,9 +155,15 @@ def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
 
 
 def _broken_entities(reader: Any) -> int:
-    """Number of entities that OCCT could not load."""
+    """Number of entities that OCCT could not load, and that it may make shapes or colors of."""
     model = reader.Reader().WS().Model()
-    return sum(model.IsErrorEntity(k) for k in range(1, model.NbEntities() + 1))
+    broken = (k for k in range(1, model.NbEntities() + 1) if model.IsErrorEntity(k))
+    return sum(not _is_beside(type(model.Value(k)).__name__) for k in broken)
+
+
+def _is_beside(kind: str) -> bool:
+    """Whether entities of a kind say nothing of shapes: who made them and when, solid angles, dimensions."""
+    return kind.endswith("AndSolidAngleUnit") or kind.startswith(_BESIDE)
 
 
 def _read_apart(path: str, unit: str, strict: bool, damage: str) -> tuple[list[Body], list[str]]:
@@ -180,7 +205,7 @@ def _face_count(reader: Any) -> int:
 
 def solids_of(path: str) -> Iterator[Any]:
     """OCCT's shapes of the bodies that `read_step` makes, in their order."""
-    document, _ = document_of(path)
+    document = document_of(path)[0]
     root = occt().XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     for label in free_labels(root):
         for leaf in leaves(label, occt().TopLoc_Location(), None, None):
@@ -268,7 +293,8 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     trims, up to curves around an axis that have no rational form (helices, intersections): those are followed to
     1e-10 of the face's extent in (u, v). Ends of edges that the file leaves apart within its tolerance are joined.
     Faces are a little smaller than the patches of their surfaces. Shells and faces outside of any solid become bodies
-    too. What bounds no face, as wires, points and annotations, is not read.
+    too. What bounds no face, as wires, points and annotations, is not read. Files of parts that the file refers to are
+    looked for beside it.
 
     Parameters
     ----------
@@ -298,7 +324,8 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     Warns
     -----
     StepWarning
-        Faces that are left out, or were approximated by more than 1e-7 mm (offset surfaces); damage to the file.
+        Faces that are left out, or were approximated by more than 1e-7 mm (offset surfaces); damage to the file; files
+        that it refers to and that are not there.
     """
     checked_unit(unit)
     if not isinstance(strict, (bool, np.bool_)):
@@ -327,7 +354,7 @@ def bodies_of(path: str, unit: str, strict: bool, folder: str | None = None) -> 
     file = Path(path)
     o = occt()
     with quiet():
-        document, count = document_of(path, folder)
+        document, count, absent = document_of(path, folder)
         root = o.XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
         bodies: list[Body] = []
         missing: list[str] = []
@@ -364,9 +391,10 @@ def bodies_of(path: str, unit: str, strict: bool, folder: str | None = None) -> 
         raise StepError(
             f"path is {str(file)!r}; {_listed('not read', missing + lost)}; pass strict=False to go without"
         )
+    away = [f"{name!r}, which it refers to and which is not there" for name in absent]
     if not bodies:
-        raise StepError(f"path is {str(file)!r}; it has no faces")
-    missing += lost
+        raise StepError(f"path is {str(file)!r}; it has no faces" + (f"; {_listed('not read', away)}" if away else ""))
+    missing += lost + away
     lines = (("not read", missing), ("approximated", inexact))
     return bodies, [f"{file.name}: {_listed(what, told)}" for what, told in lines if told]
 

@@ -1,25 +1,29 @@
 """Faces as shapes of OCCT: trimmed faces, sewn to shells and solids.
 
-Surfaces become B-splines, flat rectangles planes. Boundary curves keep their curves in (u, v); a plane's parameters are
-made lengths before. In space a curve along a parameter is taken from the surface and a curve in a plane is mapped with
-it, both exactly; any other is interpolated.
+Surfaces are written as what they are (`carriers`). A curve along a parameter is taken from the surface, and lines and
+circles in planes are lines and circles, exactly; other curves in a plane, and curves on surfaces with our parameters,
+keep their control points; any other is interpolated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
+from math import pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
-from assembly.geometry.faces.loop import Loop
-from assembly.geometry.seams.region_cuts import cut_open
-from assembly.geometry.seams.region_pieces import POLE, SEAM, Piece
+from assembly.geometry.recognition.curves import Circle, Line, curve_form
+from assembly.geometry.seams.region_cuts import cut_in_two, cut_open
+from assembly.geometry.seams.region_pieces import EDGE, POLE, SEAM, Piece
+from assembly.geometry.seams.region_strips import area_of, corners_of, strip, winds
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.step.carriers import carrier_of, spline_curve
 from assembly.step.occt import occt, parts
 from assembly.step.profiles import approximated
 from assembly.step.trims import crossings
@@ -31,93 +35,22 @@ Array = NDArray[np.float64]
 FOLLOWED = 1e-10
 # Tolerances of edges and of sewing, the latter over the size of the body.
 EDGE_TOLERANCE, SEWING = 1e-7, (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
-# Rounding of the axes of planes, which are orthonormal.
-ORTHONORMAL = 1e-13
-
-
-def _points(rows: Array) -> Any:
-    """An array of points in space or in the plane."""
-    o = occt()
-    kind, single = (o.Points, o.gp_Pnt) if rows.shape[1] == 3 else (o.Points2d, o.gp_Pnt2d)
-    array = kind(1, len(rows))
-    for k, row in enumerate(rows.tolist(), 1):
-        array.SetValue(k, single(*row))
-    return array
-
-
-def _reals(row: Array) -> Any:
-    array = occt().Reals(1, len(row))
-    for k, value in enumerate(row.tolist(), 1):
-        array.SetValue(k, value)
-    return array
-
-
-def _knots(row: Array) -> tuple[Any, Any]:
-    """Distinct knots and how often they count."""
-    distinct, times = np.unique(row, return_counts=True)
-    counts = occt().Integers(1, distinct.size)
-    for k, count in enumerate(times.tolist(), 1):
-        counts.SetValue(k, count)
-    return _reals(distinct), counts
-
-
-def spline_curve(points: Array, weights: Array, knots: Array, degree: int) -> Any:
-    """A B-spline curve of OCCT, in space or in the plane."""
-    o = occt()
-    kind = o.Geom_BSplineCurve if points.shape[1] == 3 else o.Geom2d_BSplineCurve
-    if np.ptp(weights) == 0.0:
-        return kind(_points(points), *_knots(knots), degree)
-    return kind(_points(points), _reals(weights), *_knots(knots), degree)
-
-
-def _plane_axes(surface: NurbsSurface) -> Array | None:
-    """x and y, (2, 3), of a surface origin + u x + v y where they are orthogonal; None of any other surface."""
-    if surface.degree != (1, 1) or surface.control_points.shape != (2, 2, 3) or np.ptp(surface.weights) > 0.0:
-        return None
-    net = surface.control_points
-    sides = np.array([net[1, 0] - net[0, 0], net[0, 1] - net[0, 0]])
-    twist = np.abs(net[1, 1] - net[1, 0] - net[0, 1] + net[0, 0]).max()
-    lengths = np.linalg.norm(sides, axis=1)
-    if twist > ORTHONORMAL * surface.size or abs(sides[0] @ sides[1]) > ORTHONORMAL * lengths.prod():
-        return None
-    return sides / np.ptp(surface.domain, axis=1)[:, None] if lengths.all() else None
-
-
-def occt_surface(surface: NurbsSurface) -> Any:
-    """The same surface, with the same parameters."""
-    o = occt()
-    net = surface.control_points
-    xy = _plane_axes(surface)
-    if xy is not None and np.abs(np.linalg.norm(xy, axis=1) - 1.0).max() <= ORTHONORMAL:
-        (u0, _), (v0, _) = surface.domain
-        origin, normal = net[0, 0] - u0 * xy[0] - v0 * xy[1], np.cross(*xy)
-        axes = (o.gp_Pnt(*origin.tolist()), o.gp_Dir(*normal.tolist()), o.gp_Dir(*xy[0].tolist()))
-        return o.Geom_Plane(o.gp_Ax3(*axes))
-    for row, degree in zip(surface.knots, surface.degree, strict=True):
-        if row[0] != row[degree] or row[-1] != row[-degree - 1]:
-            surface = surface.elevate(surface.degree)
-            break
-    net = surface.control_points
-    n, m, _ = net.shape
-    poles, weights = o.PointNet(1, n, 1, m), o.RealNet(1, n, 1, m)
-    for i in range(n):
-        for j in range(m):
-            poles.SetValue(i + 1, j + 1, o.gp_Pnt(*net[i, j].tolist()))
-            weights.SetValue(i + 1, j + 1, float(surface.weights[i, j]))
-    (ku, cu), (kv, cv) = _knots(surface.knots[0]), _knots(surface.knots[1])
-    return o.Geom_BSplineSurface(poles, weights, ku, kv, cu, cv, *surface.degree)
+# Faces that go on over more than so many turns are cut.
+ONCE = 1.0 + 1e-6
+# How far a bilinear surface may be from an affine one, over its size.
+LINEAR = 1e-13
 
 
 class _FaceBuilder:
     """One face on its way to OCCT."""
 
-    def __init__(self, face: Face) -> None:
+    def __init__(self, face: Face, surface: NurbsSurface, chains: list[list[Piece]]) -> None:
         o = occt()
         self.face = face
-        self.surface, self.chains = cut_open(face)
+        self.surface, self.chains = surface, chains
         self.build = o.BRep_Builder()
-        self.geometry = occt_surface(self.surface)
-        self.axes = _plane_axes(self.surface) if isinstance(self.geometry, o.Geom_Plane) else None
+        self.carrier = carrier_of(self.surface)
+        self.geometry = self.carrier.geometry
         self.made = o.TopoDS_Face()
         self.build.MakeFace(self.made, self.geometry, EDGE_TOLERANCE)
         self.corners: list[tuple[Array, Any]] = []
@@ -127,6 +60,23 @@ class _FaceBuilder:
         low, high = np.array(self.surface.domain).T
         uv = np.clip(uv, low, high)
         return self.surface.evaluate(uv[:, 0], uv[:, 1])
+
+    @cached_property
+    def is_affine(self) -> bool:
+        """Whether points of a plane are linear in our parameters."""
+        surface = self.surface
+        if surface.degree != (1, 1) or surface.control_points.shape != (2, 2, 3) or np.ptp(surface.weights) > 0.0:
+            return False
+        net = surface.control_points
+        return float(np.abs(net[1, 1] - net[1, 0] - net[0, 1] + net[0, 0]).max()) <= LINEAR * surface.size
+
+    def extended(self, uv: Array) -> Array:
+        """Points of an affine plane at any parameters."""
+        net = self.surface.control_points
+        (u0, u1), (v0, v1) = self.surface.domain
+        sides = np.array([(net[1, 0] - net[0, 0]) / (u1 - u0), (net[0, 1] - net[0, 0]) / (v1 - v0)])
+        points: Array = net[0, 0] + (uv - [u0, v0]) @ sides
+        return points
 
     def vertex(self, uv: Array) -> Any:
         """The vertex at a corner of the boundary, one for all that are one point."""
@@ -144,27 +94,41 @@ class _FaceBuilder:
         """Curve in (u, v), curve in space, range, and whether it runs backwards, of a line along a parameter."""
         o = occt()
         ends = curve.control_points
-        if len(ends) > 2:
+        if len(ends) > 2 or self.carrier.plane is not None:
             return None
         for axis in (0, 1):
             if ends[0, axis] != ends[1, axis]:
                 continue
-            first, last = ends[:, 1 - axis]
-            along = o.gp_Dir2d(*np.eye(2)[1 - axis].tolist())
+            there = self.carrier.at(ends)
+            across = 1 - axis if self.carrier.swapped else axis
+            there[:, across] = there[0, across]
+            first, last = there[:, 1 - across]
+            along = o.gp_Dir2d(*np.eye(2)[1 - across].tolist())
             start = np.zeros(2)
-            start[axis] = ends[0, axis]
+            start[across] = there[0, across]
             flat = o.Geom2d_Line(o.gp_Pnt2d(*start.tolist()), along)
-            space = (self.geometry.UIso, self.geometry.VIso)[axis](float(ends[0, axis]))
+            space = (self.geometry.UIso, self.geometry.VIso)[across](float(there[0, across]))
             return flat, space, float(min(first, last)), float(max(first, last)), bool(first > last)
         return None
 
     def _curve(self, curve: NurbsCurve) -> tuple[Any, Any, float, float, bool]:
-        flat = spline_curve(curve.control_points, curve.weights, curve.knots, curve.degree)
+        if self.carrier.plane is not None:
+            return self._in_plane(curve, self.carrier.plane)
         low, high = curve.domain
-        if self.axes is not None:
-            (u0, _), (v0, _) = self.surface.domain
-            points = self.surface.control_points[0, 0] + (curve.control_points - [u0, v0]) @ self.axes
-            return flat, spline_curve(points, curve.weights, curve.knots, curve.degree), low, high, False
+        joints = self._joints(curve)
+        space, _ = approximated(lambda t: self.at(curve.evaluate(t)), joints, FOLLOWED * self.surface.size)
+        points, weights = space.cartesian
+        if self.carrier.is_own:
+            flat = spline_curve(curve.control_points, curve.weights, curve.knots, curve.degree)
+        else:
+            around = FOLLOWED * float(np.ptp(self.carrier.at(np.array(self.surface.domain).T), axis=0).min())
+            mapped, _ = approximated(lambda t: self.carrier.at(curve.evaluate(t)), joints, around)
+            flat = spline_curve(*mapped.cartesian, mapped.knots, mapped.degree)
+        return flat, spline_curve(points, weights, space.knots, space.degree), low, high, False
+
+    def _joints(self, curve: NurbsCurve) -> Array:
+        """Parameters between which a curve on the surface is smooth."""
+        low, high = curve.domain
         breaks = [curve.breaks()]
         at = sampled(breaks[0], 17)
         values = curve.evaluate(at)
@@ -173,10 +137,55 @@ class _FaceBuilder:
                 np.array(crossings(values[:, axis], at, lambda t, axis=axis: float(curve.evaluate(t)[axis]), knots))
             )
         joints = np.unique(np.clip(np.concatenate(breaks), low, high))
-        joints = np.append(joints[:-1][np.diff(joints) > 1e-9 * (high - low)], high)
-        space, _ = approximated(lambda t: self.at(curve.evaluate(t)), joints, FOLLOWED * self.surface.size)
-        points, weights = space.cartesian
-        return flat, spline_curve(points, weights, space.knots, space.degree), low, high, False
+        return np.append(joints[:-1][np.diff(joints) > 1e-9 * (high - low)], high)
+
+    def _in_plane(self, curve: NurbsCurve, plane: Array) -> tuple[Any, Any, float, float, bool]:
+        """The same of a curve in a plane: a line or a circle if it is one."""
+        o = occt()
+        origin, axes = plane[0], plane[1:]
+        low, high = curve.domain
+        joints = self._joints(curve)
+        if self.is_affine:
+            points, weights = self.extended(curve.control_points), curve.weights
+            knots, degree = curve.knots, curve.degree
+        else:
+            space, _ = approximated(lambda t: self.at(curve.evaluate(t)), joints, FOLLOWED * self.surface.size)
+            (points, weights), knots, degree = space.cartesian, space.knots, space.degree
+        inside = (points - origin) @ axes.T
+        whole = NurbsCurve(np.column_stack([inside, np.zeros(len(inside))]), knots, degree, weights)
+        form = curve_form([whole.bezier_pieces()])
+        if isinstance(form, Line):
+            way = inside[-1] - inside[0]
+            length = float(np.linalg.norm(way))
+            space_way = o.gp_Dir(*(way @ axes).tolist())
+            flat = o.Geom2d_Line(o.gp_Pnt2d(*inside[0].tolist()), o.gp_Dir2d(*way.tolist()))
+            start = o.gp_Pnt(*(origin + inside[0] @ axes).tolist())
+            return flat, o.Geom_Line(start, space_way), 0.0, length, False
+        if isinstance(form, Circle):
+            at = sampled(whole.breaks(), 9)
+            out = whole.evaluate(at)[:, :2] - form.center[:2]
+            angles = np.unwrap(np.arctan2(out[:, 1], out[:, 0]))
+            turn = float(angles[-1] - angles[0])
+            if (np.diff(angles) * turn > 0.0).all() and abs(turn) < 2.0 * pi + 1e-9:
+                return self._arc(form, out[0], min(abs(turn), 2.0 * pi), turn > 0.0, plane)
+        flat = spline_curve(inside, weights, knots, degree)
+        return flat, spline_curve(origin + inside @ axes, weights, knots, degree), low, high, False
+
+    def _arc(
+        self, form: Circle, start: Array, turn: float, left: bool, plane: Array
+    ) -> tuple[Any, Any, float, float, bool]:
+        """A circle in a plane from the direction where it starts, counterclockwise or clockwise."""
+        o = occt()
+        origin, axes = plane[0], plane[1:]
+        x, center = start / np.linalg.norm(start), form.center[:2]
+        sense = 1.0 if left else -1.0
+        flat = o.Geom2d_Circle(o.gp_Ax2d(o.gp_Pnt2d(*center.tolist()), o.gp_Dir2d(*x.tolist())), form.radius, left)
+        place = o.gp_Ax2(
+            o.gp_Pnt(*(origin + center @ axes).tolist()),
+            o.gp_Dir(*(sense * np.cross(*axes)).tolist()),
+            o.gp_Dir(*(x @ axes).tolist()),
+        )
+        return flat, o.Geom_Circle(place, form.radius), 0.0, turn, False
 
     def edge(self, piece: Piece, partner: Piece | None) -> tuple[Any, bool]:
         """The edge of a piece, and whether the piece runs against it; of a seam, of both its pieces."""
@@ -196,7 +205,7 @@ class _FaceBuilder:
             else:
                 other = self._line(partner.curve)
                 assert other is not None and other[4] != backwards, "the two sides of a seam run against each other"
-                pair = (other[0], flat) if backwards else (flat, other[0])
+                pair = (other[0], flat) if backwards != self.carrier.turned else (flat, other[0])
                 self.build.UpdateEdge(edge, *pair, self.made, EDGE_TOLERANCE)
         self.build.Range(edge, low, high)
         first, last = (ends[1], ends[0]) if backwards else (ends[0], ends[1])
@@ -208,10 +217,12 @@ class _FaceBuilder:
         """The face."""
         o = occt()
         seams: list[tuple[Piece, Any, bool]] = []
+        # Where OCCT's normal is against ours, material is on the other side of its curves.
+        turned = self.carrier.turned
         for chain in self.chains:
             wire = o.TopoDS_Wire()
             self.build.MakeWire(wire)
-            for piece in chain:
+            for piece in chain[::-1] if turned else chain:
                 if piece.kind == SEAM:
                     known = next(((edge, back) for other, edge, back in seams if other is piece), None)
                     if known is None:
@@ -222,10 +233,10 @@ class _FaceBuilder:
                         edge, back = known
                 else:
                     edge, back = self.edge(piece, None)
-                self.build.Add(wire, edge.Oriented(o.TopAbs_REVERSED if back else o.TopAbs_FORWARD))
+                self.build.Add(wire, edge.Oriented(o.TopAbs_REVERSED if back != turned else o.TopAbs_FORWARD))
             wire.Closed(True)
             self.build.Add(self.made, wire)
-        return self.made.Oriented(o.TopAbs_REVERSED if self.face.reversed else o.TopAbs_FORWARD)
+        return self.made.Oriented(o.TopAbs_REVERSED if self.face.reversed != turned else o.TopAbs_FORWARD)
 
     def _partner(self, piece: Piece) -> Piece:
         """The piece on the other side of the domain that goes back along the same stretch of a seam."""
@@ -241,10 +252,54 @@ class _FaceBuilder:
 
 
 class Sewn:
-    """A body as a shape of OCCT, and what became of its faces."""
+    """A body as a shape of OCCT, and what became of each of its faces: several where it winds around its surface."""
 
-    def __init__(self, shape: Any, faces: list[Any], closed: bool) -> None:
+    def __init__(self, shape: Any, faces: list[list[Any]], closed: bool) -> None:
         self.shape, self.faces, self.closed = shape, faces, closed
+
+
+def _parts_of(face: Face) -> list[tuple[NurbsSurface, list[list[Piece]]]]:
+    """A face on a surface that is cut open; in parts of half a turn where it goes round more than once.
+
+    A surface of OCCT has its parameters once around, and points of a second turn would be taken for the first.
+    """
+    surface, chains = cut_open(face)
+    found = [(surface, chains)]
+    for axis in (0, 1):
+        period = face.surface._periods[axis]
+        if not period or surface.closed[axis]:
+            continue
+        low, high = surface.domain[axis]
+        points = [piece.curve.control_points[:, axis] for chain in chains for piece in chain]
+        if np.ptp(np.concatenate(points)) <= period * ONCE:
+            continue
+        count = int(np.ceil((high - low) / (0.5 * period)))
+        at = np.linspace(low, high, count + 1)
+        cut = []
+        for whole, rest in found:
+            for k, begin in enumerate(at[:-1].tolist()):
+                below = rest
+                if k < count - 1:
+                    below, rest = cut_in_two(rest, whole, axis, float(at[k + 1]))
+                part = strip(whole, axis, begin, float(at[k + 1]))
+                for piece in (piece for chain in below for piece in chain if piece.kind == SEAM):
+                    if piece.ends[0, axis] == piece.ends[1, axis]:
+                        piece.kind = EDGE
+                cut += [(part, group) for group in _grouped(below)]
+        found = cut
+    return found
+
+
+def _grouped(chains: list[list[Piece]]) -> list[list[list[Piece]]]:
+    """Outer chains, each with the holes in it."""
+    corners = [corners_of(chain) for chain in chains]
+    outer = [area_of(each) > 0.0 for each in corners]
+    groups = []
+    for k, chain in enumerate(chains):
+        if outer[k]:
+            holes = (h for h in range(len(chains)) if not outer[h] and winds(corners[k], corners[h][0]))
+            groups.append([chain, *(chains[h] for h in holes)])
+    return groups
 
 
 def sewn(faces: Sequence[Face], scale: float) -> Sewn:
@@ -258,7 +313,12 @@ def sewn(faces: Sequence[Face], scale: float) -> Sewn:
         Millimeters in our unit of length.
     """
     o = occt()
-    made = [_FaceBuilder(_in_millimeters(face, scale)).result() for face in faces]
+    made: list[Any] = []
+    owner: list[int] = []
+    for k, face in enumerate(faces):
+        for surface, chains in _parts_of(_in_millimeters(face, scale)):
+            made.append(_FaceBuilder(face, surface, chains).result())
+            owner.append(k)
     size = scale * max(face.surface.size for face in faces)
     for part in SEWING:
         sewing = o.BRepBuilderAPI_Sewing(max(part * size, EDGE_TOLERANCE))
@@ -286,7 +346,9 @@ def sewn(faces: Sequence[Face], scale: float) -> Sewn:
         build.MakeCompound(shape)
         for shell in shells:
             build.Add(shape, shell)
-    images = [sewing.Modified(face) if sewing.IsModified(face) else face for face in made]
+    images: list[list[Any]] = [[] for _ in faces]
+    for k, face in zip(owner, made, strict=True):
+        images[k].append(sewing.Modified(face) if sewing.IsModified(face) else face)
     return Sewn(shape, images, closed)
 
 
@@ -301,24 +363,8 @@ def _shell_of(face: Any, closed: bool) -> Any:
 
 
 def _in_millimeters(face: Face, scale: float) -> Face:
-    """The face in millimeters, with the same parameters, but that those of a plane become lengths, as OCCT's are."""
-    surface = face.surface if scale == 1.0 else face.surface.transformed(scale=scale)
-    axes = _plane_axes(surface)
-    factors = np.ones(2) if axes is None else np.linalg.norm(axes, axis=1)
-    if np.abs(factors - 1.0).max() > ORTHONORMAL:
-        knots = [factor * row for factor, row in zip(factors, surface.knots, strict=True)]
-        surface = NurbsSurface(surface.control_points, knots, surface.degree, surface.weights)
-        outer = None if face.outer is None else _stretched(face.outer, factors)
-        holes = [_stretched(hole, factors) for hole in face.holes]
-        return Face(surface, outer, holes, name=face.name, reversed=face.reversed)
-    if surface is face.surface:
+    """The face in millimeters, with the same parameters."""
+    if scale == 1.0:
         return face
+    surface = face.surface.transformed(scale=scale)
     return Face(surface, face.outer, face.holes, name=face.name, reversed=face.reversed)
-
-
-def _stretched(loop: Loop, factors: Array) -> list[NurbsCurve]:
-    """The curves of a loop, their u and v multiplied."""
-    return [
-        NurbsCurve(curve.control_points * factors, curve.knots, curve.degree, curve.weights, name=curve.name)
-        for curve in loop.curves
-    ]

@@ -161,7 +161,8 @@ def edge_curve(edge: Any, face: Any, patch: Patch, name: str) -> Edge:
     for vertex in (o.TopExp.FirstVertex_s(edge), o.TopExp.LastVertex_s(edge)):
         if not vertex.IsNull():
             tolerance = max(tolerance, o.BRep_Tool.Tolerance_s(vertex))
-    return Edge(made, (bool(level[0]), bool(level[1])), tolerance, name, deviation, o.BRep_Tool.IsClosed_s(edge, face))
+    is_level = (bool(level[0]), bool(level[1]))
+    return Edge(made, is_level, tolerance, name, deviation, o.BRep_Tool.IsClosed_s(edge, face))
 
 
 def _period(patch: Patch) -> Array:
@@ -177,6 +178,16 @@ def _meeting(last: Edge, first: Edge, a: Array, b: Array) -> Array:
         if last.level[axis] != first.level[axis]:
             at[axis] = (a if last.level[axis] else b)[axis]
     return at
+
+
+def _within(at: Array, patch: Patch) -> Array:
+    """(u, v), which may lie beyond the domain, in it."""
+    moved = at.copy()
+    for axis, ((low, high), closed) in enumerate(zip(patch.surface.domain, patch.surface.closed, strict=True)):
+        moved[..., axis] = (
+            low + np.mod(at[..., axis] - low, high - low) if closed else np.clip(at[..., axis], low, high)
+        )
+    return moved
 
 
 def head_to_tail(edges: list[Edge], patch: Patch) -> list[Edge]:
@@ -238,9 +249,7 @@ def chained(edges: list[Edge], patch: Patch) -> tuple[list[Edge], float]:
 
 def _apart(a: Array, b: Array, patch: Patch) -> float:
     """Distance in space of two points of (u, v), which may lie beyond the domain."""
-    at = np.array([a, b])
-    for axis, ((low, high), closed) in enumerate(zip(patch.surface.domain, patch.surface.closed, strict=True)):
-        at[:, axis] = low + np.mod(at[:, axis] - low, high - low) if closed else np.clip(at[:, axis], low, high)
+    at = _within(np.array([a, b]), patch)
     points = patch.surface.evaluate(at[:, 0], at[:, 1])
     return float(np.linalg.norm(points[0] - points[1]))
 

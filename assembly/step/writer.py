@@ -24,6 +24,21 @@ if TYPE_CHECKING:
 __all__ = ["write_step"]
 
 
+# Suffixes of other formats, and what writes those.
+_OTHERS = {
+    ".json": ("scene", "Assembly.save writes these"),
+    ".html": ("HTML", "asm.view.save_html writes these"),
+    ".stl": ("STL", "asm.write_stl writes these"),
+    ".obj": ("OBJ", "this library does not write them"),
+    ".iges": ("IGES", "this library does not write them"),
+    ".igs": ("IGES", "this library does not write them"),
+    ".brep": ("BREP", "this library does not write them"),
+    ".glb": ("glTF", "asm.write_gltf writes these"),
+    ".gltf": ("glTF", "this library does not write them"),
+    ".urdf": ("URDF", "asm.write_urdf writes these"),
+}
+
+
 def _named(label: Any, name: str) -> None:
     o = occt()
     o.TDataStd_Name.Set_s(label, o.TCollection_ExtendedString(name, True))
@@ -55,12 +70,13 @@ class _Document:
         _named(label, body.name)
         if body.color is not None:
             self.colors.SetColor(label, _color(body.color), o.XCAFDoc_ColorSurf)
-        for side, image in zip(body.faces, made.faces, strict=True):
-            sub = self.shapes.AddSubShape(label, image)
-            if not sub.IsNull():
-                _named(sub, side.name)
-                if side.face.color is not None:
-                    self.colors.SetColor(sub, _color(side.face.color), o.XCAFDoc_ColorSurf)
+        for side, images in zip(body.faces, made.faces, strict=True):
+            for image in images:
+                sub = self.shapes.AddSubShape(label, image)
+                if not sub.IsNull():
+                    _named(sub, side.name)
+                    if side.face.color is not None:
+                        self.colors.SetColor(sub, _color(side.face.color), o.XCAFDoc_ColorSurf)
         return label, made.closed
 
     def place(self, part: Any, name: str, pose: Pose, scale: float, color: Color | None) -> None:
@@ -83,9 +99,10 @@ def write_step(
     The file has one assembly. Bodies that share their faces are instances of one part where their names follow from
     its name ("nut", "nut 2"), so that `read_step` gives the same bodies again: names, poses, colors, names and colors
     of faces. Faces that close are written as a solid, others as shells; a body in several pieces is read as several.
-    Flat rectangular surfaces are written as planes, whatever their parameters, and all others as B-splines, both
-    exactly; of the edges, lines in (u, v) and curves in planes are exact and others are followed to 1e-10 of the
-    surface's size.
+    Planes, cylinders, cones, spheres, tori, extrusions and revolutions are written as such, whatever their parameters,
+    and all others as B-splines, exactly; of the edges, lines in (u, v) and curves in planes are exact and others are
+    followed to 1e-10 of the surface's size. A face that winds around its surface more than once is written in parts of
+    half a turn.
 
     Parameters
     ----------
@@ -99,13 +116,17 @@ def write_step(
     Raises
     ------
     StepError
-        Nothing to write, faces that cannot be written, a path that cannot be written to.
+        Nothing to write, faces that cannot be written, a path that cannot be written to or whose suffix is another
+        format's.
     ImportError
         OCCT is not installed: pip install "assembly-solver[step]".
     """
     scale = checked_unit(unit)
     placed = placed_bodies(what)
     file = Path(fspath(path))
+    other = _OTHERS.get(file.suffix.lower())
+    if other is not None:
+        raise StepError(f"path is {str(file)!r}, a name of {other[0]} files; expected .step or .stp; {other[1]}")
     o = occt()
     # Settings exist once there is a writer.
     writer = o.STEPCAFControl_Writer()

@@ -64,9 +64,15 @@ def test_sewn_faces_are_the_solid_they_came_from(name):
     made = sewn(direct, 1.0)
     assert made.closed and O.BRepCheck_Analyzer(made.shape).IsValid()
     assert len(parts(made.shape, O.TopAbs_FACE)) == len(direct)
-    # OCCT measures what we made of its shape, by a rule that stops at 1e-9.
-    assert off(areas(made.shape)[1], [sum(face.area() for face in direct)]) < 1e-7
-    assert off(volumes(made.shape)[1], [sum(face.volume_integral() for face in direct)]) < 1e-6
+    O.TopExp.MapShapes_s(made.shape, O.TopAbs_EDGE, numbers)
+    back = [read_face(face, numbers, None).face for face in faces(made.shape)]
+    assert off(sum(face.area() for face in back), [sum(face.area() for face in direct)]) < 1e-9
+    assert off(sum(face.volume_integral() for face in back), [sum(face.volume_integral() for face in direct)]) < 1e-8
+    if not any(isinstance(O.BRep_Tool.Surface_s(face), O.Geom_SurfaceOfLinearExtrusion) for face in faces(made.shape)):
+        # OCCT measures what we made of its shape, by a rule that stops at 1e-9; not so of splines that are extruded,
+        # of which it takes a few points however many spans they have: an ellipse's is 5 percent off.
+        assert off(areas(made.shape)[1], [sum(face.area() for face in direct)]) < 1e-7
+        assert off(volumes(made.shape)[1], [sum(face.volume_integral() for face in direct)]) < 1e-6
 
 
 @pytest.mark.parametrize("name", ["boss", "drilled torus", "drilled cone", "wedge of a sphere", "crossed cylinders"])
@@ -264,11 +270,10 @@ def test_parameters_need_not_be_lengths(tmp_path, name, factor):
 
 @pytest.mark.parametrize("name", SOLIDS)
 def test_flat_faces_may_be_splines(tmp_path, name):
-    make, _ = SOLIDS[name]
-    # Round holes in them come back as periodic splines.
+    make, planes = SOLIDS[name]
     sides = [reshaped(face, lambda surface: surface.elevate((3, 3))) for face in make()]
     for unit in ("mm", "in"):
-        check_again(tmp_path / "part.step", asm.Body(name, sides, POSE.position, POSE.quaternion), 0, unit)
+        check_again(tmp_path / "part.step", asm.Body(name, sides, POSE.position, POSE.quaternion), planes, unit)
 
 
 def test_open_shapes_are_shells(tmp_path):

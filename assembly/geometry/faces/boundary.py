@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from assembly.errors import InputError
 from assembly.geometry.faces.loop import TOLERANCE, Loop, curve_ends
+from assembly.geometry.faces.overshoot import clipped, extent, rates, widened
+from assembly.geometry.faces.relinked import Relinked, relinked
 from assembly.geometry.faces.trim_table import TrimTable, build
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
@@ -20,16 +22,18 @@ __all__ = ["Boundary", "LoopLike", "make_boundary"]
 
 Array = NDArray[np.float64]
 LoopLike = NurbsCurve | Iterable[NurbsCurve] | Loop
-# Curves that follow one another, and the way in (u, v) once around; NaN: they do not close.
-_Chain = tuple[list[NurbsCurve], Array]
 # How far beyond the domain, or off a pole edge or a seam, a curve may be, as a part of the domain.
 SLACK = 1e-9
+# How far loops may leave the surface, or go into each other, as a part of its size, where no tolerance is given.
+OVERSHOOT = 1e-4
+_EDGE = "the edge of the domain"
 
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """Loops as given (turned), all boundary curves, which of them make a chain, pole edges, and the table."""
+    """A surface that holds the loops, these (turned), all boundary curves, which make a chain, and the table."""
 
+    surface: NurbsSurface
     outer: Loop | None
     holes: tuple[Loop, ...]
     curves: tuple[NurbsCurve, ...]
@@ -55,6 +59,11 @@ class _Sheet(NamedTuple):
     domain: tuple[tuple[float, float], tuple[float, float]]
     closed: tuple[bool, bool]
     poles: int
+
+    @classmethod
+    def of(cls, surface: NurbsSurface) -> _Sheet:
+        """That of a surface."""
+        return cls(surface.domain, surface.closed, surface._pole_bits)
 
     @property
     def periods(self) -> tuple[float, float]:
@@ -168,80 +177,71 @@ def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[N
 
 
 def _as_loop(given: LoopLike, name: str, surface: NurbsSurface) -> Loop:
-    """A loop with the surface's periods, inside the domain of its open directions."""
+    """A loop with the surface's periods."""
     if isinstance(given, Loop):
-        loop = Loop.unchecked(given.curves, given.tolerance, surface._periods, name)
-    else:
-        if not isinstance(given, (NurbsCurve, Iterable)):
-            raise TypeError(f"{name} is {given!r}; expected a Loop, a NurbsCurve or several")
-        loop = Loop.unchecked(given, TOLERANCE, surface._periods, name)
-    loop.curves = _in_domain(loop.curves, name, surface)
-    return loop
+        return Loop.unchecked(given.curves, given.tolerance, surface._periods, name)
+    if not isinstance(given, (NurbsCurve, Iterable)):
+        raise TypeError(f"{name} is {given!r}; expected a Loop, a NurbsCurve or several")
+    return Loop.unchecked(given, TOLERANCE, surface._periods, name)
 
 
-def _in_domain(curves: tuple[NurbsCurve, ...], name: str, surface: NurbsSurface) -> tuple[NurbsCurve, ...]:
-    """Curves inside the domain of open directions, their control points near an edge of it moved onto the edge."""
-    counts = [len(curve.weights) for curve in curves]
-    given = np.concatenate([curve.control_points for curve in curves])
-    starts = np.cumsum([0, *counts[:-1]])
-    points = given.copy()
+def _in_domain(
+    curves: tuple[NurbsCurve, ...], name: str, surface: NurbsSurface, tolerance: Array
+) -> tuple[NurbsCurve, ...]:
+    """Curves inside the domain of open directions, their control points near an edge of it moved onto the edge.
+
+    What is farther beyond, up to the tolerance, is moved there as well.
+    """
+    made = list(curves)
     for axis in range(2):
         if surface.closed[axis]:
             continue
         low, high = surface.domain[axis]
         slack = SLACK * (high - low)
-        least = np.minimum.reduceat(given[:, axis], starts)
-        most = np.maximum.reduceat(given[:, axis], starts)
-        for k in np.flatnonzero((least < low - slack) | (most > high + slack)).tolist():
-            a, b = _extent(curves[k], axis)
-            if a < low - slack or b > high + slack:
-                raise InputError(
-                    f"{name} leaves the domain: curve {k} has {'uv'[axis]} from {a:g} to {b:g}; "
-                    f"expected {'uv'[axis]} in [{low:g}, {high:g}]"
-                )
+        given = np.concatenate([curve.control_points[:, axis] for curve in made])
+        if given.min() < low - slack or given.max() > high + slack:
+            for k, curve in enumerate(made):
+                row = curve.control_points[:, axis]
+                if row.min() >= low - slack and row.max() <= high + slack:
+                    continue
+                a, b = extent(curve, axis)
+                if a < low - tolerance[axis] or b > high + tolerance[axis]:
+                    raise InputError(
+                        f"{name} leaves the domain: curve {k} has {'uv'[axis]} from {a:g} to {b:g}; "
+                        f"expected {'uv'[axis]} in [{low:g}, {high:g}]"
+                    )
+                if a < low - slack or b > high + slack:
+                    made[k] = clipped(curve, axis, low, high)
         # A pole edge or a natural edge that was meant is met exactly.
-        for edge in (low, high):
-            points[np.abs(points[:, axis] - edge) <= slack, axis] = edge
-    changed = np.add.reduceat((points != given).any(axis=1), starts) > 0
-    if not changed.any():
-        return curves
-    return tuple(
-        NurbsCurve(points[first : first + count], curve.knots, curve.degree, curve.weights, name=curve.name)
-        if differs
-        else curve
-        for curve, first, count, differs in zip(curves, starts, counts, changed, strict=True)
-    )
+        for k, curve in enumerate(made):
+            points = curve.control_points
+            near = [np.abs(points[:, axis] - edge) <= slack for edge in (low, high)]
+            if any((at & (points[:, axis] != edge)).any() for at, edge in zip(near, (low, high), strict=True)):
+                points = points.copy()
+                for at, edge in zip(near, (low, high), strict=True):
+                    points[at, axis] = edge
+                made[k] = NurbsCurve(points, curve.knots, curve.degree, curve.weights, name=curve.name)
+    return tuple(made)
 
 
-def _extent(curve: NurbsCurve, axis: int) -> tuple[float, float]:
-    """Least and largest coordinate of a curve itself, by refined samples."""
-    at = curve.breaks()
-    t = np.unique(np.concatenate([np.linspace(a, b, 65) for a, b in zip(at[:-1], at[1:], strict=True)]))
-    result = []
-    for sign in (1.0, -1.0):
-        grid = t
-        for _ in range(6):
-            values = sign * curve.evaluate(grid)[:, axis]
-            k = int(np.argmin(values))
-            grid = np.linspace(grid[max(k - 1, 0)], grid[min(k + 1, grid.size - 1)], 65)
-        result.append(sign * float((sign * curve.evaluate(grid)[:, axis]).min()))
-    return result[0], result[1]
-
-
-def _check_apart(table: TrimTable, chains: Sequence[range], names: Sequence[str]) -> None:
-    """Raise where curves of a boundary meet beside their common corners."""
-    found = table.crossing(TOLERANCE)
-    if found is None:
-        return
+def _crossed(found: tuple[int, int, Array], chains: Sequence[range], names: Sequence[str]) -> InputError:
+    """What is raised where curves of a boundary meet beside their common corners."""
     k, m = sorted(n for curve in found[:2] for n, chain in enumerate(chains) if curve in chain)
     place = f"near (u, v) = ({found[2][0]:.6g}, {found[2][1]:.6g})"
     if names[k] == names[m]:
-        raise InputError(f"{names[k]} crosses or touches itself {place}; expected a loop without crossings")
-    raise InputError(f"{names[m]} crosses or touches {names[k]} {place}; expected loops that are apart")
+        return InputError(f"{names[k]} crosses or touches itself {place}; expected a loop without crossings")
+    return InputError(f"{names[m]} crosses or touches {names[k]} {place}; expected loops that are apart")
 
 
-def _check_ended(sheet: _Sheet, table: TrimTable, names: Sequence[str]) -> None:
-    """Raise where a face would reach an end of the domain without a boundary there."""
+def _check_bounds(sheet: _Sheet, table: TrimTable, names: Sequence[str]) -> None:
+    """Raise where loops do not bound one face, or it would reach an end of the domain without a boundary there."""
+    for k, name in enumerate(names):
+        if table.left[k] != 1.0 or table.right[k] != 0.0:
+            raise InputError(
+                f"{name} does not bound one face together with {names[0]}: on its left there is material "
+                f"{table.left[k]:g} times, on its right {table.right[k]:g} times; expected holes inside the outer "
+                "loop, none inside another, and rings with material on their left"
+            )
     domain, closed, poles = sheet
     for axis, (bit_low, bit_high) in ((1, (4, 8)), (0, (1, 2))):
         if closed[axis] or not closed[1 - axis]:
@@ -255,72 +255,139 @@ def _check_ended(sheet: _Sheet, table: TrimTable, names: Sequence[str]) -> None:
 
 
 @lru_cache(maxsize=256)
-def _natural_boundary(sheet: _Sheet) -> Boundary:
-    """The boundary of whole surfaces; many of a body are the same in their parameters."""
-    chains, names, silent = _natural_chains(sheet)
-    return _bounded(sheet, None, (), chains, names, silent)
+def _natural_boundary(sheet: _Sheet) -> tuple[tuple[NurbsCurve, ...], tuple[range, ...], TrimTable]:
+    """Curves, chains and table of whole surfaces; many of a body are the same in their parameters."""
+    chains, silent = _natural_chains(sheet)
+    curves, ranges, table = _table_of([(chain, bool(np.isfinite(turn).all())) for chain, turn in chains], sheet, silent)
+    _check_bounds(sheet, table, [_EDGE] * len(chains))
+    return curves, ranges, table
 
 
-def _natural_chains(sheet: _Sheet) -> tuple[list[_Chain], list[str], list[NurbsCurve]]:
-    """Chains of the edges of the domain, with the way once around, their names, and the pole edges."""
+def _natural_chains(sheet: _Sheet) -> tuple[list[tuple[list[NurbsCurve], Array]], list[NurbsCurve]]:
+    """Chains of the edges of the domain, with the way once around, and the pole edges."""
     edges, silent = _natural(sheet)
-    chains: list[_Chain] = []
+    chains = []
     for chain in edges:
         jump = curve_ends(chain[-1])[1] - curve_ends(chain[0])[0]
         closes = [x == 0.0 or abs(x) == p for x, p in zip(jump, sheet.periods, strict=True)]
         chains.append((chain, jump if all(closes) else np.full(2, np.nan)))
-    return chains, ["the edge of the domain"] * len(chains), silent
+    return chains, silent
 
 
-def make_boundary(surface: NurbsSurface, outer: LoopLike | None, holes: Sequence[LoopLike]) -> Boundary:
+def _tolerances(surface: NurbsSurface, tolerance: float | None) -> Array:
+    """What a tolerance in space is in u and in v."""
+    length = OVERSHOOT * surface.size if tolerance is None else tolerance
+    least = SLACK * np.ptp(np.array(surface.domain), axis=1)
+    return np.asarray(np.maximum(length / np.maximum(rates(surface), 1e-300), least))
+
+
+def make_boundary(
+    surface: NurbsSurface, outer: LoopLike | None, holes: Sequence[LoopLike], tolerance: float | None = None
+) -> Boundary:
     """Check loops and turn them; see `Face`."""
-    sheet = _Sheet(surface.domain, surface.closed, surface._pole_bits)
     if outer is None and not holes:
-        return _natural_boundary(sheet)
-    outer_loop = None
-    if outer is None:
-        chains, names, silent = _natural_chains(sheet)
+        return Boundary(surface, None, (), *_natural_boundary(_Sheet.of(surface)))
+    chains: list[tuple[list[NurbsCurve], Array]] = []
+    names: list[str] = []
+    silent: list[NurbsCurve] = []
+    outer_loop = None if outer is None else _as_loop(outer, "outer", surface)
+    hole_loops = [_as_loop(hole, f"holes[{k}]", surface) for k, hole in enumerate(holes)]
+    loops = hole_loops if outer_loop is None else [outer_loop, *hole_loops]
+    if loops and not _are_inside(loops, surface):
+        allowed = _tolerances(surface, tolerance)
+        slack = SLACK * np.ptp(np.array(surface.domain), axis=1)
+        if outer_loop is not None:
+            surface = widened(surface, [curve for loop in loops for curve in loop.curves], slack, allowed)
+        for k, loop in enumerate(loops, 0 if outer_loop is not None else 1):
+            loop.curves = _in_domain(loop.curves, f"holes[{k - 1}]" if k else "outer", surface, allowed)
+    if outer_loop is None:
+        chains, silent = _natural_chains(_Sheet.of(surface))
+        names = [_EDGE] * len(chains)
     else:
-        outer_loop = _as_loop(outer, "outer", surface)
         if not outer_loop.turn.any() and outer_loop.area < 0.0:
             outer_loop = outer_loop.reversed()
         chains, silent = _without_seams(outer_loop, surface)
         names = ["outer"] * len(chains)
-    hole_loops = []
-    for k, hole in enumerate(holes):
-        loop = _as_loop(hole, f"holes[{k}]", surface)
+    for k, loop in enumerate(hole_loops):
         if not loop.turn.any() and loop.area > 0.0:
-            loop = loop.reversed()
-        hole_loops.append(loop)
+            hole_loops[k] = loop = loop.reversed()
         more, points = _without_seams(loop, surface)
         chains += more
         silent += points
         names += [f"holes[{k}]"] * len(more)
-    return _bounded(sheet, outer_loop, tuple(hole_loops), chains, names, silent)
+    made = _Made(surface, outer_loop, tuple(hole_loops), silent)
+    return _bounding(made, chains, names, tolerance)
 
 
-def _bounded(
-    sheet: _Sheet,
-    outer: Loop | None,
-    holes: tuple[Loop, ...],
-    chains: Sequence[_Chain],
-    names: Sequence[str],
-    silent: Sequence[NurbsCurve],
-) -> Boundary:
-    """The boundary of chains with names, checked."""
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """Loops that are in the domain and turned, and the edges of theirs that are one point."""
+
+    surface: NurbsSurface
+    outer: Loop | None
+    holes: tuple[Loop, ...]
+    silent: list[NurbsCurve]
+
+
+def _are_inside(loops: Sequence[Loop], surface: NurbsSurface) -> bool:
+    """Whether no control point is beyond the domain, or so near to its edge that it has to be moved there."""
+    points = np.concatenate([curve.control_points for loop in loops for curve in loop.curves])
+    for axis, (low, high) in enumerate(surface.domain):
+        if surface.closed[axis]:
+            continue
+        row, slack = points[:, axis], SLACK * (high - low)
+        off = (np.abs(row - low) <= slack) & (row != low) | (np.abs(row - high) <= slack) & (row != high)
+        if off.any() or row.min() < low or row.max() > high:
+            return False
+    return True
+
+
+def _table_of(
+    chains: Sequence[tuple[list[NurbsCurve], bool]], sheet: _Sheet, silent: Sequence[NurbsCurve]
+) -> tuple[tuple[NurbsCurve, ...], tuple[range, ...], TrimTable]:
     curves = tuple(curve for chain, _ in chains for curve in chain)
     stops = np.cumsum([0] + [len(chain) for chain, _ in chains]).tolist()
     ranges = tuple(range(a, b) for a, b in zip(stops[:-1], stops[1:], strict=True))
-    closing = [bool(np.isfinite(turn).all()) for _, turn in chains]
-    table = build(curves, ranges, closing, silent if curves else (), sheet.domain, sheet.periods)
+    poles = silent if curves else ()
+    table = build(curves, ranges, [closes for _, closes in chains], poles, sheet.domain, sheet.periods)
+    return curves, ranges, table
+
+
+def _bounding(
+    made: _Made, chains: list[tuple[list[NurbsCurve], Array]], names: list[str], tolerance: float | None
+) -> Boundary:
+    """Chains as a boundary, cut and linked anew where loops touch."""
+    surface, outer, holes = made.surface, made.outer, made.holes
+    rows = [(chain, bool(np.isfinite(turn).all())) for chain, turn in chains]
+    curves, ranges, table = _table_of(rows, _Sheet.of(surface), made.silent)
     if outer is not None or holes:
-        _check_apart(table, ranges, names)
-    for k, name in enumerate(names):
-        if table.left[k] != 1.0 or table.right[k] != 0.0:
-            raise InputError(
-                f"{name} does not bound one face together with {names[0]}: on its left there is material "
-                f"{table.left[k]:g} times, on its right {table.right[k]:g} times; expected holes inside the outer "
-                "loop, none inside another, and rings with material on their left"
+        found = table.crossing(TOLERANCE)
+        if found is not None:
+            nearest = table.nearness(TOLERANCE)
+            side = np.ptp(np.array(surface.domain), axis=1)
+            allowed = float((_tolerances(surface, tolerance) / side).max())
+            new = relinked(chains, names, surface, (table.extent, nearest, allowed))
+            if new is None:
+                raise _crossed(found, ranges, names)
+            names = [chain.name for chain in new.chains]
+            curves, ranges, table = _table_of(
+                [(chain.curves, chain.closes) for chain in new.chains], _Sheet.of(surface), made.silent
             )
-    _check_ended(sheet, table, names)
-    return Boundary(outer, holes, curves, ranges, table)
+            if table.crossing(TOLERANCE, joined=True) is not None:
+                raise _crossed(found, ranges, names)
+            outer, holes = _loops_of(new, outer, holes, surface)
+    _check_bounds(_Sheet.of(surface), table, names)
+    return Boundary(surface, outer, holes, curves, ranges, table)
+
+
+def _loops_of(
+    new: Relinked, outer: Loop | None, holes: tuple[Loop, ...], surface: NurbsSurface
+) -> tuple[Loop | None, tuple[Loop, ...]]:
+    """Loops with their curves cut, all that touch as one, which touches itself; the given ones if some end at poles."""
+    if not all(chain.closes for chain in new.walks):
+        return outer, holes
+    loops = [Loop.unchecked(chain.curves, TOLERANCE, surface._periods, chain.name) for chain in new.walks]
+    around = new.chains[0].name
+    names = [chain.name for chain in new.walks]
+    first = names.index(around)
+    return loops[first], tuple(loops[:first] + loops[first + 1 :])

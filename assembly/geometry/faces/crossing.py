@@ -122,6 +122,15 @@ def _corners(store, trim, numbers, pair, tolerance):
     return Corners(int(after) + int(before), a.end if after else a.start, a.start if before else a.end)
 
 
+@kernel(inner=True)
+def _common_ends(pair, tolerance):
+    """The Corners of a pair of pieces that may share any of their ends."""
+    (a, b), move, near = pair, pair[1].move, 8.0 * tolerance
+    start = _is_near(a.start, b.start, move, near) or _is_near(a.start, b.end, move, near)
+    end = _is_near(a.end, b.start, move, near) or _is_near(a.end, b.end, move, near)
+    return Corners(int(start) + int(end), a.end if end else a.start, a.start if start else a.end)
+
+
 @kernel(inline=True)
 def _square_from(corner, p, q):
     """The square of the distance of a corner from the box of two points."""
@@ -187,29 +196,30 @@ def _meet(pool, a, b, corners, tolerance, size, stack, budget):
     return False, 0.0, 0.0, budget
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8, i8[::1], f8[:, ::1], i8[::1], f8, f8[::1])", allocates=True)
-def first_crossing(table, pool, trim, pieces, moves, order, tolerance, where):
+@kernel(signatures="(i8[::1], f8[::1], i8[::1], f8[:, ::1], f8, b1, f8[::1])", allocates=True)
+def first_crossing(table, pool, pieces, moves, tolerance, joined, where):
     """The first two pieces that cross, touch or overlap: their numbers, and the point in `where`; (-1, -1): none.
 
-    `pieces` are numbers of pieces, each to be moved by the row of `moves` (whole periods), and `order` is what sorts
-    them by their least u.
+    `pieces` are numbers of pieces of the trim at the start of the table, in the order of their least u after each is
+    moved by its row of `moves` (whole periods). Two pieces may meet where one follows the other; if they are `joined`,
+    wherever ends of both are one place.
     """
     store = Store(table, pool)
-    record = trim_at(table, trim)
+    record = trim_at(table, 0)
     size = trim_frame_at(pool, record.frame).extent
     stack = np.empty((256, 4))
     budget = _BUDGET
-    for j in range(order.size):
-        a = pieces[order[j]]
+    for j in range(pieces.size):
+        a = pieces[j]
         box = bounds_of(store, record, a).box
-        move_u = moves[order[j], 0]
-        move_v = moves[order[j], 1]
+        move_u = moves[j, 0]
+        move_v = moves[j, 1]
         right = box[1] + move_u + tolerance
-        for k in range(j + 1, order.size):
-            b = pieces[order[k]]
+        for k in range(j + 1, pieces.size):
+            b = pieces[k]
             other = bounds_of(store, record, b).box
-            shift_u = moves[order[k], 0]
-            shift_v = moves[order[k], 1]
+            shift_u = moves[k, 0]
+            shift_v = moves[k, 1]
             if other[0] + shift_u > right:
                 break
             if other[2] + shift_v > box[3] + move_v + tolerance:
@@ -221,6 +231,8 @@ def first_crossing(table, pool, trim, pieces, moves, order, tolerance, where):
             first = _moved(store, record, a, (0.0, 0.0))
             second = _moved(store, record, b, (shift_u - move_u, shift_v - move_v))
             corners = _corners(store, record, (a, b), (first, second), tolerance)
+            if joined:
+                corners = _common_ends((first, second), tolerance)
             found, u, v, budget = _meet(pool, first, second, corners, tolerance, size, stack, budget)
             if found:
                 where[0] = u + move_u

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import ReadOnlyArrays
-from assembly.errors import InputError, checked_color, items
+from assembly.errors import InputError, checked_color, items, positive
 from assembly.geometry.faces.boundary import Boundary, LoopLike, make_boundary
 from assembly.geometry.faces.loop import Loop
 from assembly.geometry.faces.measures import face_integrals
@@ -53,9 +53,15 @@ class Face:
         The outward normal is Su x Sv, or its negative when reversed.
     color : (red, green, blue), optional
         0 to 1 each; that of the body by default.
+    tolerance : float, optional
+        How far loops may leave the surface, or go into each other [length]; 1e-4 of the surface's size by default. The
+        surface is continued to where they end, as its last span goes on. What lies between loops that go into each
+        other belongs to no face.
 
     Attributes
     ----------
+    surface : NurbsSurface
+        The given one, or its continuation.
     boundary : tuple of NurbsCurve
         All boundary curves, material on their left, without seams and without edges that are one point in space.
     chains : tuple of range
@@ -66,8 +72,9 @@ class Face:
     TypeError
         The surface or a loop is something else.
     InputError
-        Naming the loop: one that is open, crosses or touches itself or another, leaves the domain, or does not
-        bound the face together with the others.
+        Naming the loop: one that is open, crosses itself or another or leaves the domain by more than the tolerance,
+        touches another along a stretch, or does not bound the face together with the others. Loops may touch in points,
+        and are cut there; those that do are one of `outer` and `holes`, and in `chains` none passes a place twice.
     """
 
     def __init__(
@@ -79,23 +86,27 @@ class Face:
         name: str | None = None,
         reversed: bool = False,
         color: Sequence[float] | None = None,
+        tolerance: float | None = None,
     ) -> None:
         if not isinstance(surface, NurbsSurface):
             raise TypeError(f"surface is {surface!r}; expected a NurbsSurface")
         if not isinstance(reversed, (bool, np.bool_)):
             raise TypeError(f"reversed is {reversed!r}; expected True or False")
+        if tolerance is not None:
+            tolerance = positive("tolerance", tolerance)
         self.surface = surface
         self.name = surface.name if name is None else checked_name(name)
         self.reversed = bool(reversed)
         self.color = color
         self._outer, self._holes = outer, items("holes", holes, "a sequence of loops")
         if outer is not None or self._holes:
-            _ = self._boundary
+            self._boundary = make_boundary(surface, outer, self._holes, tolerance)
+            self.surface = self._boundary.surface
 
     @cached_property
     def _boundary(self) -> Boundary:
-        """Made at once where there are loops to be checked, else when it is first asked for."""
-        return make_boundary(self.surface, self._outer, self._holes)
+        """Of a surface without loops, when it is first asked for."""
+        return make_boundary(self.surface, None, ())
 
     @property
     def color(self) -> tuple[float, float, float] | None:
@@ -109,7 +120,7 @@ class Face:
     @property
     def outer(self) -> Loop | None:
         """The outer loop, counterclockwise; None for the edge of the surface."""
-        return None if self._outer is None else self._boundary.outer
+        return self._boundary.outer if self._outer is not None or self._holes else None
 
     @property
     def holes(self) -> tuple[Loop, ...]:

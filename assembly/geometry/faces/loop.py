@@ -51,7 +51,7 @@ def _clamped(curve: NurbsCurve) -> NurbsCurve:
     return curve.elevate(p)
 
 
-def _with_ends(curve: NurbsCurve, start: Array, end: Array) -> NurbsCurve:
+def with_ends(curve: NurbsCurve, start: Array, end: Array) -> NurbsCurve:
     """A curve whose ends are moved a little."""
     points = curve.control_points.copy()
     points[0], points[-1] = start, end
@@ -186,7 +186,7 @@ class Loop(ReadOnlyArrays):
         after[-1] = np.where(turns, ends[-1, 1], corners[0] + snapped)
         differs = (ends[:, 0] != corners).any(axis=1) | (ends[:, 1] != after).any(axis=1)
         for k in np.flatnonzero(differs).tolist():
-            parts[k] = _with_ends(parts[k], corners[k], after[k])
+            parts[k] = with_ends(parts[k], corners[k], after[k])
         self.curves = tuple(parts)
         self.turn = read_only(snapped)
 

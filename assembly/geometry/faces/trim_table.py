@@ -82,14 +82,27 @@ class TrimTable:
         """Integers and doubles of all pieces, a record each."""
         return _pieces(self.table, self.pool, self.pieces)
 
-    def crossing(self, tolerance: float) -> tuple[int, int, Array] | None:
-        """Two boundary curves that cross, or come nearer than this part of the size, and where; None if none do."""
+    @property
+    def extent(self) -> float:
+        """Size of the boundary in (u, v)."""
+        return float(trim_frame_at(self.pool, trim_at(self.table, 0).frame).extent)
+
+    def nearness(self, tolerance: float) -> float:
+        """At which distance curves touch: this part of the size, or what is rounding."""
+        boxes = self.rows()[1].box[: trim_at(self.table, 0).pieces]
+        return max(tolerance * self.extent, NOISE * float(np.abs(boxes).max(initial=0.0)))
+
+    def crossing(self, tolerance: float, joined: bool = False) -> tuple[int, int, Array] | None:
+        """Two boundary curves that cross, or come nearer than this part of the size, and where; None if none do.
+
+        Curves may meet where one follows the other; if they are joined, at all of their ends.
+        """
         record = trim_at(self.table, 0)
         frame = trim_frame_at(self.pool, record.frame)
         links, bounds = self.rows()
         boxes = bounds.box[: record.pieces]
         low = boxes[:, [0, 2]]
-        nearest = max(tolerance * frame.extent, NOISE * float(np.abs(boxes).max(initial=0.0)))
+        nearest = self.nearness(tolerance)
         pieces, moves = np.arange(record.pieces), np.zeros((record.pieces, 2))
         cell = (frame.low_u, frame.period_u), (frame.low_v, frame.period_v)
         for axis, (begin, period) in enumerate(cell):
@@ -101,8 +114,9 @@ class TrimTable:
                 copies[:, axis] += period
                 moves = np.concatenate([moves, copies])
         order = np.argsort(low[pieces, 0] + moves[:, 0])
+        pieces, moves = pieces[order], np.ascontiguousarray(moves[order])
         where = np.empty(2)
-        a, b = first_crossing(self.table, self.pool, 0, pieces, moves, order, nearest, where)
+        a, b = first_crossing(self.table, self.pool, pieces, moves, nearest, joined, where)
         return None if a < 0 else (int(links.curve[a]), int(links.curve[b]), where)
 
 

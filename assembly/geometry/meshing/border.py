@@ -219,18 +219,17 @@ def border(face: Face, tolerance: float, angle: float) -> Border:
     places = [curve.evaluate(t) for curve, t in zip(face.boundary, steps, strict=True)]
     reach = _JOINED * np.ptp(np.concatenate(places), axis=0).max()
     curves, chains, spans, ends = [], [], [], []
-    for number, members in enumerate(face.chains):
-        for k in members:
-            after = k + 1 if k + 1 in members else members[0]
+    for number, members in enumerate(_linked_at_poles(face, places, reach)):
+        for k, after in zip(members, [*members[1:], members[0]], strict=True):
             t, points = steps[k], places[k]
             segments = np.stack([points[:-1], points[1:]], axis=1)
             gap = places[after][0] - points[-1]
             curve, span = np.full(len(t) - 1, k), np.column_stack([t[:-1], t[1:]])
             if np.abs(gap).max() <= reach:
                 segments[-1, 1] = places[after][0]
-            elif after == k + 1 or not _whole_periods(face.surface, gap):
+            elif not _whole_periods(face.surface, gap):
                 # Between the ends lies a pole, which is one point in space and an edge of the domain here.
-                segments = np.concatenate([segments, [[points[-1], places[after][0]]]])
+                segments = np.concatenate([segments, [[points[-1], points[-1] + _along_pole(face, points[-1], gap)]]])
                 curve, span = np.append(curve, -1), np.concatenate([span, [[0.0, 1.0]]])
             curves.append(curve)
             chains.append(np.full(len(curve), number))
@@ -245,6 +244,64 @@ def border(face: Face, tolerance: float, angle: float) -> Border:
             break
         found = found.split(rows)
     return found
+
+
+def _linked_at_poles(face: Face, places: list[Array], reach: float) -> list[list[int]]:
+    """Curves of chains that close; one that ends at a pole goes on with the next one there, material to the left."""
+    closed: list[list[int]] = []
+    broken: list[list[int]] = []
+    for members in map(list, face.chains):
+        gap = places[members[0]][0] - places[members[-1]][-1]
+        closes = np.abs(gap).max() <= reach or _whole_periods(face.surface, gap)
+        (closed if closes else broken).append(members)
+    while broken:
+        chain = broken.pop(0)
+        while True:
+            end = places[chain[-1]][-1]
+            rows = [chain, *broken]
+            ways = [_way_along_pole(face, end, places[row[0]][0]) for row in rows]
+            best = int(np.argmin(ways))
+            if best == 0 or not np.isfinite(ways[best]):
+                break
+            chain += broken.pop(best - 1)
+        closed.append(chain)
+    return closed
+
+
+def _pole_of(face: Face, place: Array) -> tuple[int, float] | None:
+    """The parameter that runs along the pole at a place, and the way it goes with the material to its left."""
+    for side in pole_sides(face.surface):
+        axis, end = divmod(side, 2)
+        low, high = face.surface.domain[axis]
+        if abs(place[axis] - (low, high)[end]) <= _JOINED * (high - low):
+            return 1 - axis, 1.0 if side in (1, 2) else -1.0
+    return None
+
+
+def _way_along_pole(face: Face, end: Array, start: Array) -> float:
+    """How far it is along a pole from the end of a chain to the start of one, infinite where they share none."""
+    pole = _pole_of(face, end)
+    if pole is None or pole != _pole_of(face, start):
+        return np.inf
+    along, sign = pole
+    way = sign * float(start[along] - end[along])
+    if face.surface.closed[along]:
+        low, high = face.surface.domain[along]
+        way %= high - low
+    return way if way >= -_JOINED else np.inf
+
+
+def _along_pole(face: Face, end: Array, gap: Array) -> Array:
+    """The step along a pole across a gap, without whole periods."""
+    pole = _pole_of(face, end)
+    if pole is None:
+        return gap
+    along, sign = pole
+    step = gap.copy()
+    if face.surface.closed[along]:
+        low, high = face.surface.domain[along]
+        step[along] = sign * ((sign * gap[along]) % (high - low))
+    return step
 
 
 def _whole_periods(surface: NurbsSurface, gap: Array) -> bool:

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from assembly.errors import InputError
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.smooth_faces import has_creases, smooth_faces
@@ -124,6 +123,8 @@ TRIMMED = {
     "disk with a hole": Face(ROOF, circle((0.9, 0.5), 0.45), [circle((0.9, 0.5), 0.2, True)]),
     "along the ridge": Face(ROOF, polygon((1, 0.1), (1.7, 0.1), (1.7, 0.9), (1, 0.9))),
     "along it for a while": Face(ROOF, polygon((0.5, 0.1), (1.7, 0.1), (1.7, 0.9), (1, 0.9), (1, 0.5), (0.5, 0.5))),
+    "a hole that touches it from beside": Face(ROOF, holes=[circle((1.3, 0.5), 0.3, True)]),
+    "a notch down to it": Face(ROOF, polygon((0, 0.1), (1.7, 0.1), (1.0, 0.5), (1.7, 0.9), (0, 0.9))),
     "a corner at the ridge": Face(ROOF, polygon((1, 0.5), (1.7, 0.1), (1.7, 0.9))),
     "comb": Face(
         ROOF, polygon((0.2, 0.1), (1.8, 0.1), (1.8, 0.3), (0.6, 0.4), (1.8, 0.5), (1.8, 0.7), (0.6, 0.8), (0.2, 0.9))
@@ -167,17 +168,3 @@ def test_parts_are_smooth_and_cover_the_face(name):
                 here, there = surface.evaluate(u[held], v[held]), part.surface.evaluate(at[held], v[held])
                 np.testing.assert_allclose(there, here, atol=1e-13)
     np.testing.assert_array_equal(count, inside)
-
-
-@pytest.mark.parametrize(
-    "face",
-    [
-        Face(ROOF, holes=[circle((1.3, 0.5), 0.3, True)]),
-        Face(ROOF, polygon((0, 0.1), (1.7, 0.1), (1.0, 0.5), (1.7, 0.9), (0, 0.9))),
-    ],
-    ids=["a hole", "a notch"],
-)
-def test_what_touches_a_crease_from_beside_is_refused(face):
-    # One of the parts would touch itself.
-    with pytest.raises(InputError, match="has a crease and cannot be cut along it: .* crosses or touches"):
-        smooth_faces(face)
