@@ -28,28 +28,34 @@ from assembly.proximity.manager.overlap import patch_at, seen_by_other
 __all__ = ["may_be_over", "may_have_own"]
 
 # Two elements of edges cross near them where the lines through their middles do within so many of their half widths;
-# elements turn by 0.2 rad, and edges whose angle's sine is less than this may cross anywhere.
-BEYOND, PARALLEL = 2.0, 0.2
+# elements turn by 0.2 rad, and of edges whose angle's sine is less than this the bends tell where they do, if these are
+# more than rounding.
+BEYOND, PARALLEL, STRAIGHT = 2.0, 0.2, 1e-9
 
 
 @kernel(inner=True)
 def may_cross(posed, codes, f, g):
     """Whether two edges may cross, seen along their common perpendicular, near two elements of theirs.
 
-    Judged by the tangents at their middles, where these are not all but parallel.
+    Judged by the tangents at their middles; where these are all but parallel, as of rims about one axis, by a step of
+    Newton's method for d.f' = d.g' = 0, the ends of the perpendicular d.
     """
     store = posed.store
-    p, along_f, _bent = edge_jet(store, feature_at(store.table, posed.shells[0], codes[0]), f.middle[0])
-    q, along_g, _bent = edge_jet(store, feature_at(store.table, posed.shells[1], codes[1]), g.middle[0])
+    p, along_f, bent_f = edge_jet(store, feature_at(store.table, posed.shells[0], codes[0]), f.middle[0])
+    q, along_g, bent_g = edge_jet(store, feature_at(store.table, posed.shells[1], codes[1]), g.middle[0])
     d = sub(seen_by_other(posed, 1, q), p)
     along_g = matvec(posed.pose.rotation, along_g)
     ff, fg, gg = dot(along_f, along_f), dot(along_f, along_g), dot(along_g, along_g)
-    determinant = ff * gg - fg * fg
-    if determinant < PARALLEL * PARALLEL * ff * gg:
-        return True
+    determinant, square, most = ff * gg - fg * fg, ff * gg, BEYOND
+    if determinant < PARALLEL * PARALLEL * square:
+        ff -= dot(d, bent_f)
+        gg += dot(d, matvec(posed.pose.rotation, bent_g))
+        determinant, most = ff * gg - fg * fg, BESIDE
+        if abs(determinant) <= STRAIGHT * square:
+            return True
     df, dg = dot(d, along_f), dot(d, along_g)
     at_f, at_g = (df * gg - dg * fg) / determinant, (df * fg - dg * ff) / determinant
-    return abs(at_f) <= BEYOND * f.half[0] and abs(at_g) <= BEYOND * g.half[0]
+    return abs(at_f) <= most * f.half[0] and abs(at_g) <= most * g.half[0]
 
 
 @kernel(inner=True)
