@@ -22,7 +22,7 @@ from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_p
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
 from assembly.proximity.clearance.slimming import slim_answer
-from assembly.proximity.clearance.touching import left_open, move_apart
+from assembly.proximity.clearance.touching import filled_bore, left_open, move_apart, off_contacts
 from assembly.proximity.extrema.pairs import ContactPair
 from assembly.solve.contact_pairs import contact_pairs, listed_contacts
 from assembly.solve.interruption import CTRL_C
@@ -48,6 +48,8 @@ Array = NDArray[np.float64]
 NEAR = 2.0
 # Moves that are tried for contacts that no row tells of.
 TRIES = 3
+# Pairs of nodes that a look may take where bodies conform.
+FEW = 500
 
 
 @dataclass(frozen=True)
@@ -119,14 +121,15 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
         ]
     touching = solution._touching * packed.scale
     with lent_proof(packed, scene.bodies) as proof:
-        # What opened contacts at the last solve may do so here, if no more was called touching there.
-        answers = proof.look(solution.q, touching, proof.moves)
+        wedged = _open_recognized(proof, solution.q, touching)
+        answers = _first_looks(proof, solution.q, touching, wedged)
         left = [k for k, answer in enumerate(answers) if not is_proven(answer) or answer.depth > touching]
+        left = [k for k in left if k not in wedged]
         near = near_contacts(solution, proof, NEAR * touching) if left else {}
         for k in left:
             answers[k] = _opened(proof, k, solution.q, near.get(k), touching)
         conforming = [
-            answer.verdict is Verdict.UNDECIDED and conforms(proof, k, solution.q, touching)
+            answer.verdict is Verdict.UNDECIDED and (k in wedged or conforms(proof, k, solution.q, touching))
             for k, answer in enumerate(answers)
         ]
         for k in np.flatnonzero(conforming).tolist():
@@ -144,6 +147,39 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
         proved = proven and not (touched and item.minimum > 0.0)
         found.append(PairAnswer(item.name, (a.name, b.name), answer, proven or k in clear, proved))
     return found
+
+
+def _open_recognized(proof: ClearanceProof, q: Array, touching: float) -> set[int]:
+    """Find what opens pairs that are recognized to touch, among the moves of a proof; the pairs that nothing opens.
+
+    What opened a pair at the last solve may do so here.
+    """
+    wedged = set()
+    for k in proof.near_pairs(q, touching):
+        if proof.moves[k].any():
+            continue
+        off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, _unknown)
+        if off is not None:
+            proof.moves[k] = off
+        elif conforms(proof, k, q, touching):
+            wedged.add(k)
+    return wedged
+
+
+def _unknown() -> None:
+    """Nothing is known of where bodies touch."""
+    return None
+
+
+def _first_looks(proof: ClearanceProof, q: Array, touching: float, wedged: set[int]) -> list[Answer]:
+    """What is proven of all pairs where their moves open them; of those that nothing opens, whether they cross.
+
+    No look tells that bodies conform: it would spend all that it may.
+    """
+    asked = [k for k in range(len(proof.pairs)) if k not in wedged]
+    answers = dict(zip(asked, proof.look(q, touching, proof.moves, which=asked), strict=True))
+    answers |= dict(zip(wedged, proof.look(q, touching, which=list(wedged), budget=FEW), strict=True))
+    return [answers[k] for k in range(len(proof.pairs))]
 
 
 def _opened(proof: ClearanceProof, k: int, q: Array, near: Contacts | None, touching: float) -> Answer:

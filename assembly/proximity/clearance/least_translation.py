@@ -106,24 +106,41 @@ class _Hulls:
         return np.asarray(best * n)
 
 
-def _is_clear(proof: ClearanceProof, k: int, q: Array, way: Array) -> bool:
-    moved = q.copy()
-    moved[proof.pairs[k][1], :3] += way
-    return proof.look(moved, 0.0, which=[k])[0].verdict is Verdict.CLEAR
+class _Translated:
+    """Pair k of a proof at poses (n, 7), its second body translated.
 
+    Where the two cross, no translation by less than the depth undoes it: what is that near to a translation at which
+    they do crosses as well, and is not looked at.
+    """
 
-def _first_clear(proof: ClearanceProof, k: int, q: Array, n: Array, most: float) -> float:
-    """The least length along a direction, no more than the most, at which a pair is found clear; inf if none is."""
-    low = 0.0
-    for length in most * np.geomspace(FIRST, 1.0, LENGTHS):
-        if _is_clear(proof, k, q, length * n):
-            high = float(length)
-            while high - low > CLOSE * high:
-                middle = 0.5 * (low + high)
-                low, high = (low, middle) if _is_clear(proof, k, q, middle * n) else (middle, high)
-            return high
-        low = float(length)
-    return np.inf
+    def __init__(self, proof: ClearanceProof, k: int, q: Array) -> None:
+        self._proof, self._k, self._q = proof, k, q
+        self._crossing, self._depths = np.empty((0, 3)), np.empty(0)
+
+    def is_clear(self, way: Array) -> bool:
+        """Whether the pair is found clear where its second body is translated so."""
+        if (np.linalg.norm(self._crossing - way, axis=1) < self._depths).any():
+            return False
+        moved = self._q.copy()
+        moved[self._proof.pairs[self._k][1], :3] += way
+        (answer,) = self._proof.look(moved, 0.0, which=[self._k])
+        if answer.verdict is Verdict.CROSSING:
+            self._crossing = np.append(self._crossing, way[None], axis=0)
+            self._depths = np.append(self._depths, answer.depth)
+        return answer.verdict is Verdict.CLEAR
+
+    def first_clear(self, n: Array, most: float) -> float:
+        """The least length along a direction, no more than the most, at which it is clear; inf if none is found."""
+        low = 0.0
+        for length in most * np.geomspace(FIRST, 1.0, LENGTHS):
+            if self.is_clear(length * n):
+                high = float(length)
+                while high - low > CLOSE * high:
+                    middle = 0.5 * (low + high)
+                    low, high = (low, middle) if self.is_clear(middle * n) else (middle, high)
+                return high
+            low = float(length)
+        return np.inf
 
 
 def least_translation(proof: ClearanceProof, k: int, q: Array) -> Array | None:
@@ -139,12 +156,15 @@ def least_translation(proof: ClearanceProof, k: int, q: Array) -> Array | None:
     way = world @ _Hulls(first, second, turn, shift).least(ways)
     most = float(np.linalg.norm(way)) * (1.0 + FARTHER) + FARTHER * max(first.size, second.size)
     best = way / np.linalg.norm(way) * most
-    if not _is_clear(proof, k, q, best):
+    translated = _Translated(proof, k, q)
+    # How deep they are in each other tells which ways are too short.
+    translated.is_clear(np.zeros(3))
+    if not translated.is_clear(best):
         return None
     for k_way, n in enumerate([best / most, *(ways @ world.T)]):
         # First cells of what is round are thicker than it: the way along hulls is shortened by any part.
         shorter = (1.0 if k_way == 0 else SHORTER) * float(np.linalg.norm(best))
-        found = _first_clear(proof, k, q, n, shorter)
+        found = translated.first_clear(n, shorter)
         if found < shorter:
             best = found * (1.0 + FARTHER) * n
     return np.asarray(best)

@@ -30,7 +30,7 @@ TOGETHER = 0.25
 # A sequence that was followed.
 NEWTON_WAY = record_dtype(
     "f8",
-    parameters=4,  # where its first step led
+    parameters=4,  # where its first step led; of elements of solids their two features
     no_extremum=1,  # 1: it came to no extremum of its own
 )
 newton_way_at = record_view(NEWTON_WAY)
@@ -85,6 +85,50 @@ def known_in_region(posed, e, d, extrema):
 
 
 @kernel(inner=True)
+def way_of(passed, count, codes):
+    """Which of the `count` sequences in `passed` is from elements of two features of solids; -1: none."""
+    for way in range(count):
+        features = newton_way_at(passed, way).parameters
+        if features[0] == codes[0] and features[1] == codes[1]:
+            return way
+    return -1
+
+
+@kernel(inner=True)
+def keep_way(passed, count, codes):
+    """Keep a sequence from elements of two features of solids, if there is room; how many there are."""
+    if count == passed.shape[0]:
+        return count
+    led = newton_way_at(passed, count)
+    led.parameters[0], led.parameters[1] = float(codes[0]), float(codes[1])
+    led.no_extremum = 0.0
+    return count + 1
+
+
+@kernel(inner=True)
+def step_of_faces(store, surfaces, pose, x, is_cut):
+    """Where Newton's method for two faces goes from x in a step, and by how much that turns a normal [rad].
+
+    The step is cut to what turns none by much where `is_cut`. Where there is no tangent plane it stays.
+    """
+    f, g = surfaces
+    frame = pair_frame(store, f, g, pose, x)
+    if not frame.regular:
+        return x, 0.0
+    a, c, r = frame.shape_f, frame.shape_g, frame.residual
+    matrix = pair_matrix(a, c, frame.gap, FLAT)
+    inverse, _level = across_first(a, c, r, matrix.k, matrix.h, matrix.inverse, FLAT)
+    step_f, step_g, bend_f, bend_g = pair_step(a, c, r, matrix.k, inverse, 1.0)
+    # Each surface by its own measure, as in `solve_pair`.
+    factor_f = bent_at_most(bend_f) if is_cut else 1.0
+    factor_g = bent_at_most(bend_g) if is_cut else 1.0
+    step_f = (factor_f * step_f[0], factor_f * step_f[1])
+    step_g = (factor_g * step_g[0], factor_g * step_g[1])
+    there, _held, _way = move_pair(store, f, g, pose.rotation, x, frame, step_f, step_g)
+    return there, max(bend_f, bend_g)
+
+
+@kernel(inner=True)
 def stays(posed, start, half, passed, count):
     """Whether Newton's method from `start` stays beside it, within BESIDE times half widths in (u, v) and (s, t).
 
@@ -92,24 +136,12 @@ def stays(posed, start, half, passed, count):
     to; and how many sequences there are now.
     """
     store, surfaces, pose = posed.store, posed.surfaces, posed.pose
-    f, g = surfaces
     x = start
     for step in range(STEPS):
-        frame = pair_frame(store, f, g, pose, x)
-        if not frame.regular:
+        there, bend = step_of_faces(store, surfaces, pose, x, True)
+        if not bend > LAST_BEND:
             return STAYED, x, count
-        a, c, r = frame.shape_f, frame.shape_g, frame.residual
-        matrix = pair_matrix(a, c, frame.gap, FLAT)
-        inverse, _level = across_first(a, c, r, matrix.k, matrix.h, matrix.inverse, FLAT)
-        step_f, step_g, bend_f, bend_g = pair_step(a, c, r, matrix.k, inverse, 1.0)
-        if not max(bend_f, bend_g) > LAST_BEND:
-            return STAYED, x, count
-        # Each surface by its own measure, as in `solve_pair`.
-        factor_f = bent_at_most(bend_f)
-        factor_g = bent_at_most(bend_g)
-        step_f = (factor_f * step_f[0], factor_f * step_f[1])
-        step_g = (factor_g * step_g[0], factor_g * step_g[1])
-        x, _held, _way = move_pair(store, f, g, pose.rotation, x, frame, step_f, step_g)
+        x = there
         if not is_beside(store, surfaces, x, start, half, BESIDE):
             return LEFT, x, count
         if step == 0:

@@ -26,8 +26,17 @@ from assembly.proximity.manager.extrema import (
 )
 from assembly.proximity.manager.flat_patches import are_flat, may_be_level
 from assembly.proximity.manager.motion_bounds import PairSearch, ball_about
-from assembly.proximity.manager.newton_regions import LEFT, half_widths, known_in_region, newton_way_at, stays
+from assembly.proximity.manager.newton_regions import (
+    LEFT,
+    half_widths,
+    keep_way,
+    known_in_region,
+    newton_way_at,
+    stays,
+    way_of,
+)
 from assembly.proximity.manager.overlap import is_outside
+from assembly.proximity.manager.own_extrema import may_have_own
 from assembly.proximity.manager.parameters import SLIDES
 
 # How far a search has come. folding: whether an extremum is near a fold; visited: how many ways of Newton's method are
@@ -71,6 +80,13 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
         stayed = way != LEFT
         if way >= 0:
             return -1, folding or newton_way_at(passed, way).no_extremum == 1.0, Progress(folding, visited, slides)
+    elif not may_have_own(posed, codes, e, d):
+        # It goes to what other elements have: of two features one such sequence is followed, which tells whether that
+        # is known.
+        way = way_of(passed, visited, codes)
+        if way >= 0:
+            return -1, folding or newton_way_at(passed, way).no_extremum == 1.0, Progress(folding, visited, slides)
+        visited = keep_way(passed, visited, codes)
     result = NOTHING
     if stayed or not folding:
         # Where nothing folds, it tells whether it goes to an extremum that is known.

@@ -13,11 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import dot, matvec, sub
-from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import EDGE, FACE
 from assembly.proximity.bvh.tree import pairs_about, three_of
-from assembly.proximity.extrema.feature_jets import edge_jet
 from assembly.proximity.features.holding import FEATURES, HELD_F, HELD_G, POINT, TILT
 from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.continua import (
@@ -29,7 +26,6 @@ from assembly.proximity.manager.continua import (
     next_in_socket,
 )
 from assembly.proximity.manager.extrema import NEW, NOTHING, add_extremum, extremum_at, is_list_full, solids_extremum
-from assembly.proximity.manager.flat_patches import may_be_level
 from assembly.proximity.manager.near_singular import into_near_singular
 from assembly.proximity.manager.near_singular_points import (
     features_of,
@@ -38,11 +34,8 @@ from assembly.proximity.manager.near_singular_points import (
     is_of_faces,
     is_on_face,
 )
-from assembly.proximity.manager.overlap import is_outside, patch_at, seen_by_other
-
-# Two elements of edges cross near them where the lines through their middles do within so many of their half widths;
-# elements turn by 0.2 rad, and edges whose angle's sine is less than this may cross anywhere.
-BEYOND, PARALLEL = 2.0, 0.2
+from assembly.proximity.manager.overlap import is_outside, patch_at
+from assembly.proximity.manager.own_extrema import may_be_over, may_have_own
 
 
 @kernel(inner=True)
@@ -65,26 +58,6 @@ def hold_extrema(posed, extrema):
         x, n = pair_parameters(extremum), three_of(extremum.normal)
         found = solids_extremum(posed, codes, x, n, extrema, FEATURES)
         extremum.corner = 0.0 if found == NOTHING else FEATURES
-
-
-@kernel(inner=True)
-def may_cross(posed, codes, f, g):
-    """Whether two edges may cross, seen along their common perpendicular, near two elements of theirs.
-
-    Judged by the tangents at their middles, where these are not all but parallel.
-    """
-    store = posed.store
-    p, along_f, _bent = edge_jet(store, feature_at(store.table, posed.shells[0], codes[0]), f.middle[0])
-    q, along_g, _bent = edge_jet(store, feature_at(store.table, posed.shells[1], codes[1]), g.middle[0])
-    d = sub(seen_by_other(posed, 1, q), p)
-    along_g = matvec(posed.pose.rotation, along_g)
-    ff, fg, gg = dot(along_f, along_f), dot(along_f, along_g), dot(along_g, along_g)
-    determinant = ff * gg - fg * fg
-    if determinant < PARALLEL * PARALLEL * ff * gg:
-        return True
-    df, dg = dot(d, along_f), dot(d, along_g)
-    at_f, at_g = (df * gg - dg * fg) / determinant, (df * fg - dg * ff) / determinant
-    return abs(at_f) <= BEYOND * f.half[0] and abs(at_g) <= BEYOND * g.half[0]
 
 
 @kernel(inner=True)
@@ -131,6 +104,8 @@ def add_vertex_contacts(posed, span, merge_radius, stack, candidates, extrema):
             break
         f, g = patch_at(posed, 0, candidates[c, 0]), patch_at(posed, 1, candidates[c, 1])
         codes = (np.int64(f.feature), np.int64(g.feature))
+        if not may_be_over(posed, codes, candidates[c, 0], candidates[c, 1]):
+            continue
         start = (f.middle[0], f.middle[1], g.middle[0], g.middle[1])
         if is_of_faces(posed, codes):
             half = (f.half[0], f.half[1], g.half[0], g.half[1])
@@ -141,10 +116,8 @@ def add_vertex_contacts(posed, span, merge_radius, stack, candidates, extrema):
         if not is_vertex_contact(posed, codes):
             continue
         kinds = kinds_of(posed, codes)
-        if kinds[0] == EDGE and kinds[1] == EDGE and not may_cross(posed, codes, f, g):
-            continue
         before = extrema.count[0]
-        if may_be_level(posed, codes, candidates[c, 0], candidates[c, 1]):
+        if may_have_own(posed, codes, candidates[c, 0], candidates[c, 1]):
             add_vertex_contact(posed, codes, start, span, merge_radius, extrema, FEATURES)
         side = 0 if kinds[0] == EDGE else 1
         if kinds[side] != EDGE or kinds[1 - side] != FACE:
