@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from assembly.proximity.brep.boundary_curves import Batch, Rim, Survey
 
-__all__ = ["all_live", "cut_at_vertices", "live_boundaries", "merged"]
+__all__ = ["all_live", "cut_at_vertices", "live_boundaries"]
 
 Array = NDArray[np.float64]
 
@@ -32,8 +32,18 @@ def _replaced(loops: list[list[Rim]], cuts: dict[Rim, Array], survey: Survey) ->
         loops[k] = [part for boundary in loop for part in parts.get(boundary, [boundary])]
 
 
-def cut_at_vertices(chains: list[list[list[Rim]]], survey: Survey) -> set[int]:
-    """Cut rims at corners and where other rims end, in place; the numbers of the faces that changed."""
+def cut_at_vertices(
+    chains: list[list[list[Rim]]], survey: Survey
+) -> tuple[set[int], Array, dict[Rim, tuple[int, int]]]:
+    """Cut rims at corners and where other rims end, in place.
+
+    Returns
+    -------
+    changed : set of int
+        The numbers of the faces that changed.
+    points, ends
+        `_merged` of what rims there are now.
+    """
     changed = set()
 
     def cut(found: dict[Rim, Array]) -> None:
@@ -51,14 +61,14 @@ def cut_at_vertices(chains: list[list[list[Rim]]], survey: Survey) -> set[int]:
         boundary.anchored = corner
     while True:
         boundaries = all_live(chains)
-        points, ends = merged(boundaries, survey.tolerance)
+        points, ends = _merged(boundaries, survey.tolerance)
         found = _crossings(boundaries, points, ends, survey)
         if not found:
-            return changed
+            return changed, points, ends
         cut(found)
 
 
-def merged(boundaries: Sequence[Rim], tolerance: float) -> tuple[Array, dict[Rim, tuple[int, int]]]:
+def _merged(boundaries: Sequence[Rim], tolerance: float) -> tuple[Array, dict[Rim, tuple[int, int]]]:
     """Vertices (n, 3) where anchored rims end, and the pair of them of every such rim."""
     anchored = [boundary for boundary in boundaries if boundary.anchored]
     if not anchored:

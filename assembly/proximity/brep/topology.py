@@ -21,7 +21,7 @@ from assembly.geometry.faces.smooth_faces import smooth_faces
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import CORNER
 from assembly.proximity.brep.boundary_curves import Rim, Survey, survey_of, turn
-from assembly.proximity.brep.boundary_cutting import all_live, cut_at_vertices, live_boundaries, merged
+from assembly.proximity.brep.boundary_cutting import all_live, cut_at_vertices, live_boundaries
 from assembly.proximity.brep.coedge_matching import STATIONS, matches_of
 from assembly.proximity.brep.recut import with_cuts
 
@@ -148,14 +148,15 @@ def topology_of(faces: Iterable[Face], tolerance: float | None = None) -> Topolo
     chains = [_chains(face, number, tolerance) for number, face in enumerate(given)]
     survey = survey_of(tuple(given), tolerance)
     survey.measure(boundary for loops in chains for loop in loops for boundary in loop)
-    for number in cut_at_vertices(chains, survey):
+    changed, points, ends = cut_at_vertices(chains, survey)
+    for number in changed:
         parts: list[list[NurbsCurve]] = [[] for _ in given[number].boundary]
         for loop in chains[number]:
             for boundary in loop:
                 parts[boundary.index].append(boundary.curve)
         given[number] = with_cuts(given[number], parts)
         assert len(given[number].boundary) == sum(map(len, parts))
-    return _joined(tuple(given), chains, survey)
+    return _joined(tuple(given), chains, survey, (points, ends))
 
 
 def _checked(faces: Iterable[Face]) -> list[Face]:
@@ -175,11 +176,16 @@ def _chains(face: Face, number: int, tolerance: float) -> list[list[Rim]]:
     return [[Rim(number, k, face.boundary[k], tolerance) for k in chain] for chain in face.chains]
 
 
-def _joined(faces: tuple[Face, ...], chains: list[list[list[Rim]]], survey: Survey) -> Topology:
-    """The topology of rims that match one to one."""
+def _joined(
+    faces: tuple[Face, ...],
+    chains: list[list[list[Rim]]],
+    survey: Survey,
+    vertices_and_ends: tuple[Array, dict[Rim, tuple[int, int]]],
+) -> Topology:
+    """The topology of rims that match one to one, given vertices and between which of them rims run."""
     tolerance = survey.tolerance
     boundaries = all_live(chains)
-    points, ends = merged(boundaries, tolerance)
+    points, ends = vertices_and_ends
     matches = matches_of(boundaries, ends, np.array([face.sign for face in faces], dtype=float), survey)
     places = {
         boundary: k for loops in chains for k, boundary in enumerate(boundary for loop in loops for boundary in loop)
