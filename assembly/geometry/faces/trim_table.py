@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly._record import rows_of
+from assembly._record import place_of, rows_of
 from assembly.geometry.faces.crossing import first_crossing
 from assembly.geometry.faces.monotone import ROW, cut_curves
 from assembly.geometry.faces.trim import windings
@@ -20,6 +20,7 @@ from assembly.geometry.faces.trim_pieces import (
     PIECE_DOUBLES,
     PIECE_INTS,
     PIECE_LINKS,
+    TRIM,
     TRIM_RECORD,
     cut_of_piece,
     ends_of_pieces,
@@ -38,6 +39,10 @@ Ints = NDArray[np.int64]
 ON_BOUNDARY = 1e-12
 # Some roundings of a coordinate, as a part of it.
 NOISE = 1e-14
+# What is the place of something else, of a trim in the table and in the pool, and of a piece in the pool.
+_IN_TABLE = [place_of(TRIM, field) for field in ("first", "piece_table", "curve_pieces")]
+_IN_POOL = [place_of(TRIM, field) for field in ("piece_pool", "frame", "step_pool")]
+_COEFFICIENTS = place_of(PIECE_LINKS, "coefficients")
 _BINOMIALS = np.array([[comb(n, k) for k in range(32)] for n in range(32)], dtype=float)
 
 
@@ -69,13 +74,13 @@ class TrimTable:
             return self.table, self.pool
         table = self.table.copy()
         record = trim_at(table, 0)
-        _pieces(table, self.pool, self.pieces)[0].coefficients += pool_at
-        records = table[TRIM_RECORD : TRIM_RECORD + CURVE_RECORD * self.curves].reshape(-1, CURVE_RECORD)
-        records[:, [CURVE_BREAKS, CURVE_COEFFICIENTS]] += pool_at
-        for field in ("first", "piece_table", "curve_pieces"):
-            record[field] += table_at
-        for field in ("piece_pool", "frame", "step_pool"):
-            record[field] += pool_at
+        pieces = record.piece_table + _COEFFICIENTS
+        table[pieces : pieces + PIECE_INTS * self.pieces : PIECE_INTS] += pool_at
+        stop = TRIM_RECORD + CURVE_RECORD * self.curves
+        for place in (CURVE_BREAKS, CURVE_COEFFICIENTS):
+            table[TRIM_RECORD + place : stop : CURVE_RECORD] += pool_at
+        table[_IN_TABLE] += table_at
+        table[_IN_POOL] += pool_at
         return table, self.pool
 
     def rows(self) -> tuple[Any, Any]:
