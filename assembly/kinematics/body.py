@@ -103,6 +103,7 @@ class Body(KnownSettings):
         self._pose = Pose(position, quaternion)  # type: ignore[arg-type]  # Pose converts them
         check_coordinates("position", self._pose.position.tolist())
         self._faces = self._selectable(self._named(shape))
+        self._edges: Edges | None = None
         self.color = color
         self._density = positive("density", density)
 
@@ -110,6 +111,7 @@ class Body(KnownSettings):
         """A body of the same name, with faces of its own that stand on the same surfaces."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
+        other._edges = None
         other._faces = other._selectable(BodyFace(other, side.face, side.name) for side in self._faces)
         return other
 
@@ -174,9 +176,11 @@ class Body(KnownSettings):
     @property
     def edges(self) -> Edges:
         """Edges: where faces meet, or end; `edges.circles(...)`, `edges("|Z")` ... select some."""
-        from assembly.selection.edges import edges_of
+        if self._edges is None:
+            from assembly.selection.edges import edges_of
 
-        return edges_of(self)
+            self._edges = edges_of(self)
+        return self._edges
 
     @property
     def vertices(self) -> Vertices:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -250,9 +249,6 @@ class Edges(Selection[BodyEdge]):
         return f"{item.name}: {item.kind}{size}"
 
 
-_EDGES: WeakKeyDictionary[Body, tuple[object, Edges]] = WeakKeyDictionary()
-
-
 def topology_of_body(body: Body) -> Topology:
     """Faces, edges and vertices of a body with a shape; faces with creases count as several."""
     return solid_of(tuple(side.face for side in body.faces))
@@ -265,9 +261,6 @@ def owners_of(body: Body) -> list[int]:
 
 
 def edges_of(body: Body) -> Edges:
-    """The edges of a body, found once."""
+    """The edges of a body; `body.edges` keeps them, and what is known of them."""
     count = len(topology_of_body(body).edges) if body.faces else 0
-    known = _EDGES.get(body)
-    if known is None or len(known[1]) != count:
-        known = _EDGES[body] = body.faces, Edges((BodyEdge(body, k) for k in range(count)), f"{body.name}.edges")
-    return known[1]
+    return Edges((BodyEdge(body, k) for k in range(count)), f"{body.name}.edges")

@@ -14,7 +14,7 @@ from assembly._kernel import kernel
 from assembly._record import Store, rows_of
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
-from assembly.geometry.shapes import solids
+from assembly.geometry.shapes import plane_curves, solids
 from assembly.geometry.splines.evaluate import surface_point
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.motion import IDENTITY, RelativePose
@@ -77,7 +77,7 @@ def bent_patch():
     points = np.stack([x, y, np.zeros_like(x)], axis=-1) + rng.uniform(size=(6, 5, 3))
     knots = np.r_[[0.0] * 4, 0.3, 0.6, [1.0] * 4], np.r_[[0.0] * 3, 0.4, 0.7, [1.0] * 3]
     surface = NurbsSurface(points, knots, (3, 2), rng.uniform(0.5, 2.0, (6, 5)))
-    return Face(surface, solids._circle((0.5, 0.5), 0.37))
+    return Face(surface, plane_curves.circle(0.37, (0.5, 0.5)))
 
 
 SOLIDS = {

@@ -328,3 +328,65 @@ def test_axes_that_the_start_gets_wrong_are_those_where_the_rest_holds(seed):
     solution = scene.solve()
     assert solution.success and solution.axes == {"mate": "aligned"}
     assert np.linalg.norm(b.point(solution, 1, -2, -1) - a.point(solution, 1, -2, 1)) < HELD
+
+
+def every_kind(rng):
+    """Parts of a machine with a mate of every kind, that hold together."""
+    a, b = plate(rng), bolt(rng)
+    lever, ball = box(rng, "lever"), Part(rng, "ball", asm.shapes.sphere(0.8))
+    cone = Part(rng, "cone", asm.Face(asm.shapes.cone(3, 4), reversed=True))
+    seat = asm.Insert(a.body.faces.cylinders(hole=True), b.body.faces.cylinders(radius=1))
+    mates = [
+        seat,
+        asm.Flush(a.body.face("front"), lever.body.face("left"), offset=1.0),
+        asm.Concentric(cone.body.face(), ball.body.face()),
+        asm.Symmetric(ball.body.face(), lever.body.point(0, 0, 0), a.body.face("right")),
+        asm.Tangent(ball.body.face(), Part(rng, "other", asm.shapes.sphere(1)).body.face()),
+        asm.Group([cone.body, Part(rng, "cap", asm.shapes.box(1, 1, 1)).body]),
+    ]
+    bodies = dict.fromkeys(body for mate in mates for body in mate.bodies)
+    scene = asm.Assembly(bodies)
+    scene.constrain(*mates)
+    return scene
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_another_solver_agrees(seed):
+    """The same scene in CasADi and IPOPT, from the same start: it has rows of its own."""
+    scene = every_kind(np.random.default_rng(seed))
+    scene.minimize(asm.Posture())
+    first = scene.solve()
+    second = asm.reference.solve(scene, first.q)
+    assert first.success and second.success and abs(first.q - second.q).max() < 1e-6
+
+
+def test_groups_and_symmetries_are_named_where_they_contradict():
+    a, b, c = (asm.Body(name, fixed=name == "a") for name in "abc")
+    scene = asm.Assembly([a, b, c])
+    scene.constrain(asm.Group([a, b, c], "group"), asm.Distance(b.point(0, 0, 0), c.point(0, 0, 0), 2.0, "apart"))
+    solution = scene.solve()
+    assert solution.status is asm.Status.INFEASIBLE and solution.conflicting == ["apart", "group"]
+    held = asm.Assembly([a, b, c])
+    held.constrain(asm.Group([a, b, c], "group"), asm.Parallel(b, c, "parallel"))
+    assert held.mobility().redundant_sets == [("group", "parallel")] and held.solve().success
+
+
+def test_what_a_group_holds_together_counts_as_joined():
+    box, other = (asm.Body(name, asm.shapes.box(1, 1, 1), (x, 0, 0)) for name, x in (("one", 0.0), ("other", 0.5)))
+    scene = asm.Assembly([box, other])
+    scene.constrain(asm.Group([box, other]))
+    solution = scene.solve()
+    assert solution.crossings == () and solution.crossings_of_joined == (("one", "other"),)
+
+
+def test_under_a_clearance_axes_are_nearest_as_well():
+    plate = asm.Body("plate", asm.shapes.plate(10, 8, 2, [(1, 1, 1.5)]), fixed=True)
+    pin = asm.Body("pin", asm.shapes.solid_cylinder(1.4, 5), (1.2, 1.1, 0.3), (0, 1, 0, 0))
+    scene = asm.Assembly([plate, pin])
+    scene.constrain(asm.Coaxial(plate.faces.cylinders(), pin.faces.cylinders(), "mate"), asm.Clearance())
+    solution = scene.solve()
+    assert solution.success and solution.proved and solution.axes == {"mate": "opposed"}
+    assert abs(solution.pose(pin).position[:2] - 1.0).max() < 1e-12
+    tracker = scene.tracker(pin.point(0, 0, 0))
+    step = tracker.step((1.0, 1.0, 0.8))
+    assert step.feasibility < 1e-12 and step.solution.axes == {"mate": "opposed"}

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import gc
+import weakref
 from math import cos, pi, sin
 
 import numpy as np
@@ -110,3 +113,14 @@ def test_what_is_not_one_says_what_there_is():
     line = edges.lines()[0]
     with pytest.raises(InputError, match="is a line and has no radius"):
         _ = line.radius
+
+
+def test_edges_are_of_their_body_and_go_with_it():
+    body = plate()
+    assert body.edges is body.edges and all(edge.body is body for edge in body.edges)
+    other = copy.copy(body)
+    assert all(edge.body is other for edge in other.edges) and other.edges.circles()[0].radius == pytest.approx(1.5)
+    gone = weakref.ref(body)
+    del body
+    gc.collect()
+    assert gone() is None

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.geometry.shapes.solids import _circle
+from assembly.geometry.shapes.plane_curves import circle
 from tests.geometry.recognition.constructions import circle_profile, line, revolved
 
 
@@ -20,8 +20,8 @@ def _wall(profile, name):
 def _ring(z, radii, is_up, name):
     """A flat face between two radii, or a disc."""
     inner, outer = min(radii), max(radii)
-    holes = [_circle((0.0, 0.0), inner)] if inner > 0.0 else []
-    flat = asm.shapes.trimmed_plane([_circle((0.0, 0.0), outer)], [[hole] for hole in holes])
+    holes = [circle(inner)] if inner > 0.0 else []
+    flat = asm.shapes.trimmed_plane([circle(outer)], [[hole] for hole in holes])
     surface = flat.surface.transformed(np.eye(3), (0.0, 0.0, z))
     return asm.Face(surface, flat.outer, flat.holes, name=name, reversed=not is_up)
 

@@ -134,12 +134,7 @@ class Symmetric(OwnState, Mate):
         if frame.body is first.body or frame.body is second.body:
             raise InputError(f"plane is on body {frame.body.name!r} of a or b; expected a third body")
         super().__init__((first.body, second.body, frame.body), name, "symmetric")
-        pairs = FramePair(frame, first), FramePair(frame, second)
-        # Along the plane they are at one place, across it at opposite heights.
-        self._own = tuple(
-            Equation(((1.0, Coordinate(SLIDE, k, pairs[0])), (sign, Coordinate(SLIDE, k, pairs[1]))))
-            for k, sign in enumerate((-1.0, -1.0, 1.0))
-        )
+        self._own = _mirrored_points(frame, first, second)
         self._given: dict[str, Any] = {"a": one, "b": other, "plane": mirror}
 
     def _shared(self) -> Iterable[object]:
@@ -149,3 +144,12 @@ class Symmetric(OwnState, Mate):
     def equations(self) -> tuple[Equation, ...]:
         """Its three rows."""
         return self._own
+
+
+def _mirrored_points(mirror: Frame, a: Frame, b: Frame) -> tuple[Equation, ...]:
+    """Along the mirror the origins are at one place, across it at opposite heights."""
+    pairs = FramePair(mirror, a), FramePair(mirror, b)
+    return tuple(
+        Equation(((1.0, Coordinate(SLIDE, k, pairs[0])), (sign, Coordinate(SLIDE, k, pairs[1]))))
+        for k, sign in enumerate((-1.0, -1.0, 1.0))
+    )
