@@ -2,8 +2,8 @@
 
     python packaging/check_cad.py FOLDER [alone] [cadquery] [build123d]
 
-makes the environments that are not in the folder yet, installs the library's dependencies there, and runs the tests that
-need them on this checkout. Kernels are compiled where there are none; NUMBA_CACHE_DIR says where they are kept.
+makes the environments that are not in the folder yet, installs the library's dependencies there, and runs the tests
+that need them on this checkout. Kernels are compiled where there are none; NUMBA_CACHE_DIR says where they are kept.
 """
 
 from __future__ import annotations

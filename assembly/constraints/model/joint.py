@@ -93,7 +93,7 @@ class Joint(OwnState, Constraint):
             raise InputError(f"{a} and {b} are both on body {self._frame_a.body.name!r}; expected two bodies")
         if not isinstance(axes, str) or axes not in ("aligned", "opposed"):
             raise InputError(f"axes is {axes!r}; expected 'aligned' or 'opposed'")
-        super().__init__((self._frame_a.body, self._frame_b.body), name, words(type(self)))
+        super().__init__((self._frame_a.body, self._frame_b.body), name, "" if name else words(type(self)))
         self._axes = axes
         self._frames = FramePair(self._frame_a, self._frame_b if axes == "aligned" else _opposed(self._frame_b))
         self._own = tuple(Equation(((1.0, self._coordinate(*which)),)) for which in self._zero)
