@@ -62,10 +62,12 @@ def frame_on(body: Body, origin: Sequence[float], z: Vector) -> Frame:
 
     Assemblies have hundreds of them.
     """
-    k = min(range(3), key=lambda i: abs(z[i]))
-    x = [(1.0 if i == k else 0.0) - z[k] * z[i] for i in range(3)]
-    norm = (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]) ** 0.5
-    a, b, c = (value / norm for value in x)
+    sizes = [abs(value) for value in z]
+    k = sizes.index(min(sizes))
+    a, b, c = -z[k] * z[0], -z[k] * z[1], -z[k] * z[2]
+    a, b, c = a + (k == 0), b + (k == 1), c + (k == 2)
+    norm = (a * a + b * b + c * c) ** 0.5
+    a, b, c = a / norm, b / norm, c / norm
     axes = np.array(
         [
             [a, z[1] * c - z[2] * b, z[0]],

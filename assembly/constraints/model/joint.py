@@ -114,7 +114,7 @@ class Joint(OwnState, RowConstraint):
             raise InputError(f"{a} and {b} are both on body {self._frame_a.body.name!r}; expected two bodies")
         if not isinstance(axes, str) or axes not in ("aligned", "opposed", "nearest"):
             raise InputError(f"axes is {axes!r}; expected 'aligned', 'opposed' or 'nearest'")
-        super().__init__((self._frame_a.body, self._frame_b.body), name, words(type(self)))
+        super().__init__((self._frame_a.body, self._frame_b.body), name, "" if name else words(type(self)))
         self._asked_axes = axes
         bodies = self._frame_a.body, self._frame_b.body
         self._axes: Sense = self._nearest_at({body: body.q for body in bodies}) if axes == "nearest" else axes

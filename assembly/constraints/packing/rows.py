@@ -195,9 +195,8 @@ class RowPacking:
     def write(self, bodies: Sequence[Body]) -> Table:
         """Write the records of all rows (m, ROW), which are returned, and how scattered bodies are put together."""
         header = self._writer.header
-        table = np.zeros((len(self._rows), layout.ROW), dtype=np.int64)
-        for record, row in zip(table, self._rows, strict=True):
-            record[: len(row)] = row
+        rows = [[*row, *[0] * (layout.ROW - len(row))] for row in self._rows]
+        table = np.array(rows, dtype=np.int64).reshape(-1, layout.ROW)
         header[layout.ROW_TABLE], _ = self._writer.add(table)
         order = gathering_order([body.fixed for body in bodies], self._joined)
         fields = [field for body, held in order for field in (body, len(held), *held)]

@@ -67,8 +67,8 @@ def _checked(size: float, marks: Mapping[Body, Sequence[Array]]) -> float:
     if not LEAST <= size <= MOST:
         raise InputError(f"the scene's size is {size:g}; expected one from {LEAST:g} to {MOST:g}, in another unit")
     for body, places in marks.items():
-        for place in places:
-            check_reach(f"a point of body {body.name!r}", float(np.abs(place).max()), size)
+        if places:
+            check_reach(f"a point of body {body.name!r}", float(np.abs(places).max()), size)
     return size
 
 
@@ -77,10 +77,10 @@ def _marks(
 ) -> dict[Body, list[Array]]:
     """The frames and points that constraints and objectives have on every body, in its coordinates."""
     marks: dict[Body, list[Array]] = {body: [] for body in bodies}
-    for equation in _equations(constraints):
-        for _, coordinate in equation.terms:
-            for frame in (coordinate.frames.frame_a, coordinate.frames.frame_b):
-                marks[frame.body].append(frame.origin)
+    # Rows of a joint have their frames in common.
+    for pair in dict.fromkeys(item.frames for equation in _equations(constraints) for _, item in equation.terms):
+        for frame in (pair.frame_a, pair.frame_b):
+            marks[frame.body].append(frame.origin)
     for _, term in objectives:
         if isinstance(term, PointDistance):
             marks[term.point.body].append(term.point.coordinates)

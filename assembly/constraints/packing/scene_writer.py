@@ -122,11 +122,11 @@ class SceneWriter(Writer):
         """Write what rows and terms asked for: frames, and the room that tapes take."""
         fields: list[int] = []
         for pair in self.frames:
-            pool = [
-                np.concatenate([frame.origin / self.scale, frame.axes.T.ravel()])
-                for frame in (pair.frame_a, pair.frame_b)
-            ]
-            _, at = self.add(pool=np.concatenate(pool))
+            pool = np.empty((2, 4, 3))
+            for part, frame in zip(pool, (pair.frame_a, pair.frame_b), strict=True):
+                part[0] = frame.origin / self.scale
+                part[1:] = frame.axes.T
+            _, at = self.add(pool=pool)
             fields += [*self.places_of((pair.frame_a.body, pair.frame_b.body)), at]
         header = self.header
         header[layout.JOINT_TABLE], _ = self.add(fields)

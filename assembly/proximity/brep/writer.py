@@ -31,16 +31,19 @@ class Writer:
 
     def __init__(self, table_at: int = 0, pool_at: int = 0) -> None:
         self.table_at, self.pool_at = table_at, pool_at
-        self._table: list[Table] = []
-        self._pool: list[Array] = []
+        self._table: list[Table] = [np.empty(0, dtype=np.int64)]
+        self._pool: list[Array] = [np.empty(0)]
 
     def add(self, table: Sequence[int] | Table = (), pool: Sequence[float] | Array = ()) -> tuple[int, int]:
         """Append; returns where the parts begin. Until `arrays`, an array that was given may still be filled."""
         at = self.table_at, self.pool_at
-        self._table.append(np.asarray(table, dtype=np.int64).ravel())
-        self._pool.append(np.asarray(pool, dtype=np.float64).ravel())
-        self.table_at += self._table[-1].size
-        self.pool_at += self._pool[-1].size
+        # Parts are many and small: nothing is written of what is empty.
+        if len(table):
+            self._table.append(np.asarray(table, dtype=np.int64).ravel())
+            self.table_at += self._table[-1].size
+        if len(pool):
+            self._pool.append(np.asarray(pool, dtype=np.float64).ravel())
+            self.pool_at += self._pool[-1].size
         return at
 
     def arrays(self) -> tuple[Table, Array]:
