@@ -154,20 +154,35 @@ def bends(curve: NurbsCurve, t: Array) -> NDArray[np.int64]:
     """To which side of its chord, and of the chords of all its parts, a boundary curve is over intervals t (n, 2).
 
     1: left, where the material of a face is; -1: right; 0: not known. Left is where its control polygon over the
-    interval, within one span, turns right only, and by less than half a turn in all: then so do the polygons of its
-    parts.
+    interval, of one span or of several after another, turns right only, and by less than half a turn in all: then so
+    do the polygons of its parts.
     """
     pieces, at = curve.bezier_pieces(), curve.breaks()
+    low, high = t.min(axis=1), t.max(axis=1)
+    # What is beyond a knot by rounding is not.
+    rounded = 1e-12 * np.diff(at)
+    first = np.searchsorted(at[1:-1] - rounded[:-1], low, side="right")
+    last = np.maximum(np.searchsorted(at[1:-1] + rounded[1:], high, side="left"), first)
     found = np.zeros(len(t), dtype=np.int64)
-    for k in range(len(at) - 1):
-        width = at[k + 1] - at[k]
-        low, high = (t.min(axis=1) - at[k]) / width, (t.max(axis=1) - at[k]) / width
-        rows = np.flatnonzero((low >= -1e-12) & (high <= 1.0 + 1e-12))
-        net = restriction(pieces.shape[1] - 1, np.clip(low[rows], 0, 1), np.clip(high[rows], 0, 1)) @ pieces[k][None]
-        way = np.diff(net[..., :2] / net[..., -1:], axis=1)
-        turn = way[:, :-1, 0] * way[:, 1:, 1] - way[:, :-1, 1] * way[:, 1:, 0]
-        ahead = ((way[:, :1] * way).sum(axis=2) > 0.0).all(axis=1)
-        little = 1e-15 * (way**2).sum(axis=2).max(axis=1)[:, None]
-        left, right = (turn <= little).all(axis=1), (turn >= -little).all(axis=1)
-        found[rows] = np.where(ahead & left, 1, np.where(ahead & right, -1, 0))
+    for k, end in np.unique(np.column_stack([first, last]), axis=0).tolist():
+        rows = np.flatnonzero((first == k) & (last == end))
+        nets = []
+        for span in range(k, end + 1):
+            width = at[span + 1] - at[span]
+            part = (np.clip((ends[rows] - at[span]) / width, 0.0, 1.0) for ends in (low, high))
+            net = restriction(pieces.shape[1] - 1, *part) @ pieces[span][None]
+            # Where spans meet both have the same point.
+            nets.append(net if span == k else net[:, 1:])
+        found[rows] = _side(np.concatenate(nets, axis=1))
     return found
+
+
+def _side(net: Array) -> NDArray[np.int64]:
+    """To which side of their chords control polygons (n, points, 3) are that turn to one side only; 0 for others."""
+    way = np.diff(net[..., :2] / net[..., -1:], axis=1)
+    turn = way[:, :-1, 0] * way[:, 1:, 1] - way[:, :-1, 1] * way[:, 1:, 0]
+    ahead = ((way[:, :1] * way).sum(axis=2) > 0.0).all(axis=1)
+    little = 1e-15 * (way**2).sum(axis=2).max(axis=1)[:, None]
+    left, right = (turn <= little).all(axis=1), (turn >= -little).all(axis=1)
+    sides: NDArray[np.int64] = np.where(ahead & left, 1, np.where(ahead & right, -1, 0))
+    return sides
