@@ -1,9 +1,10 @@
 """A crank turns once and swings a rocker, in links that are 6 mm thick and lie side by side on pins.
 
-The links are plates of 20 by 6 mm with two bores each, the pins are cylinders with a play of 0.05 mm in these. Crank and
-rocker lie on the ground, the coupler lies on both of them, so that it goes over the pins in the ground, flush with their
-ends. Joints say how they hang together, and a clearance that nothing is in anything else, of all pairs of bodies. None of
-their many contacts pushes where all slide along each other: a step is solved by its joints and then proven to be clear.
+The links are plates of 20 by 6 mm with two bores each, the pins are cylinders with a play of 0.05 mm in these. Crank
+and rocker lie on the ground, the coupler lies on both of them, so that it goes over the pins in the ground, flush
+with their ends. Joints say how they hang together, and a clearance that nothing is in anything else, of all pairs of
+bodies. None of their many contacts pushes where all slide along each other: a step is solved by its joints and then
+proven to be clear.
 Prints where the rocker is, beside where two circles meet; writes crank_with_thick_links.html, which plays the turn.
 """
 
@@ -33,6 +34,8 @@ def crank() -> tuple[asm.Assembly, asm.Revolute]:
     ground, crank, coupler, rocker = links = [link(name) for name in LENGTHS]
     steel = (0.62, 0.64, 0.68)
     pins = [asm.Body(f"pin {k}", asm.shapes.solid_cylinder(PIN, 2 * THICK), color=steel) for k in "ABCD"]
+    # Where the rocker swings: below the ground's line it would hang together as well.
+    coupler.pose, rocker.pose = asm.Pose((0.0, 60.0, 12.0)), asm.Pose.from_axis_angle((0, 0, 1), 1.6, (50.0, 30.0, 6.0))
     drive = asm.Revolute(bore(ground, -1), bore(crank, -1, -1), "drive", angle=0.0)
     scene = asm.Assembly([*links, *pins])
     scene.constrain(
@@ -53,7 +56,7 @@ def swing(angle: float) -> float:
     ground, crank, coupler, rocker = LENGTHS.values()
     way = ground - crank * np.exp(1j * angle)
     corner = np.arccos((abs(way) ** 2 + rocker**2 - coupler**2) / (2 * abs(way) * rocker))
-    return float(np.angle(-way) - corner)
+    return float(np.angle(-way) - corner) % (2.0 * np.pi)
 
 
 def main() -> list[asm.Solution]:
@@ -67,8 +70,9 @@ def main() -> list[asm.Solution]:
     print("crank [deg]   rocker [deg]   by circles")
     for solution in solutions[::6]:
         at, rocker = solution.values["drive.angle"], solution.values["swing.angle"]
-        print(f"{np.degrees(at):11.1f}{np.degrees(rocker):15.6f}{np.degrees(swing(at)) % 360:13.6f}")
-    asm.view.animate(scene, solutions, "crank_with_thick_links.html", seconds=6.0, direction=(0.3, -0.7, 1.0))
+        print(f"{np.degrees(at):11.1f}{np.degrees(rocker):15.6f}{np.degrees(swing(at)):13.6f}")
+    poses = np.array([solution.q for solution in solutions])
+    asm.view.animate(scene, poses, "crank_with_thick_links.html", seconds=6.0, direction=(0.2, -0.8, 1.0))
     return solutions
 
 

@@ -28,8 +28,9 @@ __all__ = ["is_for_proofs", "prove_start", "prove_way"]
 Array = NDArray[np.float64]
 # Verdicts at which a start does not hold.
 CROSSED = (Verdict.CROSSING, Verdict.ENCLOSED)
-# Pairs of nodes that are looked at on a way, for each pair of bodies: where it is not proven soon, its length tells.
-BUDGET = 2000
+# Pairs of nodes that are looked at on a way, for each pair of bodies: at first, where faces that come to touch have to
+# be opened if it takes more, and then.
+QUICK, BUDGET = 500, 2000
 
 
 def is_for_proofs(packed: Packed) -> bool:
@@ -105,13 +106,24 @@ def prove_way(
     with lent_proof(packed, bodies) as proof:
         if not proof.is_at(last):
             proof.look(last, length, proof.moves)
-        if proof.stays_clear(q, length, proof.moves, BUDGET):
+        if proof.stays_clear(q, length, proof.moves, QUICK):
             found = _named(packed, proof.clear_answers(q, proof.moves))
             packed.stood = _asked(packed, state), touching, found
             return found
-        if any(proof.way_length(k, last, q) > proof.radius(k) for k in proof.not_clear()):
+        if any(proof.way_length(k, last, q) > proof.radius(k) for k in _unproven_ways(proof, q, length)):
             return None
     return prove_start(packed, bodies, state, touching)
+
+
+def _unproven_ways(proof: ClearanceProof, q: Array, touching: float) -> list[int]:
+    """The pairs whose way to poses is not proven, either, if they are opened there where faces come to touch."""
+    closing = [k for k in proof.not_clear() if proof.fronts.pair.known[k] == 1.0]
+    for k in closing:
+        off = off_contacts(proof, k, q, touching, _unknown)
+        proof.moves[k] = 0.0 if off is None else off
+    answers = proof.look(q, touching, proof.moves, closing, swept=True, budget=BUDGET)
+    proven = {k for k, answer in zip(closing, answers, strict=True) if is_proven(answer)}
+    return [k for k in proof.not_clear() if k not in proven]
 
 
 def _answers(proof: ClearanceProof, q: Array, touching: float) -> tuple[list[Answer] | None, list[int]]:

@@ -1,8 +1,9 @@
 """A warm solve that no clearance hinders: rows are solved without clearances, and what these ask for is proven after.
 
 A mechanism whose links slide along each other lists hundreds of contacts, none of which pushes: joints alone say where
-all of it goes. So where no clearance pushed at the last solution, rows alone are solved first, and bodies are proven to
-be clear, or to touch, at the pose that these lead to. There the least move with clearances is the same one.
+all of it goes. So rows alone are solved first, and bodies are proven to be clear, or to touch, at the pose that these
+lead to. There the least move with clearances is the same one. Whether clearances pushed at the last solution does not
+tell: where their contacts repeat what joints hold, which of them push is anyone's guess.
 
 Nor may bodies have passed through each other. The straight way from the last pose is proven with the same look. Where
 it is not, as that of a pin which goes along an arc in its bore, the way has to be shorter than bodies are thick. Where
@@ -21,7 +22,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.constraints.packing.scene import Packed
 from assembly.solve.attempts.attempts import load, rows_alone
 from assembly.solve.clearance_proof import PairAnswer, can_prove
 from assembly.solve.interruption import Interruption
@@ -62,7 +62,7 @@ def unhindered(
     packed = scene.packed()
     if last._ended.packed is not packed or scene._scene is None or not (can_prove(packed) and is_for_proofs(packed)):
         return None
-    if not last.success or packed.corners or _is_pushed(packed, last):
+    if not last.success or packed.corners:
         return None
     prove = partial(prove_way, packed, scene.bodies, last.q)
     return _by_rows_alone(scene, partial(scene._start, packed, last, starts), settings, prove, interruption)
@@ -111,11 +111,3 @@ def _by_rows_alone(
     solution._lists = partial(with_contacts, scene)
     solution.seconds = perf_counter() - begin
     return solution
-
-
-def _is_pushed(packed: Packed, last: Solution) -> bool:
-    """Whether a contact of a clearance pushed at the end of a solve."""
-    if last._lists is not None:
-        return False
-    first = packed.multipliers_at + len(packed.contacts)
-    return bool(last._ended.state[first : first + packed.clearance_rows].any())
