@@ -174,6 +174,13 @@ class Assembly(PackedContents):
         """The same, without corners of contacts."""
         if settings[ITERATIONS] == 0.0 or not self.packed().keeps_apart:
             return self._solved(settings, q0, starts, interruption)
+        if not self._objectives and isinstance(q0, Solution):
+            from assembly.studies.unhindered import unhindered
+
+            # Where no clearance pushes, rows alone say where all of it goes.
+            solution = unhindered(self, q0, settings, starts, interruption)
+            if solution is not None:
+                return solution
         if not self._objectives and not (isinstance(q0, Solution) and q0._lists is None):
             from assembly.studies.standing_start import standing_start
 

@@ -23,11 +23,14 @@ from assembly.solve.clearance_proof import TRIES, PairAnswer, lent_proof, owned_
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.samples import PosedBodies, sampled
 
-__all__ = ["is_for_proofs", "prove_start"]
+__all__ = ["is_for_proofs", "prove_start", "prove_way"]
 
 Array = NDArray[np.float64]
 # Verdicts at which a start does not hold.
 CROSSED = (Verdict.CROSSING, Verdict.ENCLOSED)
+# Pairs of nodes that are looked at on a way, for each pair of bodies: at first, where faces that come to touch have to
+# be opened if it takes more, and then.
+QUICK, BUDGET = 500, 2000
 
 
 def is_for_proofs(packed: Packed) -> bool:
@@ -49,8 +52,7 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
     touching : float
         What bodies may be in each other and still touch, in parts of the scene's size.
     """
-    q = state[: packed.contacts_at].reshape(-1, 7)
-    asked = state[: packed.contacts_at + TRACK * len(packed.contacts)].tobytes()
+    q, asked = state[: packed.contacts_at].reshape(-1, 7), _asked(packed, state)
     if packed.stood is not None and packed.stood[:2] == (asked, touching):
         return packed.stood[2]
     with lent_proof(packed, bodies) as proof:
@@ -63,12 +65,65 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
         posed = PosedBodies(bodies, q, touching, packed.contacts, given)
         if sampled(posed, [owned[k][1] for k in conforming], CTRL_C).crossing:
             return None
-    found = [
-        PairAnswer(item.name, (a.name, b.name), answer, True, is_proven(answer))
-        for (item, (a, b), _), answer in zip(owned, answers, strict=True)
-    ]
+    found = _named(packed, answers)
     packed.stood = asked, touching, found
     return found
+
+
+def _asked(packed: Packed, state: Array) -> bytes:
+    """Poses, and pairs of the given contacts, by which a proof is found again."""
+    return state[: packed.contacts_at + TRACK * len(packed.contacts)].tobytes()
+
+
+def _named(packed: Packed, answers: Sequence[Answer]) -> list[PairAnswer]:
+    """Answers that hold, with the names of what they are of."""
+    return [
+        PairAnswer(item.name, (a.name, b.name), answer, True, is_proven(answer))
+        for (item, (a, b), _), answer in zip(owned_pairs(packed), answers, strict=True)
+    ]
+
+
+def prove_way(
+    packed: Packed, bodies: Sequence[Body], last: Array, state: Array, touching: float
+) -> list[PairAnswer] | None:
+    """What is proven of all pairs at poses, and that none has passed through the other on the way from the last ones.
+
+    The straight way is proven; where it is not, it has to be shorter than the least radius of what is round of the two
+    bodies, or a quarter of their size. None where that is not so, or the poses are not proven as `prove_start` asks.
+
+    Parameters
+    ----------
+    packed : Packed
+    bodies : sequence of Body
+    last : (n, 7)
+        The last poses.
+    state : array
+        Poses, and pairs of the given contacts.
+    touching : float
+        What bodies may be in each other and still touch, in parts of the scene's size.
+    """
+    q, length = state[: packed.contacts_at].reshape(-1, 7), touching * packed.scale
+    with lent_proof(packed, bodies) as proof:
+        if not proof.is_at(last):
+            proof.look(last, length, proof.moves)
+        if proof.stays_clear(q, length, proof.moves, QUICK):
+            found = _named(packed, proof.clear_answers(q, proof.moves))
+            packed.stood = _asked(packed, state), touching, found
+            return found
+        if any(proof.way_length(k, last, q) > proof.radius(k) for k in _unproven_ways(proof, q, length)):
+            return None
+    return prove_start(packed, bodies, state, touching)
+
+
+def _unproven_ways(proof: ClearanceProof, q: Array, touching: float) -> list[int]:
+    """The pairs whose way to poses is not proven, either, if they are opened there where faces come to touch."""
+    closing = [k for k in proof.not_clear() if proof.fronts.pair.known[k] == 1.0]
+    for k in closing:
+        off = off_contacts(proof, k, q, touching, _unknown)
+        proof.moves[k] = 0.0 if off is None else off
+    answers = proof.look(q, touching, proof.moves, closing, swept=True, budget=BUDGET)
+    proven = {k for k, answer in zip(closing, answers, strict=True) if is_proven(answer)}
+    return [k for k in proof.not_clear() if k not in proven]
 
 
 def _answers(proof: ClearanceProof, q: Array, touching: float) -> tuple[list[Answer] | None, list[int]]:

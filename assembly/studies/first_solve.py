@@ -25,6 +25,7 @@ from assembly.studies.parting import parted
 from assembly.studies.put_together import PutTogether, put_together
 from assembly.studies.seated import seated
 from assembly.studies.separation import separated
+from assembly.studies.unhindered import unhindered_at
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -105,7 +106,9 @@ class _FirstSolve:
 
     def _put_together(self, together: PutTogether) -> Solution:
         """The same, from where bodies were put together without clearances."""
-        solution = self._where_it_fits(together.poses)
+        solution = unhindered_at(
+            self.scene, together.poses, self.q, self.settings, self.starts, self.interruption
+        ) or self._where_it_fits(together.poses)
         solution.put_together = True
         return solution
 

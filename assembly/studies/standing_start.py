@@ -33,7 +33,7 @@ from assembly.solve.start_proof import is_for_proofs, prove_start
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["standing_start"]
+__all__ = ["standing_start", "with_contacts"]
 
 Array = NDArray[np.float64]
 
@@ -77,12 +77,12 @@ def standing_start(
         return None
     solution = Solution(scene._scene, packed, state, Status.SOLVED, 0.0, history, fit=Fit(float(settings[FIT])))
     solution._touching, solution._clear = touching, answers
-    solution._lists = partial(_with_contacts, scene)
+    solution._lists = partial(with_contacts, scene)
     solution.seconds = perf_counter() - begin
     return solution
 
 
-def _with_contacts(scene: Assembly, solution: Result) -> Ended:
+def with_contacts(scene: Assembly, solution: Result) -> Ended:
     """What a start that was returned as it is ended with, and with the contacts of clearances listed.
 
     Where these take more places the scene is packed with more, unless its rows are others by now.

@@ -68,7 +68,11 @@ def aligned(directions: Array) -> Array:
             axis, cosine = rotation[:, 2], -cosine
         x, y, z = np.cross(axis, along)
         skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        rotation = (np.eye(3) + skew + skew @ skew / (1.0 + cosine)) @ rotation
+        x_axis = (np.eye(3) + skew + skew @ skew / (1.0 + cosine)) @ rotation[:, 0]
+        # Orthonormal anew: turns of nearly half a turn make rounding of the last one larger.
+        x_axis -= (x_axis @ along) * along
+        x_axis /= np.linalg.norm(x_axis)
+        rotation = np.column_stack([x_axis, np.cross(along, x_axis), along])
         result[k] = rotation
     return result
 

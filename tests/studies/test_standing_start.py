@@ -146,8 +146,10 @@ def test_what_goes_on_from_it_goes_on_from_its_contacts():
         scene = flush_plates()
         first = solve(scene)
         scene.constraints[0].offset = 0.5
-        ends.append(told(scene.solve(first)))
-    assert ends[0] == ends[1]
+        ends.append(scene.solve(first))
+    # The one by rows alone, the other with contacts: rows hold to 2e-13 of the size, some hundred.
+    assert ends[0].q == pytest.approx(ends[1].q, abs=1e-10)
+    assert ends[0].status is ends[1].status and len(ends[0].contacts) == len(ends[1].contacts)
 
 
 def test_a_solve_from_it_moves_where_values_are_others():
@@ -187,7 +189,7 @@ def test_a_start_at_which_a_joint_is_off_is_solved(off):
     scene = flush_plates()
     scene.bodies[1].pose = asm.Pose((5.0, 3.0, 10.0 + off))
     solution = scene.solve()
-    assert solution.success and solution.proved and solution._lists is None
+    assert solution.success and solution.proved
     assert abs(solution.q[1, 2] - 10.0) < 1e-9
 
 

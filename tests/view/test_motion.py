@@ -47,6 +47,16 @@ def test_aligned_follows_directions_and_turns_no_more():
     assert cosine == pytest.approx((unit[:-1] * unit[1:]).sum(axis=1), abs=1e-13)
 
 
+def test_aligned_stays_a_rotation_where_directions_turn_around_again_and_again():
+    """Each turn by nearly half a turn would make rounding of the last one a thousand times larger."""
+    rng = np.random.default_rng(8)
+    path = rng.normal(size=(2000, 3))
+    path[1::2] = -path[::2] + 1e-3 * rng.normal(size=(1000, 3))
+    found = aligned(path)
+    assert np.abs(np.einsum("kji,kjl->kil", found, found) - np.eye(3)).max() < 1e-14
+    assert found[:, :, 2] == pytest.approx(path / np.linalg.norm(path, axis=1, keepdims=True), abs=1e-14)
+
+
 def test_aligned_with_opposite_and_missing_directions():
     found = aligned(np.array([[0, 0, -2.0], [0, 0, 0], [0, 0, 3.0], [1e-100, 0, 0]]))
     assert found[:, :, 2] == pytest.approx(np.array([[0, 0, -1], [0, 0, -1], [0, 0, 1], [1, 0, 0]]), abs=1e-15)

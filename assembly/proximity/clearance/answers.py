@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly._read_only import ReadOnlyArrays
+from assembly._read_only import ReadOnlyArrays, read_only
 
 __all__ = ["Answer", "Contacts", "Verdict", "is_proven"]
 
 Array = NDArray[np.float64]
+NOWHERE = read_only(np.full(3, np.nan))
 
 
 class Verdict(Enum):
@@ -49,7 +50,7 @@ class Answer(ReadOnlyArrays):
     verdict: Verdict
     bound: float = -np.inf
     depth: float = 0.0
-    place: Array = field(default_factory=lambda: np.full(3, np.nan))
+    place: Array = field(default_factory=lambda: NOWHERE)
     swept: bool = False
     part: float = 1.0
 

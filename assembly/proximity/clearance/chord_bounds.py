@@ -53,12 +53,11 @@ def _bound_bend(net, component, least):
 
 
 @kernel(inner=True, allocates=True)
-def _side(net):
+def _side(net, points):
     """1, -1 or 0: whether a control polygon turns right only, left only, and by less than half a turn, or neither."""
-    degree = net.shape[0] - 1
     most, left, right = 0.0, -np.inf, np.inf
     first_x = first_y = last_x = last_y = 0.0
-    for k in range(degree):
+    for k in range(points - 1):
         x = net[k + 1, 0] / net[k + 1, 2] - net[k, 0] / net[k, 2]
         y = net[k + 1, 1] / net[k + 1, 2] - net[k, 1] / net[k, 2]
         if k == 0:
@@ -75,6 +74,30 @@ def _side(net):
     return -1 if right >= -STRAIGHT * most else 0
 
 
+@kernel(inner=True, allocates=True)
+def _polygon(pieces, at, ends, room, polygon):
+    """Write the control polygon of a curve over an interval, span after span; the number of its points."""
+    binomials, matrix, net = room
+    begin, end = ends
+    rows = pieces.shape[1]
+    points = 0
+    for k in range(pieces.shape[0]):
+        width = at[k + 1] - at[k]
+        low, high = part_of(begin, end, at[k], width)
+        # What is beyond a knot by rounding is not; an interval of no length is in the span where it is.
+        is_beyond = (end - at[k]) / width <= WITHIN and k > 0 or (begin - at[k]) / width >= 1.0 - WITHIN
+        if is_beyond and not (points == 0 and k == pieces.shape[0] - 1):
+            continue
+        write_restriction(rows - 1, low, high, binomials, matrix)
+        _restrict(pieces[k], matrix, net)
+        # Where spans meet both have the same point.
+        for i in range(0 if points == 0 else 1, rows):
+            for c in range(3):
+                polygon[points, c] = net[i, c]
+            points += 1
+    return points
+
+
 @kernel(signatures="(f8[:,:,::1], f8[::1], f8[:,::1], f8[:,::1], i8[::1])", allocates=True)
 def bound_chords(pieces, at, t, second, hollow):
     """Bounds over intervals of a plane curve.
@@ -89,16 +112,16 @@ def bound_chords(pieces, at, t, second, hollow):
     """
     spans, rows, _ = pieces.shape
     binomials, matrix, net = np.empty((rows, rows)), np.empty((rows, rows)), np.empty((rows, 3))
+    polygon = np.empty((spans * (rows - 1) + 1, 3))
     write_binomials(binomials)
+    for n in range(t.shape[0]):
+        points = _polygon(pieces, at, (min(t[n, 0], t[n, 1]), max(t[n, 0], t[n, 1])), (binomials, matrix, net), polygon)
+        hollow[n] = _side(polygon, points)
     for k in range(spans):
         width = at[k + 1] - at[k]
         for n in range(t.shape[0]):
             begin, end = min(t[n, 0], t[n, 1]), max(t[n, 0], t[n, 1])
             low, high = part_of(begin, end, at[k], width)
-            if (begin - at[k]) / width >= -WITHIN and (end - at[k]) / width <= 1.0 + WITHIN:
-                write_restriction(rows - 1, low, high, binomials, matrix)
-                _restrict(pieces[k], matrix, net)
-                hollow[n] = _side(net)
             if rows < 2 or not low < high:
                 continue
             low, high = not_narrow(low, high)

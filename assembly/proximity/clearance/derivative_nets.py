@@ -58,8 +58,9 @@ def chord_bounds(curve: NurbsCurve, t: Array) -> tuple[Array, Indices]:
         Of |c_u''| and |c_v''|.
     hollow : (n,) of int
         To which side of its chord, and of the chords of all its parts, a boundary curve is. 1: left, where the material
-        of a face is; -1: right; 0: not known. Left is where its control polygon over the interval, within one span,
-        turns right only, and by less than half a turn in all: then so do the polygons of its parts.
+        of a face is; -1: right; 0: not known. Left is where its control polygon over the interval, of one span or of
+        several after another, turns right only, and by less than half a turn in all: then so do the polygons of its
+        parts.
     """
     second, hollow = np.zeros((len(t), 2)), np.zeros(len(t), dtype=np.int64)
     bound_chords(np.array(curve.bezier_pieces()), np.array(curve.breaks()), np.ascontiguousarray(t), second, hollow)

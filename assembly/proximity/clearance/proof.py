@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +81,8 @@ class ClearanceProof:
         # What opened contacts at the last look of a solve.
         self.moves = np.zeros((len(self.pairs), 6))
         self._on_way = np.full(len(self.pairs), ON_WAY)
+        # Poses of the last looks, where all pairs had them at the same ones.
+        self._at: bytes | None = None
 
     def look(
         self,
@@ -123,20 +126,51 @@ class ClearanceProof:
         self._run(q, touching, moved, tasks)
         counts.budget = usual
         self._begun[rows] = True
+        at = q.tobytes()
+        if len(rows) == len(self.pairs):
+            self._at = at
+        elif self._at != at:
+            self._at = None
         return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
 
-    def stays_clear(self, q: Array, touching: float, moves: Array) -> bool:
+    def stays_clear(self, q: Array, touching: float, moves: Array, budget: int | None = None) -> bool:
         """Whether all pairs, all of which were clear at the last look, are so at poses and on the way there.
 
-        Where one is not, nothing is known: `look` tells what it is. It makes fronts that have grown anew, too.
+        Where one is not, nothing is known: `look` tells what it is. The budget is as there.
         """
         self._forget()
+        self._at = None
         counts = self.fronts.counts
-        if not (self.fronts.pair.known == 1.0).all() or (counts.count > GROWN * counts.fresh + MANY).any():
+        if not (self.fronts.pair.known == 1.0).all():
             return False
-        self.fronts.pair.touch = touching
-        look_at_pairs(self.forest.arrays, self.fronts.arrays, q.copy(), moves, self._on_way, self._codes)
-        return not self._codes.any()
+        grown = counts.count > GROWN * counts.fresh + MANY
+        tasks = np.where(grown, ON_WAY_ANEW, ON_WAY) if grown.any() else self._on_way
+        usual = counts.budget.copy()
+        counts.budget = usual if budget is None else budget
+        self._run(q, touching, moves, tasks)
+        counts.budget = usual
+        if self._codes.any():
+            return False
+        self._at = q.tobytes()
+        return True
+
+    def clear_answers(self, q: Array, moves: Array) -> list[Answer]:
+        """What is proven of all pairs at poses (n, 7) at which they stayed clear, after moves (pairs, 6)."""
+        pair = self.fronts.pair
+        bounds = (pair.soonest - pair.travelled + pair.needed).tolist()
+        answers = [Answer(Verdict.CLEAR, bound, swept=True) for bound in bounds]
+        for k in np.flatnonzero(moves.any(axis=1)).tolist():
+            far = self.move_length(k, q, moves[k])
+            answers[k] = Answer(Verdict.TOUCHING, bounds[k] - far, far, swept=True)
+        return answers
+
+    def not_clear(self) -> list[int]:
+        """The pairs of which `stays_clear` did not find that they do, where it looked at any; else all."""
+        return np.flatnonzero((self._codes != CLEAR) | (self.fronts.pair.known != 1.0)).tolist()
+
+    def is_at(self, q: Array) -> bool:
+        """Whether all pairs were clear at their last looks, and these were at poses (n, 7)."""
+        return self._at == q.tobytes() and bool((self.fronts.pair.known == 1.0).all())
 
     def forget_poses(self) -> None:
         """From now on no way leads from the last poses."""
@@ -255,8 +289,11 @@ class ClearanceProof:
         if not move[3:].any():
             return float(np.linalg.norm(move[:3]))
         root = self.cells_of(k).root
-        way = move[:3] + np.cross(move[3:], rotation_matrix(q[self.pairs[k][1], 3:]) @ root.center)
-        return float(np.linalg.norm(way) + root.radius * np.linalg.norm(move[3:]))
+        # In plain floats: np.cross takes longer than all the rest.
+        x, y, z = (rotation_matrix(q[self.pairs[k][1], 3:]) @ root.center).tolist()
+        dx, dy, dz, u, v, w = move.tolist()
+        way = hypot(dx + v * z - w * y, dy + w * x - u * z, dz + u * y - v * x)
+        return way + float(root.radius) * hypot(u, v, w)
 
     def way_length(self, k: int, before: Array, after: Array) -> float:
         """How far points of the second body of pair k go between two poses, seen from the first, at most."""
@@ -275,7 +312,7 @@ class ClearanceProof:
 
     def go_back(self, poses: tuple[Array, Array]) -> None:
         """Make earlier poses, from which all ways were clear, the last ones again."""
-        pair = self.fronts.pair
+        pair, self._at = self.fronts.pair, None
         for k, (turn, shift) in enumerate(zip(*poses, strict=True)):
             now = pair.turn[k].reshape(3, 3).copy(), pair.shift[k].copy()
             pair.travelled[k] += self._length(k, now, (turn.reshape(3, 3), shift))

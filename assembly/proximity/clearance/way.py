@@ -4,6 +4,10 @@ The middle of b's root goes along a straight line, and b turns about it, with co
 straight line between its two places by no more than its distance from the axis of rotation times 1 - cos(angle / 2):
 the height of the arc over its chord, here called its sag. What is convex and holds two points holds their chord: nodes
 that one plane, or one bore, keeps apart at both poses by more than the sag are apart all the way.
+
+The arc is across the axis of rotation, and so is what it is off its chord. So of a plane that is across the axis, as
+that on which links of a planar mechanism slide, the sag is zero; of another one it is that part of it that is along the
+plane's normal.
 """
 
 from __future__ import annotations
@@ -20,13 +24,15 @@ from assembly.proximity.clearance.separation import across, is_round, is_wire, p
 
 # swept: whether the way is looked at, or its end alone. moved: the longest way of a point of b. sag: of any point;
 # factor: of a point at distance 1 from the axis of rotation. axis, middle: of that, in axes of b (zero: it is not
-# known). before, after: the poses.
-Way = namedtuple("Way", "swept moved sag factor axis middle before after")
+# known); lean: what the axis may be off. before, after: the poses.
+Way = namedtuple("Way", "swept moved sag factor axis lean middle before after")
 ROUNDED_UP = 1.0 + 1e-12
 # Below so small a sine of the angle its axis is lost in rounding, above so large an angle as well.
 LEAST_SINE, LARGEST_ANGLE = 1e-9, 3.0
 # What the axis may be off, as a part of distances; the sag of so small angles is far below that.
 AXIS_OFF = 1e-6
+# What rounding does to the sine of the angle, of which the axis is a part: that of two matrices and of their product.
+SINE_OFF = 1e-14
 
 
 @kernel(inner=True)
@@ -45,11 +51,13 @@ def way_of(before, after, center, radius, swept):
     m = matmul_t(before.rotation, after.rotation)
     axis = (m[7] - m[5], m[2] - m[6], m[3] - m[1])
     length = math.sqrt(dot(axis, axis))
+    lean = 0.0
     if length > LEAST_SINE and angle < LARGEST_ANGLE:
         axis = scale(1.0 / length, axis)
+        lean = SINE_OFF / length
     else:
         axis = (0.0, 0.0, 0.0)
-    return Way(swept, moved, factor * radius if swept else 0.0, factor, axis, center, before, after)
+    return Way(swept, moved, factor * radius if swept else 0.0, factor, axis, lean, center, before, after)
 
 
 @kernel(inline=True)
@@ -99,6 +107,12 @@ def sag_backward(way, forest, a):
     return 0.125 * angle * (angle * far + 2.0 * math.sqrt(dot(d, d))) * ROUNDED_UP
 
 
+@kernel(inline=True)
+def part_along(way, n):
+    """Which part of a sag is along the normal n of a plane, at most: a sag is across the axis of rotation."""
+    return min(across(n, matvec(way.after.rotation, way.axis)) + way.lean, 1.0)
+
+
 @kernel(inner=True)
 def stays_apart(forest, nodes, way, n, gaps):
     """Whether two nodes are kept apart all the way by what keeps them apart at both poses, by gaps before and after.
@@ -113,9 +127,10 @@ def stays_apart(forest, nodes, way, n, gaps):
     if nodes.how == BY_BORE_B:
         sag = sag_backward(way, forest, nodes.a)
         return after > sag and before > sag
-    if after > way.sag and before > way.sag:
+    part = 1.0 if nodes.how == BY_BORE_A else part_along(way, n)
+    if after > part * way.sag and before > part * way.sag:
         return True
-    sag = sag_of(way, forest, nodes.b)
+    sag = part * sag_of(way, forest, nodes.b)
     if nodes.how == BY_BORE_A:
         # The room in a bore is that of a ball instead of a disc already.
         return after > sag and before > sag

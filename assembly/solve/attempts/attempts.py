@@ -14,7 +14,7 @@ from assembly.solve.attempts.assembled import run_gathered
 from assembly.solve.attempts.balance import balanced
 from assembly.solve.attempts.corners import corners_first
 from assembly.solve.attempts.fit import Loop, fitted, fitted_again
-from assembly.solve.attempts.postures import following_none
+from assembly.solve.attempts.postures import following_none, rows_measured_from
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.settings import (
@@ -42,7 +42,7 @@ from assembly.solve.loop.workspace import workspace_needed
 from assembly.solve.options import Options
 from assembly.solve.second_order.leave import Fit, Outcome, leave_saddles
 
-__all__ = ["as_it_stands", "attempt", "begin", "go_on_once", "load", "new_workspace", "with_listed"]
+__all__ = ["as_it_stands", "attempt", "begin", "go_on_once", "load", "new_workspace", "rows_alone", "with_listed"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -179,6 +179,19 @@ def as_it_stands(packed: Packed, interruption: Interruption, settings: Array, st
     settings = settings.copy()
     settings[ITERATIONS], settings[GATHER], settings[PLACES], settings[ANY_POSE] = 0.0, NEVER, 0.0, 0.0
     return _run(packed, interruption, packed.without_manager(), settings, state)
+
+
+def rows_alone(
+    packed: Packed, interruption: Interruption, settings: Array, state: Array, reference: Array | None = None
+) -> Outcome:
+    """The outcome of the loop where no contact of a clearance is looked for, and nothing is gathered.
+
+    Postures are measured from the state's poses, or from a reference (n, 7).
+    """
+    settings = settings.copy()
+    settings[GATHER], settings[PLACES] = NEVER, 0.0
+    table = packed.without_manager() if reference is None else rows_measured_from(packed, reference)
+    return _run(packed, interruption, table, settings, state)
 
 
 def with_listed(packed: Packed, interruption: Interruption, settings: Array, state: Array) -> Outcome:

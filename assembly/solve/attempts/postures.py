@@ -14,7 +14,7 @@ from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program.objective_terms import POSTURE, TERM, TERM_RECORD, posture_at
 from assembly.constraints.program.records import TERM_TABLE, TERMS
 
-__all__ = ["following_none", "postures_from"]
+__all__ = ["following_none", "postures_from", "rows_measured_from"]
 
 Array = NDArray[np.float64]
 
@@ -31,16 +31,31 @@ def following_none(packed: Packed) -> NDArray[np.int64]:
     return table
 
 
+def _refer(packed: Packed, terms: Any, pool: Array, q: Array) -> None:
+    """Write poses (n, 7) that postures of terms are measured from into a pool."""
+    for term in terms:
+        reference = posture_at(pool, term.parameters)
+        reference.position[:] = (q[term.body, :3] - packed.reference) / packed.scale
+        reference.quaternion[:] = q[term.body, 3:]
+
+
+def rows_measured_from(packed: Packed, q: Array) -> NDArray[np.int64]:
+    """A table without a contact manager for a run of the loop that measures postures from poses (n, 7)."""
+    table = packed.without_manager()
+    terms = _terms(table)
+    following = np.flatnonzero((terms.kind == POSTURE) & (terms.follows == 1))
+    _refer(packed, terms[following], packed.rows_pool, q)
+    terms.follows[following] = 0
+    return table
+
+
 @contextmanager
 def postures_from(packed: Packed, q: Array) -> Iterator[None]:
     """Postures that would follow the start of each solve are measured from poses (n, 7) meanwhile."""
     terms = _terms(packed.table)
     following = np.flatnonzero((terms.kind == POSTURE) & (terms.follows == 1))
     try:
-        for term in terms[following]:
-            reference = posture_at(packed.pool, term.parameters)
-            reference.position[:] = (q[term.body, :3] - packed.reference) / packed.scale
-            reference.quaternion[:] = q[term.body, 3:]
+        _refer(packed, terms[following], packed.pool, q)
         terms.follows[following] = 0
         yield
     finally:

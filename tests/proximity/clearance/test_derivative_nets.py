@@ -128,3 +128,16 @@ def test_arcs_bend_away_from_the_inside_of_holes_alone():
     t = np.array([[0.05, 0.95], [0.2, 0.4]])
     assert (chord_bounds(arc.reversed(), t)[1] == 1).all()
     assert (chord_bounds(arc, t)[1] == -1).all()
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_of_a_circle_the_side_of_all_short_chords_is_known(side):
+    """Also of those over knots, where quarters meet. Seen from a hole it is 1: counterclockwise it turns left."""
+    circle = asm.shapes.solid_cylinder(2.0, 1.0)[-1].boundary[0]
+    if side == 1:
+        circle = asm.shapes.plate(10.0, 10.0, 1.0, [(1.0, 2.0, 2.0)])[-1].boundary[-1]
+    begin, end = circle.domain
+    middles = np.linspace(begin + 1.6, end - 1.6, 400)
+    # A turn of less than a right angle, 1.5 of a radius of 2.
+    assert (chord_bounds(circle, middles[:, None] + [-1.5, 1.5])[1] == side).all()
+    assert (chord_bounds(circle, middles[:, None] + [-1e-6, 1e-6])[1] == side).all()

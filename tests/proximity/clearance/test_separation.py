@@ -20,7 +20,7 @@ from assembly.proximity.clearance.front import Front, Parted
 from assembly.proximity.clearance.look import gap_along
 from assembly.proximity.clearance.records import BY_PLANE, Forest
 from assembly.proximity.clearance.separation import best_bore, room_in_bore, separation
-from assembly.proximity.clearance.way import Way, pose_at, sag_of, way_of
+from assembly.proximity.clearance.way import Way, part_along, pose_at, sag_of, way_of
 from tests.proximity.clearance.nodes import forest_of, halve_all, tree_of
 from tests.proximity.clearance.scenes import direction, faces_of
 from tests.proximity.clearance.splines import points_of, shapes
@@ -153,6 +153,12 @@ def test_ways_go_straight_and_turn_about_one_axis(cases):
             off = np.linalg.norm(here - (1.0 - s) * start - s * end, axis=1).max()
             assert off <= way.sag + 1e-14
             assert off <= sag_of(way, packed(forest), 0) + 1e-14
+            # Of a plane all but across the axis of rotation next to nothing of that counts.
+            axis = np.reshape(after.rotation, (3, 3)) @ way.axis
+            n = axis + 10.0 ** rng.uniform(-12.0, 0.0) * rng.normal(size=3)
+            n /= np.linalg.norm(n)
+            along = np.abs((here - (1.0 - s) * start - s * end) @ n).max()
+            assert along <= part_along(way, tuple(n)) * sag_of(way, packed(forest), 0) + 2e-15
         assert np.abs(last - end).max() < 1e-14
         assert length.max() <= way.moved + 1e-14
         middle = posed(pose_at(way, 0.25), root.center[None])
@@ -173,7 +179,7 @@ def test_directions_part_what_is_apart(cases):
     for _ in range(cases(20, 500)):
         shift, turn = (0.7 + 10.0 ** rng.uniform(-9.0, 0.0)) * direction(rng), random_turn(rng)
         pose = relative(turn, shift)
-        way = Way(False, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), pose, pose)
+        way = Way(False, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), pose, pose)
         found, _ = best_direction(packed(forest), front, Parted(*forest.roots, BY_PLANE), way, (0.0, 0.0, 0.0), 0.0)
         assert found.after == pytest.approx(np.linalg.norm(shift) - 0.7, abs=1e-14)
         assert math.isinf(found.before)

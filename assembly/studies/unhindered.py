@@ -1,0 +1,113 @@
+"""A warm solve that no clearance hinders: rows are solved without clearances, and what these ask for is proven after.
+
+A mechanism whose links slide along each other lists hundreds of contacts, none of which pushes: joints alone say where
+all of it goes. So rows alone are solved first, and bodies are proven to be clear, or to touch, at the pose that these
+lead to. There the least move with clearances is the same one. Whether clearances pushed at the last solution does not
+tell: where their contacts repeat what joints hold, which of them push is anyone's guess.
+
+Nor may bodies have passed through each other. The straight way from the last pose is proven with the same look. Where
+it is not, as that of a pin which goes along an arc in its bore, the way has to be shorter than bodies are thick. Where
+any of this fails, the solve is as it would be without.
+
+Where parts were put together without clearances it is the same, but for the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.solve.attempts.attempts import load, rows_alone
+from assembly.solve.clearance_proof import PairAnswer, can_prove
+from assembly.solve.interruption import Interruption
+from assembly.solve.loop.settings import ALLOWED_OVERLAP, FIT, SOLVED
+from assembly.solve.scene import Status
+from assembly.solve.second_order.leave import Fit
+from assembly.solve.solution import Solution
+from assembly.solve.start_proof import is_for_proofs, prove_start, prove_way
+from assembly.studies.standing_start import with_contacts
+
+if TYPE_CHECKING:
+    from assembly.assembly import Assembly
+
+__all__ = ["unhindered", "unhindered_at"]
+
+Array = NDArray[np.float64]
+
+
+def unhindered(
+    scene: Assembly,
+    last: Solution,
+    settings: Array,
+    starts: Mapping[str, ArrayLike] | None,
+    interruption: Interruption,
+) -> Solution | None:
+    """The solution of a scene with clearances and no objective that rows alone lead to, or None where they do not.
+
+    Parameters
+    ----------
+    scene : Assembly
+    last : Solution
+        Where to start.
+    settings : array
+        What the loop is told.
+    starts : mapping of constraint name -> (4,), optional
+    interruption : Interruption
+    """
+    packed = scene.packed()
+    if last._ended.packed is not packed or scene._scene is None or not (can_prove(packed) and is_for_proofs(packed)):
+        return None
+    if not last.success or packed.corners:
+        return None
+    prove = partial(prove_way, packed, scene.bodies, last.q)
+    return _by_rows_alone(scene, partial(scene._start, packed, last, starts), settings, prove, interruption)
+
+
+def unhindered_at(
+    scene: Assembly,
+    poses: Array,
+    reference: Array,
+    settings: Array,
+    starts: Mapping[str, ArrayLike] | None,
+    interruption: Interruption,
+) -> Solution | None:
+    """The same from poses (n, 7) at which rows hold, whatever objective there is; moves are measured from a reference.
+
+    No way to there is asked for.
+    """
+    packed = scene.packed()
+    if scene._scene is None or packed.corners or not (can_prove(packed) and is_for_proofs(packed)):
+        return None
+    prove = partial(prove_start, packed, scene.bodies)
+    return _by_rows_alone(scene, partial(scene._start, packed, poses, starts), settings, prove, interruption, reference)
+
+
+def _by_rows_alone(
+    scene: Assembly,
+    start: Callable[[], Array],
+    settings: Array,
+    prove: Callable[[Array, float], list[PairAnswer] | None],
+    interruption: Interruption,
+    reference: Array | None = None,
+) -> Solution | None:
+    """The solution that rows alone lead to from a start, if they do, and it is proven there that bodies are clear."""
+    packed = scene.packed()
+    load(packed, start)
+    begin = perf_counter()
+    code, state, history, *_ = rows_alone(packed, interruption, settings, start(), reference)
+    if code != SOLVED or interruption.is_over():
+        return None
+    touching = float(settings[ALLOWED_OVERLAP])
+    answers = prove(state, touching)
+    if answers is None or scene._scene is None or interruption.is_over():
+        return None
+    solution = Solution(scene._scene, packed, state, Status.SOLVED, 0.0, history, fit=Fit(float(settings[FIT])))
+    solution._touching, solution._clear = touching, answers
+    solution._lists = partial(with_contacts, scene)
+    solution.seconds = perf_counter() - begin
+    return solution

@@ -1,0 +1,107 @@
+"""Warm solves that no clearance hinders end where solves with contacts do, and lead through nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.studies import unhindered as module
+
+
+def slider():
+    """A plate that is slid over another one, flush, and turned on it."""
+    lower = asm.Body("lower", asm.shapes.plate(60, 40, 10, [(10, 0, 4.5)]), fixed=True)
+    upper = asm.Body("upper", asm.shapes.plate(40, 30, 8, [(-5, 3, 4.0)]), position=(3, 2, 9))
+    joint = asm.Planar(lower.frame((0, 0, 5)), upper.frame((0, 0, -4)), "on", x=3.0, y=2.0, angle=0.0)
+    scene = asm.Assembly([lower, upper])
+    scene.constrain(joint, asm.Clearance())
+    return scene, joint
+
+
+def rings(slide):
+    """Two linked rings, one of which is drawn along its own plane."""
+    a, b = (asm.Body(name, asm.shapes.torus(1.0, 0.1), fixed=name == "a") for name in "ab")
+    b.pose = asm.Pose((slide, 0.0, 0.0), (0.5**0.5, 0.5**0.5, 0.0, 0.0))
+    joint = asm.Prismatic(a.frame(z=(1, 0, 0), x=(0, 1, 0)), b.frame(z=(1, 0, 0), x=(0, 0, -1)), "draw", slide=slide)
+    return a, b, joint
+
+
+def without(monkeypatch):
+    monkeypatch.setattr(module, "unhindered", lambda *_: None)
+
+
+def test_a_slid_plate_is_where_contacts_lead_it(monkeypatch):
+    ends = []
+    for alone in (True, False):
+        scene, joint = slider()
+        if not alone:
+            without(monkeypatch)
+        solution = scene.solve()
+        for k in range(1, 9):
+            joint.x, joint.y, joint.angle = 3.0 - 2.0 * k, 2.0 + k, 0.2 * k
+            solution = scene.solve(solution)
+            assert solution.success and solution.proved
+            # Contacts that nobody asks for are not listed.
+            assert (solution._lists is not None) is alone
+        ends.append(solution)
+    assert ends[0].q == pytest.approx(ends[1].q, abs=1e-10)
+    assert ends[0].contacts and ends[0].values == pytest.approx(ends[1].values, abs=1e-12)
+
+
+def test_contacts_are_there_where_they_are_asked_for():
+    scene, joint = slider()
+    joint.x = 5.0
+    solution = scene.solve(scene.solve())
+    assert solution._lists is not None
+    assert max(abs(contact.gap) for contact in solution.contacts.values()) < 1e-10
+    assert solution.feasibility < 1e-10 and solution.mobility.dof == 0
+    joint.x = 6.0
+    assert scene.solve(solution).success
+
+
+def test_what_is_in_the_way_pushes():
+    """A block on a rail is driven against another one, which is free to slide."""
+    ground = asm.Body("ground", fixed=True)
+    first, second = (asm.Body(name, asm.shapes.box(2, 2, 2), position=(x, 0, 0)) for name, x in (("a", 0.0), ("b", 3)))
+    drive = asm.Prismatic(ground.frame(z=(1, 0, 0)), first.frame(z=(1, 0, 0)), "drive", slide=0.0)
+    scene = asm.Assembly([ground, first, second])
+    scene.constrain(drive, asm.Prismatic(ground.frame(z=(1, 0, 0)), second.frame(z=(1, 0, 0)), "rail"), asm.Clearance())
+    solution = scene.solve()
+    for slide, other in ((0.5, 3.0), (0.9, 3.0), (1.2, 3.2), (1.9, 3.9), (1.0, 3.9)):
+        drive.slide = slide
+        solution = scene.solve(solution)
+        assert solution.success and solution.proved
+        assert solution.q[1:, 0] == pytest.approx([slide, other], abs=1e-8)
+
+
+@pytest.mark.parametrize("slide", [1.0, 0.95])
+def test_no_rows_alone_lead_linked_rings_apart(slide, monkeypatch):
+    """Where they end the rings are clear, but on the way there they are not."""
+    a, b, joint = rings(slide)
+    scene, ends = asm.Assembly([a, b]), []
+    scene.constrain(joint, asm.Clearance())
+    solution = scene.solve()
+    assert solution.success and solution.q[1, 0] == pytest.approx(slide)
+    alone = module.unhindered
+    monkeypatch.setattr(module, "unhindered", lambda *asked: ends.append(alone(*asked)) or ends[-1])
+    joint.slide = 3.0
+    scene.solve(solution, max_iterations=30)
+    joint.slide = slide - 0.02
+    assert scene.solve(solution).success
+    assert ends[0] is None and ends[1].q[1, 0] == pytest.approx(slide - 0.02)
+
+
+def test_ways_along_a_plane_are_proven_however_long():
+    """An arm that lies on a plate goes around by sixth parts of a turn."""
+    plate = asm.Body("plate", asm.shapes.box(50, 50, 4), fixed=True)
+    arm = asm.Body("arm", asm.shapes.box(30, 6, 4), position=(10, 0, 4))
+    hinge = asm.Revolute(plate.frame((0, 0, 2)), arm.frame((-10, 0, -2)), "hinge", angle=0.0)
+    scene = asm.Assembly([plate, arm])
+    scene.constrain(hinge, asm.Clearance())
+    solution = scene.solve()
+    for k in range(1, 7):
+        hinge.angle = k * np.pi / 3
+        solution = scene.solve(solution)
+        assert solution.success and solution.proved and solution._lists is not None
+        assert all(pair.answer.swept for pair in solution._clear)
