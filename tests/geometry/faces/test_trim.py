@@ -287,7 +287,7 @@ for face, measures in zip(faces, (["area"], ["area", "volume_integral"], ["volum
     out.append([side, near.distance.tolist(), near.point.tolist(), face.space_distance(u, inside).tolist()])
     out[-1] += [getattr(face, measure)() for measure in measures]
 refused = []
-for outer in (circle((0, 0), 3), circle((4.5, 0), 1)):
+for outer in (circle((0, 0), 2.5), circle((4.5, 0), 1)):
     try:
         Face(shapes.plane(10.0, 10.0), outer, [circle((2, 0), 1)])
     except ValueError as error:
