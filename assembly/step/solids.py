@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 FOLLOWED = 1e-10
 # Tolerances of edges and of sewing, the latter over the size of the body.
 EDGE_TOLERANCE, SEWING = 1e-7, (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
-# Faces that go on over more than so many turns are cut.
+# Splines that go on over more than so many turns are cut.
 ONCE = 1.0 + 1e-6
 # How far a bilinear surface may be from an affine one, over its size.
 LINEAR = 1e-13
@@ -259,9 +259,9 @@ class Sewn:
 
 
 def _parts_of(face: Face) -> list[tuple[NurbsSurface, list[list[Piece]]]]:
-    """A face on a surface that is cut open; in parts of half a turn where it goes round more than once.
+    """A face on a surface that is cut open; in parts of half a turn where it goes round more than once as a spline.
 
-    A surface of OCCT has its parameters once around, and points of a second turn would be taken for the first.
+    OCCT knows that angles go on. Of a spline it would take points of a second turn for those of the first.
     """
     surface, chains = cut_open(face)
     found = [(surface, chains)]
@@ -271,7 +271,7 @@ def _parts_of(face: Face) -> list[tuple[NurbsSurface, list[list[Piece]]]]:
             continue
         low, high = surface.domain[axis]
         points = [piece.curve.control_points[:, axis] for chain in chains for piece in chain]
-        if np.ptp(np.concatenate(points)) <= period * ONCE:
+        if np.ptp(np.concatenate(points)) <= period * ONCE or not carrier_of(surface).is_own:
             continue
         count = int(np.ceil((high - low) / (0.5 * period)))
         at = np.linspace(low, high, count + 1)

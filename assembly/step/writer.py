@@ -101,8 +101,8 @@ def write_step(
     of faces. Faces that close are written as a solid, others as shells; a body in several pieces is read as several.
     Planes, cylinders, cones, spheres, tori, extrusions and revolutions are written as such, whatever their parameters,
     and all others as B-splines, exactly; of the edges, lines in (u, v) and curves in planes are exact and others are
-    followed to 1e-10 of the surface's size. A face that winds around its surface more than once is written in parts of
-    half a turn.
+    followed to 1e-10 of the surface's size. A face that winds more than once around a surface that is written as
+    a B-spline is written in parts of half a turn.
 
     Parameters
     ----------

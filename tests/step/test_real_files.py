@@ -34,7 +34,7 @@ def file(request):
 def occt_solids(path):
     """Name of the part and solid, as OCCT has them."""
     with quiet():
-        document, _ = document_of(str(path))
+        document = document_of(str(path))[0]
         root = occt().XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
         for label in free_labels(root):
             for leaf in leaves(label, O.TopLoc_Location(), path.stem, None):

@@ -25,6 +25,8 @@ _CHORDS = 32
 _NEWTON = 30
 # Cuts nearer than this part of the extent are one: that near to a corner, curves are not compared with one another.
 _ONE_CUT = 1e-5
+# Parameters that differ by less, over the domain, are one.
+_SAME = 1e-8
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
@@ -172,9 +174,35 @@ class _Pair:
                 at_b = abs(self._gap(b, part)[0])
             if min(at_a, at_b) > 100.0 * self.tolerance and high - low < 1e-3 * (self.a.t[-1] - self.a.t[0]):
                 break
-        s = 0.5 * (low + high)
+        s = self._parallel(0.5 * (low + high), 0.02 * (self.a.t[-1] - self.a.t[0]), part)
         g, t, _ = self._gap(s, part)
         return s, t, abs(g)
+
+    def _parallel(self, s: float, reach: float, part: tuple[float, float]) -> float:
+        """The place near one at which tangents are parallel, by secants: a least distance tells half of the digits."""
+
+        def turn(at: float) -> float:
+            _, t, _ = self._gap(at, part)
+            x, y = self.a.curve.evaluate(at, 1)[1], self.b.curve.evaluate(t, 1)[1]
+            return float((x[0] * y[1] - x[1] * y[0]) / max(np.linalg.norm(x) * np.linalg.norm(y), 1e-300))
+
+        ends = float(self.a.t[0]), float(self.a.t[-1])
+        last, at = min(max(s - 1e-4 * reach, ends[0]), ends[1]), s
+        before, here = turn(last), turn(at)
+        for _ in range(12):
+            if here == before or abs(here) < 1e-15:
+                break
+            new = min(max(at - here * (at - last) / (here - before), ends[0]), ends[1])
+            last, before = at, here
+            at, here = new, turn(new)
+        return at if abs(at - s) <= reach and abs(here) <= abs(turn(s)) else s
+
+
+def _at_knot(t: float, sampled_curve: _Sampled) -> float:
+    """A parameter, moved to a knot that is next to it."""
+    knots = sampled_curve.curve.breaks()
+    near = float(knots[np.argmin(np.abs(knots - t))])
+    return near if abs(near - t) <= _SAME * (knots[-1] - knots[0]) else t
 
 
 def _apart(rows: list[tuple[float, float]], a: _Sampled, b: _Sampled, radius: float) -> list[tuple[float, float]]:
@@ -194,7 +222,8 @@ def _apart(rows: list[tuple[float, float]], a: _Sampled, b: _Sampled, radius: fl
         ends = [row for row in close if row[0] in (a.t[0], a.t[-1]) or row[1] in (b.t[0], b.t[-1])]
         both = [row for row in ends if row[0] in (a.t[0], a.t[-1]) and row[1] in (b.t[0], b.t[-1])]
         best = both or ends or close
-        chosen.append(best[len(best) // 2])
+        s, t = best[len(best) // 2]
+        chosen.append((_at_knot(s, a), _at_knot(t, b)))
     return chosen
 
 
