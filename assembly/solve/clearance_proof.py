@@ -32,12 +32,14 @@ if TYPE_CHECKING:
     from assembly.solve.solution import Solution
 
 __all__ = [
+    "FEW",
     "TRIES",
     "PairAnswer",
     "can_prove",
     "lent_proof",
     "near_contacts",
     "new_proof",
+    "nothing_known",
     "opening_move",
     "owned_pairs",
     "prove_end",
@@ -158,7 +160,7 @@ def _open_recognized(proof: ClearanceProof, q: Array, touching: float) -> set[in
     for k in proof.near_pairs(q, touching):
         if proof.moves[k].any():
             continue
-        off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, _unknown)
+        off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, nothing_known)
         if off is not None:
             proof.moves[k] = off
         elif conforms(proof, k, q, touching):
@@ -166,7 +168,7 @@ def _open_recognized(proof: ClearanceProof, q: Array, touching: float) -> set[in
     return wedged
 
 
-def _unknown() -> None:
+def nothing_known() -> None:
     """Nothing is known of where bodies touch."""
     return None
 

@@ -31,6 +31,7 @@ from assembly.proximity.clearance.body_cells import has_cells
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
 from assembly.proximity.clearance.slimming import slim_answer
 from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
+from assembly.solve.clearance_proof import FEW
 from assembly.solve.interruption import Interruption
 from assembly.solve.samples import ROUNDED, PosedBodies, sampled
 
@@ -54,8 +55,6 @@ Pair = tuple[Body, Body]
 Normal = Callable[[], Array | None]
 # Pairs whose proofs are made at once.
 AT_ONCE = 64
-# Pairs of nodes that a look may take where bodies conform.
-FEW = 500
 # Moves that are tried for what a look leaves open.
 TRIES = 2
 # What rounding may make of boxes, in parts of where they end.

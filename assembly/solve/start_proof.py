@@ -19,7 +19,7 @@ from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.slimming import slim_answer
 from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
 from assembly.proximity.features.solid_contact import TRACK
-from assembly.solve.clearance_proof import TRIES, PairAnswer, lent_proof, owned_pairs
+from assembly.solve.clearance_proof import TRIES, PairAnswer, lent_proof, nothing_known, owned_pairs
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.samples import PosedBodies, sampled
 
@@ -164,7 +164,7 @@ def _opening(proof: ClearanceProof, q: Array, touching: float) -> tuple[Array, s
     for k in proof.near_pairs(q, touching):
         if moves[k].any():
             continue
-        off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, _unknown)
+        off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, nothing_known)
         if off is None:
             hopeless.add(k)
         else:
@@ -172,14 +172,9 @@ def _opening(proof: ClearanceProof, q: Array, touching: float) -> tuple[Array, s
     return moves, hopeless
 
 
-def _unknown() -> None:
-    """Nothing is known of where bodies touch."""
-    return None
-
-
 def _off_what_is_open(proof: ClearanceProof, k: int, q: Array, moves: Array, touching: float) -> Answer:
     """What is proven of a pair that is moved off what is recognized to touch here, or off what looks leave open."""
-    off = off_contacts(proof, k, q, touching, _unknown)
+    off = off_contacts(proof, k, q, touching, nothing_known)
     moves[k] = 0.0 if off is None else off
     (answer,) = proof.look(q, touching, moves, which=[k])
     for _ in range(TRIES):
