@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary
 
 from assembly.assembly import Assembly
 from assembly.cad.cadquery_joints import Maker
+from assembly.cad.libraries import uncollected
 from assembly.cad.locations import location_of, pose_of
 from assembly.cad.markers import Requirement, requirements_of
 from assembly.constraints.model.joint import Joint
@@ -147,8 +148,12 @@ def solve_cadquery(assembly: Any, options: dict[str, Any]) -> Solution:
     read = [requirements_of(constraint) for constraint in constraints]
     known = _SCENES.get(assembly)
     if known is None or not known.is_of(assembly, read):
-        known = _SCENES[assembly] = _Scene(assembly, constraints, read)
-    began = known.begin(assembly)
+        with uncollected():
+            known = _SCENES[assembly] = _Scene(assembly, constraints, read)
+            began = known.begin(assembly)
+            known.scene.packed()
+    else:
+        began = known.begin(assembly)
     solution = known.scene.solve(**options)
     if solution.success:
         known.apply(assembly, began, solution)

@@ -135,3 +135,15 @@ def test_a_browser_shows_an_ellipsoid_and_what_is_behind_it(photo, tmp_path):
     assert middle[1] > middle[2] + 20
     assert beside[0] > beside[1] + 40 and abs(beside[1] - beside[2]) < 40
     assert pixels[:, [0, -1]].min() > 200
+
+
+def test_a_page_needs_nothing_of_what_the_server_needs(run_python, tmp_path):
+    code = f"""
+import sys
+for name in ("tornado", "zmq", "IPython", "PIL", "pyngrok"):
+    sys.modules[name] = None
+import assembly as asm
+asm.view.save_html({str(tmp_path / "ball.html")!r}, asm.Assembly([asm.Body("ball", asm.shapes.sphere(1.0))]))
+"""
+    run_python(code)
+    assert (tmp_path / "ball.html").stat().st_size > 100_000
