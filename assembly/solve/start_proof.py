@@ -119,7 +119,7 @@ def _unproven_ways(proof: ClearanceProof, q: Array, touching: float) -> list[int
     """The pairs whose way to poses is not proven, either, if they are opened there where faces come to touch."""
     closing = [k for k in proof.not_clear() if proof.fronts.pair.known[k] == 1.0]
     for k in closing:
-        off = off_contacts(proof, k, q, touching, _unknown)
+        off = off_contacts(proof, k, q, touching, nothing_known)
         proof.moves[k] = 0.0 if off is None else off
     answers = proof.look(q, touching, proof.moves, closing, swept=True, budget=BUDGET)
     proven = {k for k, answer in zip(closing, answers, strict=True) if is_proven(answer)}
