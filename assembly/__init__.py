@@ -82,7 +82,11 @@ if TYPE_CHECKING:
     from assembly.solve.second_order.classification import SecondOrder as SecondOrder
     from assembly.solve.solution import Solution as Solution
     from assembly.solve.way import Way as Way
+    from assembly.step import read_brep as read_brep
+    from assembly.step import read_iges as read_iges
     from assembly.step import read_step as read_step
+    from assembly.step import write_brep as write_brep
+    from assembly.step import write_iges as write_iges
     from assembly.step import write_step as write_step
     from assembly.studies.interference.clash import Clash as Clash
     from assembly.studies.interference.clash import Interference as Interference
@@ -167,6 +171,8 @@ else:
             "interference": "assembly.studies.interference.report",
             "load": "assembly.scene_file",
             "proximity": "assembly.proximity",
+            "read_brep": "assembly.step",
+            "read_iges": "assembly.step",
             "read_step": "assembly.step",
             "read_urdf": "assembly.files.urdf_reader",
             "reference": "assembly.solve.oracle.reference",
@@ -174,7 +180,9 @@ else:
             "statics": "assembly.solve.forces.statics",
             "tip_jacobian": "assembly.solve.forces.end_effector",
             "view": "assembly.view",
+            "write_brep": "assembly.step",
             "write_gltf": "assembly.files.gltf",
+            "write_iges": "assembly.step",
             "write_step": "assembly.step",
             "write_stl": "assembly.files.stl",
             "write_urdf": "assembly.files.urdf_writer",

@@ -21,6 +21,8 @@ _MODULES = (
     "Geom2d",
     "GeomAbs",
     "GeomConvert",
+    "IGESCAFControl",
+    "IGESControl",
     "IFSelect",
     "Interface",
     "Message",

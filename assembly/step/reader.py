@@ -350,12 +350,32 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
 
 def bodies_of(path: str, unit: str, strict: bool, folder: str | None = None) -> tuple[list[Body], list[str]]:
     """The bodies of a file, also of one that is damaged if there is a folder, and what there is to warn of."""
-    scale = 1.0 / checked_unit(unit)
-    file = Path(path)
-    o = occt()
     with quiet():
         document, count, absent = document_of(path, folder)
-        root = o.XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+        found = Source(Path(path), document, count, tuple(absent), folder is not None)
+        return bodies_in(found, 1.0 / checked_unit(unit), strict)
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A file as a document of OCCT, in millimeters, with the number of its faces.
+
+    `absent` are files that it refers to and that are not there; of a damaged file what is whole is in the document.
+    """
+
+    file: Path
+    document: Any
+    count: int
+    absent: tuple[str, ...] = ()
+    damaged: bool = False
+
+
+def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], list[str]]:
+    """The bodies of a document, and what there is to warn of; lengths are millimeters times `scale`."""
+    file, count = source.file, source.count
+    o = occt()
+    with quiet():
+        root = o.XCAFDoc_DocumentTool.ShapeTool_s(source.document.Main())
         bodies: list[Body] = []
         missing: list[str] = []
         inexact: list[str] = []
@@ -387,11 +407,11 @@ def bodies_of(path: str, unit: str, strict: bool, folder: str | None = None) -> 
                         bodies.append(body)
     lost = [f"{count - built} of {count} faces, of which OCCT makes nothing"] if built < count else []
     # Those of a file that is not damaged are of no shape.
-    if strict and (missing or (lost and folder is not None)):
+    if strict and (missing or (lost and source.damaged)):
         raise StepError(
             f"path is {str(file)!r}; {_listed('not read', missing + lost)}; pass strict=False to go without"
         )
-    away = [f"{name!r}, which it refers to and which is not there" for name in absent]
+    away = [f"{name!r}, which it refers to and which is not there" for name in source.absent]
     if not bodies:
         raise StepError(f"path is {str(file)!r}; it has no faces" + (f"; {_listed('not read', away)}" if away else ""))
     missing += lost + away

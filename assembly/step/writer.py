@@ -30,9 +30,9 @@ _OTHERS = {
     ".html": ("HTML", "asm.view.save_html writes these"),
     ".stl": ("STL", "asm.write_stl writes these"),
     ".obj": ("OBJ", "this library does not write them"),
-    ".iges": ("IGES", "this library does not write them"),
-    ".igs": ("IGES", "this library does not write them"),
-    ".brep": ("BREP", "this library does not write them"),
+    ".iges": ("IGES", "asm.write_iges writes these"),
+    ".igs": ("IGES", "asm.write_iges writes these"),
+    ".brep": ("BREP", "asm.write_brep writes these"),
     ".glb": ("glTF", "asm.write_gltf writes these"),
     ".gltf": ("glTF", "this library does not write them"),
     ".urdf": ("URDF", "asm.write_urdf writes these"),
@@ -49,7 +49,7 @@ def _color(color: Color) -> Any:
     return o.Quantity_Color(*map(float, color), o.Quantity_TOC_sRGB)
 
 
-class _Document:
+class OcctDocument:
     """A document of OCCT with one assembly, to which parts are added."""
 
     def __init__(self, name: str) -> None:
@@ -122,7 +122,7 @@ def write_step(
         OCCT is not installed: pip install "assembly-solver[step]".
     """
     scale = checked_unit(unit)
-    placed = placed_bodies(what)
+    placed_bodies(what)  # bad bodies first
     file = Path(fspath(path))
     other = _OTHERS.get(file.suffix.lower())
     if other is not None:
@@ -130,9 +130,25 @@ def write_step(
     o = occt()
     # Settings exist once there is a writer.
     writer = o.STEPCAFControl_Writer()
-    bare = [body.name for body, _ in placed if not body.faces]
     with quiet(), settings({"write.stepcaf.subshapes.name": 1, "write.step.assembly": 1}):
-        document = _Document(file.stem)
+        document = document_of_bodies(file, what, scale)
+        for mode in ("SetColorMode", "SetNameMode"):
+            getattr(writer, mode)(True)
+        if not writer.Transfer(document.made, o.STEPControl_AsIs):
+            raise StepError(f"path is {str(file)!r}; OCCT cannot turn the bodies into STEP")
+        if writer.Write(str(file)) != o.IFSelect_RetDone:
+            raise StepError(f"path is {str(file)!r}; OCCT cannot write there")
+
+
+def document_of_bodies(file: Path, what: Assembly | Solution | Body | Sequence[Body], scale: float) -> OcctDocument:
+    """A document of one assembly, named after a file; bodies that share their faces are instances of one part.
+
+    `scale` is millimeters in the bodies' unit. Bodies without faces are left out, and a warning says so.
+    """
+    placed = placed_bodies(what)
+    bare = [body.name for body, _ in placed if not body.faces]
+    with quiet():
+        document = OcctDocument(file.stem)
         parts: dict[tuple[int, ...], tuple[Any, Body]] = {}
         taken: set[str] = set()
         for body, pose in placed:
@@ -153,12 +169,7 @@ def write_step(
         if not taken:
             raise StepError("what has no body with faces; expected something to write")
         document.shapes.UpdateAssemblies()
-        for mode in ("SetColorMode", "SetNameMode"):
-            getattr(writer, mode)(True)
-        if not writer.Transfer(document.made, o.STEPControl_AsIs):
-            raise StepError(f"path is {str(file)!r}; OCCT cannot turn the bodies into STEP")
-        if writer.Write(str(file)) != o.IFSelect_RetDone:
-            raise StepError(f"path is {str(file)!r}; OCCT cannot write there")
     if bare:
         names = ", ".join(map(repr, bare))
-        warnings.warn(f"{file.name}: bodies without faces are left out: {names}", StepWarning, stacklevel=2)
+        warnings.warn(f"{file.name}: bodies without faces are left out: {names}", StepWarning, stacklevel=3)
+    return document
