@@ -27,6 +27,8 @@ _NEWTON = 30
 _ONE_CUT = 1e-5
 # Parameters that differ by less, over the domain, are one.
 _SAME = 1e-8
+# Curves that meet more often lie on each other; whether loops still touch after that is looked at again.
+_MOST = 32
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
@@ -115,6 +117,8 @@ class _Pair:
             over &= second > first + 1
         rows: list[tuple[float, float]] = []
         for k in np.flatnonzero(over.any(axis=1)).tolist():
+            if len(rows) > _MOST:
+                break
             others = np.flatnonzero(over[k])
             for run in np.split(others, np.flatnonzero(np.diff(others) > 1) + 1):
                 part = (float(b.t[run[0]]), float(b.t[run[-1] + 1]))
