@@ -36,7 +36,10 @@ def small_document():
     f = ca.Function("f", [pose], [ca.fmax(pose[0] * pose[1], 2.5) + ca.sin(pose[2])])
     hinge, slider = asm.Revolute(a, b, "h", angle=0.5, limits=(0, 1)), asm.Prismatic(a, c, "s", limits=(None, 1))
     screw = asm.Screw(a, c, 2.0, angle_limits=(None, 1))
-    scene = asm.Assembly([a, b, c])
+    plate = asm.Body("d", asm.shapes.plate(4, 4, 1, [(0, 0, 1)]))
+    pin, sphere = asm.Body("e", asm.shapes.solid_cylinder(1, 2)), asm.shapes.sphere(1)
+    ball, twin = asm.Body("f", sphere), asm.Body("g", sphere)
+    scene = asm.Assembly([a, b, c, plate, pin, ball, twin])
     touch = asm.Contact(a, b.face("top"))
     scene.constrain(
         asm.Gear(hinge, screw.freedom("angle"), 2.0),
@@ -60,12 +63,22 @@ def small_document():
         asm.TrimContact(touch, a.face().face.holes[0], name="n"),
         asm.TrimContact(touch, inner, form="cartesian", side="b"),
         asm.Clearance([a, b], 0.1, exclude=[(a, b)]),
+        asm.Flush(a.face(), plate.faces(">Z")),
+        asm.Coaxial(a.frame(), plate.faces.cylinders(), axes="nearest"),
+        asm.Insert(plate.faces.cylinders(), pin.faces.cylinders()),
+        asm.Concentric(ball.face(), twin.face()),
+        asm.Width(plate.faces("|X"), pin.faces("|Z")),
+        asm.Symmetric(a.point(1, 0, 0), plate.vertices(">X and >Y and >Z"), c.frame()),
+        asm.Tangent(a.face(), ball.face(), side="outside"),
+        asm.Group([plate, pin]),
+        asm.Linear(slider, screw.freedom("slide"), 2.0),
+        asm.ConstantVelocity(a, b),
         asm.Expression(f, [b]),
     )
     scene.minimize(
         asm.PointDistance(b.point(0, 0, 0), (1, 2, 3)), asm.FrameDistance(b, asm.Pose()), asm.Expression(f, [c])
     )
-    scene.maximize(asm.Posture([[0, 0, 0, 1, 0, 0, 0]] * 3), asm.Dexterity(c, [hinge, slider]))
+    scene.maximize(asm.Weight([pin, ball]), asm.Posture([[0, 0, 0, 1, 0, 0, 0]] * 7), asm.Dexterity(c, [hinge, slider]))
     with TemporaryDirectory() as folder:
         path = Path(folder) / "scene.json"
         scene.save(path)
