@@ -21,21 +21,13 @@ def drawn() -> cq.Assembly:
     return assembly.add(bracket, name="bracket", color=cq.Color(0.9, 0.6, 0.2), loc=loose)
 
 
-def hole(assembly: cq.Assembly, bodies: dict[str, asm.Body], name: str) -> asm.Frame:
-    """A frame on the axis of a part's hole, by CadQuery's selectors."""
-    axis = assembly.objects[name].obj.faces("%CYLINDER").val()._geomAdaptor().Cylinder().Axis()
-    at, along = axis.Location(), axis.Direction()
-    up = 1.0 if along.Z() > 0 else -1.0
-    return bodies[name].frame((at.X(), at.Y(), at.Z()), (up * along.X(), up * along.Y(), up * along.Z()))
-
-
 def main() -> tuple[cq.Assembly, asm.Solution]:
     assembly = drawn()
     bodies = {body.name: body for body in asm.cad.from_cadquery(assembly, fixed=["plate"])}
     plate, bracket = bodies.values()
     scene = asm.Assembly([plate, bracket])
-    holes = asm.Cylindrical(hole(assembly, bodies, "plate"), hole(assembly, bodies, "bracket"), angle=0.5)
-    scene.constrain(holes, asm.Contact(plate.face("top"), bracket.face("foot"), edges=False))
+    holes = asm.Coaxial(plate.faces("%CYLINDER"), bracket.faces("%CYLINDER"), angle=0.5)
+    scene.constrain(holes, asm.Flush(plate.face("top"), bracket.face("foot")))
     solution = scene.solve()
     asm.cad.place(assembly, solution)
     print(solution.status.value, assembly.objects["bracket"].loc.toTuple())

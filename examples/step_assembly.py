@@ -1,6 +1,7 @@
 """Parts come from a STEP file and lie about anywhere; holes and faces put them together, and a STEP file is written.
 
-A corner bracket is bolted to a plate. Holes, bolts and nuts share axes; faces lie flush, named as the file names them.
+A corner bracket is bolted to a plate. Holes, bolts and nuts share axes and faces lie flush: faces are selected by what
+they are, or by the names that the file gives them.
 The parts are drawn here, so that it takes no other file, but OCCT: pip install "assembly-solver[step]".
 Prints what is left to move and where the parts are; writes step_assembly.step, and step_assembly.html for a browser.
 """
@@ -44,13 +45,14 @@ def drawn() -> list[asm.Body]:
 def put_together(plate: asm.Body, bracket: asm.Body, *fasteners: asm.Body) -> asm.Assembly:
     ground = asm.Body("ground", fixed=True)
     scene = asm.Assembly([ground, plate, bracket, *fasteners])
-    scene.constrain(asm.Fixed(ground, plate), asm.Contact(plate.face("top"), bracket.face("bottom"), edges=False))
+    lower, upper = plate.faces.cylinders(radius=4.5, hole=True), bracket.faces.cylinders(radius=4.5, hole=True)
+    scene.constrain(asm.Fixed(ground, plate), asm.Flush(plate.faces(">Z"), bracket.faces("<Z")))
     for k, hole in enumerate(HOLES):
-        below, above, bolt, nut = plate.frame((*hole, 0)), bracket.frame((*hole - CORNER, 0)), *fasteners[k::2]
-        scene.constrain(asm.Cylindrical(below, above, f"holes {k + 1}"))
-        scene.constrain(asm.Cylindrical(above, bolt.frame()), asm.Cylindrical(below, nut.frame()))
-        scene.constrain(asm.Contact(bracket.face("top"), bolt.face("under head"), edges=False))
-        scene.constrain(asm.Contact(plate.face("bottom"), nut.face("top"), edges=False))
+        below, above, bolt, nut = lower.near((*hole, 0)), upper.near((*hole - CORNER, 0)), *fasteners[k::2]
+        scene.constrain(asm.Coaxial(below, above, f"holes {k + 1}"))
+        scene.constrain(asm.Coaxial(above, bolt.face("shank")), asm.Coaxial(below, nut.faces.cylinders(hole=True)))
+        scene.constrain(asm.Flush(bracket.faces(">Z"), bolt.face("under head")))
+        scene.constrain(asm.Flush(plate.faces("<Z"), nut.faces(">Z")))
     return scene
 
 
