@@ -101,8 +101,10 @@ def real_array(name: str, value: ArrayLike, shape: Sequence[int | str]) -> NDArr
     if is_masked(value):
         raise InputError(f"{name} has masked values; expected real numbers")
     # What nearly always comes, without numpy's price for small arrays. A sum may overflow: that is seen below.
-    if array is not None and array.shape == tuple(shape) and math.isfinite(sum(array.ravel().tolist())):
-        return array
+    if array is not None and array.ndim == len(shape) and math.isfinite(sum(array.ravel().tolist())):
+        pairs = zip(array.shape, shape, strict=True)
+        if all(has == want or (has >= 1 and isinstance(want, str)) for has, want in pairs):
+            return array
     wanted = "(" + ", ".join(str(extent) for extent in shape) + ("," if len(shape) == 1 else "") + ")"
     if array is None:
         raise InputError(f"{name} is {_shown(value)}; expected real numbers of shape {wanted}")

@@ -93,10 +93,10 @@ def _seconds(call: Any, repeats: int) -> tuple[float, Any]:
 
 def _row(o: Any, name: str, path: Path, folder: Path, repeats: int) -> dict[str, Any]:
     """Everything of one file."""
-    quiet, reader = import_module("assembly.step.occt").quiet, import_module("assembly.step.reader")
+    quiet, documents = import_module("assembly.step.occt").quiet, import_module("assembly.step.documents")
     with quiet():
-        occt_seconds, _ = _seconds(lambda: reader.document_of(str(path)), repeats)
-        solids = list(reader.solids_of(str(path)))
+        occt_seconds, _ = _seconds(lambda: documents.document_of(str(path)), repeats)
+        solids = list(import_module("assembly.step.bodies").solids_of(str(path)))
     seconds, bodies = _seconds(lambda: asm.read_step(path), repeats)
     areas, volumes = [0.0], [0.0]
     for body, shape in zip(bodies, solids, strict=True):
@@ -113,7 +113,7 @@ def _row(o: Any, name: str, path: Path, folder: Path, repeats: int) -> dict[str,
         "file": name,
         "bodies": len(bodies),
         "faces": len(unique),
-        "in file": reader.document_of(str(path))[1],
+        "in file": documents.document_of(str(path))[1],
         "area": max(areas),
         "volume": max(volumes),
         "again": max(abs(_volume(b) / _volume(a) - 1.0) for a, b in zip(bodies, back, strict=True)),
@@ -147,7 +147,7 @@ def run(quick: bool) -> dict[str, Any]:
         for part, path in files:
             try:
                 rows.append(_row(o, part, path, folder, repeats))
-            except import_module("assembly.step.reader").StepError:
+            except import_module("assembly.step").StepError:
                 refused.append(part)
     faces, total = (sum(row[key] for row in rows) for key in ("faces", "in file"))
     largest = max(rows, key=lambda row: row["faces"])

@@ -12,8 +12,8 @@ from assembly.cad.shapes import Bodies, Label, color_of
 from assembly.errors import InputError, items, text
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
+from assembly.step.bodies import unique
 from assembly.step.occt import occt
-from assembly.step.reader import unique
 from assembly.step.tree import Color
 
 __all__ = ["Leaf", "built", "from_build123d", "leaves_of", "place_build123d", "renew"]

@@ -22,7 +22,7 @@ from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.solve.solution import Solution
-from assembly.step.reader import unique
+from assembly.step.bodies import unique
 
 __all__ = ["solve_cadquery"]
 

@@ -17,8 +17,9 @@ from assembly.errors import InputError, items, text
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
+from assembly.step.bodies import read_shape, solids_in, unique
+from assembly.step.documents import StepWarning
 from assembly.step.occt import occt, parts
-from assembly.step.reader import StepWarning, read_shape, solids_in, unique
 from assembly.step.tree import Color
 
 __all__ = ["Bodies", "Label", "color_of", "from_occt"]

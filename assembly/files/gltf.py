@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from assembly.errors import InputError, positive
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
+from assembly.step.documents import checked_unit
 from assembly.step.placed import placed_bodies
-from assembly.step.reader import checked_unit
 from assembly.view.mesh import Mesh, body_mesh
 from assembly.view.picture import body_colors
 from assembly.view.series import Trajectory, trajectory_rows

@@ -20,7 +20,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose, axes_quaternion
-from assembly.step.reader import checked_unit
+from assembly.step.documents import checked_unit
 
 __all__ = ["read_urdf"]
 

@@ -21,7 +21,7 @@ from assembly.files.primitives import Primitive, primitives_of
 from assembly.files.robot import Inertial, Robot, UrdfError
 from assembly.files.stl import stl_bytes
 from assembly.kinematics.body import Body, Frame
-from assembly.step.reader import checked_unit
+from assembly.step.documents import checked_unit
 
 __all__ = ["write_urdf"]
 

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
+from assembly.step.bodies import Source, bodies_in
+from assembly.step.documents import StepError, StepWarning, checked_unit
 from assembly.step.occt import occt, parts, quiet, settings
-from assembly.step.reader import Source, StepError, StepWarning, bodies_in, checked_unit
 from assembly.step.writer import document_of_bodies
 
 if TYPE_CHECKING:

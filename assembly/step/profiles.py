@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from math import ceil, cos, pi, tan
 from typing import Any
 
@@ -108,8 +109,12 @@ class Turning:
     def joint(self, k: Array) -> Array:
         """Parameters of the joints between arcs; beyond the domain they go on with its period."""
         turns, within = np.divmod(k, self.spans)
-        at = np.linspace(self.low, self.high, self.spans + 1)
-        return self.radius * (at[within.astype(np.int64)] + turns * (self.high - self.low))
+        return self.radius * (self._ends[within.astype(np.int64)] + turns * (self.high - self.low))
+
+    @cached_property
+    def _ends(self) -> Array:
+        """Angles where arcs begin and end."""
+        return np.linspace(self.low, self.high, self.spans + 1)
 
     @property
     def knots(self) -> Array:
@@ -168,29 +173,42 @@ def approximated(function: Callable[[Array], Array], breaks: Array, tolerance: f
     Unreadable
         Some piece cannot be made to fit.
     """
+    parts, solve, check = _interpolation()
+    found: list[tuple[float, float, Array]] = []
+    worst = 0.0
+    # Stretches of one halving are asked for at once; of those that do not fit, the halves of the first come first.
+    todo = [(breaks[:-1], breaks[1:], 0)]
+    while todo:
+        low, high, depth = todo.pop()
+        asked = function((low[:, None] + (high - low)[:, None] * parts).ravel())
+        halves = []
+        for a, b, values in zip(low.tolist(), high.tolist(), asked.reshape(len(low), len(parts), -1), strict=True):
+            piece = solve @ values[: _DEGREE + 1]
+            piece[0], piece[-1] = values[0], values[_DEGREE]
+            error = float(np.abs(check @ piece - values[_DEGREE + 1 :]).max())
+            if error > tolerance:
+                if depth == _HALVINGS:
+                    raise Unreadable(f"a curve bends too sharply to be followed to {tolerance:.1g}")
+                middle = 0.5 * (a + b)
+                halves.append((np.array([a, middle]), np.array([middle, b]), depth + 1))
+                continue
+            found.append((a, b, piece))
+            worst = max(worst, error)
+        todo += halves[::-1]
+    found.sort(key=lambda one: one[0])
+    stack = np.array([piece for _, _, piece in found])
+    stack[1:, 0] = stack[:-1, -1]
+    ends = np.array([found[0][0], *(b for _, b, _ in found)])
+    return spline(bezier.joined(stack), bezier.full_knots(ends, _DEGREE), _DEGREE), worst
+
+
+@lru_cache(maxsize=1)
+def _interpolation() -> tuple[Array, Array, Array]:
+    """Where a stretch is asked for, first its nodes; from values there to control points; from these to the others."""
     nodes = 0.5 - 0.5 * np.cos(np.linspace(0.0, pi, _DEGREE + 1))
     between = 0.5 - 0.5 * np.cos(np.linspace(0.0, pi, 3 * _DEGREE + 1))
-    solve = np.linalg.inv(bezier.bernstein(_DEGREE, nodes))
-    check = bezier.bernstein(_DEGREE, between)
-    pieces, ends, worst = [], [float(breaks[0])], 0.0
-    todo = [(float(a), float(b), 0) for a, b in zip(breaks[:-1], breaks[1:], strict=True)][::-1]
-    while todo:
-        a, b, depth = todo.pop()
-        values = function(a + (b - a) * nodes)
-        piece = solve @ values
-        piece[0], piece[-1] = values[0], values[-1]
-        error = float(np.abs(check @ piece - function(a + (b - a) * between)).max())
-        if error > tolerance:
-            if depth == _HALVINGS:
-                raise Unreadable(f"a curve bends too sharply to be followed to {tolerance:.1g}")
-            todo += [(0.5 * (a + b), b, depth + 1), (a, 0.5 * (a + b), depth + 1)]
-            continue
-        pieces.append(piece)
-        ends.append(b)
-        worst = max(worst, error)
-    stack = np.array(pieces)
-    stack[1:, 0] = stack[:-1, -1]
-    return spline(bezier.joined(stack), bezier.full_knots(np.array(ends), _DEGREE), _DEGREE), worst
+    solve = np.asarray(np.linalg.inv(bezier.bernstein(_DEGREE, nodes)), dtype=np.float64)
+    return np.concatenate([nodes, between]), solve, bezier.bernstein(_DEGREE, between)
 
 
 def point(p: Any) -> Array:

@@ -8,6 +8,7 @@ are approximated.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import cos, pi, sin
 from typing import Any
 
@@ -47,6 +48,21 @@ class Patch:
     u: Direction
     v: Direction
     deviation: float = 0.0
+
+    @cached_property
+    def sides(self) -> Array:
+        """Lengths of the domain in u and in v."""
+        return np.asarray(np.ptp(np.array(self.surface.domain), axis=1))
+
+    @cached_property
+    def scales(self) -> list[float]:
+        """Our lengths in one of OCCT's, in u and in v."""
+        return [along.radius if isinstance(along, Turning) else 1.0 for along in (self.u, self.v)]
+
+    @cached_property
+    def period(self) -> Array:
+        """Periods in u and v; infinite where the surface is not closed."""
+        return np.where(self.surface.closed, self.sides, np.inf)
 
 
 def _slack(low: float, high: float, least: float = -np.inf, most: float = np.inf) -> tuple[float, float]:

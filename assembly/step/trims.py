@@ -8,6 +8,8 @@ ends mapped; any other curve, a helix say, has no rational form and is interpola
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,7 +19,7 @@ from scipy.optimize import brentq
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
 from assembly.step.occt import occt
-from assembly.step.profiles import Direction, Spline, Straight, Turning, Unreadable, approximated, profile, spline
+from assembly.step.profiles import Direction, Spline, Straight, Unreadable, approximated, profile, spline
 from assembly.step.surfaces import Patch
 
 __all__ = ["Edge", "chained", "crossings", "edge_curve", "head_to_tail"]
@@ -55,14 +57,20 @@ class Edge:
     deviation: float
     seam: bool = False
 
-    @property
+    @cached_property
     def ends(self) -> Array:
         """First and last point (2, 2)."""
-        return self.curve.cartesian[0][[0, -1]]
+        points = self.curve.points[[0, -1]]
+        return np.asarray(points[:, :2] / points[:, 2:])
 
     def moved(self, points: Array) -> Edge:
         """The curve with its two ends at the points (2, 2); what is level stays so."""
         made = self.curve.points.copy()
+        if len(made) == 2 and made[0, 2] == made[1, 2] == 1.0:
+            if (points == self.ends).all():
+                return self
+            made[:, :2] = points
+            return replace(self, curve=Spline(made, self.curve.knots, self.curve.degree))
         for axis in np.flatnonzero(self.level):
             made[:, axis] = points[0, axis] * made[:, 2]
         made[[0, -1], :2] = points * made[[0, -1], 2:]
@@ -133,27 +141,14 @@ def edge_curve(edge: Any, face: Any, patch: Patch, name: str) -> Edge:
     if raw is None:
         raise Unreadable("an edge has no curve in the surface's parameters")
     source, _, deviation = profile(raw, low, high, cut=True)
-    maps = (patch.u, patch.v)
-    points, weights = source.cartesian
-    scales = np.array([along.radius if isinstance(along, Turning) else 1.0 for along in maps])
-    sides = np.ptp(np.array(patch.surface.domain), axis=1)
-    extent = np.ptp(points, axis=0) * scales / sides
-    level = extent <= LEVEL
-    if level.all():
-        level[np.argmax(extent)] = False
-    other = points[:, int(level[0])]
-    if level.any() and (np.all(np.diff(other) >= 0.0) or np.all(np.diff(other) <= 0.0)):
-        ends = points[[0, -1]]
-        ends[:, level] = 0.5 * (points.min(axis=0) + points.max(axis=0))[level]
-        mapped = np.column_stack([along(column) for along, column in zip(maps, ends.T, strict=True)])
-        made = spline(mapped, np.array([0.0, 0.0, 1.0, 1.0]), 1)
-    elif all(isinstance(along, Straight) for along in maps):
-        level[:] = False
-        mapped = np.column_stack([along(column) for along, column in zip(maps, points.T, strict=True)])
-        made = spline(mapped, source.knots, source.degree, weights)
+    line, level = _level_line(source, patch)
+    if line is not None:
+        made = line
+    elif isinstance(patch.u, Straight) and isinstance(patch.v, Straight):
+        points, weights = source.cartesian
+        made = spline(points, source.knots, source.degree, weights)
     else:
-        level[:] = False
-        made, error = _followed(source, maps, FOLLOWED * float(sides.min()))
+        made, error = _followed(source, (patch.u, patch.v), FOLLOWED * float(patch.sides.min()))
         deviation += error
     if edge.Orientation() == o.TopAbs_REVERSED:
         made = Spline(made.points[::-1], made.knots[0] + made.knots[-1] - made.knots[::-1], made.degree)
@@ -161,23 +156,25 @@ def edge_curve(edge: Any, face: Any, patch: Patch, name: str) -> Edge:
     for vertex in (o.TopExp.FirstVertex_s(edge), o.TopExp.LastVertex_s(edge)):
         if not vertex.IsNull():
             tolerance = max(tolerance, o.BRep_Tool.Tolerance_s(vertex))
-    is_level = (bool(level[0]), bool(level[1]))
-    return Edge(made, is_level, tolerance, name, deviation, o.BRep_Tool.IsClosed_s(edge, face))
+    return Edge(made, level, tolerance, name, deviation, o.BRep_Tool.IsClosed_s(edge, face))
 
 
-def _period(patch: Patch) -> Array:
-    """Periods in u and v; infinite where the surface is not closed."""
-    pairs = zip(patch.surface.domain, patch.surface.closed, strict=True)
-    return np.array([high - low if closed else np.inf for (low, high), closed in pairs])
-
-
-def _meeting(last: Edge, first: Edge, a: Array, b: Array) -> Array:
-    """Where two curves that should meet are made to: what is level in one of them keeps its coordinate."""
-    at = 0.5 * (a + b)
-    for axis in (0, 1):
-        if last.level[axis] != first.level[axis]:
-            at[axis] = (a if last.level[axis] else b)[axis]
-    return at
+def _level_line(source: Spline, patch: Patch) -> tuple[Spline | None, tuple[bool, bool]]:
+    """The line along one of our parameters that a curve in OCCT's is, and which of them is constant; None if none."""
+    points = source.cartesian[0]
+    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    extent = [(b - a) * k / side for a, b, k, side in zip(low, high, patch.scales, patch.sides.tolist(), strict=True)]
+    along = int(extent[1] > extent[0])
+    if not extent[1 - along] <= LEVEL:
+        return None, (False, False)
+    row = points[:, along].tolist()
+    if not (all(a <= b for a, b in pairwise(row)) or all(a >= b for a, b in pairwise(row))):
+        return None, (False, False)
+    ends = points[[0, -1]]
+    ends[:, 1 - along] = 0.5 * (low[1 - along] + high[1 - along])
+    made = np.ones((2, 3))
+    made[:, 0], made[:, 1] = patch.u(ends[:, 0]), patch.v(ends[:, 1])
+    return Spline(made, np.array([0.0, 0.0, 1.0, 1.0]), 1), (along == 1, along == 0)
 
 
 def _within(at: Array, patch: Patch) -> Array:
@@ -192,7 +189,7 @@ def _within(at: Array, patch: Patch) -> Array:
 
 def head_to_tail(edges: list[Edge], patch: Patch) -> list[Edge]:
     """Edges in an order in which each begins nearest to where the one before ends, up to periods."""
-    period = _period(patch)
+    period = patch.period
     whole = np.where(np.isfinite(period), period, 1.0)
     row, left = edges[:1], edges[1:]
     while left:
@@ -215,51 +212,51 @@ def chained(edges: list[Edge], patch: Patch) -> tuple[list[Edge], float]:
     Unreadable
         Two curves are farther apart than their tolerance.
     """
-    period = _period(patch)
+    period = patch.period
     open_ = ~np.isfinite(period)
-    rows: list[Edge] = []
-    for edge in edges:
-        if rows:
-            jump = rows[-1].ends[1] - edge.ends[0]
-            turns = np.where(open_, 0.0, np.round(jump / np.where(open_, 1.0, period)))
-            if turns.any():
-                edge = edge.shifted(turns * np.where(open_, 0.0, period))
-        rows.append(edge)
+    whole, periods = np.where(open_, 1.0, period), np.where(open_, 0.0, period)
+    rows = edges
+    if not open_.all():
+        rows = edges[:1]
+        for edge in edges[1:]:
+            turns = np.where(open_, 0.0, np.round((rows[-1].ends[1] - edge.ends[0]) / whole))
+            rows.append(edge.shifted(turns * periods) if turns.any() else edge)
+    ends, level = np.array([edge.ends for edge in rows]), np.array([edge.level for edge in rows])
     # A ring closes up to a period, and so does its joint.
-    closing = rows[0].ends[0] - rows[-1].ends[1]
-    ring = np.where(open_, 0.0, np.round(closing / np.where(open_, 1.0, period))) * np.where(open_, 0.0, period)
-    # Joint k is where edge k begins.
-    joints = np.empty((len(rows), 2))
-    worst = 0.0
-    for k, first in enumerate(rows):
-        last = rows[k - 1]
-        a, b = last.ends[1] + (ring if k == 0 else 0.0), first.ends[0]
-        joints[k] = _meeting(last, first, a, b)
-        if (a != b).any():
-            gap = _apart(a, b, patch)
-            if gap > 2.0 * (last.tolerance + first.tolerance):
-                raise Unreadable(f"two edges that should meet are {gap:.2g} mm apart")
-            worst = max(worst, gap)
+    ring = np.where(open_, 0.0, np.round((ends[0, 0] - ends[-1, 1]) / whole)) * periods
+    # Joint k is where edge k begins; what is level in one of both edges keeps its coordinate.
+    before, after = np.roll(ends[:, 1], 1, axis=0) + 0.0, ends[:, 0]
+    before[0] += ring
+    last_level = np.roll(level, 1, axis=0)
+    joints = np.where(last_level != level, np.where(last_level, before, after), 0.5 * (before + after))
+    worst = _checked_gaps(rows, before, after, patch)
     _match_seams(rows, joints, period)
-    after = np.roll(joints, -1, axis=0)
-    after[-1] -= ring
-    made = [edge.moved(np.array(pair)) for edge, *pair in zip(rows, joints, after, strict=True)]
-    return made, worst
+    stops = np.roll(joints, -1, axis=0)
+    stops[-1] -= ring
+    return [edge.moved(pair) for edge, pair in zip(rows, np.stack([joints, stops], axis=1), strict=True)], worst
 
 
-def _apart(a: Array, b: Array, patch: Patch) -> float:
-    """Distance in space of two points of (u, v), which may lie beyond the domain."""
-    at = _within(np.array([a, b]), patch)
-    points = patch.surface.evaluate(at[:, 0], at[:, 1])
-    return float(np.linalg.norm(points[0] - points[1]))
+def _checked_gaps(rows: list[Edge], before: Array, after: Array, patch: Patch) -> float:
+    """The largest gap in space at the start of an edge, where the one before ends; raise beyond their tolerances."""
+    apart = np.flatnonzero((before != after).any(axis=1))
+    if not apart.size:
+        return 0.0
+    # Points may lie beyond the domain.
+    at = _within(np.stack([before[apart], after[apart]]), patch)
+    points = patch.surface.evaluate(at[..., 0], at[..., 1])
+    gaps = np.linalg.norm(points[0] - points[1], axis=1).tolist()
+    for k, gap in zip(apart.tolist(), gaps, strict=True):
+        if gap > 2.0 * (rows[k - 1].tolerance + rows[k].tolerance):
+            raise Unreadable(f"two edges that should meet are {gap:.2g} mm apart")
+    return float(max(gaps))
 
 
 def _match_seams(rows: list[Edge], joints: Array, period: Array) -> None:
     """Make both sides of a seam, which is one edge run to and fro, end at the same places up to a period."""
     whole = np.where(np.isfinite(period), period, 1.0)
     for i, edge in enumerate(rows):
-        for j in range(i + 1, len(rows)):
-            if not edge.seam or rows[j].name != edge.name:
+        for j in range(i + 1, len(rows) if edge.seam else 0):
+            if rows[j].name != edge.name:
                 continue
             for here, there in ((i, (j + 1) % len(rows)), ((i + 1) % len(rows), j)):
                 if here == there:

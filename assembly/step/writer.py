@@ -12,9 +12,10 @@ from assembly.errors import AssemblyError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.solve.solution import Solution
+from assembly.step.bodies import unique
+from assembly.step.documents import StepError, StepWarning, checked_unit
 from assembly.step.occt import occt, quiet, settings
 from assembly.step.placed import placed_bodies
-from assembly.step.reader import StepError, StepWarning, checked_unit, unique
 from assembly.step.solids import sewn
 from assembly.step.tree import Color
 

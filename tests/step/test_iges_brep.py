@@ -7,7 +7,7 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
-from assembly.step.reader import StepError
+from assembly.step.documents import StepError
 
 pytest.importorskip("OCP")
 # Surfaces are written exactly; what is left is how edges are followed, and sums of some ten faces.

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.step import StepError, StepWarning, reader
+from assembly.step import StepError, StepWarning, bodies, reader
 from assembly.step.faces import read_face
 from assembly.step.occt import quiet, settings
 from assembly.step.profiles import Unreadable
@@ -190,7 +190,7 @@ def test_a_face_that_cannot_be_read_is_named(tmp_path, monkeypatch):
             raise Unreadable("two edges that should meet are 1 mm apart")
         return read_face(face, edges, name, scale)
 
-    monkeypatch.setattr(reader, "read_face", fails)
+    monkeypatch.setattr(bodies, "read_face", fails)
     with pytest.raises(StepError, match="not read: 'tower', 'face 3': two edges that should meet are 1 mm apart; pass"):
         asm.read_step(path)
     with pytest.warns(StepWarning, match="tower.step: not read: 'tower', 'face 3'"):
@@ -217,7 +217,7 @@ def test_placements_that_are_not_rigid_are_refused(mirror):
     else:
         transform.SetScale(O.gp_Pnt(0, 0, 0), 2.0)
     with pytest.raises(Unreadable, match="mirrored or scaled"):
-        reader._pose(O.TopLoc_Location(transform), 1.0)
+        bodies._pose(O.TopLoc_Location(transform), 1.0)
 
 
 def test_approximated_faces_are_named(tmp_path):
@@ -233,7 +233,7 @@ def test_large_deviations_are_said(tmp_path, monkeypatch):
     file = File()
     file.part(pushed(vase()), "vase")
     path = file.write(tmp_path / "vase.step")
-    monkeypatch.setattr(reader, "EXACT", -1.0)
+    monkeypatch.setattr(bodies, "EXACT", -1.0)
     with pytest.warns(StepWarning, match="vase.step: approximated: 'vase', 'face 1' to 0 mm; "):
         asm.read_step(path)
 
@@ -345,7 +345,7 @@ def test_nothing_is_left_of_a_process_that_ended(damaged, monkeypatch, tmp_path)
     monkeypatch.setenv("TMPDIR", str(tmp_path / "apart"))
     monkeypatch.setattr(tempfile, "tempdir", None)
     (tmp_path / "apart").mkdir()
-    child = "import sys; from assembly.step import reader; reader._loaded = lambda *_: __import__('os').abort()\n"
+    child = "import sys; from assembly.step import documents; documents._loaded = lambda *_: __import__('os').abort()\n"
     monkeypatch.setattr(reader, "_APART", child + reader._APART)
     with pytest.raises(StepError, match="OCCT cannot read the rest"):
         asm.read_step(damaged, strict=False)

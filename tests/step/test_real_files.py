@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.step.bodies import solids_in
+from assembly.step.documents import document_of
 from assembly.step.occt import occt, quiet
-from assembly.step.reader import _shapes, document_of
 from assembly.step.syntax import first_fault, is_step
 from assembly.step.tree import Part, free_labels, leaves
 from tests.step.models import O, areas, faces, off, volumes
@@ -38,7 +39,7 @@ def occt_solids(path):
         root = occt().XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
         for label in free_labels(root):
             for leaf in leaves(label, O.TopLoc_Location(), path.stem, None):
-                for shape in _shapes(Part(leaf.label)):
+                for shape in solids_in(Part(leaf.label).shape):
                     yield shape, leaf.location
 
 

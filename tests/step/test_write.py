@@ -10,9 +10,9 @@ import pytest
 import assembly as asm
 from assembly.geometry.splines.bezier import full_knots
 from assembly.step import StepError, StepWarning
+from assembly.step.documents import UNITS
 from assembly.step.faces import read_face
 from assembly.step.occt import parts
-from assembly.step.reader import UNITS
 from assembly.step.solids import sewn
 from tests.step.models import MODELS, O, areas, faces, off, volumes
 

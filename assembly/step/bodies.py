@@ -1,0 +1,175 @@
+"""Bodies made of documents and shapes of OCCT."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from assembly.geometry.faces.face import Face
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import Pose, axes_quaternion
+from assembly.step.documents import StepError, document_of
+from assembly.step.faces import read_face
+from assembly.step.occt import occt, parts, quiet
+from assembly.step.profiles import Unreadable
+from assembly.step.tree import Color, Part, free_labels, leaves
+
+__all__ = ["Source", "bodies_in", "read_shape", "solids_in", "solids_of", "unique"]
+
+# A deviation [mm] below which a face is what the file says: OCCT takes nearer points for one.
+EXACT = 1e-7
+
+
+@dataclass
+class Shape:
+    """Faces of one solid, or of one sheet, in the part's own coordinates."""
+
+    faces: list[Face]
+    color: Color | None
+    name: str | None
+    missing: list[str]
+    inexact: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A file as a document of OCCT, in millimeters, with the number of its faces.
+
+    `absent` are files that it refers to and that are not there; of a damaged file what is whole is in the document.
+    """
+
+    file: Path
+    document: Any
+    count: int
+    absent: tuple[str, ...] = ()
+    damaged: bool = False
+
+
+def solids_of(path: str) -> Iterator[Any]:
+    """OCCT's shapes of the bodies that `read_step` makes, in their order."""
+    document = document_of(path)[0]
+    root = occt().XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    for label in free_labels(root):
+        for leaf in leaves(label, occt().TopLoc_Location(), None, None):
+            yield from solids_in(Part(leaf.label).shape)
+
+
+def solids_in(shape: Any) -> Iterator[Any]:
+    """Solids of a shape, and then its shells and faces that are in no solid."""
+    o = occt()
+    yield from parts(shape, o.TopAbs_SOLID)
+    yield from parts(shape, o.TopAbs_SHELL, o.TopAbs_SOLID)
+    yield from parts(shape, o.TopAbs_FACE, o.TopAbs_SHELL)
+
+
+def read_shape(
+    shape: Any, said: Callable[[Any], tuple[str | None, Color | None]], color: Color | None, scale: float
+) -> Shape:
+    """The faces of a shape, those that cannot be read left out and told.
+
+    Parameters
+    ----------
+    shape
+        TopoDS_Shape.
+    said
+        Name and color of the shape and of its faces, None where there is none.
+    color
+        Of the shape if it says none.
+    scale : float
+        Our unit of length in a millimeter.
+    """
+    o = occt()
+    edges = o.ShapeMap()
+    o.TopExp.MapShapes_s(shape, o.TopAbs_EDGE, edges)
+    name, own_color = said(shape)
+    made = Shape([], own_color or color, name, [], [])
+    taken: set[str] = set()
+    for k, face in enumerate(parts(shape, o.TopAbs_FACE), 1):
+        face = o.as_face(face)
+        own, tint = said(face)
+        label = unique(own or f"face {k}", taken)
+        try:
+            read = read_face(face, edges, label, scale)
+        except Unreadable as reason:
+            made.missing.append(f"{label!r}: {reason}")
+            continue
+        if read.deviation > EXACT:
+            made.inexact.append(f"{label!r} to {read.deviation:.1g} mm")
+        read.face.color = tint
+        made.faces.append(read.face)
+    return made
+
+
+def unique(name: str, taken: set[str]) -> str:
+    """The name, with a number where it is taken; taken now."""
+    candidate, k = name, 2
+    while candidate in taken:
+        candidate, k = f"{name} {k}", k + 1
+    taken.add(candidate)
+    return candidate
+
+
+def _pose(location: Any, scale: float) -> Pose:
+    transform = location.Transformation()
+    rows = np.array([[transform.Value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)])
+    if np.abs(rows[:, :3].T @ rows[:, :3] - np.eye(3)).max() > 1e-9 or np.linalg.det(rows[:, :3]) < 0.0:
+        raise Unreadable("its placement is mirrored or scaled, which no rigid body can be")
+    return Pose(scale * rows[:, 3], axes_quaternion(rows[:, :3]))
+
+
+def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], list[str]]:
+    """The bodies of a document, and what there is to warn of; lengths are millimeters times `scale`."""
+    file, count = source.file, source.count
+    o = occt()
+    with quiet():
+        root = o.XCAFDoc_DocumentTool.ShapeTool_s(source.document.Main())
+        bodies: list[Body] = []
+        missing: list[str] = []
+        inexact: list[str] = []
+        built = 0
+        taken: set[str] = set()
+        read: dict[str, list[Shape]] = {}
+        for label in free_labels(root):
+            for leaf in leaves(label, o.TopLoc_Location(), file.stem, None):
+                entry = o.TCollection_AsciiString()
+                o.TDF_Tool.Entry_s(leaf.label, entry)
+                key = entry.ToCString()
+                if key not in read:
+                    part = Part(leaf.label)
+                    read[key] = [read_shape(shape, part.said, part.color, scale) for shape in solids_in(part.shape)]
+                    for shape in read[key]:
+                        built += len(shape.faces) + len(shape.missing)
+                        missing += [f"{leaf.name!r}, {text}" for text in shape.missing]
+                        inexact += [f"{leaf.name!r}, {text}" for text in shape.inexact]
+                for shape in read[key]:
+                    try:
+                        pose = _pose(leaf.location, scale)
+                    except Unreadable as reason:
+                        missing.append(f"{leaf.name!r}: {reason}")
+                        continue
+                    if shape.faces:
+                        name = unique(shape.name or leaf.name or file.stem, taken)
+                        body = Body(name, shape.faces, pose.position, pose.quaternion)
+                        body.color = leaf.color or shape.color
+                        bodies.append(body)
+    lost = [f"{count - built} of {count} faces, of which OCCT makes nothing"] if built < count else []
+    # Those of a file that is not damaged are of no shape.
+    if strict and (missing or (lost and source.damaged)):
+        raise StepError(
+            f"path is {str(file)!r}; {_listed('not read', missing + lost)}; pass strict=False to go without"
+        )
+    away = [f"{name!r}, which it refers to and which is not there" for name in source.absent]
+    if not bodies:
+        raise StepError(f"path is {str(file)!r}; it has no faces" + (f"; {_listed('not read', away)}" if away else ""))
+    missing += lost + away
+    lines = (("not read", missing), ("approximated", inexact))
+    return bodies, [f"{file.name}: {_listed(what, told)}" for what, told in lines if told]
+
+
+def _listed(what: str, lines: list[str], most: int = 10) -> str:
+    more = f"; and {len(lines) - most} more" if len(lines) > most else ""
+    return f"{what}: {'; '.join(lines[:most])}{more}"

@@ -1,0 +1,123 @@
+"""STEP files as documents of OCCT, and what may be wrong with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from assembly.errors import InputError
+from assembly.step.occt import occt, settings
+from assembly.step.references import references_of
+from assembly.step.syntax import first_fault, is_step, mended
+
+__all__ = ["UNITS", "Damaged", "Malformed", "StepError", "StepWarning", "checked_unit", "document_of"]
+
+# Millimeters in a unit.
+UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}
+# Beginnings of OCCT's names of entities that say nothing of shapes.
+_BESIDE = (
+    "StepBasic_Approval", "StepBasic_Date", "StepBasic_Person", "StepBasic_Organization", "StepBasic_Security",
+    "StepBasic_Certification", "StepBasic_Contract", "StepBasic_CalendarDate", "StepBasic_LocalTime",
+    "StepBasic_Address", "StepBasic_Action", "StepAP214_Applied", "StepAP203_Cc", "StepDimTol_",
+)  # fmt: skip
+
+
+class StepError(InputError):
+    """A STEP file that cannot be read or written, or not whole; the text says which faces, and why."""
+
+
+class StepWarning(UserWarning):
+    """Something of a STEP file was left out or approximated; the text says what, and why."""
+
+
+class Damaged(StepError):
+    """A file with entities that OCCT could not load, or with references that lead nowhere."""
+
+
+class Malformed(Damaged):
+    """A file whose text is damaged."""
+
+
+def checked_unit(unit: str) -> float:
+    """Millimeters in a unit."""
+    if not isinstance(unit, str) or unit not in UNITS:
+        raise InputError(f"unit is {unit!r}; expected one of {', '.join(map(repr, UNITS))}")
+    return UNITS[unit]
+
+
+def document_of(path: str, folder: str | None = None) -> tuple[Any, int, list[str]]:
+    """The file as a document of OCCT, in millimeters, the number of its faces, and files that it needs and are missing.
+
+    Entities that OCCT cannot load may end the process when it makes shapes of them, or some later time, and text that
+    is no STEP file's may hold up its parser for good: a file that has such is refused, unless there is a folder. Then
+    OCCT is given what is whole of the text, from there.
+    """
+    # OCCT looks for files that this one refers to beside it only by a whole path.
+    file = Path(path).absolute()
+    text = file.read_bytes()
+    if not is_step(text):
+        raise StepError(f"path is {path!r}; expected a STEP file, which begins with ISO-10303-21")
+    others = references_of(text, file.parent)
+    whole = _whole(path, text, folder)
+    for other in others.files:
+        _whole(str(other), other.read_bytes(), folder, other.relative_to(file.parent))
+    del text
+    return (*_loaded(path, str(file) if folder is None else whole, folder is not None), others.missing)
+
+
+def _whole(path: str, text: bytes, folder: str | None, name: Path = Path("whole.step")) -> str:
+    """Where what is whole of a text is: in the folder, by a name."""
+    fault = first_fault(text)
+    if folder is None:
+        if fault is None:
+            return path
+        if fault.is_lost:
+            raise Damaged(f"path is {path!r}; a reference in line {fault.line} leads nowhere")
+        raise Malformed(f"path is {path!r}; its text is damaged in line {fault.line}")
+    file = Path(folder) / name
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(text if fault is None else mended(text))
+    return str(file)
+
+
+def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
+    """`document_of` a file that has the form of one, and is, or is made of, the one at the path."""
+    o = occt()
+    # Settings exist once there is a reader.
+    reader = o.STEPCAFControl_Reader()
+    auto = o.XCAFDoc_ShapeTool.AutoNaming_s()
+    try:
+        o.XCAFDoc_ShapeTool.SetAutoNaming_s(False)
+        with settings({"read.stepcaf.subshapes.name": 1, "read.step.product.mode": 1}):
+            if reader.ReadFile(file) != o.IFSelect_RetDone:
+                raise StepError(f"path is {path!r}; expected a STEP file, and OCCT cannot parse it")
+            if not damaged and (broken := _broken_entities(reader)):
+                raise Damaged(f"path is {path!r}; {broken} of its entities are damaged")
+            document = o.TDocStd_Document(o.TCollection_ExtendedString("XmlOcaf"))
+            o.XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
+            for mode in ("SetColorMode", "SetNameMode"):
+                getattr(reader, mode)(True)
+            if not reader.Transfer(document):
+                raise StepError(f"path is {path!r}; OCCT finds no shapes in it")
+    finally:
+        o.XCAFDoc_ShapeTool.SetAutoNaming_s(auto)
+    return document, _face_count(reader)
+
+
+def _broken_entities(reader: Any) -> int:
+    """Number of entities that OCCT could not load, and that it may make shapes or colors of."""
+    model = reader.Reader().WS().Model()
+    broken = (k for k in range(1, model.NbEntities() + 1) if model.IsErrorEntity(k))
+    return sum(not _is_beside(type(model.Value(k)).__name__) for k in broken)
+
+
+def _is_beside(kind: str) -> bool:
+    """Whether entities of a kind say nothing of shapes: who made them and when, solid angles, dimensions."""
+    return kind.endswith("AndSolidAngleUnit") or kind.startswith(_BESIDE)
+
+
+def _face_count(reader: Any) -> int:
+    """Number of faces in the file."""
+    model = reader.Reader().WS().Model()
+    kinds = ("StepShape_AdvancedFace", "StepShape_FaceSurface")
+    return sum(type(model.Value(k)).__name__ in kinds for k in range(1, model.NbEntities() + 1))
