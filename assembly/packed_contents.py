@@ -200,11 +200,10 @@ class PackedContents(Contents):
 
     def _place_tangents(self, packed: Packed, state: Array) -> None:
         """Start tangents at pairs on the side that they ask for."""
-        q = state[: packed.contacts_at].reshape(-1, 7)
-        places = {id(body): k for k, body in enumerate(self._bodies)}
         for k, contact in enumerate(packed.contacts):
             if isinstance(contact, Tangent) and not contact.edges:
-                rows = (q[places[id(body)]].copy() for body in (contact.body_a, contact.body_b))
+                q = state[: packed.contacts_at].reshape(-1, 7)
+                rows = (q[self._bodies.index(body)].copy() for body in (contact.body_a, contact.body_b))
                 start = contact.start_at(*rows)
                 if start is not None:
                     at = packed.contacts_at + TRACK * k
