@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
+from assembly.geometry.faces.boundary import OVERSHOOT
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
@@ -111,18 +112,22 @@ def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Re
         outer: list[NurbsCurve] | None = None
         holes: list[list[NurbsCurve]] = []
         gap, deviation = 0.0, where.deviation
+        # What the file says of its edges and vertices, and at least what faces forgive by themselves.
+        tolerance = OVERSHOOT * made_surface.size
         for wire in parts(forward, o.TopAbs_WIRE):
             made = _loop(o.as_wire(wire), forward, where, edges)
             if made is None:
                 continue
             gap = max(gap, made[1])
             deviation = max(deviation, max(edge.deviation for edge in made[0]))
+            tolerance = max(tolerance, scale * max(edge.tolerance for edge in made[0]))
             loop = [edge.nurbs(factors) for edge in made[0]]
             if wire.IsSame(outermost):
                 outer = loop
             else:
                 holes.append(loop)
         reverse = face.Orientation() == o.TopAbs_REVERSED
-        return Read(Face(made_surface, outer, holes, name=name, reversed=reverse), deviation, gap)
+        made_face = Face(made_surface, outer, holes, name=name, reversed=reverse, tolerance=tolerance)
+        return Read(made_face, deviation, gap)
     except InputError as error:
         raise Unreadable(str(error)) from error

@@ -124,16 +124,16 @@ def test_triangles_are_unreadable():
         read_face(face, O.ShapeMap(), None)
 
 
-def sheet_of(points, order, shared, ends=None):
+def sheet_of(points, order, shared, ends=None, surface=None, tolerance=1e-7):
     """A polygon in the plane whose edges stand in any order and share their vertices or not."""
     build, face, wire = O.BRep_Builder(), O.TopoDS_Face(), O.TopoDS_Wire()
-    build.MakeFace(face, O.Geom_Plane(O.gp_Pln()), 1e-7)
+    build.MakeFace(face, surface or O.Geom_Plane(O.gp_Pln()), 1e-7)
     build.MakeWire(wire)
     vertices, edges = {}, []
     for k, (a, b) in enumerate(zip(points, ends or points[1:] + points[:1], strict=True)):
         edge, step = O.TopoDS_Edge(), (b[0] - a[0], b[1] - a[1])
         build.MakeEdge(edge)
-        build.UpdateEdge(edge, O.Geom2d_Line(O.gp_Pnt2d(*a), O.gp_Dir2d(*step)), face, 1e-7)
+        build.UpdateEdge(edge, O.Geom2d_Line(O.gp_Pnt2d(*a), O.gp_Dir2d(*step)), face, tolerance)
         build.Range(edge, 0.0, float(np.hypot(*step)))
         for corner, side in ((k, O.TopAbs_FORWARD), ((k + 1) % len(points), O.TopAbs_REVERSED)):
             key = corner if shared else (corner, k)
@@ -166,6 +166,19 @@ def test_gaps_within_the_tolerance_are_closed_and_said():
     # Lines along u or v stay so: of the two ends that are apart, each moves along its own line.
     points = np.array([curve.control_points[0] for curve in found.face.boundary])
     np.testing.assert_allclose(points[0], (0.0, 0.0), rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
+def test_trims_overshoot_a_spline_by_no_more_than_the_file_s_tolerance(scale):
+    # Splines end where they end: other surfaces reach beyond their faces. 2e-3 is more than a face forgives by itself.
+    square = O.Geom_RectangularTrimmedSurface(O.Geom_Plane(O.gp_Pln()), 0.0, 1.0, 0.0, 1.0)
+    surface = O.GeomConvert.SurfaceToBSplineSurface_s(square)
+    corners = [(-2e-3, 0.0), (1.0, 0.0), (1.0, 1.0), (-2e-3, 1.0)]
+    loose = sheet_of(corners, range(4), True, surface=surface, tolerance=3e-3)
+    assert read_face(loose, O.ShapeMap(), None, scale).face.area() == pytest.approx(1.002 * scale**2, rel=1e-12)
+    tight = sheet_of(corners, range(4), True, surface=surface, tolerance=1e-3)
+    with pytest.raises(Unreadable, match="outer leaves the domain"):
+        read_face(tight, O.ShapeMap(), None, scale)
 
 
 def test_a_gap_beyond_the_tolerance_is_unreadable():

@@ -18,7 +18,7 @@ from assembly.geometry.faces.trim_table import TrimTable, build
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["Boundary", "LoopLike", "make_boundary"]
+__all__ = ["OVERSHOOT", "Boundary", "LoopLike", "make_boundary"]
 
 Array = NDArray[np.float64]
 LoopLike = NurbsCurve | Iterable[NurbsCurve] | Loop
