@@ -226,6 +226,8 @@ class Edges(Selection[BodyEdge]):
         for face in faces:
             if not isinstance(face, BodyFace):
                 raise TypeError(f"face is {face!r}; expected a face of a body")
+            if self and face not in self[0].body.faces:
+                raise InputError(f"face is {face!r}; expected one of body {self[0].body.name!r}, whose edges these are")
         return self._chosen(
             lambda edge: all(face in edge.faces for face in faces), f".of({', '.join(map(repr, faces))})"
         )

@@ -110,6 +110,9 @@ def test_what_is_not_one_says_what_there_is():
         plate().vertices(">X and >Y and >Z").frame()
     with pytest.raises(TypeError, match="face is 'top'; expected a face of a body"):
         edges.of("top")
+    other = asm.Body("other", asm.shapes.box(1, 1, 1))
+    with pytest.raises(InputError, match="expected one of body '.*', whose edges these are"):
+        edges.of(other.faces[0])
     line = edges.lines()[0]
     with pytest.raises(InputError, match="is a line and has no radius"):
         _ = line.radius
