@@ -49,6 +49,8 @@ def read_urdf(path: str | PathLike[str], *, unit: str = "mm") -> Robot:
     ------
     UrdfError
         No robot's text, joints that are no tree, or values that no robot can have; the text names link or joint.
+    FileNotFoundError
+        No such file, or a folder.
     ImportError
         Without yourdfpy, of the extra `robots`.
 
@@ -72,7 +74,7 @@ def read_urdf(path: str | PathLike[str], *, unit: str = "mm") -> Robot:
 
 def _parsed(path: str) -> Any:
     if not Path(path).is_file():
-        raise UrdfError(f"path is {path!r}; expected a URDF file")
+        raise FileNotFoundError(f"path is {path!r}; {'a folder' if Path(path).is_dir() else 'no such file'}")
     module = yourdfpy()
     try:
         loaded = module.URDF.load(path, build_scene_graph=False, load_meshes=False)

@@ -64,9 +64,9 @@ def write_urdf(
         Where the file goes; a body that is neither a box, a cylinder nor a ball goes as a mesh into an STL file beside
         it, named after the file and the link. Existing files are replaced.
     what : Robot or Assembly
-        Joints are `Revolute`, `Prismatic`, `Planar` or `Fixed` and make a tree; of several bodies that nothing carries
-        none is the root. Every joint is written free, with its limits; couplings of turns, or of a slide and a turn,
-        as joints that mimic others. Other constraints, and objectives, raise.
+        Joints are `Revolute`, `Prismatic`, `Planar` or `Fixed`, or mates that are such, and make a tree; of several
+        bodies that nothing carries none is the root. Every joint is written free, with its limits; couplings of turns,
+        or of a slide and a turn, as joints that mimic others. Other constraints, and objectives, raise.
     unit : str
         Of the bodies: "um", "mm", "cm", "m", "in" or "ft"; the file has meters.
     name : str, optional
@@ -94,7 +94,7 @@ def write_urdf(
     joints = [item for item in constraints if isinstance(item, Joint)]
     couplings = [item for item in constraints if isinstance(item, Coupling)]
     for item in constraints:
-        if type(item) not in (*_TYPES, Gear, RackPinion):
+        if not isinstance(item, (*_TYPES, Gear, RackPinion)):
             raise UrdfError(
                 f"{item.name!r} is {item!r}; expected Revolute, Prismatic, Planar, Fixed, Gear or RackPinion"
             )
@@ -152,6 +152,7 @@ class _Writer:
         self._scale = scale
         self._inertials = inertials
         self.meshes: dict[str, bytes] = {}
+        self._files: dict[str, str] = {}
 
     def link(self, link: _Link) -> ElementTree.Element:
         """A link with what it weighs and its shape."""
@@ -180,8 +181,14 @@ class _Writer:
         ElementTree.SubElement(element, "origin", xyz=xyz, rpy=rpy)
 
     def _mesh(self, element: ElementTree.Element, link: _Link) -> None:
-        file = f"{self._target.stem}_{_file_name(link.body.name)}.stl"
-        if file not in self.meshes:
+        file = self._files.get(link.body.name)
+        if file is None:
+            stem, count = f"{self._target.stem}_{_file_name(link.body.name)}", 2
+            file = f"{stem}.stl"
+            # Names that differ by signs that no file has, or by capitals, which some systems do not tell apart.
+            while file.lower() in map(str.lower, self.meshes):
+                file, count = f"{stem}_{count}.stl", count + 1
+            self._files[link.body.name] = file
             self.meshes[file] = stl_bytes([(link.body, np.eye(3), -link.origin)], self._scale)
         self._place(element, np.zeros(3), np.eye(3))
         ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), "mesh", filename=file)
@@ -200,13 +207,18 @@ class _Writer:
         """The joint that carries a link."""
         joint, parent = link.joint, link.parent
         assert joint is not None and parent is not None
-        (low, high), kind = self._limits(joint), _TYPES[type(joint)]
+        (low, high), kind = (
+            self._limits(joint),
+            next(word for type_, word in _TYPES.items() if isinstance(joint, type_)),
+        )
         if isinstance(joint, Planar) and joint.offset != 0.0:
             raise UrdfError(f"joint {joint.name!r} is planar at an offset of {joint.offset:g}; expected 0")
         if kind == "revolute" and low == -np.inf and high == np.inf:
             kind = "continuous"
         elif kind in ("revolute", "prismatic") and not np.isfinite([low, high]).all():
             raise UrdfError(f"joint {joint.name!r} has limits from {low:g} to {high:g}; expected finite ones")
+        if isinstance(joint, Planar) and any(freedom.limits for freedom in joint.freedoms.values()):
+            raise UrdfError(f"joint {joint.name!r} is planar with limits, which a file has not; expected none")
         element = ElementTree.Element("joint", name=joint.name, type=kind)
         ElementTree.SubElement(element, "parent", link=parent.body.name)
         ElementTree.SubElement(element, "child", link=link.body.name)

@@ -104,6 +104,8 @@ class Body(KnownSettings):
         check_coordinates("position", self._pose.position.tolist())
         self._faces = self._selectable(self._named(shape))
         self._edges: Edges | None = None
+        # Found when it is first asked for: faces are for life.
+        self._size: float | None = None
         self.color = color
         self._density = positive("density", density)
 
@@ -249,12 +251,14 @@ class Body(KnownSettings):
     @property
     def size(self) -> float:
         """Diagonal of the box around the control points of all faces; 0 without a shape."""
-        if not self.faces:
-            return 0.0
-        boxes = [face.face.surface.bounding_box() for face in self.faces]
-        low = np.min([box[0] for box in boxes], axis=0)
-        high = np.max([box[1] for box in boxes], axis=0)
-        return length(high - low)
+        if self._size is None:
+            self._size = 0.0
+            if self.faces:
+                boxes = [face.face.surface.bounding_box() for face in self.faces]
+                low = np.min([box[0] for box in boxes], axis=0)
+                high = np.max([box[1] for box in boxes], axis=0)
+                self._size = length(high - low)
+        return self._size
 
     def face(self, name: str | None = None) -> BodyFace:
         """A face by name; the only face when no name is given.

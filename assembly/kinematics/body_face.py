@@ -133,6 +133,11 @@ class BodyFace:
             return self.body.frame(center)
         return self.body.frame(center, self.normal if kind == "plane" else self.axis)
 
+    def at_least(self, point: Array) -> float:
+        """What its distance of a point (3,) is at least: that of the box around its surface's control points."""
+        low, high = self.face.surface.bounding_box()
+        return float(np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0.0)))
+
     def distance(self, point: NDArray[np.float64] | tuple[float, float, float]) -> float:
         """How far a point (3,) in the body's coordinates is from the face, within its boundary."""
         from assembly.selection.nearness import distance_to_face

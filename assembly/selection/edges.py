@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -179,6 +180,10 @@ class BodyEdge:
                     break
         return self.body.frame(form.center, axis)
 
+    def at_least(self, point: Array) -> float:
+        """What its distance of a point (3,) is at least: it is on all of its faces, to the tolerance of points."""
+        return max(face.at_least(point) for face in self.faces) - self._topology.tolerance
+
     def distance(self, point: ArrayLike) -> float:
         """How far a point (3,) in the body's coordinates is from it."""
         return distance_along(self.at, self._breaks, checked_place("point", point))
@@ -251,15 +256,27 @@ class Edges(Selection[BodyEdge]):
         return f"{item.name}: {item.kind}{size}"
 
 
+# Topologies and owners of bodies: to look them up by all faces takes as long as a body has faces, for each edge.
+_KNOWN: WeakKeyDictionary[Body, tuple[Topology, list[int]]] = WeakKeyDictionary()
+
+
+def _known(body: Body) -> tuple[Topology, list[int]]:
+    known = _KNOWN.get(body)
+    if known is None:
+        parts = [len(smooth_faces(side.face)) if has_creases(side.face) else 1 for side in body.faces]
+        owners = [k for k, count in enumerate(parts) for _ in range(count)]
+        known = _KNOWN[body] = solid_of(tuple(side.face for side in body.faces)), owners
+    return known
+
+
 def topology_of_body(body: Body) -> Topology:
     """Faces, edges and vertices of a body with a shape; faces with creases count as several."""
-    return solid_of(tuple(side.face for side in body.faces))
+    return _known(body)[0]
 
 
 def owners_of(body: Body) -> list[int]:
     """Which face of the body each face of its topology is, or is a part of."""
-    parts = [len(smooth_faces(side.face)) if has_creases(side.face) else 1 for side in body.faces]
-    return [k for k, count in enumerate(parts) for _ in range(count)]
+    return _known(body)[1]
 
 
 def edges_of(body: Body) -> Edges:

@@ -29,6 +29,7 @@ class _Thing(Protocol):
     def name(self) -> str: ...
     @property
     def centroid(self) -> Array: ...
+    def at_least(self, point: Any, /) -> float: ...
     def distance(self, point: Any, /) -> float: ...
 
 
@@ -101,8 +102,14 @@ class Selection(tuple[Item, ...]):
         place = checked_place("point", point)
         if not self:
             return self._chosen(lambda item: True, ".near(...)")
-        gaps = [item.distance(place) for item in self]
-        nearest = int(np.argmin(np.array(gaps) > min(gaps) + 1e-9 * self._size()))
+        least, slack = np.array([item.at_least(place) for item in self]), 1e-9 * self._size()
+        gaps = np.full(len(self), np.inf)
+        for k in np.argsort(least, kind="stable"):
+            # All that follow are farther.
+            if least[k] > gaps.min() + slack:
+                break
+            gaps[k] = self[int(k)].distance(place)
+        nearest = int(np.argmin(gaps > gaps.min() + slack))
         said = f"{self._said}.near({', '.join(f'{x:g}' for x in place)})"
         return type(self)((self[nearest],), said, self)
 

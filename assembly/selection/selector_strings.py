@@ -32,6 +32,8 @@ Chosen = set[int]
 Rule = Callable[["Seen"], Chosen]
 # Directions within this angle are parallel: CadQuery's 1e-4 rad.
 PARALLEL = 1e-4
+# Expressions in expressions, each of which takes some calls on the stack.
+_DEEPEST = 50
 _SIMPLE = {"X": (1, 0, 0), "Y": (0, 1, 0), "Z": (0, 0, 1), "XY": (1, 1, 0), "XZ": (1, 0, 1), "YZ": (0, 1, 1)}
 _VIEWS = {"front": ">Z", "back": "<Z", "left": "<X", "right": ">X", "top": ">Y", "bottom": "<Y"}
 _NUMBER = r"\s*([+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*"
@@ -116,6 +118,7 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self._text = text
         self._at = 0
+        self._depth = 0
 
     def read(self) -> Rule:
         rule = self._expression()
@@ -148,6 +151,14 @@ class _Reader:
         return InputError(f"selector is {self._text!r}; expected {expected} at {here}")
 
     def _expression(self) -> Rule:
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise InputError(f"selector nests more than {_DEEPEST} times 'not' and '('; expected a shorter one")
+        rule = self._nested()
+        self._depth -= 1
+        return rule
+
+    def _nested(self) -> Rule:
         if self._takes("not"):
             inner = self._expression()
             return lambda seen: seen.all() - inner(seen)
@@ -246,7 +257,7 @@ class _Reader:
         size = float(np.linalg.norm(given))
         if not 0.0 < size < np.inf:
             raise InputError(
-                f"selector is {self._text!r} with the direction {given.tolist()}; expected one that is not 0"
+                f"selector is {self._text!r} with the direction {given.tolist()}; expected one that is finite and not 0"
             )
         return np.asarray(given / size)
 

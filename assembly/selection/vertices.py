@@ -74,6 +74,10 @@ class BodyVertex:
         owners = owners_of(self.body)
         return tuple(self.body.faces[k] for k in dict.fromkeys(owners[k] for k in self._vertex.faces))
 
+    def at_least(self, point: Array) -> float:
+        """What its distance of a point (3,) is at least."""
+        return float(np.linalg.norm(point - self._vertex.point))
+
     def distance(self, point: ArrayLike) -> float:
         """How far a point (3,) in the body's coordinates is from it."""
         return float(np.linalg.norm(checked_place("point", point) - self.center))

@@ -47,9 +47,10 @@ class _FaceBuilder:
     def __init__(self, face: Face, surface: NurbsSurface, chains: list[list[Piece]]) -> None:
         o = occt()
         self.face = face
-        self.surface, self.chains = surface, chains
+        self.surface = surface
         self.build = o.BRep_Builder()
         self.carrier = carrier_of(self.surface)
+        self.chains = chains if self.carrier.plane is None else self._of_plane(chains)
         self.geometry = self.carrier.geometry
         self.made = o.TopoDS_Face()
         self.build.MakeFace(self.made, self.geometry, EDGE_TOLERANCE)
@@ -60,6 +61,24 @@ class _FaceBuilder:
         low, high = np.array(self.surface.domain).T
         uv = np.clip(uv, low, high)
         return self.surface.evaluate(uv[:, 0], uv[:, 1])
+
+    def _of_plane(self, chains: list[list[Piece]]) -> list[list[Piece]]:
+        """The same without seams and poles, which a disc about its center has in (u, v), and OCCT's plane has not."""
+        left = [piece for chain in chains for piece in chain if piece.kind not in (SEAM, POLE)]
+        if len(left) == sum(map(len, chains)):
+            return chains
+        begin, end = (self.at(np.array([piece.ends[k] for piece in left])) for k in (0, 1))
+        unused, joined = list(range(len(left))), []
+        while unused:
+            chain = [unused.pop(0)]
+            while unused:
+                gaps = np.linalg.norm(begin[unused] - end[chain[-1]], axis=1)
+                # Back at the start: no other piece begins nearer.
+                if np.linalg.norm(begin[chain[0]] - end[chain[-1]]) <= gaps.min():
+                    break
+                chain.append(unused.pop(int(np.argmin(gaps))))
+            joined.append([left[k] for k in chain])
+        return joined
 
     @cached_property
     def is_affine(self) -> bool:

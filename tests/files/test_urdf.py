@@ -268,8 +268,51 @@ def test_scenes_that_are_no_robots(tmp_path):
         asm.write_urdf(tmp_path / "robot.step", slider)
     with pytest.raises(TypeError, match="what is 3; expected a Robot or an Assembly"):
         asm.write_urdf(path, 3)
-    with pytest.raises(UrdfError, match="expected a URDF file"):
+    planar = asm.Assembly([a, b])
+    planar.constrain(asm.Planar(a.frame(), b.frame(), "table", x_limits=(-1.0, 1.0)))
+    with pytest.raises(UrdfError, match="joint 'table' is planar with limits"):
+        asm.write_urdf(path, planar)
+    with pytest.raises(FileNotFoundError, match="no such file"):
         asm.read_urdf(tmp_path / "nothing.urdf")
+    with pytest.raises(FileNotFoundError, match="a folder"):
+        asm.read_urdf(tmp_path)
     with pytest.raises(InputError, match="unit is 'yard'"):
         asm.read_urdf(path, unit="yard")
     assert not path.exists()
+
+
+def test_mates_are_written_as_the_joints_they_are(tmp_path):
+    plate = asm.Body("plate", asm.shapes.plate(20, 20, 8, [(3, 0, 2)]), fixed=True)
+    pin = asm.Body("pin", asm.shapes.solid_cylinder(2, 14), position=(1, 2, 15))
+    scene = asm.Assembly([plate, pin])
+    scene.constrain(asm.Insert(plate.face("hole 1"), pin.faces.cylinders(), "swivel", limits=(-1, 1)))
+    asm.write_urdf(tmp_path / "robot.urdf", scene)
+    with pytest.warns(UrdfWarning, match="'plate' are no exact shapes"):
+        robot = asm.read_urdf(tmp_path / "robot.urdf")
+    joint = robot.joint("swivel")
+    assert isinstance(joint, asm.Revolute) and joint.limits == (-1.0, 1.0)
+    joint.angle = 0.0
+    scene.constraints[0].angle = 0.0
+    # The link's origin is at the seat, with the axes of its body.
+    again, solved = robot.assembly().solve().pose("pin"), scene.solve().pose(pin)
+    assert np.abs(again.position - solved.apply(scene.constraints[0].seats.shank.center)).max() < CLOSE
+    assert abs(again.quaternion @ solved.quaternion) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_meshes_of_names_that_make_one_file_name(tmp_path):
+    """Each link has its own: "a b", "a_b" and "A_b" differ by what files do not tell apart."""
+    cone = asm.shapes.revolution(asm.curves.polygon([(0, 0), (3, 0), (0, 4)]))
+    ring = asm.shapes.revolution(asm.curves.polygon([(1, 0), (3, 0), (2, 4)]))
+    rod = asm.shapes.revolution(asm.curves.polygon([(0, 0), (1, 0), (2, 4), (0, 4)]))
+    bodies = [
+        asm.Body(name, shape, fixed=name == "a b") for name, shape in (("a b", cone), ("a_b", ring), ("A_b", rod))
+    ]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Fixed(bodies[0], bodies[1]), asm.Fixed(bodies[0], bodies[2]))
+    asm.write_urdf(tmp_path / "robot.urdf", scene)
+    files = sorted(tmp_path.glob("*.stl"))
+    assert len(files) == 3 and len({file.name.lower() for file in files}) == 3
+    assert len({file.read_bytes() for file in files}) == 3
+    text = (tmp_path / "robot.urdf").read_text()
+    # One for what is seen, and one for what collides.
+    assert all(text.count(f'filename="{file.name}"') == 2 for file in files)

@@ -225,3 +225,32 @@ def test_what_is_not_one_says_what_there_is():
 def test_bad_input(call, error, text):
     with pytest.raises(error, match=text):
         call(plate().faces)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_distances_are_at_least(seed):
+    rng = np.random.default_rng(seed)
+    body, rotation, offset = placed(seed, asm.shapes.plate(10, 8, 2, [(1, 1, 1.5), (-3, 0, 0.5)]))
+    for point in offset + rng.uniform(-8, 8, (4, 3)) @ rotation.T:
+        for item in (*body.faces, *body.edges, *body.vertices):
+            # Vertices' are their distances.
+            assert item.at_least(point) <= item.distance(point) + 1e-12
+
+
+def test_few_distances_find_the_nearest_of_many_faces(monkeypatch):
+    holes = [(x, y, 0.3) for x in range(-6, 7, 2) for y in range(-6, 7, 2)]
+    body, asked = asm.Body("plate", asm.shapes.plate(16, 16, 2, holes)), []
+    plain = type(body.faces[0]).distance
+    monkeypatch.setattr(type(body.faces[0]), "distance", lambda face, point: asked.append(face) or plain(face, point))
+    (found,) = body.faces.cylinders().near((4.1, 2, 0))
+    assert np.allclose(found.center, (4, 2, 0)) and len(holes) == 49 and len(asked) <= 2
+
+
+def test_boxes_around_faces_are_asked_for_once(monkeypatch):
+    """A selection by lengths asks for the body's size at each of its faces."""
+    holes = [(x, 0, 0.3) for x in range(-6, 7, 2)]
+    body, asked = asm.Body("plate", asm.shapes.plate(16, 16, 2, holes)), []
+    plain = asm.NurbsSurface.bounding_box
+    assert len(body.faces.cylinders(0.3)) == 7
+    monkeypatch.setattr(asm.NurbsSurface, "bounding_box", lambda surface: asked.append(surface) or plain(surface))
+    assert len(body.faces.cylinders(0.3)) == 7 and body.size > 0.0 and not asked

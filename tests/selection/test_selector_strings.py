@@ -163,7 +163,7 @@ def test_vertices():
         ("Q", "expected one of > < >> << | # + - %, or a direction"),
         (">", "expected a direction, X, Y, Z, XY, XZ, YZ or (x, y, z) at its end"),
         (">(1, 2)", "expected a direction"),
-        (">(0, 0, 0)", "expected one that is not 0"),
+        (">(0, 0, 0)", "expected one that is finite and not 0"),
         (">Z[x]", "expected 'and', 'or', 'exc' or the end at '[x]'"),
         (">Z <X", "expected 'and', 'or', 'exc' or the end at '<X'"),
         (">Z and", "expected one of"),
@@ -184,3 +184,11 @@ def test_edges_have_no_sense():
     for text in ("+X", "-X", "X", "|X and +X"):
         with pytest.raises(InputError, match=re.escape("expected '|' for edges")):
             BODY.edges(text)
+
+
+@pytest.mark.parametrize("text", ["not " * 4000 + "|Z", "(" * 4000 + "|Z" + ")" * 4000])
+def test_strings_that_nest_without_end(text):
+    box = asm.Body("box", asm.shapes.box(1, 2, 3))
+    with pytest.raises(InputError, match="selector nests more than 50 times"):
+        box.faces(text)
+    assert len(box.faces("(" * 40 + "|Z" + ")" * 40)) == 2

@@ -41,7 +41,16 @@ SHAPES = {
     "ellipsoid": lambda: asm.shapes.ellipsoid(1.0, 2.0, 3.0),
     "torus": lambda: asm.shapes.torus(4.0, 1.0),
     "paper clip": lambda: asm.shapes.paper_clip(length=33.0, width=8.0, wire_radius=0.5),
+    # Their flat walls are discs and rings about their centers, with a seam, and a pole, in (u, v).
+    "turned bolt": lambda: turned((0, -12), (1.9, -12), (1.9, 0), (5, 0), (5, 4), (0, 4)),
+    "turned ring": lambda: turned((1, 0), (3, 0), (2, 4)),
+    "turned tube": lambda: turned((1, 0), (3, 0), (3, 4), (1, 4)),
+    "turned in part": lambda: turned((0, 0), (3, 0), (3, 4), (0, 4), angle=2.0),
 }
+
+
+def turned(*corners, angle=2.0 * pi):
+    return asm.shapes.revolution(asm.curves.polygon(corners), angle)
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -53,6 +62,29 @@ def test_closed_shapes_are_solids(tmp_path, name):
     assert back.name == name and len(back.faces) == len(body.faces)
     # The surfaces are the same; full circles come back as they were written.
     assert measures(back) == pytest.approx(measures(body), rel=1e-12)
+
+
+# Corners in (u, v), whether they are those of a hole, and how many edges there are: the seam cuts two of a hole's.
+TRIMS = {
+    "beside the seam": ([(2, 1), (5, 1), (5, 2), (2, 2)], False, 4),
+    "across the seam": ([(-2, 1), (3, 1), (3, 2), (-2, 2)], False, 4),
+    "a hole": ([(2, 1), (2, 2), (5, 2), (5, 1)], True, 5),
+    "a hole across the seam": ([(-2, 1), (-2, 2), (3, 2), (3, 1)], True, 7),
+}
+
+
+@pytest.mark.parametrize("name", TRIMS)
+def test_trims_of_a_disc_about_its_center(tmp_path, name):
+    corners, is_hole, count = TRIMS[name]
+    disc = turned((0, 0), (3, 0), (3, 4), (0, 4))[0].surface
+    sides = zip(corners, [*corners[1:], corners[0]], strict=True)
+    loop = [asm.NurbsCurve(np.array(side, dtype=float), [0, 0, 1, 1], 1) for side in sides]
+    face = asm.Face(disc, None, [loop]) if is_hole else asm.Face(disc, loop)
+    made = sewn([face], 1.0)
+    assert O.BRepCheck_Analyzer(made.shape).IsValid() and len(parts(made.shape, O.TopAbs_EDGE)) == count
+    (back,) = again(tmp_path / "part.step", asm.Body("part", face))
+    # Circles of a disc are followed to 1e-10 of its size.
+    assert back.area == pytest.approx(face.area(), rel=1e-10) and back.faces[0].kind == "plane"
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -14,7 +14,7 @@ from assembly.errors import InputError
 from assembly.kinematics.body import BodyFace
 from assembly.kinematics.pose import rotation_matrix
 from assembly.selection.edges import BodyEdge
-from assembly.selection.selection import are_parallel
+from assembly.selection.selection import EQUAL, are_parallel
 
 __all__ = ["Seats", "found_seats"]
 
@@ -50,6 +50,11 @@ def found_seats(hole: Any, shank: Any, said: Sequence[Any] | None) -> Seats:
                 refused(f"seats[{k}]", edge, "a circle of a body")
             if edge.body is not side.body:
                 raise InputError(f"seats[{k}] is on body {edge.body.name!r}; expected one of {side.body.name!r}")
+            off = np.linalg.norm(np.cross(edge.center - side.center, side.axis))
+            if not are_parallel(edge.axis, side.axis) or off > EQUAL * side.body.size:
+                raise InputError(
+                    f"seats[{k}] is {edge!r}, about another axis than {side!r}; expected one about its axis"
+                )
         return Seats(*edges, "opposed")
     mouths, bottoms = _ends("hole", hole)
     ends, shoulders = _ends("shank", shank)

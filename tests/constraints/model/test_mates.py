@@ -120,6 +120,10 @@ REFUSED = {
         "hole is plate.face('top'), a plane; expected a cylinder",
     ),
     "seats": (lambda: asm.Insert(HOLE, SHANK, seats=3), "seats is 3; expected two circles"),
+    "seat of another hole": (
+        lambda: asm.Insert(HOLE, SHANK, seats=(PLATE.edges.circles(0.5)[:1], mate_end(BOLT))),
+        "about another axis than plate.face('hole 1')",
+    ),
     "seat": (
         lambda: asm.Insert(HOLE, SHANK, seats=(PLATE.edges.lines()[:1], SHANK)),
         "seats[0] is plate.edges[0], a line",
