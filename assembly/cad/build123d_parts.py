@@ -9,7 +9,7 @@ from typing import Any
 from assembly.cad.libraries import is_of, shown
 from assembly.cad.locations import location_of, pose_of
 from assembly.cad.shapes import Bodies, Label, color_of
-from assembly.errors import InputError, items, text
+from assembly.errors import items, text
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
 from assembly.step.bodies import unique
@@ -142,9 +142,7 @@ def from_build123d(
         # A face that was selected of a part that has moved since is where the part was.
         pose = pose_of(leaf.location, repr(leaf.name))
         made.add(leaf.name, [leaf.part.wrapped.Located(bare)], pose, leaf.color, labels)
-    if not any(body.faces for body in made.bodies):
-        raise InputError("thing has no faces; expected solids, shells or faces")
-    return made.finished()
+    return made.finished("thing")
 
 
 def place_build123d(thing: Any, solution: Solution, names: set[str]) -> set[str]:

@@ -9,7 +9,7 @@ from typing import Any
 from assembly.cad.libraries import is_of, shown
 from assembly.cad.locations import location_of, pose_of
 from assembly.cad.shapes import Bodies, Label, color_of
-from assembly.errors import InputError, text
+from assembly.errors import text
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.solve.solution import Solution
@@ -127,9 +127,7 @@ def from_cadquery(thing: Any, name: str = "part", *, fixed: Iterable[str] = (), 
         made.add(name, _shapes(thing), Pose(), None, _tags(thing))
     else:
         raise TypeError(f"thing is {shown(thing)}; expected a cadquery.Workplane, a cadquery.Shape or an Assembly")
-    if not any(body.faces for body in made.bodies):
-        raise InputError("thing has no faces; expected solids, shells or faces")
-    return made.finished()
+    return made.finished("thing")
 
 
 def place_cadquery(assembly: Any, solution: Solution, names: set[str]) -> set[str]:

@@ -100,14 +100,16 @@ class Bodies:
         self.bodies.append(body)
         return body
 
-    def finished(self) -> list[Body]:
-        """All bodies.
+    def finished(self, what: str) -> list[Body]:
+        """All bodies of an argument.
 
         Raises
         ------
         InputError
-            A name of `fixed` that no body has.
+            No body with faces; a name of `fixed` that no body has.
         """
+        if not any(body.faces for body in self.bodies):
+            raise InputError(f"{what} has no faces; expected solids, shells or faces")
         unknown = sorted(self._fixed - self._taken)
         if unknown:
             known = ", ".join(repr(body.name) for body in self.bodies)
@@ -284,6 +286,4 @@ def from_occt(shape: Any, name: str = "part", *, fixed: Iterable[str] = (), stri
     for piece in () if shape.IsNull() else solids_in(shape):
         own = piece.Located(o.TopLoc_Location())
         made.add(name, [own], pose_of(piece.Location(), repr(name)), None)
-    if not any(body.faces for body in made.bodies):
-        raise InputError("shape has no faces; expected a solid, a shell or a face")
-    return made.finished()
+    return made.finished("shape")

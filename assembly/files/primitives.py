@@ -14,8 +14,8 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.elementary import elementary_form
 from assembly.geometry.recognition.forms import Cylinder, Plane, Sphere
 from assembly.kinematics.body import Body
-from assembly.proximity.brep.mass import mass_properties
-from assembly.proximity.brep.solid import solid_of
+from assembly.proximity.features.mass import mass_properties
+from assembly.proximity.features.places import shells_of
 
 __all__ = ["Primitive", "primitives_of"]
 
@@ -49,26 +49,12 @@ def primitives_of(body: Body) -> list[Primitive] | None:
     """The primitives of which a body is made, one a piece; None for another one, and for one that encloses nothing."""
     faces = tuple(side.face for side in body.faces)
     found = []
-    for piece in _pieces(faces):
+    for piece in shells_of(faces):
         primitive = _primitive_of(body.name, piece)
         if primitive is None:
             return None
         found.append(primitive)
     return found
-
-
-def _pieces(faces: tuple[Face, ...]) -> list[tuple[Face, ...]]:
-    """Faces that are joined by edges."""
-    solid = solid_of(faces)
-    if len(solid.faces) != len(faces):
-        # Faces with creases count as several: none of a primitive has any.
-        return [faces]
-    piece = list(range(len(faces)))
-    for edge in solid.edges:
-        if edge.face_b is not None:
-            low, high = sorted((piece[edge.face_a], piece[edge.face_b]))
-            piece = [low if each == high else each for each in piece]
-    return [tuple(face for face, at in zip(faces, piece, strict=True) if at == each) for each in dict.fromkeys(piece)]
 
 
 def _primitive_of(name: str, faces: tuple[Face, ...]) -> Primitive | None:

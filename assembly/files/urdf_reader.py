@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from assembly.constraints.model.couplings import Coupling, Gear, RackPinion
+from assembly.constraints.model.couplings import Coupling, Gear, Linear, RackPinion
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.joints import Fixed, Planar, Prismatic, Revolute
 from assembly.errors import AssemblyError
@@ -64,7 +64,7 @@ def read_urdf(path: str | PathLike[str], *, unit: str = "mm") -> Robot:
     reader = _Reader(robot, scale)
     try:
         made = reader.robot()
-    except UrdfError as error:
+    except AssemblyError as error:
         raise UrdfError(f"path is {fspath(path)!r}; {error}") from None
     if reader.meshes:
         names = ", ".join(map(repr, reader.meshes))
@@ -215,15 +215,21 @@ class _Reader:
             raise UrdfError(f"joint {joint.name!r} mimics {joint.mimic.joint!r}; expected another joint that moves")
         ratio = 1.0 if joint.mimic.multiplier is None else float(joint.mimic.multiplier)
         offset = 0.0 if joint.mimic.offset is None else float(joint.mimic.offset)
-        name = f"{joint.name} mimics {joint.mimic.joint}"
+        if not np.isfinite([ratio, offset]).all() or ratio == 0.0:
+            raise UrdfError(
+                f"joint {joint.name!r} mimics by {ratio:g} and {offset:g}; expected finite numbers, not by 0"
+            )
+        name, scale = f"{joint.name} mimics {joint.mimic.joint}", self._scale
         if isinstance(led, Revolute) and isinstance(leader, Revolute):
             return Gear(leader, led, ratio, name, offset)
         if isinstance(led, Prismatic) and isinstance(leader, Revolute):
-            return RackPinion(leader, led, ratio * self._scale, name, offset * self._scale)
-        raise UrdfError(
-            f"joint {joint.name!r} is {joint.type} and mimics {joint.mimic.joint!r}; expected a turn that mimics a "
-            "turn or a slide that mimics a turn"
-        )
+            return RackPinion(leader, led, ratio * scale, name, offset * scale)
+        if isinstance(led, Prismatic) and isinstance(leader, Prismatic):
+            return Linear(leader, led, ratio, name, offset * scale)
+        if isinstance(led, Revolute) and isinstance(leader, Prismatic):
+            # angle = ratio slide + offset, as a pinion has it the other way around.
+            return RackPinion(led, leader, scale / ratio, name, -offset / ratio * scale)
+        raise UrdfError(f"joint {joint.name!r} is {joint.type} and mimics; expected a turn or a slide that mimics one")
 
     def _inertial(self, name: str, inertial: Any) -> Inertial:
         place = self._origin(inertial)

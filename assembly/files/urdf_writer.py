@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from assembly.assembly import Assembly
-from assembly.constraints.model.couplings import Coupling, Gear, RackPinion
+from assembly.constraints.model.couplings import Gear, Linear, RackPinion
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.joints import Fixed, Planar, Prismatic, Revolute
 from assembly.errors import InputError, positive
@@ -92,11 +92,11 @@ def write_urdf(
         raise InputError(f"path is {str(target)!r}; expected a name that ends in .urdf")
     constraints = (*what.joints, *what.couplings) if isinstance(what, Robot) else what.constraints
     joints = [item for item in constraints if isinstance(item, Joint)]
-    couplings = [item for item in constraints if isinstance(item, Coupling)]
+    couplings = [item for item in constraints if isinstance(item, (Gear, Linear, RackPinion))]
     for item in constraints:
-        if not isinstance(item, (*_TYPES, Gear, RackPinion)):
+        if not isinstance(item, (*_TYPES, Gear, Linear, RackPinion)):
             raise UrdfError(
-                f"{item.name!r} is {item!r}; expected Revolute, Prismatic, Planar, Fixed, Gear or RackPinion"
+                f"{item.name!r} is {item!r}; expected Revolute, Prismatic, Planar, Fixed, a Gear, Linear or RackPinion"
             )
     title = name or (what.name if isinstance(what, Robot) else target.stem)
     scale = 1e-3 * checked_unit(unit)
@@ -203,7 +203,7 @@ class _Writer:
         }
         ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), primitive.kind, fields[primitive.kind])
 
-    def joint(self, link: _Link, couplings: Sequence[Coupling]) -> ElementTree.Element:
+    def joint(self, link: _Link, couplings: Sequence[Gear | Linear | RackPinion]) -> ElementTree.Element:
         """The joint that carries a link."""
         joint, parent = link.joint, link.parent
         assert joint is not None and parent is not None
@@ -241,14 +241,16 @@ class _Writer:
         factor = self._scale if isinstance(joint, Prismatic) else 1.0
         return (-np.inf if low is None else factor * low), (np.inf if high is None else factor * high)
 
-    def _mimic(self, element: ElementTree.Element, joint: Joint, couplings: Sequence[Coupling]) -> None:
+    def _mimic(
+        self, element: ElementTree.Element, joint: Joint, couplings: Sequence[Gear | Linear | RackPinion]
+    ) -> None:
         for coupling in couplings:
             if coupling.follower.joint is not joint:
                 continue
-            factor = 1.0 if isinstance(coupling, Gear) else self._scale
-            ratio = coupling.ratio if isinstance(coupling, Gear) else coupling.radius  # type: ignore[attr-defined]
-            offset = {"multiplier": repr(float(factor * ratio)), "offset": repr(float(factor * coupling.offset))}
-            ElementTree.SubElement(element, "mimic", {"joint": coupling.leader.joint.name, **offset})
+            ratio = self._scale * coupling.radius if isinstance(coupling, RackPinion) else coupling.ratio
+            offset = coupling.offset if isinstance(coupling, Gear) else self._scale * coupling.offset
+            values = {"multiplier": repr(float(ratio)), "offset": repr(float(offset))}
+            ElementTree.SubElement(element, "mimic", {"joint": coupling.leader.joint.name, **values})
 
 
 def _weighed(bodies: Sequence[Body], factor: float) -> dict[str, Inertial]:

@@ -17,7 +17,7 @@ from assembly.kinematics.body_face import BodyFace
 from assembly.kinematics.pose import Pose, direction, length
 
 if TYPE_CHECKING:
-    from assembly.proximity.brep.mass import MassProperties
+    from assembly.proximity.features.mass import MassProperties
     from assembly.selection.edges import Edges
     from assembly.selection.faces import Faces
     from assembly.selection.vertices import Vertices
@@ -146,7 +146,7 @@ class Body(KnownSettings):
         InputError
             A body whose faces enclose nothing: without a shape, open, or with normals that look inward.
         """
-        from assembly.proximity.brep.mass import mass_properties
+        from assembly.proximity.features.mass import mass_properties
 
         return mass_properties(self.name, tuple(side.face for side in self._faces), self._density)
 

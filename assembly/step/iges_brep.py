@@ -81,6 +81,8 @@ def write_iges(
 ) -> None:
     """Write bodies to an IGES file (solids, in millimeters), each where it stands; see `write_step`.
 
+    Names of bodies and of faces do not come back from there, colors do.
+
     Raises
     ------
     StepError, InputError, ImportError

@@ -61,6 +61,25 @@ def test_poses_are_those_of_forward_kinematics(tmp_path):
         assert_same(robot, driven(robot, values), places)
 
 
+@pytest.mark.parametrize("leader", ["continuous", "prismatic"])
+@pytest.mark.parametrize("led", ["continuous", "prismatic"])
+def test_what_mimics_follows(tmp_path, leader, led):
+    """value = multiplier of the other one's + offset, in radians and meters; also when it is written and read again."""
+    limit = '<limit lower="-9" upper="9" effort="1" velocity="1"/>'
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/>'
+        f'<joint name="j" type="{leader}"><parent link="a"/><child link="b"/>{limit}</joint>'
+        f'<joint name="k" type="{led}"><parent link="b"/><child link="c"/><origin xyz="0 0.1 0"/>{limit}'
+        '<mimic joint="j" multiplier="-0.7" offset="0.2"/></joint></robot>'
+    )
+    robot = read(tmp_path, text)
+    places = forward_kinematics(text, {"j": 0.4, "k": -0.7 * 0.4 + 0.2})
+    assert_same(robot, driven(robot, {"j": 0.4}), places)
+    asm.write_urdf(tmp_path / "again.urdf", robot)
+    again = asm.read_urdf(tmp_path / "again.urdf")
+    assert_same(again, driven(again, {"j": 0.4}), places)
+
+
 def test_limits_masses_and_shapes(tmp_path):
     robot = read(tmp_path, ARM)
     assert robot.joint("shoulder").limits == (-2.0, 2.5) and robot.joint("grip").limits == (0.0, 100.0)
@@ -73,7 +92,11 @@ def test_limits_masses_and_shapes(tmp_path):
     assert inertial.mass == 5.0 and list(robot.inertials) == ["base"]
     assert robot.body("base").volume == pytest.approx(np.pi * 100.0**3, rel=1e-12)
     np.testing.assert_allclose(robot.body("base").center_of_mass, (0, 0, 50), atol=1e-9)
-    assert robot.body("upper").volume == pytest.approx(np.pi * (40.0**2 * 500.0 + 4.0 / 3.0 * 50.0**3), rel=1e-12)
+    kinds = {each.kind: each.lengths for each in primitives_of(robot.body("upper"))}
+    assert kinds == {"cylinder": pytest.approx((40.0, 500.0)), "sphere": pytest.approx((50.0,))}
+    # They overlap, so that their volumes do not add up.
+    with pytest.raises(InputError, match="'upper' has pieces that meet"):
+        _ = robot.body("upper").volume
     assert [face.name for face in robot.body("finger").faces][0].startswith("pad ")
     assert len({face.name for face in robot.body("upper").faces}) == 4
     meters = read(tmp_path, ARM, unit="m")
@@ -90,9 +113,9 @@ def test_a_robot_that_is_written_is_the_same_robot(tmp_path):
     np.testing.assert_allclose(driven(other, values).q, driven(robot, values).q, rtol=0, atol=CLOSE)
     np.testing.assert_allclose(other.inertials["base"].inertia, robot.inertials["base"].inertia, rtol=1e-12)
     for one, two in zip(robot.bodies, other.bodies, strict=True):
-        if one.faces:
-            assert two.volume == pytest.approx(one.volume, rel=1e-12)
-            np.testing.assert_allclose(two.center_of_mass, one.center_of_mass, rtol=0, atol=1e-9)
+        for piece, again in zip(*(primitives_of(body) if body.faces else () for body in (one, two)), strict=True):
+            assert piece.kind == again.kind and again.lengths == pytest.approx(piece.lengths, rel=1e-12)
+            np.testing.assert_allclose(again.center, piece.center, rtol=0, atol=1e-9)
     assert {joint.name: joint.limits for joint in robot.joints if hasattr(joint, "limits")} == {
         joint.name: pytest.approx(joint.limits) if joint.limits else None
         for joint in other.joints
@@ -207,6 +230,12 @@ BAD = {
         '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/>'
         '<child link="b"/><origin xyz="nan 0 0"/></joint></robot>',
         "joint 'j' has the origin",
+    ),
+    "mimics by nothing": (
+        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><joint name="j" type="continuous">'
+        '<parent link="a"/><child link="b"/></joint><joint name="k" type="continuous"><parent link="b"/>'
+        '<child link="c"/><mimic joint="j" multiplier="0"/></joint></robot>',
+        "joint 'k' mimics by 0 and 0; expected finite numbers, not by 0",
     ),
     "mimics nobody": (
         '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous"><parent link="a"/>'

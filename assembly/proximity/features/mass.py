@@ -6,8 +6,10 @@ faces: of 1 (the volume) of p_x n_x, of p the integral of p (p . n) / 4, and of 
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +20,14 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.topology import Edge, Topology
+from assembly.proximity.features.body_distance import DistanceStatus, distance
+from assembly.proximity.features.places import shells_of
 
 __all__ = ["MassProperties", "mass_properties"]
 
 Array = NDArray[np.float64]
+# How near the distance of two pieces has to be known, in parts of the body's size.
+_APART = 1e-9
 # Places of an edge at which the curves of its two faces are compared.
 _PLACES = 17
 # Steps of Gauss and Newton to the nearest point of a curve.
@@ -67,7 +73,8 @@ def mass_properties(name: str, faces: tuple[Face, ...], density: float) -> MassP
     Raises
     ------
     InputError
-        Faces that enclose nothing: none, an edge that one face has for itself, or normals that look inward.
+        Faces that enclose nothing: none, an edge that one face has for itself, normals that look inward; or pieces
+        that meet, or lie in each other other than as voids.
     """
     if not faces:
         raise InputError(f"body {name!r} has no shape; expected faces that enclose a volume")
@@ -76,14 +83,61 @@ def mass_properties(name: str, faces: tuple[Face, ...], density: float) -> MassP
         open_edge = next(edge for edge in solid.edges if edge.face_b is None)
         face = solid.faces[open_edge.face_a].name or f"face {open_edge.face_a + 1}"
         raise InputError(f"body {name!r} is open: an edge of {face!r} has no other face; expected a closed body")
+    fault = _fault(faces)
+    if fault:
+        raise InputError(f"body {name!r} {fault}")
     unit = _of_density_one(faces)
-    if not unit.volume > unit.volume_error:
-        raise InputError(
-            f"body {name!r} has a volume of {unit.volume:g}; expected a positive one, by normals that look outward"
-        )
     return MassProperties(
         density, unit.volume, unit.area, unit.center_of_mass, density * unit.inertia, unit.volume_error
     )
+
+
+@lru_cache(maxsize=256)
+def _fault(faces: tuple[Face, ...]) -> str:
+    """Why the volumes of a body's pieces do not add up to that of the body, and what is expected; nothing if they do.
+
+    A piece that lies in an even number of others is material, with normals that look outward; one in an odd number is
+    a void, whose normals look into it.
+    """
+    shells = shells_of(faces)
+    volumes = [_of_density_one(shell).volume for shell in shells]
+    inside = [0] * len(shells)
+    for i, k in combinations(range(len(shells)), 2):
+        first, second = _outward(shells[i], volumes[i]), _outward(shells[k], volumes[k])
+        found = distance(first, second, tolerance=_APART * _size(faces))
+        if not found.lower > 0.0:
+            return (
+                f"has pieces that meet, with {_name(shells[i])} and {_name(shells[k])}; expected pieces that are apart"
+            )
+        if found.status is DistanceStatus.ENCLOSED:
+            inside[i if abs(volumes[i]) < abs(volumes[k]) else k] += 1
+    for shell, volume, around in zip(shells, volumes, inside, strict=True):
+        least = _of_density_one(shell).volume_error
+        if around % 2 and not volume < -least:
+            return f"has a piece within another one, with {_name(shell)}; expected a void there, by normals into it"
+        if around % 2 == 0 and not volume > least:
+            text = f"has a piece with a volume of {volume:g}, with {_name(shell)}"
+            return f"{text}; expected a positive one, by normals that look outward"
+    return ""
+
+
+def _outward(shell: tuple[Face, ...], volume: float) -> list[Face]:
+    """The faces of a piece as those of a body that it would be by itself."""
+    if volume > 0.0:
+        return list(shell)
+    turned = [copy(face) for face in shell]
+    for face in turned:
+        face.reversed = not face.reversed
+    return turned
+
+
+def _name(shell: tuple[Face, ...]) -> str:
+    return repr(shell[0].name or "a face without a name")
+
+
+def _size(faces: tuple[Face, ...]) -> float:
+    boxes = [face.surface.bounding_box() for face in faces]
+    return float(np.linalg.norm(np.max([box[1] for box in boxes], axis=0) - np.min([box[0] for box in boxes], axis=0)))
 
 
 @lru_cache(maxsize=256)

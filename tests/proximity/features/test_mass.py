@@ -98,7 +98,7 @@ def test_what_encloses_nothing_raises():
     # Its flux along the axis is zero, and yet it is open.
     assert asm.Body("tube", asm.shapes.cylinder(1.0, 2.0)).area == pytest.approx(4.0 * PI, rel=RIGHT)
     inward = asm.Face(asm.shapes.sphere(1.0), reversed=True)
-    with pytest.raises(InputError, match="'hollow' has a volume of -4.18879; expected a positive one, by normals"):
+    with pytest.raises(InputError, match="'hollow' has a piece with a volume of -4.18879, .*; expected a positive one"):
         _ = asm.Body("hollow", inward).mass
     for density in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(InputError, match="density is"):
@@ -110,4 +110,47 @@ def test_results_are_for_reading():
     with pytest.raises(ValueError, match="read-only"):
         body.inertia[0, 0] = 1.0
     with pytest.raises(AttributeError):
-        body.volume = 2.0  # type: ignore[misc]
+        body.volume = 2.0  # type: ignore[misc]  # it is read-only, as mypy says too
+
+
+def moved(faces, shift, reverse=False):
+    return [
+        asm.Face(face.surface.transformed(translation=shift), face.outer, face.holes, name=f"{face.name} {shift}",
+                 reversed=face.reversed != reverse)
+        for face in faces
+    ]  # fmt: skip
+
+
+def ball(radius, shift=(0.0, 0.0, 0.0), reverse=False):
+    return moved([asm.Face(asm.shapes.sphere(radius))], shift, reverse)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_pieces_apart_and_voids(order):
+    """Two balls, one with a void that has a ball in it."""
+    faces = [*ball(3.0), *ball(2.0, (0.1, 0, 0), True), *ball(1.0, (0.2, 0, 0)), *ball(0.5, (9.0, 0, 0))][::order]
+    body = asm.Body("body", faces)
+    volumes = 4.0 / 3.0 * PI * np.array([27.0, -8.0, 1.0, 0.125])
+    assert body.volume == pytest.approx(volumes.sum(), rel=RIGHT)
+    center = volumes @ [0.0, 0.1, 0.2, 9.0] / volumes.sum()
+    np.testing.assert_allclose(body.center_of_mass, (center, 0.0, 0.0), atol=1e-12)
+    box = [*asm.shapes.box(4.0, 4.0, 4.0), *moved(asm.shapes.box(2.0, 2.0, 2.0), (0.5, 0, 0), True)]
+    assert asm.Body("box", box[::order]).volume == pytest.approx(56.0, rel=RIGHT)
+
+
+def test_pieces_that_do_not_add_up_raise():
+    box, small = asm.shapes.box(4.0, 4.0, 4.0), asm.shapes.box(2.0, 2.0, 2.0)
+    for pieces, message in (
+        ([*box, *moved(small, (9.0, 0, 0), True)], "has a piece with a volume of -8, .*; expected a positive one"),
+        ([*box, *moved(small, (0.0, 0, 0))], "has a piece within another one, .*; expected a void there"),
+        ([*box, *moved(small, (2.0, 0, 0))], "has pieces that meet, .*; expected pieces that are apart"),
+        ([*box, *ball(1.0)], "has a piece within another one"),
+        (
+            [*ball(3.0), *ball(2.0, (0.1, 0, 0), True), *ball(1.0, (0.2, 0, 0), True)],
+            "has a piece with a volume of -4.1",
+        ),
+        ([*ball(1.0), *ball(1.0, (1e-9, 0, 0))], "has pieces that meet"),
+        ([*small, *moved(small, (0.0, 0, 0))], "has pieces that meet"),
+    ):
+        with pytest.raises(InputError, match=f"body 'pieces' {message}"):
+            _ = asm.Body("pieces", pieces).volume
