@@ -152,6 +152,10 @@ def test_scenes_are_written_whatever_way_their_joints_go(tmp_path, axes, backwar
         matrix = solution.pose(body).matrix.copy()
         matrix[:3, 3] = solution.pose(body).apply(frame.origin)
         np.testing.assert_allclose(matrix, expected, rtol=0, atol=CLOSE)
+    # The mesh is drawn where the link's frame is, in meters.
+    trimesh = pytest.importorskip("trimesh")
+    center = trimesh.load(tmp_path / "scene_slider.stl").center_mass
+    np.testing.assert_allclose(center, -1e-3 * sides[3].origin, rtol=0, atol=1e-7)
     with pytest.warns(UrdfWarning, match="meshes of 'slider' are no exact shapes and were left out"):
         robot = asm.read_urdf(path)
     # 6 cm^3 of water weigh 6 g.

@@ -105,3 +105,22 @@ def test_ways_along_a_plane_are_proven_however_long():
         solution = scene.solve(solution)
         assert solution.success and solution.proved and solution._lists is not None
         assert all(pair.answer.swept for pair in solution._clear)
+
+
+def test_nothing_is_known_of_the_way_from_a_solve_that_failed(monkeypatch):
+    """Bodies may be in each other there: a block is driven into one that does not move, and back."""
+    wall = asm.Body("wall", asm.shapes.box(2, 2, 2), position=(3, 0, 0), fixed=True)
+    block = asm.Body("block", asm.shapes.box(2, 2, 2))
+    drive = asm.Prismatic(wall.frame((-3, 0, 0), z=(1, 0, 0)), block.frame(z=(1, 0, 0)), "drive", slide=0.9)
+    scene, ends = asm.Assembly([wall, block]), []
+    scene.constrain(drive, asm.Clearance())
+    solution = scene.solve()
+    assert solution.success
+    drive.slide = 1.5
+    failed = scene.solve(solution)
+    assert not failed.success
+    alone = module.unhindered
+    monkeypatch.setattr(module, "unhindered", lambda *asked: ends.append(alone(*asked)) or ends[-1])
+    drive.slide = 0.8
+    assert scene.solve(failed).success and ends == [None]
+    assert scene.solve(solution).success and ends[1] is not None
