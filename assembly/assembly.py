@@ -23,7 +23,6 @@ from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.loop.settings import (
     ALLOWED_OVERLAP,
     ANY_POSE,
-    FEASIBILITY,
     GATHER,
     ITERATIONS,
     NEVER,
@@ -266,32 +265,12 @@ class Assembly(PackedContents):
                         continue
                 solution = Solution(self._scene, packed, state, status, spent, history, order, fit)
                 solution._touching = float(settings[ALLOWED_OVERLAP])
-                return self._proven(solution, settings, interruption) if packed.keeps_apart else solution
+                if packed.keeps_apart:
+                    from assembly.solve.clearance_proof import judge_end
+
+                    judge_end(solution, settings, interruption)
+                return solution
             self._pack_with_more_places()
-
-    @staticmethod
-    def _proven(solution: Solution, settings: Array, interruption: Interruption) -> Solution:
-        """A solution under clearances, STALLED where it is not known that its bodies are clear.
-
-        Where any pose does, and the loop ended because of a crossing, one that holds is a solution if all is proven.
-        """
-        from assembly.solve.clearance_proof import prove_end
-
-        if solution._is_lost or (interruption.is_over() and not solution.success):
-            return solution
-        begin = perf_counter()
-        solution._clear = prove_end(solution)
-        if solution.success and not all(pair.holds for pair in solution._clear):
-            solution.status = Status.STALLED
-        elif (
-            solution.status is Status.STALLED
-            and settings[ANY_POSE] == 1.0
-            and all(pair.proved for pair in solution._clear)
-            and solution.feasibility <= settings[FEASIBILITY] * solution._packed.scale
-        ):
-            solution.status = Status.SOLVED
-        solution.seconds += perf_counter() - begin
-        return solution
 
     def solve_all(
         self, *, starts: int = 16, seed: int = 0, time_limit: float | None = None, **options: Any

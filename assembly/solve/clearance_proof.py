@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,8 +26,10 @@ from assembly.proximity.clearance.slimming import slim_answer
 from assembly.proximity.clearance.touching import filled_bore, left_open, move_apart, off_contacts
 from assembly.proximity.extrema.pairs import ContactPair
 from assembly.solve.contact_pairs import contact_pairs, listed_contacts
-from assembly.solve.interruption import CTRL_C
+from assembly.solve.interruption import CTRL_C, Interruption
+from assembly.solve.loop.settings import ANY_POSE, FEASIBILITY
 from assembly.solve.samples import PosedBodies, sampled
+from assembly.solve.scene import Status
 
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
@@ -36,6 +39,7 @@ __all__ = [
     "TRIES",
     "PairAnswer",
     "can_prove",
+    "judge_end",
     "lent_proof",
     "near_contacts",
     "new_proof",
@@ -111,6 +115,27 @@ def lent_proof(packed: Packed, bodies: Sequence[Body]) -> Iterator[ClearanceProo
 def can_prove(packed: Packed) -> bool:
     """Whether a scene has a size at which a proof is possible; else rows alone keep bodies apart."""
     return LEAST_SIZE < packed.scale < 1.0 / LEAST_SIZE
+
+
+def judge_end(solution: Solution, settings: NDArray[np.float64], interruption: Interruption) -> None:
+    """Have a solution under clearances STALLED where it is not known that its bodies are clear.
+
+    Where any pose does, and the loop ended because of a crossing, one that holds is a solution if all is proven.
+    """
+    if solution._is_lost or (interruption.is_over() and not solution.success):
+        return
+    begin = perf_counter()
+    solution._clear = prove_end(solution)
+    if solution.success and not all(pair.holds for pair in solution._clear):
+        solution.status = Status.STALLED
+    elif (
+        solution.status is Status.STALLED
+        and settings[ANY_POSE] == 1.0
+        and all(pair.proved for pair in solution._clear)
+        and solution.feasibility <= settings[FEASIBILITY] * solution._packed.scale
+    ):
+        solution.status = Status.SOLVED
+    solution.seconds += perf_counter() - begin
 
 
 def prove_end(solution: Solution) -> list[PairAnswer]:
