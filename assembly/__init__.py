@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from assembly.constraints.model.tangent import Tangent as Tangent
     from assembly.constraints.model.trim_contact import TrimContact as TrimContact
     from assembly.files.gltf import write_gltf as write_gltf
+    from assembly.files.picture_reader import read_picture as read_picture
     from assembly.files.robot import Robot as Robot
     from assembly.files.stl import write_stl as write_stl
     from assembly.files.urdf_reader import read_urdf as read_urdf
@@ -66,6 +67,7 @@ if TYPE_CHECKING:
     from assembly.geometry.splines.surface import NurbsSurface as NurbsSurface
     from assembly.kinematics.body import Body as Body
     from assembly.kinematics.ellipsoid import Ellipsoid as Ellipsoid
+    from assembly.kinematics.picture_mesh import PictureMesh as PictureMesh
     from assembly.kinematics.pose import Pose as Pose
     from assembly.proximity.extrema.pairs import ContactPair as ContactPair
     from assembly.proximity.manager.events import Event as Event
@@ -139,6 +141,7 @@ else:
             "PointDistance": "assembly.constraints.model.objectives",
             "PointOnLine": "assembly.constraints.model.placements",
             "PointOnPlane": "assembly.constraints.model.placements",
+            "PictureMesh": "assembly.kinematics.picture_mesh",
             "Pose": "assembly.kinematics.pose",
             "Posture": "assembly.constraints.model.objectives",
             "Prismatic": "assembly.constraints.model.joints",
@@ -174,6 +177,7 @@ else:
             "read_brep": "assembly.step",
             "read_iges": "assembly.step",
             "read_step": "assembly.step",
+            "read_picture": "assembly.files.picture_reader",
             "read_urdf": "assembly.files.urdf_reader",
             "reference": "assembly.solve.oracle.reference",
             "shapes": "assembly.geometry.shapes",

@@ -47,7 +47,7 @@ def write_gltf(
     path : str or path
         Ends in .glb; an existing file is replaced.
     what : Assembly, Solution, Body or several bodies
-        A body without a shape is a node without a mesh.
+        A body without a shape and a picture is a node without a mesh.
     trajectory : (frames, n, 7) or sequence of Solution, optional
         Poses of all bodies of an Assembly, rows as in `scene.q`, or its solutions; two frames at least. They are played
         at a constant rate; between two of them bodies move along lines and turn at constant speed.
@@ -105,8 +105,8 @@ class _Document:
         node = self._g.Node(name=body.name, translation=[x, y, z], rotation=[i, j, k, w])
         mesh = body_mesh(body)
         if mesh is not None:
-            # Bodies of the same faces and color share a mesh.
-            key = (*(id(side.face) for side in body.faces), color)
+            # Bodies of the same faces, picture and color share a mesh.
+            key = (*(id(side.face) for side in body.faces), id(body.picture), color)
             if key not in self._meshes:
                 self._meshes[key] = self._mesh(body.name, mesh, color)
             node.mesh = self._meshes[key]

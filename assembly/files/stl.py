@@ -20,7 +20,7 @@ from assembly.view.mesh import body_mesh
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["stl_bytes", "write_stl"]
+__all__ = ["stl_bytes", "the_trimesh", "write_stl"]
 
 Array = NDArray[np.float64]
 
@@ -59,14 +59,17 @@ def stl_bytes(placed: Iterable[tuple[Body, Array, Array]], scale: float) -> byte
     if not corners:
         raise InputError("what has no body with a shape; expected at least one")
     triangles = np.concatenate(corners)
-    trimesh = _trimesh()
+    trimesh = the_trimesh()
     mesh = trimesh.Trimesh(**trimesh.triangles.to_kwargs(triangles), process=False)
     written: bytes = mesh.export(file_type="stl")
     return written
 
 
-def _trimesh() -> Any:
+def the_trimesh() -> Any:
+    """The module that reads and writes triangles."""
     try:
         return import_module("trimesh")
     except ImportError:
-        raise ImportError("STL files need trimesh, which is not installed; install the extra meshes") from None
+        raise ImportError(
+            "meshes of triangles need trimesh, which is not installed; install the extra meshes"
+        ) from None

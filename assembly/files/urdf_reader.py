@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,9 @@ from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.joints import Fixed, Planar, Prismatic, Revolute
 from assembly.errors import AssemblyError
 from assembly.files.robot import Inertial, Robot, UrdfError, UrdfWarning, yourdfpy
-from assembly.geometry import shapes
-from assembly.geometry.faces.face import Face
-from assembly.geometry.splines.surface import NurbsSurface
+from assembly.files.urdf_shapes import LinkPictures, link_faces, origin_of
 from assembly.kinematics.body import Body
-from assembly.kinematics.pose import Pose, axes_quaternion
+from assembly.kinematics.pose import Pose
 from assembly.step.documents import checked_unit
 
 __all__ = ["read_urdf"]
@@ -40,10 +38,11 @@ def read_urdf(path: str | PathLike[str], *, unit: str = "mm") -> Robot:
     Returns
     -------
     Robot
-        Boxes, cylinders and spheres of `<collision>` are exact shapes of the bodies. A mesh is no exact shape: a link
-        of meshes alone has none. Revolute, continuous, prismatic, planar and fixed joints become `Revolute`,
-        `Prismatic`, `Planar` and `Fixed` with their limits; a floating joint constrains nothing; a joint that mimics
-        another one is coupled to it.
+        Boxes, cylinders and spheres of `<collision>` are exact shapes of the bodies. What `<visual>` shows is the
+        body's `picture` where meshes are in it, or where there are no exact shapes; a mesh of `<collision>` is one
+        where nothing else is to be seen. A mesh is no exact shape: nothing touches it. Revolute, continuous, prismatic,
+        planar and fixed joints become `Revolute`, `Prismatic`, `Planar` and `Fixed` with their limits; a floating joint
+        constrains nothing; a joint that mimics another one is coupled to it.
 
     Raises
     ------
@@ -57,18 +56,18 @@ def read_urdf(path: str | PathLike[str], *, unit: str = "mm") -> Robot:
     Warns
     -----
     UrdfWarning
-        Meshes that were left out.
+        Meshes of which there is no file that can be read; these are left out. Their names are looked for from the
+        file's folder and those above it, `package://` names without the package as well.
     """
     scale = _METER / checked_unit(unit)
     robot = _parsed(fspath(path))
-    reader = _Reader(robot, scale)
+    reader = _Reader(robot, scale, LinkPictures(robot, Path(fspath(path)), scale))
     try:
         made = reader.robot()
     except AssemblyError as error:
         raise UrdfError(f"path is {fspath(path)!r}; {error}") from None
-    if reader.meshes:
-        names = ", ".join(map(repr, reader.meshes))
-        warnings.warn(f"{fspath(path)}: meshes of {names} are no exact shapes and were left out", UrdfWarning, 2)
+    if reader.pictures.lost:
+        warnings.warn(f"{fspath(path)}: {'; '.join(reader.pictures.lost)}; left out", UrdfWarning, 2)
     return made
 
 
@@ -86,12 +85,12 @@ def _parsed(path: str) -> Any:
 
 
 class _Reader:
-    """A robot while it is made; `meshes` are the links whose meshes were left out."""
+    """A robot while it is made."""
 
-    def __init__(self, robot: Any, scale: float) -> None:
+    def __init__(self, robot: Any, scale: float, pictures: LinkPictures) -> None:
         self._robot = robot
         self._scale = scale
-        self.meshes: list[str] = []
+        self.pictures = pictures
 
     def robot(self) -> Robot:
         """Links as bodies, joints, what mimics others."""
@@ -101,7 +100,7 @@ class _Reader:
         order = self._tree(list(links))
         poses: dict[str, Pose] = {}
         for name, joint in order:
-            poses[name] = Pose() if joint is None else poses[joint.parent] @ self._origin(joint)
+            poses[name] = Pose() if joint is None else poses[joint.parent] @ origin_of(joint, self._scale)
         root = order[0][0]
         bodies = {name: self._body(link, poses[name], fixed=name == root) for name, link in links.items()}
         joints = {joint.name: made for joint in self._robot.joints if (made := self._joint(joint, bodies)) is not None}
@@ -140,44 +139,14 @@ class _Reader:
             raise UrdfError(f"links {sorted(set(links) - {name for name, _ in order})} hang on each other in a ring")
         return order
 
-    def _origin(self, thing: Any) -> Pose:
-        """Where a joint or shape is on its link."""
-        matrix = np.eye(4) if thing.origin is None else np.asarray(thing.origin, dtype=np.float64)
-        if not np.isfinite(matrix).all():
-            raise UrdfError(f"{_label(thing)} has the origin {matrix.tolist()}; expected finite numbers")
-        return Pose(matrix[:3, 3] * self._scale, axes_quaternion(matrix[:3, :3]))
-
     def _body(self, link: Any, pose: Pose, fixed: bool) -> Body:
-        shape = [face for k, part in enumerate(link.collisions) for face in self._shape(link, part, k)]
-        return Body(link.name, shape or None, pose.position, pose.quaternion, fixed)
-
-    def _shape(self, link: Any, part: Any, number: int) -> Iterator[Face]:
-        geometry, scale = part.geometry, self._scale
-        faces: Iterable[Face | NurbsSurface]
-        try:
-            if geometry.box is not None:
-                label, faces = "box", shapes.box(*(scale * np.asarray(geometry.box.size, dtype=np.float64)).tolist())
-            elif geometry.cylinder is not None:
-                round_, long = geometry.cylinder.radius, geometry.cylinder.length
-                label, faces = "cylinder", shapes.solid_cylinder(scale * round_, scale * long)
-            elif geometry.sphere is not None:
-                label, faces = "sphere", (shapes.sphere(scale * geometry.sphere.radius),)
-            else:
-                if link.name not in self.meshes:
-                    self.meshes.append(link.name)
-                return
-        except AssemblyError as error:
-            raise UrdfError(f"link {link.name!r}: {error}") from None
-        place = self._origin(part)
-        before = part.name or (label if len(link.collisions) == 1 else f"{label} {number + 1}")
-        for item in faces:
-            face = item if isinstance(item, Face) else Face(item)
-            moved = face.transformed(place.matrix[:3, :3], place.position)
-            moved.name = f"{before} {face.name}" if face.name else before
-            yield moved
+        faces = link_faces(link, link.collisions, self._scale)
+        body = Body(link.name, faces or None, pose.position, pose.quaternion, fixed)
+        body.picture = self.pictures.of(link, bool(faces))
+        return body
 
     def _joint(self, joint: Any, bodies: dict[str, Body]) -> Joint | None:
-        place = self._origin(joint)
+        place = origin_of(joint, self._scale)
         axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.asarray(joint.axis, dtype=np.float64)
         kinds: dict[str, type[Joint]] = {
             "revolute": Revolute, "continuous": Revolute, "prismatic": Prismatic, "planar": Planar, "fixed": Fixed,
@@ -232,7 +201,7 @@ class _Reader:
         raise UrdfError(f"joint {joint.name!r} is {joint.type} and mimics; expected a turn or a slide that mimics one")
 
     def _inertial(self, name: str, inertial: Any) -> Inertial:
-        place = self._origin(inertial)
+        place = origin_of(inertial, self._scale)
         mass = 0.0 if inertial.mass is None else float(inertial.mass)
         inertia = np.zeros((3, 3)) if inertial.inertia is None else np.asarray(inertial.inertia, dtype=np.float64)
         if not (np.isfinite(inertia).all() and np.isfinite(mass) and mass >= 0.0):
@@ -245,8 +214,3 @@ def _name(what: str, name: Any) -> str:
     if not isinstance(name, str) or not name.strip():
         raise UrdfError(f"a {what} has the name {name!r}; expected a nonempty string")
     return name
-
-
-def _label(thing: Any) -> str:
-    kind = type(thing).__name__.lower()
-    return f"{kind} {thing.name!r}" if getattr(thing, "name", None) else f"a {kind}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from os import PathLike, fspath
 from pathlib import Path
@@ -62,7 +63,8 @@ def write_urdf(
     ----------
     path : str or path
         Where the file goes; a body that is neither a box, a cylinder nor a ball goes as a mesh into an STL file beside
-        it, named after the file and the link. Existing files are replaced.
+        it, named after the file and the link, and so does `body.picture`, as what is seen of the link. Existing files
+        are replaced.
     what : Robot or Assembly
         Joints are `Revolute`, `Prismatic`, `Planar` or `Fixed`, or mates that are such, and make a tree; of several
         bodies that nothing carries none is the root. Every joint is written free, with its limits; couplings of turns,
@@ -152,7 +154,7 @@ class _Writer:
         self._scale = scale
         self._inertials = inertials
         self.meshes: dict[str, bytes] = {}
-        self._files: dict[str, str] = {}
+        self._files: dict[tuple[str, bool], str] = {}
 
     def link(self, link: _Link) -> ElementTree.Element:
         """A link with what it weighs and its shape."""
@@ -166,11 +168,15 @@ class _Writer:
             inertia = inertial.inertia * self._scale**2
             names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
             ElementTree.SubElement(part, "inertia", {key: repr(float(inertia[at])) for key, at in names.items()})
+        if body.picture is not None:
+            self._mesh(ElementTree.SubElement(element, "visual"), link, body)
         if body.faces:
             primitives = primitives_of(body)
-            for kind in ("visual", "collision"):
+            exact = copy(body)
+            exact.picture = None
+            for kind in ("visual", "collision") if body.picture is None else ("collision",):
                 if primitives is None:
-                    self._mesh(ElementTree.SubElement(element, kind), link)
+                    self._mesh(ElementTree.SubElement(element, kind), link, exact)
                 for primitive in primitives or ():
                     self._primitive(ElementTree.SubElement(element, kind), link, primitive)
         return element
@@ -180,16 +186,17 @@ class _Writer:
         rpy = " ".join(repr(float(angle)) for angle in _roll_pitch_yaw(axes))
         ElementTree.SubElement(element, "origin", xyz=xyz, rpy=rpy)
 
-    def _mesh(self, element: ElementTree.Element, link: _Link) -> None:
-        file = self._files.get(link.body.name)
+    def _mesh(self, element: ElementTree.Element, link: _Link, shown: Body) -> None:
+        """Triangles of a body beside the file: of its picture where it has one, else of its faces."""
+        file = self._files.get((shown.name, shown.picture is None))
         if file is None:
-            stem, count = f"{self._target.stem}_{_file_name(link.body.name)}", 2
+            stem, count = f"{self._target.stem}_{_file_name(shown.name)}", 2
             file = f"{stem}.stl"
             # Names that differ by signs that no file has, or by capitals, which some systems do not tell apart.
             while file.lower() in map(str.lower, self.meshes):
                 file, count = f"{stem}_{count}.stl", count + 1
-            self._files[link.body.name] = file
-            self.meshes[file] = stl_bytes([(link.body, np.eye(3), -link.origin)], self._scale)
+            self._files[shown.name, shown.picture is None] = file
+            self.meshes[file] = stl_bytes([(shown, np.eye(3), -link.origin)], self._scale)
         self._place(element, np.zeros(3), np.eye(3))
         ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), "mesh", filename=file)
 

@@ -14,6 +14,7 @@ from assembly.errors import InputError, KnownSettings, check_coordinates, checke
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body_face import BodyFace
+from assembly.kinematics.picture_mesh import PictureMesh
 from assembly.kinematics.pose import Pose, direction, length
 
 if TYPE_CHECKING:
@@ -78,6 +79,8 @@ class Body(KnownSettings):
         0 to 1 each, for pictures and files; settable.
     density : float
         Mass a volume, positive; for life, as faces are.
+    picture : PictureMesh, optional
+        Triangles that the body is drawn with in the place of its faces; settable.
 
     Raises
     ------
@@ -94,6 +97,7 @@ class Body(KnownSettings):
         fixed: bool = False,
         color: Sequence[float] | None = None,
         density: float = 1.0,
+        picture: PictureMesh | None = None,
     ) -> None:
         if not isinstance(fixed, (bool, np.bool_)):
             raise InputError(f"fixed is {fixed!r}; expected True or False")
@@ -108,6 +112,7 @@ class Body(KnownSettings):
         self._size: float | None = None
         self.color = color
         self._density = positive("density", density)
+        self.picture = picture
 
     def __copy__(self) -> Self:
         """A body of the same name, with faces of its own that stand on the same surfaces."""
@@ -211,6 +216,17 @@ class Body(KnownSettings):
     @color.setter
     def color(self, value: Sequence[float] | None) -> None:
         self._color = checked_color(value)
+
+    @property
+    def picture(self) -> PictureMesh | None:
+        """Triangles that the body is drawn with, or None where it is drawn by its faces."""
+        return self._picture
+
+    @picture.setter
+    def picture(self, value: PictureMesh | None) -> None:
+        if value is not None and not isinstance(value, PictureMesh):
+            raise TypeError(f"picture is {value!r}; expected a PictureMesh or None")
+        self._picture = value
 
     def _selectable(self, faces: Iterable[BodyFace]) -> Faces:
         from assembly.selection.faces import Faces

@@ -3,11 +3,11 @@
 A file is one object, and every field must be there:
 
     format       "assembly-scene"
-    version      3
+    version      4
     surfaces     [{name, degree [p, q], knots [U, V], control_points [n_u][n_v][3], weights [n_u][n_v]}]
     faces        [{surface, name, reversed, color [red, green, blue], outer (a loop), holes [loops]}]
     bodies       [{name, fixed, position [3], quaternion [w, x, y, z], color [red, green, blue], density,
-                  shape [faces]}]
+                  picture, shape [faces]}]
     constraints  [{type, name, and the fields of the type}]
     objective    [{type, sign, and the fields of the type}]
 
@@ -55,20 +55,21 @@ Fields of a term of the objective by its type:
 
 A loop is {tolerance, curves [{name, degree, knots, control_points [n][2], weights [n]}]}, as `Loop` takes them. A
 face's `surface` is an index into `surfaces`, and a body's `shape` are indices into `faces`, so that what many bodies
-share is there once. Names of surfaces, faces and curves, and colors, are null where none were given, `outer` where the
-edge of the surface is meant; the face of a contact's side is null where the nearest is to be found. A trim refers to a
-contact of the same file that stands before it; its `side` is "a" or "b", its `loop` "outer" or the index of a hole of
-that side's face, or a loop of its own. Frames, and the points of joints, are {body, origin [3], axes [x, y, z]} in body
-coordinates, the axes unit vectors at right angles. The `axes` of a joint are "aligned", "opposed" or "nearest". What a
-mate ties (`seats`, `slot` and `tab`: two each) is {body, face}, {body, edge}, {body, vertex} or {body, point [3]}, or a
-frame: faces by name, edges and vertices by their number in `body.edges` and `body.vertices`. A driven value is a
-number, or null where the freedom is free; limits are [lower, upper], null for a side without limit, or null without
-limits; angles are in radians. A coupling refers to joints of the same file, which may stand after it. The `function` of
-an expression is the text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers are the
-shortest decimals that give back the same doubles.
+share is there once. A `picture` is {vertices [n][3], triangles [m][3], colors [n][3] or null}, or null. Names of
+surfaces, faces and curves, and colors, are null where none were given, `outer` where the edge of the surface is meant;
+the face of a contact's side is null where the nearest is to be found. A trim refers to a contact of the same file that
+stands before it; its `side` is "a" or "b", its `loop` "outer" or the index of a hole of that side's face, or a loop of
+its own. Frames, and the points of joints, are {body, origin [3], axes [x, y, z]} in body coordinates, the axes unit
+vectors at right angles. The `axes` of a joint are "aligned", "opposed" or "nearest". What a mate ties (`seats`, `slot`
+and `tab`: two each) is {body, face}, {body, edge}, {body, vertex} or {body, point [3]}, or a frame: faces by name,
+edges and vertices by their number in `body.edges` and `body.vertices`. A driven value is a number, or null where the
+freedom is free; limits are [lower, upper], null for a side without limit, or null without limits; angles are in
+radians. A coupling refers to joints of the same file, which may stand after it. The `function` of an expression is the
+text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers are the shortest decimals that give
+back the same doubles.
 
-Older versions are read, too. Version 2 had no densities; version 1 had no faces, colors, loops, edges and trims
-either, and a `shape` was [{surface, name, reversed}].
+Older versions are read, too. Version 3 had no pictures; version 2 had no densities; version 1 had no faces, colors,
+loops, edges and trims either, and a `shape` was [{surface, name, reversed}].
 """
 
 from __future__ import annotations

@@ -41,6 +41,7 @@ from assembly.geometry.faces.loop import Loop
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.picture_mesh import PictureMesh
 from assembly.kinematics.pose import Pose
 from assembly.scene_file.features import Feature
 from assembly.scene_file.fields import bad, each, flag, number, or_null, table, text, vector, whole
@@ -224,6 +225,12 @@ FACE = Record(
     Field("outer", OrNull(LOOP), since=2),
     Field("holes", Listed(LOOP), since=2),
 )
+PICTURE = Record(
+    PictureMesh,
+    Field("vertices", Plain(table(2), _to_list)),
+    Field("triangles", Plain(lambda path, value: each(path, value, lambda at, row: each(at, row, whole, 3)), _to_list)),
+    Field("colors", OrNull(Plain(table(2), _to_list))),
+)
 BODY = Record(
     Body,
     NAME,
@@ -232,6 +239,7 @@ BODY = Record(
     Field("quaternion", NUMBERS, "pose.quaternion"),
     COLOR,
     Field("density", NUMBER, since=3),
+    Field("picture", OrNull(PICTURE), since=4),
     Field("shape", Listed(_BodyFace("faces")), lambda body: [side.face for side in body.faces]),
     make=lambda shape, **others: Body(shape=shape or None, **others),
 )

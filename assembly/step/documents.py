@@ -38,10 +38,10 @@ class Malformed(Damaged):
     """A file whose text is damaged."""
 
 
-def checked_unit(unit: str) -> float:
+def checked_unit(unit: str, name: str = "unit") -> float:
     """Millimeters in a unit."""
     if not isinstance(unit, str) or unit not in UNITS:
-        raise InputError(f"unit is {unit!r}; expected one of {', '.join(map(repr, UNITS))}")
+        raise InputError(f"{name} is {unit!r}; expected one of {', '.join(map(repr, UNITS))}")
     return UNITS[unit]
 
 

@@ -230,7 +230,10 @@ def _grid_mesh(face: Face, budget: int) -> Mesh:
 
 
 def body_mesh(body: Body, budget: int = 20_000) -> Mesh | None:
-    """Triangles of all faces of a body, in body coordinates; None for a body without a shape."""
+    """Triangles of a body, its picture's or those of all its faces, in body coordinates; None without either."""
+    picture = body.picture
+    if picture is not None:
+        return Mesh(picture.vertices, picture.normals, picture.triangles, picture.colors)
     if not body.faces:
         return None
     share = max(budget // len(body.faces), 100)

@@ -72,9 +72,9 @@ def extent(faces: Sequence[Face]) -> float:
 
 
 def body_lines(body: Body) -> Lines | None:
-    """Edges of a body, in body coordinates; None for a body without edges."""
+    """Edges of a body, in body coordinates; None for a body without edges, or drawn by a picture."""
     faces = [side.face for side in body.faces]
-    if not faces:
+    if not faces or body.picture is not None:
         return None
     size = extent(faces)
     chords = np.concatenate([_chords(face, _TOLERANCE * size, turning(len(faces))) for face in faces])

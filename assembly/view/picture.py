@@ -92,7 +92,7 @@ def body_colors(bodies: Sequence[Body]) -> Iterator[Color]:
         if body.color is not None:
             yield body.color
             continue
-        if body.fixed and not body.faces and name not in _NAMED:
+        if body.fixed and not body.faces and body.picture is None and name not in _NAMED:
             # The ground of a mechanism.
             yield _GROUND
             continue
