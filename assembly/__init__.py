@@ -93,6 +93,8 @@ if TYPE_CHECKING:
     from assembly.studies.interference.clash import Clash as Clash
     from assembly.studies.interference.clash import Interference as Interference
     from assembly.studies.interference.report import interference as interference
+    from assembly.studies.reachable import Workspace as Workspace
+    from assembly.studies.reachable import workspace as workspace
     from assembly.tracking.log import TrackLog as TrackLog
     from assembly.tracking.manager import Manager as Manager
     from assembly.tracking.tick import Step as Step
@@ -165,6 +167,7 @@ else:
             "Way": "assembly.solve.way",
             "Weight": "assembly.constraints.model.objectives",
             "Width": "assembly.constraints.model.mates",
+            "Workspace": "assembly.studies.reachable",
             "Wrench": "assembly.solve.forces.statics",
             "cad": "assembly.cad",
             "curves": "assembly.geometry.shapes.curves",
@@ -184,6 +187,7 @@ else:
             "statics": "assembly.solve.forces.statics",
             "tip_jacobian": "assembly.solve.forces.end_effector",
             "view": "assembly.view",
+            "workspace": "assembly.studies.reachable",
             "write_brep": "assembly.step",
             "write_gltf": "assembly.files.gltf",
             "write_iges": "assembly.step",

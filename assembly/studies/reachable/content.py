@@ -1,0 +1,72 @@
+"""Area or volume of the cells that were reached, with the parts of cells that the boundary cuts."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from assembly.studies.reachable.grid import Grid
+
+__all__ = ["Content", "content"]
+
+Array = NDArray[np.float64]
+# Points a side of a cell at which it is asked whether they are in the set.
+_SIDE = {2: 10, 3: 6}
+
+
+class Content(NamedTuple):
+    """Area or volume: of cells reached like all around them, of cells reached or next to one, and the best guess."""
+
+    inner: float
+    outer: float
+    estimate: float
+
+
+def content(grid: Grid, reached: NDArray[np.int64], places: Array, normals: Array) -> Content:
+    """Area or volume, from the cells (k, d) reached and places (m, 3) of the boundary with outward normals.
+
+    A cell all of whose neighbors are reached counts whole. Of the others a point counts where it is behind the tangent
+    plane of the boundary at the place nearest to it, which is off by the square of the cell's size.
+    """
+    near, cut = _beside(reached)
+    inner = grid.content * (len(reached) - len(cut))
+    outer = grid.content * (len(reached) + len(near))
+    if not len(places) or not len(reached):
+        return Content(inner, outer, grid.content * len(reached))
+    shares = _shares(grid, np.concatenate([cut, near]), places, normals)
+    return Content(inner, outer, inner + grid.content * float(shares.sum()))
+
+
+def _beside(reached: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Cells not reached that share a side, an edge or a corner with one that is, and those reached beside one not."""
+    if not len(reached):
+        return reached, reached
+    dimension = reached.shape[1]
+    # Cells as single numbers, with one row of cells around those reached.
+    low = reached.min(axis=0) - 1
+    counts = reached.max(axis=0) + 2 - low
+    weights = np.cumprod(np.concatenate([[1], counts[:-1]]))
+    steps = np.stack(np.meshgrid(*[(-1, 0, 1)] * dimension, indexing="ij"), axis=-1).reshape(-1, dimension)
+    inside = (reached - low) @ weights
+    around = inside[:, None] + steps @ weights
+    is_in = np.isin(around, inside)
+    near = np.unique(around[~is_in])
+    cells = near[:, None] // weights % counts + low
+    return cells, reached[~is_in.all(axis=1)]
+
+
+def _shares(grid: Grid, cells: NDArray[np.int64], places: Array, normals: Array) -> Array:
+    """Which part of each cell (k, d) is in the set, (k,)."""
+    count = _SIDE[grid.dimension]
+    steps = (np.arange(count) + 0.5) / count
+    offsets = np.stack(np.meshgrid(*[steps] * grid.dimension, indexing="ij"), axis=-1).reshape(-1, grid.dimension)
+    points = (cells[:, None, :] + offsets).reshape(-1, grid.dimension)
+    # In units of cells, along the grid's axes.
+    flat, sides = grid.flat(places), normals @ grid.axes.T
+    _, nearest = cKDTree(flat).query(points)
+    behind = ((points - flat[nearest]) * sides[nearest]).sum(axis=1) <= 0.0
+    result: Array = behind.reshape(len(cells), -1).mean(axis=1)
+    return result

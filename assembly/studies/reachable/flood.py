@@ -1,0 +1,146 @@
+"""Cells that a tip can reach, one after the other: each is tried from the poses at which its neighbors are reached.
+
+A solve draws the tip to the middle of a cell, with all constraints. Where the tip comes there, the cell is reached, and
+its neighbors are tried from the new pose. Where it does not, the tip stops at the place of the set that is nearest to
+the middle: a place of the set's boundary, whose outward normal is the direction in which the rest of the way lies,
+because at the least distance all that can still move moves at right angles to it.
+
+A mechanism may reach a place in several configurations (an elbow to the left or to the right), and a boundary of the
+one need not be one of the other. They meet where the tip stops with the mechanism straight or folded: what has moved
+on as it came there brings the tip back in another configuration. So from each stop the motion is carried on to its
+mirror image, and the cell that it came from is solved for from there; a pose that differs goes on by itself.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.errors import InputError
+from assembly.kinematics.pose import multiply
+from assembly.studies.reachable.drawn_tip import DrawnTip, Stop
+from assembly.studies.reachable.grid import Cell, Grid
+
+__all__ = ["Flood"]
+
+Array = NDArray[np.float64]
+# [cells] Poses of one cell that are nearer are one: solves end much nearer to the middle.
+_ONE = 1e-3
+# [cells] A place of the boundary that is farther from the middle of a cell tells nothing of the cell.
+_FAR = 2.0
+
+
+class _Reached(NamedTuple):
+    """A cell that was reached, how, and after how many flips."""
+
+    cell: Cell
+    stop: Stop
+    flips: int
+
+
+@dataclass(eq=False)
+class Flood:
+    """Cells found so far.
+
+    Attributes
+    ----------
+    grid : Grid
+    tip : DrawnTip
+    arm : float
+        Half the scene's size: a turn by an angle counts as a motion this far from the axis.
+    flips : int
+        How often a way may go on in another configuration.
+    most : int
+        Cells that may be reached.
+    reached : dict of cell -> list of (poses (n, 7), marks (n, 19))
+    limits : dict of cell -> list of (place, outward normal)
+        Of cells beside reached ones whose middles are not reached: where the tip stopped.
+    undecided : set of cell
+        Cells at which a solve has not ended; none of them is reached.
+    solves : int
+        How many there were.
+    """
+
+    grid: Grid
+    tip: DrawnTip
+    arm: float
+    flips: int
+    most: int
+    reached: dict[Cell, list[tuple[Array, Array]]] = field(default_factory=dict)
+    limits: dict[Cell, list[tuple[Array, Array]]] = field(default_factory=dict)
+    undecided: set[Cell] = field(default_factory=set)
+    solves: int = 0
+    _done: set[tuple[int, Cell]] = field(default_factory=set)
+    _waiting: deque[_Reached] = field(default_factory=deque)
+
+    def run(self, first: Cell, stop: Stop, within: Callable[[Cell], bool]) -> None:
+        """All cells that can be reached from a pose at which the tip is in the first cell."""
+        start = _Reached(first, stop, 0)
+        for cell in (first, *self.grid.around(first)):
+            self._try(cell, start)
+        while self._waiting:
+            start = self._waiting.popleft()
+            for beside in self.grid.beside(start.cell):
+                if within(beside) and (start.flips, beside) not in self._done:
+                    self._try(beside, start)
+        for cell in self.reached:
+            self.limits.pop(cell, None)
+        self.undecided -= set(self.reached)
+
+    def _marks(self, poses: Array) -> Array:
+        """Numbers that differ by about as much as poses do: origins, and 2 arm e e^T of quaternions e, (n, 19).
+
+        A quaternion and its negative have the same; of a turn by a small angle they change by about arm times it.
+        """
+        e = poses[:, 3:]
+        turns = 2.0 * self.arm * e[:, :, None] * e[:, None, :]
+        return np.concatenate([poses[:, :3], turns.reshape(len(e), 16)], axis=1)
+
+    def _try(self, cell: Cell, start: _Reached) -> None:
+        """Draw the tip from where it is to the middle of a cell."""
+        target = self.grid.center(cell)
+        stop = self._drawn(target, start.stop)
+        if stop.is_there:
+            self._add(cell, stop, start.flips)
+        elif not stop.has_ended:
+            self.undecided.add(cell)
+        else:
+            place = self.tip.place(stop)
+            length = float(np.linalg.norm(target - place))
+            if length <= _FAR * self.grid.size:
+                self.limits.setdefault(cell, []).append((place, (target - place) / length))
+            if start.flips < self.flips and start.cell in self.reached:
+                back = self._drawn(self.grid.center(start.cell), self._mirrored(start.stop, stop))
+                if back.is_there:
+                    self._add(start.cell, back, start.flips + 1)
+
+    def _drawn(self, target: Array, start: Stop | Array) -> Stop:
+        self.solves += 1
+        return self.tip.to(target, start.solution if isinstance(start, Stop) else start)
+
+    def _mirrored(self, start: Stop, stop: Stop) -> Array:
+        """As far beyond a stop as the start is before it, poses (n, 7)."""
+        result = 2.0 * stop.poses - start.poses
+        for row, before, at in zip(result, start.poses, stop.poses, strict=True):
+            row[3:] = multiply(multiply(at[3:], before[3:] * [1.0, -1.0, -1.0, -1.0]), at[3:])
+        return result
+
+    def _add(self, cell: Cell, stop: Stop, flips: int) -> None:
+        """A pose with the tip in the middle of a cell: one that is new goes on."""
+        marks = self._marks(stop.poses)
+        known = self.reached.setdefault(cell, [])
+        self._done.add((flips, cell))
+        if any(np.abs(marks - other).max() < _ONE * self.grid.size for _, other in known):
+            return
+        known.append((stop.poses, marks))
+        self._waiting.append(_Reached(cell, stop, flips))
+        if len(self.reached) > self.most:
+            raise InputError(
+                f"the tip reaches more than {self.most} cells of {self.grid.size:g}; expected a larger cell, "
+                "a region `within` which to look, or limits of the joints"
+            )

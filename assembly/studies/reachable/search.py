@@ -1,0 +1,159 @@
+"""The workspace of a tip: what it can reach from the start of a scene, or from several."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from assembly.assembly import Assembly
+from assembly.errors import InputError, integer, positive, vector
+from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.pose import pose_rows
+from assembly.solve.solution import Solution
+from assembly.studies.reachable.content import content
+from assembly.studies.reachable.drawn_tip import DrawnTip
+from assembly.studies.reachable.flood import Flood
+from assembly.studies.reachable.grid import Cell, Grid, grid_of
+from assembly.studies.reachable.result import Workspace
+
+__all__ = ["workspace"]
+
+Array = NDArray[np.float64]
+
+
+def workspace(
+    scene: Assembly,
+    tip: Point | Frame | Body,
+    *,
+    cell: float,
+    plane: Frame | str | None = None,
+    starts: Iterable[ArrayLike | Solution] = (),
+    within: tuple[ArrayLike, ArrayLike] | None = None,
+    flips: int = 1,
+    most: int = 200_000,
+) -> Workspace:
+    """The set of places that a tip can reach with all constraints, limits and clearances (paper 001, section 3.1).
+
+    Space, or a plane, is divided into cells. From the start the tip is drawn to the middles of neighboring cells by
+    warm solves, until no neighbor is left that it comes to. Where it stops on the way to a middle is the boundary.
+
+    Parameters
+    ----------
+    scene : Assembly
+        Driven values hold; its objective is not used.
+    tip : Point, Frame or Body
+        Of a frame or a body its origin.
+    cell : float
+        Length of a cell's sides.
+    plane : Frame of a fixed body, "xy", "yz" or "zx", optional
+        The area in the x-y plane of a frame, or in a plane of the world through the tip's start. Without it the volume.
+    starts : several (n, 7) or Solution, optional
+        Poses from which it is looked as well: places that the tip comes to only by another assembly of the mechanism.
+    within : ((3,), (3,)), optional
+        Lower and upper corner of the box of the world in which it is looked, for tips that go on without end.
+    flips : int
+        How often the search may go on in another configuration where the mechanism is straight or folded; see Notes.
+    most : int
+        Cells after which the search ends with an error.
+
+    Returns
+    -------
+    Workspace
+
+    Raises
+    ------
+    InputError, TypeError
+        Arguments that cannot be used, a scene whose start cannot be solved, or more cells than `most`.
+
+    Notes
+    -----
+    The estimate is off by the square of the cell's size, in parts of the boundary's radius of curvature. A part of the
+    set that is thinner than a cell may be missed, and so may one that is reached only by a configuration that more
+    flips, or other starts, lead to: an arm has two for its elbow, and one flip more for each joint like it. A tip that
+    moves along a curve, or on a surface, has no area or volume: no cell is reached.
+    """
+    if not isinstance(scene, Assembly):
+        raise TypeError(f"scene is {scene!r}; expected an Assembly")
+    point = _point(scene, tip)
+    size = positive("cell", cell)
+    integer("flips", flips, 0, 64)
+    integer("most", most, 1, 10**7)
+    first = _solved(scene, None)
+    grid = grid_of(plane, first.pose(point.body).apply(point.coordinates), size)
+    is_within = _Region(grid, within)
+    drawn = DrawnTip(scene, point, grid)
+    flood = Flood(grid, drawn, 0.5 * scene.packed().scale, flips, most)
+    for start in (first, *(_solved(scene, each, f"starts[{k}]") for k, each in enumerate(starts))):
+        place = start.pose(point.body).apply(point.coordinates)
+        stop = drawn.to(grid.origin + (place - grid.origin) @ grid.axes.T @ grid.axes, start.q)
+        flood.run(grid.cell(drawn.place(stop)), stop, is_within)
+    return _found(scene, flood)
+
+
+def _found(scene: Assembly, flood: Flood) -> Workspace:
+    """Cells, poses and boundary in order."""
+    grid = flood.grid
+    order = sorted(flood.reached)
+    cells = np.array(order, dtype=np.int64).reshape(-1, grid.dimension)
+    limits = [limit for at in sorted(flood.limits) for limit in flood.limits[at]]
+    places = np.array([place for place, _ in limits]).reshape(-1, 3)
+    normals = np.array([normal for _, normal in limits]).reshape(-1, 3)
+    return Workspace(
+        cells=cells,
+        poses=np.array([flood.reached[at][0][0] for at in order]).reshape(len(cells), len(scene.bodies), 7),
+        boundary=places,
+        normals=normals,
+        content=content(grid, cells, places, normals),
+        undecided=len(flood.undecided),
+        solves=flood.solves,
+        grid=grid,
+        scene=scene,
+        _drawn=flood.tip,
+    )
+
+
+def _point(scene: Assembly, tip: Point | Frame | Body) -> Point:
+    if isinstance(tip, Body):
+        tip = tip.frame()
+    if isinstance(tip, Frame):
+        tip = tip.body.point(*tip.origin.tolist())
+    if not isinstance(tip, Point):
+        raise TypeError(f"tip is {tip!r}; expected a point, a frame or a body")
+    if not any(body is tip.body for body in scene.bodies):
+        raise InputError(f"tip is a point of {tip.body.name!r}; expected one of a body of the scene")
+    if tip.body.fixed:
+        raise InputError(f"tip is a point of {tip.body.name!r}, which is fixed; expected one that moves")
+    return tip
+
+
+def _solved(scene: Assembly, start: ArrayLike | Solution | None, name: str = "the start") -> Solution:
+    """Where constraints hold near a start."""
+    if start is not None and not isinstance(start, Solution):
+        start = pose_rows(name, start)
+    still = Assembly(scene.bodies)
+    still.constrain(*scene.constraints)
+    solution = still.solve(start.q if isinstance(start, Solution) else start)
+    if not solution.success:
+        raise InputError(f"scene has no pose near {name} at which all holds; {solution.message}")
+    return solution
+
+
+class _Region:
+    """Whether the middle of a cell is in a box of the world."""
+
+    def __init__(self, grid: Grid, box: tuple[ArrayLike, ArrayLike] | None) -> None:
+        self._grid = grid
+        self._box = None
+        if box is not None:
+            low, high = vector("within[0]", box[0]), vector("within[1]", box[1])
+            if not (low < high).all():
+                raise InputError(f"within is {box!r}; expected a lower and an upper corner")
+            self._box = low, high
+
+    def __call__(self, cell: Cell) -> bool:
+        if self._box is None:
+            return True
+        center = self._grid.center(cell)
+        return bool((self._box[0] <= center).all() and (center <= self._box[1]).all())
