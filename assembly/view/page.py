@@ -1,12 +1,15 @@
 """A picture, still or moving, as one HTML file that needs no server and no network.
 
-The file holds meshcat's viewer, which comes with the meshcat package, and the commands that draw the picture.
+The file holds meshcat's viewer, which comes with the meshcat package, and the commands that draw the picture, both
+packed by gzip and written in base64, which browsers unpack. A command stands behind its length, a big-endian uint32.
 """
 
 from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Iterable
+from functools import cache
+from gzip import compress
 from html import escape
 from importlib.util import find_spec
 from os import PathLike
@@ -43,14 +46,35 @@ body {{ margin: 0; }}
 </head>
 <body>
 <div id="meshcat-pane"></div>
-<script>{viewer}</script>
+{player}<script type="text/plain" id="packed-viewer">{viewer}</script>
+<script type="text/plain" id="packed-drawing">{drawing}</script>
 <script>
-const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-for (const command of [
-{commands}
-]) viewer.handle_command_bytearray(Uint8Array.from(atob(command), c => c.charCodeAt(0)));
+async function unpacked(id) {{
+  const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), c => c.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")));
+}}
+function run(text) {{
+  const script = document.createElement("script");
+  script.textContent = text;
+  document.body.append(script);
+}}
+var viewer;
+// What needs the viewer is `text/plain` above, and is run once it is there.
+const drawn = (async () => {{
+  run(await (await unpacked("packed-viewer")).text());
+  viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+  const drawing = new DataView(await (await unpacked("packed-drawing")).arrayBuffer());
+  for (let at = 0; at < drawing.byteLength;) {{
+    const length = drawing.getUint32(at);
+    viewer.handle_command_bytearray(new Uint8Array(drawing.buffer, at + 4, length));
+    at += 4 + length;
+  }}
+  for (const script of document.querySelectorAll("script.with-viewer")) run(script.textContent);
+}})().catch(error => {{
+  document.getElementById("meshcat-pane").textContent = `No picture: ${{error}} (browsers of 2023 and later show it)`;
+}});
 </script>
-{player}</body>
+</body>
 </html>
 """
 # The viewer's own player is in its menu, and answers to its slider only once it has played. `#frame=12` at the end of
@@ -61,7 +85,7 @@ _PLAYER = """<div id="player">
 <output id="frame"></output>
 <label><input id="loop" type="checkbox"{checked}> loop</label>
 </div>
-<script>
+<script type="text/plain" class="with-viewer">
 const part = Object.fromEntries(
   ["play", "sign", "slider", "frame", "loop"].map(id => [id, document.getElementById(id)]));
 const animator = viewer.animator;
@@ -89,24 +113,30 @@ follow();
 """
 
 
-def _viewer() -> str:
+@cache
+def _packed_viewer() -> str:
     """The script of meshcat's viewer; found without importing meshcat, which takes a while."""
     package = find_spec("meshcat")
     assert package is not None and package.submodule_search_locations
     folder = Path(package.submodule_search_locations[0])
-    return (folder / "viewer" / "dist" / "main.min.js").read_text(encoding="utf-8")
+    return _base64((folder / "viewer" / "dist" / "main.min.js").read_bytes())
+
+
+def _base64(data: bytes) -> str:
+    # Without a time: the same picture is the same file.
+    return b64encode(compress(data, mtime=0)).decode("ascii")
 
 
 def write_page(path: str | PathLike[str], title: str | None, drawing: Iterable[Command], controls: str = "") -> None:
     """Write a page of commands; the file's name is the title where none is given."""
-    lines = ",\n".join(f'"{b64encode(packed(command)).decode("ascii")}"' for command in drawing)
+    data = b"".join(len(each).to_bytes(4, "big") + each for each in map(packed, drawing))
     if title is not None and not isinstance(title, str):
         raise InputError(f"title is {title!r}; expected a string or None")
     if title is not None:
         check_encodable("title", title)
     # The name of a file may be none that UTF-8 has.
     heading = escape(Path(path).stem.encode(errors="replace").decode() if title is None else title)
-    page = _PAGE.format(title=heading, viewer=_viewer(), commands=lines, player=controls)
+    page = _PAGE.format(title=heading, viewer=_packed_viewer(), drawing=_base64(data), player=controls)
     Path(path).write_text(page, encoding="utf-8")
 
 

@@ -42,7 +42,7 @@ _PANEL = """<div id="happened">
 <output id="clock"></output>
 {events}
 </div>
-<script>
+<script type="text/plain" class="with-viewer">
 const happened = [...document.querySelectorAll("#happened button")];
 happened.forEach(entry => entry.onclick = () => seek(Number(entry.dataset.frame)));
 function tell() {{

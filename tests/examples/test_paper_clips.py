@@ -131,4 +131,6 @@ def test_it_prints_the_solution_and_writes_the_page(run):
     _, solution, printed, folder = run
     assert printed == f"{solution}\n"
     assert printed.startswith("SOLVED: every constraint holds")
-    assert "MeshCat.Viewer" in (folder / "paper_clips.html").read_text(encoding="utf-8")
+    page = folder / "paper_clips.html"
+    assert "MeshCat.Viewer" in page.read_text(encoding="utf-8")
+    assert page.stat().st_size < 1_000_000

@@ -83,7 +83,9 @@ class Chromium:
         """The session of a page at a fragment, `#...`, with a script at its end, after its virtual time."""
         bare = self._folder / "page.html"
         text = page.read_text(encoding="utf-8").replace("</head>", NO_MENU, 1)
-        bare.write_text(text.replace("</body>", f"<script>{script}</script></body>"), encoding="utf-8")
+        # A page of ours is drawn once its viewer is unpacked; meshcat's own page has its viewer at once.
+        later = f'<script>(typeof drawn === "undefined" ? Promise.resolve() : drawn).then(() => {{{script}}})</script>'
+        bare.write_text(text.replace("</body>", f"{later}</body>"), encoding="utf-8")
         target = self._ask("Target.createTarget", url="about:blank")["targetId"]
         session = self._ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         size = {"width": width, "height": height, "deviceScaleFactor": scale, "mobile": False}
