@@ -149,8 +149,8 @@ NAN, INF = float("nan"), float("inf")
 CASES = {
     "format": (["format"], "step", 'format is "step"; expected a scene of format'),
     "no format": (["format"], MISSING, "format is null"),
-    "newer": (["version"], 4, "version is 4; expected 1 to 3; a newer version of this library wrote the file"),
-    "older": (["version"], 0, "version is 0; expected 1 to 3$"),
+    "newer": (["version"], 5, "version is 5; expected 1 to 4; a newer version of this library wrote the file"),
+    "older": (["version"], 0, "version is 0; expected 1 to 4$"),
     "no version": (["version"], MISSING, "version is null; expected an integer"),
     "version true": (["version"], True, "version is true; expected an integer"),
     "missing table": (["surfaces"], MISSING, "document has no field 'surfaces'; expected the fields format, version"),

@@ -90,6 +90,10 @@ def every_constraint():
         asm.Angle(here, wheel, 0.1),
         asm.Angle(there, wheel, name="between", limits=(0.2, 0.3)),
     ]
+    beside = [
+        asm.PointOnLine(point, there, distance=THIRD, slide=0.1),
+        asm.PointOnLine(point, ground, "beside", distance=None, distance_limits=(0.1, None)),
+    ]
     touch = asm.Contact(ground, crank, "touch", edges=True)
     corners = np.array([[0.1, 0.2], [THIRD, 0.2], [0.3, 0.7], [0.1, 0.2]])
     loop = asm.NurbsCurve(corners, [0, 0, 1, 2, 3, 3], 1)
@@ -105,6 +109,7 @@ def every_constraint():
         *every_mate(ground, crank, wheel, plate, pin),
         asm.Linear(slider, shaft, -THIRD, "slides", offset=0.1),
         asm.ConstantVelocity(here, there, axes="nearest", swing=0.3, azimuth_limits=(None, 0.1)),
+        *beside,
         asm.Expression(mixed(3, 2), [wheel, ground, crank], unilateral=True, scale=0.1, weight=THIRD),
     )
     scene.minimize(

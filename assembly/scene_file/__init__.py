@@ -3,7 +3,7 @@
 A file is one object, and every field must be there:
 
     format       "assembly-scene"
-    version      3
+    version      4
     surfaces     [{name, degree [p, q], knots [U, V], control_points [n_u][n_v][3], weights [n_u][n_v]}]
     faces        [{surface, name, reversed, color [red, green, blue], outer (a loop), holes [loops]}]
     bodies       [{name, fixed, position [3], quaternion [w, x, y, z], color [red, green, blue], density,
@@ -24,7 +24,7 @@ Fields of a constraint by its type:
     universal       frame_a, frame_b, angle_a, angle_a_limits, angle_b, angle_b_limits
     parallel        frame_a, frame_b, axes, angle, limits
     perpendicular   frame_a, frame_b
-    point_on_line   point, frame, slide, limits
+    point_on_line   point, frame, slide, limits, distance, distance_limits
     point_on_plane  point, frame, offset, x, x_limits, y, y_limits
     distance        point_a, point_b, value, limits
     angle           frame_a, frame_b, value, limits
@@ -67,8 +67,8 @@ limits; angles are in radians. A coupling refers to joints of the same file, whi
 an expression is the text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers are the
 shortest decimals that give back the same doubles.
 
-Older versions are read, too. Version 2 had no densities; version 1 had no faces, colors, loops, edges and trims
-either, and a `shape` was [{surface, name, reversed}].
+Older versions are read, too. Version 3 had no distances from lines, version 2 no densities either;
+version 1 had no faces, colors, loops, edges and trims either, and a `shape` was [{surface, name, reversed}].
 """
 
 from __future__ import annotations

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from assembly.constraints.model.constraint import Equation
+from assembly.constraints.model.constraint import Bounds, Equation, Freedom
 from assembly.constraints.model.joint import ON_AXIS, Driven, Joint, Limits, Offset, Side, SidePoint
 from assembly.constraints.model.joints import ALONG, Number, Range
-from assembly.constraints.program.primitives import ANGLE, DISTANCE, SLIDE
+from assembly.constraints.program.primitives import ANGLE, DISTANCE, RADIUS, SLIDE
+from assembly.errors import InputError, number
 
 __all__ = ["Angle", "Distance", "PointOnLine", "PointOnPlane"]
 
 
 class PointOnLine(Joint):
-    """A point stays on the z axis of a frame: 2 rows.
+    """A point stays on the z axis of a frame: 2 rows. Or at a distance from it: 1 row, or one for each limit.
 
-    Frame a is the line's. Free with a name: `slide` along z_a; the bodies turn freely against each other.
+    Frame a is the line's. Free with a name: `slide` along z_a; the bodies turn freely against each other. Of a point
+    at a distance, or within limits, `distance` is a freedom as well, whose value the joint holds.
 
     Parameters
     ----------
@@ -21,6 +23,12 @@ class PointOnLine(Joint):
         Of a frame or a body its origin.
     frame : Frame or Body
         Its z axis is the line.
+    distance : float or None
+        From the line: 0 is on it, None within `distance_limits`.
+    slide, limits
+        Driven value and limits along the line.
+    distance_limits : (lower, upper), optional
+        Of the distance, which is None or above zero then.
     """
 
     _zero = ON_AXIS
@@ -31,9 +39,47 @@ class PointOnLine(Joint):
     limits = Limits("slide")
 
     def __init__(
-        self, point: SidePoint, frame: Side, name: str | None = None, *, slide: Number = None, limits: Range = None
+        self,
+        point: SidePoint,
+        frame: Side,
+        name: str | None = None,
+        *,
+        distance: Number = 0.0,
+        slide: Number = None,
+        limits: Range = None,
+        distance_limits: Range = None,
     ) -> None:
         super().__init__(frame, point, name, slide=(slide, limits))
+        if distance is None or distance_limits is not None or number("distance", distance) != 0.0:
+            self._own = ()
+            radius = self._coordinate(RADIUS, 0)
+            self._freedoms["distance"] = Freedom(
+                self, "distance", radius, distance, distance_limits, "distance", "distance_limits"
+            )
+
+    @property
+    def distance(self) -> float | None:
+        """From the line: 0 on it, None where it is within limits. Settable, of a point that was made at a distance."""
+        return self._freedoms["distance"].value if "distance" in self._freedoms else 0.0
+
+    @distance.setter
+    def distance(self, value: float | None) -> None:
+        self._away().value = value
+
+    @property
+    def distance_limits(self) -> Bounds | None:
+        """(lower, upper) of distance; either may be None; None without limits. Settable, as `distance` is."""
+        return self._freedoms["distance"].limits if "distance" in self._freedoms else None
+
+    @distance_limits.setter
+    def distance_limits(self, value: Range) -> None:
+        self._away().limits = value
+
+    def _away(self) -> Freedom:
+        """The distance as a freedom."""
+        if "distance" not in self._freedoms:
+            raise InputError(f"{self.name!r} was made for a point on the line; expected one made with a distance")
+        return self._freedoms["distance"]
 
 
 class PointOnPlane(Joint):
