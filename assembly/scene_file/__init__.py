@@ -37,7 +37,7 @@ Fields of a constraint by its type:
     insert          hole, shank, seats, axes, offset, angle, limits
     concentric      a, b, swing, swing_limits, azimuth, azimuth_limits, twist, twist_limits
     width           slot, tab, axes, offset, x, x_limits, y, y_limits, angle, angle_limits
-    tangent         a, b, side, unilateral
+    tangent         a, b, side, unilateral, touch
     symmetric       a, b, plane
     group           bodies [names], poses [poses]
     trim_contact    contact, side, loop, keep, form
@@ -67,7 +67,7 @@ limits; angles are in radians. A coupling refers to joints of the same file, whi
 an expression is the text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers are the
 shortest decimals that give back the same doubles.
 
-Older versions are read, too. Version 3 had no distances from lines, version 2 no densities either;
+Older versions are read, too. Version 3 had no distances from lines and no `touch`, version 2 no densities either;
 version 1 had no faces, colors, loops, edges and trims either, and a `shape` was [{surface, name, reversed}].
 """
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from assembly.assembly import Assembly
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.objectives import PointDistance
+from assembly.constraints.model.tangent import Tangent
 from assembly.constraints.program.primitives import COINCIDENT, DISTANCE, RADIUS, SLIDE
 from assembly.kinematics.body import Body
 from assembly.view.item import Color, Item, Place, Stations
@@ -41,7 +42,8 @@ _PARALLEL = 0.02
 
 
 def _joints(scene: Assembly) -> list[Joint]:
-    return [constraint for constraint in scene.constraints if isinstance(constraint, Joint)]
+    """Joints but tangents: what these ask of frames is not where their faces touch."""
+    return [item for item in scene.constraints if isinstance(item, Joint) and not isinstance(item, Tangent)]
 
 
 def held_points(scene: Assembly) -> dict[Body, Array]:

@@ -55,6 +55,9 @@ RECORD = size_of(JOINT_FRAMES)
 
 # A vector shorter than this is rounding, and so is its direction.
 UNDEFINED = 1e-12
+# The same across an axis: less than a tolerance of a solve, so that a ball that is drawn onto the axis of a funnel, to
+# where it touches all around, comes there. Roundings of coordinates of size one are a hundredth of it.
+ON_AXIS = 1e-14
 # The least distance, and sine of an angle, by which the curvatures of DISTANCE, RADIUS and ANGLE are divided.
 LEAST_DIVISOR = 1e-6
 # The same for SWING where the axes are opposed: its gradient grows there, too.
@@ -111,7 +114,7 @@ def radial_direction(records, k):
     y = dot(side, d)
     length = math.sqrt(x * x + y * y)
     n = axis
-    if length > UNDEFINED:
+    if length > ON_AXIS:
         n = blend(x / length, axis, y / length, side)
     return length, n
 

@@ -39,7 +39,7 @@ ALL = [(count, mate) for count, mates in MATES.items() for mate in mates]
 
 @pytest.mark.parametrize(("count", "mate"), ALL, ids=lambda value: type(value).__name__)
 def test_each_names_what_it_takes_away(count, mate):
-    kind = type(mate)
+    kind = asm.Tangent if isinstance(mate, asm.Tangent) else type(mate)
     assert mate.removes == count and f"takes away {count} " in repr(mate)
     assert f"takes away {count} degree" in kind.__doc__ or kind is asm.Group
     word = kind.__name__.lower()

@@ -472,7 +472,7 @@ def test_compiled_and_plain_python_agree(swing):
 
 def test_a_radius_of_zero():
     """Toward x_a where there is no direction, as what a point leaves the axis along; a bounded curvature around it."""
-    for away in (0.0, 1e-300, 1e-13):
+    for away in (0.0, 1e-300, 1e-15):
         records = record(apart=(0.0, -away, 0.7))
         assert value(P.RADIUS, 0, records, 0) == pytest.approx(away, abs=1e-160)
         np.testing.assert_array_equal(gradient(P.RADIUS, 0, records, 0)[6:9], [1.0, 0.0, 0.0])
