@@ -99,6 +99,11 @@ def test_elementary_faces_touch_as_their_numbers_say(kinds, side, turned):
         parts = [Part(rng, name, hollow(shape) if k in turned else shape) for k, (name, shape) in enumerate(
             (("one", one), ("other", other)))]  # fmt: skip
         faces = [part.body.face() for part in parts]
+        if turned == (1,) and side == "outside" and "plane" not in kinds and "cone" not in kinds:
+            # What is wider than a bore is not in it.
+            with pytest.raises(asm.errors.InputError, match="expected one that fits"):
+                asm.Tangent(*faces)
+            continue
         mate = asm.Tangent(*(faces if seed % 2 else faces[::-1]), side=side)
         # It has the rank that it says, which `solved` holds against the rank of the rows.
         solution = solved(parts, mate)
@@ -180,6 +185,10 @@ def test_what_is_no_tangent_is_told():
         asm.Tangent(wall, other.face("wall"), touch="line", unilateral=True)
     with pytest.raises(asm.errors.InputError, match="touch is 'face'; expected 'line' or 'point'"):
         asm.Tangent(wall, other.face("wall"), touch="face")
+    bore = asm.Body("bore", hollow(SHAPES.cylinder(0.9, 5)))
+    with pytest.raises(asm.errors.InputError, match="has the radius 1, and bore.face.*, which is hollow, 0.9; exp"):
+        asm.Tangent(wall, bore.face())
+    assert asm.Tangent(wall, bore.face(), side="inside").removes == 3
     with pytest.raises(asm.errors.InputError, match="a and b are both on body 'pin'; expected two bodies"):
         asm.Tangent(wall, pin.face("top"))
 

@@ -23,11 +23,12 @@ import numpy as np
 from assembly.constraints.model.joint import ON_AXIS, SAME_AXIS, SAME_POINT, Axes
 from assembly.constraints.model.joints import ALONG, Z_DOT_Z
 from assembly.constraints.program.primitives import DISTANCE, RADIUS
+from assembly.errors import InputError
 from assembly.geometry.recognition.forms import Cone
 from assembly.kinematics.body import BodyFace, Frame
 from assembly.selection.selection import EQUAL
 
-__all__ = ["ELEMENTARY", "TangentRow", "TangentRows", "touching_rows"]
+__all__ = ["ELEMENTARY", "TangentRow", "TangentRows", "check_fit", "touching_rows"]
 
 # In the order in which one of them has frame a.
 ELEMENTARY = ("plane", "cylinder", "cone", "sphere")
@@ -48,6 +49,19 @@ class TangentRows(NamedTuple):
     frame_b: Frame
     axes: Axes
     rows: tuple[TangentRow, ...]
+
+
+def check_fit(a: BodyFace, b: BodyFace, outside: bool) -> None:
+    """Raise where what touches a bore or a socket from within is wider: it would be through the wall elsewhere."""
+    round_ones = {"cylinder", "sphere"}
+    if not outside or a.kind not in round_ones or b.kind not in round_ones or a.is_hole == b.is_hole:
+        return
+    hollow, full = (a, b) if a.is_hole else (b, a)
+    if full.radius > hollow.radius + EQUAL * max(full.body.size, hollow.body.size):
+        raise InputError(
+            f"{full!r} has the radius {full.radius:.9g}, and {hollow!r}, which is hollow, {hollow.radius:.9g}; "
+            "expected one that fits, or side='inside'"
+        )
 
 
 def touching_rows(a: BodyFace, b: BodyFace, outside: bool) -> TangentRows | None:

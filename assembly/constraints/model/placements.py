@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from assembly.constraints.model.constraint import Bounds, Equation, Freedom
 from assembly.constraints.model.joint import ON_AXIS, Driven, Joint, Limits, Offset, Side, SidePoint
 from assembly.constraints.model.joints import ALONG, Number, Range
+from assembly.constraints.model.mate_features import AxisLike, PlaneLike, axis_frame, one_feature, plane_frame
 from assembly.constraints.program.primitives import ANGLE, DISTANCE, RADIUS, SLIDE
 from assembly.errors import InputError, number
+from assembly.kinematics.body import BodyFace, Frame
+from assembly.selection.edges import BodyEdge
 
 __all__ = ["Angle", "Distance", "PointOnLine", "PointOnPlane"]
+
+
+def _of_feature(frame: Side | AxisLike, frame_of: Callable[[str, Any], Frame]) -> Any:
+    """The frame of a face or an edge, or what else was given."""
+    given = one_feature(frame)
+    return frame_of("frame", given) if isinstance(given, (BodyFace, BodyEdge)) else given
 
 
 class PointOnLine(Joint):
@@ -19,9 +31,9 @@ class PointOnLine(Joint):
 
     Parameters
     ----------
-    point : Point, Frame or Body
-        Of a frame or a body its origin.
-    frame : Frame or Body
+    point : Point, vertex, sphere or circle; Frame or Body
+        Of a sphere or a circle its center, of a frame or a body its origin.
+    frame : Frame or Body; or a face or an edge with an axis
         Its z axis is the line.
     distance : float or None
         From the line: 0 is on it, None within `distance_limits`.
@@ -41,7 +53,7 @@ class PointOnLine(Joint):
     def __init__(
         self,
         point: SidePoint,
-        frame: Side,
+        frame: Side | AxisLike,
         name: str | None = None,
         *,
         distance: Number = 0.0,
@@ -49,7 +61,7 @@ class PointOnLine(Joint):
         limits: Range = None,
         distance_limits: Range = None,
     ) -> None:
-        super().__init__(frame, point, name, slide=(slide, limits))
+        super().__init__(_of_feature(frame, axis_frame), point, name, slide=(slide, limits))
         if distance is None or distance_limits is not None or number("distance", distance) != 0.0:
             self._own = ()
             radius = self._coordinate(RADIUS, 0)
@@ -89,10 +101,10 @@ class PointOnPlane(Joint):
 
     Parameters
     ----------
-    point : Point, Frame or Body
-        Of a frame or a body its origin.
-    frame : Frame or Body
-        Its z axis is the plane's normal.
+    point : Point, vertex, sphere or circle; Frame or Body
+        Of a sphere or a circle its center, of a frame or a body its origin.
+    frame : Frame or Body, or a flat face
+        Its z axis is the plane's normal, of a face the outward one.
     offset : float
         Height of the point along z_a.
     """
@@ -109,7 +121,7 @@ class PointOnPlane(Joint):
     def __init__(
         self,
         point: SidePoint,
-        frame: Side,
+        frame: Side | PlaneLike,
         name: str | None = None,
         *,
         offset: float = 0.0,
@@ -118,7 +130,7 @@ class PointOnPlane(Joint):
         x_limits: Range = None,
         y_limits: Range = None,
     ) -> None:
-        super().__init__(frame, point, name, x=(x, x_limits), y=(y, y_limits))
+        super().__init__(_of_feature(frame, plane_frame), point, name, x=(x, x_limits), y=(y, y_limits))
         self.offset = offset
         self._own = (Equation(((1.0, self._coordinate(*ALONG)),), (self, "offset")),)
 
@@ -128,8 +140,8 @@ class Distance(Joint):
 
     Parameters
     ----------
-    point_a, point_b : Point, Frame or Body
-        Of a frame or a body its origin.
+    point_a, point_b : Point, vertex, sphere or circle; Frame or Body
+        Of a sphere or a circle its center, of a frame or a body its origin.
     value : float, optional
         Above zero; points that coincide are `Spherical`.
     limits : (lower, upper), optional

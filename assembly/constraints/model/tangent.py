@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.constraint import Constraint, Equation
 from assembly.constraints.model.contact import Contact, side_face
-from assembly.constraints.model.elementary_tangents import touching_rows
+from assembly.constraints.model.elementary_tangents import check_fit, touching_rows
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.mate_features import Mate, one_feature
 from assembly.errors import InputError
@@ -60,7 +60,7 @@ class Tangent(Constraint):
     ------
     InputError
         An unknown side, a selection that is not a single face, both faces on one body, two planes, a `touch` that the
-        faces have not.
+        faces have not, a ball or a pin that is wider than the bore it is in.
     TypeError
         Something else than a face.
     """
@@ -171,6 +171,7 @@ class SurfaceTangent(Tangent, Mate, Joint):
         touch: Touch | None = None,
     ) -> None:
         one, other, said = self._take(a, b, name, side, touch, unilateral)
+        check_fit(one, other, side == "outside")
         found = touching_rows(one, other, side == "outside")
         assert found is not None, "the faces have rows"
         Joint.__init__(self, found.frame_a, found.frame_b, said, found.axes)
