@@ -17,7 +17,7 @@ from assembly.constraints.model.constraint import Constraint, structure_changes
 from assembly.constraints.model.contact import Contact, lone_surfaces
 from assembly.constraints.model.contents import Contents
 from assembly.constraints.model.joint import Joint, Sense
-from assembly.constraints.model.tangent import Tangent
+from assembly.constraints.model.tangent import ContactTangent
 from assembly.constraints.packing.earlier import is_earlier, is_same_scene, taken_over
 from assembly.constraints.packing.lower_pairs import LowerPair, lower_pairs
 from assembly.constraints.packing.scene import MORE_PLACES, Packed, structure_of
@@ -201,7 +201,7 @@ class PackedContents(Contents):
     def _place_tangents(self, packed: Packed, state: Array) -> None:
         """Start tangents at pairs on the side that they ask for."""
         for k, contact in enumerate(packed.contacts):
-            if isinstance(contact, Tangent) and not contact.edges:
+            if isinstance(contact, ContactTangent) and not contact.edges:
                 q = state[: packed.contacts_at].reshape(-1, 7)
                 rows = (q[self._bodies.index(body)].copy() for body in (contact.body_a, contact.body_b))
                 start = contact.start_at(*rows)

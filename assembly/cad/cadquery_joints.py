@@ -8,7 +8,7 @@ With p, o points and d, n unit directions of the markers where the parts stand, 
 | Axis | the angle between d and n is v; a half turn without a value | Parallel, Angle |
 | Plane | Axis with v, and Point | Revolute; Angle and Spherical |
 | PointInPlane | n . (p - o) = v | PointOnPlane |
-| PointOnLine | the distance of p from the line is abs(v) | PointOnLine; an arm about the line |
+| PointOnLine | the distance of p from the line is abs(v) | PointOnLine |
 | FixedPoint | p = v | Spherical with the world |
 | FixedAxis | d points along v | Parallel with the world |
 | FixedRotation | the part is turned by v about the world's x, then y, then z axis | Parallel with the world |
@@ -20,7 +20,7 @@ size; its documentation calls v a distance, and so it is taken.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, fabs, fmod, hypot, pi, sin
+from math import cos, fabs, fmod, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +28,13 @@ from numpy.typing import NDArray
 from assembly.cad.locations import Vector, frame_on
 from assembly.cad.markers import Marker, Requirement
 from assembly.constraints.model.joint import Joint
-from assembly.constraints.model.joints import Cylindrical, Parallel, Revolute, Spherical
+from assembly.constraints.model.joints import Parallel, Revolute, Spherical
 from assembly.constraints.model.placements import Angle, Distance, PointOnLine, PointOnPlane
 from assembly.errors import InputError
-from assembly.kinematics.body import Body, Frame, Point
-from assembly.kinematics.pose import Pose, axes_quaternion, direction
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import direction
 
-__all__ = ["Arm", "Maker"]
+__all__ = ["Maker"]
 
 Array = NDArray[np.float64]
 # Angles that are nearer to 0 or a half turn are taken for that: radians of whole degrees are rounded, 540 say.
@@ -42,49 +42,10 @@ ANGLE_ROUNDING = 1e-14
 ORIGIN = (0.0, 0.0, 0.0)
 
 
-class Arm:
-    """A body that reaches from a line to a point at a distance: turns about the line and slides along it.
-
-    Where the point is on the line at the start, the arm has a direction, and the distance none.
-    """
-
-    def __init__(self, name: str, line: Frame, point: Point, length: float) -> None:
-        self.body = Body(name)
-        self._line = line
-        self._point = point
-        self._length = length
-
-    def joints(self, name: str) -> list[Joint]:
-        """What holds the arm to the line, and the point to the arm."""
-        end = self.body.point(self._length, 0.0, 0.0)
-        return [
-            Cylindrical(self._line, self.body.frame(), name=f"{name}, line"),
-            Spherical(end, self._point, name=f"{name}, distance"),
-        ]
-
-    def begin(self) -> None:
-        """Put the arm to where the line and the point stand."""
-        pose = self._line.body.pose
-        origin, axes = pose.apply(self._line.origin), pose.apply(self._line.axes.T) - pose.position
-        away = self._point.body.pose.apply(self._point.coordinates) - origin
-        along, across = (away @ axes[2]) * axes[2], away @ axes[:2].T
-        far = hypot(*across)
-        x = axes[0] if far == 0.0 else (across @ axes[:2]) / far
-        turned = np.column_stack([x, np.cross(axes[2], x), axes[2]])
-        self.body.pose = Pose(origin + along, axes_quaternion(turned))
-
-
 class Maker:
-    """Makes joints of requirements.
-
-    Attributes
-    ----------
-    arms : list of Arm
-        Bodies that joints needed.
-    """
+    """Makes joints of requirements."""
 
     def __init__(self) -> None:
-        self.arms: list[Arm] = []
         self._kinds: dict[str, Callable[[str, Requirement, tuple[Body, ...]], list[Joint]]] = {
             "Axis": self._axis,
             "FixedAxis": self._fixed_axis,
@@ -146,11 +107,7 @@ class Maker:
         marker, line = item.markers
         point = bodies[0].point(*_place(marker))
         frame = frame_on(bodies[1], _place(line), _way(line))
-        if not item.value:
-            return [PointOnLine(point, frame, name=name)]
-        arm = Arm(f"arm of {name}", frame, point, fabs(item.value))
-        self.arms.append(arm)
-        return arm.joints(name)
+        return [PointOnLine(point, frame, name=name, distance=fabs(item.value or 0.0))]
 
     def _fixed_point(self, name: str, item: Requirement, bodies: tuple[Body, ...]) -> list[Joint]:
         part, world = bodies

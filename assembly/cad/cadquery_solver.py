@@ -61,7 +61,7 @@ class _Scene:
         ]
         joints += [Fixed(post, self.parts[name], name=f"Fixed {name}") for name, post in self._posts.items()]
         joints += [Fixed(self.parts[name], twin, name=f"{name} is rigid") for name, twin in self._twins.items()]
-        bodies = [*self.parts.values(), *self._twins.values(), *(arm.body for arm in self._maker.arms)]
+        bodies = [*self.parts.values(), *self._twins.values()]
         bodies += self._posts.values()
         self.scene = Assembly(bodies if self._world is None else [*bodies, self._world])
         self.scene.constrain(*joints)
@@ -108,8 +108,6 @@ class _Scene:
         for others in (self._twins, self._posts):
             for name, other in others.items():
                 other.pose = poses[name]
-        for arm in self._maker.arms:
-            arm.begin()
         return poses
 
     def apply(self, assembly: Any, began: dict[str, Pose], solution: Solution) -> None:

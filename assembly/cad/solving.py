@@ -41,7 +41,7 @@ def solve(assembly: Any, *, fixed: Any = (), driven: Mapping[Any, Any] | None = 
     -------
     Solution
         Constraints are named by their kinds and parts, "Plane base-lid", joints by parts and labels,
-        "base.hinge-lid.pin"; bodies are those of the parts, and a world or arms where constraints need them.
+        "base.hinge-lid.pin"; bodies are those of the parts, and a world where constraints need it.
 
     Raises
     ------

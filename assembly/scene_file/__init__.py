@@ -24,7 +24,7 @@ Fields of a constraint by its type:
     universal       frame_a, frame_b, angle_a, angle_a_limits, angle_b, angle_b_limits
     parallel        frame_a, frame_b, axes, angle, limits
     perpendicular   frame_a, frame_b
-    point_on_line   point, frame, slide, limits
+    point_on_line   point, frame, slide, limits, distance, distance_limits
     point_on_plane  point, frame, offset, x, x_limits, y, y_limits
     distance        point_a, point_b, value, limits
     angle           frame_a, frame_b, value, limits
@@ -37,7 +37,7 @@ Fields of a constraint by its type:
     insert          hole, shank, seats, axes, offset, angle, limits
     concentric      a, b, swing, swing_limits, azimuth, azimuth_limits, twist, twist_limits
     width           slot, tab, axes, offset, x, x_limits, y, y_limits, angle, angle_limits
-    tangent         a, b, side, unilateral
+    tangent         a, b, side, unilateral, touch
     symmetric       a, b, plane
     group           bodies [names], poses [poses]
     trim_contact    contact, side, loop, keep, form
@@ -68,8 +68,8 @@ radians. A coupling refers to joints of the same file, which may stand after it.
 text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers are the shortest decimals that give
 back the same doubles.
 
-Older versions are read, too. Version 3 had no pictures; version 2 had no densities; version 1 had no faces, colors,
-loops, edges and trims either, and a `shape` was [{surface, name, reversed}].
+Older versions are read, too. Version 3 had no pictures, no distances from lines and no `touch`; version 2 had no
+densities; version 1 had no faces, colors, loops, edges and trims either, and a `shape` was [{surface, name, reversed}].
 """
 
 from __future__ import annotations

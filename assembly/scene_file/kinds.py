@@ -33,7 +33,7 @@ from assembly.constraints.model.mate_features import Mate
 from assembly.constraints.model.mates import Coaxial, Concentric, Flush, Insert, Width
 from assembly.constraints.model.objectives import FrameDistance, PointDistance, Posture, Weight
 from assembly.constraints.model.placements import Angle, Distance, PointOnLine, PointOnPlane
-from assembly.constraints.model.tangent import Tangent
+from assembly.constraints.model.tangent import ContactTangent, SurfaceTangent, Tangent
 from assembly.constraints.model.trim_contact import TrimContact, single_face
 from assembly.errors import InputError
 from assembly.geometry.faces.face import Face
@@ -177,6 +177,8 @@ LINES = Plain(
 
 NAME = Field("name", Plain(text))
 UNILATERAL = Field("unilateral", Plain(flag))
+# Of what is never one-sided as well.
+UNILATERAL_OR_NOT = Field("unilateral", Plain(flag), lambda item: getattr(item, "unilateral", False))
 WEIGHT = Field("weight", NUMBER)
 FRAMES = (Field("frame_a", FRAME), Field("frame_b", FRAME))
 POINTS = (Field("point_a", FRAME, "frame_a"), Field("point_b", FRAME, "frame_b"))
@@ -271,7 +273,14 @@ CONSTRAINTS = OneOf(
         "universal": Record(Universal, NAME, *FRAMES, *_free("angle_a", "angle_b")),
         "parallel": Record(Parallel, NAME, *FRAMES, AXES, *_free("angle")),
         "perpendicular": Record(Perpendicular, NAME, *FRAMES),
-        "point_on_line": Record(PointOnLine, NAME, *POINT_AND_FRAME, *_free("slide")),
+        "point_on_line": Record(
+            PointOnLine,
+            NAME,
+            *POINT_AND_FRAME,
+            *_free("slide"),
+            Field("distance", DRIVEN, since=4),
+            Field("distance_limits", LIMITS, since=4),
+        ),
         "point_on_plane": Record(PointOnPlane, NAME, *POINT_AND_FRAME, OFFSET, *_free("x", "y")),
         "distance": Record(Distance, NAME, *POINTS, *HELD),
         "angle": Record(Angle, NAME, *FRAMES, *HELD),
@@ -321,12 +330,13 @@ CONSTRAINTS = OneOf(
             *_free("x", "y", "angle"),
         ),
         "tangent": Record(
-            Tangent,
+            (Tangent, SurfaceTangent, ContactTangent),
             NAME,
             Field("a", FEATURE, lambda mate: mate.faces[0]),
             Field("b", FEATURE, lambda mate: mate.faces[1]),
             Field("side", Plain(text)),
-            UNILATERAL,
+            UNILATERAL_OR_NOT,
+            Field("touch", Plain(or_null(text)), since=4),
         ),
         "symmetric": Record(Symmetric, NAME, *_features("a", "b", "plane")),
         "group": Record(Group, NAME, Field("bodies", Listed(BODY_NAME)), Field("poses", Listed(POSE))),

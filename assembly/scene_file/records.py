@@ -136,18 +136,19 @@ class Record:
 
     Parameters
     ----------
-    kind : type
-        What the thing is.
+    kind : type, or several
+        What the thing is; of several, the class that makes them first.
     *fields : Field
         In the order in which they are written.
     make : callable, optional
         Takes the fields' values by their arguments' names; the class by default.
     """
 
-    def __init__(self, kind: type, *fields: Field, make: Callable[..., Any] | None = None) -> None:
-        self.kind = kind
+    def __init__(self, kind: type | tuple[type, ...], *fields: Field, make: Callable[..., Any] | None = None) -> None:
+        self.kinds = kind if isinstance(kind, tuple) else (kind,)
+        self.kind = self.kinds[0]
         self.fields = fields
-        self.make: Callable[..., Any] = make or kind
+        self.make: Callable[..., Any] = make or self.kind
 
     def write(self, path: str, value: Any, parts: Parts) -> dict[str, Any]:
         """See `Form`."""
@@ -174,7 +175,7 @@ class OneOf:
     def write(self, path: str, value: Any, parts: Parts, **before: Any) -> dict[str, Any]:
         """See `Form`; `before` are fields of the caller's."""
         for word, record in self.kinds.items():
-            if record.kind is type(value):
+            if type(value) in record.kinds:
                 return {"type": word, **before, **record.write(path, value, parts)}
         known = ", ".join(record.kind.__name__ for record in self.kinds.values())
         raise InputError(f"{path} is {value!r}; expected one of what scene files hold: {known}")

@@ -19,8 +19,8 @@ from assembly.kinematics.body_face import BodyFace
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.topology import Edge, Topology
 from assembly.selection.edge_forms import EdgeForm, form_of_points
-from assembly.selection.nearness import distance_along, finer
-from assembly.selection.selection import Selection, are_parallel, checked_place, is_about, shown
+from assembly.selection.nearness import distance_to_boundary, finer
+from assembly.selection.selection import Selection, are_parallel, is_about, shown
 
 if TYPE_CHECKING:
     from assembly.selection.vertices import BodyVertex
@@ -185,8 +185,8 @@ class BodyEdge:
         return max(face.at_least(point) for face in self.faces) - self._topology.tolerance
 
     def distance(self, point: ArrayLike) -> float:
-        """How far a point (3,) in the body's coordinates is from it."""
-        return distance_along(self.at, self._breaks, checked_place("point", point))
+        """How far a point (3,) in the body's coordinates is from it; proven, as the distance of a face is."""
+        return distance_to_boundary(self._topology.faces[self._edge.face_a], self._edge.curve_a, point)
 
     def _formed(self, what: str) -> EdgeForm:
         if self._form is None:

@@ -1,48 +1,37 @@
-"""How far points are from trimmed faces and from edges."""
+"""How far points are from trimmed faces and from edges, with a proof: by the search for the distance of two bodies.
+
+A point is a body of one sheet of no size.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.geometry.faces.face import Face
-from assembly.geometry.splines.curve import NurbsCurve
+from assembly.distance.bodies.packing import KeptTree, tree_of, tree_of_boundary
+from assembly.distance.bodies.query import bodies_apart
+from assembly.geometry.faces.face import Face, whole_face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.selection.selection import checked_place
 
-__all__ = ["distance_along", "distance_to_face", "finer"]
+__all__ = ["distance_to_boundary", "distance_to_face", "finer"]
 
 Array = NDArray[np.float64]
-# Samples of a span of a curve, and rounds in which the best place among them is looked at more closely.
-_SAMPLES, _ROUNDS = 17, 10
-# Samples of a face along either parameter, four a span, and how many of the nearest are gone on from.
-_GRID, _MOST, _STARTS = 16, 96, 4
-# Steps of Newton's method, and halvings of a step that does not come nearer.
-_STEPS, _HALVINGS = 30, 8
+# Parts of the size of what is looked at that the two bounds of a distance are to be apart at most.
+_EXACT = 1e-12
+# Parts of a face that are looked at for that; a face of two hundred spans takes some hundreds, in a tenth of a
+# millisecond. All of them, in 50 ms, are spent where nearest points are a circle of a cone or of a turned curve.
+_BUDGET = 20_000
 
 
-def distance_along(curve: Callable[[Array], Array], breaks: Array, point: Array) -> float:
-    """How far a point is from a curve of t, by samples between its breaks that are refined about the nearest.
-
-    Parameters
-    ----------
-    curve : callable
-        Points (n, 3) at parameters (n,).
-    breaks : (k,)
-        The ends of its smooth parts.
-    point : (3,)
-    """
-    t = np.unique(np.concatenate([np.linspace(a, b, _SAMPLES) for a, b in pairwise(breaks)]))
-    best = np.inf
-    for _ in range(_ROUNDS):
-        gaps = np.linalg.norm(curve(t) - point, axis=1)
-        k = int(np.argmin(gaps))
-        best = min(best, float(gaps[k]))
-        t = np.linspace(t[max(k - 1, 0)], t[min(k + 1, t.size - 1)], _SAMPLES)
-    return best
+@cache
+def _point_tree() -> KeptTree:
+    """The origin."""
+    ends = [0.0, 0.0, 1.0, 1.0]
+    return tree_of((whole_face(NurbsSurface(np.zeros((2, 2, 3)), (ends, ends), (1, 1))),))
 
 
 def finer(breaks: Array, surface: NurbsSurface) -> Array:
@@ -53,66 +42,24 @@ def finer(breaks: Array, surface: NurbsSurface) -> Array:
 
 
 def distance_to_face(face: Face, point: ArrayLike) -> float:
-    """How far a point (3,) is from a face, within its boundary.
+    """How far a point (3,) is from a face, within its boundary: that of the nearest point of it that is known.
 
-    That of the nearest place that is found from samples of the inside, by Newton's method, and of the boundary.
+    It is proven that no point is nearer by more than 1e-12 of the size; by more than some 1e-6 of it where nearest
+    points are not single ones, and the face is neither a plane nor a cylinder, sphere or torus.
     """
+    return _nearest(tree_of((face,)), face, point)
+
+
+def distance_to_boundary(face: Face, curve: int, point: ArrayLike) -> float:
+    """The same of a boundary curve of a face, by its number."""
+    return _nearest(tree_of_boundary(face, curve), face, point)
+
+
+def _nearest(tree: KeptTree, face: Face, point: ArrayLike) -> float:
     place = checked_place("point", point)
-    surface = face.surface
-    best = _inside(face, place)
-    for curve in face.boundary:
-
-        def along(t: Array, curve: NurbsCurve = curve) -> Array:
-            return np.asarray(surface.evaluate(*curve.evaluate(t).T))
-
-        best = min(best, distance_along(along, finer(curve.breaks(), surface), place))
-    return best
-
-
-def _inside(face: Face, point: Array) -> float:
-    """The distance of the nearest place inside of a face that is found; infinite where no sample is inside."""
-    surface = face.surface
-    counts = [min(max(_GRID, 4 * len(at)), _MOST) for at in surface.breaks()]
-    grid = [np.linspace(*ends, count) for ends, count in zip(surface.domain, counts, strict=True)]
-    u, v = (each.ravel() for each in np.meshgrid(*grid, indexing="ij"))
-    inside = face.contains(u, v)
-    if not inside.any():
-        return np.inf
-    uv = np.column_stack([u, v])[inside]
-    gaps = np.linalg.norm(surface.evaluate(*uv.T) - point, axis=1)
-    best = float(gaps.min())
-    # The nearest samples that are not beside each other.
-    steps = [each[1] - each[0] for each in grid]
-    left = np.argsort(gaps, kind="stable")
-    for _ in range(_STARTS):
-        if not left.size:
-            break
-        start = uv[left[0]]
-        best = min(best, _descended(face, point, start, float(gaps[left[0]])))
-        left = left[(np.abs(uv[left] - start) > 3.0 * np.array(steps)).any(axis=1)]
-    return best
-
-
-def _descended(face: Face, point: Array, at: Array, gap: float) -> float:
-    """The distance at the end of damped Newton steps from parameters (2,) that stay inside of a face."""
-    surface = face.surface
-    low, high = np.array(surface.domain).T
-    for _ in range(_STEPS):
-        s, su, sv, suu, suv, svv = surface.evaluate(at[0], at[1], 2)
-        off, tangents = s - point, np.column_stack([su, sv])
-        gradient = tangents.T @ off
-        first = tangents.T @ tangents
-        hessian = first + np.array([[off @ suu, off @ suv], [off @ suv, off @ svv]])
-        if not np.linalg.eigvalsh(hessian)[0] > 0.0:
-            hessian = first
-        step = np.linalg.lstsq(hessian, -gradient, rcond=1e-12)[0]
-        for _ in range(_HALVINGS):
-            there = np.clip(at + step, low, high)
-            now = float(np.linalg.norm(surface.evaluate(there[0], there[1]) - point))
-            if now < gap and bool(face.contains(there[0], there[1])):
-                break
-            step = 0.5 * step
-        else:
-            return gap
-        at, gap = there, now
-    return gap
+    q = np.zeros((2, 7))
+    q[:, 3], q[1, :3] = 1.0, place
+    low, high = face.surface.bounding_box()
+    # Coordinates, too: their rounding is what doubles let be known.
+    size = max(float(np.abs(each).max()) for each in (low, high, place)) + 1e-150
+    return bodies_apart(tree, _point_tree(), q, _EXACT * size, _BUDGET).upper

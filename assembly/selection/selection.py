@@ -98,7 +98,10 @@ class Selection(tuple[Item, ...]):
         return type(self)((item for k, item in enumerate(self) if k in chosen), f"{self._said}({selector!r})", self)
 
     def near(self, point: ArrayLike) -> Self:
-        """The one nearest to a point (3,) in the body's coordinates; of several that are as near, the first."""
+        """The one nearest to a point (3,) in the body's coordinates; of several that are as near, the first.
+
+        By distances that are proven; as near is what differs by less than 1e-9 of the body's size.
+        """
         place = checked_place("point", point)
         if not self:
             return self._chosen(lambda item: True, ".near(...)")

@@ -24,6 +24,7 @@ from assembly.constraints.model.contact import side_faces
 from assembly.constraints.model.couplings import Coupling
 from assembly.constraints.model.groups import Group
 from assembly.constraints.model.joint import Joint
+from assembly.constraints.model.tangent import Tangent
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Answer, Verdict
@@ -145,7 +146,7 @@ def _shaped_pairs(bodies: Iterable[Body], constraints: Iterable[Constraint]) -> 
 
 def _ties(constraints: Iterable[Constraint]) -> set[frozenset[int]]:
     """Pairs of bodies that a joint or a group ties, or a coupling, whose teeth are in each other."""
-    ties = {_key(*item.bodies) for item in constraints if isinstance(item, Joint)}
+    ties = {_key(*item.bodies) for item in constraints if isinstance(item, Joint) and not isinstance(item, Tangent)}
     ties |= {_key(*pair) for item in constraints if isinstance(item, Group) for pair in combinations(item.bodies, 2)}
     return ties | {_key(*pair) for item in constraints if isinstance(item, Coupling) for pair in item.meshing}
 

@@ -14,7 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.model.constraint import Coordinate, Equation
-from assembly.constraints.program.primitives import ANGLE, AZIMUTH, COINCIDENT, DISTANCE, DOT, SLIDE, SWING, TURN
+from assembly.constraints.program.primitives import (
+    ANGLE,
+    AZIMUTH,
+    COINCIDENT,
+    DISTANCE,
+    DOT,
+    RADIUS,
+    SLIDE,
+    SWING,
+    TURN,
+)
 from assembly.kinematics.body import Frame
 from assembly.kinematics.pose import rotation_matrix
 
@@ -79,6 +89,8 @@ def measure(coordinate: Coordinate, frames: Standing, near: float = 0.0) -> floa
         return float(frames.a[:, component] @ frames.apart)
     if kind == DISTANCE:
         return float(np.linalg.norm(frames.apart))
+    if kind == RADIUS:
+        return hypot(*(frames.a[:, :2].T @ frames.apart).tolist())
     if kind == DOT:
         return float(frames.a[:, component // 3] @ frames.b[:, component % 3])
     if kind == SWING:

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from assembly.assembly import Assembly
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.objectives import PointDistance
-from assembly.constraints.program.primitives import COINCIDENT, DISTANCE, SLIDE
+from assembly.constraints.model.tangent import Tangent
+from assembly.constraints.program.primitives import COINCIDENT, DISTANCE, RADIUS, SLIDE
 from assembly.kinematics.body import Body
 from assembly.view.item import Color, Item, Place, Stations
 from assembly.view.marks import arrow, ball, rods, stick
@@ -41,7 +42,8 @@ _PARALLEL = 0.02
 
 
 def _joints(scene: Assembly) -> list[Joint]:
-    return [constraint for constraint in scene.constraints if isinstance(constraint, Joint)]
+    """Joints but tangents: what these ask of frames is not where their faces touch."""
+    return [item for item in scene.constraints if isinstance(item, Joint) and not isinstance(item, Tangent)]
 
 
 def held_points(scene: Assembly) -> dict[Body, Array]:
@@ -128,7 +130,7 @@ def joint_items(scene: Assembly, stations: Stations, place: Place, size: float) 
         a, b = (place(stations.points(frame.body, frame.origin)) for frame in (joint.frame_a, joint.frame_b))
         turn_a, turn_b = (stations.rotation(f.body) @ f.axes for f in (joint.frame_a, joint.frame_b))
         in_front = any(body.faces for body in joint.bodies)
-        meets = bool(kinds & {COINCIDENT, SLIDE, DISTANCE})
+        meets = bool(kinds & {COINCIDENT, SLIDE, DISTANCE, RADIUS})
         gap = float(np.linalg.norm(b - a, axis=1).max())
         sine = np.linalg.norm(np.cross(turn_a[:, :, 2], turn_b[:, :, 2]), axis=1).max()
 
@@ -138,7 +140,7 @@ def joint_items(scene: Assembly, stations: Stations, place: Place, size: float) 
         if gap > size * MARK:
             parts.append(("other ball", ball(), b, np.eye(3), thick))
         # The second arrow of a hinge lies on the first.
-        if kinds - {COINCIDENT, DISTANCE, SLIDE} and not (meets and sine < _PARALLEL):
+        if kinds - {COINCIDENT, DISTANCE, RADIUS, SLIDE} and not (meets and sine < _PARALLEL):
             parts.append(("other axis", axis, b, turn_b, np.ones(3)))
         for what, mesh, position, rotation, scale in parts:
             yield Item(("joints", joint.name, what), mesh, _COLOR, position, rotation, scale, in_front)

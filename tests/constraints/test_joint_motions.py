@@ -137,6 +137,45 @@ def test_rows_hold_where_the_freedoms_say(joint, axes, seed):
     assert drives.sum() == len(values) and len(drives) == count + (joint not in HOLDING) * len(values)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_point_at_a_distance_from_a_line(seed):
+    rng = np.random.default_rng(seed)
+    distance, around, slide = rng.uniform(0.1, 3), rng.uniform(-PI, PI), rng.uniform(-2, 2)
+    motion = turn(2, around) @ shift(distance, 0, slide) @ random_turn(rng)
+    made, poses = stand(asm.PointOnLine, {"distance": distance}, motion, rng)
+    residuals, gradients = evaluate(made, poses)
+    assert len(residuals) == 1 and abs(residuals[0]) < 1e-13 and not made.equations[0].is_drive
+    # The point's own velocity counts as it is away from the line.
+    assert np.linalg.norm(gradients[0, 6:9]) == pytest.approx(1)
+    made.slide, made.distance = slide + 0.125, distance + 0.25
+    assert evaluate(made, poses)[0] == pytest.approx([-0.125, -0.25], abs=1e-13)
+    made.distance, made.distance_limits = distance, (0.0, distance + 0.5)
+    made.slide = made.distance = None
+    # A lower limit of zero asks for nothing.
+    assert evaluate(made, poses)[0] == pytest.approx([0.5], abs=1e-13)
+    assert made.distance_limits == (0.0, distance + 0.5) and "distance_limits" in repr(made)
+
+
+def test_what_a_distance_from_a_line_may_be():
+    a, b = asm.Body("ground"), asm.Body("crank")
+    on = asm.PointOnLine(b, a)
+    assert (on.distance, on.distance_limits, list(on.freedoms), len(on.equations)) == (0.0, None, ["slide"], 2)
+    with pytest.raises(asm.errors.InputError, match="was made for a point on the line; expected one made with"):
+        on.distance = 1.0
+    with pytest.raises(asm.errors.InputError, match="expected a distance above zero; a point on a line is PointOnLine"):
+        asm.PointOnLine(b, a, distance=-1.0)
+    beside = asm.PointOnLine(b, a, distance=2.0)
+    assert list(beside.freedoms) == ["slide", "distance"] and beside.freedom("distance").value == 2.0
+    with pytest.raises(asm.errors.InputError, match="distance is 0.0; expected a distance above zero"):
+        beside.distance = 0.0
+    with pytest.raises(asm.errors.InputError, match="distance is None without limits; expected a number or limits"):
+        asm.PointOnLine(b, a, distance=None)
+    with pytest.raises(asm.errors.InputError, match="expected a value within the limits"):
+        asm.PointOnLine(b, a, distance=2.0, distance_limits=(None, 1.0))
+    with pytest.raises(asm.errors.InputError, match="distance is .far."):
+        asm.PointOnLine(b, a, distance="far")
+
+
 @pytest.mark.parametrize("axes", ["aligned", "opposed"])
 @pytest.mark.parametrize("pitch", [2.0, -0.5])
 def test_a_screw_slides_as_it_turns(pitch, axes):

@@ -21,6 +21,7 @@ COORDINATES = [
     (P.TURN, 0),
     *((P.AZIMUTH, k) for k in range(3)),
     (P.ANGLE, 0),
+    (P.RADIUS, 0),
 ]
 
 

@@ -193,6 +193,13 @@ SCENES = {
     "parallel": lambda: two(asm.Parallel, axes="opposed", angle=1.0),
     "perpendicular": lambda: two(asm.Perpendicular),
     "point on line": lambda: two(lambda a, b, name: asm.PointOnLine(b, a, name, slide=0.3)),
+    "point by line": lambda: two(lambda a, b, name: asm.PointOnLine(b, a, name, distance=0.7, slide=0.3)),
+    "point near line": lambda: pulled(
+        lambda a, b, name: asm.PointOnLine(b, a, name, distance=None, distance_limits=(0.2, 0.6)), (2.0, -2.0, 0.2)
+    ),
+    "point far from line": lambda: pulled(
+        lambda a, b, name: asm.PointOnLine(b, a, name, distance=None, distance_limits=(0.6, None)), (0.1, 0.2, 0.3)
+    ),
     "point on plane": lambda: two(lambda a, b, name: asm.PointOnPlane(b, a, name, offset=-0.3, y=1.0)),
     "distance": lambda: two(asm.Distance, value=2.0),
     "distance, at most": lambda: pulled(asm.Distance, (5.0, 3.0, 1.0), limits=(1.0, 2.0)),

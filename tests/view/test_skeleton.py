@@ -112,6 +112,11 @@ def joined(joint, apart=(0.0, 0.0, 0.0), a=None, b=None, shape=None):
         (lambda a, b: Angle(a, b, 1.0), {"apart": (0, 1, 0)}, {"ball", "axis", "other ball", "other axis"}),
         (Parallel, {"apart": (0, 1, 0)}, {"ball", "axis", "other ball", "other axis"}),
         (lambda a, b: PointOnLine(b, a), {"apart": (0, 0, 1), "b": SIDEWAYS}, {"ball", "axis", "other ball", "line"}),
+        (
+            lambda a, b: PointOnLine(b, a, distance=1.0),
+            {"apart": (1, 0, 0), "b": SIDEWAYS},
+            {"ball", "axis", "other ball", "line"},
+        ),
         (lambda a, b: PointOnPlane(b, a), {"b": SIDEWAYS}, {"ball", "axis"}),
     ],
 )

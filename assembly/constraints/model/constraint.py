@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assembly.constraints.program.primitives import ANGLE, COINCIDENT, DISTANCE, SLIDE
+from assembly.constraints.program.primitives import ANGLE, COINCIDENT, DISTANCE, RADIUS, SLIDE
 from assembly.errors import FARTHEST, InputError, KnownSettings, number, text
 from assembly.kinematics.body import Body, Frame
 
@@ -37,10 +37,11 @@ __all__ = [
 Bounds = tuple[float | None, float | None]
 
 # Values that a coordinate can take: at 0 and pi are kinks, which no row can hold, farther lengths may overflow.
-_RANGES = {SLIDE: (-FARTHEST, FARTHEST), DISTANCE: (0.0, FARTHEST), ANGLE: (0.0, pi)}
+_RANGES = {SLIDE: (-FARTHEST, FARTHEST), DISTANCE: (0.0, FARTHEST), RADIUS: (0.0, FARTHEST), ANGLE: (0.0, pi)}
 _EXPECTED = {
     SLIDE: f"a length between {-FARTHEST:g} and {FARTHEST:g}",
     DISTANCE: f"a distance above zero; points that coincide are Spherical, and none is above {FARTHEST:g}",
+    RADIUS: f"a distance above zero; a point on a line is PointOnLine without one, and none is above {FARTHEST:g}",
     ANGLE: "an angle between 0 and pi, both excluded; axes along each other are Parallel, axes='aligned' or 'opposed'",
 }
 _changes = 0
@@ -135,7 +136,7 @@ class Coordinate:
     @property
     def is_angle(self) -> bool:
         """Whether the number has no unit of length: radians, or the cosine that a dot product is."""
-        return self.kind not in (COINCIDENT, SLIDE, DISTANCE)
+        return self.kind not in (COINCIDENT, SLIDE, DISTANCE, RADIUS)
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,10 +27,13 @@ from assembly.constraints.model.constraint import (
     count_change,
     words,
 )
+from assembly.constraints.model.mate_features import CenterLike, one_feature, point_frame
 from assembly.constraints.program.primitives import COINCIDENT, SLIDE, SWING
 from assembly.errors import InputError, bounded
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body, BodyFace, Frame, Point
 from assembly.kinematics.pose import rotation_matrix
+from assembly.selection.edges import BodyEdge
+from assembly.selection.vertices import BodyVertex
 
 __all__ = ["Axes", "Driven", "Joint", "Limits", "Offset", "Sense", "Side", "SidePoint"]
 
@@ -38,7 +41,7 @@ Array = NDArray[np.float64]
 Axes = Literal["aligned", "opposed", "nearest"]
 Sense = Literal["aligned", "opposed"]
 Side = Frame | Body
-SidePoint = Point | Frame | Body
+SidePoint = CenterLike | Frame | Body
 
 SAME_POINT = ((COINCIDENT, 0), (COINCIDENT, 1), (COINCIDENT, 2))
 SAME_AXIS = ((SWING, 0), (SWING, 1))
@@ -51,13 +54,14 @@ _LEAN = rotation_matrix(np.array([1.0, 0.00024, 0.0003, 0.00032]))
 
 def _frame(name: str, side: Any, takes_point: bool) -> Frame:
     """The frame that a side stands for; a point's and a body's axes are those of the body."""
+    side = one_feature(side)
     if isinstance(side, Frame):
         return side
     if isinstance(side, Body):
         return side.frame()
-    if takes_point and isinstance(side, Point):
-        return side.body.frame(at=side.coordinates)
-    expected = "a point, a frame or a body" if takes_point else "a frame, body.frame(...), or a body"
+    if takes_point and isinstance(side, (Point, BodyVertex, BodyFace, BodyEdge)):
+        return point_frame(name, side)
+    expected = "a point, a frame or a body" if takes_point else "a frame, body.frame(...) or face.frame(), or a body"
     raise TypeError(f"{name} is {side!r}; expected {expected}")
 
 
@@ -75,7 +79,8 @@ class Joint(OwnState, RowConstraint):
     Parameters
     ----------
     frame_a, frame_b : Frame or Body
-        `body.frame(at, z, x)`; of a body the frame at its origin.
+        `body.frame(at, z, x)`; of a body the frame at its origin. Where a point is asked for, a vertex will do, or a
+        sphere or a circle, whose center is meant, and selections of a single one.
     name : str, optional
         The kind and the bodies' names by default, as in "revolute ground-crank".
     axes : "aligned", "opposed" or "nearest"

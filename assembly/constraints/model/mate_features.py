@@ -34,7 +34,7 @@ __all__ = [
 Array = NDArray[np.float64]
 PlaneLike = BodyFace | Frame | Faces
 AxisLike = BodyFace | BodyEdge | Frame | Faces | Edges
-CenterLike = BodyFace | BodyVertex | Point | Faces | Vertices
+CenterLike = Point | BodyVertex | BodyFace | BodyEdge | Vertices | Faces | Edges
 
 
 class Mate(RowConstraint):

@@ -2,25 +2,45 @@
 
 from __future__ import annotations
 
-from assembly.constraints.model.constraint import Equation
+from collections.abc import Callable
+from typing import Any
+
+from assembly.constraints.model.constraint import Bounds, Equation, Freedom
 from assembly.constraints.model.joint import ON_AXIS, Driven, Joint, Limits, Offset, Side, SidePoint
 from assembly.constraints.model.joints import ALONG, Number, Range
-from assembly.constraints.program.primitives import ANGLE, DISTANCE, SLIDE
+from assembly.constraints.model.mate_features import AxisLike, PlaneLike, axis_frame, one_feature, plane_frame
+from assembly.constraints.program.primitives import ANGLE, DISTANCE, RADIUS, SLIDE
+from assembly.errors import InputError, number
+from assembly.kinematics.body import BodyFace, Frame
+from assembly.selection.edges import BodyEdge
 
 __all__ = ["Angle", "Distance", "PointOnLine", "PointOnPlane"]
 
 
-class PointOnLine(Joint):
-    """A point stays on the z axis of a frame: 2 rows.
+def _of_feature(frame: Side | AxisLike, frame_of: Callable[[str, Any], Frame]) -> Any:
+    """The frame of a face or an edge, or what else was given."""
+    given = one_feature(frame)
+    return frame_of("frame", given) if isinstance(given, (BodyFace, BodyEdge)) else given
 
-    Frame a is the line's. Free with a name: `slide` along z_a; the bodies turn freely against each other.
+
+class PointOnLine(Joint):
+    """A point stays on the z axis of a frame: 2 rows. Or at a distance from it: 1 row, or one for each limit.
+
+    Frame a is the line's. Free with a name: `slide` along z_a; the bodies turn freely against each other. Of a point
+    at a distance, or within limits, `distance` is a freedom as well, whose value the joint holds.
 
     Parameters
     ----------
-    point : Point, Frame or Body
-        Of a frame or a body its origin.
-    frame : Frame or Body
+    point : Point, vertex, sphere or circle; Frame or Body
+        Of a sphere or a circle its center, of a frame or a body its origin.
+    frame : Frame or Body; or a face or an edge with an axis
         Its z axis is the line.
+    distance : float or None
+        From the line: 0 is on it, None within `distance_limits`.
+    slide, limits
+        Driven value and limits along the line.
+    distance_limits : (lower, upper), optional
+        Of the distance, which is None or above zero then.
     """
 
     _zero = ON_AXIS
@@ -31,9 +51,47 @@ class PointOnLine(Joint):
     limits = Limits("slide")
 
     def __init__(
-        self, point: SidePoint, frame: Side, name: str | None = None, *, slide: Number = None, limits: Range = None
+        self,
+        point: SidePoint,
+        frame: Side | AxisLike,
+        name: str | None = None,
+        *,
+        distance: Number = 0.0,
+        slide: Number = None,
+        limits: Range = None,
+        distance_limits: Range = None,
     ) -> None:
-        super().__init__(frame, point, name, slide=(slide, limits))
+        super().__init__(_of_feature(frame, axis_frame), point, name, slide=(slide, limits))
+        if distance is None or distance_limits is not None or number("distance", distance) != 0.0:
+            self._own = ()
+            radius = self._coordinate(RADIUS, 0)
+            self._freedoms["distance"] = Freedom(
+                self, "distance", radius, distance, distance_limits, "distance", "distance_limits"
+            )
+
+    @property
+    def distance(self) -> float | None:
+        """From the line: 0 on it, None where it is within limits. Settable, of a point that was made at a distance."""
+        return self._freedoms["distance"].value if "distance" in self._freedoms else 0.0
+
+    @distance.setter
+    def distance(self, value: float | None) -> None:
+        self._away().value = value
+
+    @property
+    def distance_limits(self) -> Bounds | None:
+        """(lower, upper) of distance; either may be None; None without limits. Settable, as `distance` is."""
+        return self._freedoms["distance"].limits if "distance" in self._freedoms else None
+
+    @distance_limits.setter
+    def distance_limits(self, value: Range) -> None:
+        self._away().limits = value
+
+    def _away(self) -> Freedom:
+        """The distance as a freedom."""
+        if "distance" not in self._freedoms:
+            raise InputError(f"{self.name!r} was made for a point on the line; expected one made with a distance")
+        return self._freedoms["distance"]
 
 
 class PointOnPlane(Joint):
@@ -43,10 +101,10 @@ class PointOnPlane(Joint):
 
     Parameters
     ----------
-    point : Point, Frame or Body
-        Of a frame or a body its origin.
-    frame : Frame or Body
-        Its z axis is the plane's normal.
+    point : Point, vertex, sphere or circle; Frame or Body
+        Of a sphere or a circle its center, of a frame or a body its origin.
+    frame : Frame or Body, or a flat face
+        Its z axis is the plane's normal, of a face the outward one.
     offset : float
         Height of the point along z_a.
     """
@@ -63,7 +121,7 @@ class PointOnPlane(Joint):
     def __init__(
         self,
         point: SidePoint,
-        frame: Side,
+        frame: Side | PlaneLike,
         name: str | None = None,
         *,
         offset: float = 0.0,
@@ -72,7 +130,7 @@ class PointOnPlane(Joint):
         x_limits: Range = None,
         y_limits: Range = None,
     ) -> None:
-        super().__init__(frame, point, name, x=(x, x_limits), y=(y, y_limits))
+        super().__init__(_of_feature(frame, plane_frame), point, name, x=(x, x_limits), y=(y, y_limits))
         self.offset = offset
         self._own = (Equation(((1.0, self._coordinate(*ALONG)),), (self, "offset")),)
 
@@ -82,8 +140,8 @@ class Distance(Joint):
 
     Parameters
     ----------
-    point_a, point_b : Point, Frame or Body
-        Of a frame or a body its origin.
+    point_a, point_b : Point, vertex, sphere or circle; Frame or Body
+        Of a sphere or a circle its center, of a frame or a body its origin.
     value : float, optional
         Above zero; points that coincide are `Spherical`.
     limits : (lower, upper), optional

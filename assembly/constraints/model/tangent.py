@@ -1,14 +1,21 @@
-"""Tangent: two faces touch at a point, with the side said."""
+"""Tangent: two faces have one tangent plane where they touch, with the side said.
+
+Of two elementary faces it has rows between planes, axes and centers, of others it is a contact: the class chooses.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.model.constraint import Constraint, Equation
 from assembly.constraints.model.contact import Contact, side_face
-from assembly.constraints.model.mate_features import one_feature
+from assembly.constraints.model.elementary_tangents import check_fit, touching_rows
+from assembly.constraints.model.joint import Joint
+from assembly.constraints.model.mate_features import Mate, one_feature
 from assembly.errors import InputError
 from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.smooth_faces import has_creases
@@ -17,18 +24,23 @@ from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.extrema.pairs import PairStatus, extremal_pair
 from assembly.selection.faces import Faces
 
-__all__ = ["Tangent"]
+__all__ = ["ContactTangent", "SurfaceTangent", "Tangent"]
 
 Array = NDArray[np.float64]
+Side = Literal["outside", "inside"]
+Touch = Literal["line", "point"]
 # Samples of each surface along either parameter, and pairs of them from which an extremal pair is looked for.
 _GRID, _TRIED = 16, 8
 
 
-class Tangent(Contact):
-    """Two faces touch somewhere, and have one tangent plane there: takes away 1 degree of freedom.
+class Tangent(Constraint):
+    """Two faces touch, and have one tangent plane there: takes away 1 degree of freedom, more along lines and circles.
 
-    A `Contact` of two faces, with the side on which they touch. Like a contact it means the pair that it tracks, from
-    where the solve starts. Surfaces count whole, also where faces are trimmed; a `TrimContact` keeps the point inside.
+    Planes, cylinders, cones and spheres count whole, to where their surfaces go on: they are held by the distances of
+    planes, axes and centers. A cylinder on a plane, or a cone, lies on it along a line, and takes away 2; on a parallel
+    cylinder 3. Other faces, those that touch in a point, and `unilateral` ones are a `Contact`, with the side on which
+    they touch: it means the pair that it tracks, from where the solve starts, and is held on the surfaces, not within
+    their trims. To hold it there add a `TrimContact`, or ask for a `Contact` with edges.
 
     Parameters
     ----------
@@ -41,14 +53,41 @@ class Tangent(Contact):
         pin in a wider bore. Inside: the normals are one, the bodies are on the same side, as two drums in one band.
     unilateral : bool
         gap >= 0 instead of gap = 0.
+    touch : "line" or "point", optional
+        How two cylinders touch: along a line, with parallel axes, by default; or in a point, as crossed ones do.
 
     Raises
     ------
     InputError
-        An unknown side, a selection that is not a single face, both faces on one body.
+        An unknown side, a selection that is not a single face, both faces on one body, two planes, a `touch` that the
+        faces have not, a ball or a pin that is wider than the bore it is in.
     TypeError
         Something else than a face.
     """
+
+    _side: Side
+    _faces: tuple[BodyFace, BodyFace]
+
+    def __new__(
+        cls,
+        a: Any = None,
+        b: Any = None,
+        name: str | None = None,
+        *,
+        side: str = "outside",
+        unilateral: bool = False,
+        touch: Touch | None = None,
+    ) -> Tangent:
+        """Choose by the faces; see the class."""
+        if cls is not Tangent:
+            # What is copied.
+            made: Tangent = object.__new__(cls)
+            return made
+        one, other = one_feature(a), one_feature(b)
+        exact = isinstance(one, BodyFace) and isinstance(other, BodyFace) and touch != "point" and not unilateral
+        has_rows = exact and touching_rows(one, other, True) is not None
+        chosen: Tangent = object.__new__(SurfaceTangent if has_rows else ContactTangent)
+        return chosen
 
     def __init__(
         self,
@@ -56,33 +95,120 @@ class Tangent(Contact):
         b: BodyFace | Faces,
         name: str | None = None,
         *,
-        side: Literal["outside", "inside"] = "outside",
+        side: Side = "outside",
         unilateral: bool = False,
+        touch: Touch | None = None,
     ) -> None:
-        one, other = _face("a", a), _face("b", b)
-        if not isinstance(side, str) or side not in ("outside", "inside"):
-            raise InputError(f"side is {side!r}; expected 'outside' or 'inside'")
-        said = f"tangent {one.body.name}-{other.body.name}" if name is None else name
-        # Those with creases are cut into smooth ones, which only edges join.
-        edges = None if has_creases(one.face) or has_creases(other.face) else False
-        super().__init__(one, other if side == "outside" else _turned(other), said, unilateral, edges=edges)
-        self._side = side
-        self._given = one, other
+        raise NotImplementedError  # one of the two below is made
 
     @property
-    def side(self) -> Literal["outside", "inside"]:
+    def side(self) -> Side:
         """Whether the outward normals oppose each other where they touch, or are one."""
         return self._side
 
     @property
     def faces(self) -> tuple[BodyFace, BodyFace]:
         """The two faces as they were given."""
-        return self._given
+        return self._faces
+
+    @property
+    def touch(self) -> Touch | None:
+        """Whether two cylinders touch along a line or in a point; None of other faces, which leave no choice."""
+        if {face.kind for face in self._faces} != {"cylinder"} or self._is_one_sided:
+            return None
+        return "line" if isinstance(self, SurfaceTangent) else "point"
+
+    @property
+    def _is_one_sided(self) -> bool:
+        return isinstance(self, Contact) and self.unilateral
+
+    @property
+    def _removes(self) -> int:
+        """How many degrees of freedom it takes away."""
+        return sum(not row.one_sided for row in self._own) if isinstance(self, SurfaceTangent) else 1
+
+    def _take(
+        self, a: Any, b: Any, name: str | None, side: Side, touch: Any, unilateral: bool
+    ) -> tuple[BodyFace, BodyFace, str]:
+        """Check what was given, and keep it; the faces and the name."""
+        one, other = _face("a", a), _face("b", b)
+        if not isinstance(side, str) or side not in ("outside", "inside"):
+            raise InputError(f"side is {side!r}; expected 'outside' or 'inside'")
+        kinds = one.kind, other.kind
+        if set(kinds) == {"plane"}:
+            raise InputError(f"a and b are {one!r} and {other!r}, two planes; expected Flush for them")
+        if touch is not None:
+            if unilateral or set(kinds) != {"cylinder"}:
+                what = "a one-sided tangent" if unilateral else f"a {kinds[0]} and a {kinds[1]}"
+                raise InputError(f"touch is {touch!r} of {what}; expected it of two cylinders alone")
+            if not isinstance(touch, str) or touch not in ("line", "point"):
+                raise InputError(f"touch is {touch!r}; expected 'line' or 'point'")
+        self._side = side
+        self._faces = one, other
+        return one, other, f"tangent {one.body.name}-{other.body.name}" if name is None else name
+
+    def __repr__(self) -> str:
+        one_sided = ", unilateral=True" if self._is_one_sided else ""
+        touch = "" if self.touch is None else f", touch={self.touch!r}"
+        settings = f"name={self.name!r}, side={self.side!r}{one_sided}{touch}"
+        count = f"takes away {self._removes} of 6 degrees of freedom"
+        return f"Tangent({self.faces[0]!r}, {self.faces[1]!r}, {settings}; {count})"
+
+
+class SurfaceTangent(Tangent, Mate, Joint):
+    """Two elementary faces, by rows between their planes, axes and centers."""
+
+    _sides = ("a", "b")
+
+    def __init__(
+        self,
+        a: BodyFace | Faces,
+        b: BodyFace | Faces,
+        name: str | None = None,
+        *,
+        side: Side = "outside",
+        unilateral: bool = False,
+        touch: Touch | None = None,
+    ) -> None:
+        one, other, said = self._take(a, b, name, side, touch, unilateral)
+        check_fit(one, other, side == "outside")
+        found = touching_rows(one, other, side == "outside")
+        assert found is not None, "the faces have rows"
+        Joint.__init__(self, found.frame_a, found.frame_b, said, found.axes)
+        self._given = {"a": one, "b": other}
+        rows = []
+        for k, row in enumerate(found.rows):
+            setattr(self, f"_value_{k}", row.value)
+            terms = tuple((factor, self._coordinate(*which)) for factor, which in row.terms)
+            rows.append(Equation(terms, (self, f"_value_{k}") if row.value else None, row.one_sided))
+        self._own = tuple(rows)
+
+    def _shared(self) -> Iterable[object]:
+        return *super()._shared(), *self._faces
+
+
+class ContactTangent(Tangent, Contact):
+    """Two faces by the pair of points at which they touch."""
+
+    def __init__(
+        self,
+        a: BodyFace | Faces,
+        b: BodyFace | Faces,
+        name: str | None = None,
+        *,
+        side: Side = "outside",
+        unilateral: bool = False,
+        touch: Touch | None = None,
+    ) -> None:
+        one, other, said = self._take(a, b, name, side, touch, unilateral)
+        # Those with creases are cut into smooth ones, which only edges join.
+        edges = None if has_creases(one.face) or has_creases(other.face) else False
+        Contact.__init__(self, one, other if side == "outside" else _turned(other), said, unilateral, edges=edges)
 
     @property
     def removes(self) -> int:
-        """How many degrees of freedom it takes away."""
-        return 1
+        """How many degrees of freedom it takes away; one-sided, none while it is open."""
+        return self._removes
 
     def start_at(self, q_a: Array, q_b: Array) -> Array | None:
         """Parameters (4,) of an extremal pair whose outward normals oppose each other, near the ones that nearly do.
@@ -111,11 +237,6 @@ class Tangent(Contact):
             if f @ g < 0.0:
                 return pair.parameters
         return None
-
-    def __repr__(self) -> str:
-        one_sided = ", unilateral=True" if self.unilateral else ""
-        settings = f"name={self.name!r}, side={self.side!r}{one_sided}"
-        return f"Tangent({self.faces[0]!r}, {self.faces[1]!r}, {settings}; takes away 1 of 6 degrees of freedom)"
 
 
 def _sampled(face: Face, q: Array) -> tuple[Array, Array, Array]:

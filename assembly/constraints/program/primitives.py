@@ -8,6 +8,7 @@
     TURN              atan2(y_a.x_b - x_a.y_b, x_a.x_b + y_a.y_b), the turn of b about z_a
     AZIMUTH l         atan2(y_a.v, x_a.v), v the axis l of b
     ANGLE             theta
+    RADIUS            |d - (z_a.d) z_a|, how far the origin of b is from the z axis of a
 
 Turns u (with f) and v (with g) change u.v by (w_g - w_f).(v x u). So a coordinate of angles has the gradient (-h, h)
 in the angular velocities, and its second derivative is K in (f, f) and (g, g) and [h]x / 2 - K in (f, g), with a
@@ -26,7 +27,7 @@ from assembly.geometry.vec import add, blend, cross, dot, matvec, scale, sub
 from assembly.kinematics.motion import rotation
 from assembly.proximity.extrema.rates import load_row, put_row
 
-COINCIDENT, SLIDE, DISTANCE, DOT, SWING, TURN, AZIMUTH, ANGLE = 0, 1, 2, 3, 4, 5, 6, 7
+COINCIDENT, SLIDE, DISTANCE, DOT, SWING, TURN, AZIMUTH, ANGLE, RADIUS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 # A coordinate's value, and n, arm_f, arm_g, h of its gradient -(n, arm_f x n + h), (n, arm_g x n + h).
 Coordinate = namedtuple("Coordinate", "value n arm_f arm_g h")
 # What `swing` says of a SWING; its names are those of the formulas there, `rate` is phi', `second` phi'' u.z_b.
@@ -54,7 +55,10 @@ RECORD = size_of(JOINT_FRAMES)
 
 # A vector shorter than this is rounding, and so is its direction.
 UNDEFINED = 1e-12
-# The least distance, and sine of an angle, by which the curvatures of DISTANCE and ANGLE are divided.
+# The same across an axis: less than a tolerance of a solve, so that a ball that is drawn onto the axis of a funnel, to
+# where it touches all around, comes there. Roundings of coordinates of size one are a hundredth of it.
+ON_AXIS = 1e-14
+# The least distance, and sine of an angle, by which the curvatures of DISTANCE, RADIUS and ANGLE are divided.
 LEAST_DIVISOR = 1e-6
 # The same for SWING where the axes are opposed: its gradient grows there, too.
 OPPOSED = 1e-3
@@ -96,6 +100,22 @@ def distance_direction(records, k):
     n = load_row(records, k, AXES_A + 6)
     if length > UNDEFINED:
         n = scale(1.0 / length, d)
+    return length, n
+
+
+@kernel(inline=True)
+def radial_direction(records, k):
+    """How far the origin of b is from the z axis of a, and the unit vector that points there from the axis."""
+    d = load_row(records, k, APART)
+    axis = load_row(records, k, AXES_A)
+    side = load_row(records, k, AXES_A + 3)
+    # By the two slides across: what d has along the axis may be longer by far.
+    x = dot(axis, d)
+    y = dot(side, d)
+    length = math.sqrt(x * x + y * y)
+    n = axis
+    if length > ON_AXIS:
+        n = blend(x / length, axis, y / length, side)
     return length, n
 
 
@@ -198,6 +218,10 @@ def coordinate(kind, component, records, k, near):
     elif kind == ANGLE:
         c, s, h = tilt(records, k)
         value = math.atan2(s, c)
+    elif kind == RADIUS:
+        # The slide along a direction that turns with f.
+        value, n = radial_direction(records, k)
+        d = load_row(records, k, APART)
     else:
         value, n = distance_direction(records, k)
     # `records` is used last where the branches meet: else Numba counts references to it, which costs half a row.
@@ -271,13 +295,49 @@ def add_stretch(hessian, a, b, r, t, n, w):
     add_block(hessian, a + 3, b + 3, general(scale(-w, t), r, scale(-w, rn), tn, ZERO, w * dot(r, t)))
 
 
+@kernel(inner=True)
+def add_slope(hessian, a, b, r, t, n, w):
+    """w (n.dp) (n.dp') for the rates dp, dp' of points at arms r, t of the twists at a, b (a <= b)."""
+    rn = scale(w, cross(r, n))
+    tn = cross(t, n)
+    wn = scale(w, n)
+    add_block(hessian, a, b, general(wn, n, ZERO, ZERO, ZERO, 0.0))
+    add_block(hessian, a, b + 3, general(wn, tn, ZERO, ZERO, ZERO, 0.0))
+    if a < b:
+        add_block(hessian, a + 3, b, general(rn, n, ZERO, ZERO, ZERO, 0.0))
+    add_block(hessian, a + 3, b + 3, general(rn, tn, ZERO, ZERO, ZERO, 0.0))
+
+
+@kernel(inner=True)
+def add_around(records, k, y, hessian, f, g):
+    """The part of the second derivative of RADIUS that its direction has: the square of the slide around the axis."""
+    length, n = radial_direction(records, k)
+    around = cross(load_row(records, k, AXES_A + 6), n)
+    arm_f = add(load_row(records, k, ARM_A), load_row(records, k, APART))
+    arm_g = load_row(records, k, ARM_B)
+    w = y / max(length, LEAST_DIVISOR)
+    if f >= 0:
+        add_slope(hessian, f, f, arm_f, arm_f, around, w)
+    if g >= 0:
+        add_slope(hessian, g, g, arm_g, arm_g, around, w)
+    if f >= 0 and g >= 0:
+        if f < g:
+            add_slope(hessian, f, g, arm_f, arm_g, around, -w)
+        else:
+            add_slope(hessian, g, f, arm_g, arm_f, around, -w)
+
+
 @kernel(inline=True)
 def add_point_terms(kind, component, records, k, y, hessian, f, g):
-    """`add_coordinate_hessian` of COINCIDENT, SLIDE and DISTANCE."""
+    """`add_coordinate_hessian` of COINCIDENT, SLIDE, RADIUS and DISTANCE."""
     arm_f = load_row(records, k, ARM_A)
     arm_g = load_row(records, k, ARM_B)
-    if kind == SLIDE:
-        n = scale(y, load_row(records, k, AXES_A + 3 * component))
+    if kind == SLIDE or kind == RADIUS:
+        n = load_row(records, k, AXES_A + 3 * component)
+        if kind == RADIUS:
+            _length, n = radial_direction(records, k)
+            add_around(records, k, y, hessian, f, g)
+        n = scale(y, n)
         arm_f = add(arm_f, load_row(records, k, APART))
         if f >= 0:
             # The axis turns with f: n.(x_g + arm_g - x_f), the rest of d being fixed to it.
@@ -365,7 +425,7 @@ def turning_form(kind, component, records, k):
 @kernel(inner=True)
 def add_coordinate_hessian(kind, component, records, k, y, hessian, f, g):
     """Upper triangle of hessian += y (second derivative of a coordinate), twists at f.. and g.., negative: fixed."""
-    if kind == COINCIDENT or kind == SLIDE or kind == DISTANCE:
+    if kind == COINCIDENT or kind == SLIDE or kind == DISTANCE or kind == RADIUS:
         add_point_terms(kind, component, records, k, y, hessian, f, g)
     elif f >= 0 or g >= 0:
         form = turning_form(kind, component, records, k)

@@ -32,13 +32,13 @@ _HALVINGS = 20
 _WEIGHT = 1e-2
 
 
-def boundary_patches(face: Face, patches: PatchBlock) -> Iterator[PatchBlock]:
-    """The boundary curves of a face with these patches, a block a part."""
+def boundary_patches(face: Face, patches: PatchBlock, only: int | None = None) -> Iterator[PatchBlock]:
+    """The boundary curves of a face with these patches, or one of them by its number, a block a part."""
     surface = face.surface
     at = surface.breaks()
     curves = face.boundary
     pieces = [curve.bezier_pieces() for curve in curves]
-    for number, low, high, middle in _parts(face):
+    for number, low, high, middle in _parts(face, only):
         breaks = curves[number].breaks()
         span = min(max(int(np.searchsorted(breaks, 0.5 * (low + high), "right")) - 1, 0), len(breaks) - 2)
         whole = breaks[span + 1] - breaks[span]
@@ -53,7 +53,7 @@ def boundary_patches(face: Face, patches: PatchBlock) -> Iterator[PatchBlock]:
             yield PatchBlock(points.net[None, :, None], spans, patches.face, number, face.sign, False, error)
 
 
-def _parts(face: Face) -> Iterator[tuple[int, float, float, Array]]:
+def _parts(face: Face, only: int | None) -> Iterator[tuple[int, float, float, Array]]:
     """Parts of boundary curves that stay on one patch: number of the curve, its interval, and a point inside it."""
     trim = face._boundary.table
     links, bounds = trim.rows()
@@ -62,6 +62,8 @@ def _parts(face: Face) -> Iterator[tuple[int, float, float, Array]]:
     count = int(trim.table[3])
     for k in range(count):
         piece, ends = links[k], bounds[k]
+        if only is not None and int(piece.curve) != only:
+            continue
         shift = np.array([ends.shift_u, ends.shift_v])
         begin, end = ends.start - shift, ends.end - shift
         times = [float(ends.t0), float(ends.t1)]

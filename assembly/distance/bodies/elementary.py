@@ -33,6 +33,12 @@ def spine_row(block: PatchBlock, face: Face, center: Array) -> Array | None:
     center : (3,)
         What was subtracted from its points.
     """
+    if block.curve == NONE and not np.ptp(face.surface.control_points.reshape(-1, 3), axis=0).any():
+        # A point is a ball of no radius.
+        row = np.zeros(SPINE_SIZE)
+        spine = spine_at(row, 0)
+        spine.kind, spine.center, spine.axis, spine.off = SPHERE, block.nets[0, 0, 0, :3], (0.0, 0.0, 1.0), block.error
+        return row
     if block.curve == NONE and _is_free(block, face, center):
         return None
     surface_form = elementary_form(face.surface) if block.curve == NONE else None

@@ -32,7 +32,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.bezier_packing import degree_tables
 from assembly.geometry.splines.bezier_pieces import UNIT
 
-__all__ = ["KeptTree", "tree_of"]
+__all__ = ["KeptTree", "tree_of", "tree_of_boundary"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -100,14 +100,27 @@ def _tables(degree: int) -> Array:
 @lru_cache(maxsize=256)
 def tree_of(faces: tuple[Face, ...]) -> KeptTree:
     """The tree of a body with these faces."""
+    center, half = _box_of(faces)
+    blocks = [patches_of(face, number, center) for number, face in enumerate(faces)]
+    blocks += [curves for block in blocks if block.trimmed for curves in boundary_patches(faces[block.face], block)]
+    return _planted(faces, blocks, center, half)
+
+
+@lru_cache(maxsize=256)
+def tree_of_boundary(face: Face, curve: int) -> KeptTree:
+    """The tree of one of the curves that bound a face, by its number."""
+    center, half = _box_of((face,))
+    blocks = boundary_patches(face, patches_of(face, 0, center), curve)
+    return _planted((face,), list(blocks), center, half)
+
+
+def _box_of(faces: Sequence[Face]) -> tuple[Array, Array]:
+    """Center and half extents of the box around all control points."""
     low, high = faces[0].surface.bounding_box()
     for face in faces[1:]:
         lower, upper = face.surface.bounding_box()
         low, high = np.minimum(low, lower), np.maximum(high, upper)
-    center = 0.5 * low + 0.5 * high
-    blocks = [patches_of(face, number, center) for number, face in enumerate(faces)]
-    blocks += [curves for block in blocks if block.trimmed for curves in boundary_patches(faces[block.face], block)]
-    return _planted(faces, blocks, center, 0.5 * (high - low))
+    return 0.5 * low + 0.5 * high, 0.5 * (high - low)
 
 
 def _planted(faces: Sequence[Face], blocks: list[PatchBlock], center: Array, half: Array) -> KeptTree:

@@ -5,9 +5,11 @@ With d = p_b - p_a and unit axes of frames a and b, rows of one coordinate are
     coinciding points, slides, dot products    as they are,
     SWING k     axis_k(a).z_b sqrt(2 / (1 + z_a.z_b)), of length 2 sin(theta / 2): zero only where z_b = z_a,
     DISTANCE    (|d|^2 - t^2) / (2 t),         t the value asked for,
+    RADIUS      ((x_a.d)^2 + (y_a.d)^2 - t^2) / (2 t),
     ANGLE       (cos t - z_a.z_b) / sin t,
 
-which have the gradients of the coordinates wherever they hold, so that multipliers compare. An angle in a plane, of
+which have the gradients of the coordinates wherever they hold, so that multipliers compare; a RADIUS beside another
+coordinate is the root that it means. An angle in a plane, of
 sine part S and cosine part C, is a variable t with
 
     atan2(S cos t - C sin t, C cos t + S sin t) = 0,
@@ -29,7 +31,17 @@ from assembly.constraints.model.constraint import Constraint, Coordinate, RowCon
 from assembly.constraints.model.contact import Contact
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.packing.scene import Packed
-from assembly.constraints.program.primitives import ANGLE, AZIMUTH, COINCIDENT, DISTANCE, DOT, SLIDE, SWING, TURN
+from assembly.constraints.program.primitives import (
+    ANGLE,
+    AZIMUTH,
+    COINCIDENT,
+    DISTANCE,
+    DOT,
+    RADIUS,
+    SLIDE,
+    SWING,
+    TURN,
+)
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import retract
@@ -92,6 +104,11 @@ class _Frames(NamedTuple):
     def cosine(self) -> ca.MX:
         """z_a . z_b."""
         return ca.dot(self.a[:, 2], self.b[:, 2])
+
+    @property
+    def across(self) -> ca.MX:
+        """p_b - p_a along x_a and y_a."""
+        return self.a[:, :2].T @ self.apart
 
     def linear(self, coordinate: Coordinate) -> ca.MX:
         """A coordinate that is a row as it is."""
@@ -193,9 +210,12 @@ class Rows:
                 # No joint drives a swing: the value is zero.
                 across = ca.dot(frames.a[:, coordinate.component], frames.b[:, 2])
                 total += factor * ca.sqrt(2 / (1 + frames.cosine)) * across
-            elif kind == DISTANCE:
+            elif kind == DISTANCE or (kind == RADIUS and len(row.places) == 1):
                 t = value / factor
-                return factor * (ca.sumsqr(frames.apart) - t**2) / (2 * t)
+                away = frames.apart if kind == DISTANCE else frames.across
+                return factor * (ca.sumsqr(away) - t**2) / (2 * t)
+            elif kind == RADIUS:
+                total += factor * self._scale / row.unit * ca.norm_2(frames.across)
             elif kind == ANGLE and len(row.places) == 1:
                 t = value / factor
                 return factor * (ca.cos(t) - frames.cosine) / ca.sin(t)
@@ -244,9 +264,10 @@ class Rows:
                 cosine = float(frames.a[:, 2] @ frames.b[:, 2])
                 # The only dot product of joints is that of the z axes.
                 turns = cosine < -_STEEP if kind == SWING else kind in (DOT, ANGLE) and abs(cosine) > _STEEP
-                parts = kind == DISTANCE and float(np.linalg.norm(frames.apart)) < _FLAT * self._scale
+                parts = kind in (DISTANCE, RADIUS) and measure(coordinate, frames) < _FLAT * self._scale
                 if turns or parts:
-                    twist = [parts * self._scale * frames.a[:, 2], turns * frames.a[:, 1]]
+                    away = frames.a[:, 0 if kind == RADIUS else 2]
+                    twist = [parts * self._scale * away, turns * frames.a[:, 1]]
                     self._move(q, places, _NUDGE * np.concatenate(twist))
         return q
 

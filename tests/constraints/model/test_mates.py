@@ -6,6 +6,7 @@ import copy
 import pickle
 from math import nan
 
+import numpy as np
 import pytest
 
 import assembly as asm
@@ -39,7 +40,7 @@ ALL = [(count, mate) for count, mates in MATES.items() for mate in mates]
 
 @pytest.mark.parametrize(("count", "mate"), ALL, ids=lambda value: type(value).__name__)
 def test_each_names_what_it_takes_away(count, mate):
-    kind = type(mate)
+    kind = asm.Tangent if isinstance(mate, asm.Tangent) else type(mate)
     assert mate.removes == count and f"takes away {count} " in repr(mate)
     assert f"takes away {count} degree" in kind.__doc__ or kind is asm.Group
     word = kind.__name__.lower()
@@ -187,3 +188,35 @@ def test_bad_input_is_named_with_what_came_and_what_was_expected(case):
     with pytest.raises(errors) as caught:
         call()
     assert text in str(caught.value)
+
+
+def test_joints_of_points_take_what_has_a_center():
+    corner, rim = PLATE.vertices(">X and >Y and >Z"), BOLT.edges.of(SHANK).circles()[:1]
+    made = asm.Distance(corner, rim, 3.0)
+    assert np.array_equal(made.frame_a.origin, corner.one().center)
+    assert np.array_equal(made.frame_b.origin, rim.one().center)
+    assert np.array_equal(asm.Spherical(BALL.face(), corner).frame_a.origin, BALL.face().center)
+    beside = asm.PointOnLine(BALL.face(), HOLE, distance=2.0)
+    assert beside.frame_a.body is PLATE and np.array_equal(beside.frame_a.axes[:, 2], HOLE.axis)
+    above = asm.PointOnPlane(rim, PLATE.faces(">Z"), offset=2.0)
+    assert np.array_equal(above.frame_a.axes[:, 2], PLATE.face("top").normal)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "text"),
+    [
+        (lambda: asm.Distance(PLATE.face("top"), BALL.face(), 2.0), InputError, "a plane; expected a point of a body"),
+        (
+            lambda: asm.PointOnLine(BALL.face(), PLATE.face("top")),
+            InputError,
+            "frame is plate.*a plane; expected a c",
+        ),
+        (lambda: asm.PointOnPlane(BALL.face(), HOLE), InputError, "frame is plate.*a cylinder; expected a flat face"),
+        (lambda: asm.PointOnPlane(PLATE.face("top"), BALL.frame()), InputError, "point is plate.*a plane; expected a"),
+        (lambda: asm.Revolute(HOLE, SHANK), TypeError, r"expected a frame, body.frame\(...\) or face.frame\(\), or a"),
+        (lambda: asm.Distance(PLATE.vertices, BALL.face(), 2.0), InputError, "plate.vertices is .* vertices"),
+    ],
+)
+def test_features_that_are_no_points(call, error, text):
+    with pytest.raises(error, match=text):
+        call()

@@ -20,8 +20,9 @@ COORDINATES = [
     (P.TURN, 0),
     *((P.AZIMUTH, k) for k in range(3)),
     (P.ANGLE, 0),
+    (P.RADIUS, 0),
 ]
-TURNING = [(kind, component) for kind, component in COORDINATES if kind >= P.DOT]
+TURNING = [(kind, component) for kind, component in COORDINATES if P.DOT <= kind <= P.ANGLE]
 every_coordinate = pytest.mark.parametrize(("kind", "component"), COORDINATES)
 # From z_a to z_b. SWING is a series below arccos(1 - SERIES) = 0.04472.
 SWINGS = [1e-9, 1e-3, 0.0447, 0.0448, 1.5, 3.0, math.pi - 0.02]
@@ -105,6 +106,8 @@ def workspace(kind, component, records):
     v = records[1, P.AXES_B + 6 : P.AXES_B + 9]
     if kind == P.DISTANCE:
         return min(1.0, np.linalg.norm(records[1, P.APART :]))
+    if kind == P.RADIUS:
+        return min(1.0, np.linalg.norm(np.cross(z, records[1, P.APART :])))
     if kind in (P.SWING, P.TURN):
         return min(1.0, np.linalg.norm(z + v))
     if kind == P.AZIMUTH:
@@ -287,7 +290,7 @@ def test_a_swing_beside_opposed_axes_keeps_its_value_and_bounds_its_gradient(the
         np.testing.assert_allclose(away, [-math.sin(heading), math.cos(heading), 0.0], rtol=0, atol=2e-6)
 
 
-DEGENERATE = [(P.DISTANCE, 0), (P.SWING, 0), (P.SWING, 1), (P.TURN, 0), (P.AZIMUTH, 2), (P.ANGLE, 0)]
+DEGENERATE = [(P.DISTANCE, 0), (P.RADIUS, 0), (P.SWING, 0), (P.SWING, 1), (P.TURN, 0), (P.AZIMUTH, 2), (P.ANGLE, 0)]
 
 
 @pytest.mark.parametrize(("kind", "component"), DEGENERATE)
@@ -465,3 +468,23 @@ def test_compiled_and_plain_python_agree(swing):
             np.testing.assert_allclose(jacobian[r], gradient(kind, component, plain), rtol=0, atol=1e-14 * scale)
             np.testing.assert_allclose(second[r], expected, rtol=0, atol=1e-13 * scale)
     assert np.isfinite(values).all() and np.isfinite(jacobian).all()
+
+
+def test_a_radius_of_zero():
+    """Toward x_a where there is no direction, as what a point leaves the axis along; a bounded curvature around it."""
+    for away in (0.0, 1e-300, 1e-15):
+        records = record(apart=(0.0, -away, 0.7))
+        assert value(P.RADIUS, 0, records, 0) == pytest.approx(away, abs=1e-160)
+        np.testing.assert_array_equal(gradient(P.RADIUS, 0, records, 0)[6:9], [1.0, 0.0, 0.0])
+        second = hessian(P.RADIUS, 0, records, 0)
+        np.testing.assert_allclose(second[6:9, 6:9], np.diag([0.0, 1.0, 0.0]) / P.LEAST_DIVISOR, rtol=1e-15)
+
+
+@pytest.mark.parametrize("away", [1e-9, 1e-5, 0.3])
+def test_a_radius_has_the_direction_across_the_axis(away):
+    records = record(apart=(0.6 * away, -0.8 * away, 2.0))
+    assert value(P.RADIUS, 0, records, 0) == pytest.approx(away, rel=1e-15)
+    np.testing.assert_allclose(gradient(P.RADIUS, 0, records, 0)[6:9], [0.6, -0.8, 0.0], rtol=0, atol=4e-16)
+    second = hessian(P.RADIUS, 0, records, 0)[6:9, 6:9]
+    around = np.array([0.8, 0.6, 0.0])
+    np.testing.assert_allclose(second * max(away, P.LEAST_DIVISOR), np.outer(around, around), rtol=0, atol=1e-15)

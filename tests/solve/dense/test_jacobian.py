@@ -52,6 +52,7 @@ def everything(rng):
         asm.Distance(bodies[3], bodies[5].point(0.1, 0.2, 0.3), 1.0),
         asm.Angle(*between(1, 5), 1.0),
         asm.PointOnLine(*between(2, 0)),
+        asm.PointOnLine(*between(3, 4), distance=0.3),
         asm.PointOnPlane(*between(6, 3), offset=0.1),
         asm.Gear(hinge, asm.Revolute(*between(2, 1)), -2.5),
         asm.RackPinion(hinge, slider, 0.3),

@@ -189,6 +189,15 @@ def test_what_a_joint_leaves_free(joint, dof):
     assert mobility.dof == mobility.grubler == dof and mobility.redundant == []
 
 
+def test_a_point_at_a_distance_from_a_line_takes_one():
+    ground, body = asm.Body("ground", fixed=True), asm.Body("body", position=(1, 2, 3))
+    scene = asm.Assembly([ground, body])
+    scene.constrain(asm.PointOnLine(body, ground.frame((1, 0, 0)), "it", distance=2.0))
+    mobility = scene.mobility()
+    check(scene, mobility)
+    assert mobility.dof == mobility.grubler == 5 and mobility.redundant == []
+
+
 def test_free_motions_are_readable():
     ground, shaft = asm.Body("ground", fixed=True), asm.Body("shaft", position=(1, 2, 3))
     scene = asm.Assembly([ground, shaft])
