@@ -52,6 +52,10 @@ if TYPE_CHECKING:
     from assembly.constraints.model.placements import PointOnPlane as PointOnPlane
     from assembly.constraints.model.tangent import Tangent as Tangent
     from assembly.constraints.model.trim_contact import TrimContact as TrimContact
+    from assembly.derivatives.implicit import sensitivity as sensitivity
+    from assembly.derivatives.measure import Measure as Measure
+    from assembly.derivatives.parameter import Parameter as Parameter
+    from assembly.derivatives.result import Sensitivity as Sensitivity
     from assembly.files.gltf import write_gltf as write_gltf
     from assembly.files.robot import Robot as Robot
     from assembly.files.stl import write_stl as write_stl
@@ -66,6 +70,7 @@ if TYPE_CHECKING:
     from assembly.geometry.splines.surface import NurbsSurface as NurbsSurface
     from assembly.kinematics.body import Body as Body
     from assembly.kinematics.ellipsoid import Ellipsoid as Ellipsoid
+    from assembly.kinematics.parametric import Parametric as Parametric
     from assembly.kinematics.pose import Pose as Pose
     from assembly.proximity.extrema.pairs import ContactPair as ContactPair
     from assembly.proximity.manager.events import Event as Event
@@ -131,9 +136,12 @@ else:
             "Loop": "assembly.geometry.faces.loop",
             "Manager": "assembly.tracking.manager",
             "Mobility": "assembly.solve.diagnosis.mobility",
+            "Measure": "assembly.derivatives.measure",
             "NurbsCurve": "assembly.geometry.splines.curve",
             "NurbsSurface": "assembly.geometry.splines.surface",
             "Parallel": "assembly.constraints.model.joints",
+            "Parameter": "assembly.derivatives.parameter",
+            "Parametric": "assembly.kinematics.parametric",
             "Perpendicular": "assembly.constraints.model.joints",
             "Planar": "assembly.constraints.model.joints",
             "PointDistance": "assembly.constraints.model.objectives",
@@ -147,6 +155,7 @@ else:
             "Robot": "assembly.files.robot",
             "Screw": "assembly.constraints.model.joints",
             "SecondOrder": "assembly.solve.second_order.classification",
+            "Sensitivity": "assembly.derivatives.result",
             "Solution": "assembly.solve.solution",
             "Spherical": "assembly.constraints.model.joints",
             "Status": "assembly.solve.scene",
@@ -176,6 +185,7 @@ else:
             "read_step": "assembly.step",
             "read_urdf": "assembly.files.urdf_reader",
             "reference": "assembly.solve.oracle.reference",
+            "sensitivity": "assembly.derivatives.implicit",
             "shapes": "assembly.geometry.shapes",
             "statics": "assembly.solve.forces.statics",
             "tip_jacobian": "assembly.solve.forces.end_effector",

@@ -29,7 +29,7 @@ from assembly.constraints.model.constraint import (
 )
 from assembly.constraints.program.primitives import COINCIDENT, SLIDE, SWING
 from assembly.errors import InputError, bounded
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body, Frame, OpposedFrame, Point
 from assembly.kinematics.pose import rotation_matrix
 
 __all__ = ["Axes", "Driven", "Joint", "Limits", "Offset", "Sense", "Side", "SidePoint"]
@@ -59,11 +59,6 @@ def _frame(name: str, side: Any, takes_point: bool) -> Frame:
         return side.body.frame(at=side.coordinates)
     expected = "a point, a frame or a body" if takes_point else "a frame, body.frame(...), or a body"
     raise TypeError(f"{name} is {side!r}; expected {expected}")
-
-
-def _opposed(frame: Frame) -> Frame:
-    axes = frame.axes * np.array([1.0, -1.0, -1.0])
-    return Frame(frame.body, frame.origin, axes)
 
 
 class Joint(OwnState, RowConstraint):
@@ -118,7 +113,7 @@ class Joint(OwnState, RowConstraint):
         self._asked_axes = axes
         bodies = self._frame_a.body, self._frame_b.body
         self._axes: Sense = self._nearest_at({body: body.q for body in bodies}) if axes == "nearest" else axes
-        pairs = FramePair(self._frame_a, self._frame_b), FramePair(self._frame_a, _opposed(self._frame_b))
+        pairs = FramePair(self._frame_a, self._frame_b), FramePair(self._frame_a, OpposedFrame(self._frame_b))
         self._senses: Mapping[Sense, FramePair] = {"aligned": pairs[0], "opposed": pairs[1]}
         # Coordinates of the one sense and of the other, of what "nearest" may turn around.
         self._twins: dict[Coordinate, Coordinate] = {}

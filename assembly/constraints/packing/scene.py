@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from assembly._address import clock_address
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint, RowConstraint, structure_changes
-from assembly.constraints.model.contact import Contact, side_face
+from assembly.constraints.model.contact import Contact, lone_surfaces, side_face
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import Objective, Posture
 from assembly.constraints.model.trim_contact import TrimContact
@@ -38,6 +38,7 @@ from assembly.constraints.program.kept import kept_size, kept_unknowns
 from assembly.constraints.program.primitives import RECORD as JOINT_FRAMES
 from assembly.errors import FARTHEST, InputError
 from assembly.kinematics.body import Body
+from assembly.kinematics.changes import numbers_set
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.events import fresh_memory, listed_places
@@ -75,6 +76,8 @@ class Packed(ManagerLast):
         Clearances have so many times the places they ask for.
     corners : bool
         Whether the corners of contacts of solids are listed (`packing/corners.py`).
+    size : float, optional
+        What lengths are divided by; the scene's size by default.
 
     Attributes
     ----------
@@ -100,6 +103,12 @@ class Packed(ManagerLast):
         Whether the scene has a size.
     before : Packed or None
         The same scene as it was packed before it had this size, or these rows of clearances.
+    lineage : object
+        The same of a scene that is packed again because numbers were set anew (`numbers`), and of no other one.
+    numbers : int
+        The count of such numbers (`kinematics/changes.py`) when it was packed or compared last.
+    domains : list of (4, 2) array or None
+        Of every contact of two surfaces the ranges of their parameters.
     unit : float
         What one of the loop's objective counts in the user's units.
     sides : list of (Body or BodyFace, Body or BodyFace)
@@ -144,11 +153,14 @@ class Packed(ManagerLast):
         objectives: Sequence[tuple[float, Objective]],
         places: int = 1,
         corners: bool = False,
+        size: float | None = None,
     ) -> None:
         self.count = len(bodies)
+        self.numbers, self.lineage = numbers_set(), object()
         self.stamp = structure_changes()
         self.structure = structure_of(constraints)
-        size = scene_size(bodies, constraints, objectives)
+        if size is None:
+            size = scene_size(bodies, constraints, objectives)
         self.has_size = size > 0.0
         self._has_no_extent = has_no_extent(bodies, constraints, objectives)
         self.scale = size if self.has_size else 1.0
@@ -163,6 +175,8 @@ class Packed(ManagerLast):
             (side_face(contact.a), side_face(contact.b)) if whole else (contact.a, contact.b)
             for contact, whole in zip(self.contacts, self.whole, strict=True)
         ]
+        surfaces = [lone_surfaces(pair) for pair in self.sides]
+        self.domains = [None if pair is None else np.array([d for s in pair for d in s.domain]) for pair in surfaces]
         self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
         self.clearance_pairs = manager_packing.clearance_pairs(self.clearances, bodies)
         self.keeps_apart = any(self.clearance_pairs)
