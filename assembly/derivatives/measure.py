@@ -13,6 +13,7 @@ from assembly.constraints.model.joint import Joint
 from assembly.errors import InputError, text
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import rotation_matrix
+from assembly.solve.solution import Solution
 
 __all__ = ["Measure"]
 
@@ -78,6 +79,21 @@ class Measure:
             )
         self.on = on
         self.name = label if name is None else text("name", name)
+
+    def value(self, solution: Solution) -> float:
+        """What it is at a solution, in the user's units; angles go on past whole turns."""
+        if self.kind == "objective":
+            return solution.objective
+        if self.kind == "coordinate":
+            return solution.values[f"{self.thing.joint.name}.{self.thing.name}"]
+        if self.kind == "gap":
+            return solution.contacts[self.thing.name].gap
+        if self.kind == "wrench":
+            assert self.on is not None
+            return float(solution.wrenches[self.thing.name][self.on.name].vector[self.axis])
+        sides = self.thing if self.kind == "distance" else (self.thing,)
+        places = [world(side, solution.q[solution._scene.index(place_of(side)[0])])[0] for side in sides]
+        return float(np.linalg.norm(places[1] - places[0])) if len(places) == 2 else float(places[0][self.axis])
 
     def __repr__(self) -> str:
         return f"Measure({self.name!r})"
