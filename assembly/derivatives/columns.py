@@ -7,7 +7,7 @@ at the pose: of sixth order, of the scene packed with three values on either sid
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,13 +21,13 @@ from assembly.constraints.program import records as layout
 from assembly.constraints.program.objective_terms import POSTURE, TERM
 from assembly.derivatives.numbers import FrameNumber, LeastGap, RowNumber, ShapeNumber, TargetNumber
 from assembly.derivatives.parameter import Parameter
-from assembly.derivatives.probed import Evaluated, ProbedScene, stands_for
+from assembly.derivatives.probed import Evaluated, ProbedScene
 from assembly.errors import InputError
 from assembly.kinematics.body import Body, Frame
 from assembly.kinematics.changes import tried_numbers
-from assembly.kinematics.pose import rotation_matrix
+from assembly.kinematics.pose import skew
 
-__all__ = ["Column", "Problem", "by_frame", "column_of", "differences", "joint_frame"]
+__all__ = ["Columns", "Frames", "Problem", "by_frames", "columns_of", "differences"]
 
 Array = NDArray[np.float64]
 # Sixth-order central differences, and their step over the value.
@@ -46,10 +46,12 @@ class Problem:
     bodies, constraints, objectives
         Of the scene; constraints as they were packed.
     packed, state
+    turns : (b, 3, 3)
+        The bodies' rotations.
     forces : (m,)
         Multipliers of all rows, folds included.
-    frames : sequence of Frame
-        Those on probes.
+    frames : Frames
+        Parameters that are places of frames, on probes.
     probed, here : ProbedScene, Evaluated
     """
 
@@ -58,118 +60,160 @@ class Problem:
     objectives: Sequence[tuple[float, Objective]]
     packed: Packed
     state: Array
+    turns: Array
     forces: Array
-    frames: Sequence[Frame]
+    frames: Frames
     probed: ProbedScene
     here: Evaluated
 
-    def row(self, body: Body) -> Array:
-        """The pose of a body, (7,), in the user's units."""
-        k = next(k for k, other in enumerate(self.bodies) if other is body)
-        return self.state[7 * k : 7 * k + 7]
-
-    def place(self, number: FrameNumber) -> int:
-        """The place of a number's frame among those on probes."""
-        return next(k for k, frame in enumerate(self.frames) if frame is number.frame)
-
-    def frame_twist(self, number: FrameNumber) -> Array:
-        """Twists of all probes a unit of a frame's number, (6 k,), lengths over the scene's size."""
-        twists, place = np.zeros(6 * len(self.frames)), self.place(number)
-        twists[6 * place : 6 * place + 6] = number.twist(self.row(number.frame.body), self.packed.scale)
-        return twists
+    def index(self, body: Body) -> int:
+        """The place of a body."""
+        for k, other in enumerate(self.bodies):
+            if other is body:
+                return k
+        raise InputError(f"body {body.name!r} is of another scene; expected one of the solution's")
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
-    """What a unit of a parameter adds: to residuals (m,), to slopes of the Lagrangian (n,), to the objective."""
+class Columns:
+    """What a unit of each parameter adds: to residuals (m, p), to slopes of the Lagrangian (n, p), to the objective."""
 
     rows: Array
     slopes: Array
-    value: float
+    values: Array
 
 
-def joint_frame(parameter: Parameter, packed: Packed) -> FrameNumber | None:
-    """The number of a parameter that is a place of a frame which rows of joints have, and no term of the objective."""
+class Frames:
+    """The parameters that are places of frames which only rows of joints and frame distances have.
+
+    Parameters
+    ----------
+    packed : Packed
+    parameters : sequence of Parameter
+    turns : (b, 3, 3)
+        Of the bodies.
+    bodies : sequence of Body
+
+    Attributes
+    ----------
+    numbers : list of FrameNumber or None
+        Of every parameter.
+    each : list of Frame
+    twists : (6 k, p)
+        Of every frame a unit of each parameter, about the origin of its body, lengths over the scene's size.
+    """
+
+    def __init__(self, packed: Packed, parameters: Sequence[Parameter], turns: Array, bodies: Sequence[Body]) -> None:
+        known: dict[int, None] = {}
+        if not packed.end_effectors:
+            # A dexterity has frames of its inputs as well.
+            pairs = [*packed._frames, *(term for term, _ in packed._turns)]
+            sides = (side for pair in pairs for side in (getattr(pair, name, None) for name in SIDES))
+            known = {id(getattr(side, "base", side)): None for side in sides if side is not None}
+        self.numbers = [_on_probe(parameter, known) for parameter in parameters]
+        self.each: list[Frame] = []
+        places: dict[int, int] = {}
+        for number in self.numbers:
+            if number is not None and id(number.frame) not in places:
+                places[id(number.frame)] = len(self.each)
+                self.each.append(number.frame)
+        self.twists = np.zeros((6 * len(self.each), len(parameters)))
+        hosts = {id(body): k for k, body in enumerate(bodies)}
+        for r, number in enumerate(self.numbers):
+            if number is not None:
+                at = 6 * places[id(number.frame)]
+                self.twists[at : at + 6, r] = number.twist(turns[hosts[id(number.frame.body)]], packed.scale)
+
+
+# Names of what has frames: of a pair of a joint, of a term of the objective.
+SIDES = ("frame_a", "frame_b", "frame")
+
+
+def _on_probe(parameter: Parameter, known: Collection[int]) -> FrameNumber | None:
     number = parameter._number
-    if not isinstance(number, FrameNumber) or packed.end_effectors:
-        return None
-    in_term = any(stands_for(term.frame, number.frame) for term, _ in packed._turns)
-    pairs = ((pair.frame_a, pair.frame_b) for pair in packed._frames)
-    of_joints = not in_term and any(stands_for(frame, number.frame) for pair in pairs for frame in pair)
-    return number if of_joints else None
+    return number if isinstance(number, FrameNumber) and id(number.frame) in known else None
 
 
-def column_of(problem: Problem, parameter: Parameter) -> Column:
-    """The column of a parameter.
+def columns_of(problem: Problem, parameters: Sequence[Parameter]) -> Columns:
+    """The columns of parameters.
 
     Raises
     ------
     InputError
         A parameter that enters no row and no term.
     """
-    number, packed = parameter._number, problem.packed
-    rows, slopes, value = np.zeros_like(problem.here.residual), np.zeros_like(problem.here.gradient), 0.0
-    enters = True
-    if isinstance(number, RowNumber):
-        units = [
-            (row, unit)
-            for row, (equation, _, unit) in zip(packed.value_rows, packed._values, strict=True)
-            if equation.source is not None
-            and equation.source[0] is number.owner
-            and equation.source[1] == number.attribute
-        ]
-        for row, unit in units:
-            rows[row] = (1.0 if number.attribute == "upper" else -1.0) / unit
-        enters = bool(units)
-    elif isinstance(number, LeastGap):
-        own = [k for k, item in enumerate(problem.constraints) if item is number.clearance]
-        table = packed.table_at(problem.state)
-        kept = packed.owners == (own[0] if own else -1)
-        bodies = table[table[layout.ROW_TABLE] :][: layout.ROW * packed.rows].reshape(-1, layout.ROW)[:, layout.BODY_F]
-        rows[: packed.rows][kept & (bodies >= 0)] = -1.0 / packed.scale
-        enters = bool(own)
-    elif isinstance(number, TargetNumber):
-        slopes, value, enters = _of_target(problem, number)
-    elif (frame := joint_frame(parameter, packed)) is not None:
-        rows = problem.here.by_frames @ problem.frame_twist(frame)
-        slopes = by_frame(problem, problem.here, frame)
-    else:
-        rows, slopes, value = _by_differences(problem, parameter)
-        enters = bool(rows.any() or slopes.any() or value)
-    if not enters:
-        raise InputError(f"parameter {parameter.name!r} enters no row and no term; expected one of what is solved")
-    return Column(rows, slopes, value)
+    frames, here = problem.frames, problem.here
+    rows, slopes = here.by_frames @ frames.twists, by_frames(problem, here)
+    values = here.slopes_by_frames @ frames.twists
+    for r, parameter in enumerate(parameters):
+        number = parameter._number
+        if frames.numbers[r] is not None:
+            continue
+        if isinstance(number, RowNumber):
+            enters = _of_row(problem, number, rows[:, r])
+        elif isinstance(number, LeastGap):
+            enters = _of_least_gap(problem, number, rows[:, r])
+        elif isinstance(number, TargetNumber):
+            values[r], enters = _of_target(problem, number, slopes[:, r])
+        else:
+            rows[:, r], slopes[:, r], values[r] = _by_differences(problem, parameter)
+            enters = bool(rows[:, r].any() or slopes[:, r].any() or values[r])
+        if not enters:
+            raise InputError(f"parameter {parameter.name!r} enters no row and no term; expected one of what is solved")
+    return Columns(rows, slopes, values)
 
 
-def by_frame(problem: Problem, here: Evaluated, number: FrameNumber) -> Array:
-    """What a unit of a frame's number adds to the slopes of forces . rows, (n,).
+def by_frames(problem: Problem, here: Evaluated) -> Array:
+    """What a unit of each parameter's frame adds to the slopes of the Lagrangian, (n, p).
 
     The frame goes with its body: a turn of the body comes after the frame's twist, which the symmetric second
     derivative has half before and half after.
     """
-    place = problem.place(number)
-    twist, pulls = problem.frame_twist(number)[6 * place : 6 * place + 6], here.pulls[6 * place : 6 * place + 6]
-    slopes: Array = here.mixed @ problem.frame_twist(number)
-    turned = slice(6 * problem.probed.hosts[place] + 3, 6 * problem.probed.hosts[place] + 6)
-    slopes[turned] += np.cross(twist[:3], pulls[:3]) + 0.5 * np.cross(twist[3:], pulls[3:])
+    twists = problem.frames.twists
+    slopes: Array = here.mixed @ twists
+    for k, host in enumerate(problem.probed.hosts):
+        force, torque = here.pulls[6 * k : 6 * k + 3], here.pulls[6 * k + 3 : 6 * k + 6]
+        if force.any() or torque.any():
+            slopes[6 * host + 3 : 6 * host + 6] -= skew(force) @ twists[6 * k : 6 * k + 3]
+            slopes[6 * host + 3 : 6 * host + 6] -= 0.5 * skew(torque) @ twists[6 * k + 3 : 6 * k + 6]
     return slopes
 
 
-def _of_target(problem: Problem, number: TargetNumber) -> tuple[Array, float, bool]:
-    """Slopes and value a unit of a target's coordinate."""
-    packed, slopes, value, enters = problem.packed, np.zeros_like(problem.here.gradient), 0.0, False
+def _of_row(problem: Problem, number: RowNumber, rows: Array) -> bool:
+    """Write what a unit of a row's own number adds; whether there is such a row."""
+    enters = False
+    for row, (equation, _, unit) in zip(problem.packed.value_rows, problem.packed._values, strict=True):
+        source = equation.source
+        if source is not None and source[0] is number.owner and source[1] == number.attribute:
+            rows[row] = (1.0 if number.attribute == "upper" else -1.0) / unit
+            enters = True
+    return enters
+
+
+def _of_least_gap(problem: Problem, number: LeastGap, rows: Array) -> bool:
+    """The same of the contacts of a clearance."""
+    packed = problem.packed
+    own = [k for k, item in enumerate(problem.constraints) if item is number.clearance]
+    table = packed.table_at(problem.state)
+    kept = packed.owners == (own[0] if own else -1)
+    bodies = table[table[layout.ROW_TABLE] :][: layout.ROW * packed.rows].reshape(-1, layout.ROW)[:, layout.BODY_F]
+    rows[: packed.rows][kept & (bodies >= 0)] = -1.0 / packed.scale
+    return bool(own)
+
+
+def _of_target(problem: Problem, number: TargetNumber, slopes: Array) -> tuple[float, bool]:
+    """Write the slopes a unit of a target's coordinate adds; what it adds to the value, and whether there is one."""
+    packed, value, enters = problem.packed, 0.0, False
     for term, at in packed._targets:
         if term is number.term:
-            body = term.bodies[0]
-            row = problem.row(body)
-            k = next(k for k, other in enumerate(problem.bodies) if other is body)
-            arm = rotation_matrix(row[3:]) @ packed.pool[at - 3 : at]
-            off = (row[:3] - packed.reference) / packed.scale + arm - packed.pool[at : at + 3]
+            k = problem.index(term.bodies[0])
+            arm = problem.turns[k] @ packed.pool[at - 3 : at]
+            place = (problem.state[7 * k : 7 * k + 3] - packed.reference) / packed.scale + arm
             factor, axis = -2.0 * packed.pool[at - 4] / packed.scale, np.eye(3)[number.axis]
-            slopes[6 * k : 6 * k + 6] += factor * np.concatenate([axis, np.cross(arm, axis)])
-            value += factor * float(off[number.axis])
+            slopes[6 * k : 6 * k + 6] += factor * np.concatenate([axis, skew(arm) @ axis])
+            value += factor * float((place - packed.pool[at : at + 3])[number.axis])
             enters = True
-    return slopes, value, enters
+    return value, enters
 
 
 def _by_differences(problem: Problem, parameter: Parameter) -> tuple[Array, Array, float]:

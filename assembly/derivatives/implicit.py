@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.program.contact import TOUCHING
-from assembly.derivatives.columns import Column, Problem, column_of, joint_frame
+from assembly.derivatives.columns import Columns, Frames, Problem, columns_of
 from assembly.derivatives.kkt import Moves, System, one_sided_moves, solve_system
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.measured import rates_of
@@ -17,7 +17,8 @@ from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.probed import Evaluated, ProbedScene
 from assembly.derivatives.result import Sensitivity
 from assembly.errors import InputError, items
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.pose import rotation_matrix
 from assembly.solve.second_order.dense import CUT, PUSHING, STATIONARY, UNBALANCED
 from assembly.solve.solution import Solution
 
@@ -56,11 +57,14 @@ def sensitivity(
     measures = _given("of", of, Measure)
     parameters = _given("wrt", wrt, Parameter)
     problem, pushing, weak = _problem(scene, solution, measures, parameters)
-    columns = [column_of(problem, parameter) for parameter in parameters]
+    columns = columns_of(problem, parameters)
     system, moving = _system(problem, columns)
     below, above = _moves(system, pushing, weak)
-    rates = [rates_of(problem, measures, parameters, columns, moving, moves) for moves in (below, above)]
-    return _result(problem, measures, parameters, (below, above), (moving, pushing), rates)
+    rates = [
+        rates_of(problem, measures, parameters, columns, moving, moves)
+        for moves in {id(below): below, id(above): above}.values()
+    ]
+    return _result(problem, measures, parameters, (below, above), moving, rates)
 
 
 def _given(name: str, value: Any, kind: type) -> tuple[Any, ...]:
@@ -87,25 +91,26 @@ def _problem(
     packed.refresh()
     if not _are_same(packed.asked, solution._asked):
         raise InputError("solution is of other values or targets than the scene has now; expected one solved with them")
-    bodies, frames = scene.bodies, _frames(packed, parameters)
+    bodies = scene.bodies
+    turns = np.array([rotation_matrix(row) for row in state[: packed.contacts_at].reshape(-1, 7)[:, 3:]])
+    frames = Frames(packed, parameters, turns, bodies)
     coordinates = [item.thing.coordinate for item in measures if item.kind == "coordinate"]
-    probed = ProbedScene(packed, state, bodies, frames, coordinates)
-    forces = state[packed.multipliers_at : packed.residuals_at]
-    here = probed.evaluate(forces)
-    one_sided = np.concatenate([packed.one_sided, np.zeros(len(here.residual) - packed.rows, dtype=bool)])
+    probed = ProbedScene(packed, state, bodies, frames.each, coordinates)
+    given = state[packed.multipliers_at : packed.residuals_at]
+    # The least move: nothing pushes, and every one-sided row at its bound may open.
+    here = probed.evaluate(np.zeros_like(given) if packed.is_implicit else given)
+    folds = len(here.residual) - packed.rows
+    one_sided = np.concatenate([packed.one_sided, np.zeros(folds, dtype=bool)])
     touching = ~one_sided | (np.abs(here.residual) <= TOUCHING)
-    all_forces = np.zeros(len(here.residual))
-    all_forces[: packed.rows] = forces
-    if packed.is_implicit:
-        # The least move from here: nothing pushes, and every one-sided row at its bound may open.
-        all_forces[:] = 0.0
-    else:
-        all_forces = _balanced(here, _moving(bodies, len(here.gradient)), all_forces, touching, one_sided)
-    if not np.array_equal(all_forces[: packed.rows], forces) or all_forces[packed.rows :].any():
-        here = probed.evaluate(all_forces)
-    pushing = ~one_sided | (touching & (all_forces < -PUSHING))
+    forces = np.zeros(len(here.residual))
+    if not packed.is_implicit:
+        forces[: packed.rows] = given
+        forces = _balanced(here, _moving(bodies, len(here.gradient)), forces, touching, one_sided)
+        if not np.array_equal(forces[: packed.rows], given) or forces[packed.rows :].any():
+            here = probed.evaluate(forces)
+    pushing = ~one_sided | (touching & (forces < -PUSHING))
     problem = Problem(
-        bodies, solution._scene.constraints, scene.objectives, packed, state, all_forces, frames, probed, here
+        bodies, solution._scene.constraints, scene.objectives, packed, state, turns, forces, frames, probed, here
     )
     return problem, pushing, touching & ~pushing
 
@@ -115,16 +120,6 @@ def _are_same(asked: Sequence[Any], others: Sequence[Any]) -> bool:
         np.array_equal(a, b) if isinstance(a, np.ndarray) else a is b or a == b
         for a, b in zip(asked, others, strict=True)
     )
-
-
-def _frames(packed: Any, parameters: Sequence[Parameter]) -> list[Frame]:
-    """Frames of parameters that stand on probes, each once."""
-    frames: list[Frame] = []
-    for parameter in parameters:
-        number = joint_frame(parameter, packed)
-        if number is not None and not any(number.frame is other for other in frames):
-            frames.append(number.frame)
-    return frames
 
 
 def _moving(bodies: Sequence[Body], n: int) -> NDArray[np.int64]:
@@ -151,12 +146,11 @@ def _balanced(here: Evaluated, columns: NDArray[np.int64], forces: Array, touchi
     return forces
 
 
-def _system(problem: Problem, columns: Sequence[Column]) -> tuple[System, NDArray[np.int64]]:
+def _system(problem: Problem, columns: Columns) -> tuple[System, NDArray[np.int64]]:
     """The equations in the twists of moving bodies and coordinates of folds; and which columns these are."""
     here = problem.here
     moving = _moving(problem.bodies, len(here.gradient))
-    rows_by = np.column_stack([column.rows for column in columns])
-    slopes_by = np.column_stack([column.slopes for column in columns])[moving]
+    rows_by, slopes_by = columns.rows, columns.slopes[moving]
     hessian = here.hessian[np.ix_(moving, moving)]
     if problem.packed.is_implicit:
         # Of the least move: |x|^2 + lever^2 |turn|^2 of every body, as a posture from here has it.
@@ -165,7 +159,8 @@ def _system(problem: Problem, columns: Sequence[Column]) -> tuple[System, NDArra
             lever = 0.5 * (body.size or problem.packed.scale) / problem.packed.scale
             weights[6 * k : 6 * k + 6] = [1.0, 1.0, 1.0, lever**2, lever**2, lever**2]
         hessian, slopes_by = np.diag(weights[moving]), np.zeros_like(slopes_by)
-    return System(np.ascontiguousarray(here.jacobian[:, moving]), hessian, rows_by, slopes_by), moving
+    jacobian = np.ascontiguousarray(here.jacobian[:, moving])
+    return System(jacobian, hessian, rows_by, slopes_by, problem.packed.is_implicit), moving
 
 
 def _moves(system: System, pushing: Flags, weak: Flags) -> tuple[Moves, Moves]:
@@ -189,16 +184,16 @@ def _result(
     measures: Sequence[Measure],
     parameters: Sequence[Parameter],
     sides: tuple[Moves, Moves],
-    chosen: tuple[NDArray[np.int64], Flags],
+    moving: NDArray[np.int64],
     rates: Sequence[tuple[Array, Flags]],
 ) -> Sensitivity:
     """What is told of it."""
     below, above = sides
-    (shrinking, loose), (growing, _) = rates
-    moving, _ = chosen
+    (shrinking, loose), (growing, _) = rates[0], rates[-1]
     packed = problem.packed
-    shrinking, growing = shrinking.copy(), growing.copy()
     reasons: dict[str, str] = {}
+    # No negative zeros.
+    shrinking, growing = shrinking + 0.0, growing + 0.0
     for moves, matrix in ((below, shrinking), (above, growing)):
         matrix[:, moves.contradicts | moves.drifts] = np.nan
     differs = np.abs(shrinking - growing) > SAME * (1.0 + np.abs(shrinking) + np.abs(growing))

@@ -39,12 +39,15 @@ class System:
     jacobian, hessian : (m, n), (n, n)
     rows_by, slopes_by : (m, p), (n, p)
         Of residuals, and of the slopes of the Lagrangian.
+    is_least_move : bool
+        Whether the Hessian only chooses the least move, so that what rows leave is free.
     """
 
     jacobian: Array
     hessian: Array
     rows_by: Array
     slopes_by: Array
+    is_least_move: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +100,7 @@ def solve_system(system: System, held: Flags) -> Moves:
         drifts = np.abs(amounts[level]).max(axis=0, initial=0.0) > AGREE * (1.0 + np.abs(lacking).max(axis=0))
         amounts = amounts / np.where(level, np.inf, curvatures)[:, None]
         steps = steps + basis @ (ways @ amounts)
-        free = basis @ ways[:, level]
+        free = basis if system.is_least_move else basis @ ways[:, level]
     pulled = -right[:rank] @ (system.slopes_by + system.hessian @ steps)
     forces = np.zeros((len(held), count))
     forces[rows] = scales[:, None] * (left[:, :rank] @ (pulled / values[:rank, None]))

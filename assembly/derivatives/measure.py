@@ -92,7 +92,8 @@ class Measure:
             assert self.on is not None
             return float(solution.wrenches[self.thing.name][self.on.name].vector[self.axis])
         sides = self.thing if self.kind == "distance" else (self.thing,)
-        places = [world(side, solution.q[solution._scene.index(place_of(side)[0])])[0] for side in sides]
+        rows = [solution.q[solution._scene.index(place_of(side)[0])] for side in sides]
+        places = [world(side, row[:3], rotation_matrix(row[3:]))[0] for side, row in zip(sides, rows, strict=True)]
         return float(np.linalg.norm(places[1] - places[0])) if len(places) == 2 else float(places[0][self.axis])
 
     def __repr__(self) -> str:
@@ -106,9 +107,9 @@ def place_of(thing: Point | Frame | Body) -> tuple[Body, Array]:
     return thing.body, thing.coordinates if isinstance(thing, Point) else thing.origin
 
 
-def world(thing: Point | Frame | Body, row: Array) -> tuple[Array, Array]:
-    """Where a place is with its body at a pose (7,), and its slopes in the body's twist, (3, 6)."""
+def world(thing: Point | Frame | Body, position: Array, rotation: Array) -> tuple[Array, Array]:
+    """Where a place is with its body at a position (3,) and a rotation (3, 3); its slopes in the body's twist, (3, 6)."""
     _, place = place_of(thing)
-    x, y, z = arm = rotation_matrix(row[3:]) @ place
+    x, y, z = arm = rotation @ place
     turn = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-    return row[:3] + arm, np.hstack([np.eye(3), turn])
+    return position + arm, np.hstack([np.eye(3), turn])

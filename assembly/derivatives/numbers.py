@@ -17,7 +17,7 @@ from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace, Frame
 from assembly.kinematics.changes import count_number
 from assembly.kinematics.parametric import Parametric
-from assembly.kinematics.pose import Pose, rotation_matrix, skew
+from assembly.kinematics.pose import Pose, skew
 
 __all__ = [
     "ControlPoint",
@@ -100,8 +100,8 @@ class FrameNumber(Number):
         self.frame, self.axis = frame, axis
 
     @abstractmethod
-    def twist(self, row: Array, scale: float) -> Array:
-        """The twist (6,) of the frame a unit of the number, about the origin of its body, which is at a pose (7,).
+    def twist(self, turn: Array, scale: float) -> Array:
+        """The twist (6,) of the frame a unit of the number, about the origin of its body, which is turned by (3, 3).
 
         World axes, lengths over a scale.
         """
@@ -124,9 +124,9 @@ class FrameOrigin(FrameNumber):
         origin[self.axis] = value
         self.frame.place(at=origin)
 
-    def twist(self, row: Array, scale: float) -> Array:
+    def twist(self, turn: Array, scale: float) -> Array:
         """The twist of the frame a unit of the number."""
-        return np.concatenate([rotation_matrix(row[3:])[:, self.axis] / scale, np.zeros(3)])
+        return np.concatenate([turn[:, self.axis] / scale, np.zeros(3)])
 
 
 class FrameTurn(FrameNumber):
@@ -155,11 +155,10 @@ class FrameTurn(FrameNumber):
         self.frame._stand(self.frame.origin, rotation_by(turn) @ axes)
         self.frame.__dict__["_turned"] = (axes, turn)
 
-    def twist(self, row: Array, scale: float) -> Array:
+    def twist(self, turn: Array, scale: float) -> Array:
         """The twist of the frame a unit of the number."""
-        turn = rotation_matrix(row[3:])
         velocity = turn @ turn_rates(self._turned()[1])[:, self.axis]
-        return np.concatenate([-np.cross(velocity, turn @ self.frame.origin / scale), velocity])
+        return np.concatenate([-skew(velocity) @ (turn @ self.frame.origin) / scale, velocity])
 
 
 class TargetNumber(Number):

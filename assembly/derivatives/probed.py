@@ -16,24 +16,22 @@ from numpy.typing import NDArray
 
 from assembly._record import place_of
 from assembly.constraints.model.constraint import Coordinate, FramePair
+from assembly.constraints.model.objectives import FrameDistance
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program import records as layout
+from assembly.constraints.program.objective_terms import POINT_DISTANCE_FIELDS, POSTURE_QUATERNION, TERM
 from assembly.errors import InputError
 from assembly.kinematics.body import Body, Frame
 from assembly.solve.second_order.curvature import curvature_at
 
-__all__ = ["Evaluated", "ProbedScene", "stands_for"]
+__all__ = ["Evaluated", "ProbedScene"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
+TARGET = place_of(POINT_DISTANCE_FIELDS, "target")
 # Where a coordinate says its joint, and its bodies; where a row does, and where its second coordinate is.
 JOINT, BODIES = (place_of(layout.BODY_COORDINATE, name) for name in ("joint", "body_f"))
 FIRST_JOINT, SECOND = (place_of(layout.JOINT_ROW_RECORD, name) for name in ("joint", "second"))
-
-
-def stands_for(frame: Frame, other: Frame) -> bool:
-    """Whether a frame is another one, or that one turned around."""
-    return frame is other or getattr(frame, "base", None) is other
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +48,8 @@ class Evaluated:
         bodies.
     by_frames, mixed : (m, 6 k), (n, 6 k)
         The same by twists of the frames, about the origins of their bodies.
-    pulls : (6 k,)
-        Slopes of forces . rows in these twists.
+    slopes_by_frames, pulls : (6 k,)
+        Slopes of the objective, and of the objective + forces . rows, in these twists.
     measured, measured_by_frames : (e, n), (e, 6 k)
         Slopes of the coordinates that were asked for.
     """
@@ -63,6 +61,7 @@ class Evaluated:
     hessian: Array
     by_frames: Array
     mixed: Array
+    slopes_by_frames: Array
     pulls: Array
     measured: Array
     measured_by_frames: Array
@@ -128,11 +127,11 @@ class ProbedScene:
                 joints.append([places[id(pair.frame_a.body)], places[id(pair.frame_b.body)], pool_at])
                 pool.append(np.concatenate(parts).ravel())
                 pool_at += pool[-1].size
+        probes = {id(frame): packed.count + k for k, frame in enumerate(frames)}
         for pair, number in numbers.items():
             for side, frame in enumerate((pair.frame_a, pair.frame_b)):
-                for k, probed in enumerate(frames):
-                    if stands_for(frame, probed):
-                        joints[number][side] = packed.count + k
+                joints[number][side] = probes.get(id(getattr(frame, "base", frame)), joints[number][side])
+        self._put_terms_on(probes)
         rows = table[table[layout.ROW_TABLE] :][: layout.ROW * packed.rows].reshape(-1, layout.ROW).copy()
         of_joints = np.flatnonzero(rows[:, layout.KIND] == layout.JOINT_ROW)
         sides = np.array(joints, dtype=np.int64)[:, :2]
@@ -152,6 +151,19 @@ class ProbedScene:
         table[layout.ROW_TABLE], table[layout.ROWS] = table.size + flat.size, packed.rows + len(coordinates)
         self.table = np.concatenate([table, flat, rows.ravel(), asked.ravel()])
         self.pool = np.concatenate([packed.pool, *pool])
+
+    def _put_terms_on(self, probes: dict[int, int]) -> None:
+        """Have terms that draw a frame act on its probe."""
+        packed, table = self.packed, self.table
+        drawn = {at: term for term, at in packed._targets if isinstance(term, FrameDistance)}
+        places = {at - TARGET: term for at, term in drawn.items()}
+        places.update({at - POSTURE_QUATERNION: term for term, at in packed._turns})
+        for k in range(int(table[layout.TERMS])):
+            term = int(table[layout.TERM_TABLE]) + TERM * k
+            drawing = places.get(int(table[term + 2]))
+            if drawing is not None:
+                frame = drawing.frame
+                table[term + 1] = probes.get(id(getattr(frame, "base", frame)), table[term + 1])
 
     def evaluate(self, forces: Array) -> Evaluated:
         """Evaluate with multipliers of the program's rows (m,), and perhaps of rows of folds behind them.
@@ -181,7 +193,8 @@ class ProbedScene:
         own = np.ones(m, dtype=bool)
         own[self.rows : self.rows + self.coordinates] = False
         at = slice(6 * self.bodies, 6 * self.bodies + probes)
-        pulls = given[:m] @ jacobian[:, at]
+        slopes_by_frames = gradient[at].copy()
+        pulls = slopes_by_frames + given[:m] @ jacobian[:, at]
         by_frames, mixed = jacobian[:, at].copy(), self._on_hosts(hessian[:, at].T).T
         jacobian = self._on_hosts(jacobian)
         return Evaluated(
@@ -192,6 +205,7 @@ class ProbedScene:
             self._on_hosts(self._on_hosts(hessian).T),
             by_frames[own],
             mixed,
+            slopes_by_frames,
             pulls,
             jacobian[~own],
             by_frames[~own],

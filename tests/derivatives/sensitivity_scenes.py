@@ -220,6 +220,4 @@ def trimmed():
     return Case(scene, of, [size, asm.Parameter(goal, "target", "y")])
 
 
-CASES = {
-    case.__name__: case for case in (slider_crank, ball_in_v, rocker, cam, clips, pushed, kept_apart, trimmed)
-}
+CASES = {case.__name__: case for case in (slider_crank, ball_in_v, rocker, cam, clips, pushed, kept_apart, trimmed)}
