@@ -20,6 +20,7 @@ from assembly.constraints.model.joint import Joint, Sense
 from assembly.constraints.model.tangent import Tangent
 from assembly.constraints.packing.earlier import is_earlier, is_same_scene, taken_over
 from assembly.constraints.packing.lower_pairs import LowerPair, lower_pairs
+from assembly.constraints.packing.renumbered import renumbered
 from assembly.constraints.packing.scene import MORE_PLACES, Packed, structure_of
 from assembly.constraints.packing.scene_size import check_reach, scene_size
 from assembly.errors import InputError, vector
@@ -92,10 +93,15 @@ class PackedContents(Contents):
                 self._has_changed()
 
     def _with_numbers_of_now(self, before: Packed) -> Packed:
-        """The scene packed with the numbers that it has now: of rows, in the same places."""
-        packed = Packed(self._bodies, self._seated_constraints(), self._objectives, self._crowding, self._corners)
+        """The scene packed with the numbers that it has now: in the same places, or anew where they make others."""
+        constraints = self._seated_constraints()
+        packed: Packed | None = renumbered(before, self._bodies, constraints, self._objectives)
+        if packed is None:
+            packed = Packed(self._bodies, constraints, self._objectives, self._crowding, self._corners)
+            packed.lineage = before.lineage
+        if packed is before:
+            return packed
         self._take_packed(packed, before.before)
-        packed.lineage = before.lineage
         return packed
 
     def _pack(self, before: Packed | None) -> Packed:

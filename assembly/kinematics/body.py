@@ -73,15 +73,14 @@ class Frame(ReadOnlyArrays):
 
         Whatever has the frame, joints, terms and scenes, has it in its new place from then on.
         """
-        origin = self.origin if at is None else at
-        other = self.body.frame(origin, self.axes[:, 2] if z is None else z, self.axes[:, 0] if z is None else x)
         if z is None:
             if x is not None:
                 raise InputError("x is given without z; expected both, or neither to keep the axes")
-            self._stand(other.origin, self.axes)
-        else:
-            self._stand(other.origin, other.axes)
-            self.__dict__.pop("_turned", None)
+            self._stand(self.origin if at is None else _place("at", at), self.axes)
+            return
+        other = self.body.frame(self.origin if at is None else at, z, x)
+        self._stand(other.origin, other.axes)
+        self.__dict__.pop("_turned", None)
 
     def _stand(self, origin: Array, axes: Array) -> None:
         """Have another origin and other axes, orthonormal ones."""
