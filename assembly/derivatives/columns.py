@@ -30,9 +30,11 @@ from assembly.kinematics.pose import skew
 __all__ = ["Columns", "Frames", "Problem", "by_frames", "columns_of", "differences"]
 
 Array = NDArray[np.float64]
-# Sixth-order central differences, and their step over the value.
-WEIGHTS = ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0))
-STEP = 5e-3
+# Figures of an evaluated scene, given how many units of the objective of before one of its own is.
+Figures = Callable[[Evaluated, float], Array]
+# The first step of sixth-order differences, over the value; while those of order four differ by more than AGREE it is
+# shortened by SHORTEN, SHORTER times at most.
+STEP, AGREE, SHORTEN, SHORTER = 5e-3, 5e-8, 0.4, 4
 # Differences of figures of order one that are rounding.
 ROUNDING = 1e-14
 
@@ -228,31 +230,42 @@ def _by_differences(problem: Problem, parameter: Parameter) -> tuple[Array, Arra
     return change[:m], change[m:-1], float(change[-1])
 
 
-def differences(problem: Problem, parameter: Parameter, figures: Callable[[Evaluated, float], Array]) -> Array:
+def differences(problem: Problem, parameter: Parameter, figures: Figures) -> Array:
     """Figures of the scene at the solution's pose, differenced by a parameter.
 
     `figures` is given what the scene is with the parameter's value, and how many units of the objective one of its is.
     """
-    number, shape = parameter._number, (problem.here.residual.shape, problem.here.gradient.shape)
-    middle = number.get()
+    middle = parameter._number.get()
     step = parameter.step or STEP * (abs(middle) or _size(problem, parameter))
     change: Array = np.zeros(0)
     with tried_numbers():
         try:
-            for k, weight in WEIGHTS:
-                for sign in (1.0, -1.0):
-                    number.set(middle + sign * k * step)
-                    there, ratio = evaluated_now(problem)
-                    if (there.residual.shape, there.gradient.shape) != shape:
-                        raise InputError(
-                            f"{parameter.name} changes what rows there are; expected a step below {step:g}"
-                        )
-                    found = sign * weight / step * figures(there, ratio)
-                    change = change + found if change.size else found
+            for _ in range(SHORTER):
+                halves = [_half(problem, parameter, middle, k * step, figures) / step for k in (1, 2, 3)]
+                change = 0.75 * halves[0] - 0.15 * halves[1] + halves[2] / 60.0
+                fourth = (8.0 * halves[0] - halves[1]) / 12.0
+                # The error of order six is about that of order four to the power 3/2.
+                if parameter.step or np.abs(change - fourth).max() <= AGREE * np.abs(change).max():
+                    break
+                step *= SHORTEN
         finally:
-            number.set(middle)
+            parameter._number.set(middle)
     # What rounding leaves of what does not change is no derivative.
     change[np.abs(change) < ROUNDING / step] = 0.0
+    return change
+
+
+def _half(problem: Problem, parameter: Parameter, middle: float, way: float, figures: Figures) -> Array:
+    """What figures are more with the number one way from its middle than the other way."""
+    shape = problem.here.residual.shape, problem.here.gradient.shape
+    found = []
+    for value in (middle + way, middle - way):
+        parameter._number.set(value)
+        there, ratio = evaluated_now(problem)
+        if (there.residual.shape, there.gradient.shape) != shape:
+            raise InputError(f"{parameter.name} has other rows at {value:g}; expected a smaller step than {abs(way):g}")
+        found.append(figures(there, ratio))
+    change: Array = found[0] - found[1]
     return change
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.packing.renumbered import have_same_numbers
 from assembly.constraints.program.contact import TOUCHING
 from assembly.derivatives.columns import Columns, Frames, Problem, columns_of
 from assembly.derivatives.kkt import Moves, System, one_sided_moves, solve_system
@@ -86,7 +87,7 @@ def _problem(
     if not solution.success:
         raise InputError(f"solution is {solution.status.name}; expected one that succeeded")
     packed, state = solution._packed, solution._state
-    if scene.packed() is not packed:
+    if not have_same_numbers(packed, scene.packed()):
         raise InputError("solution is of another scene, or of this one with other numbers; expected one of it as it is")
     packed.refresh()
     if not _are_same(packed.asked, solution._asked):

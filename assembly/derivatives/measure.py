@@ -108,7 +108,7 @@ def place_of(thing: Point | Frame | Body) -> tuple[Body, Array]:
 
 
 def world(thing: Point | Frame | Body, position: Array, rotation: Array) -> tuple[Array, Array]:
-    """Where a place is with its body at a position (3,) and a rotation (3, 3); its slopes in the body's twist, (3, 6)."""
+    """Where a place is, with its body at a position (3,) and turned by (3, 3); its slopes in the twist, (3, 6)."""
     _, place = place_of(thing)
     x, y, z = arm = rotation @ place
     turn = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])

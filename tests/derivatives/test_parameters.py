@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.derivatives.sensitivity_scenes import CASES
 
-import assembly as asm
 from assembly.constraints.program.records import VERSION
+from tests.derivatives.sensitivity_scenes import CASES
 
 EACH = [(name, k) for name, case in CASES.items() for k in range(len(case().wrt))]
 

@@ -28,7 +28,7 @@ from assembly.kinematics.changes import numbers_set
 if TYPE_CHECKING:
     from assembly.constraints.packing.scene import Packed
 
-__all__ = ["renumbered"]
+__all__ = ["have_same_numbers", "renumbered"]
 
 Array = NDArray[np.float64]
 # The numbers of a posture's reference, behind its weight and before its lever.
@@ -81,8 +81,8 @@ def renumbered(
         for equation, place, _ in packed._values:
             (_, first), *others = equation.terms
             unit = 1.0 if first.is_angle else scale
-            for factor, term in others:
-                pool[place - 1] = factor * (1.0 if term.is_angle else scale) / unit
+            for factor, second in others:
+                pool[place - 1] = factor * (1.0 if second.is_angle else scale) / unit
             pool[place] = 0.0
             other._values.append((equation, place, unit))
         other._sources = [item for item in other._values if item[0].source is not None]
@@ -95,14 +95,25 @@ def renumbered(
     for at in _following_postures(packed):
         # Where the last solve began, until the next one begins.
         pool[at + 1 : at + 1 + REFERENCE] = packed.rows_pool[at + 1 : at + 1 + REFERENCE]
-    for each in (packed, other):
-        each.refresh()
-    version, pool[layout.VERSION] = pool[layout.VERSION], packed.rows_pool[layout.VERSION]
-    if scale == packed.scale and np.array_equal(pool, packed.rows_pool):
+    if have_same_numbers(packed, other):
         packed.numbers = numbers_set()
         return packed
-    pool[layout.VERSION] = version
     return other
+
+
+def have_same_numbers(one: Packed, other: Packed) -> bool:
+    """Whether a scene that was packed twice has the same numbers now, wherever its last solves began."""
+    if one is other:
+        return True
+    if one.lineage is not other.lineage or one.scale != other.scale or one.pool.size != other.pool.size:
+        return False
+    for each in (one, other):
+        each.refresh()
+    apart = one.pool != other.pool
+    apart[layout.VERSION] = False
+    for at in _following_postures(one):
+        apart[at + 1 : at + 1 + REFERENCE] = False
+    return not apart.any()
 
 
 def _following_postures(packed: Packed) -> list[int]:
