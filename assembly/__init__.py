@@ -55,6 +55,8 @@ if TYPE_CHECKING:
     from assembly.derivatives.implicit import sensitivity as sensitivity
     from assembly.derivatives.measure import Measure as Measure
     from assembly.derivatives.parameter import Parameter as Parameter
+    from assembly.derivatives.response import Response as Response
+    from assembly.derivatives.response import ResponseError as ResponseError
     from assembly.derivatives.result import Sensitivity as Sensitivity
     from assembly.files.gltf import write_gltf as write_gltf
     from assembly.files.robot import Robot as Robot
@@ -96,6 +98,10 @@ if TYPE_CHECKING:
     from assembly.studies.interference.clash import Clash as Clash
     from assembly.studies.interference.clash import Interference as Interference
     from assembly.studies.interference.report import interference as interference
+    from assembly.studies.tolerances.distributions import Normal as Normal
+    from assembly.studies.tolerances.distributions import Uniform as Uniform
+    from assembly.studies.tolerances.result import Tolerances as Tolerances
+    from assembly.studies.tolerances.stack import tolerances as tolerances
     from assembly.tracking.log import TrackLog as TrackLog
     from assembly.tracking.manager import Manager as Manager
     from assembly.tracking.tick import Step as Step
@@ -139,6 +145,7 @@ else:
             "Measure": "assembly.derivatives.measure",
             "NurbsCurve": "assembly.geometry.splines.curve",
             "NurbsSurface": "assembly.geometry.splines.surface",
+            "Normal": "assembly.studies.tolerances.distributions",
             "Parallel": "assembly.constraints.model.joints",
             "Parameter": "assembly.derivatives.parameter",
             "Parametric": "assembly.kinematics.parametric",
@@ -155,6 +162,8 @@ else:
             "Robot": "assembly.files.robot",
             "Screw": "assembly.constraints.model.joints",
             "SecondOrder": "assembly.solve.second_order.classification",
+            "Response": "assembly.derivatives.response",
+            "ResponseError": "assembly.derivatives.response",
             "Sensitivity": "assembly.derivatives.result",
             "Solution": "assembly.solve.solution",
             "Spherical": "assembly.constraints.model.joints",
@@ -162,11 +171,13 @@ else:
             "Step": "assembly.tracking.tick",
             "Symmetric": "assembly.constraints.model.groups",
             "Tangent": "assembly.constraints.model.tangent",
+            "Tolerances": "assembly.studies.tolerances.result",
             "Trace": "assembly.tracking.trace",
             "TrackLog": "assembly.tracking.log",
             "TrackStatus": "assembly.tracking.tick",
             "Tracker": "assembly.tracking.tracker",
             "TrimContact": "assembly.constraints.model.trim_contact",
+            "Uniform": "assembly.studies.tolerances.distributions",
             "Universal": "assembly.constraints.model.joints",
             "Way": "assembly.solve.way",
             "Weight": "assembly.constraints.model.objectives",
@@ -188,6 +199,7 @@ else:
             "sensitivity": "assembly.derivatives.implicit",
             "shapes": "assembly.geometry.shapes",
             "statics": "assembly.solve.forces.statics",
+            "tolerances": "assembly.studies.tolerances.stack",
             "tip_jacobian": "assembly.solve.forces.end_effector",
             "view": "assembly.view",
             "write_brep": "assembly.step",

@@ -26,7 +26,7 @@ from assembly.solve.solution import Solution
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["sensitivity"]
+__all__ = ["sensitivity", "several"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -55,8 +55,8 @@ def sensitivity(
     InputError, TypeError
         A solution that failed, or of other numbers than the scene has now; a parameter that enters nothing.
     """
-    measures = _given("of", of, Measure)
-    parameters = _given("wrt", wrt, Parameter)
+    measures = several("of", of, Measure)
+    parameters = several("wrt", wrt, Parameter)
     problem, pushing, weak = _problem(scene, solution, measures, parameters)
     columns = columns_of(problem, parameters)
     system, moving = _system(problem, columns)
@@ -68,7 +68,8 @@ def sensitivity(
     return _result(problem, measures, parameters, (below, above), moving, rates)
 
 
-def _given(name: str, value: Any, kind: type) -> tuple[Any, ...]:
+def several(name: str, value: Any, kind: type) -> tuple[Any, ...]:
+    """One thing of a kind, or several."""
     given = (value,) if isinstance(value, kind) else items(name, value, f"a {kind.__name__} or several")
     for k, item in enumerate(given):
         if not isinstance(item, kind):
