@@ -52,6 +52,12 @@ if TYPE_CHECKING:
     from assembly.constraints.model.placements import PointOnPlane as PointOnPlane
     from assembly.constraints.model.tangent import Tangent as Tangent
     from assembly.constraints.model.trim_contact import TrimContact as TrimContact
+    from assembly.derivatives.implicit import sensitivity as sensitivity
+    from assembly.derivatives.measure import Measure as Measure
+    from assembly.derivatives.parameter import Parameter as Parameter
+    from assembly.derivatives.response import Response as Response
+    from assembly.derivatives.response import ResponseError as ResponseError
+    from assembly.derivatives.result import Sensitivity as Sensitivity
     from assembly.files.gltf import write_gltf as write_gltf
     from assembly.files.picture_reader import read_picture as read_picture
     from assembly.files.robot import Robot as Robot
@@ -67,6 +73,7 @@ if TYPE_CHECKING:
     from assembly.geometry.splines.surface import NurbsSurface as NurbsSurface
     from assembly.kinematics.body import Body as Body
     from assembly.kinematics.ellipsoid import Ellipsoid as Ellipsoid
+    from assembly.kinematics.parametric import Parametric as Parametric
     from assembly.kinematics.picture_mesh import PictureMesh as PictureMesh
     from assembly.kinematics.pose import Pose as Pose
     from assembly.proximity.extrema.pairs import ContactPair as ContactPair
@@ -95,6 +102,10 @@ if TYPE_CHECKING:
     from assembly.studies.interference.report import interference as interference
     from assembly.studies.reachable import Workspace as Workspace
     from assembly.studies.reachable import workspace as workspace
+    from assembly.studies.tolerances.distributions import Normal as Normal
+    from assembly.studies.tolerances.distributions import Uniform as Uniform
+    from assembly.studies.tolerances.result import Tolerances as Tolerances
+    from assembly.studies.tolerances.stack import tolerances as tolerances
     from assembly.tracking.log import TrackLog as TrackLog
     from assembly.tracking.manager import Manager as Manager
     from assembly.tracking.tick import Step as Step
@@ -135,9 +146,13 @@ else:
             "Loop": "assembly.geometry.faces.loop",
             "Manager": "assembly.tracking.manager",
             "Mobility": "assembly.solve.diagnosis.mobility",
+            "Measure": "assembly.derivatives.measure",
             "NurbsCurve": "assembly.geometry.splines.curve",
             "NurbsSurface": "assembly.geometry.splines.surface",
+            "Normal": "assembly.studies.tolerances.distributions",
             "Parallel": "assembly.constraints.model.joints",
+            "Parameter": "assembly.derivatives.parameter",
+            "Parametric": "assembly.kinematics.parametric",
             "Perpendicular": "assembly.constraints.model.joints",
             "Planar": "assembly.constraints.model.joints",
             "PointDistance": "assembly.constraints.model.objectives",
@@ -152,17 +167,22 @@ else:
             "Robot": "assembly.files.robot",
             "Screw": "assembly.constraints.model.joints",
             "SecondOrder": "assembly.solve.second_order.classification",
+            "Response": "assembly.derivatives.response",
+            "ResponseError": "assembly.derivatives.response",
+            "Sensitivity": "assembly.derivatives.result",
             "Solution": "assembly.solve.solution",
             "Spherical": "assembly.constraints.model.joints",
             "Status": "assembly.solve.scene",
             "Step": "assembly.tracking.tick",
             "Symmetric": "assembly.constraints.model.groups",
             "Tangent": "assembly.constraints.model.tangent",
+            "Tolerances": "assembly.studies.tolerances.result",
             "Trace": "assembly.tracking.trace",
             "TrackLog": "assembly.tracking.log",
             "TrackStatus": "assembly.tracking.tick",
             "Tracker": "assembly.tracking.tracker",
             "TrimContact": "assembly.constraints.model.trim_contact",
+            "Uniform": "assembly.studies.tolerances.distributions",
             "Universal": "assembly.constraints.model.joints",
             "Way": "assembly.solve.way",
             "Weight": "assembly.constraints.model.objectives",
@@ -183,8 +203,10 @@ else:
             "read_picture": "assembly.files.picture_reader",
             "read_urdf": "assembly.files.urdf_reader",
             "reference": "assembly.solve.oracle.reference",
+            "sensitivity": "assembly.derivatives.implicit",
             "shapes": "assembly.geometry.shapes",
             "statics": "assembly.solve.forces.statics",
+            "tolerances": "assembly.studies.tolerances.stack",
             "tip_jacobian": "assembly.solve.forces.end_effector",
             "view": "assembly.view",
             "workspace": "assembly.studies.reachable",

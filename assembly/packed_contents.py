@@ -20,10 +20,12 @@ from assembly.constraints.model.joint import Joint, Sense
 from assembly.constraints.model.tangent import ContactTangent
 from assembly.constraints.packing.earlier import is_earlier, is_same_scene, taken_over
 from assembly.constraints.packing.lower_pairs import LowerPair, lower_pairs
+from assembly.constraints.packing.renumbered import renumbered
 from assembly.constraints.packing.scene import MORE_PLACES, Packed, structure_of
 from assembly.constraints.packing.scene_size import check_reach, scene_size
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
+from assembly.kinematics.changes import edits, numbers_set
 from assembly.kinematics.pose import pose_rows
 from assembly.proximity.extrema.pairs import inside
 from assembly.proximity.features.solid_contact import TRACK
@@ -42,6 +44,8 @@ class PackedContents(Contents):
 
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._packed: Packed | None = None
+        self._edits = -1  # the count of edits (`kinematics/changes.py`) at which bodies and constraints were as here
+        self._asked_for: list[bool] = []  # of every body whether it is fixed, of every constraint whether it counts
         self._crowding = 1  # how many times as many places as clearances ask for
         self._has_changed()
         super().__init__(bodies)
@@ -59,12 +63,15 @@ class PackedContents(Contents):
 
     def packed(self) -> Packed:
         """The scene as the compiled loop reads it; made at first use."""
+        self._notice_edits()
         if self._packed is not None and self._packed.stamp != structure_changes():
             # A row came or went somewhere; perhaps in another scene.
             if self._packed.structure == structure_of(self._seated_constraints()):
                 self._packed.stamp = structure_changes()
             else:
                 self._packed = None
+        if self._packed is not None and self._packed.numbers != numbers_set():
+            return self._with_numbers_of_now(self._packed)
         before = self._packed
         if before is not None and before.may_have_outgrown():
             # Nothing was a length then, a slide driven to 0 say, or only one that was rounding.
@@ -76,10 +83,37 @@ class PackedContents(Contents):
             return self._pack(before)
         return self._packed
 
+    def _notice_edits(self) -> None:
+        """Forget how the scene is packed if a body became fixed or free, or a constraint enabled or disabled."""
+        if self._edits != edits():
+            self._edits = edits()
+            asked = [body.fixed for body in self._bodies] + [item._is_asked for item in self._constraints]
+            if asked != self._asked_for:
+                self._asked_for = asked
+                self._has_changed()
+
+    def _with_numbers_of_now(self, before: Packed) -> Packed:
+        """The scene packed with the numbers that it has now: in the same places, or anew where they make others."""
+        constraints = self._seated_constraints()
+        packed: Packed | None = renumbered(before, self._bodies, constraints, self._objectives)
+        if packed is None:
+            packed = Packed(self._bodies, constraints, self._objectives, self._crowding, self._corners)
+            packed.lineage = before.lineage
+        if packed is before:
+            return packed
+        self._take_packed(packed, before.before)
+        return packed
+
     def _pack(self, before: Packed | None) -> Packed:
         """Pack the scene, which was packed otherwise before."""
         constraints = self._seated_constraints()
         packed = Packed(self._bodies, constraints, self._objectives, self._crowding, self._corners)
+        self._take_packed(packed, before)
+        return packed
+
+    def _take_packed(self, packed: Packed, before: Packed | None) -> None:
+        """Have a packed scene, and what solutions of it speak of."""
+        constraints = self._seated_constraints()
         seats = tuple(item for number, _ in self._seats if isinstance(item := self._constraints[number], Contact))
         self._scene = Scene(
             self.bodies, tuple(constraints), tuple(packed.contacts), tuple(packed.sides), packed.scale, seats
@@ -87,7 +121,6 @@ class PackedContents(Contents):
         self._scene.axes = {item.name: item.axes for item in constraints if _takes_nearest(item)}
         packed.before = before
         self._packed = packed
-        return packed
 
     def _pack_with_more_places(self) -> Packed:
         """The scene packed again, with more places for contacts of clearances. What is proven of its pairs stays."""
@@ -118,13 +151,14 @@ class PackedContents(Contents):
                 constraints[number] = seat
             else:
                 self._nearest[number]._take_axes(seat)
-        return constraints
+        return [seat for seat, item in zip(constraints, self._constraints, strict=True) if item._is_asked]
 
     def _take_seats(self, q0: ArrayLike | Solution | None, starts: Mapping[str, ArrayLike] | None = None) -> None:
         """Make those contacts joints that are lower pairs at a start, or were where a solution began.
 
         One whose pair the user starts is none of them. What was packed for others is kept for their solutions.
         """
+        self._notice_edits()
         if isinstance(q0, Solution):
             packed = q0._ended.packed
             if packed is self._packed or (self._packed is not None and is_same_scene(packed, self._packed)):

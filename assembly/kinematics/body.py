@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,8 @@ from assembly.errors import InputError, KnownSettings, check_coordinates, checke
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body_face import BodyFace
+from assembly.kinematics.changes import count_edit, count_number
+from assembly.kinematics.parametric import Parametric
 from assembly.kinematics.picture_mesh import PictureMesh
 from assembly.kinematics.pose import Pose, direction, length
 
@@ -23,10 +25,10 @@ if TYPE_CHECKING:
     from assembly.selection.faces import Faces
     from assembly.selection.vertices import Vertices
 
-__all__ = ["Body", "BodyFace", "Frame", "Point", "Shape"]
+__all__ = ["Body", "BodyFace", "Frame", "OpposedFrame", "Point", "Shape"]
 
 Array = NDArray[np.float64]
-Shape = NurbsSurface | Face | Iterable[NurbsSurface | Face]
+Shape = NurbsSurface | Face | Iterable[NurbsSurface | Face] | Parametric
 
 
 def _place(name: str, value: ArrayLike) -> Array:
@@ -34,6 +36,12 @@ def _place(name: str, value: ArrayLike) -> Array:
     place = vector(name, value)
     check_coordinates(name, place.tolist())
     return _frozen(place)
+
+
+def _flag(name: str, value: Any) -> bool:
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} is {value!r}; expected True or False")
+    return bool(value)
 
 
 def _frozen(array: Array) -> Array:
@@ -61,20 +69,65 @@ class Frame(ReadOnlyArrays):
     origin: Array
     axes: Array
 
+    def place(self, at: ArrayLike | None = None, z: ArrayLike | None = None, x: ArrayLike | None = None) -> None:
+        """Set the frame anew on its body: its origin, its axes, or both, as `Body.frame` takes them.
+
+        Whatever has the frame, joints, terms and scenes, has it in its new place from then on.
+        """
+        if z is None:
+            if x is not None:
+                raise InputError("x is given without z; expected both, or neither to keep the axes")
+            self._stand(self.origin if at is None else _place("at", at), self.axes)
+            return
+        other = self.body.frame(self.origin if at is None else at, z, x)
+        self._stand(other.origin, other.axes)
+        self.__dict__.pop("_turned", None)
+
+    def _stand(self, origin: Array, axes: Array) -> None:
+        """Have another origin and other axes, orthonormal ones."""
+        self.__dict__.update(origin=_frozen(origin.copy()), axes=_frozen(axes.copy()))
+        count_number()
+
+
+class OpposedFrame(Frame):
+    """A frame turned by pi about the x axis of another one, wherever that stands."""
+
+    def __init__(self, frame: Frame) -> None:
+        self.__dict__.update(body=frame.body, _frame=frame)
+
+    @property
+    def origin(self) -> Array:
+        """That of the other frame."""
+        return self.base.origin
+
+    @property
+    def axes(self) -> Array:
+        """Those of the other frame, y and z reversed."""
+        return _frozen(self.base.axes * np.array([1.0, -1.0, -1.0]))
+
+    @property
+    def base(self) -> Frame:
+        """The frame that it is turned from."""
+        frame: Frame = self.__dict__["_frame"]
+        return frame
+
+    def _stand(self, origin: Array, axes: Array) -> None:
+        self.base._stand(origin, axes * np.array([1.0, -1.0, -1.0]))
+
 
 class Body(KnownSettings):
-    """A rigid body. Its pose may be set anew; its name, its faces and whether it is fixed are for life.
+    """A rigid body. Its pose may be set anew, and whether it is fixed; its name and its shape are for life.
 
     Parameters
     ----------
     name : str
         Not empty; unique in an assembly.
-    shape : NurbsSurface, Face, or several of them, optional
-        In body coordinates. A surface's outward normal is Su x Sv.
+    shape : NurbsSurface, Face, or several of them, or Parametric, optional
+        In body coordinates. A surface's outward normal is Su x Sv. Numbers of a `Parametric` may be set anew.
     position, quaternion
         Where the body stands, body to world; the quaternion is (w, x, y, z), unit to within a percent.
     fixed : bool
-        A fixed body does not move in a solve and costs no unknowns.
+        A fixed body does not move in a solve and costs no unknowns. Settable.
     color : (red, green, blue), optional
         0 to 1 each, for pictures and files; settable.
     density : float
@@ -99,16 +152,17 @@ class Body(KnownSettings):
         density: float = 1.0,
         picture: PictureMesh | None = None,
     ) -> None:
-        if not isinstance(fixed, (bool, np.bool_)):
-            raise InputError(f"fixed is {fixed!r}; expected True or False")
         self._name = text("name", name)
-        self._fixed = bool(fixed)
+        self._fixed = _flag("fixed", fixed)
         # Pose takes what is like an array, which its fields do not say: they are tuples once it is made.
         self._pose = Pose(position, quaternion)  # type: ignore[arg-type]  # Pose converts them
         check_coordinates("position", self._pose.position.tolist())
-        self._faces = self._selectable(self._named(shape))
+        self._shape = shape if isinstance(shape, Parametric) else None
+        self._faces = self._selectable(self._named(shape.made() if isinstance(shape, Parametric) else shape))
+        if self._shape is not None:
+            self._shape._belongs_to(self)
         self._edges: Edges | None = None
-        # Found when it is first asked for: faces are for life.
+        # Found when it is first asked for.
         self._size: float | None = None
         self.color = color
         self._density = positive("density", density)
@@ -119,6 +173,8 @@ class Body(KnownSettings):
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
         other._edges = None
+        # The numbers of a shape are those of the original alone.
+        other._shape = None
         other._faces = other._selectable(BodyFace(other, side.face, side.name) for side in self._faces)
         return other
 
@@ -129,8 +185,26 @@ class Body(KnownSettings):
 
     @property
     def fixed(self) -> bool:
-        """Whether the body stays where it is in a solve."""
+        """Whether the body stays where it is; settable. Constraints of fixed bodies alone ask for nothing."""
         return self._fixed
+
+    @fixed.setter
+    def fixed(self, value: bool) -> None:
+        self._fixed = _flag("fixed", value)
+        count_edit()
+
+    @property
+    def shape(self) -> Parametric:
+        """The shape whose numbers may be set anew.
+
+        Raises
+        ------
+        InputError
+            A body whose shape is no `Parametric`; `faces` has what it is.
+        """
+        if self._shape is None:
+            raise InputError(f"body {self.name!r} has faces that are no function of numbers; expected a Parametric")
+        return self._shape
 
     @property
     def faces(self) -> Faces:
@@ -255,6 +329,27 @@ class Body(KnownSettings):
                 )
             faces.append(BodyFace(self, face, name))
         return tuple(faces)
+
+    def _checked_faces(self, shape: Shape | None) -> tuple[Face, ...]:
+        """Faces in place of those that there are.
+
+        Raises
+        ------
+        InputError
+            Not as many, or of other names.
+        """
+        made = self._named(shape)
+        names, others = [side.name for side in self._faces], [side.name for side in made]
+        if others != names:
+            raise InputError(f"shape of body {self.name!r} has faces {others} now; expected {names}, as before")
+        return tuple(side.face for side in made)
+
+    def _take_faces(self, faces: Sequence[Face]) -> None:
+        """Have other faces, each in its place: who has a `BodyFace` of the body has the new one."""
+        for side, face in zip(self._faces, faces, strict=True):
+            side._take(face)
+        self._size, self._edges = None, None
+        count_number()
 
     def __repr__(self) -> str:
         return f"Body({self.name!r}, {len(self.faces)} faces{', fixed' if self.fixed else ''})"

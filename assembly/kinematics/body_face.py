@@ -148,6 +148,10 @@ class BodyFace:
 
         return distance_to_face(self.face, point)
 
+    def _take(self, face: Face) -> None:
+        """Be another face: of a body whose shape was made anew."""
+        self.__dict__["face"] = face
+
     def _torus(self, what: str) -> Torus:
         form = form_of(self.face)
         if isinstance(form, Torus):

@@ -36,7 +36,8 @@ def save(scene: Assembly, path: str | PathLike[str]) -> None:
     TypeError
         Not an assembly.
     InputError
-        A constraint or a term that scene files do not hold, or a coupling of joints that are not in the scene.
+        A constraint or a term that scene files do not hold, or a coupling of joints that are not in the scene; one that
+        is disabled, or of fixed bodies alone.
     OSError
         The file cannot be written.
     """
@@ -47,6 +48,12 @@ def save(scene: Assembly, path: str | PathLike[str]) -> None:
 
 
 def _document(scene: Assembly) -> dict[str, Any]:
+    for item in scene.constraints:
+        if not item._is_asked:
+            what = "is of fixed bodies alone" if item.enabled else "is disabled"
+            raise InputError(
+                f"constraint {item.name!r} {what}, which files do not hold; expected scene.remove of it first"
+            )
     parts = Parts(scene, VERSION, {item.name: item for item in scene.constraints})
     # Bodies first, then their faces: both tables are numbered as their entries come.
     bodies = Listed(BODY).write("bodies", scene.bodies, parts)

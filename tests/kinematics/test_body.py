@@ -45,14 +45,18 @@ def test_size_is_the_diagonal_of_all_faces_together():
     assert asm.Body("a", [SPHERE, shifted]).size == pytest.approx(np.sqrt(14.0**2 + 2 * 4.0**2), rel=1e-15)
 
 
-def test_poses_may_be_set_and_the_rest_may_not():
+def test_poses_and_whether_it_is_fixed_may_be_set_and_the_rest_may_not():
     body = asm.Body("a", SPHERE, position=(1, 2, 3), fixed=True)
     body.pose = asm.Pose((4, 5, 6))
     assert body.q.tolist() == [4, 5, 6, 1, 0, 0, 0]
     with pytest.raises(TypeError, match="pose is .*; expected a Pose"):
         body.pose = body.q
+    body.fixed = False
+    assert body.fixed is False
+    with pytest.raises(ValueError, match="fixed is 1; expected True or False"):
+        body.fixed = 1
     # An assembly has packed these; changes would go unnoticed.
-    for name, value in (("name", "b"), ("fixed", False), ("faces", ())):
+    for name, value in (("name", "b"), ("faces", ())):
         with pytest.raises(AttributeError):
             setattr(body, name, value)
 

@@ -9,6 +9,7 @@ from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.tracked_sizes import check_size
 from assembly.errors import InputError, bounded, items, number, renamed
 from assembly.kinematics.body import Body
+from assembly.kinematics.changes import count_number
 
 __all__ = ["Clearance"]
 
@@ -94,9 +95,7 @@ class Clearance(Constraint):
                 raise InputError(f"bodies has {len(chosen)} of them; expected two or more, or None for all")
         super().__init__(chosen or (), "clearance" if chosen is None and name is None else name, "clearance")
         self._all = chosen is None
-        self._minimum = bounded("minimum", minimum)
-        if not self._minimum >= 0.0:
-            raise InputError(f"minimum is {self._minimum:g}; expected a length of zero or more")
+        self.minimum = minimum
         merge_radius = renamed("merge_radius", merge_radius, "neglect", neglect)
         self._merge_radius = number("merge_radius", merge_radius)
         if not 0.0 < self._merge_radius <= 1.0:
@@ -115,8 +114,16 @@ class Clearance(Constraint):
 
     @property
     def minimum(self) -> float:
-        """The least gap."""
+        """The least gap; settable between solves."""
         return self._minimum
+
+    @minimum.setter
+    def minimum(self, value: float) -> None:
+        least = bounded("minimum", value)
+        if not least >= 0.0:
+            raise InputError(f"minimum is {least:g}; expected a length of zero or more")
+        self._minimum = least
+        count_number()
 
     @property
     def merge_radius(self) -> float:

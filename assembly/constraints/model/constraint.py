@@ -17,6 +17,7 @@ import numpy as np
 from assembly.constraints.program.primitives import ANGLE, COINCIDENT, DISTANCE, RADIUS, SLIDE
 from assembly.errors import FARTHEST, InputError, KnownSettings, number, text
 from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.changes import count_edit
 
 if TYPE_CHECKING:
     from assembly.constraints.model.joint import Joint
@@ -70,6 +71,8 @@ def words(cls: type) -> str:
 class Constraint(KnownSettings):
     """Something that must hold between bodies; see its subclasses.
 
+    `enabled` is settable: False leaves the constraint in its scene, and asks for nothing.
+
     Parameters
     ----------
     bodies : tuple of Body
@@ -84,6 +87,9 @@ class Constraint(KnownSettings):
     InputError
         The same body twice, or a name that is no string or empty.
     """
+
+    # Copies and pickles of before it could be set have none of their own.
+    _enabled = True
 
     def __init__(self, bodies: tuple[Body, ...], name: str | None, kind: str = "") -> None:
         for k, body in enumerate(bodies):
@@ -101,6 +107,23 @@ class Constraint(KnownSettings):
     def bodies(self) -> tuple[Body, ...]:
         """Bodies that the constraint names, distinct."""
         return self._bodies
+
+    @property
+    def enabled(self) -> bool:
+        """Whether scenes ask for it."""
+        return self._enabled
+
+    @enabled.setter
+    def enabled(self, value: bool) -> None:
+        if not isinstance(value, (bool, np.bool_)):
+            raise InputError(f"enabled is {value!r}; expected True or False")
+        self._enabled = bool(value)
+        count_edit()
+
+    @property
+    def _is_asked(self) -> bool:
+        """Whether a solve asks for it: it is enabled, and not of bodies that are all fixed."""
+        return self._enabled and not (self._bodies and all(body.fixed for body in self._bodies))
 
 
 class RowConstraint(Constraint):

@@ -112,6 +112,31 @@ class Contents:
             self._taken.add(constraint.name)
             self._has_changed()
 
+    def remove(self, constraint: Constraint | str) -> Constraint:
+        """Take a constraint, or the one of that name, out of the assembly, and return it.
+
+        Raises
+        ------
+        InputError
+            It is not in the assembly, or a `TrimContact` there is of it.
+        """
+        for item in self._constraints:
+            if item is constraint or (isinstance(constraint, str) and item.name == constraint):
+                break
+        else:
+            known = ", ".join(repr(item.name) for item in self._constraints) or "none"
+            raise InputError(f"constraint is {constraint!r}; expected one of the assembly: {known}")
+        for other in self._constraints:
+            if isinstance(other, TrimContact) and other.contact is item:
+                raise InputError(
+                    f"constraint is {item.name!r}, whose contact {other.name!r} keeps on a face; "
+                    f"expected {other.name!r} to be removed before it"
+                )
+        self._constraints.remove(item)
+        self._taken.discard(item.name)
+        self._has_changed()
+        return item
+
     def minimize(self, *objectives: Objective) -> None:
         """Add terms to the objective."""
         self._add_terms(1.0, objectives)

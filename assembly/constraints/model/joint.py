@@ -30,7 +30,7 @@ from assembly.constraints.model.constraint import (
 from assembly.constraints.model.mate_features import CenterLike, one_feature, point_frame
 from assembly.constraints.program.primitives import COINCIDENT, SLIDE, SWING
 from assembly.errors import InputError, bounded
-from assembly.kinematics.body import Body, BodyFace, Frame, Point
+from assembly.kinematics.body import Body, BodyFace, Frame, OpposedFrame, Point
 from assembly.kinematics.pose import rotation_matrix
 from assembly.selection.edges import BodyEdge
 from assembly.selection.vertices import BodyVertex
@@ -63,11 +63,6 @@ def _frame(name: str, side: Any, takes_point: bool) -> Frame:
         return point_frame(name, side)
     expected = "a point, a frame or a body" if takes_point else "a frame, body.frame(...) or face.frame(), or a body"
     raise TypeError(f"{name} is {side!r}; expected {expected}")
-
-
-def _opposed(frame: Frame) -> Frame:
-    axes = frame.axes * np.array([1.0, -1.0, -1.0])
-    return Frame(frame.body, frame.origin, axes)
 
 
 class Joint(OwnState, RowConstraint):
@@ -123,7 +118,7 @@ class Joint(OwnState, RowConstraint):
         self._asked_axes = axes
         bodies = self._frame_a.body, self._frame_b.body
         self._axes: Sense = self._nearest_at({body: body.q for body in bodies}) if axes == "nearest" else axes
-        pairs = FramePair(self._frame_a, self._frame_b), FramePair(self._frame_a, _opposed(self._frame_b))
+        pairs = FramePair(self._frame_a, self._frame_b), FramePair(self._frame_a, OpposedFrame(self._frame_b))
         self._senses: Mapping[Sense, FramePair] = {"aligned": pairs[0], "opposed": pairs[1]}
         # Coordinates of the one sense and of the other, of what "nearest" may turn around.
         self._twins: dict[Coordinate, Coordinate] = {}

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from operator import is_
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import read_only
 from assembly.errors import InputError, KnownSettings, check_coordinates, extent, items, positive, vector
+from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, multiply, pose_rows
 from assembly.kinematics.pose import direction as unit_direction
@@ -132,9 +134,7 @@ class FrameDistance(Objective):
         super().__init__((frame.body,), weight)
         self._frame = frame
         self._length = 0.5 * frame.body.size or 1.0 if length is None else extent("length", length)
-        # Of the rotation that takes the world's axes to those of the frame on the body, turned back.
-        w, x, y, z = axes_quaternion(frame.axes)
-        self._back = np.array([w, -x, -y, -z])
+        self._axes = frame.axes
         self.target = target
 
     @property
@@ -159,12 +159,21 @@ class FrameDistance(Objective):
         check_coordinates("target.position", value.position.tolist())
         self._pose = value
         self._target = value.position
-        self._body_quaternion = multiply(value.quaternion, self._back)
+        self._body_quaternion = self._turned_back()
 
     @property
     def body_quaternion(self) -> Array:
         """The quaternion of the body whose frame is at the target, read-only."""
+        if self._axes is not self._frame.axes:
+            # The frame was placed anew.
+            self._axes = self._frame.axes
+            self._body_quaternion = self._turned_back()
         return read_only(self._body_quaternion)
+
+    def _turned_back(self) -> Array:
+        """The target's quaternion after the turn from the frame's axes on the body to the body's."""
+        w, x, y, z = axes_quaternion(self._frame.axes)
+        return multiply(self._pose.quaternion, np.array([w, -x, -y, -z]))
 
     def __repr__(self) -> str:
         return f"FrameDistance({self._frame!r}, target={self._pose!r}, length={self._length:g}, weight={self.weight:g})"
@@ -201,7 +210,8 @@ class Weight(Objective):
             raise InputError(f"bodies are {[body.name for body in pulled]}; expected distinct bodies, one at least")
         super().__init__(tuple(pulled), weight)
         self._direction = unit_direction("direction", direction)
-        self._points = tuple((body.mass, read_only(body.center_of_mass)) for body in pulled)
+        self._faces: list[Face] = []
+        self._points = self._points_of_now()
 
     @property
     def direction(self) -> Array:
@@ -211,12 +221,21 @@ class Weight(Objective):
     @property
     def points(self) -> tuple[tuple[float, Array], ...]:
         """Mass and center of mass, in body coordinates, of every body."""
+        # Numbers of shapes may be set anew.
+        faces = [side.face for body in self.bodies for side in body.faces]
+        if len(faces) != len(self._faces) or not all(map(is_, faces, self._faces)):
+            self._points = self._points_of_now()
         return self._points
+
+    def _points_of_now(self) -> tuple[tuple[float, Array], ...]:
+        """The same, and of which faces."""
+        self._faces = [side.face for body in self.bodies for side in body.faces]
+        return tuple((body.mass, read_only(body.center_of_mass)) for body in self.bodies)
 
     @property
     def mass(self) -> float:
         """Of all bodies."""
-        return float(sum(mass for mass, _ in self._points))
+        return float(sum(mass for mass, _ in self.points))
 
     def __repr__(self) -> str:
         names = ", ".join(body.name for body in self.bodies)

@@ -149,6 +149,11 @@ class TrimContact(Constraint):
         """Whether the contact may leave the loop."""
         return self._keep != "on"
 
+    @property
+    def _is_asked(self) -> bool:
+        """Whether a solve asks for it, and for its contact."""
+        return super()._is_asked and self._contact._is_asked
+
     def __repr__(self) -> str:
         return f"TrimContact({self._contact.name!r}, keep={self._keep!r}, form={self._form!r}, name={self.name!r})"
 

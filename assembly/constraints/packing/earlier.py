@@ -12,13 +12,15 @@ from assembly.proximity.features.solid_contact import TRACK
 if TYPE_CHECKING:
     from assembly.constraints.packing.scene import Packed
 
-__all__ = ["is_earlier", "is_same_scene", "taken_over"]
+__all__ = ["is_earlier", "is_same_scene", "stretch", "taken_over"]
 
 Array = NDArray[np.float64]
 
 
 def is_earlier(earlier: Packed, packed: Packed) -> bool:
-    """Whether a scene was packed as `earlier` before it was packed as it is now."""
+    """Whether a scene was packed as `earlier` before it was packed as it is now, or with other numbers."""
+    if packed.lineage is earlier.lineage:
+        return packed is not earlier
     before = packed.before
     while before is not None and before is not earlier:
         before = before.before
@@ -40,6 +42,8 @@ def taken_over(earlier: Packed, packed: Packed, state: Array) -> Array:
     given = len(packed.contacts)
     pairs = slice(packed.contacts_at, packed.contacts_at + TRACK * given)
     taken[pairs] = state[pairs]
+    if given and earlier.lineage is packed.lineage:
+        stretch(earlier, packed, taken)
     taken[packed.angles_at : packed.multipliers_at] = state[earlier.angles_at : earlier.multipliers_at]
     # Rows: of contacts, of clearances, of all the rest.
     before, now = given + earlier.clearance_rows, given + packed.clearance_rows
@@ -49,3 +53,13 @@ def taken_over(earlier: Packed, packed: Packed, state: Array) -> Array:
     multipliers *= earlier.unit / packed.unit
     multipliers[packed.lengths] *= packed.scale / earlier.scale
     return taken
+
+
+def stretch(earlier: Packed, packed: Packed, state: Array) -> None:
+    """Parameters of contacts where surfaces have other domains now: knots are lengths, and grow with a shape."""
+    pairs = slice(packed.contacts_at, packed.contacts_at + TRACK * len(packed.contacts))
+    tracked = state[pairs].reshape(-1, TRACK)
+    for k, (before, now) in enumerate(zip(earlier.domains, packed.domains, strict=True)):
+        if before is not None and now is not None and not np.array_equal(before, now):
+            part = (tracked[k, :4] - before[:, 0]) / (before[:, 1] - before[:, 0])
+            tracked[k, :4] = now[:, 0] + part * (now[:, 1] - now[:, 0])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from assembly._address import clock_address
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint, RowConstraint, structure_changes
-from assembly.constraints.model.contact import Contact, side_face
+from assembly.constraints.model.contact import Contact, lone_surfaces, side_face
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import Objective, Posture
 from assembly.constraints.model.trim_contact import TrimContact
@@ -28,7 +28,7 @@ from assembly.constraints.packing.manager_last import ManagerLast
 from assembly.constraints.packing.numbering import number_bodies
 from assembly.constraints.packing.revolutions import Turns
 from assembly.constraints.packing.rows import RowPacking
-from assembly.constraints.packing.scene_size import check_reach, has_no_extent, scene_size
+from assembly.constraints.packing.scene_size import check_reach, size_and_extent
 from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.packing.terms import TermPacking, natural_unit
 from assembly.constraints.program import records as layout
@@ -38,6 +38,7 @@ from assembly.constraints.program.kept import kept_size, kept_unknowns
 from assembly.constraints.program.primitives import RECORD as JOINT_FRAMES
 from assembly.errors import FARTHEST, InputError
 from assembly.kinematics.body import Body
+from assembly.kinematics.changes import numbers_set
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager.events import fresh_memory, listed_places
@@ -75,6 +76,8 @@ class Packed(ManagerLast):
         Clearances have so many times the places they ask for.
     corners : bool
         Whether the corners of contacts of solids are listed (`packing/corners.py`).
+    size : float, optional
+        What lengths are divided by; the scene's size by default.
 
     Attributes
     ----------
@@ -100,6 +103,18 @@ class Packed(ManagerLast):
         Whether the scene has a size.
     before : Packed or None
         The same scene as it was packed before it had this size, or these rows of clearances.
+    lineage : object
+        The same of a scene that is packed again because numbers were set anew (`numbers`), and of no other one.
+    numbers : int
+        The count of such numbers (`kinematics/changes.py`) when it was packed or compared last.
+    faces : list of Face
+        Of all bodies when it was packed.
+    terms_at, frames_at : int
+        Where the pool has the numbers of terms, and of frames.
+    body_places : dict
+        The number of a body.
+    domains : list of (4, 2) array or None
+        Of every contact of two surfaces the ranges of their parameters.
     unit : float
         What one of the loop's objective counts in the user's units.
     sides : list of (Body or BodyFace, Body or BodyFace)
@@ -144,17 +159,18 @@ class Packed(ManagerLast):
         objectives: Sequence[tuple[float, Objective]],
         places: int = 1,
         corners: bool = False,
+        size: float | None = None,
     ) -> None:
         self.count = len(bodies)
+        self.numbers, self.lineage = numbers_set(), object()
         self.stamp = structure_changes()
         self.structure = structure_of(constraints)
-        size = scene_size(bodies, constraints, objectives)
+        measured, self._has_no_extent = size_and_extent(bodies, constraints, objectives)
+        size = measured if size is None else size
         self.has_size = size > 0.0
-        self._has_no_extent = has_no_extent(bodies, constraints, objectives)
-        self.scale = size if self.has_size else 1.0
         self.before: Packed | None = None
-        self.reference = bodies[0].pose.position.copy()
-        self._reference = self.reference.tolist()
+        self.faces = [side.face for body in bodies for side in body.faces]
+        self._measure_by(size if self.has_size else 1.0, bodies, objectives or [(1.0, Posture())])
         self.contacts = [constraint for constraint in constraints if isinstance(constraint, Contact)]
         # Of a contact with trims the surfaces take part without their own boundaries.
         trimmed = {item.contact.name for item in constraints if isinstance(item, TrimContact)}
@@ -163,6 +179,8 @@ class Packed(ManagerLast):
             (side_face(contact.a), side_face(contact.b)) if whole else (contact.a, contact.b)
             for contact, whole in zip(self.contacts, self.whole, strict=True)
         ]
+        surfaces = [lone_surfaces(pair) for pair in self.sides]
+        self.domains = [None if pair is None else np.array([d for s in pair for d in s.domain]) for pair in surfaces]
         self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
         self.clearance_pairs = manager_packing.clearance_pairs(self.clearances, bodies)
         self.keeps_apart = any(self.clearance_pairs)
@@ -201,17 +219,23 @@ class Packed(ManagerLast):
         # Without a factor, to copy what a solution keeps takes longer than to evaluate it anew.
         self._state_size = self.kept_at + (self.kept_size if kept_unknowns(self.rows_table) > 0 else 0)
 
+    def _measure_by(self, scale: float, bodies: Sequence[Body], goals: Sequence[tuple[float, Objective]]) -> None:
+        """Keep what lengths, positions and the objective are counted in."""
+        self.scale = scale
+        self.reference = bodies[0].pose.position.copy()
+        self._reference = self.reference.tolist()
+        self.unit = max(term.weight * natural_unit(term, scale) for _, term in goals)
+        if not LEAST_UNIT <= self.unit <= 1.0 / LEAST_UNIT:
+            raise InputError(
+                f"the objective counts in units of {self.unit:g}, by its weights and the scene's size {scale:g}; "
+                f"expected from {LEAST_UNIT:g} to {1.0 / LEAST_UNIT:g}"
+            )
+
     def _write(
         self, bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
     ) -> None:
         """Write table and pool, part by part, and keep what tells of them."""
         goals = objectives or [(1.0, Posture())]
-        self.unit = max(term.weight * natural_unit(term, self.scale) for _, term in goals)
-        if not LEAST_UNIT <= self.unit <= 1.0 / LEAST_UNIT:
-            raise InputError(
-                f"the objective counts in units of {self.unit:g}, by its weights and the scene's size {self.scale:g}; "
-                f"expected from {LEAST_UNIT:g} to {1.0 / LEAST_UNIT:g}"
-            )
         writer = SceneWriter(bodies, self.scale, self.pair_rows)
         header = writer.header
         writer.add(header, self._pool_header())
@@ -222,10 +246,12 @@ class Packed(ManagerLast):
         header[layout.CONTACTS] = self.pair_rows
         header[layout.IMPLICIT] = not objectives
         self._write_rows(writer, bodies, constraints, unknown_blocks)
+        self.terms_at = writer.pool_at
         terms = TermPacking(writer, bodies, self.reference, self.unit)
         for sign, term in goals:
             terms.add(sign, term)
         terms.write()
+        self.frames_at = writer.pool_at
         writer.add_shared()
         # Rows of clearances are of any bodies, those of trims and dexterities are not by blocks.
         if header[layout.MOVING] > FEW and not (self.clearance_rows or self.trims or header[layout.DEXTERITIES]):
@@ -237,7 +263,7 @@ class Packed(ManagerLast):
         self.end_effectors = 1 if header[layout.DEXTERITIES] else None
         self.tracked = int(header[layout.TRACKED])
         self.shells, self._angles = writer.shells, writer.angles
-        self._places, self._frames = writer.places, writer.frames
+        self.body_places, self._frames = writer.places, writer.frames
         self._targets, self._turns = terms.targets, terms.turns
         self._turned = Turns(self._angles, [(equation, at) for equation, at, _ in self._values])
         self.chooses_turns = self._turned.chosen and not self.clearance_rows

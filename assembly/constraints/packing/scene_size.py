@@ -14,7 +14,7 @@ from assembly.errors import FARTHEST, InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import length
 
-__all__ = ["check_reach", "has_no_extent", "scene_size"]
+__all__ = ["check_reach", "scene_size", "size_and_extent"]
 
 Array = NDArray[np.float64]
 Objectives = Sequence[tuple[float, Objective]]
@@ -36,11 +36,19 @@ def scene_size(bodies: Sequence[Body], constraints: Sequence[Constraint], object
     InputError
         Too small or too large for squares of lengths to be doubles.
     """
+    return size_and_extent(bodies, constraints, objectives)[0]
+
+
+def size_and_extent(
+    bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Objectives
+) -> tuple[float, bool]:
+    """The same, and whether no body has a shape or two marks: then it rests on values and places, which may change."""
     marks = _marks(bodies, constraints, objectives)
     on_bodies = max(_box(places) for places in marks.values())
     shapes = max(body.size for body in bodies)
     if shapes > 0.0:
-        return _checked(max(shapes, on_bodies), marks)
+        return _checked(max(shapes, on_bodies), marks), False
+    rests_on_values = on_bodies < LEAST
     asked, limits = _lengths(constraints)
     known = max(on_bodies, asked)
     if on_bodies < LEAST:
@@ -48,13 +56,7 @@ def scene_size(bodies: Sequence[Body], constraints: Sequence[Constraint], object
     if known < LEAST:
         wished = [far for far in (limits, _farthest_target(bodies, objectives)) if far > 0.0]
         known = max(known, min(wished, default=0.0))
-    return _checked(known, marks) if known > 0.0 else 0.0
-
-
-def has_no_extent(bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Objectives) -> bool:
-    """Whether no body has a shape or two marks: then the size rests on values and places, which may change."""
-    marks = _marks(bodies, constraints, objectives).values()
-    return max(body.size for body in bodies) == 0.0 and max(map(_box, marks)) < LEAST
+    return (_checked(known, marks) if known > 0.0 else 0.0), rests_on_values
 
 
 def check_reach(what: str, far: float, size: float) -> None:

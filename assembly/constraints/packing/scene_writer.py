@@ -17,15 +17,24 @@ from assembly.geometry.expression import tape
 from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import OFFSETS, SURFACE_RECORD
-from assembly.kinematics.body import Body
+from assembly.kinematics.body import Body, Frame
 from assembly.proximity.brep.packing import pack_shell
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.writer import Writer
 
-__all__ = ["SceneWriter"]
+__all__ = ["SceneWriter", "frame_numbers"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
+
+
+def frame_numbers(frame_a: Frame, frame_b: Frame, scale: float) -> Array:
+    """Two frames as the pool has them, (24,)."""
+    numbers = np.empty((2, 4, 3))
+    for part, frame in zip(numbers, (frame_a, frame_b), strict=True):
+        part[0] = frame.origin / scale
+        part[1:] = frame.axes.T
+    return numbers.ravel()
 
 
 class SceneWriter(Writer):
@@ -122,11 +131,7 @@ class SceneWriter(Writer):
         """Write what rows and terms asked for: frames, and the room that tapes take."""
         fields: list[int] = []
         for pair in self.frames:
-            pool = np.empty((2, 4, 3))
-            for part, frame in zip(pool, (pair.frame_a, pair.frame_b), strict=True):
-                part[0] = frame.origin / self.scale
-                part[1:] = frame.axes.T
-            _, at = self.add(pool=pool)
+            _, at = self.add(pool=frame_numbers(pair.frame_a, pair.frame_b, self.scale))
             fields += [*self.places_of((pair.frame_a.body, pair.frame_b.body)), at]
         header = self.header
         header[layout.JOINT_TABLE], _ = self.add(fields)

@@ -81,7 +81,7 @@ def _gradient(packed: Packed, item: Coordinate, poses: Array) -> Array:
     """Of a coordinate, in the twists of all bodies, (6 n,)."""
     frames = (item.frames.frame_a, item.frames.frame_b)
     pool = np.concatenate([part.ravel() for frame in frames for part in (frame.origin / packed.scale, frame.axes.T)])
-    i, j = (packed._places[frame.body] for frame in frames)
+    i, j = (packed.body_places[frame.body] for frame in frames)
     records, row, out = np.empty((1, RECORD)), np.empty((1, 12)), np.zeros((len(poses), 6))
     place_frames(pool, 0, poses, i, j, records, 0)
     _, n, arm_f, arm_g, h = coordinate(item.kind, item.component, records, 0, 0.0)
@@ -92,7 +92,7 @@ def _gradient(packed: Packed, item: Coordinate, poses: Array) -> Array:
 
 def _end_effector_rows(packed: Packed, task: TipTask, poses: Array) -> Array:
     """The end effector's velocity by the twists of all bodies, lengths over the scene's size, (3 or 6, 6 n)."""
-    body = packed._places[task.tip.body]
+    body = packed.body_places[task.tip.body]
     arm = rotation_matrix(poses[body, 3:]) @ task.origin / packed.scale
     out = np.zeros((6, 6 * len(poses)))
     out[:, 6 * body : 6 * body + 6] = np.block([[np.eye(3), -skew(arm)], [np.zeros((3, 3)), np.eye(3)]])

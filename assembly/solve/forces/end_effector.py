@@ -198,7 +198,7 @@ def _state(scene: Assembly, packed: Packed, q: ArrayLike | Solution | None) -> A
 
 def _with_term(packed: Packed, objective: Dexterity) -> tuple[NDArray[np.int64], Array, int]:
     """Table and pool with a term at their end that is not part of the objective, and where it is."""
-    task, places, scale = objective.tip_task, packed._places, packed.scale
+    task, places, scale = objective.tip_task, packed.body_places, packed.scale
     table, pool = packed.table, packed.pool
     joints, first = int(table[layout.JOINTS]), int(table[layout.JOINT_TABLE])
     frames: list[int] = []

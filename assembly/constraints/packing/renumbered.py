@@ -1,0 +1,123 @@
+"""A packed scene with other numbers in the same places: what changes when a frame is placed anew, or a value set.
+
+What is in the pool is written by what packs it, into a pool of its own; the table stays. So the bits are those of the
+scene packed anew, and solutions of before keep theirs. Where numbers make trees or surfaces, a shape or a least gap or
+the size of a scene with contacts, the scene is packed anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.model.constraint import Constraint
+from assembly.constraints.model.dexterity import Dexterity
+from assembly.constraints.model.expression import Expression
+from assembly.constraints.model.objectives import Objective, Posture
+from assembly.constraints.packing.scene_size import size_and_extent
+from assembly.constraints.packing.scene_writer import SceneWriter, frame_numbers
+from assembly.constraints.packing.terms import TermPacking
+from assembly.constraints.program import records as layout
+from assembly.constraints.program.objective_terms import POSTURE, POSTURE_PARAMETERS, TERM
+from assembly.kinematics.body import Body
+from assembly.kinematics.changes import numbers_set
+
+if TYPE_CHECKING:
+    from assembly.constraints.packing.scene import Packed
+
+__all__ = ["have_same_numbers", "renumbered"]
+
+Array = NDArray[np.float64]
+# The numbers of a posture's reference, behind its weight and before its lever.
+REFERENCE = POSTURE_PARAMETERS - 2
+
+
+class _PoolWriter:
+    """Takes what terms add to a pool, of scenes whose table is written."""
+
+    def __init__(self, packed: Packed, scale: float) -> None:
+        self.scale, self.places, self.header = scale, packed.body_places, np.zeros(layout.HEADER, dtype=np.int64)
+        self.pool: list[float] = []
+
+    def add(self, table: Sequence[int] = (), pool: Sequence[float] = ()) -> tuple[int, int]:
+        """Keep what goes to the pool."""
+        at = len(self.pool)
+        self.pool += pool
+        return 0, at
+
+
+def renumbered(
+    packed: Packed,
+    bodies: Sequence[Body],
+    constraints: Sequence[Constraint],
+    objectives: Sequence[tuple[float, Objective]],
+) -> Packed | None:
+    """The scene with its numbers of now, itself where these are no others; None where it has to be packed anew."""
+    goals = objectives or [(1.0, Posture())]
+    faces = [side.face for body in bodies for side in body.faces]
+    if packed.clearance_rows or any(isinstance(term, (Dexterity, Expression)) for _, term in goals):
+        return None
+    if len(faces) != len(packed.faces) or any(a is not b for a, b in zip(faces, packed.faces, strict=True)):
+        return None
+    size, has_no_extent = size_and_extent(bodies, constraints, objectives)
+    scale = size if size > 0.0 else 1.0
+    if scale != packed.scale and packed.pair_rows:
+        return None
+    other = packed.twin()
+    other.numbers = numbers_set()
+    other.has_size, other._has_no_extent = size > 0.0, has_no_extent
+    other._measure_by(scale, bodies, goals)
+    pool = other.rows_pool
+    pool[: layout.POOL_HEADER - 2] = other._pool_header()[: layout.POOL_HEADER - 2]
+    at = packed.frames_at
+    for pair in packed._frames:
+        pool[at : at + 24] = frame_numbers(pair.frame_a, pair.frame_b, scale)
+        at += 24
+    if scale != packed.scale:
+        other._values = []
+        for equation, place, _ in packed._values:
+            (_, first), *others = equation.terms
+            unit = 1.0 if first.is_angle else scale
+            for factor, second in others:
+                pool[place - 1] = factor * (1.0 if second.is_angle else scale) / unit
+            pool[place] = 0.0
+            other._values.append((equation, place, unit))
+        other._sources = [item for item in other._values if item[0].source is not None]
+        other._standing_units = np.array([1.0 if item.is_angle else scale for item in packed._turned.told])
+    writer = _PoolWriter(packed, scale)
+    terms = TermPacking(cast(SceneWriter, writer), bodies, other.reference, other.unit)
+    for sign, term in goals:
+        terms.add(sign, term)
+    pool[packed.terms_at : packed.terms_at + len(writer.pool)] = writer.pool
+    for at in _following_postures(packed):
+        # Where the last solve began, until the next one begins.
+        pool[at + 1 : at + 1 + REFERENCE] = packed.rows_pool[at + 1 : at + 1 + REFERENCE]
+    if have_same_numbers(packed, other):
+        packed.numbers = numbers_set()
+        return packed
+    return other
+
+
+def have_same_numbers(one: Packed, other: Packed) -> bool:
+    """Whether a scene that was packed twice has the same numbers now, wherever its last solves began."""
+    if one is other:
+        return True
+    if one.lineage is not other.lineage or one.scale != other.scale or one.pool.size != other.pool.size:
+        return False
+    for each in (one, other):
+        each.refresh()
+    apart = one.pool != other.pool
+    apart[layout.VERSION] = False
+    for at in _following_postures(one):
+        apart[at + 1 : at + 1 + REFERENCE] = False
+    return not apart.any()
+
+
+def _following_postures(packed: Packed) -> list[int]:
+    """Where the numbers are of postures that are measured from where each solve begins."""
+    table = packed.rows_table
+    terms = table[table[layout.TERM_TABLE] :][: TERM * table[layout.TERMS]].reshape(-1, TERM).tolist()
+    return [at for kind, _, at, _, follows, *_ in terms if kind == POSTURE and follows]

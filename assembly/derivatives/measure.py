@@ -1,0 +1,115 @@
+"""Measure: a number of a solution, whose derivatives are asked for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.model.constraint import Constraint, Freedom
+from assembly.constraints.model.contact import Contact
+from assembly.constraints.model.joint import Joint
+from assembly.errors import InputError, text
+from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.pose import rotation_matrix
+from assembly.solve.solution import Solution
+
+__all__ = ["Measure"]
+
+Array = NDArray[np.float64]
+AXES = ("x", "y", "z")
+WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
+
+
+class Measure:
+    """A number of a solution.
+
+    | thing | component |
+    |---|---|
+    | a point, a frame, a body | "x", "y" or "z" of it, or of its origin, in the world |
+    | a joint or a freedom | the name of the freedom; none where there is one |
+    | two points (or frames, bodies) | none: their distance |
+    | a contact of the scene | none: its gap |
+    | a constraint, `on=body` | "fx" to "tz" of what it exerts on the body, about the body's origin, in world axes |
+    | "objective" | none |
+
+    Parameters
+    ----------
+    thing, component
+        As in the table.
+    on : Body, optional
+        Of a wrench: the body that it acts on.
+    name : str, optional
+        How tables call it.
+
+    Raises
+    ------
+    InputError, TypeError
+        A thing that has no such component.
+    """
+
+    def __init__(self, thing: Any, component: str | None = None, *, on: Body | None = None, name: str | None = None):
+        self.kind, self.thing, self.axis, self.unit = "", thing, 0, "length"
+        label = ""
+        if on is not None:
+            if not isinstance(thing, Constraint) or component not in WRENCH:
+                raise InputError(f"component is {component!r} with on={on!r}; expected a constraint and 'fx' to 'tz'")
+            self.kind, self.axis, label = "wrench", WRENCH.index(component), f"{thing.name} on {on.name}.{component}"
+            self.unit = "force" if self.axis < 3 else "torque"
+        elif isinstance(thing, (Point, Frame, Body)):
+            if component not in AXES:
+                raise InputError(f"component is {component!r}; expected 'x', 'y' or 'z'")
+            self.kind, self.axis = "place", AXES.index(component)
+            label = f"{thing.name if isinstance(thing, Body) else thing.body.name}.{component}"
+        elif isinstance(thing, (Joint, Freedom)):
+            freedom = thing.freedom(component) if isinstance(thing, Joint) else thing
+            self.kind, self.thing, label = "coordinate", freedom, f"{freedom.joint.name}.{freedom.name}"
+            self.unit = "rad" if freedom.coordinate.is_angle else "length"
+        elif isinstance(thing, Contact):
+            self.kind, label = "gap", f"{thing.name}.gap"
+        elif isinstance(thing, str) and thing == "objective":
+            self.kind, self.unit, label = "objective", "objective", "objective"
+        elif isinstance(thing, tuple) and len(thing) == 2 and all(isinstance(p, (Point, Frame, Body)) for p in thing):
+            self.kind, label = "distance", "-".join(place_of(side)[0].name for side in thing)
+        else:
+            raise TypeError(
+                f"thing is {thing!r}; expected a point, a frame, a body, a joint, a contact, a pair of points, a "
+                "constraint with on=body, or 'objective'"
+            )
+        self.on = on
+        self.name = label if name is None else text("name", name)
+
+    def value(self, solution: Solution) -> float:
+        """What it is at a solution, in the user's units; angles go on past whole turns."""
+        if self.kind == "objective":
+            return solution.objective
+        if self.kind == "coordinate":
+            return solution.values[f"{self.thing.joint.name}.{self.thing.name}"]
+        if self.kind == "gap":
+            return solution.contacts[self.thing.name].gap
+        if self.kind == "wrench":
+            assert self.on is not None
+            return float(solution.wrenches[self.thing.name][self.on.name].vector[self.axis])
+        sides = self.thing if self.kind == "distance" else (self.thing,)
+        rows = [solution.q[solution._scene.index(place_of(side)[0])] for side in sides]
+        places = [world(side, row[:3], rotation_matrix(row[3:]))[0] for side, row in zip(sides, rows, strict=True)]
+        return float(np.linalg.norm(places[1] - places[0])) if len(places) == 2 else float(places[0][self.axis])
+
+    def __repr__(self) -> str:
+        return f"Measure({self.name!r})"
+
+
+def place_of(thing: Point | Frame | Body) -> tuple[Body, Array]:
+    """The body of a place, and where it is on the body."""
+    if isinstance(thing, Body):
+        return thing, np.zeros(3)
+    return thing.body, thing.coordinates if isinstance(thing, Point) else thing.origin
+
+
+def world(thing: Point | Frame | Body, position: Array, rotation: Array) -> tuple[Array, Array]:
+    """Where a place is, with its body at a position (3,) and turned by (3, 3); its slopes in the twist, (3, 6)."""
+    _, place = place_of(thing)
+    x, y, z = arm = rotation @ place
+    turn = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+    return position + arm, np.hstack([np.eye(3), turn])

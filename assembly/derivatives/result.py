@@ -1,0 +1,95 @@
+"""Sensitivity: the derivatives of measures of a solution by parameters, and what has none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._read_only import ReadOnlyArrays
+from assembly.derivatives.measure import Measure
+from assembly.derivatives.parameter import Parameter
+from assembly.errors import InputError
+
+__all__ = ["Sensitivity"]
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity(ReadOnlyArrays):
+    """Derivatives of measures by parameters at a solution: `d[x, r]`; print it for a table.
+
+    Attributes
+    ----------
+    of : tuple of Measure
+    wrt : tuple of Parameter
+    matrix : (m, p)
+        A row a measure, a column a parameter; NaN where there is no derivative, and `reasons` has why.
+    shrinking, growing : (m, p)
+        The derivatives from below and from above. They differ where a one-sided row is at its bound without a force.
+    undetermined : (m,) bool
+        Measures that a free motion changes: of these the derivative is that of the least move.
+    twists : mapping of body's name to (p, 6)
+        The bodies' twists a unit of each parameter; `poses` has them by parameter.
+    multipliers : mapping of constraint's name to (rows, p)
+        Derivatives of `Solution.multipliers`.
+    rank : int
+        Of the rows that hold at the solution.
+    reasons : mapping of parameter's name to str
+    """
+
+    of: tuple[Measure, ...]
+    wrt: tuple[Parameter, ...]
+    matrix: Array
+    shrinking: Array
+    growing: Array
+    undetermined: Flags
+    twists: Mapping[str, Array]
+    multipliers: Mapping[str, Array]
+    rank: int
+    reasons: Mapping[str, str]
+
+    def __getitem__(self, pair: tuple[Measure, Parameter]) -> float:
+        """The derivative of a measure by a parameter; NaN where there is none."""
+        measure, parameter = pair
+        return float(self.matrix[_place("measure", measure, self.of), _place("parameter", parameter, self.wrt)])
+
+    def one_sided(self, measure: Measure, parameter: Parameter) -> tuple[float, float]:
+        """The derivatives as the parameter shrinks, and as it grows."""
+        at = _place("measure", measure, self.of), _place("parameter", parameter, self.wrt)
+        return float(self.shrinking[at]), float(self.growing[at])
+
+    @property
+    def poses(self) -> dict[str, dict[Parameter, Array]]:
+        """Of every body, by name, its twist (6,) a unit of each parameter: world axes, at its origin."""
+        return {name: dict(zip(self.wrt, rows, strict=True)) for name, rows in self.twists.items()}
+
+    def __str__(self) -> str:
+        heads = [f"{item.name} [{item.unit}]" if item.unit else item.name for item in self.wrt]
+        names = [f"{item.name} [{item.unit}]" for item in self.of]
+        first = max(map(len, ["d / d", *names]))
+        widths = [max(len(head), 14) for head in heads]
+        lines = ["  ".join([f"{'d / d':<{first}}", *(f"{h:>{w}}" for h, w in zip(heads, widths, strict=True))])]
+        for i, name in enumerate(names):
+            cells = [f"{self._cell(i, k):>{width}}" for k, width in enumerate(widths)]
+            note = "  undetermined: a free motion changes it" if self.undetermined[i] else ""
+            lines.append("  ".join([f"{name:<{first}}", *cells]) + note)
+        lines.append(f"rank {self.rank} of the rows that hold")
+        return "\n".join([*lines, *(f"{name}: {reason}" for name, reason in self.reasons.items())])
+
+    def _cell(self, i: int, k: int) -> str:
+        low, high = self.shrinking[i, k], self.growing[i, k]
+        if np.isnan(self.matrix[i, k]) and np.isfinite(low) and np.isfinite(high):
+            return f"{low:.6g} | {high:.6g}"
+        return "none" if np.isnan(self.matrix[i, k]) else f"{self.matrix[i, k]:.8g}"
+
+
+def _place(what: str, item: object, items: Sequence[object]) -> int:
+    for k, other in enumerate(items):
+        if other is item:
+            return k
+    raise InputError(f"{what} is {item!r}; expected one of {list(items)!r}")

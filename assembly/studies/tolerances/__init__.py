@@ -1,0 +1,1 @@
+"""What tolerances of dimensions do to measures of an assembly."""

@@ -1,0 +1,55 @@
+"""How far a piston moves when a dimension of its crank mechanism changes a little.
+
+The crank is driven to an angle; its hinges are frames on the bodies, whose places are the lengths of crank and rod.
+Prints where the piston is, its derivatives beside those of the closed form, and what a longer crank would do: by the
+derivative, and solved with the number set anew. Writes slider_crank_sensitivity.html: open it in any browser.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import assembly as asm
+
+RADIUS, LENGTH, ANGLE = 2.0, 5.0, 0.7
+LONGER = 0.01
+
+
+def slider_crank() -> tuple[asm.Assembly, asm.Measure, list[asm.Parameter]]:
+    ground, crank, rod = asm.Body("ground", fixed=True), asm.Body("crank"), asm.Body("rod", position=(1.5, 1.3, 0))
+    piston = asm.Body("piston", position=(6, 0, 0))
+    hinge = asm.Revolute(ground, crank, "hinge", angle=ANGLE)
+    pin = asm.Revolute(crank.frame(at=(RADIUS, 0, 0)), rod, "pin")
+    wrist = asm.Revolute(rod.frame(at=(LENGTH, 0, 0)), piston, "wrist")
+    guide = asm.Prismatic(ground.frame(z=(1, 0, 0)), piston.frame(z=(1, 0, 0)), "guide")
+    scene = asm.Assembly([ground, crank, rod, piston])
+    scene.constrain(hinge, pin, wrist, guide)
+    angle = asm.Parameter(hinge, "angle", name="angle")
+    radius = asm.Parameter(pin.frame_a, "origin", "x", name="crank")
+    length = asm.Parameter(wrist.frame_a, "origin", "x", name="rod")
+    return scene, asm.Measure(guide, name="stroke"), [angle, radius, length]
+
+
+def closed_form() -> np.ndarray:
+    """x = r cos(angle) + sqrt(l^2 - r^2 sin(angle)^2), derived by hand."""
+    cosine, sine = np.cos(ANGLE), np.sin(ANGLE)
+    along = np.sqrt(LENGTH**2 - (RADIUS * sine) ** 2)
+    return np.array([-RADIUS * sine * (1 + RADIUS * cosine / along), cosine - RADIUS * sine**2 / along, LENGTH / along])
+
+
+def main() -> tuple[asm.Sensitivity, np.ndarray, float, float]:
+    scene, stroke, (angle, radius, length) = slider_crank()
+    solution = scene.solve()
+    d = asm.sensitivity(scene, solution, of=stroke, wrt=[angle, radius, length])
+    print(f"the piston is at {stroke.value(solution):.12f}")
+    print(d)
+    print("closed form:", *(f"{value:.8g}" for value in closed_form()))
+    asm.view.save_html("slider_crank_sensitivity.html", scene, solution)
+    radius.value += LONGER
+    moved = stroke.value(scene.solve(solution)) - stroke.value(solution)
+    print(f"a crank longer by {LONGER}: {LONGER * d[stroke, radius]:.8f} by the derivative, {moved:.8f} solved anew")
+    return d, closed_form(), LONGER * d[stroke, radius], moved
+
+
+if __name__ == "__main__":
+    main()

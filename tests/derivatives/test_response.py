@@ -1,0 +1,135 @@
+"""Measures as functions of numbers of a scene: values, exact derivatives, and what optimizers make of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares, minimize
+
+import assembly as asm
+from assembly.errors import InputError
+
+R, L, ANGLE = 2.0, 5.0, 0.7
+
+
+@pytest.fixture
+def crank():
+    """Slider-crank; its stroke, and radius, length and angle."""
+    ground, wheel, rod = asm.Body("ground", fixed=True), asm.Body("wheel"), asm.Body("rod", position=(1.5, 1.3, 0))
+    piston = asm.Body("piston", position=(6, 0, 0))
+    hinge = asm.Revolute(ground, wheel, "hinge", angle=ANGLE)
+    pin = asm.Revolute(wheel.frame(at=(R, 0, 0)), rod, "pin")
+    wrist = asm.Revolute(rod.frame(at=(L, 0, 0)), piston, "wrist")
+    guide = asm.Prismatic(ground.frame(z=(1, 0, 0)), piston.frame(z=(1, 0, 0)), "guide")
+    scene = asm.Assembly([ground, wheel, rod, piston])
+    scene.constrain(hinge, pin, wrist, guide)
+    radius = asm.Parameter(pin.frame_a, "origin", "x", name="radius")
+    length = asm.Parameter(wrist.frame_a, "origin", "x", name="length")
+    return scene, asm.Measure(guide), radius, length, asm.Parameter(hinge, "angle", name="angle")
+
+
+def stroke(r, l, a):  # noqa: E741
+    return r * np.cos(a) + np.sqrt(l**2 - (r * np.sin(a)) ** 2)
+
+
+def slopes(r, l, a):  # noqa: E741
+    along = np.sqrt(l**2 - (r * np.sin(a)) ** 2)
+    return np.array([np.cos(a) - r * np.sin(a) ** 2 / along, l / along, -r * np.sin(a) * (1.0 + r * np.cos(a) / along)])
+
+
+def test_values_and_derivatives_are_those_of_the_closed_form(crank):
+    scene, travel, *parameters = crank
+    f = asm.Response(scene, travel, parameters)
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        values = [R, L, ANGLE] * rng.uniform(0.9, 1.1, 3)
+        found, rates = f.both(values)
+        # Rows hold to 1e-12 of the size, some 6.
+        assert found == pytest.approx(stroke(*values), abs=1e-11)
+        np.testing.assert_allclose(rates, slopes(*values), rtol=0, atol=1e-10)
+        assert f(values) == found and (f.jacobian(values) == rates).all()
+    # The scene is as it was.
+    assert [p.value for p in parameters] == [R, L, ANGLE]
+    assert f.values.tolist() == [R, L, ANGLE]
+
+
+def test_several_measures(crank):
+    scene, travel, radius, length, _ = crank
+    rod = scene.bodies[2]
+    f = asm.Response(scene, [travel, asm.Measure(rod, "y")], [radius, length])
+    found, rates = f.both([R, L])
+    assert found == pytest.approx([stroke(R, L, ANGLE), R * np.sin(ANGLE)], abs=1e-12)
+    np.testing.assert_allclose(rates, [slopes(R, L, ANGLE)[:2], [np.sin(ANGLE), 0.0]], rtol=0, atol=1e-11)
+
+
+def test_a_value_does_not_depend_on_the_calls_before(crank):
+    scene, travel, radius, length, _ = crank
+    f = asm.Response(scene, travel, [radius, length])
+    first = f([1.9, 5.2])
+    for values in ([2.5, 4.0], [1.0, 6.0]):
+        f(values)
+    assert f([1.9, 5.2]) == first
+
+
+def test_a_response_that_follows_stays_on_its_branch(crank):
+    """The crank driven through a turn in steps, from the last solution each; and far at once from the first one."""
+    scene, travel, _, _, angle = crank
+    f = asm.Response(scene, travel, angle, follow=True)
+    for value in np.linspace(ANGLE, ANGLE + 2.0 * np.pi, 90):
+        assert f([value]) == pytest.approx(stroke(R, L, value), abs=1e-11)
+    assert f.solution.success
+
+
+def test_what_optimizers_make_of_it(crank):
+    """Both lengths from two strokes, by scipy; and the largest stroke for a sum of lengths."""
+    scene, travel, radius, length, _ = crank
+    rod = scene.bodies[2]
+    f = asm.Response(scene, [travel, asm.Measure(rod, "y")], [radius, length])
+    goal = np.array([stroke(1.7, 5.6, ANGLE), 1.7 * np.sin(ANGLE)])
+    found = least_squares(lambda v: f(v) - goal, [R, L], jac=f.jacobian, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    np.testing.assert_allclose(found.x, [1.7, 5.6], rtol=0, atol=1e-10)
+    assert found.nfev <= 10
+    g = asm.Response(scene, travel, [radius, length])
+    best = minimize(
+        lambda v: -g(v), [R, L], jac=lambda v: -g.jacobian(v), method="SLSQP", bounds=[(0.5, 3.0), (4.0, 6.0)],
+        constraints={"type": "eq", "fun": lambda v: v.sum() - 7.0, "jac": lambda v: np.ones((1, 2))},
+    )  # fmt: skip
+    # A unit of length lengthens the stroke more than one of radius all the way.
+    np.testing.assert_allclose(best.x, [1.0, 6.0], rtol=0, atol=1e-8)
+
+
+def test_what_has_no_solution_raises_or_costs_a_penalty(crank):
+    scene, travel, radius, length, _ = crank
+    f = asm.Response(scene, travel, [radius, length])
+    with pytest.raises(asm.ResponseError, match="no solution with radius = 9, length = 1; INFEASIBLE"):
+        f([9.0, 1.0])
+    assert (radius.value, length.value) == (R, L)
+    g = asm.Response(scene, travel, [radius, length], penalty=1e3)
+    found, rates = g.both([9.0, 1.0])
+    assert (found, rates.tolist(), g.failures) == (1e3, [0.0, 0.0], 1)
+    # And it goes on as if nothing had been.
+    assert g([R, L]) == f([R, L])
+
+
+def test_a_free_motion_has_no_derivative(crank):
+    scene, travel, radius, _, _ = crank
+    scene.constraints[0].angle = None
+    with pytest.raises(
+        asm.ResponseError, match=r"measures \['guide.slide'\] change with a motion that the scene leaves"
+    ):
+        asm.Response(scene, travel, radius).jacobian([R])
+
+
+def test_bad_arguments(crank):
+    scene, travel, radius, length, _ = crank
+    f = asm.Response(scene, travel, [radius, length])
+    for values in ([1.0], [1.0, np.nan], "ab", [[1.0, 2.0]]):
+        with pytest.raises(InputError, match="expected 2 finite numbers: radius, length"):
+            f(values)
+    with pytest.raises(TypeError, match=r"of\[0\] is 3; expected a Measure"):
+        asm.Response(scene, [3], radius)
+    with pytest.raises(InputError, match="follow is 1; expected True or False"):
+        asm.Response(scene, travel, radius, follow=1)
+    length.value = 0.5
+    with pytest.raises(asm.ResponseError, match="no solution with radius = 2"):
+        asm.Response(scene, travel, radius)

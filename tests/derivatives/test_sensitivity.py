@@ -1,0 +1,159 @@
+"""Derivatives of solutions against closed forms, differences of re-solved scenes, CasADi, and the envelope theorem."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.derivatives.columns import columns_of
+from assembly.derivatives.implicit import _problem
+from tests.derivatives.sensitivity_scenes import CASES, ball_in_v, clips, differences, pushed, rocker, slider_crank
+
+EACH = [(name, k) for name, case in CASES.items() for k in range(len(case().wrt))]
+# Of dx/dangle, dx/dr, dx/dl of the slider-crank with r 2, l 5, angle 0.7.
+SLIDER_CRANK = (-1.696392624895384, 0.593033361407271, 1.034951956465550)
+
+
+def derived(case, **options):
+    solution = case.solved()
+    return solution, asm.sensitivity(case.scene, solution, case.of, case.wrt)
+
+
+def test_slider_crank_is_its_closed_form():
+    _, d = derived(slider_crank())
+    # The crank's angle is 0.7 to rounding, and so are the derivatives.
+    assert np.abs(d.matrix[0, :3] - SLIDER_CRANK).max() < 1e-13
+    assert np.array_equal(d.matrix[0], d.matrix[1]) or np.abs(d.matrix[0] - d.matrix[1]).max() < 1e-13
+    assert d.rank == 18 and not d.undetermined.any() and not d.reasons
+
+
+def test_a_ball_in_a_v_is_its_closed_form():
+    angle = 0.6
+    _, d = derived(ball_in_v(half_angle=angle))
+    # Nets are differenced with a step of 3e-3: rounding of figures of order ten over it.
+    assert np.abs(d.matrix[0] - [1 / np.sin(angle), -np.cos(angle) / np.sin(angle) ** 2]).max() < 1e-12
+    assert np.abs(d.matrix[1]).max() < 1e-12
+
+
+@pytest.mark.parametrize(("name", "k"), EACH)
+def test_derivatives_are_differences_of_solved_scenes(name, k):
+    case = CASES[name]()
+    solution, d = derived(case)
+    # Of sixth order: their error is what solves leave, 2e-13, over the step.
+    found = differences(case, solution, case.wrt[k], 1e-3 * max(1.0, abs(case.wrt[k].value)))
+    assert np.abs(found - d.matrix[:, k]).max() < 1e-8 * max(1.0, np.abs(found).max())
+
+
+def test_the_objective_falls_by_the_envelope_theorem_as_along_the_motion():
+    case = rocker()
+    solution, d = derived(case)
+    problem, _, _ = _problem(case.scene, solution, case.of, case.wrt)
+    columns = columns_of(problem, case.wrt)
+    scales = np.repeat([problem.packed.scale, 1.0], 3)
+    steps = np.concatenate([d.twists[body.name] / scales for body in case.scene.bodies], axis=1).T
+    direct = (problem.here.gradient @ steps + columns.values) * problem.packed.unit
+    at = [measure.kind for measure in case.of].index("objective")
+    assert np.abs(direct - d.matrix[at]).max() < 1e-11 * np.abs(d.matrix[at]).max()
+
+
+@pytest.mark.parametrize("case", [rocker, clips])
+def test_multipliers_are_derived(case):
+    case = case()
+    solution, d = derived(case)
+    parameter, step = case.wrt[0], 1e-3
+    found = {name: np.zeros(len(y)) for name, y in solution.multipliers.items()}
+    middle = parameter.value
+    for k, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
+        for sign in (1.0, -1.0):
+            parameter.value = middle + sign * k * step
+            for name, y in case.solved(solution).multipliers.items():
+                found[name] += sign * weight / step * y
+    for name, y in found.items():
+        assert np.abs(y - d.multipliers[name][:, 0]).max() < 1e-7 * max(1.0, np.abs(y).max())
+
+
+@pytest.mark.parametrize(("limit", "target", "expected"), [(0.5, 2.0, (1.0, 0.0)), (0.5, 0.2, (0.0, 1.0))])
+def test_both_sides_of_a_change_of_the_active_set(limit, target, expected):
+    _, d = derived(pushed(limit, target))
+    assert d.matrix[0] == pytest.approx(expected, abs=1e-14)
+
+
+def test_at_a_change_of_the_active_set_there_are_two_derivatives():
+    case = pushed(0.5, 0.5)
+    _, d = derived(case)
+    limit, target = case.wrt
+    slide, objective, force = case.of
+    assert np.isnan(d[slide, limit]) and np.isnan(d[slide, target])
+    assert d.one_sided(slide, limit) == pytest.approx((1.0, 0.0), abs=1e-12)
+    assert d.one_sided(slide, target) == pytest.approx((1.0, 0.0), abs=1e-12)
+    assert d.one_sided(force, target) == pytest.approx((0.0, -2.0), abs=1e-12)
+    assert d[objective, limit] == 0.0
+    assert "1 | 0" in str(d) and "one-sided" in d.reasons[limit.name]
+
+
+def test_what_a_free_motion_changes_is_undetermined_and_moves_least():
+    case = slider_crank()
+    hinge = case.scene.constraints[0]
+    hinge.angle = None
+    solution = case.solved()
+    d = asm.sensitivity(case.scene, solution, case.of, case.wrt[1:])
+    assert d.undetermined.all() and d.rank == 17 and np.isfinite(d.matrix).all()
+    # A re-solve that starts at the solution moves as little as rows ask for.
+    radius, step = case.wrt[1], 1e-4
+    ends = []
+    for sign in (1.0, -1.0):
+        radius.value = 2.0 + sign * step
+        ends.append(case.scene.solve(solution.q).q)
+    found = (ends[0] - ends[1])[:, :3] / (2.0 * step)
+    for body, row in zip(case.scene.bodies, found, strict=True):
+        assert np.abs(d.poses[body.name][radius][:3] - row).max() < 1e-7
+
+
+def test_rows_that_repeat_each_other_and_cannot_follow_have_no_derivative():
+    door, frame = asm.Body("door"), asm.Body("frame", fixed=True)
+    scene = asm.Assembly([frame, door])
+    high = asm.Revolute(frame.frame(at=(0, 0, 2)), door.frame(at=(0, 0, 2)), "high")
+    scene.constrain(asm.Revolute(frame, door, "low", angle=0.3), high)
+    solution = scene.solve()
+    tip = asm.Measure(door.point(1, 0, 0), "x")
+    apart = asm.Parameter(high.frame_a, "origin", "x")
+    turned = asm.Parameter(high.frame_a, "turn", "z")
+    d = asm.sensitivity(scene, solution, tip, [apart, turned])
+    assert np.isnan(d[tip, apart]) and "cannot all follow" in d.reasons[apart.name]
+    assert d[tip, turned] == pytest.approx(0.0, abs=1e-12)
+    assert d.rank == 6
+
+
+def test_casadi_derives_the_same():
+    """The slider-crank's closing equations and a pull on its piston, as a program that CasADi derives."""
+    casadi = pytest.importorskip("casadi")
+    x, p = casadi.SX.sym("x", 3), casadi.SX.sym("p", 3)
+    crank, rod, piston = x[0], x[1], x[2]
+    radius, length, target = p[0], p[1], p[2]
+    rows = casadi.vertcat(
+        radius * casadi.cos(crank) + length * casadi.cos(rod) - piston,
+        radius * casadi.sin(crank) + length * casadi.sin(rod),
+    )
+    options = {"ipopt.print_level": 0, "print_time": 0, "ipopt.tol": 1e-14, "ipopt.acceptable_tol": 1e-14}
+    solve = casadi.nlpsol("s", "ipopt", {"x": x, "p": p, "f": (piston - target) ** 2 + crank**2, "g": rows}, options)
+    solution_of = solve.factory("d", ["x0", "p", "lbx", "ubx", "lbg", "ubg", "lam_x0", "lam_g0"], ["jac:x:p"])
+    values = np.array([2.0, 5.0, 4.5])
+    first = solve(x0=[0.7, -0.2, 6.0], p=values, lbg=0.0, ubg=0.0)
+    given = {"x0": first["x"], "lam_x0": first["lam_x"], "lam_g0": first["lam_g"]}
+    bounds = {"lbx": -np.inf, "ubx": np.inf, "lbg": 0.0, "ubg": 0.0}
+    jacobian = np.array(solution_of(**given, **bounds, p=values)["jac_x_p"])
+    case = slider_crank()
+    hinge = case.scene.constraints[0]
+    hinge.angle = None
+    _, crank_body, _, piston_body = case.scene.bodies
+    goal = asm.PointDistance(piston_body.point(0, 0, 0), (4.5, 0, 0))
+    q = casadi.SX.sym("q", 7)
+    turn = casadi.Function("turn", [q], [(2.0 * casadi.atan2(q[6], q[3])) ** 2])
+    case.scene.minimize(goal, asm.Expression(turn, [crank_body]))
+    solution = case.scene.solve(stationarity=1e-13)
+    assert solution.success
+    of = [asm.Measure(hinge), asm.Measure(piston_body, "x")]
+    wrt = [case.wrt[1], case.wrt[2], asm.Parameter(goal, "target", "x")]
+    d = asm.sensitivity(case.scene, solution, of, wrt)
+    assert np.abs(d.matrix - jacobian[[0, 2]]).max() < 1e-8

@@ -1,0 +1,165 @@
+"""Stacks of tolerances against closed forms, and against samples that are solved in full."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.errors import InputError
+
+
+def stack(lengths):
+    """Blocks in a row in a housing of a width: the gap that is left, and the parameters."""
+    width = sum(lengths) + 1.0
+    ground = asm.Body("ground", fixed=True)
+    blocks = [asm.Body(f"block {k}") for k in range(len(lengths))]
+    scene, before, parameters = asm.Assembly([ground, *blocks]), ground, []
+    at = 0.0
+    for k, (length, block) in enumerate(zip(lengths, blocks, strict=True)):
+        joint = asm.Fixed(before.frame(at=(at, 0, 0)), block, f"seat {k}")
+        scene.constrain(joint)
+        if k:
+            parameters.append(asm.Parameter(joint.frame_a, "origin", "x", name=f"L{k}"))
+        before, at = block, length
+    end = blocks[-1].frame(at=(lengths[-1], 0, 0))
+    wall = ground.frame(at=(width, 0, 0))
+    lid = asm.Body("lid", position=(width, 0, 0))
+    closing = asm.Fixed(wall, lid, "wall")
+    last = asm.Body("end")
+    tie = asm.Fixed(end, last, "end of the row")
+    whole = asm.Assembly([*scene.bodies, lid, last])
+    whole.constrain(*scene.constraints, closing, tie)
+    parameters.append(asm.Parameter(tie.frame_a, "origin", "x", name=f"L{len(lengths)}"))
+    parameters.append(asm.Parameter(closing.frame_a, "origin", "x", name="W"))
+    return whole, asm.Measure((last, lid), name="gap"), parameters
+
+
+def test_a_linear_stack_is_exact():
+    scene, gap, parameters = stack([3.0, 5.0, 2.0])
+    sigmas = [0.01, 0.02, 0.03, 0.04]
+    solution = scene.solve()
+    found = asm.tolerances(scene, solution, gap, dict(zip(parameters, map(asm.Normal, sigmas), strict=True)))
+    assert found.nominal[0] == pytest.approx(1.0, abs=1e-12)
+    assert found.sigma[0] == pytest.approx(np.sqrt(np.sum(np.square(sigmas))), rel=1e-12)
+    assert found.worst[0] == pytest.approx([1.0 - 3.0 * sum(sigmas), 1.0 + 3.0 * sum(sigmas)], abs=1e-12)
+    assert found.contributions[0] == pytest.approx(np.square(sigmas) / np.sum(np.square(sigmas)), abs=1e-12)
+    # Differences of derivatives that are equal but for rounding, over steps of half a sigma.
+    assert abs(found.mean_shift[0]) < 1e-12
+
+
+def test_samples_scatter_as_the_stack_says():
+    scene, gap, parameters = stack([3.0, 5.0, 2.0])
+    scatter = {parameters[0]: asm.Uniform(0.05), parameters[1]: asm.Normal(0.02), parameters[3]: asm.Uniform(0.03)}
+    solution, count = scene.solve(), 4000
+    one, two = (
+        asm.tolerances(scene, solution, gap, scatter, samples=count, seed=3, limits={gap: (0.95, None)})
+        for _ in range(2)
+    )
+    variance = 0.05**2 / 3.0 + 0.02**2 + 0.03**2 / 3.0
+    assert one.sigma[0] ** 2 == pytest.approx(variance, rel=1e-12)
+    # Three of the errors that such numbers of samples have.
+    assert one.sampled_sigma[0] == pytest.approx(one.sigma[0], rel=3.0 / np.sqrt(2.0 * count))
+    assert one.mean[0] == pytest.approx(1.0, abs=3.0 * one.sigma[0] / np.sqrt(count))
+    gaps = one.nominal[0] + (one.samples.inputs - [p.value for p in scatter]) @ one.derivatives.matrix[0]
+    np.testing.assert_allclose(one.samples.values[:, 0], gaps, rtol=0, atol=1e-11)
+    assert one.yields == (gaps >= 0.95).mean()
+    # The same seed, the same bits; and the scene is as it was.
+    assert (one.samples.values == two.samples.values).all()
+    assert scene.solve(solution).q.tobytes() == solution.q.tobytes()
+
+
+def test_a_curved_measure_has_another_mean():
+    """The distance of a crank's end from a point beside its pivot: second derivatives by differences of first ones."""
+    ground, crank = asm.Body("ground", fixed=True), asm.Body("crank")
+    scene = asm.Assembly([ground, crank])
+    hinge = asm.Revolute(ground, crank, "hinge", angle=0.4)
+    scene.constrain(hinge)
+    height = asm.Measure(crank.point(3.0, 0.0, 0.0), "y")
+    angle = asm.Parameter(hinge, "angle")
+    sigma = 0.05
+    found = asm.tolerances(scene, scene.solve(), height, {angle: asm.Normal(sigma)})
+    # y = 3 sin a; differences of the fourth order in steps of 0.025 are off by 1e-7 of the second derivative.
+    assert found.mean_shift[0] == pytest.approx(-1.5 * np.sin(0.4) * sigma**2, rel=1e-6)
+    assert found.sigma[0] == pytest.approx(3.0 * np.cos(0.4) * sigma, rel=1e-12)
+
+
+def test_a_stop_that_is_just_reached_counts_half():
+    """A slide that is drawn against a stop, its free optimum exactly there: only a lower stop moves it."""
+    ground, slider = asm.Body("ground", fixed=True), asm.Body("slider")
+    slide = asm.Prismatic(ground, slider, "slide", limits=(None, 1.0))
+    scene = asm.Assembly([ground, slider])
+    scene.constrain(slide)
+    scene.minimize(asm.PointDistance(slider.point(0, 0, 0), (0, 0, 1.0)))
+    stop, place = asm.Parameter(slide, "limits", 1, name="stop"), asm.Measure(slide)
+    solution = scene.solve()
+    sigma = 0.1
+    found = asm.tolerances(scene, solution, place, {stop: asm.Normal(sigma)}, samples=4000, seed=1)
+    # min(0, x) of a normal x: mean -sigma / sqrt(2 pi), mean square sigma^2 / 2.
+    assert found.mean_shift[0] == pytest.approx(-sigma / np.sqrt(2.0 * np.pi), rel=1e-9)
+    assert found.sigma[0] ** 2 == pytest.approx(sigma**2 * (0.5 - 0.5 / np.pi), rel=1e-9)
+    assert found.worst[0] == pytest.approx([1.0 - 3.0 * sigma, 1.0], abs=1e-9)
+    assert found.mean[0] == pytest.approx(1.0 + found.mean_shift[0], abs=3.0 * sigma / np.sqrt(4000))
+    assert found.sampled_sigma[0] == pytest.approx(found.sigma[0], rel=0.05)
+
+
+def test_samples_without_a_solution_are_told():
+    """A rod that is now and then too short to close the loop."""
+    ground, crank, rod = asm.Body("ground", fixed=True), asm.Body("crank"), asm.Body("rod", position=(1, 0, 0))
+    scene = asm.Assembly([ground, crank, rod])
+    hinge = asm.Revolute(ground, crank, "hinge", angle=1.2)
+    pin = asm.Revolute(crank.frame(at=(1, 0, 0)), rod, "pin")
+    way = asm.PointOnPlane(rod.point(1, 0, 0), ground.frame(z=(0, 1, 0)), "way")
+    scene.constrain(hinge, pin, way)
+    solution = scene.solve()
+    length = asm.Parameter(way.frame_b, "origin", "x", name="rod")
+    place = asm.Measure(rod, "x")
+    found = asm.tolerances(scene, solution, [place, asm.Measure(pin)], {length: asm.Normal(0.05)}, samples=200, seed=2)
+    # A rod shorter than the height of the pin, sin 1.2, reaches no way.
+    short = found.samples.inputs[:, 0] < np.sin(1.2)
+    assert 0 < short.sum() < 200 and found.samples.failed == short.sum()
+    assert np.isnan(found.samples.values[short]).all() and np.isfinite(found.samples.values[~short]).all()
+    assert f"{short.sum()} without a solution" in str(found)
+
+
+def test_plots(tmp_path):
+    pytest.importorskip("matplotlib").use("Agg")
+    scene, gap, parameters = stack([3.0, 5.0])
+    scatter = dict.fromkeys(parameters, asm.Normal(0.01))
+    found = asm.tolerances(scene, scene.solve(), gap, scatter, samples=50, limits={gap: (0.9, 1.1)})
+    figure = found.plot()
+    figure.savefig(tmp_path / "stack.png")
+    assert len(figure.axes) == 2 and len(figure.axes[1].patches) == len(parameters)
+    assert (tmp_path / "stack.png").stat().st_size > 5000
+
+
+def test_bad_arguments():
+    scene, gap, parameters = stack([3.0, 5.0])
+    solution, scatter = scene.solve(), {parameters[0]: asm.Normal(0.01)}
+    for arguments, error, text in (
+        (dict(of=gap, parameters={}), TypeError, "expected a mapping of Parameter"),
+        (
+            dict(of=gap, parameters={parameters[0]: 0.1}),
+            TypeError,
+            r"parameters\['L1'\] is 0.1; expected Normal or Uniform",
+        ),
+        (dict(of=gap, parameters={"L1": asm.Normal(1)}), TypeError, "has the key 'L1'; expected a Parameter"),
+        (dict(of=gap, parameters=scatter, samples=-1), InputError, "samples is -1"),
+        (dict(of=gap, parameters=scatter, limits={gap: (0, 1)}), InputError, "limits are given without samples"),
+        (
+            dict(of=gap, parameters=scatter, samples=5, limits={gap: (1, 0)}),
+            InputError,
+            "a lower limit below the upper",
+        ),
+        (dict(of=gap, parameters=scatter, samples=5, limits={gap: 3}), InputError, r"is 3; expected \(lower, upper\)"),
+    ):
+        with pytest.raises(error, match=text):
+            asm.tolerances(scene, solution, **arguments)
+    for wrong in (0.0, -1.0, np.nan):
+        with pytest.raises(InputError, match="sigma is"):
+            asm.Normal(wrong)
+        with pytest.raises(InputError, match="half_width is"):
+            asm.Uniform(wrong)
+    found = asm.tolerances(scene, solution, gap, scatter)
+    with pytest.raises(InputError, match="no samples were drawn"):
+        _ = found.yields
