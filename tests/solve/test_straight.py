@@ -1,4 +1,4 @@
-"""Solves that go on from a solution by the loop alone: what they return is what the way with all that may follow does."""
+"""Solves that go on from a solution by the loop alone: they return what the way with all that may follow does."""
 
 from __future__ import annotations
 

@@ -280,7 +280,7 @@ class Packed(ManagerLast):
         self._sources = [item for item in self._values if item[0].source is not None]
         # What every solve reads of them: where a value is kept, where it goes, its unit, whether it is a length.
         self._reads = [
-            (*equation.place, at, unit, not equation.terms[0][1].is_angle) for equation, at, unit in self._sources
+            (*equation.place(), at, unit, not equation.terms[0][1].is_angle) for equation, at, unit in self._sources
         ]
         self.rows = len(table)
         self.owners = np.array(rows.owners, dtype=np.int64)
