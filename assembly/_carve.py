@@ -16,12 +16,20 @@ from numba.core import cgutils, config
 from numba.extending import intrinsic, overload
 from numba.np.arrayobj import make_array, populate_array
 
-__all__ = ["carve"]
+__all__ = ["carve", "uncounted"]
 
 
 def carve(block: Any, at: int, shape: tuple[int, ...]) -> Any:
     """The array of this shape that begins at a place of a block, (n,)."""
     return block[at : at + math.prod(shape)].reshape(shape)
+
+
+def uncounted(array: Any) -> Any:
+    """An array that the caller of an entry holds, as one to which nobody counts references.
+
+    The entry's own parameters are counted wherever they go: 200 times in a warm solve, 0.1 to 0.2 us of 8.
+    """
+    return array
 
 
 if not config.DISABLE_JIT:
@@ -57,3 +65,20 @@ if not config.DISABLE_JIT:
     @overload(carve)
     def _carve(block: Any, at: Any, shape: Any) -> Any:  # the same signature as the one above, as Numba asks
         return _carve_it
+
+    @intrinsic
+    def _uncounted(_typing: Any, array: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            source = make_array(signature.args[0])(context, builder, values[0])
+            source.meminfo = cgutils.get_null_value(source.meminfo.type)
+            source.parent = cgutils.get_null_value(source.parent.type)
+            return source._getvalue()
+
+        return array(array), generate
+
+    def _uncount_it(array: Any) -> Any:
+        return _uncounted(array)
+
+    @overload(uncounted)
+    def _uncounted_array(array: Any) -> Any:  # the same signature as the one above, as Numba asks
+        return _uncount_it

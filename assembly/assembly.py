@@ -22,7 +22,6 @@ from assembly.solve.attempts.postures import postures_from
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.loop.settings import (
     ALLOWED_OVERLAP,
-    ANY_POSE,
     GATHER,
     ITERATIONS,
     NEVER,
@@ -31,7 +30,9 @@ from assembly.solve.loop.settings import (
 )
 from assembly.solve.options import Options
 from assembly.solve.scene import Status
+from assembly.solve.scene_settings import scene_settings
 from assembly.solve.solution import Solution
+from assembly.solve.straight import straight_from
 
 if TYPE_CHECKING:
     from assembly.solve.diagnosis.mobility import Mobility
@@ -40,8 +41,6 @@ if TYPE_CHECKING:
 __all__ = ["Assembly"]
 
 Array = NDArray[np.float64]
-_SETTINGS = CTRL_C.fill(Options().settings())
-_WARM_SETTINGS = CTRL_C.fill(Options().settings(warm=True))
 # How a solve may end where solids come to lie on each other, and corners are not listed.
 AT_KINKS = (Status.STALLED, Status.ITERATION_LIMIT, Status.INFEASIBLE, Status.CONTACT_LOST)
 
@@ -106,6 +105,11 @@ class Assembly(PackedContents):
         Solution
             Check `success`; the status and the message say what happened otherwise.
         """
+        is_plain = starts is None and time_limit is None and callback is None and swept is False and not options
+        if is_plain and type(q0) is Solution:
+            straight = straight_from(q0, self._scene, self._packed, bool(self._objectives))
+            if straight is not None:
+                return straight
         interruption = CTRL_C if time_limit is None and callback is None else Interruption(time_limit, callback)
         if swept is not False and not isinstance(swept, (bool, np.bool_)):
             raise InputError(f"swept is {swept!r}; expected True or False")
@@ -115,36 +119,43 @@ class Assembly(PackedContents):
             solution = swept_solve(self, q0, starts, options, interruption)
         else:
             solution = self._from_start(q0, starts, options, interruption)
-        if not solution.success and solution.axes and not isinstance(q0, Solution) and not swept:
-            from assembly.studies.nearest_axes import with_axes_of_the_rest
-
-            solution = with_axes_of_the_rest(self, solution, self._given(q0), starts, options, interruption)
         if not solution.success:
-            from assembly.studies.restarts import may_hold_elsewhere, restarted
-
-            if may_hold_elsewhere(solution) and not interruption.is_over():
-                given = q0 if isinstance(q0, Solution) else self._given(q0)
-                settings = self._settings(options, interruption, warm=False)
-                solution = restarted(self, solution, settings, given, interruption)
+            solution = self._tried_otherwise(solution, q0, starts, swept, options, interruption)
         if options and Options.of(options).verbose:
             print(solution.iteration_table())
         return solution
 
+    def _tried_otherwise(
+        self,
+        solution: Solution,
+        q0: ArrayLike | Solution | None,
+        starts: Mapping[str, ArrayLike] | None,
+        swept: bool,
+        options: dict[str, Any],
+        interruption: Interruption,
+    ) -> Solution:
+        """A solve that failed, again with other axes or from elsewhere, where that may help."""
+        if solution.axes and not isinstance(q0, Solution) and not swept:
+            from assembly.studies.nearest_axes import with_axes_of_the_rest
+
+            solution = with_axes_of_the_rest(self, solution, self._given(q0), starts, options, interruption)
+            if solution.success:
+                return solution
+        from assembly.studies.restarts import may_hold_elsewhere, restarted
+
+        if may_hold_elsewhere(solution) and not interruption.is_over():
+            given = q0 if isinstance(q0, Solution) else self._given(q0)
+            settings = self._settings(options, interruption, warm=False)
+            solution = restarted(self, solution, settings, given, interruption)
+        return solution
+
     def _settings(self, options: dict[str, Any], interruption: Interruption, warm: bool) -> Array:
         """What the loop is told."""
-        settings = _WARM_SETTINGS if warm else _SETTINGS
-        if options:
-            settings = CTRL_C.fill(Options.of(options).settings(warm))
-        if not self._objectives:
-            settings = settings.copy()
-            settings[ANY_POSE] = 1.0
-            settings[GATHER] = 0.0 if warm else 1.0
-        elif not warm:
-            settings = settings.copy()
-            settings[STRAYS] = 1.0
+        settings = scene_settings(options, interruption, bool(self._objectives), warm)
         if options.get("keep_topology") and self.packed().keeps_apart:
+            settings = settings.copy()
             settings[GATHER] = NEVER
-        return interruption.settings(settings)
+        return settings
 
     def _from_start(
         self,
@@ -157,8 +168,9 @@ class Assembly(PackedContents):
         self._take_seats(q0, starts)
         settings = self._settings(options, interruption, isinstance(q0, Solution))
         solution = self._solved_or_standing(q0, settings, starts, options, interruption)
-        may_go_on = settings[ITERATIONS] > 0.0 and not interruption.is_over()
-        if solution.status in AT_KINKS and not self._corners and may_go_on:
+        # Asked of every solve: what a callback or a signal's handler raised is raised there.
+        is_over = interruption.is_over()
+        if solution.status in AT_KINKS and not self._corners and settings[ITERATIONS] > 0.0 and not is_over:
             return self._at_corners(solution, partial(self._from_start, q0, starts, options, interruption))
         return solution
 
@@ -171,7 +183,7 @@ class Assembly(PackedContents):
         interruption: Interruption,
     ) -> Solution:
         """The same, without corners of contacts."""
-        if settings[ITERATIONS] == 0.0 or not self.packed().keeps_apart:
+        if not self.packed().keeps_apart or settings[ITERATIONS] == 0.0:
             return self._solved(settings, q0, starts, interruption)
         if not self._objectives and isinstance(q0, Solution):
             from assembly.studies.unhindered import unhindered

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -50,6 +50,18 @@ class Result(ReadOnlyArrays):
     """The state that a solve ended with; `Solution` documents the attributes."""
 
     way: Way | None = None
+    # What few solutions have otherwise. Made for every one, they would be a part of what a warm solve takes.
+    restarted = False
+    put_together = False
+    # Of a start that was returned as it is: what lists the contacts of clearances there.
+    _lists: Callable[[Result], Ended] | None = None
+    _clear: Sequence[PairAnswer] = ()
+    # Of a tick: whether samples stand for its proof.
+    _is_sampled = False
+    # What bodies may be in each other and still touch, in parts of the scene's size.
+    _touching = Options.touching
+    # What the objective asked for; flat contacts alone need it again, for the center of their pressure.
+    _wishes: Array | None = None
 
     def __init__(
         self,
@@ -64,24 +76,15 @@ class Result(ReadOnlyArrays):
     ) -> None:
         self._scene = scene
         self._ended = Ended(packed, state)
-        # Of a start that was returned as it is: what lists the contacts of clearances there.
-        self._lists: Callable[[Result], Ended] | None = None
         self._rows = history
         self.status = status
         self.seconds = seconds
         self._order = order
-        self.restarted = False
-        self.put_together = False
         self._fit = fit
         # What it was solved with: a solve that goes on from it may ask for the way.
         self._asked = packed.asked
-        self._clear: list[PairAnswer] = []
-        # Of a tick: whether samples stand for its proof.
-        self._is_sampled = False
-        # What bodies may be in each other and still touch, in parts of the scene's size.
-        self._touching = Options.touching
-        # Flat contacts alone need it again, for the center of their pressure.
-        self._wishes = packed.rows_pool[scene.wished(packed)] if scene.contacts else None
+        if scene.contacts:
+            self._wishes = packed.rows_pool[scene.wished(packed)].copy()
 
     def _list_contacts(self) -> None:
         """List the contacts of clearances, unless they are: a start that holds is returned before any is looked for."""

@@ -59,16 +59,19 @@ class Scene:
         self.seats = seats
         # Joints of nearest axes: what these were where the solve began.
         self.axes: dict[str, Sense] = {}
-        self._wished: NDArray[np.int64] | None = None
+        self._wished: slice | NDArray[np.int64] | None = None
 
-    def wished(self, packed: Packed) -> NDArray[np.int64]:
+    def wished(self, packed: Packed) -> slice | NDArray[np.int64]:
         """Where the pool has what the objective asks for and may change between solves: targets and postures."""
         if self._wished is None:
             table = packed.rows_table
             records = table[table[TERM_TABLE] :][: TERM * table[TERMS]].reshape(-1, TERM)
             sizes = {POINT_DISTANCE: 7, POSTURE: POSTURE_PARAMETERS}
             places = [np.arange(sizes.get(kind, 0)) + at for kind, _, at, *_ in records.tolist()]
-            self._wished = np.concatenate([*places, np.empty(0, dtype=np.int64)]).astype(np.int64)
+            found = np.concatenate([*places, np.empty(0, dtype=np.int64)]).astype(np.int64)
+            # Of one term it is a slice, which is read in less time.
+            is_one = len(found) > 0 and bool((np.diff(found) == 1).all())
+            self._wished = slice(int(found[0]), int(found[-1]) + 1) if is_one else found
         return self._wished
 
     def index(self, body: Body | str) -> int:

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import ast
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numba.core import config
+
+from assembly._carve import uncounted
+from assembly._kernel import kernel
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SOURCES = {path: ast.parse(path.read_text()) for path in sorted((ROOT / "assembly").rglob("*.py"))}
@@ -34,8 +40,8 @@ def functions_of(trees: list[ast.Module]) -> list[ast.FunctionDef]:
 
 
 def carving(functions: list[ast.FunctionDef]) -> set[str]:
-    """Names of what returns carved arrays: `carve`, and inlined kernels that call such."""
-    found = {"carve"}
+    """Names of what returns arrays that nobody keeps: `carve`, `uncounted`, and inlined kernels that call such."""
+    found = {"carve", "uncounted"}
     while True:
         more = {
             function.name
@@ -82,6 +88,7 @@ def test_no_kernel_carves_from_a_block_of_its_own():
         ("return inner(table, np.empty(9))", ["outer"]),
         ("block = np.zeros(9)\n    a = inner(table, block)\n    return a[0]", ["outer"]),
         ("return carve(np.empty(9), 0, (3, 3))", ["outer"]),
+        ("block = uncounted(np.zeros(9))\n    return block[0]", ["outer"]),
         # Called, and not inlined: the block is an argument for as long as the call lasts.
         ("return called(table, np.empty(9))", []),
     ],
@@ -101,3 +108,25 @@ def outer(table, doubles):
     {body}
 """
     assert borrowed([ast.parse(text)]) == wrong
+
+
+@kernel(allocates=True)
+def raise_all(array, other):
+    same = uncounted(array)
+    pair = (same, uncounted(other))
+    for k in range(same.shape[0]):
+        for i in range(same.shape[1]):
+            pair[0][k, i] += pair[1][0]
+    return same[0, 0]
+
+
+@pytest.mark.skipif(bool(config.DISABLE_JIT), reason="Python counts references for itself")
+def test_an_uncounted_array_is_the_array_and_lets_go_of_it():
+    array, other = np.zeros((2, 3)), np.ones(1)
+    assert raise_all(array, other) == 1.0
+    references = sys.getrefcount(array), sys.getrefcount(other)
+    for _ in range(50):
+        raise_all(array, other)
+    np.testing.assert_array_equal(array, np.full((2, 3), 51.0))
+    # A call holds its arguments: none of them was kept, none let go of twice.
+    assert (sys.getrefcount(array), sys.getrefcount(other)) == references

@@ -189,16 +189,21 @@ class Equation:
         """The right-hand side now, in the user's units: the driven value, the lower limit, minus the upper limit."""
         if self.source is None:
             return 0.0
-        owner, attribute = self.source
-        value = float(getattr(owner, attribute))
-        return -value if attribute == "upper" else value
+        owner, name, sign = self.place()
+        return sign * float(getattr(owner, name))
 
     def ask_for(self, value: float) -> None:
         """Set what `current` reads. The value is taken as it is, limits of a driven freedom or not."""
         if self.source is not None:
-            owner, attribute = self.source
-            name = f"_{attribute}" if isinstance(owner, Freedom) else attribute
-            setattr(owner, name, -value if attribute == "upper" else value)
+            owner, name, sign = self.place()
+            setattr(owner, name, sign * value)
+
+    def place(self) -> tuple[Constraint | Freedom, str, float]:
+        """Where the value is kept: owner, attribute, and the sign it has there. For who reads it in every solve."""
+        assert self.source is not None
+        owner, attribute = self.source
+        name = f"_{attribute}" if isinstance(owner, Freedom) else attribute
+        return owner, name, -1.0 if attribute == "upper" else 1.0
 
     @property
     def value(self) -> float:

@@ -85,7 +85,9 @@ class Turns:
                 self._limits.setdefault(coordinate, []).append(equation)
             elif coordinate in self._places:
                 self._drives[self._places[coordinate]] = at
-        self._driven = [(k, drive) for k, drive in enumerate(self._drives) if drive is not None]
+        # Driven angles, and where the pool has their values: near these, and that is all there is to do in a warm start
+        # without couplings.
+        self.driven = [(k, drive) for k, drive in enumerate(self._drives) if drive is not None]
         coupled = {coordinate for equation in self._couplings for _, coordinate in equation.terms}
         self._coupled = [angle in coupled for angle in angles]
         # Driven coordinates, slides too, and all that couplings move with them.
@@ -115,11 +117,6 @@ class Turns:
     def chosen(self) -> bool:
         """Whether the turn of an angle is told by its limits, or a coupling, and where bodies stand."""
         return bool(self._couplings) or any(angle in self._limits for angle in self._angles)
-
-    def follow_drives(self, pool: Array, near: Array) -> None:
-        """Driven angles near their values; all there is to do in a warm start without couplings."""
-        for k, drive in self._driven:
-            near[k] = pool[drive]
 
     def start(self, pool: Array, near: Array, warm: bool, measure: Callable[[], Array]) -> None:
         """Write where each angle is looked for into `near`, which has the values found last, zeros at first.

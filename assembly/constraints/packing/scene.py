@@ -124,6 +124,8 @@ class Packed(ManagerLast):
     clearances : list of Clearance
     clearance_pairs : list of list of (Body, Body)
         The pairs of bodies of every clearance.
+    is_loop_alone : bool
+        Whether a solve that goes on from another one is a run of the loop and nothing else, if that arrives.
     keeps_apart : bool
         Whether a clearance keeps two bodies apart, so that ends of solves are to be proven.
     corners : list of ContactCorners
@@ -201,6 +203,7 @@ class Packed(ManagerLast):
         self.contacts_at = 7 * self.count
         self.angles_at = self.contacts_at + TRACK * self.pair_rows
         self.angles = slice(self.angles_at, self.angles_at + TRACK * len(self._angles), TRACK)
+        self._driven_angles = [(self.angles_at + TRACK * k, at) for k, at in self._turned.driven]
         self.multipliers_at = self.contacts_at + TRACK * self.tracked
         self.residuals_at = self.multipliers_at + self.rows
         self.results_at = self.residuals_at + self.rows
@@ -209,6 +212,9 @@ class Packed(ManagerLast):
         if self.clearance_rows:
             # The first update sees what crosses at the start as well, if it is no deeper than this.
             self._memory = fresh_memory(len(self.kept_pairs), self.clearance_rows, LARGEST_MARGIN)
+        # What has no extent may have outgrown its size; corners are tried first; clearances are looked after.
+        needs_more = self._has_no_extent or self.keeps_apart or self.clearance_rows > 0 or bool(self.corners)
+        self.is_loop_alone = not needs_more
         self.asked: Asked = []
         self.workspaces: list[tuple[Array, Array, Table]] = []
         self.proofs: list[ClearanceProof] = []
@@ -298,6 +304,10 @@ class Packed(ManagerLast):
         table = rows.write(bodies)
         self._values = rows.values
         self._sources = [item for item in self._values if item[0].source is not None]
+        # What every solve reads of them: where a value is kept, where it goes, its unit, whether it is a length.
+        self._reads = [
+            (*equation.place(), at, unit, not equation.terms[0][1].is_angle) for equation, at, unit in self._sources
+        ]
         self.rows = len(table)
         self.owners = np.array(rows.owners, dtype=np.int64)
         self.one_sided = table[:, layout.ONE_SIDED] == 1
@@ -428,9 +438,10 @@ class Packed(ManagerLast):
         """Write the turns that angles start on at the poses of a state into it."""
         if not self._angles:
             return
-        near = state[self.angles]
+        pool = self.rows_pool
         if warm and not self._turned.coupled:
-            self._turned.follow_drives(self.rows_pool, near)
+            for place, at in self._driven_angles:
+                state[place] = pool[at]
             return
 
         def measure() -> Array:
@@ -445,7 +456,7 @@ class Packed(ManagerLast):
             values *= self._standing_units
             return values
 
-        self._turned.start(self.rows_pool, near, warm, measure)
+        self._turned.start(pool, state[self.angles], warm, measure)
 
     def twin(self) -> Packed:
         """The same with a pool of its own, of which anything may be changed."""
@@ -487,12 +498,11 @@ class Packed(ManagerLast):
         x, y, z = self._reference
         asked: Asked = []
         self.asked = asked
-        for equation, at, unit in self._sources:
-            current = equation.current()
+        for owner, name, sign, at, unit, is_length in self._reads:
+            current = sign * float(getattr(owner, name))
             value = current / unit
-            if not -FARTHEST <= value <= FARTHEST and not equation.terms[0][1].is_angle:
-                assert equation.source is not None
-                check_reach(f"a value of {equation.source[0]!r}", abs(current), scale)
+            if is_length and not -FARTHEST <= value <= FARTHEST:
+                check_reach(f"a value of {owner!r}", abs(current), scale)
             asked.append(current)
             pool[at] = value
         for distance, at in self._targets:

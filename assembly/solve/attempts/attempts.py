@@ -42,7 +42,17 @@ from assembly.solve.loop.workspace import workspace_needed
 from assembly.solve.options import Options
 from assembly.solve.second_order.leave import Fit, Outcome, leave_saddles
 
-__all__ = ["as_it_stands", "attempt", "begin", "go_on_once", "load", "new_workspace", "rows_alone", "with_listed"]
+__all__ = [
+    "as_it_stands",
+    "attempt",
+    "begin",
+    "go_on_once",
+    "load",
+    "new_workspace",
+    "rows_alone",
+    "run",
+    "with_listed",
+]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -93,8 +103,10 @@ def attempt(
         found = _with_corners_first(packed, settings, start, interruption, turns)
         return _attempt(packed, settings, start, interruption, turns) if found is None else found
     outcome = _attempt(packed, settings, start, interruption, turns)
+    if outcome.code == SOLVED or not packed.clearance_rows:
+        return outcome
     is_crowded = settings[PLACES] == 1.0 and packed.is_crowded(outcome.state)
-    if outcome.code == SOLVED or not packed.clearance_rows or is_crowded or interruption.is_over():
+    if is_crowded or interruption.is_over():
         return outcome
     return _with_corners_first(packed, settings, start, interruption, turns) or outcome
 
@@ -205,6 +217,13 @@ def with_listed(packed: Packed, interruption: Interruption, settings: Array, sta
 
 
 def _run(packed: Packed, interruption: Interruption, table: Table, settings: Array, state: Array) -> Outcome:
+    return Outcome(*run(packed, interruption, table, settings, state))
+
+
+def run(
+    packed: Packed, interruption: Interruption, table: Table, settings: Array, state: Array
+) -> tuple[int, Array, Array]:
+    """The loop once: the code it ended with, the state, which is written to, and the history."""
     if interruption.callback is not None:
         state[packed.results_at + OBJECTIVE], state[packed.results_at + VIOLATION] = np.nan, np.inf
         interruption.watched = (state, packed.results_at)
@@ -212,13 +231,14 @@ def _run(packed: Packed, interruption: Interruption, table: Table, settings: Arr
     spare = packed.workspaces
     workspace = spare.pop() if spare else new_workspace(packed)
     try:
-        pool = packed.pool if table[MANAGER_RECORD] >= 0 else packed.rows_pool
+        has_manager = packed.clearance_rows > 0 and table[MANAGER_RECORD] >= 0
+        pool = packed.pool if has_manager else packed.rows_pool
         code = solve_program(table, pool, settings, state, *workspace, packed.end_effectors)
         # A solution keeps the rows that there are: memory that nobody wrote to yet is slow to come by.
         history = workspace[0][: int(state[packed.results_at + COUNT]) + 1].copy()
     finally:
         spare.append(workspace)
-    return Outcome(code, state, history)
+    return code, state, history
 
 
 def go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:

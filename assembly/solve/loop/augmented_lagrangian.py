@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import math
 
+from assembly._carve import uncounted
 from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.constraints.program.objective_terms import objective
@@ -55,6 +56,8 @@ def solve_program(table, pool, settings, state, history, doubles, integers, end_
     `doubles` and `integers` are two blocks to work in (`workspace_needed`). `end_effectors` is None where no
     term of the objective is a dexterity.
     """
+    table, pool, settings, state = uncounted(table), uncounted(pool), uncounted(settings), uncounted(state)
+    history, doubles, integers = uncounted(history), uncounted(doubles), uncounted(integers)
     store = Store(table, pool)
     workspace = carve_all(store, memory_of(table, state), end_effectors, doubles, integers)
     results, limits = results_of(table, state), settings_at(settings, 0)

@@ -1,0 +1,129 @@
+"""Solves that go on from a solution by the loop alone: they return what the way with all that may follow does."""
+
+from __future__ import annotations
+
+import math
+import threading
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.solve.interruption import CTRL_C
+from assembly.solve.straight import straight_from
+from benchmarks import linkages
+from benchmarks.running import example
+
+
+def four_bar():
+    scene, crank = linkages.four_bar()
+
+    def change(k):
+        crank.angle = 0.3 + math.radians(k)
+
+    return scene, change
+
+
+def gears():
+    train, crank, _ = example("gear_train").gear_train()
+
+    def change(k):
+        crank.angle = 0.3 * k
+
+    return train, change
+
+
+def arm():
+    scene, tip, hinges = linkages.arm(4, seed=3)
+    for hinge in hinges:
+        hinge.angle = None
+    hand = asm.PointDistance(tip, (3.0, 0.3, 0.4))
+    scene.minimize(hand)
+
+    def change(k):
+        hand.target = (3.0 - 0.01 * k, 0.3, 0.4)
+
+    return scene, change
+
+
+def clips():
+    scene = example("paper_clips").paper_clips()
+    ((_, grip),) = scene.objectives
+    begin = np.array(grip.target)
+
+    def change(k):
+        grip.target = begin + np.array([0.06, -0.04, 0.05]) * k
+
+    return scene, change
+
+
+def straight_of(scene, begun):
+    return straight_from(begun, scene._scene, scene._packed, bool(scene._objectives))
+
+
+@pytest.mark.parametrize("make", [four_bar, gears, arm, clips])
+def test_it_is_to_the_bit_the_solve_with_all_that_may_follow(make):
+    scene, change = make()
+    begun = scene.solve()
+    assert begun.success
+    went = 0
+    for k in (1, 2, 3, 9):
+        change(k)
+        straight = straight_of(scene, begun)
+        whole = scene._from_start(begun, None, {}, CTRL_C)
+        assert whole.success
+        if straight is not None:
+            went += 1
+            assert straight.status is whole.status and straight._order is whole._order and straight._fit is whole._fit
+            assert straight._touching == whole._touching
+            np.testing.assert_array_equal(straight._state, whole._state)
+            np.testing.assert_array_equal(straight.history, whole.history)
+            assert all(map(np.array_equal, straight._asked, whole._asked))
+        begun = scene.solve(begun)
+        np.testing.assert_array_equal(begun.q, whole.q)
+    assert went == 4
+
+
+def test_what_does_not_arrive_is_tried_with_all_there_is():
+    ground, link = asm.Body("ground", fixed=True), asm.Body("link")
+    hinge = asm.Revolute(ground, link, "hinge")
+    far = asm.Distance(ground.point(0, 0, 0), link.point(1, 0, 0), 1.0, "far")
+    scene = asm.Assembly([ground, link])
+    scene.constrain(hinge, far)
+    begun = scene.solve()
+    assert begun.success and straight_of(scene, begun) is not None
+    far.value = 1.5
+    assert straight_of(scene, begun) is None
+    failed = scene.solve(begun)
+    assert failed.status is asm.Status.INFEASIBLE and failed.conflicting == ["far", "hinge"]
+
+
+def test_what_has_changed_or_needs_more_goes_the_whole_way():
+    scene, change = four_bar()
+    begun = scene.solve()
+    change(1)
+    assert straight_of(scene, begun) is not None
+    # A row more, of a joint of this scene: it is packed anew, and the solution is of before.
+    scene.constraints[0].freedom().limits = (-9.0, 9.0)
+    scene.constraints[0].angle = None
+    assert straight_of(scene, begun) is None
+    with pytest.raises(asm.errors.InputError, match="q0 is a solution of another assembly"):
+        scene.solve(begun)
+
+    balls = [asm.Body(name, asm.shapes.sphere(1.0), (4.0 * k, 0, 0), fixed=k == 0) for k, name in enumerate("ab")]
+    apart = asm.Assembly(balls)
+    apart.constrain(asm.Clearance())
+    apart.minimize(asm.PointDistance(balls[1].point(0, 0, 0), (3.0, 0.0, 0.0)))
+    begun = apart.solve()
+    assert begun.success and straight_of(apart, begun) is None and apart.solve(begun).proved
+
+
+def test_another_thread_goes_straight_as_well():
+    scene, change = four_bar()
+    begun = scene.solve()
+    change(1)
+    here, there = scene.solve(begun), []
+    thread = threading.Thread(target=lambda: there.append(scene.solve(begun)))
+    thread.start()
+    thread.join()
+    np.testing.assert_array_equal(there[0].q, here.q)
