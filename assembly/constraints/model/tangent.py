@@ -123,8 +123,8 @@ class Tangent(Constraint):
         return isinstance(self, Contact) and self.unilateral
 
     @property
-    def _removes(self) -> int:
-        """How many degrees of freedom it takes away."""
+    def removes(self) -> int:
+        """How many degrees of freedom it takes away; one-sided, none while it is open."""
         return sum(not row.one_sided for row in self._own) if isinstance(self, SurfaceTangent) else 1
 
     def _take(
@@ -151,7 +151,7 @@ class Tangent(Constraint):
         one_sided = ", unilateral=True" if self._is_one_sided else ""
         touch = "" if self.touch is None else f", touch={self.touch!r}"
         settings = f"name={self.name!r}, side={self.side!r}{one_sided}{touch}"
-        count = f"takes away {self._removes} of 6 degrees of freedom"
+        count = f"takes away {self.removes} of 6 degrees of freedom"
         return f"Tangent({self.faces[0]!r}, {self.faces[1]!r}, {settings}; {count})"
 
 
@@ -204,11 +204,6 @@ class ContactTangent(Tangent, Contact):
         # Those with creases are cut into smooth ones, which only edges join.
         edges = None if has_creases(one.face) or has_creases(other.face) else False
         Contact.__init__(self, one, other if side == "outside" else _turned(other), said, unilateral, edges=edges)
-
-    @property
-    def removes(self) -> int:
-        """How many degrees of freedom it takes away; one-sided, none while it is open."""
-        return self._removes
 
     def start_at(self, q_a: Array, q_b: Array) -> Array | None:
         """Parameters (4,) of an extremal pair whose outward normals oppose each other, near the ones that nearly do.
