@@ -25,7 +25,7 @@ from assembly.constraints.packing.scene import MORE_PLACES, Packed, structure_of
 from assembly.constraints.packing.scene_size import check_reach, scene_size
 from assembly.errors import InputError, vector
 from assembly.kinematics.body import Body
-from assembly.kinematics.changes import edits, numbers_set
+from assembly.kinematics.changes import changes, numbers_set
 from assembly.kinematics.pose import pose_rows
 from assembly.proximity.extrema.pairs import inside
 from assembly.proximity.features.solid_contact import TRACK
@@ -44,7 +44,6 @@ class PackedContents(Contents):
 
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._packed: Packed | None = None
-        self._edits = -1  # the count of edits (`kinematics/changes.py`) at which bodies and constraints were as here
         self._asked_for: list[bool] = []  # of every body whether it is fixed, of every constraint whether it counts
         self._crowding = 1  # how many times as many places as clearances ask for
         self._has_changed()
@@ -53,6 +52,8 @@ class PackedContents(Contents):
     def _has_changed(self) -> None:
         # Packed anew: of copies what a solve of the one has changed there the other does not know.
         self._packed = None
+        # The counts (`kinematics/changes.py`) when it was as it is packed.
+        self._seen: tuple[int, int] | None = None
         self._scene: Scene | None = None
         self._corners = False  # whether corners of contacts of solids are listed
         self._lower_pairs: list[LowerPair] | None = None
@@ -63,15 +64,19 @@ class PackedContents(Contents):
 
     def packed(self) -> Packed:
         """The scene as the compiled loop reads it; made at first use."""
-        self._notice_edits()
+        is_new = self._seen is not changes()
+        if is_new:
+            self._notice_edits()
         if self._packed is not None and self._packed.stamp != structure_changes():
             # A row came or went somewhere; perhaps in another scene.
             if self._packed.structure == structure_of(self._seated_constraints()):
                 self._packed.stamp = structure_changes()
             else:
                 self._packed = None
-        if self._packed is not None and self._packed.numbers != numbers_set():
-            return self._with_numbers_of_now(self._packed)
+        if is_new:
+            if self._packed is not None and self._packed.numbers != numbers_set():
+                self._with_numbers_of_now(self._packed)
+            self._seen = changes()
         before = self._packed
         if before is not None and before.may_have_outgrown():
             # Nothing was a length then, a slide driven to 0 say, or only one that was rounding.
@@ -85,12 +90,10 @@ class PackedContents(Contents):
 
     def _notice_edits(self) -> None:
         """Forget how the scene is packed if a body became fixed or free, or a constraint enabled or disabled."""
-        if self._edits != edits():
-            self._edits = edits()
-            asked = [body.fixed for body in self._bodies] + [item._is_asked for item in self._constraints]
-            if asked != self._asked_for:
-                self._asked_for = asked
-                self._has_changed()
+        asked = [body.fixed for body in self._bodies] + [item._is_asked for item in self._constraints]
+        if asked != self._asked_for:
+            self._asked_for = asked
+            self._has_changed()
 
     def _with_numbers_of_now(self, before: Packed) -> Packed:
         """The scene packed with the numbers that it has now: in the same places, or anew where they make others."""
@@ -158,7 +161,10 @@ class PackedContents(Contents):
 
         One whose pair the user starts is none of them. What was packed for others is kept for their solutions.
         """
-        self._notice_edits()
+        if self._seen is not changes():
+            self._notice_edits()
+            # Faces may have other radii.
+            self._lower_pairs = None
         if isinstance(q0, Solution):
             packed = q0._ended.packed
             if packed is self._packed or (self._packed is not None and is_same_scene(packed, self._packed)):
@@ -184,6 +190,7 @@ class PackedContents(Contents):
         if seats != self._seats:
             self._packings[self._seats] = self._packed, self._scene
             self._packed, self._scene = self._packings.pop(seats, (None, None))
+            self._seen = None
             self._seats = seats
 
     @contextmanager

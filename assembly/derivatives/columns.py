@@ -22,6 +22,7 @@ from assembly.constraints.program.objective_terms import POSTURE, TERM
 from assembly.derivatives.numbers import FrameNumber, LeastGap, RowNumber, ShapeNumber, TargetNumber
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.probed import Evaluated, ProbedScene
+from assembly.derivatives.size import by_size, size_rate
 from assembly.errors import InputError
 from assembly.kinematics.body import Body, Frame
 from assembly.kinematics.changes import tried_numbers
@@ -162,7 +163,22 @@ def columns_of(problem: Problem, parameters: Sequence[Parameter]) -> Columns:
             enters = bool(rows[:, r].any() or slopes[:, r].any() or values[r])
         if not enters:
             raise InputError(f"parameter {parameter.name!r} enters no row and no term; expected one of what is solved")
+    _add_size(problem, parameters, slopes, values)
     return Columns(rows, slopes, values)
+
+
+def _add_size(problem: Problem, parameters: Sequence[Parameter], slopes: Array, values: Array) -> None:
+    """Add what parameters do through the scene's size."""
+    slope, value = by_size(problem.packed, problem.bodies, problem.state, len(slopes))
+    if value or slope.any():
+        scene = (problem.bodies, problem.constraints, problem.objectives)
+        for r, parameter in enumerate(parameters):
+            # Values count for the size where nothing has an extent.
+            of_values = isinstance(parameter._number, RowNumber) and not problem.packed._has_no_extent
+            if not of_values and not isinstance(parameter._number, TargetNumber):
+                rate = size_rate(parameter, problem.packed.scale, scene)
+                slopes[:, r] += rate * slope
+                values[r] += rate * value
 
 
 def by_frames(problem: Problem, here: Evaluated) -> Array:

@@ -90,7 +90,7 @@ class ProbedScene:
         frames: Sequence[Frame] = (),
         coordinates: Sequence[Coordinate] = (),
     ) -> None:
-        self.packed = packed
+        self.packed, self._given = packed, state
         self.bodies, self.rows, self.coordinates = packed.count, packed.rows, len(coordinates)
         places = {id(body): k for k, body in enumerate(bodies)}
         self.hosts = [places[id(frame.body)] for frame in frames]
@@ -179,7 +179,7 @@ class ProbedScene:
         given[: self.rows] = forces[: self.rows]
         behind = forces[self.rows :]
         given[self.rows + self.coordinates :][: behind.size] = behind
-        folds = int(curvature_at(self.table, self.pool, self.state.copy(), given, out, self.packed.end_effectors))
+        folds = int(curvature_at(self.table, self.pool, self.state.copy(), given, out, None))
         if folds < 0:
             raise InputError("solution leaves a contact without an extremal pair; expected a pose where it has one")
         m = self.rows + self.coordinates + 4 * folds
@@ -190,6 +190,8 @@ class ProbedScene:
             raise InputError("solution has a row or a term without derivatives; expected finite ones")
         value, residual, gradient, jacobian, hessian = np.split(out[: sizes[-1]], sizes[:-1])
         jacobian, hessian = jacobian.reshape(m, n), hessian.reshape(n, n)
+        if self.packed.end_effectors:
+            self._add_dexterities(value, gradient, hessian)
         own = np.ones(m, dtype=bool)
         own[self.rows : self.rows + self.coordinates] = False
         at = slice(6 * self.bodies, 6 * self.bodies + probes)
@@ -210,6 +212,27 @@ class ProbedScene:
             jacobian[~own],
             by_frames[~own],
         )
+
+    def _add_dexterities(self, value: Array, gradient: Array, hessian: Array) -> None:
+        """Add what dexterities are, of the mechanism as it is: fixed bodies are fixed, and no row is one too many."""
+        packed, state = self.packed, self._given
+        table, n = packed.table_at(state), 6 * int(packed.table[layout.MOVING])
+        blocks = table[table[layout.UNKNOWN_BLOCKS] :][: packed.count]
+        moving = np.flatnonzero(blocks >= 0)
+        # The unknowns of a block, as columns of its body.
+        own = (6 * moving[np.argsort(blocks[moving])][:, None] + np.arange(6)).ravel()
+        most, columns = packed.rows + 4 * packed.pair_rows, n + 4 * packed.pair_rows
+        for sign, end_effectors in ((1.0, packed.end_effectors), (-1.0, None)):
+            out = np.empty(1 + most + columns + most * columns + columns * columns)
+            folds = int(curvature_at(table, packed.pool, state.copy(), np.zeros(most), out, end_effectors))
+            m, columns_there = packed.rows + 4 * folds, n + 4 * folds
+            sizes = np.cumsum([1, m, columns_there, m * columns_there, columns_there**2])
+            told, _, slopes, _, curves = np.split(out[: sizes[-1]], sizes[:-1])
+            if not np.isfinite(told).all() or not np.isfinite(slopes).all() or not np.isfinite(curves).all():
+                raise InputError("solution has a dexterity without derivatives; expected finite ones")
+            value += sign * told
+            gradient[own] += sign * slopes[:n]
+            hessian[np.ix_(own, own)] += sign * curves.reshape(columns_there, columns_there)[:n, :n]
 
     def _on_hosts(self, columns: Array) -> Array:
         """What is by twists of bodies and probes, (k, n), by those of bodies: frames go with them."""

@@ -220,4 +220,58 @@ def trimmed():
     return Case(scene, of, [size, asm.Parameter(goal, "target", "y")])
 
 
-CASES = {case.__name__: case for case in (slider_crank, ball_in_v, rocker, cam, clips, pushed, kept_apart, trimmed)}
+def geared():
+    """Two wheels and a rack that follow each other, a rod of a length from the rack to a carriage, drawn to a place."""
+    ground, small, large = asm.Body("ground", fixed=True), asm.Body("small"), asm.Body("large", position=(3, 0, 0))
+    rack, carriage = asm.Body("rack", position=(3, 2, 0)), asm.Body("carriage", position=(6, 3, 0.5))
+    scene = asm.Assembly([ground, small, large, rack, carriage])
+    one = asm.Revolute(ground, small, "one")
+    two = asm.Revolute(ground.frame(at=(3, 0, 0)), large, "two")
+    slide = asm.Prismatic(ground.frame(at=(3, 2, 0), z=(1, 0, 0)), rack.frame(z=(1, 0, 0)), "slide")
+    gear = asm.Gear(one, two, -0.5, "gear", offset=0.1)
+    pinion = asm.RackPinion(two, slide, -2.0, "pinion", offset=0.2)
+    deck = asm.Planar(ground, carriage, "deck", offset=0.5)
+    rod = asm.Distance(rack.point(0.5, 0, 0), carriage.point(0, 0.2, 0), 3.0, "rod")
+    goal = asm.PointDistance(carriage.point(1, 0, 0), (8.0, 2.0, 1.0))
+    scene.constrain(one, two, slide, gear, pinion, deck, rod)
+    scene.minimize(goal, asm.Posture(scene.q, weight=0.3))
+    of = [
+        asm.Measure(one),
+        asm.Measure(deck, "angle"),
+        asm.Measure(carriage, "y"),
+        asm.Measure(gear, "tz", on=small),
+        asm.Measure(rod, "fx", on=rack),
+        asm.Measure("objective"),
+    ]
+    wrt = [
+        asm.Parameter(gear, "offset"),
+        asm.Parameter(pinion, "offset"),
+        asm.Parameter(deck, "offset"),
+        asm.Parameter(rod, "value"),
+        asm.Parameter(two.frame_b, "turn", "z"),
+        asm.Parameter(slide.frame_a, "origin", "y"),
+        asm.Parameter(slide.frame_a, "turn", "z", name="rack turned"),
+        asm.Parameter(rod.frame_b, "origin", "y", name="rod's end"),
+    ]
+    return Case(scene, of, wrt)
+
+
+def leaning():
+    """A box on an edge of a step, whose size a function has, pulled by its weight and held by a guide."""
+    size = asm.Parameter(lambda a: asm.shapes.box(a, 2.0, 1.0), 3.0, name="length")
+    step = asm.Body("step", asm.shapes.box(4.0, 4.0, 2.0), fixed=True)
+    crate = asm.Body("crate", size.shape, (2.8, 0.0, 2.3), (0.97, 0.0, 0.243, 0.0))
+    scene = asm.Assembly([step, crate])
+    deck = asm.Planar(step.frame(z=(0, 1, 0)), crate.frame(z=(0, 1, 0)), "deck")
+    touch = asm.Contact(step, crate, "touch")
+    goal = asm.PointDistance(crate.point(0.5, 0, -0.5), (2.5, 0.0, 1.0))
+    scene.constrain(deck, touch)
+    scene.minimize(goal, asm.Posture(scene.q, weight=0.4))
+    of = [asm.Measure(crate, "x"), asm.Measure(deck, "angle"), asm.Measure(touch, "fz", on=crate)]
+    return Case(scene, of, [size, asm.Parameter(goal, "target", "z"), asm.Parameter(deck.frame_b, "origin", "x")])
+
+
+CASES = {
+    case.__name__: case
+    for case in (slider_crank, ball_in_v, rocker, cam, clips, pushed, kept_apart, trimmed, geared, leaning)
+}

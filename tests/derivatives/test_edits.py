@@ -172,3 +172,26 @@ def test_files_refuse_what_is_disabled(tmp_path):
     scene.constraints[2].enabled = False
     with pytest.raises(asm.errors.InputError, match="constraint 'wrist' is disabled, which files do not hold"):
         scene.save(tmp_path / "scene.json")
+
+
+def test_a_freedom_let_go_and_a_frame_placed_at_once():
+    case, other = slider_crank(), slider_crank(radius=2.2)
+    for scene in (case.scene, other.scene):
+        scene.solve()
+        scene.constraints[0].angle = None
+    case.wrt[1].value = 2.2
+    assert np.array_equal(case.scene.solve().q, other.scene.solve().q)
+
+
+def test_what_is_set_in_another_scene_changes_nothing_of_this_one():
+    case, other = slider_crank(), slider_crank()
+    scene, wrist = case.scene, case.scene.constraints[2]
+    scene.solve()
+    scene.remove(wrist)
+    scene.solve()
+    scene.constrain(wrist)
+    solution = scene.solve()
+    other.wrt[1].value = 2.5
+    other.scene.constraints[2].enabled = False
+    # Packed as it was: the solution is one of the scene as it is.
+    assert scene.solve(solution).iterations == 0 and scene.packed() is solution._packed

@@ -8,7 +8,16 @@ import pytest
 import assembly as asm
 from assembly.derivatives.columns import columns_of
 from assembly.derivatives.implicit import _problem
-from tests.derivatives.sensitivity_scenes import CASES, ball_in_v, clips, differences, pushed, rocker, slider_crank
+from tests.derivatives.sensitivity_scenes import (
+    CASES,
+    Case,
+    ball_in_v,
+    clips,
+    differences,
+    pushed,
+    rocker,
+    slider_crank,
+)
 
 EACH = [(name, k) for name, case in CASES.items() for k in range(len(case().wrt))]
 # Of dx/dangle, dx/dr, dx/dl of the slider-crank with r 2, l 5, angle 0.7.
@@ -157,3 +166,20 @@ def test_casadi_derives_the_same():
     wrt = [case.wrt[1], case.wrt[2], asm.Parameter(goal, "target", "x")]
     d = asm.sensitivity(case.scene, solution, of, wrt)
     assert np.abs(d.matrix - jacobian[[0, 2]]).max() < 1e-8
+
+
+def test_a_dexterity_is_differenced_by_frames():
+    """A planar arm that is to be dexterous and near a place: its second link is made longer."""
+    ground, upper, lower = asm.Body("ground", fixed=True), asm.Body("upper"), asm.Body("lower", position=(1, 0, 0))
+    scene = asm.Assembly([ground, upper, lower])
+    one, two = asm.Revolute(ground, upper, "one"), asm.Revolute(upper.frame(at=(1, 0, 0)), lower, "two")
+    tip = lower.point(0.8, 0, 0)
+    goal = asm.PointDistance(tip, (0.6, 0.9, 0.0))
+    scene.constrain(one, two)
+    scene.minimize(goal)
+    scene.maximize(asm.Dexterity(tip, [one, two], task="position", weight=0.05))
+    case = Case(scene, [asm.Measure(one), asm.Measure(tip, "x")], [asm.Parameter(two.frame_a, "origin", "x")])
+    solution, d = derived(case)
+    found = differences(case, solution, case.wrt[0], 1e-2)
+    # Hessians of dexterities are differences themselves, to 1e-6 or so.
+    assert np.abs(found - d.matrix[:, 0]).max() < 1e-5

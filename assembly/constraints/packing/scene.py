@@ -415,6 +415,8 @@ class Packed(ManagerLast):
     def __setstate__(self, state: dict[str, Any]) -> None:
         # Addresses are those of one process; a copy, or what another process wrote, takes its own.
         self.__dict__.update(state)
+        # Counts of another process say nothing here.
+        self.numbers = -1
         self.rows_table = self.rows_table.copy()
         self.rows_table[layout.DEEPEST_AT] = 0
         self._take_addresses()
