@@ -17,7 +17,7 @@ from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.occt import occt, parts
 from assembly.step.profiles import Unreadable
 from assembly.step.surfaces import Patch, patch
-from assembly.step.trims import Edge, chained, edge_curve, head_to_tail
+from assembly.step.trims import Edge, Tolerances, chained, curves_of, edge_curves, head_to_tail
 
 __all__ = ["Read", "read_face"]
 
@@ -57,15 +57,17 @@ def _is_seam(edge: Any, face: Any) -> bool:
     return bool(occt().BRep_Tool.IsClosed_s(edge, face))
 
 
-def _loop(wire: Any, face: Any, where: Patch, edges: Any) -> tuple[list[Edge], float] | None:
+def _loop(wire: Any, face: Any, where: Patch, edges: Any, tolerances: Tolerances) -> tuple[list[Edge], float] | None:
     """The boundary curves of a wire; None where nothing is left of it but seams and poles."""
     o = occt()
     row, ordered = _edges(wire, face)
-    seams = [edge for edge in row if _is_seam(edge, face)]
-    bare = all(o.BRep_Tool.Degenerated_s(edge) or _is_seam(edge, face) for edge in row)
-    if not row or (bare and len(seams) % 2 == 0):
+    seams = [_is_seam(edge, face) for edge in row]
+    bare = sum(seams) % 2 == 0 and all(
+        seam or o.BRep_Tool.Degenerated_s(edge) for edge, seam in zip(row, seams, strict=True)
+    )
+    if not row or bare:
         return None
-    curves = [edge_curve(edge, face, where, f"edge {edges.FindIndex(edge)}") for edge in row]
+    curves = edge_curves(row, face, where, edges, tolerances)
     return chained(curves if ordered else head_to_tail(curves, where), where)
 
 
@@ -79,7 +81,9 @@ def _scaled(where: Patch, scale: float) -> tuple[NurbsSurface, Array]:
     return NurbsSurface(scale * surface.control_points, knots, surface.degree, surface.weights), factors
 
 
-def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Read:
+def read_face(
+    face: Any, edges: Any, name: str | None, scale: float = 1.0, tolerances: Tolerances | None = None
+) -> Read:
     """A face of OCCT, its surface and its loops.
 
     Parameters
@@ -91,6 +95,8 @@ def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Re
     name : str, optional
     scale : float
         Our unit of length in a millimeter.
+    tolerances
+        Of the solid's edges.
 
     Raises
     ------
@@ -98,6 +104,7 @@ def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Re
         Saying why.
     """
     o = occt()
+    known = Tolerances() if tolerances is None else tolerances
     forward = o.as_face(face.Oriented(o.TopAbs_FORWARD))
     surface = o.BRep_Tool.Surface_s(forward)
     if surface is None:
@@ -115,13 +122,13 @@ def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Re
         # What the file says of its edges and vertices, and at least what faces forgive by themselves.
         tolerance = OVERSHOOT * made_surface.size
         for wire in parts(forward, o.TopAbs_WIRE):
-            made = _loop(o.as_wire(wire), forward, where, edges)
+            made = _loop(o.as_wire(wire), forward, where, edges, known)
             if made is None:
                 continue
             gap = max(gap, made[1])
             deviation = max(deviation, max(edge.deviation for edge in made[0]))
             tolerance = max(tolerance, scale * max(edge.tolerance for edge in made[0]))
-            loop = [edge.nurbs(factors) for edge in made[0]]
+            loop = curves_of(made[0], factors)
             if wire.IsSame(outermost):
                 outer = loop
             else:

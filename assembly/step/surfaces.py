@@ -60,6 +60,23 @@ class Patch:
         return [along.radius if isinstance(along, Turning) else 1.0 for along in (self.u, self.v)]
 
     @cached_property
+    def lengths(self) -> tuple[float, float]:
+        """The same as floats."""
+        (a, b), (c, d) = self.surface.domain
+        return b - a, d - c
+
+    @cached_property
+    def periods(self) -> tuple[float, float]:
+        """Periods in u and v; 0 where the surface is not closed."""
+        (u, v), (closed_u, closed_v) = self.lengths, self.surface.closed
+        return (u if closed_u else 0.0), (v if closed_v else 0.0)
+
+    @cached_property
+    def is_straight(self) -> bool:
+        """Whether OCCT's parameters are ours."""
+        return isinstance(self.u, Straight) and isinstance(self.v, Straight)
+
+    @cached_property
     def period(self) -> Array:
         """Periods in u and v; infinite where the surface is not closed."""
         return np.where(self.surface.closed, self.sides, np.inf)

@@ -9,6 +9,7 @@ unclamped knots both work. It is evaluated from one power table per span (`geome
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, Literal, overload
 
@@ -27,6 +28,9 @@ __all__ = ["NurbsCurve"]
 Array = NDArray[np.float64]
 # Positions closer than this part of the size coincide.
 COINCIDENT = 1e-12
+# Weights of straight lines.
+_ONES = np.ones(2)
+_ONES.flags.writeable = False
 
 
 def checked_weights(value: ArrayLike | None, shape: tuple[int, ...]) -> Array:
@@ -156,6 +160,31 @@ class NurbsCurve(ReadOnlyArrays):
         corners = real_array("points", points, ("n", "d"))
         last = corners.shape[0] - 1.0
         return cls(corners, np.concatenate([[0.0], np.arange(last + 1.0), [last]]), 1, name=name)
+
+    @classmethod
+    def lines(cls, ends: Array, intervals: Sequence[tuple[float, float]], names: Sequence[str]) -> list[NurbsCurve]:
+        """Straight lines, checked together.
+
+        Parameters
+        ----------
+        ends : (n, 2, d)
+            Where each begins and ends.
+        intervals : n pairs
+            Their domains.
+        names : of each
+        """
+        knots = np.repeat(np.array(intervals, dtype=np.float64).reshape(-1, 2), 2, axis=1)
+        if not (np.isfinite(ends).all() and np.isfinite(knots).all() and all(low < high for low, high in intervals)):
+            return [cls(row, turn, 1, name=name) for row, turn, name in zip(ends, knots, names, strict=True)]
+        points = np.array(ends, dtype=np.float64, order="C")
+        points.flags.writeable = knots.flags.writeable = False
+        made = []
+        for row, turn, domain, name in zip(points, knots, intervals, names, strict=True):
+            line = object.__new__(cls)
+            line.control_points, line.degree, line.knots, line.weights = row, 1, turn, _ONES
+            line.name, line.domain = name, domain
+            made.append(line)
+        return made
 
     def __repr__(self) -> str:
         label = "" if self.name is None else f"{self.name!r}, "
