@@ -7,6 +7,7 @@ and it may come back one period away from where it began, as once around a cylin
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-9
 # Curves smaller than this part of the loop's size are left out.
 _NO_LENGTH = 1e-12
+# What rounding may make of an area, as a part of the size's square, for loops of up to thousands of corners.
+_ROUNDING = 1e-9
 
 
 def _checked_period(value: Sequence[float]) -> tuple[float, float]:
@@ -41,6 +44,21 @@ def curve_ends(curve: NurbsCurve) -> Array:
     pieces = curve.bezier_pieces()
     ends = np.array([pieces[0, 0], pieces[-1, -1]])
     return np.asarray(ends[:, :-1] / ends[:, -1:])
+
+
+def all_ends(curves: Sequence[NurbsCurve]) -> Array:
+    """First and last points of curves, (n, 2, d)."""
+    if all(len(curve.control_points) == 2 for curve in curves):
+        return np.array([curve.control_points for curve in curves])
+    return np.array([curve_ends(curve) for curve in curves])
+
+
+def _largest_side(curve: NurbsCurve) -> float:
+    """The larger side of the box around a plane curve's control points."""
+    if len(curve.control_points) == 2:
+        (u, v), (x, y) = curve.control_points.tolist()
+        return max(abs(u - x), abs(v - y))
+    return float(np.ptp(curve.control_points, axis=0).max())
 
 
 def _clamped(curve: NurbsCurve) -> NurbsCurve:
@@ -138,12 +156,15 @@ class Loop(ReadOnlyArrays):
         if not self.size > 0.0:
             raise InputError(f"{name} is a single point; expected a loop")
         # Files have edges of no length where something else was once; they have no direction.
-        parts = [c for c in parts if np.ptp(c.control_points, axis=0).max() > _NO_LENGTH * self.size]
+        parts = [c for c in parts if _largest_side(c) > _NO_LENGTH * self.size]
         self._join([_clamped(curve) for curve in parts], period is not None, name)
 
     def _join(self, parts: list[NurbsCurve], known: bool, name: str) -> None:
+        ends = all_ends(parts)
+        if (ends[1:, 0] == ends[:-1, 1]).all() and (ends[0, 0] == ends[-1, 1]).all():
+            self.curves, self.turn = tuple(parts), read_only(np.zeros(2))
+            return
         allowed = self.tolerance * self.size
-        ends = np.array([curve_ends(curve) for curve in parts])
         periods = np.array(self.period)
         whole = np.where(periods > 0.0, periods, 1.0)
         gaps = ends[1:, 0] - ends[:-1, 1]
@@ -202,6 +223,19 @@ class Loop(ReadOnlyArrays):
     def area(self) -> float:
         """Signed area, positive counterclockwise; of a loop that turns, of no meaning."""
         return signed_area(self.curves)
+
+    @property
+    def is_clockwise(self) -> bool:
+        """Whether its signed area is negative."""
+        if all(len(curve.control_points) == 2 for curve in self.curves):
+            # Cross products of corners, relative to the first one. Where rounding might decide the whole area is asked.
+            rows = [curve.control_points[0].tolist() for curve in self.curves]
+            (u, v), area = rows[0], 0.0
+            for (a, b), (c, d) in pairwise(rows):
+                area += (a - u) * (d - v) - (b - v) * (c - u)
+            if abs(area) > _ROUNDING * self.size**2:
+                return area < 0.0
+        return self.area < 0.0
 
     def reversed(self) -> Loop:
         """The same loop run the other way round."""

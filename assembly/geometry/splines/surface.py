@@ -117,10 +117,25 @@ class NurbsSurface(ReadOnlyArrays):
     @cached_property
     def closed(self) -> tuple[bool, bool]:
         """Whether u and v come back to the edge they start from."""
-        pieces = self._pieces
-        u = self._same_edge(pieces[0, :, 0], pieces[-1, :, -1])
-        v = self._same_edge(pieces[:, 0, :, 0], pieces[:, -1, :, -1])
+        apart_u, apart_v = self._apart
+        u = not apart_u and self._same_edge(self._pieces[0, :, 0], self._pieces[-1, :, -1])
+        v = not apart_v and self._same_edge(self._pieces[:, 0, :, 0], self._pieces[:, -1, :, -1])
         return u, v
+
+    @cached_property
+    def _apart(self) -> tuple[bool, bool]:
+        """Whether ends in u, and in v, are surely at two points, so that neither edge is the other, nor one point."""
+        if not self._is_clamped:
+            return False, False
+        net = self.control_points
+        corners = (net[0, 0].tolist(), net[-1, 0].tolist(), net[0, -1].tolist(), net[-1, -1].tolist())
+        # Of no corner is it left to rounding.
+        least = 10.0 * COINCIDENT * self.size
+        low_v, high_v, low_u, high_u = (
+            max(abs(a - b) for a, b in zip(corners[j], corners[k], strict=True)) > least
+            for j, k in ((0, 1), (2, 3), (0, 2), (1, 3))
+        )
+        return low_v and high_v, low_u and high_u
 
     @cached_property
     def _periods(self) -> tuple[float, float]:
@@ -145,6 +160,8 @@ class NurbsSurface(ReadOnlyArrays):
     @cached_property
     def _pole_bits(self) -> int:
         """Bits 1, 2, 4, 8: whether the edge at the low and high end of u, then of v, is one point."""
+        if all(self._apart):
+            return 0
         pieces = self._pieces
         edges = (pieces[0, :, 0], pieces[-1, :, -1], pieces[:, 0, :, 0], pieces[:, -1, :, -1])
         points = (edge[..., :3] / edge[..., 3:] for edge in edges)
