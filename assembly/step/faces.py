@@ -48,6 +48,8 @@ def _edges(wire: Any, face: Any) -> tuple[list[Any], bool]:
     while walk.More():
         found.append(o.as_edge(walk.Current()))
         walk.Next()
+    if len(found) == wire.NbChildren():
+        return found, True
     every = [o.as_edge(edge) for edge in parts(wire, o.TopAbs_EDGE) if _is_boundary(edge)]
     # Where vertices are not shared the walk ends early.
     return (found, True) if len(found) == len(every) else (every, False)

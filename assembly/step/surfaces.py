@@ -97,7 +97,8 @@ def _revolved(shape: Spline, turning: Turning, origin: Array, axis: Array) -> Sp
     # Ends that lie on the axis are poles.
     out[np.linalg.norm(out, axis=1) < CONFUSION] = 0.0
     ring = arc(turning).points
-    across = np.cross(axis, out)
+    (a, b, c), (x, y, z) = axis, out.T
+    across = np.column_stack([b * z - c * y, c * x - a * z, a * y - b * x])
     net = np.empty((len(ring), len(points), 4))
     net[..., :3] = (
         ring[:, 2, None, None] * foot[None] + ring[:, 0, None, None] * out[None] + ring[:, 1, None, None] * across[None]
@@ -120,7 +121,8 @@ def _plane(surface: Any, box: Box) -> Patch:
     u, v = _slack(*box[:2]), _slack(*box[2:])
     origin, x, y = point(place.Location()), point(place.XDirection()), point(place.YDirection())
     net = origin + np.array(u)[:, None, None] * x + np.array(v)[None, :, None] * y
-    return Patch(NurbsSurface(net, (np.repeat(u, 2), np.repeat(v, 2)), (1, 1)), Straight(True), Straight(True))
+    knots = [[end for end in ends for _ in (0, 1)] for ends in (u, v)]
+    return Patch(NurbsSurface(net, knots, (1, 1)), Straight(True), Straight(True))
 
 
 def _round(surface: Any, box: Box) -> Patch:

@@ -35,7 +35,11 @@ _ONES.flags.writeable = False
 
 def checked_weights(value: ArrayLike | None, shape: tuple[int, ...]) -> Array:
     """Positive weights of the given shape, read-only; ones where none are given."""
-    weights = np.ones(shape) if value is None else real_array("weights", value, shape)
+    if value is None:
+        ones = np.ones(shape)
+        ones.flags.writeable = False
+        return ones
+    weights = real_array("weights", value, shape)
     # Sums of products with points and with each other are to be finite, and not nothing.
     outside = ~((weights >= 1e-100) & (weights <= 1e100))
     if outside.any():
