@@ -20,6 +20,7 @@ from assembly.geometry.splines.curve_parts import sampled
 from assembly.step.occt import occt
 from assembly.step.profiles import Direction, Spline, Unreadable, approximated, profile, spline
 from assembly.step.surfaces import Patch
+from assembly.step.wires import Traced
 
 __all__ = ["Edge", "Segment", "Tolerances", "chained", "crossings", "curves_of", "edge_curves", "head_to_tail"]
 
@@ -193,17 +194,15 @@ class _Draft(NamedTuple):
     deviation: float
 
 
-def edge_curves(row: Sequence[Any], face: Any, patch: Patch, edges: Any, tolerances: Tolerances) -> list[Edge]:
-    """The curves of the edges of a wire on a face (which is taken forward), mapped to our parameters.
+def edge_curves(row: Sequence[Traced], patch: Patch, edges: Any, tolerances: Tolerances) -> list[Edge]:
+    """The curves of the edges of a wire mapped to our parameters.
 
     Parameters
     ----------
     row
-        TopoDS_Edge, several.
-    face
-        TopoDS_Face.
+        Several on a face.
     patch
-        Where it is on.
+        What that is on.
     edges
         Map of the solid's edges, which numbers them.
     tolerances
@@ -215,24 +214,24 @@ def edge_curves(row: Sequence[Any], face: Any, patch: Patch, edges: Any, toleran
         An edge has no curve on the face, or one that cannot be carried over.
     """
     o = occt()
-    drafts = [_draft(edge, face, patch) for edge in row]
+    drafts = [_draft(traced, patch) for traced in row]
     # Ends of all curves that are level are mapped at once.
-    level = [draft for draft in drafts if any(draft.level)]
+    level = [draft for draft in drafts if draft.level[0] or draft.level[1]]
     places = np.array([(draft.curve.start, draft.curve.end) for draft in level if isinstance(draft.curve, Segment)])
     mapped = places.reshape(-1, 2)
     if level and not patch.is_straight:
         mapped = np.column_stack([patch.u(mapped[:, 0]), patch.v(mapped[:, 1])])
     points = iter(mapped.tolist())
     made = []
-    for edge, (curve, sides, deviation) in zip(row, drafts, strict=True):
-        if any(sides):
+    for traced, (curve, sides, deviation) in zip(row, drafts, strict=True):
+        edge = traced.edge
+        if sides[0] or sides[1]:
             (u, v), (x, y) = next(points), next(points)
             curve = Segment((u, v), (x, y))
         if edge.Orientation() == o.TopAbs_REVERSED:
             curve = _reversed(curve)
         number = edges.FindIndex(edge)
-        seam = o.BRep_Tool.IsClosed_s(edge, face)
-        made.append(Edge(curve, sides, tolerances.of(edge, number), f"edge {number}", deviation, seam))
+        made.append(Edge(curve, sides, tolerances.of(edge, number), f"edge {number}", deviation, traced.seam))
     return made
 
 
@@ -244,27 +243,21 @@ def _reversed(curve: Spline | Segment) -> Spline | Segment:
     return Spline(curve.points[::-1], curve.knots[0] + curve.knots[-1] - curve.knots[::-1], curve.degree)
 
 
-def _draft(edge: Any, face: Any, patch: Patch) -> _Draft:
+def _draft(traced: Traced, patch: Patch) -> _Draft:
     """The curve of an edge, its ends not mapped where it is level."""
-    o = occt()
-    low, high = o.BRep_Tool.Range_s(edge, face)
-    raw = o.BRep_Tool.CurveOnSurface_s(edge, face, low, high)
-    if raw is None:
+    if traced.curve is None:
         raise Unreadable("an edge has no curve in the surface's parameters")
-    if type(raw) is o.Geom2d_Line:
-        place, along = raw.Location(), raw.Direction()
-        x, y, dx, dy = place.X(), place.Y(), along.X(), along.Y()
-        start, end = (x + low * dx, y + low * dy), (x + high * dx, y + high * dy)
-        level = _level([start[0], end[0]], [start[1], end[1]], patch)
-        if level:
-            return _leveled([start[0], end[0]], [start[1], end[1]], level, 0.0)
+    if traced.line is not None:
+        start, end = traced.line
+        us, vs = [start[0], end[0]], [start[1], end[1]]
+        if level := _level(us, vs, patch):
+            return _leveled(us, vs, level, 0.0)
         if patch.is_straight:
-            return _Draft(Segment(start, end, low, high), (False, False), 0.0)
-    source, _, deviation = profile(raw, low, high, cut=True)
+            return _Draft(Segment(start, end, traced.low, traced.high), (False, False), 0.0)
+    source, _, deviation = profile(traced.curve, traced.low, traced.high, cut=True)
     points, weights = source.cartesian
     us, vs = points[:, 0].tolist(), points[:, 1].tolist()
-    level = _level(us, vs, patch)
-    if level:
+    if level := _level(us, vs, patch):
         return _leveled(us, vs, level, deviation)
     if patch.is_straight:
         return _Draft(spline(points, source.knots, source.degree, weights), (False, False), deviation)
@@ -292,7 +285,7 @@ def _level(us: list[float], vs: list[float], patch: Patch) -> tuple[bool, bool] 
     if not (extent_u if along_v else extent_v) <= LEVEL:
         return None
     row = vs if along_v else us
-    if not (all(a <= b for a, b in pairwise(row)) or all(a >= b for a, b in pairwise(row))):
+    if len(row) > 2 and not (all(a <= b for a, b in pairwise(row)) or all(a >= b for a, b in pairwise(row))):
         return None
     return along_v, not along_v
 
