@@ -38,8 +38,7 @@ def _checked_period(value: Sequence[float]) -> tuple[float, float]:
 
 def curve_ends(curve: NurbsCurve) -> Array:
     """First and last point of a curve, (2, d)."""
-    p, knots = curve.degree, curve.knots
-    if knots[0] == knots[p] and knots[-1] == knots[-p - 1]:
+    if curve._is_clamped:
         return curve.control_points[[0, -1]]
     pieces = curve.bezier_pieces()
     ends = np.array([pieces[0, 0], pieces[-1, -1]])
@@ -48,7 +47,7 @@ def curve_ends(curve: NurbsCurve) -> Array:
 
 def all_ends(curves: Sequence[NurbsCurve]) -> Array:
     """First and last points of curves, (n, 2, d)."""
-    if all(len(curve.control_points) == 2 for curve in curves):
+    if all(len(curve.control_points) == 2 and curve._is_clamped for curve in curves):
         return np.array([curve.control_points for curve in curves])
     return np.array([curve_ends(curve) for curve in curves])
 
@@ -57,16 +56,13 @@ def _largest_side(curve: NurbsCurve) -> float:
     """The larger side of the box around a plane curve's control points."""
     if len(curve.control_points) == 2:
         (u, v), (x, y) = curve.control_points.tolist()
-        return max(abs(u - x), abs(v - y))
+        return float(max(abs(u - x), abs(v - y)))
     return float(np.ptp(curve.control_points, axis=0).max())
 
 
 def _clamped(curve: NurbsCurve) -> NurbsCurve:
     """The same curve with its first and last control point at its ends."""
-    p, knots = curve.degree, curve.knots
-    if knots[0] == knots[p] and knots[-1] == knots[-p - 1]:
-        return curve
-    return curve.elevate(p)
+    return curve if curve._is_clamped else curve.elevate(curve.degree)
 
 
 def with_ends(curve: NurbsCurve, start: Array, end: Array) -> NurbsCurve:
@@ -116,7 +112,7 @@ class Loop(ReadOnlyArrays):
         tolerance: float = TOLERANCE,
         period: Sequence[float] | None = None,
     ) -> None:
-        self._make(curves, tolerance, period, "loop")
+        self._make(curves, tolerance, None if period is None else _checked_period(period), "loop")
         (u, v), (x, y) = self._box()
         # In the unrolled plane: seams meet one period away, and whether anything else does is for a face to see.
         chain = range(len(self.curves))
@@ -130,7 +126,7 @@ class Loop(ReadOnlyArrays):
 
     @classmethod
     def unchecked(
-        cls, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: Sequence[float] | None, name: str
+        cls, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: tuple[float, float] | None, name: str
     ) -> Loop:
         """A loop by its name in messages; whether it crosses itself is looked at later, with all loops of a face."""
         loop = object.__new__(cls)
@@ -138,7 +134,7 @@ class Loop(ReadOnlyArrays):
         return loop
 
     def _make(
-        self, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: Sequence[float] | None, name: str
+        self, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: tuple[float, float] | None, name: str
     ) -> None:
         parts = [curves] if isinstance(curves, NurbsCurve) else items(name, curves, "one NurbsCurve or several")
         if not parts:
@@ -149,7 +145,7 @@ class Loop(ReadOnlyArrays):
             if curve.control_points.shape[1] != 2:
                 raise InputError(f"{name}[{k}] is a curve in space; expected a plane curve in (u, v)")
         self.tolerance = number("tolerance", tolerance)
-        self.period = (0.0, 0.0) if period is None else _checked_period(period)
+        self.period = (0.0, 0.0) if period is None else period
         self.curves = tuple(parts)
         low, high = self._box()
         self.size = float(np.linalg.norm(high - low))

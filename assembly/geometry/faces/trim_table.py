@@ -30,7 +30,7 @@ from assembly.geometry.faces.trim_pieces import (
 )
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_packing import packed_curves
-from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_COEFFICIENTS, CURVE_DEGREE, CURVE_RECORD, CURVE_SPANS
+from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_COEFFICIENTS, CURVE_RECORD
 
 __all__ = ["TrimTable", "build"]
 
@@ -168,7 +168,8 @@ class _Pieces:
 
     def __init__(self, curves: Sequence[NurbsCurve], chains: Ints) -> None:
         bezier, self.pool, self.records = packed_curves(curves)
-        rows = np.empty((int((8 * self.records[:, CURVE_DEGREE] * self.records[:, CURVE_SPANS]).sum()), ROW))
+        # Room for eight pieces a degree and span, whose points have three coordinates.
+        rows = np.empty((8 * (len(bezier) // 3), ROW))
         count = cut_curves(bezier, self.pool, self.records, _BINOMIALS, rows)
         if count > len(rows):
             # Weights far apart.

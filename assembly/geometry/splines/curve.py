@@ -186,7 +186,7 @@ class NurbsCurve(ReadOnlyArrays):
         for row, turn, domain, name in zip(points, knots, intervals, names, strict=True):
             line = object.__new__(cls)
             line.control_points, line.degree, line.knots, line.weights = row, 1, turn, _ONES
-            line.name, line.domain = name, domain
+            line.name, line.domain, line._is_clamped = name, domain, True
             made.append(line)
         return made
 
@@ -207,6 +207,12 @@ class NurbsCurve(ReadOnlyArrays):
         first, last = pieces[0, 0], pieces[-1, -1]
         gap = np.linalg.norm(first[:-1] / first[-1] - last[:-1] / last[-1])
         return bool(self.size > 0.0 and gap <= COINCIDENT * self.size)
+
+    @cached_property
+    def _is_clamped(self) -> bool:
+        """Whether its first and last control point are its ends."""
+        p, row = self.degree, self.knots
+        return bool(row[0] == row[p] and row[-1] == row[-p - 1])
 
     @property
     def _homogeneous(self) -> Array:

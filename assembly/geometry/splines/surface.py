@@ -124,18 +124,20 @@ class NurbsSurface(ReadOnlyArrays):
 
     @cached_property
     def _apart(self) -> tuple[bool, bool]:
-        """Whether ends in u, and in v, are surely at two points, so that neither edge is the other, nor one point."""
+        """Whether ends in u, and in v, are surely at two points, so that neither edge is the other, nor one point.
+
+        Corners that are nearer to each other are left to a look along the whole edges.
+        """
         if not self._is_clamped:
             return False, False
-        net = self.control_points
-        corners = (net[0, 0].tolist(), net[-1, 0].tolist(), net[0, -1].tolist(), net[-1, -1].tolist())
-        # Of no corner is it left to rounding.
-        least = 10.0 * COINCIDENT * self.size
-        low_v, high_v, low_u, high_u = (
-            max(abs(a - b) for a, b in zip(corners[j], corners[k], strict=True)) > least
-            for j, k in ((0, 1), (2, 3), (0, 2), (1, 3))
-        )
-        return low_v and high_v, low_u and high_u
+        net, least = self.control_points, 10.0 * COINCIDENT * self.size
+        corners = net[[0, -1, 0, -1], [0, 0, -1, -1]]
+        a, b, c, d = corners.tolist()
+
+        def apart(p: list[float], q: list[float]) -> bool:
+            return max(abs(p[0] - q[0]), abs(p[1] - q[1]), abs(p[2] - q[2])) > least
+
+        return apart(a, b) and apart(c, d), apart(a, c) and apart(b, d)
 
     @cached_property
     def _periods(self) -> tuple[float, float]:
@@ -218,8 +220,9 @@ class NurbsSurface(ReadOnlyArrays):
     @property
     def _is_clamped(self) -> bool:
         """Whether the domain ends where the knots do, in u and in v."""
-        ends = zip(self.knots, self.degree, strict=True)
-        return all(bool(row[0] == row[p] and row[-1] == row[-1 - p]) for row, p in ends)
+        (row, other), (p, q) = self.knots, self.degree
+        ends = row[0] == row[p] and row[-1] == row[-1 - p] and other[0] == other[q] and other[-1] == other[-1 - q]
+        return bool(ends)
 
     @cached_property
     def _pieces(self) -> Array:
