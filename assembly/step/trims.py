@@ -116,7 +116,7 @@ def curves_of(edges: Sequence[Edge], scales: Array) -> list[NurbsCurve]:
     straight = [edge for edge in edges if isinstance(edge.curve, Segment)]
     ends = np.array([edge.corners for edge in straight]).reshape(-1, 2, 2) * scales
     intervals = [(edge.curve.low, edge.curve.high) for edge in straight if isinstance(edge.curve, Segment)]
-    lines = iter(NurbsCurve.lines(ends, intervals, [edge.name for edge in straight]))
+    lines = iter(NurbsCurve._lines(ends, intervals, [edge.name for edge in straight]))
     made = []
     for edge in edges:
         if isinstance(edge.curve, Segment):

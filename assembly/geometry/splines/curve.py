@@ -166,7 +166,7 @@ class NurbsCurve(ReadOnlyArrays):
         return cls(corners, np.concatenate([[0.0], np.arange(last + 1.0), [last]]), 1, name=name)
 
     @classmethod
-    def lines(cls, ends: Array, intervals: Sequence[tuple[float, float]], names: Sequence[str]) -> list[NurbsCurve]:
+    def _lines(cls, ends: Array, intervals: Sequence[tuple[float, float]], names: Sequence[str]) -> list[NurbsCurve]:
         """Straight lines, checked together.
 
         Parameters
