@@ -17,6 +17,7 @@ from assembly.step.faces import read_face
 from assembly.step.occt import occt, parts, quiet
 from assembly.step.profiles import Unreadable
 from assembly.step.tree import Color, Part, free_labels, leaves
+from assembly.step.trims import Tolerances
 
 __all__ = ["Source", "bodies_in", "read_shape", "solids_in", "solids_of", "unique"]
 
@@ -88,12 +89,13 @@ def read_shape(
     name, own_color = said(shape)
     made = Shape([], own_color or color, name, [], [])
     taken: set[str] = set()
+    tolerances = Tolerances()
     for k, face in enumerate(parts(shape, o.TopAbs_FACE), 1):
         face = o.as_face(face)
         own, tint = said(face)
         label = unique(own or f"face {k}", taken)
         try:
-            read = read_face(face, edges, label, scale)
+            read = read_face(face, edges, label, scale, tolerances)
         except Unreadable as reason:
             made.missing.append(f"{label!r}: {reason}")
             continue

@@ -14,10 +14,11 @@ from assembly.geometry.faces.boundary import OVERSHOOT
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.step.occt import occt, parts
+from assembly.step.occt import occt
 from assembly.step.profiles import Unreadable
 from assembly.step.surfaces import Patch, patch
-from assembly.step.trims import Edge, chained, edge_curve, head_to_tail
+from assembly.step.trims import Edge, Tolerances, chained, curves_of, edge_curves, head_to_tail
+from assembly.step.wires import Wire, bounds, outermost, wires_of
 
 __all__ = ["Read", "read_face"]
 
@@ -35,38 +36,12 @@ class Read:
     gap: float
 
 
-def _is_boundary(edge: Any) -> bool:
-    o = occt()
-    return edge.Orientation() in (o.TopAbs_FORWARD, o.TopAbs_REVERSED)
-
-
-def _edges(wire: Any, face: Any) -> tuple[list[Any], bool]:
-    """Edges of a wire, and whether each begins where the one before ends."""
-    o = occt()
-    walk = o.BRepTools_WireExplorer(wire, face)
-    found = []
-    while walk.More():
-        found.append(o.as_edge(walk.Current()))
-        walk.Next()
-    every = [o.as_edge(edge) for edge in parts(wire, o.TopAbs_EDGE) if _is_boundary(edge)]
-    # Where vertices are not shared the walk ends early.
-    return (found, True) if len(found) == len(every) else (every, False)
-
-
-def _is_seam(edge: Any, face: Any) -> bool:
-    return bool(occt().BRep_Tool.IsClosed_s(edge, face))
-
-
-def _loop(wire: Any, face: Any, where: Patch, edges: Any) -> tuple[list[Edge], float] | None:
+def _loop(wire: Wire, where: Patch, edges: Any, tolerances: Tolerances) -> tuple[list[Edge], float] | None:
     """The boundary curves of a wire; None where nothing is left of it but seams and poles."""
-    o = occt()
-    row, ordered = _edges(wire, face)
-    seams = [edge for edge in row if _is_seam(edge, face)]
-    bare = all(o.BRep_Tool.Degenerated_s(edge) or _is_seam(edge, face) for edge in row)
-    if not row or (bare and len(seams) % 2 == 0):
+    if not wire.edges or wire.is_bare:
         return None
-    curves = [edge_curve(edge, face, where, f"edge {edges.FindIndex(edge)}") for edge in row]
-    return chained(curves if ordered else head_to_tail(curves, where), where)
+    curves = edge_curves(wire.edges, where, edges, tolerances)
+    return chained(curves if wire.ordered else head_to_tail(curves, where), where)
 
 
 def _scaled(where: Patch, scale: float) -> tuple[NurbsSurface, Array]:
@@ -79,7 +54,9 @@ def _scaled(where: Patch, scale: float) -> tuple[NurbsSurface, Array]:
     return NurbsSurface(scale * surface.control_points, knots, surface.degree, surface.weights), factors
 
 
-def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Read:
+def read_face(
+    face: Any, edges: Any, name: str | None, scale: float = 1.0, tolerances: Tolerances | None = None
+) -> Read:
     """A face of OCCT, its surface and its loops.
 
     Parameters
@@ -91,6 +68,8 @@ def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Re
     name : str, optional
     scale : float
         Our unit of length in a millimeter.
+    tolerances
+        Of the solid's edges.
 
     Raises
     ------
@@ -98,31 +77,33 @@ def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Re
         Saying why.
     """
     o = occt()
+    known = Tolerances() if tolerances is None else tolerances
     forward = o.as_face(face.Oriented(o.TopAbs_FORWARD))
     surface = o.BRep_Tool.Surface_s(forward)
     if surface is None:
         raise Unreadable("it has no surface")
-    box = o.BRepTools.UVBounds_s(forward)
+    wires = wires_of(forward)
+    box = bounds(wires, surface, forward)
     if not all(isfinite(x) and abs(x) < _FAR for x in box):
         raise Unreadable("it has no boundary, and its surface no end")
     try:
         where = patch(surface, box)
         made_surface, factors = _scaled(where, scale)
-        outermost = o.BRepTools.OuterWire_s(forward)
+        around = outermost(wires, surface, forward)
         outer: list[NurbsCurve] | None = None
         holes: list[list[NurbsCurve]] = []
         gap, deviation = 0.0, where.deviation
         # What the file says of its edges and vertices, and at least what faces forgive by themselves.
         tolerance = OVERSHOOT * made_surface.size
-        for wire in parts(forward, o.TopAbs_WIRE):
-            made = _loop(o.as_wire(wire), forward, where, edges)
+        for k, wire in enumerate(wires):
+            made = _loop(wire, where, edges, known)
             if made is None:
                 continue
             gap = max(gap, made[1])
             deviation = max(deviation, max(edge.deviation for edge in made[0]))
             tolerance = max(tolerance, scale * max(edge.tolerance for edge in made[0]))
-            loop = [edge.nurbs(factors) for edge in made[0]]
-            if wire.IsSame(outermost):
+            loop = curves_of(made[0], factors)
+            if k == around:
                 outer = loop
             else:
                 holes.append(loop)

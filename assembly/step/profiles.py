@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import read_only
 from assembly.errors import AssemblyError
 from assembly.geometry.splines import bezier
 from assembly.step.occt import occt
@@ -119,7 +120,9 @@ class Turning:
     @property
     def knots(self) -> Array:
         """Knots of the arcs."""
-        return bezier.full_knots(self.joint(np.append(np.arange(self.spans), self.spans)), 2)
+        ends = self._ends.copy()
+        ends[-1] = self.low + (self.high - self.low)
+        return bezier.full_knots(self.radius * ends, 2)
 
     def __call__(self, x: Array) -> Array:
         """Our parameter of an angle."""
@@ -146,16 +149,22 @@ def tan_ratio(angle: Array, step: float) -> Array:
 
 def arc(map_: Turning) -> Spline:
     """Unit arc (cos, sin) of the angles of a map, homogeneous in the plane."""
-    half = 0.5 * map_.step
-    at = map_.low + half * np.arange(2 * map_.spans + 1)
+    return Spline(_ring(map_.low, map_.high, map_.spans), map_.knots, 2)
+
+
+@lru_cache(maxsize=256)
+def _ring(low: float, high: float, spans: int) -> Array:
+    """Control points of an arc of the unit circle, read-only: many arcs of a body have the same angles."""
+    half = 0.5 * ((high - low) / spans)
+    at = low + half * np.arange(2 * spans + 1)
     weights = np.where(np.arange(at.size) % 2 == 1, cos(half), 1.0)
     ring = np.column_stack([np.cos(at), np.sin(at)])
     # Quarter turns are exact: sin(pi) is not zero in doubles.
     ring = np.where(np.abs(ring) < 1e-15, 0.0, ring)
-    if map_.high - map_.low >= 2.0 * pi - _SAME_ANGLE:
+    if high - low >= 2.0 * pi - _SAME_ANGLE:
         ring[-1] = ring[0]
     # The middle control point of an arc lies 1 / cos h out; in homogeneous form that is the weight's inverse.
-    return Spline(np.column_stack([ring, weights]), map_.knots, 2)
+    return read_only(np.column_stack([ring, weights]))
 
 
 def approximated(function: Callable[[Array], Array], breaks: Array, tolerance: float) -> tuple[Spline, float]:
@@ -174,32 +183,30 @@ def approximated(function: Callable[[Array], Array], breaks: Array, tolerance: f
         Some piece cannot be made to fit.
     """
     parts, solve, check = _interpolation()
-    found: list[tuple[float, float, Array]] = []
+    found: list[tuple[Array, Array, Array]] = []
     worst = 0.0
     # Stretches of one halving are asked for at once; of those that do not fit, the halves of the first come first.
     todo = [(breaks[:-1], breaks[1:], 0)]
     while todo:
         low, high, depth = todo.pop()
-        asked = function((low[:, None] + (high - low)[:, None] * parts).ravel())
-        halves = []
-        for a, b, values in zip(low.tolist(), high.tolist(), asked.reshape(len(low), len(parts), -1), strict=True):
-            piece = solve @ values[: _DEGREE + 1]
-            piece[0], piece[-1] = values[0], values[_DEGREE]
-            error = float(np.abs(check @ piece - values[_DEGREE + 1 :]).max())
-            if error > tolerance:
-                if depth == _HALVINGS:
-                    raise Unreadable(f"a curve bends too sharply to be followed to {tolerance:.1g}")
-                middle = 0.5 * (a + b)
-                halves.append((np.array([a, middle]), np.array([middle, b]), depth + 1))
-                continue
-            found.append((a, b, piece))
-            worst = max(worst, error)
-        todo += halves[::-1]
-    found.sort(key=lambda one: one[0])
-    stack = np.array([piece for _, _, piece in found])
+        asked = function((low[:, None] + (high - low)[:, None] * parts).ravel()).reshape(len(low), len(parts), -1)
+        pieces = solve @ asked[:, : _DEGREE + 1]
+        pieces[:, 0], pieces[:, -1] = asked[:, 0], asked[:, _DEGREE]
+        errors = np.abs(check @ pieces - asked[:, _DEGREE + 1 :]).max(axis=(1, 2))
+        fits = ~(errors > tolerance)
+        if depth == _HALVINGS and not fits.all():
+            raise Unreadable(f"a curve bends too sharply to be followed to {tolerance:.1g}")
+        found.append((low[fits], high[fits], pieces[fits]))
+        worst = max(worst, float(errors[fits].max(initial=0.0)))
+        for k in np.flatnonzero(~fits)[::-1]:
+            middle = 0.5 * (low[k] + high[k])
+            todo.append((np.array([low[k], middle]), np.array([middle, high[k]]), depth + 1))
+    begins, ends, stack = (np.concatenate(column) for column in zip(*found, strict=True))
+    order = np.argsort(begins)
+    begins, ends, stack = begins[order], ends[order], stack[order]
     stack[1:, 0] = stack[:-1, -1]
-    ends = np.array([found[0][0], *(b for _, b, _ in found)])
-    return spline(bezier.joined(stack), bezier.full_knots(ends, _DEGREE), _DEGREE), worst
+    at = np.append(begins[:1], ends)
+    return spline(bezier.joined(stack), bezier.full_knots(at, _DEGREE), _DEGREE), worst
 
 
 @lru_cache(maxsize=1)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 __all__ = ["References", "references_of"]
 
+_WORD = b"DOCUMENT_FILE"
 _DOCUMENT = re.compile(rb"\bDOCUMENT_FILE\s*\(\s*'((?:[^']|'')*+)'")
 # Of other documents, drawings say, no shapes are made.
 _SUFFIXES = {".stp", ".step", ".p21"}
@@ -21,7 +22,8 @@ class References:
 
     def add(self, text: bytes, folder: Path) -> None:
         """Those of one more file, whose text and folder these are."""
-        for found in _DOCUMENT.findall(text):
+        # Few files have any, and a search for the word is quicker by far.
+        for found in _DOCUMENT.findall(text) if _WORD in text else ():
             name = found.replace(b"''", b"'").decode("utf-8", "replace")
             if Path(name).suffix.lower() not in _SUFFIXES:
                 continue

@@ -60,6 +60,23 @@ class Patch:
         return [along.radius if isinstance(along, Turning) else 1.0 for along in (self.u, self.v)]
 
     @cached_property
+    def lengths(self) -> tuple[float, float]:
+        """The same as floats."""
+        (a, b), (c, d) = self.surface.domain
+        return b - a, d - c
+
+    @cached_property
+    def periods(self) -> tuple[float, float]:
+        """Periods in u and v; 0 where the surface is not closed."""
+        (u, v), (closed_u, closed_v) = self.lengths, self.surface.closed
+        return (u if closed_u else 0.0), (v if closed_v else 0.0)
+
+    @cached_property
+    def is_straight(self) -> bool:
+        """Whether OCCT's parameters are ours."""
+        return isinstance(self.u, Straight) and isinstance(self.v, Straight)
+
+    @cached_property
     def period(self) -> Array:
         """Periods in u and v; infinite where the surface is not closed."""
         return np.where(self.surface.closed, self.sides, np.inf)
@@ -80,7 +97,8 @@ def _revolved(shape: Spline, turning: Turning, origin: Array, axis: Array) -> Sp
     # Ends that lie on the axis are poles.
     out[np.linalg.norm(out, axis=1) < CONFUSION] = 0.0
     ring = arc(turning).points
-    across = np.cross(axis, out)
+    (a, b, c), (x, y, z) = axis, out.T
+    across = np.column_stack([b * z - c * y, c * x - a * z, a * y - b * x])
     net = np.empty((len(ring), len(points), 4))
     net[..., :3] = (
         ring[:, 2, None, None] * foot[None] + ring[:, 0, None, None] * out[None] + ring[:, 1, None, None] * across[None]
@@ -103,7 +121,8 @@ def _plane(surface: Any, box: Box) -> Patch:
     u, v = _slack(*box[:2]), _slack(*box[2:])
     origin, x, y = point(place.Location()), point(place.XDirection()), point(place.YDirection())
     net = origin + np.array(u)[:, None, None] * x + np.array(v)[None, :, None] * y
-    return Patch(NurbsSurface(net, (np.repeat(u, 2), np.repeat(v, 2)), (1, 1)), Straight(True), Straight(True))
+    knots = [[end for end in ends for _ in (0, 1)] for ends in (u, v)]
+    return Patch(NurbsSurface(net, knots, (1, 1)), Straight(True), Straight(True))
 
 
 def _round(surface: Any, box: Box) -> Patch:

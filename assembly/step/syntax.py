@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from assembly.step.scanning import PADDING, is_whole
+
 __all__ = ["Fault", "first_fault", "is_step", "mended"]
 
 # Groups are not possessive: before Python 3.11.5 those are matched wrongly. No two of their parts begin alike.
@@ -80,6 +82,8 @@ def first_fault(text: bytes) -> Fault | None:
 
     None where there is no fault. After the end all may follow.
     """
+    if is_whole(np.frombuffer(text + bytes(PADDING), np.uint8).copy()):
+        return None
     at = 0
     while not (end := _END.match(text, at)) and (after := _after_statement(text, at)):
         at = after

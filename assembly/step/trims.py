@@ -7,10 +7,9 @@ ends mapped; any other curve, a helix say, has no rational form and is interpola
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,25 +18,37 @@ from scipy.optimize import brentq
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
 from assembly.step.occt import occt
-from assembly.step.profiles import Direction, Spline, Straight, Unreadable, approximated, profile, spline
+from assembly.step.profiles import Direction, Spline, Unreadable, approximated, profile, spline
 from assembly.step.surfaces import Patch
+from assembly.step.wires import Traced
 
-__all__ = ["Edge", "chained", "crossings", "edge_curve", "head_to_tail"]
+__all__ = ["Edge", "Segment", "Tolerances", "chained", "crossings", "curves_of", "edge_curves", "head_to_tail"]
 
 Array = NDArray[np.float64]
+Pair = tuple[float, float]
 # Deviation allowed to curves without rational form, over the shorter side of the surface's domain.
 FOLLOWED = 1e-10
 # Curves that leave a coordinate line by less, over the side of the domain, run along it.
 LEVEL = 1e-9
+# Ends that are nearer to each other, over the side of the domain, are apart by rounding alone.
+ROUNDING = 1e-12
 
 
-@dataclass(frozen=True)
-class Edge:
+class Segment(NamedTuple):
+    """A straight line in (u, v) over an interval of its parameter, where two control points and knots are too much."""
+
+    start: Pair
+    end: Pair
+    low: float = 0.0
+    high: float = 1.0
+
+
+class Edge(NamedTuple):
     """One boundary curve in our (u, v), run with the material on its left.
 
     Attributes
     ----------
-    curve : Spline
+    curve : Spline or Segment
     level : (bool, bool)
         Whether u, or v, is constant along it.
     tolerance : float
@@ -50,42 +61,70 @@ class Edge:
         Whether the face has it on both sides.
     """
 
-    curve: Spline
+    curve: Spline | Segment
     level: tuple[bool, bool]
     tolerance: float
     name: str
     deviation: float
     seam: bool = False
 
-    @cached_property
-    def ends(self) -> Array:
-        """First and last point (2, 2)."""
-        points = self.curve.points[[0, -1]]
-        return np.asarray(points[:, :2] / points[:, 2:])
+    @property
+    def corners(self) -> tuple[Pair, Pair]:
+        """First and last point."""
+        if isinstance(self.curve, Segment):
+            return self.curve.start, self.curve.end
+        (u, v, w), (x, y, z) = self.curve.points[0].tolist(), self.curve.points[-1].tolist()
+        return (u / w, v / w), (x / z, y / z)
 
-    def moved(self, points: Array) -> Edge:
-        """The curve with its two ends at the points (2, 2); what is level stays so."""
+    @property
+    def ends(self) -> Array:
+        """The same as an array (2, 2)."""
+        return np.array(self.corners)
+
+    def moved(self, start: Pair, end: Pair) -> Edge:
+        """The curve with its two ends at two points; what is level stays so."""
+        if isinstance(self.curve, Segment):
+            if start == self.curve.start and end == self.curve.end:
+                return self
+            return self._replace(curve=Segment(start, end, self.curve.low, self.curve.high))
         made = self.curve.points.copy()
         if len(made) == 2 and made[0, 2] == made[1, 2] == 1.0:
-            if (points == self.ends).all():
-                return self
-            made[:, :2] = points
-            return replace(self, curve=Spline(made, self.curve.knots, self.curve.degree))
-        for axis in np.flatnonzero(self.level):
-            made[:, axis] = points[0, axis] * made[:, 2]
-        made[[0, -1], :2] = points * made[[0, -1], 2:]
-        return replace(self, curve=Spline(made, self.curve.knots, self.curve.degree))
+            made[:, :2] = start, end
+            return self._replace(curve=Spline(made, self.curve.knots, self.curve.degree))
+        for axis in (0, 1):
+            if self.level[axis]:
+                made[:, axis] = start[axis] * made[:, 2]
+        made[[0, -1], :2] = np.array((start, end)) * made[[0, -1], 2:]
+        return self._replace(curve=Spline(made, self.curve.knots, self.curve.degree))
 
-    def shifted(self, by: Array) -> Edge:
+    def shifted(self, by: Pair) -> Edge:
         """The curve moved by a vector of (u, v)."""
+        if isinstance(self.curve, Segment):
+            (u, v), (x, y), low, high = self.curve
+            return self._replace(curve=Segment((u + by[0], v + by[1]), (x + by[0], y + by[1]), low, high))
         made = self.curve.points.copy()
-        made[:, :2] += by * made[:, 2:]
-        return replace(self, curve=Spline(made, self.curve.knots, self.curve.degree))
+        made[:, :2] += np.array(by) * made[:, 2:]
+        return self._replace(curve=Spline(made, self.curve.knots, self.curve.degree))
 
     def nurbs(self, scales: Array) -> NurbsCurve:
         """As the loops of a face take it, its u and v multiplied."""
-        points, weights = self.curve.cartesian
-        return NurbsCurve(points * scales, self.curve.knots, self.curve.degree, weights, name=self.name)
+        return curves_of([self], scales)[0]
+
+
+def curves_of(edges: Sequence[Edge], scales: Array) -> list[NurbsCurve]:
+    """Edges as the loops of a face take them, their u and v multiplied."""
+    straight = [edge for edge in edges if isinstance(edge.curve, Segment)]
+    ends = np.array([edge.corners for edge in straight]).reshape(-1, 2, 2) * scales
+    intervals = [(edge.curve.low, edge.curve.high) for edge in straight if isinstance(edge.curve, Segment)]
+    lines = iter(NurbsCurve._lines(ends, intervals, [edge.name for edge in straight]))
+    made = []
+    for edge in edges:
+        if isinstance(edge.curve, Segment):
+            made.append(next(lines))
+        else:
+            points, weights = edge.curve.cartesian
+            made.append(NurbsCurve(points * scales, edge.curve.knots, edge.curve.degree, weights, name=edge.name))
+    return made
 
 
 def crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:
@@ -127,54 +166,128 @@ def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: floa
     return approximated(mapped, breaks, tolerance)
 
 
-def edge_curve(edge: Any, face: Any, patch: Patch, name: str) -> Edge:
-    """The curve of an edge on a face (which is taken forward), mapped to our parameters.
+class Tolerances:
+    """Tolerances of the edges of a solid and of their ends [mm], each asked for once."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, float] = {}
+
+    def of(self, edge: Any, number: int) -> float:
+        """The largest of an edge, which has this number, and of its vertices."""
+        known = self._known.get(number)
+        if known is None:
+            o = occt()
+            known = o.BRep_Tool.Tolerance_s(edge)
+            for vertex in (o.TopExp.FirstVertex_s(edge), o.TopExp.LastVertex_s(edge)):
+                if not vertex.IsNull():
+                    known = max(known, o.BRep_Tool.Tolerance_s(vertex))
+            if number:
+                self._known[number] = known
+        return known
+
+
+class _Draft(NamedTuple):
+    """An edge whose ends are in OCCT's (u, v) yet where it is level or a line."""
+
+    curve: Spline | Segment
+    level: tuple[bool, bool]
+    deviation: float
+
+
+def edge_curves(row: Sequence[Traced], patch: Patch, edges: Any, tolerances: Tolerances) -> list[Edge]:
+    """The curves of the edges of a wire mapped to our parameters.
+
+    Parameters
+    ----------
+    row
+        Several on a face.
+    patch
+        What that is on.
+    edges
+        Map of the solid's edges, which numbers them.
+    tolerances
+        Of the solid's edges.
 
     Raises
     ------
     Unreadable
-        The edge has no curve on the face, or one that cannot be carried over.
+        An edge has no curve on the face, or one that cannot be carried over.
     """
     o = occt()
-    low, high = o.BRep_Tool.Range_s(edge, face)
-    raw = o.BRep_Tool.CurveOnSurface_s(edge, face, low, high)
-    if raw is None:
+    drafts = [_draft(traced, patch) for traced in row]
+    # Ends of all curves that are level are mapped at once.
+    level = [draft for draft in drafts if draft.level[0] or draft.level[1]]
+    places = np.array([(draft.curve.start, draft.curve.end) for draft in level if isinstance(draft.curve, Segment)])
+    mapped = places.reshape(-1, 2)
+    if level and not patch.is_straight:
+        mapped = np.column_stack([patch.u(mapped[:, 0]), patch.v(mapped[:, 1])])
+    points = iter(mapped.tolist())
+    made = []
+    for traced, (curve, sides, deviation) in zip(row, drafts, strict=True):
+        edge = traced.edge
+        if sides[0] or sides[1]:
+            (u, v), (x, y) = next(points), next(points)
+            curve = Segment((u, v), (x, y))
+        if edge.Orientation() == o.TopAbs_REVERSED:
+            curve = _reversed(curve)
+        number = edges.FindIndex(edge)
+        made.append(Edge(curve, sides, tolerances.of(edge, number), f"edge {number}", deviation, traced.seam))
+    return made
+
+
+def _reversed(curve: Spline | Segment) -> Spline | Segment:
+    """A curve run the other way round, over the same interval."""
+    if isinstance(curve, Segment):
+        both = curve.low + curve.high
+        return Segment(curve.end, curve.start, both - curve.high, both - curve.low)
+    return Spline(curve.points[::-1], curve.knots[0] + curve.knots[-1] - curve.knots[::-1], curve.degree)
+
+
+def _draft(traced: Traced, patch: Patch) -> _Draft:
+    """The curve of an edge, its ends not mapped where it is level."""
+    if traced.curve is None:
         raise Unreadable("an edge has no curve in the surface's parameters")
-    source, _, deviation = profile(raw, low, high, cut=True)
-    line, level = _level_line(source, patch)
-    if line is not None:
-        made = line
-    elif isinstance(patch.u, Straight) and isinstance(patch.v, Straight):
-        points, weights = source.cartesian
-        made = spline(points, source.knots, source.degree, weights)
-    else:
-        made, error = _followed(source, (patch.u, patch.v), FOLLOWED * float(patch.sides.min()))
-        deviation += error
-    if edge.Orientation() == o.TopAbs_REVERSED:
-        made = Spline(made.points[::-1], made.knots[0] + made.knots[-1] - made.knots[::-1], made.degree)
-    tolerance = o.BRep_Tool.Tolerance_s(edge)
-    for vertex in (o.TopExp.FirstVertex_s(edge), o.TopExp.LastVertex_s(edge)):
-        if not vertex.IsNull():
-            tolerance = max(tolerance, o.BRep_Tool.Tolerance_s(vertex))
-    return Edge(made, level, tolerance, name, deviation, o.BRep_Tool.IsClosed_s(edge, face))
+    if traced.line is not None:
+        start, end = traced.line
+        us, vs = [start[0], end[0]], [start[1], end[1]]
+        if level := _level(us, vs, patch):
+            return _leveled(us, vs, level, 0.0)
+        if patch.is_straight:
+            return _Draft(Segment(start, end, traced.low, traced.high), (False, False), 0.0)
+    source, _, deviation = profile(traced.curve, traced.low, traced.high, cut=True)
+    points, weights = source.cartesian
+    us, vs = points[:, 0].tolist(), points[:, 1].tolist()
+    if level := _level(us, vs, patch):
+        return _leveled(us, vs, level, deviation)
+    if patch.is_straight:
+        return _Draft(spline(points, source.knots, source.degree, weights), (False, False), deviation)
+    made, error = _followed(source, (patch.u, patch.v), FOLLOWED * float(patch.sides.min()))
+    return _Draft(made, (False, False), deviation + error)
 
 
-def _level_line(source: Spline, patch: Patch) -> tuple[Spline | None, tuple[bool, bool]]:
-    """The line along one of our parameters that a curve in OCCT's is, and which of them is constant; None if none."""
-    points = source.cartesian[0]
-    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    extent = [(b - a) * k / side for a, b, k, side in zip(low, high, patch.scales, patch.sides.tolist(), strict=True)]
-    along = int(extent[1] > extent[0])
-    if not extent[1 - along] <= LEVEL:
-        return None, (False, False)
-    row = points[:, along].tolist()
-    if not (all(a <= b for a, b in pairwise(row)) or all(a >= b for a, b in pairwise(row))):
-        return None, (False, False)
-    ends = points[[0, -1]]
-    ends[:, 1 - along] = 0.5 * (low[1 - along] + high[1 - along])
-    made = np.ones((2, 3))
-    made[:, 0], made[:, 1] = patch.u(ends[:, 0]), patch.v(ends[:, 1])
-    return Spline(made, np.array([0.0, 0.0, 1.0, 1.0]), 1), (along == 1, along == 0)
+def _leveled(us: list[float], vs: list[float], level: tuple[bool, bool], deviation: float) -> _Draft:
+    """The line between the ends of a curve, its constant coordinate in the middle of the curve's."""
+    if level[0]:
+        u = 0.5 * (min(us) + max(us))
+        return _Draft(Segment((u, vs[0]), (u, vs[-1])), level, deviation)
+    v = 0.5 * (min(vs) + max(vs))
+    return _Draft(Segment((us[0], v), (us[-1], v)), level, deviation)
+
+
+def _level(us: list[float], vs: list[float], patch: Patch) -> tuple[bool, bool] | None:
+    """Which of our parameters is constant along a curve in OCCT's, of which these are the control points.
+
+    None for none; the other one has to go one way.
+    """
+    (scale_u, scale_v), (side_u, side_v) = patch.scales, patch.lengths
+    extent_u, extent_v = (max(us) - min(us)) * scale_u / side_u, (max(vs) - min(vs)) * scale_v / side_v
+    along_v = extent_v > extent_u
+    if not (extent_u if along_v else extent_v) <= LEVEL:
+        return None
+    row = vs if along_v else us
+    if len(row) > 2 and not (all(a <= b for a, b in pairwise(row)) or all(a >= b for a, b in pairwise(row))):
+        return None
+    return along_v, not along_v
 
 
 def _within(at: Array, patch: Patch) -> Array:
@@ -212,48 +325,70 @@ def chained(edges: list[Edge], patch: Patch) -> tuple[list[Edge], float]:
     Unreadable
         Two curves are farther apart than their tolerance.
     """
-    period = patch.period
-    open_ = ~np.isfinite(period)
-    whole, periods = np.where(open_, 1.0, period), np.where(open_, 0.0, period)
+    periods = patch.periods
     rows = edges
-    if not open_.all():
+    if any(periods):
         rows = edges[:1]
         for edge in edges[1:]:
-            turns = np.where(open_, 0.0, np.round((rows[-1].ends[1] - edge.ends[0]) / whole))
-            rows.append(edge.shifted(turns * periods) if turns.any() else edge)
-    ends, level = np.array([edge.ends for edge in rows]), np.array([edge.level for edge in rows])
+            by = _whole(rows[-1].corners[1], edge.corners[0], periods)
+            rows.append(edge.shifted(by) if any(by) else edge)
+    corners = [edge.corners for edge in rows]
     # A ring closes up to a period, and so does its joint.
-    ring = np.where(open_, 0.0, np.round((ends[0, 0] - ends[-1, 1]) / whole)) * periods
-    # Joint k is where edge k begins; what is level in one of both edges keeps its coordinate.
-    before, after = np.roll(ends[:, 1], 1, axis=0) + 0.0, ends[:, 0]
-    before[0] += ring
-    last_level = np.roll(level, 1, axis=0)
-    joints = np.where(last_level != level, np.where(last_level, before, after), 0.5 * (before + after))
+    ring = _whole(corners[0][0], corners[-1][1], periods)
+    # Joint k is where edge k begins.
+    before = [(u + 0.0, v + 0.0) for _, (u, v) in corners[-1:] + corners[:-1]]
+    before[0] = (before[0][0] + ring[0], before[0][1] + ring[1])
+    after = [start for start, _ in corners]
     worst = _checked_gaps(rows, before, after, patch)
-    _match_seams(rows, joints, period)
-    stops = np.roll(joints, -1, axis=0)
-    stops[-1] -= ring
-    return [edge.moved(pair) for edge, pair in zip(rows, np.stack([joints, stops], axis=1), strict=True)], worst
+    levels = [edge.level for edge in rows[-1:] + rows[:-1]]
+    joints = [
+        (_joint(last[0], edge.level[0], b[0], a[0]), _joint(last[1], edge.level[1], b[1], a[1]))
+        for last, edge, b, a in zip(levels, rows, before, after, strict=True)
+    ]
+    _match_seams(rows, joints, periods)
+    stops = joints[1:] + joints[:1]
+    stops[-1] = (stops[-1][0] - ring[0], stops[-1][1] - ring[1])
+    return [edge.moved(start, end) for edge, start, end in zip(rows, joints, stops, strict=True)], worst
 
 
-def _checked_gaps(rows: list[Edge], before: Array, after: Array, patch: Patch) -> float:
+def _whole(to: Pair, at: Pair, periods: Pair) -> Pair:
+    """The whole periods by which a point has to be moved to be next to another one."""
+    (u, v), (period_u, period_v) = to, periods
+    return (
+        round((u - at[0]) / period_u) * period_u if period_u else 0.0,
+        round((v - at[1]) / period_v) * period_v if period_v else 0.0,
+    )
+
+
+def _joint(last_level: bool, level: bool, before: float, after: float) -> float:
+    """A coordinate of the joint of two edges: what is level in one of both keeps it."""
+    if last_level != level:
+        return before if last_level else after
+    return 0.5 * (before + after)
+
+
+def _checked_gaps(rows: list[Edge], before: list[Pair], after: list[Pair], patch: Patch) -> float:
     """The largest gap in space at the start of an edge, where the one before ends; raise beyond their tolerances."""
-    apart = np.flatnonzero((before != after).any(axis=1))
-    if not apart.size:
+    noise_u, noise_v = (ROUNDING * side for side in patch.lengths)
+    apart = [
+        k
+        for k, ((u, v), (x, y)) in enumerate(zip(before, after, strict=True))
+        if not (abs(u - x) <= noise_u and abs(v - y) <= noise_v)
+    ]
+    if not apart:
         return 0.0
     # Points may lie beyond the domain.
-    at = _within(np.stack([before[apart], after[apart]]), patch)
+    at = _within(np.array([[before[k] for k in apart], [after[k] for k in apart]]), patch)
     points = patch.surface.evaluate(at[..., 0], at[..., 1])
     gaps = np.linalg.norm(points[0] - points[1], axis=1).tolist()
-    for k, gap in zip(apart.tolist(), gaps, strict=True):
+    for k, gap in zip(apart, gaps, strict=True):
         if gap > 2.0 * (rows[k - 1].tolerance + rows[k].tolerance):
             raise Unreadable(f"two edges that should meet are {gap:.2g} mm apart")
     return float(max(gaps))
 
 
-def _match_seams(rows: list[Edge], joints: Array, period: Array) -> None:
+def _match_seams(rows: list[Edge], joints: list[Pair], periods: Pair) -> None:
     """Make both sides of a seam, which is one edge run to and fro, end at the same places up to a period."""
-    whole = np.where(np.isfinite(period), period, 1.0)
     for i, edge in enumerate(rows):
         for j in range(i + 1, len(rows) if edge.seam else 0):
             if rows[j].name != edge.name:
@@ -261,7 +396,8 @@ def _match_seams(rows: list[Edge], joints: Array, period: Array) -> None:
             for here, there in ((i, (j + 1) % len(rows)), ((i + 1) % len(rows), j)):
                 if here == there:
                     continue
-                off = joints[here] - joints[there]
-                off -= np.where(np.isfinite(period), np.round(off / whole) * whole, 0.0)
-                joints[here] -= 0.5 * off
-                joints[there] += 0.5 * off
+                (u, v), (x, y) = joints[here], joints[there]
+                by = _whole((u, v), (x, y), periods)
+                off_u, off_v = u - x - by[0], v - y - by[1]
+                joints[here] = (u - 0.5 * off_u, v - 0.5 * off_v)
+                joints[there] = (x + 0.5 * off_u, y + 0.5 * off_v)

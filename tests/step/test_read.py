@@ -185,7 +185,7 @@ def test_a_face_that_cannot_be_read_is_named(tmp_path, monkeypatch):
     file.part(joined(box(), box(1.0, 1.0, 1.0, (0, 0, 3))), "tower")
     path = file.write(tmp_path / "tower.step")
 
-    def fails(face, edges, name, scale):
+    def fails(face, edges, name, scale, tolerances):
         if name == "face 3":
             raise Unreadable("two edges that should meet are 1 mm apart")
         return read_face(face, edges, name, scale)

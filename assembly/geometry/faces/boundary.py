@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
-from assembly.geometry.faces.loop import TOLERANCE, Loop, curve_ends
+from assembly.geometry.faces.loop import TOLERANCE, Loop, all_ends, curve_ends
 from assembly.geometry.faces.overshoot import clipped, extent, rates, widened
 from assembly.geometry.faces.relinked import Relinked, relinked
 from assembly.geometry.faces.trim_table import TrimTable, build
@@ -121,6 +121,8 @@ def _are_seam(a: NurbsCurve, b: NurbsCurve, period: Array, slack: Array) -> bool
 def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[NurbsCurve], Array]], list[NurbsCurve]]:
     """Chains of a loop (with the way from their start to their end if that is whole periods), and pole edges."""
     curves = list(loop.curves)
+    if not surface._pole_bits and not any(surface._periods):
+        return [(curves, loop.turn)], []
     slack = SLACK * np.ptp(np.array(surface.domain), axis=1)
     period = np.array(surface._periods)
     silent: list[NurbsCurve] = []
@@ -133,7 +135,7 @@ def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[N
                 ends[:, axis] = value
                 silent.append(segment(*ends))
     if period.any():
-        ends = np.array([curve_ends(curve) for curve in curves])
+        ends = all_ends(curves)
         jump = ends[None, :, ::-1] - ends[:, None]
         whole = np.where(period > 0.0, np.round(jump / np.where(period > 0.0, period, 1.0)) * period, 0.0)
         for k, other in np.argwhere((np.abs(jump - whole) <= slack).all(axis=(2, 3))).tolist():
@@ -304,12 +306,12 @@ def make_boundary(
         chains, silent = _natural_chains(_Sheet.of(surface))
         names = [_EDGE] * len(chains)
     else:
-        if not outer_loop.turn.any() and outer_loop.area < 0.0:
+        if not outer_loop.turn.any() and outer_loop.is_clockwise:
             outer_loop = outer_loop.reversed()
         chains, silent = _without_seams(outer_loop, surface)
         names = ["outer"] * len(chains)
     for k, loop in enumerate(hole_loops):
-        if not loop.turn.any() and loop.area > 0.0:
+        if not loop.turn.any() and not loop.is_clockwise:
             hole_loops[k] = loop = loop.reversed()
         more, points = _without_seams(loop, surface)
         chains += more
@@ -332,10 +334,13 @@ class _Made:
 def _are_inside(loops: Sequence[Loop], surface: NurbsSurface) -> bool:
     """Whether no control point is beyond the domain, or so near to its edge that it has to be moved there."""
     points = np.concatenate([curve.control_points for loop in loops for curve in loop.curves])
+    least, most = points.min(axis=0).tolist(), points.max(axis=0).tolist()
     for axis, (low, high) in enumerate(surface.domain):
         if surface.closed[axis]:
             continue
         row, slack = points[:, axis], SLACK * (high - low)
+        if least[axis] > low + 2.0 * slack and most[axis] < high - 2.0 * slack:
+            continue
         off = (np.abs(row - low) <= slack) & (row != low) | (np.abs(row - high) <= slack) & (row != high)
         if off.any() or row.min() < low or row.max() > high:
             return False

@@ -7,6 +7,7 @@ and it may come back one period away from where it began, as once around a cylin
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-9
 # Curves smaller than this part of the loop's size are left out.
 _NO_LENGTH = 1e-12
+# What rounding may make of an area, as a part of the size's square, for loops of up to thousands of corners.
+_ROUNDING = 1e-9
 
 
 def _checked_period(value: Sequence[float]) -> tuple[float, float]:
@@ -35,20 +38,31 @@ def _checked_period(value: Sequence[float]) -> tuple[float, float]:
 
 def curve_ends(curve: NurbsCurve) -> Array:
     """First and last point of a curve, (2, d)."""
-    p, knots = curve.degree, curve.knots
-    if knots[0] == knots[p] and knots[-1] == knots[-p - 1]:
+    if curve._is_clamped:
         return curve.control_points[[0, -1]]
     pieces = curve.bezier_pieces()
     ends = np.array([pieces[0, 0], pieces[-1, -1]])
     return np.asarray(ends[:, :-1] / ends[:, -1:])
 
 
+def all_ends(curves: Sequence[NurbsCurve]) -> Array:
+    """First and last points of curves, (n, 2, d)."""
+    if all(len(curve.control_points) == 2 and curve._is_clamped for curve in curves):
+        return np.array([curve.control_points for curve in curves])
+    return np.array([curve_ends(curve) for curve in curves])
+
+
+def _largest_side(curve: NurbsCurve) -> float:
+    """The larger side of the box around a plane curve's control points."""
+    if len(curve.control_points) == 2:
+        (u, v), (x, y) = curve.control_points.tolist()
+        return float(max(abs(u - x), abs(v - y)))
+    return float(np.ptp(curve.control_points, axis=0).max())
+
+
 def _clamped(curve: NurbsCurve) -> NurbsCurve:
     """The same curve with its first and last control point at its ends."""
-    p, knots = curve.degree, curve.knots
-    if knots[0] == knots[p] and knots[-1] == knots[-p - 1]:
-        return curve
-    return curve.elevate(p)
+    return curve if curve._is_clamped else curve.elevate(curve.degree)
 
 
 def with_ends(curve: NurbsCurve, start: Array, end: Array) -> NurbsCurve:
@@ -98,7 +112,7 @@ class Loop(ReadOnlyArrays):
         tolerance: float = TOLERANCE,
         period: Sequence[float] | None = None,
     ) -> None:
-        self._make(curves, tolerance, period, "loop")
+        self._make(curves, tolerance, None if period is None else _checked_period(period), "loop")
         (u, v), (x, y) = self._box()
         # In the unrolled plane: seams meet one period away, and whether anything else does is for a face to see.
         chain = range(len(self.curves))
@@ -112,7 +126,7 @@ class Loop(ReadOnlyArrays):
 
     @classmethod
     def unchecked(
-        cls, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: Sequence[float] | None, name: str
+        cls, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: tuple[float, float] | None, name: str
     ) -> Loop:
         """A loop by its name in messages; whether it crosses itself is looked at later, with all loops of a face."""
         loop = object.__new__(cls)
@@ -120,7 +134,7 @@ class Loop(ReadOnlyArrays):
         return loop
 
     def _make(
-        self, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: Sequence[float] | None, name: str
+        self, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: tuple[float, float] | None, name: str
     ) -> None:
         parts = [curves] if isinstance(curves, NurbsCurve) else items(name, curves, "one NurbsCurve or several")
         if not parts:
@@ -131,19 +145,22 @@ class Loop(ReadOnlyArrays):
             if curve.control_points.shape[1] != 2:
                 raise InputError(f"{name}[{k}] is a curve in space; expected a plane curve in (u, v)")
         self.tolerance = number("tolerance", tolerance)
-        self.period = (0.0, 0.0) if period is None else _checked_period(period)
+        self.period = (0.0, 0.0) if period is None else period
         self.curves = tuple(parts)
         low, high = self._box()
         self.size = float(np.linalg.norm(high - low))
         if not self.size > 0.0:
             raise InputError(f"{name} is a single point; expected a loop")
         # Files have edges of no length where something else was once; they have no direction.
-        parts = [c for c in parts if np.ptp(c.control_points, axis=0).max() > _NO_LENGTH * self.size]
+        parts = [c for c in parts if _largest_side(c) > _NO_LENGTH * self.size]
         self._join([_clamped(curve) for curve in parts], period is not None, name)
 
     def _join(self, parts: list[NurbsCurve], known: bool, name: str) -> None:
+        ends = all_ends(parts)
+        if (ends[1:, 0] == ends[:-1, 1]).all() and (ends[0, 0] == ends[-1, 1]).all():
+            self.curves, self.turn = tuple(parts), read_only(np.zeros(2))
+            return
         allowed = self.tolerance * self.size
-        ends = np.array([curve_ends(curve) for curve in parts])
         periods = np.array(self.period)
         whole = np.where(periods > 0.0, periods, 1.0)
         gaps = ends[1:, 0] - ends[:-1, 1]
@@ -202,6 +219,19 @@ class Loop(ReadOnlyArrays):
     def area(self) -> float:
         """Signed area, positive counterclockwise; of a loop that turns, of no meaning."""
         return signed_area(self.curves)
+
+    @property
+    def is_clockwise(self) -> bool:
+        """Whether its signed area is negative."""
+        if all(len(curve.control_points) == 2 for curve in self.curves):
+            # Cross products of corners, relative to the first one. Where rounding might decide the whole area is asked.
+            rows = [curve.control_points[0].tolist() for curve in self.curves]
+            (u, v), area = rows[0], 0.0
+            for (a, b), (c, d) in pairwise(rows):
+                area += (a - u) * (d - v) - (b - v) * (c - u)
+            if abs(area) > _ROUNDING * self.size**2:
+                return area < 0.0
+        return self.area < 0.0
 
     def reversed(self) -> Loop:
         """The same loop run the other way round."""

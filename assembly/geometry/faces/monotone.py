@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
+from assembly.geometry.splines.evaluate import spline_curve_at
 
 # A row of pieces: curve, span, ends in the parameter, bounds on |C'|, |C''|, |C'''|.
 ROW = 7
@@ -224,12 +225,11 @@ def _weights_differ(c, p):
 
 
 @kernel(signatures="(f8[::1], f8[::1], i8[:, ::1], f8[:, ::1], f8[:, ::1])", allocates=True)
-def cut_curves(pieces, breaks, shape, binomials, rows):
+def cut_curves(pieces, pool, records, binomials, rows):
     """Cut curves into pieces.
 
-    `pieces` holds the homogeneous Bezier points (u w, v w, w) of all spans of all curves in order, `breaks` the
-    ends of their spans, `shape` (curves, 2) degrees and numbers of spans. Returns how many pieces there are; `rows`
-    has the first of them.
+    `pieces` holds the homogeneous Bezier points (u w, v w, w) of all spans of all curves in order, `pool` and `records`
+    are those of the curves. Returns how many pieces there are; `rows` has the first of them.
     """
     limit = 32
     b = np.empty((limit, 3))
@@ -240,11 +240,11 @@ def cut_curves(pieces, breaks, shape, binomials, rows):
     work = np.empty(limit)
     roots = np.empty(256)
     at = 0
-    at_break = 0
     count = 0
-    for curve in range(shape.shape[0]):
-        p = shape[curve, 0]
-        for span in range(shape[curve, 1]):
+    for curve in range(records.shape[0]):
+        arc = spline_curve_at(records, curve)
+        p, breaks = arc.degree, arc.breaks
+        for span in range(arc.spans):
             for k in range(p + 1):
                 for axis in range(3):
                     b[k, axis] = pieces[at]
@@ -259,8 +259,8 @@ def cut_curves(pieces, breaks, shape, binomials, rows):
                 if largest > 1e-14 * scale:
                     found = _roots(slopes[line], n, roots, found, stack, places, work)
             cuts = np.sort(roots[:found])
-            t0 = breaks[at_break + span]
-            width = breaks[at_break + span + 1] - t0
+            t0 = pool[breaks + span]
+            width = pool[breaks + span + 1] - t0
             low = 0.0
             for k in range(found + 1):
                 high = 1.0
@@ -281,11 +281,10 @@ def cut_curves(pieces, breaks, shape, binomials, rows):
                         row[0] = curve
                         row[1] = span
                         row[2] = t0 + width * low
-                        row[3] = breaks[at_break + span + 1] if end == 1.0 else t0 + width * end
+                        row[3] = pool[breaks + span + 1] if end == 1.0 else t0 + width * end
                         row[4] = m1 * scale_t
                         row[5] = m2 * scale_t**2
                         row[6] = m3 * scale_t**3
                     count += 1
                     low = end
-        at_break += shape[curve, 1] + 1
     return count

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.geometry.faces.touch_gaps import gap_between, nearest_place
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
 
@@ -22,7 +23,6 @@ __all__ = ["Touch", "touches"]
 Array = NDArray[np.float64]
 # Chords of a span.
 _CHORDS = 32
-_NEWTON = 30
 # Cuts nearer than this part of the extent are one: that near to a corner, curves are not compared with one another.
 _ONE_CUT = 1e-5
 # Parameters that differ by less, over the domain, are one.
@@ -56,27 +56,13 @@ class _Sampled:
         self.high = np.maximum(self.points[:-1], self.points[1:]) + self.sag
         self.box = np.array([self.low.min(axis=0), self.high.max(axis=0)])
 
+        self.traced = (*curve.packed(), self.t, np.ascontiguousarray(self.points))
+
     def nearest(self, point: Array, within: tuple[float, float] | None = None) -> tuple[float, float]:
-        """Parameter and distance of the nearest point, in a part of the curve: Newton's method from the polygon."""
-        low, high = self.curve.domain if within is None else within
-        inside = (self.t >= low) & (self.t <= high)
-        start = self.t[inside] if inside.any() else np.array([0.5 * (low + high)])
-        points = self.points[inside] if inside.any() else self.curve.evaluate(start)
-        t = float(start[np.argmin(((points - point) ** 2).sum(axis=1))])
-        for _ in range(_NEWTON):
-            at, first, second = self.curve.evaluate(t, 2)
-            off = at - point
-            slope, bend = float(off @ first), float(first @ first + off @ second)
-            if bend <= 0.0:
-                bend = float(first @ first)
-            if bend <= 0.0:
-                break
-            new = min(max(t - slope / bend, low), high)
-            if abs(new - t) <= 1e-15 * (abs(t) + high - low):
-                t = new
-                break
-            t = new
-        return t, float(np.linalg.norm(self.curve.evaluate(t) - point))
+        """Parameter and distance of the nearest point, in a part of the curve."""
+        x, y = point.tolist()
+        t, distance = nearest_place(self.traced, x, y, self.curve.domain if within is None else within)
+        return t, distance
 
 
 class _Pair:
@@ -84,6 +70,7 @@ class _Pair:
 
     def __init__(self, a: _Sampled, b: _Sampled, move: Array, tolerance: float, own: bool) -> None:
         self.a, self.b, self.move, self.tolerance, self.own = a, b, move, tolerance, own
+        self._shift = (float(move[0]), float(move[1]))
 
     def found(self) -> list[tuple[float, float]]:
         """Parameters on both at which they meet."""
@@ -125,14 +112,10 @@ class _Pair:
                 rows += self._along(float(a.t[k]), float(a.t[k + 1]), part)
         return rows
 
-    def _gap(self, s: float, part: tuple[float, float]) -> tuple[float, float, bool]:
-        """Signed distance of the first curve's point from the second one, its parameter, and whether that is inside."""
-        point = self.a.curve.evaluate(s) - self.move
-        t, distance = self.b.nearest(point, part)
-        at, along = self.b.curve.evaluate(t, 1)
-        side = float(along[0] * (point - at)[1] - along[1] * (point - at)[0])
-        width = 1e-12 * (part[1] - part[0])
-        return (distance if side >= 0.0 else -distance), t, part[0] + width < t < part[1] - width
+    def _gap(self, s: float, part: tuple[float, float]) -> tuple[float, float, bool, float]:
+        """Of the first curve's point, see `gap_between`."""
+        gap, t, inside, turn = gap_between(self.a.traced, self.b.traced, s, self._shift, part)
+        return gap, t, inside, turn
 
     def _along(self, low: float, high: float, part: tuple[float, float]) -> list[tuple[float, float]]:
         """Meetings of a chord's arc with a part of the other curve."""
@@ -142,7 +125,7 @@ class _Pair:
         rows = [self._gap(x, part) for x in s.tolist()]
         found = []
         for k in range(8):
-            (g, _, inside), (h, _, beside) = rows[k], rows[k + 1]
+            (g, _, inside, _), (h, _, beside, _) = rows[k], rows[k + 1]
             if inside and beside and g * h < 0.0:
                 found.append(self._crossed(float(s[k]), float(s[k + 1]), g, part))
         for k in range(9):
@@ -160,7 +143,7 @@ class _Pair:
             else:
                 high = middle
         s = 0.5 * (low + high)
-        g, t, _ = self._gap(s, part)
+        g, t, _, _ = self._gap(s, part)
         return s, t, abs(g)
 
     def _least(self, low: float, high: float, part: tuple[float, float]) -> tuple[float, float, float]:
@@ -179,16 +162,14 @@ class _Pair:
             if min(at_a, at_b) > 100.0 * self.tolerance and high - low < 1e-3 * (self.a.t[-1] - self.a.t[0]):
                 break
         s = self._parallel(0.5 * (low + high), 0.02 * (self.a.t[-1] - self.a.t[0]), part)
-        g, t, _ = self._gap(s, part)
+        g, t, _, _ = self._gap(s, part)
         return s, t, abs(g)
 
     def _parallel(self, s: float, reach: float, part: tuple[float, float]) -> float:
         """The place near one at which tangents are parallel, by secants: a least distance tells half of the digits."""
 
         def turn(at: float) -> float:
-            _, t, _ = self._gap(at, part)
-            x, y = self.a.curve.evaluate(at, 1)[1], self.b.curve.evaluate(t, 1)[1]
-            return float((x[0] * y[1] - x[1] * y[0]) / max(np.linalg.norm(x) * np.linalg.norm(y), 1e-300))
+            return self._gap(at, part)[3]
 
         ends = float(self.a.t[0]), float(self.a.t[-1])
         last, at = min(max(s - 1e-4 * reach, ends[0]), ends[1]), s

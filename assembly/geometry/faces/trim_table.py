@@ -14,6 +14,7 @@ from assembly._record import place_of, rows_of
 from assembly.geometry.faces.crossing import first_crossing
 from assembly.geometry.faces.monotone import ROW, cut_curves
 from assembly.geometry.faces.trim import windings
+from assembly.geometry.faces.trim_layout import any_empty, fill_pieces, finish_pieces, join_pieces, move_pieces
 from assembly.geometry.faces.trim_pieces import (
     FRAME,
     PIECE_BOUNDS,
@@ -21,15 +22,15 @@ from assembly.geometry.faces.trim_pieces import (
     PIECE_INTS,
     PIECE_LINKS,
     TRIM,
+    TRIM_FRAME_RECORD,
     TRIM_RECORD,
     cut_of_piece,
-    ends_of_pieces,
-    trim_at,
-    trim_frame_at,
+    piece_bounds_at,
+    piece_links_at,
 )
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_packing import packed_curves
-from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_COEFFICIENTS, CURVE_DEGREE, CURVE_RECORD, CURVE_SPANS
+from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_COEFFICIENTS, CURVE_RECORD
 
 __all__ = ["TrimTable", "build"]
 
@@ -42,7 +43,13 @@ NOISE = 1e-14
 # What is the place of something else, of a trim in the table and in the pool, and of a piece in the pool.
 _IN_TABLE = [place_of(TRIM, field) for field in ("first", "piece_table", "curve_pieces")]
 _IN_POOL = [place_of(TRIM, field) for field in ("piece_pool", "frame", "step_pool")]
-_COEFFICIENTS = place_of(PIECE_LINKS, "coefficients")
+_BOUNDARY, _PIECE_TABLE = place_of(TRIM, "pieces"), place_of(TRIM, "piece_table")
+_PIECE_POOL, _FRAME = place_of(TRIM, "piece_pool"), place_of(TRIM, "frame")
+_LOW, _PERIOD = place_of(TRIM_FRAME_RECORD, "low_u"), place_of(TRIM_FRAME_RECORD, "period_u")
+_BOTTOM = place_of(TRIM_FRAME_RECORD, "bottom")
+_CURVE, _COEFFICIENTS = place_of(PIECE_LINKS, "curve"), place_of(PIECE_LINKS, "coefficients")
+_BEFORE, _AFTER = place_of(PIECE_LINKS, "before"), place_of(PIECE_LINKS, "after")
+_BOX, _T0, _START = (place_of(PIECE_BOUNDS, field) for field in ("box", "t0", "start"))
 _BINOMIALS = np.array([[comb(n, k) for k in range(32)] for n in range(32)], dtype=float)
 
 
@@ -58,6 +65,8 @@ class TrimTable:
         w beside every chain: 1 and 0 if the chains bound one face.
     beyond : two pairs
         w beyond the low and the high end of u, and of v, each where the other direction is closed.
+    extent, largest : float
+        Size of the boundary in (u, v), and its largest coordinate.
     """
 
     table: Ints
@@ -67,14 +76,15 @@ class TrimTable:
     left: Array
     right: Array
     beyond: tuple[tuple[float, float], tuple[float, float]]
+    extent: float
+    largest: float
 
     def at(self, table_at: int, pool_at: int) -> tuple[Ints, Array]:
         """The same for being appended to a table and a pool of these lengths."""
         if table_at == 0 and pool_at == 0:
             return self.table, self.pool
         table = self.table.copy()
-        record = trim_at(table, 0)
-        pieces = record.piece_table + _COEFFICIENTS
+        pieces = int(table[_PIECE_TABLE]) + _COEFFICIENTS
         table[pieces : pieces + PIECE_INTS * self.pieces : PIECE_INTS] += pool_at
         stop = TRIM_RECORD + CURVE_RECORD * self.curves
         for place in (CURVE_BREAKS, CURVE_COEFFICIENTS):
@@ -87,50 +97,58 @@ class TrimTable:
         """Integers and doubles of all pieces, a record each."""
         return _pieces(self.table, self.pool, self.pieces)
 
-    @property
-    def extent(self) -> float:
-        """Size of the boundary in (u, v)."""
-        return float(trim_frame_at(self.pool, trim_at(self.table, 0).frame).extent)
-
     def nearness(self, tolerance: float) -> float:
         """At which distance curves touch: this part of the size, or what is rounding."""
-        boxes = self.rows()[1].box[: trim_at(self.table, 0).pieces]
-        return max(tolerance * self.extent, NOISE * float(np.abs(boxes).max(initial=0.0)))
+        return max(tolerance * self.extent, NOISE * self.largest)
 
     def crossing(self, tolerance: float, joined: bool = False) -> tuple[int, int, Array] | None:
         """Two boundary curves that cross, or come nearer than this part of the size, and where; None if none do.
 
         Curves may meet where one follows the other; if they are joined, at all of their ends.
         """
-        record = trim_at(self.table, 0)
-        frame = trim_frame_at(self.pool, record.frame)
-        links, bounds = self.rows()
-        boxes = bounds.box[: record.pieces]
-        low = boxes[:, [0, 2]]
+        links, doubles = _blocks(self.table, self.pool, self.pieces)
+        count = int(self.table[_BOUNDARY])
+        low = doubles[:count, _BOX : _BOX + 4 : 2]
         nearest = self.nearness(tolerance)
-        pieces, moves = np.arange(record.pieces), np.zeros((record.pieces, 2))
-        cell = (frame.low_u, frame.period_u), (frame.low_v, frame.period_v)
-        for axis, (begin, period) in enumerate(cell):
-            if period:
-                # What touches the lower border of the cell meets what touches the upper one.
-                touches = low[pieces, axis] <= begin + nearest
-                pieces = np.concatenate([pieces, pieces[touches]])
-                copies = moves[touches]
-                copies[:, axis] += period
-                moves = np.concatenate([moves, copies])
-        order = np.argsort(low[pieces, 0] + moves[:, 0])
-        pieces, moves = pieces[order], np.ascontiguousarray(moves[order])
+        frame = int(self.table[_FRAME])
+        begins, periods = self.pool[frame + _LOW :][:2].tolist(), self.pool[frame + _PERIOD :][:2].tolist()
+        if any(periods):
+            pieces, moves = np.arange(count), np.zeros((count, 2))
+            for axis, (begin, period) in enumerate(zip(begins, periods, strict=True)):
+                if period:
+                    # What touches the lower border of the cell meets what touches the upper one.
+                    touches = low[pieces, axis] <= begin + nearest
+                    pieces = np.concatenate([pieces, pieces[touches]])
+                    copies = moves[touches]
+                    copies[:, axis] += period
+                    moves = np.concatenate([moves, copies])
+            order = np.argsort(low[pieces, 0] + moves[:, 0])
+            pieces, moves = pieces[order], np.ascontiguousarray(moves[order])
+        else:
+            pieces, moves = np.argsort(low[:, 0]), np.zeros((count, 2))
         where = np.empty(2)
         a, b = first_crossing(self.table, self.pool, pieces, moves, nearest, joined, where)
-        return None if a < 0 else (int(links.curve[a]), int(links.curve[b]), where)
+        return None if a < 0 else (int(links[a, _CURVE]), int(links[b, _CURVE]), where)
+
+
+def _blocks(table: Ints, pool: Array, count: int) -> tuple[Ints, Array]:
+    """Integers and doubles of the pieces of a trim at the start of a table, a row each."""
+    ints, doubles = int(table[_PIECE_TABLE]), int(table[_PIECE_POOL])
+    return (
+        table[ints : ints + PIECE_INTS * count].reshape(-1, PIECE_INTS),
+        pool[doubles : doubles + PIECE_DOUBLES * count].reshape(-1, PIECE_DOUBLES),
+    )
 
 
 def _pieces(table: Ints, pool: Array, count: int) -> tuple[Any, Any]:
-    """Integers and doubles of the pieces of a trim at the start of a table, a record each."""
-    record = trim_at(table, 0)
-    ints = table[record.piece_table :][: PIECE_INTS * count].reshape(-1, PIECE_INTS)
-    doubles = pool[record.piece_pool :][: PIECE_DOUBLES * count].reshape(-1, PIECE_DOUBLES)
+    """The same, a record each."""
+    ints, doubles = _blocks(table, pool, count)
     return rows_of(PIECE_LINKS, ints), rows_of(PIECE_BOUNDS, doubles)
+
+
+def _record(dtype: np.dtype[Any], **fields: float) -> list[float]:
+    """The items of a record, in its order."""
+    return [fields[name] for name in dtype.names or ()]
 
 
 def _largest_gap(low: Array, high: Array, period: float) -> float:
@@ -146,129 +164,89 @@ def _largest_gap(low: Array, high: Array, period: float) -> float:
 
 
 class _Pieces:
-    """Pieces while they are made: columns of equal length, in the order of the curves."""
+    """Pieces while they are made: a record of integers and one of doubles each, in the order of the curves."""
 
-    COLUMNS = ("curve", "degree", "coefficients", "middle", "bounds", "shift", "t", "ends", "before", "after")
-
-    def __init__(self, curves: Sequence[NurbsCurve], chains: Sequence[range], closing: Sequence[bool]) -> None:
+    def __init__(self, curves: Sequence[NurbsCurve], chains: Ints) -> None:
         bezier, self.pool, self.records = packed_curves(curves)
-        shape = np.ascontiguousarray(self.records[:, [CURVE_DEGREE, CURVE_SPANS]])
-        breaks = np.concatenate(
-            [np.empty(0)] + [self.pool[r[CURVE_BREAKS] : r[CURVE_COEFFICIENTS]] for r in self.records.tolist()]
-        )
-        rows = np.empty((int((8 * shape[:, 0] * shape[:, 1]).sum()), ROW))
-        count = cut_curves(bezier, breaks, shape, _BINOMIALS, rows)
+        # Room for eight pieces a degree and span, whose points have three coordinates.
+        rows = np.empty((8 * (len(bezier) // 3), ROW))
+        count = cut_curves(bezier, self.pool, self.records, _BINOMIALS, rows)
         if count > len(rows):
             # Weights far apart.
             rows = np.empty((count, ROW))
-            cut_curves(bezier, breaks, shape, _BINOMIALS, rows)
-        rows = rows[:count].copy()
-        self.curve = rows[:, 0].astype(np.int64)
-        span = rows[:, 1].astype(np.int64)
-        record = self.records[self.curve]
-        self.degree = np.ascontiguousarray(record[:, CURVE_DEGREE])
-        self.coefficients = record[:, CURVE_COEFFICIENTS] + 4 * (self.degree + 1) * span
-        at = record[:, CURVE_BREAKS] + span
-        self.middle = 0.5 * (self.pool[at] + self.pool[at + 1])
-        self.t = rows[:, 2:4].copy()
-        self.bounds = rows[:, 4:7]
-        self.shift = np.zeros((len(rows), 2))
-        self.ends = np.empty((len(rows), 2, 2))
-        for side in range(2):
-            out = np.empty((len(rows), 2))
-            ends_of_pieces(self.pool, self.coefficients, self.degree, self.middle, self.t[:, side].copy(), out)
-            self.ends[:, side] = out
-        self._neighbors(chains, closing)
+            cut_curves(bezier, self.pool, self.records, _BINOMIALS, rows)
+        self.links, self.bounds = np.empty((count, PIECE_INTS), dtype=np.int64), np.empty((count, PIECE_DOUBLES))
+        extent = fill_pieces(rows[:count], self.records, self.pool, chains, self.links, self.bounds)
+        self.size = float(np.linalg.norm(extent)) if count else 1.0
 
-    def _neighbors(self, chains: Sequence[range], closing: Sequence[bool]) -> None:
-        count = self.curve.size
-        self.before = np.arange(count) - 1
-        self.after = np.arange(count) + 1
-        first = np.searchsorted(self.curve, np.arange(self.records.shape[0] + 1))
-        for chain, closes in zip(chains, closing, strict=True):
-            begin, stop = first[chain.start], first[chain.stop]
-            self.before[begin] = stop - 1 if closes else -1
-            self.after[stop - 1] = begin if closes else -1
-        # Curves without a chain are pole edges.
-        silent = self.curve >= (chains[-1].stop if chains else 0)
-        self.before[silent] = self.after[silent] = -1
+    @property
+    def ends(self) -> Array:
+        """First and last point of every piece, (pieces, 2, 2)."""
+        return self.bounds[:, _START : _START + 4].reshape(-1, 2, 2)
 
     def cut(self, axis: int, low: float, period: float) -> None:
         """Cut where a coordinate passes `low` plus a whole period, and move the pieces into the cell."""
         values = self.ends[:, :, axis]
-        cell = np.floor((values - low) / period)
         # A piece that ends on the border of a cell is in the cell it comes from.
         least, most = values.min(axis=1), values.max(axis=1)
         for piece in np.flatnonzero(np.floor((least - low) / period) < np.ceil((most - low) / period) - 1.0)[::-1]:
             self._cut_piece(int(piece), axis, low, period)
-        middle = self.ends[:, :, axis].mean(axis=1)
-        cell = np.floor((middle - low) / period)
-        move = -cell * period
-        self.shift[:, axis] += move
-        self.ends[:, :, axis] += move[:, None]
-        np.clip(self.ends[:, :, axis], low, low + period, out=self.ends[:, :, axis])
+        move_pieces(self.bounds, axis, low, period)
 
     def _cut_piece(self, piece: int, axis: int, low: float, period: float) -> None:
-        (a, b), (t0, t1) = self.ends[piece], self.t[piece]
+        link, bound = piece_links_at(self.links, piece), piece_bounds_at(self.bounds, piece)
+        (a, b), (t0, t1) = self.ends[piece].copy(), (float(bound.t0), float(bound.t1))
+        shift = np.array([bound.shift_u, bound.shift_v])
         sign = 1 if b[axis] > a[axis] else -1
         lowest, highest = sorted((a[axis], b[axis]))
         crossed = np.arange(np.floor((lowest - low) / period) + 1.0, np.ceil((highest - low) / period)) * period + low
         times, points = [t0], [a]
         for level in crossed[::sign]:
             t, x, y = cut_of_piece(
-                self.pool, int(self.coefficients[piece]), int(self.degree[piece]), float(self.middle[piece]),
-                (float(t0), float(t1)), axis, float(level), (float(a[axis]), float(b[axis])),
+                self.pool, int(link.coefficients), int(link.degree), float(bound.middle),
+                (t0, t1), axis, float(level), (float(a[axis]), float(b[axis])),
             )  # fmt: skip
             # Cuts along u come first: nothing has been moved along the axis itself.
-            point = np.array([x, y]) + self.shift[piece]
+            point = np.array([x, y]) + shift
             point[axis] = level
             times.append(t)
             points.append(point)
         times.append(t1)
         points.append(b)
         extra = len(times) - 2
-        for name in _Pieces.COLUMNS:
-            column = getattr(self, name)
-            setattr(self, name, np.insert(column, [piece] * extra, column[piece], axis=0))
-        self.before = np.where(self.before > piece, self.before + extra, self.before)
-        self.after = np.where(self.after > piece, self.after + extra, self.after)
+        neighbors = self.links[:, _BEFORE : _AFTER + 1]
+        neighbors[neighbors > piece] += extra
+        # What came before the piece ends in its first part.
+        self.links = np.insert(self.links, [piece] * extra, self.links[piece], axis=0)
+        self.bounds = np.insert(self.bounds, [piece] * extra, self.bounds[piece], axis=0)
         part = slice(piece, piece + extra + 1)
-        self.t[part] = np.column_stack([times[:-1], times[1:]])
+        self.bounds[part, _T0 : _T0 + 2] = np.column_stack([times[:-1], times[1:]])
         self.ends[part] = np.stack([points[:-1], points[1:]], axis=1)
-        # The piece and its parts follow one another; what came before the piece ends in its first part.
-        last = self.after[piece]
-        self.before[piece + 1 : piece + extra + 1] = np.arange(piece, piece + extra)
-        self.after[piece : piece + extra] = np.arange(piece + 1, piece + extra + 1)
-        self.after[piece + extra] = last
+        # The piece and its parts follow one another; what comes after it comes after its last part.
+        before, after = self.links[:, _BEFORE], self.links[:, _AFTER]
+        last = after[piece + extra]
+        before[piece + 1 : piece + extra + 1] = np.arange(piece, piece + extra)
+        after[piece : piece + extra] = np.arange(piece + 1, piece + extra + 1)
         if last >= 0:
-            self.before[last] = piece + extra
+            before[last] = piece + extra
 
     def drop_empty(self, noise: float) -> None:
         """Leave out pieces without length but rounding, of repeated control points: they have no direction."""
-        keep = (np.abs(self.ends[:, 0] - self.ends[:, 1]) > noise).any(axis=1)
-        if keep.all():
+        if not any_empty(self.bounds, noise):
             return
+        ends = self.ends
+        keep = (np.abs(ends[:, 0] - ends[:, 1]) > noise * float(np.abs(ends).max(initial=0.0))).any(axis=1)
+        befores, afters = self.links[:, _BEFORE], self.links[:, _AFTER]
         for k in np.flatnonzero(~keep).tolist():
-            before, after = self.before[k], self.after[k]
+            before, after = befores[k], afters[k]
             if before >= 0:
-                self.after[before] = after
+                afters[before] = after
             if after >= 0:
-                self.before[after] = before
+                befores[after] = before
         place = np.append(np.cumsum(keep) - 1, -1)
-        for name in _Pieces.COLUMNS:
-            setattr(self, name, getattr(self, name)[keep])
-        self.before, self.after = place[self.before], place[self.after]
-
-    def join(self, periods: tuple[float, float]) -> None:
-        """Let every piece begin exactly where the one before it ends, but for whole periods."""
-        has = np.flatnonzero(self.before >= 0)
-        for axis, period in enumerate(periods):
-            come, go = self.ends[self.before[has], 1, axis], self.ends[has, 0, axis]
-            if period:
-                jump = np.round((go - come) / period) * period
-                # At the border of the cell both have its exact value already.
-                come = np.where(jump == 0.0, come, go)
-            self.ends[has, 0, axis] = come
+        self.links, self.bounds = self.links[keep], self.bounds[keep]
+        for column in (_BEFORE, _AFTER):
+            self.links[:, column] = place[self.links[:, column]]
 
 
 def build(
@@ -288,10 +266,10 @@ def build(
     silent : pole edges
     domain, periods : of the surface; a period of 0 stands for a direction that is not closed
     """
-    pieces = _Pieces([*curves, *silent], chains, closing)
-    low = np.array([domain[0][0], domain[1][0]])
-    high = np.array([domain[0][1], domain[1][1]])
-    size = float(np.linalg.norm(np.ptp(pieces.ends.reshape(-1, 2), axis=0))) if pieces.curve.size else 1.0
+    rows = [(chain.start, chain.stop, closes) for chain, closes in zip(chains, closing, strict=True)]
+    linked = np.array(rows, dtype=np.int64).reshape(-1, 3)
+    pieces = _Pieces([*curves, *silent], linked)
+    low, high = [domain[0][0], domain[1][0]], [domain[0][1], domain[1][1]]
     steps: list[tuple[float, float]] = []
     for axis, period in enumerate(periods):
         if period:
@@ -300,8 +278,8 @@ def build(
                 low[axis] = _largest_gap(values.min(axis=1), values.max(axis=1), period)
             high[axis] = low[axis] + period
             pieces.cut(axis, float(low[axis]), period)
-    pieces.drop_empty(1e-15 * float(np.abs(pieces.ends).max(initial=0.0)))
-    pieces.join(periods)
+    pieces.drop_empty(1e-15)
+    join_pieces(pieces.links, pieces.bounds, *periods)
     pieces.drop_empty(0.0)
     if periods[1]:
         # Upward through the bottom of the cell: material is to the left, so w falls by one to the right.
@@ -312,72 +290,51 @@ def build(
     walk = []
     for u, step in sorted(steps):
         w += step
-        walk.append((u, w))
-    return _table(pieces, len(curves), chains, (low, high), periods, size, np.array(walk).reshape(-1, 2))
+        walk += [u, w]
+    return _table(pieces, len(curves), linked, (low, high), periods, walk)
 
 
 def _table(
     pieces: _Pieces,
     count: int,
-    chains: Sequence[range],
-    cell: tuple[Array, Array],
+    chains: Ints,
+    cell: tuple[list[float], list[float]],
     periods: tuple[float, float],
-    size: float,
-    walk: Array,
+    walk: list[float],
 ) -> TrimTable:
-    total = pieces.curve.size
-    low, high = pieces.ends.min(axis=1), pieces.ends.max(axis=1)
-    extent = pieces.ends[:, 1] - pieces.ends[:, 0]
-    first = np.searchsorted(pieces.curve, np.arange(count + 1))
-    records = pieces.records[:count]
-    table = np.concatenate(
-        [np.zeros(TRIM_RECORD, dtype=np.int64), records.ravel(), np.zeros(PIECE_INTS * total, dtype=np.int64), first]
+    total, size = len(pieces.links), pieces.size
+    sides, beside = 2 * len(chains), np.empty((3, 2 * len(chains)))
+    first = np.empty(count + 1, dtype=np.int64)
+    distances = (1e-10 * size, NOISE)
+    largest, way = finish_pieces(
+        pieces.pool, pieces.links, pieces.bounds, chains, first, distances, beside[0], beside[1]
     )
-    pool = np.concatenate([pieces.pool, np.zeros(PIECE_DOUBLES * total + FRAME), walk.ravel()])
-    record = trim_at(table, 0)
-    record.curves, record.first, record.all_pieces, record.pieces = count, TRIM_RECORD, total, first[-1]
-    record.piece_table, record.piece_pool = TRIM_RECORD + records.size, pieces.pool.size
-    record.curve_pieces = record.piece_table + PIECE_INTS * total
-    record.frame = pieces.pool.size + PIECE_DOUBLES * total
-    record.steps, record.step_pool = len(walk), record.frame + FRAME
-    links, bounds = _pieces(table, pool, total)
-    links.curve, links.coefficients, links.degree = pieces.curve, pieces.coefficients, pieces.degree
-    links.before, links.after = pieces.before, pieces.after
-    links.sign_u, links.sign_v = np.sign(extent).T
-    links.major = np.abs(extent[:, 1]) > np.abs(extent[:, 0])
-    bounds.box = np.stack([low, high], 2).reshape(-1, 4)
-    (bounds.t0, bounds.t1), (bounds.shift_u, bounds.shift_v) = pieces.t.T, pieces.shift.T
-    bounds.middle = pieces.middle
-    bounds.bound_1, bounds.bound_2, bounds.bound_3 = pieces.bounds.T
-    bounds.start, bounds.end = pieces.ends[:, 0], pieces.ends[:, 1]
-    frame = trim_frame_at(pool, record.frame)
-    (frame.low_u, frame.low_v), (frame.high_u, frame.high_v) = cell
-    frame.period_u, frame.period_v = periods
-    frame.on, frame.extent = ON_BOUNDARY * size, size
-    left, right = np.empty(len(chains)), np.empty(len(chains))
-    if chains:
-        # The longest piece of every chain, and points beside its middle.
-        lengths = np.abs(extent).sum(axis=1)
-        begins = first[[chain.start for chain in chains]]
-        stops = first[[chain.stop for chain in chains]]
-        longest = np.array([b + int(np.argmax(lengths[b:s])) for b, s in zip(begins, stops, strict=True)])
-        t = pieces.t[longest].mean(axis=1)
-        point = np.empty((len(chains), 2))
-        ends_of_pieces(pool, pieces.coefficients[longest], pieces.degree[longest], pieces.middle[longest], t, point)
-        point += pieces.shift[longest]
-        across = np.column_stack([-extent[longest, 1], extent[longest, 0]])
-        beside = max(1e-10 * size, NOISE * float(np.abs(pieces.ends).max()))
-        across *= beside / np.linalg.norm(across, axis=1, keepdims=True)
-        for probe, out in ((point + across, left), (point - across, right)):
-            windings(table, pool, 0, probe[:, 0].copy(), probe[:, 1].copy(), out)
+    records = pieces.records[:count].ravel()
+    piece_table, piece_pool = TRIM_RECORD + records.size, pieces.pool.size
+    frame_at = piece_pool + PIECE_DOUBLES * total
+    head = _record(
+        TRIM, curves=count, first=TRIM_RECORD, all_pieces=total, pieces=int(first[-1]), piece_table=piece_table,
+        piece_pool=piece_pool, curve_pieces=piece_table + PIECE_INTS * total, frame=frame_at, steps=len(walk) // 2,
+        step_pool=frame_at + FRAME,
+    )  # fmt: skip
+    table = np.concatenate([head, records, pieces.links.ravel(), first])
+    (low_u, low_v), (high_u, high_v) = cell
+    frame = _record(
+        TRIM_FRAME_RECORD, low_u=low_u, low_v=low_v, high_u=high_u, high_v=high_v, period_u=periods[0],
+        period_v=periods[1], on=ON_BOUNDARY * size, bottom=0.0, extent=size,
+    )  # fmt: skip
+    pool = np.concatenate([pieces.pool, pieces.bounds.ravel(), frame, walk])
+    left, right = beside[2, : len(chains)], beside[2, len(chains) :]
+    bottom = 1.0
+    if sides:
+        windings(table, pool, 0, *beside)
         # w is to be 1 where there is material.
-        bottom = 1.0 - left[0]
-        pool[record.step_pool + 1 :: 2] += bottom
+        bottom = 1.0 - float(left[0])
+        pool[frame_at + FRAME + 1 :: 2] += bottom
         left, right = left + bottom, right + bottom
-    else:
-        bottom = 1.0
-    frame.bottom = bottom = float(bottom)
-    across_u = float(pool[-1]) if len(walk) else bottom
+    pool[frame_at + _BOTTOM] = bottom
+    across_u = float(pool[-1]) if walk else bottom
     # Once around, every u is passed by as many rings, net, as the whole way in u has periods.
-    rings = float(np.round(extent[:, 0].sum() / periods[0])) if periods[0] else 0.0
-    return TrimTable(table, pool, count, total, left, right, ((bottom, across_u), (bottom, bottom + rings)))
+    rings = float(np.round(way / periods[0])) if periods[0] else 0.0
+    beyond = ((bottom, across_u), (bottom, bottom + rings))
+    return TrimTable(table, pool, count, total, left, right, beyond, size, largest)

@@ -45,6 +45,10 @@ def checked_knots(name: str, value: ArrayLike, degree: int, count: int) -> Array
         )
     # Plain floats: most vectors have a dozen knots, for which every call of numpy costs more than all of this.
     values = knots.tolist()
+    if count == degree + 1 and values[0] == values[degree] < values[count] == values[-1]:
+        # One clamped span.
+        knots.flags.writeable = False
+        return knots
     for k, (knot, following) in enumerate(pairwise(values)):
         if following < knot:
             raise InputError(

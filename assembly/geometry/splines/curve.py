@@ -9,6 +9,7 @@ unclamped knots both work. It is evaluated from one power table per span (`geome
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, Literal, overload
 
@@ -27,11 +28,18 @@ __all__ = ["NurbsCurve"]
 Array = NDArray[np.float64]
 # Positions closer than this part of the size coincide.
 COINCIDENT = 1e-12
+# Weights of straight lines.
+_ONES = np.ones(2)
+_ONES.flags.writeable = False
 
 
 def checked_weights(value: ArrayLike | None, shape: tuple[int, ...]) -> Array:
     """Positive weights of the given shape, read-only; ones where none are given."""
-    weights = np.ones(shape) if value is None else real_array("weights", value, shape)
+    if value is None:
+        ones = np.ones(shape)
+        ones.flags.writeable = False
+        return ones
+    weights = real_array("weights", value, shape)
     # Sums of products with points and with each other are to be finite, and not nothing.
     outside = ~((weights >= 1e-100) & (weights <= 1e100))
     if outside.any():
@@ -157,6 +165,31 @@ class NurbsCurve(ReadOnlyArrays):
         last = corners.shape[0] - 1.0
         return cls(corners, np.concatenate([[0.0], np.arange(last + 1.0), [last]]), 1, name=name)
 
+    @classmethod
+    def _lines(cls, ends: Array, intervals: Sequence[tuple[float, float]], names: Sequence[str]) -> list[NurbsCurve]:
+        """Straight lines, checked together.
+
+        Parameters
+        ----------
+        ends : (n, 2, d)
+            Where each begins and ends.
+        intervals : n pairs
+            Their domains.
+        names : of each
+        """
+        knots = np.repeat(np.array(intervals, dtype=np.float64).reshape(-1, 2), 2, axis=1)
+        if not (np.isfinite(ends).all() and np.isfinite(knots).all() and all(low < high for low, high in intervals)):
+            return [cls(row, turn, 1, name=name) for row, turn, name in zip(ends, knots, names, strict=True)]
+        points = np.array(ends, dtype=np.float64, order="C")
+        points.flags.writeable = knots.flags.writeable = False
+        made = []
+        for row, turn, domain, name in zip(points, knots, intervals, names, strict=True):
+            line = object.__new__(cls)
+            line.control_points, line.degree, line.knots, line.weights = row, 1, turn, _ONES
+            line.name, line.domain, line._is_clamped = name, domain, True
+            made.append(line)
+        return made
+
     def __repr__(self) -> str:
         label = "" if self.name is None else f"{self.name!r}, "
         n, d = self.control_points.shape
@@ -174,6 +207,12 @@ class NurbsCurve(ReadOnlyArrays):
         first, last = pieces[0, 0], pieces[-1, -1]
         gap = np.linalg.norm(first[:-1] / first[-1] - last[:-1] / last[-1])
         return bool(self.size > 0.0 and gap <= COINCIDENT * self.size)
+
+    @cached_property
+    def _is_clamped(self) -> bool:
+        """Whether its first and last control point are its ends."""
+        p, row = self.degree, self.knots
+        return bool(row[0] == row[p] and row[-1] == row[-p - 1])
 
     @property
     def _homogeneous(self) -> Array:

@@ -24,15 +24,18 @@ def packed_curves(curves: Sequence[NurbsCurve]) -> tuple[Array, Array, Ints]:
     """Bezier points, pool and records of plane curves."""
     if not curves:
         return np.empty(0), np.empty(0), np.empty((0, CURVE_RECORD), dtype=np.int64)
-    for curve in curves:
-        checked_table_degree(curve)
-    shape = np.array([(curve.degree, len(curve.weights)) for curve in curves], dtype=np.int64).reshape(-1, 2)
+    sizes = [(curve.degree, len(curve.weights)) for curve in curves]
+    if max(sizes)[0] > MAX_DEGREE:
+        for curve in curves:
+            checked_table_degree(curve)
+    shape = np.array(sizes, dtype=np.int64)
     points = np.concatenate([curve.control_points for curve in curves])
     weights = np.concatenate([curve.weights for curve in curves])
     knots = np.concatenate([curve.knots for curve in curves])
-    degree, count = shape[:, 0], shape[:, 1]
-    workspace = (count - degree) * (degree + 1)
-    bezier, pool = np.empty(3 * int(workspace.sum())), np.empty(int((4 * workspace + count - degree + 1).sum()))
+    # Of all spans that there may be.
+    breaks = sum(count - degree + 1 for degree, count in sizes)
+    coefficients = sum((count - degree) * (degree + 1) for degree, count in sizes)
+    bezier, pool = np.empty(3 * coefficients), np.empty(4 * coefficients + breaks)
     records = np.empty((len(curves), CURVE_RECORD), dtype=np.int64)
     filled, used, finite = bezier_tables(
         (points, weights, knots), shape, _power_matrices(), COINCIDENT, bezier, pool, records

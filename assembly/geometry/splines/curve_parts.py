@@ -19,7 +19,7 @@ _SNAP = 1e-10
 
 def sampled(breaks: Array, count: int) -> Array:
     """Parameters between breaks, with the breaks."""
-    return np.unique(np.concatenate([np.linspace(a, b, count) for a, b in zip(breaks[:-1], breaks[1:], strict=True)]))
+    return np.unique(np.linspace(breaks[:-1], breaks[1:], count))
 
 
 def between(curve: NurbsCurve, low: float, high: float) -> NurbsCurve:

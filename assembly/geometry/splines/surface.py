@@ -117,10 +117,27 @@ class NurbsSurface(ReadOnlyArrays):
     @cached_property
     def closed(self) -> tuple[bool, bool]:
         """Whether u and v come back to the edge they start from."""
-        pieces = self._pieces
-        u = self._same_edge(pieces[0, :, 0], pieces[-1, :, -1])
-        v = self._same_edge(pieces[:, 0, :, 0], pieces[:, -1, :, -1])
+        apart_u, apart_v = self._apart
+        u = not apart_u and self._same_edge(self._pieces[0, :, 0], self._pieces[-1, :, -1])
+        v = not apart_v and self._same_edge(self._pieces[:, 0, :, 0], self._pieces[:, -1, :, -1])
         return u, v
+
+    @cached_property
+    def _apart(self) -> tuple[bool, bool]:
+        """Whether ends in u, and in v, are surely at two points, so that neither edge is the other, nor one point.
+
+        Corners that are nearer to each other are left to a look along the whole edges.
+        """
+        if not self._is_clamped:
+            return False, False
+        net, least = self.control_points, 10.0 * COINCIDENT * self.size
+        corners = net[[0, -1, 0, -1], [0, 0, -1, -1]]
+        a, b, c, d = corners.tolist()
+
+        def apart(p: list[float], q: list[float]) -> bool:
+            return max(abs(p[0] - q[0]), abs(p[1] - q[1]), abs(p[2] - q[2])) > least
+
+        return apart(a, b) and apart(c, d), apart(a, c) and apart(b, d)
 
     @cached_property
     def _periods(self) -> tuple[float, float]:
@@ -145,6 +162,8 @@ class NurbsSurface(ReadOnlyArrays):
     @cached_property
     def _pole_bits(self) -> int:
         """Bits 1, 2, 4, 8: whether the edge at the low and high end of u, then of v, is one point."""
+        if all(self._apart):
+            return 0
         pieces = self._pieces
         edges = (pieces[0, :, 0], pieces[-1, :, -1], pieces[:, 0, :, 0], pieces[:, -1, :, -1])
         points = (edge[..., :3] / edge[..., 3:] for edge in edges)
@@ -201,8 +220,9 @@ class NurbsSurface(ReadOnlyArrays):
     @property
     def _is_clamped(self) -> bool:
         """Whether the domain ends where the knots do, in u and in v."""
-        ends = zip(self.knots, self.degree, strict=True)
-        return all(bool(row[0] == row[p] and row[-1] == row[-1 - p]) for row, p in ends)
+        (row, other), (p, q) = self.knots, self.degree
+        ends = row[0] == row[p] and row[-1] == row[-1 - p] and other[0] == other[q] and other[-1] == other[-1 - q]
+        return bool(ends)
 
     @cached_property
     def _pieces(self) -> Array:

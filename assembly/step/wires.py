@@ -1,0 +1,152 @@
+"""Wires of a face of OCCT: their edges in order, the curves these have in (u, v), and where in (u, v) they are.
+
+OCCT finds the extent of a face in (u, v) anew for each of its wires and once more for all, from curves that are asked
+for again. Of wires of straight lines it is that of their ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from assembly.step.occt import occt, parts
+
+__all__ = ["Box", "Traced", "Wire", "bounds", "outermost", "wires_of"]
+
+Pair = tuple[float, float]
+# u_min, u_max, v_min, v_max.
+Box = tuple[float, float, float, float]
+
+
+class Traced(NamedTuple):
+    """An edge on a face.
+
+    Attributes
+    ----------
+    edge
+        TopoDS_Edge.
+    curve
+        Geom2d_Curve, or None where it has none on the face.
+    low, high : float
+        The interval of that.
+    line : (start, end), optional
+        Its ends, where it is a straight line.
+    seam : bool
+        Whether the face has the edge on both sides.
+    """
+
+    edge: Any
+    curve: Any
+    low: float
+    high: float
+    line: tuple[Pair, Pair] | None
+    seam: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Wire:
+    """A wire on a face, which is taken forward.
+
+    Attributes
+    ----------
+    wire, face
+        TopoDS_Wire, TopoDS_Face.
+    edges : list of Traced
+        Those that bound the face.
+    ordered : bool
+        Whether each begins where the one before ends.
+    whole : bool
+        Whether the wire has no others.
+    """
+
+    wire: Any
+    face: Any
+    edges: list[Traced]
+    ordered: bool
+    whole: bool
+
+    @cached_property
+    def box(self) -> Box:
+        """Its extent."""
+        ends = [end for traced in self.edges if traced.line is not None for end in traced.line]
+        if not self.whole or not ends or len(ends) < 2 * len(self.edges):
+            box: Box = occt().BRepTools.UVBounds_s(self.face, self.wire)
+            return box
+        us, vs = zip(*ends, strict=True)
+        return min(us), max(us), min(vs), max(vs)
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether nothing is left of it but seams and poles."""
+        degenerated = occt().BRep_Tool.Degenerated_s
+        return sum(traced.seam for traced in self.edges) % 2 == 0 and all(
+            traced.seam or degenerated(traced.edge) for traced in self.edges
+        )
+
+
+def wires_of(face: Any) -> list[Wire]:
+    """The wires of a face, which is taken forward."""
+    o = occt()
+    return [_wire(o.as_wire(wire), face) for wire in parts(face, o.TopAbs_WIRE)]
+
+
+def _wire(wire: Any, face: Any) -> Wire:
+    o = occt()
+    walk = o.BRepTools_WireExplorer(wire, face)
+    found = []
+    while walk.More():
+        found.append(o.as_edge(walk.Current()))
+        walk.Next()
+    if len(found) == wire.NbChildren():
+        return Wire(wire, face, [_traced(edge, face) for edge in found], ordered=True, whole=True)
+    sides = (o.TopAbs_FORWARD, o.TopAbs_REVERSED)
+    every = [o.as_edge(edge) for edge in parts(wire, o.TopAbs_EDGE) if edge.Orientation() in sides]
+    # Where vertices are not shared the walk ends early.
+    ordered = len(found) == len(every)
+    return Wire(wire, face, [_traced(edge, face) for edge in (found if ordered else every)], ordered, whole=False)
+
+
+def _traced(edge: Any, face: Any) -> Traced:
+    o = occt()
+    tool = o.BRep_Tool
+    low, high = tool.Range_s(edge, face)
+    curve = tool.CurveOnSurface_s(edge, face, low, high)
+    line = None
+    if type(curve) is o.Geom2d_Line:
+        place, along = curve.Location(), curve.Direction()
+        x, y, dx, dy = place.X(), place.Y(), along.X(), along.Y()
+        line = (x + low * dx, y + low * dy), (x + high * dx, y + high * dy)
+    return Traced(edge, curve, low, high, line, tool.IsClosed_s(edge, face))
+
+
+def bounds(wires: list[Wire], surface: Any, face: Any) -> Box:
+    """The extent of a face with these wires on a surface."""
+    o = occt()
+    # OCCT keeps to the ends of other surfaces.
+    endless = isinstance(surface, (o.Geom_Plane, o.Geom_CylindricalSurface, o.Geom_ConicalSurface))
+    drawn = all(wire.edges and all(traced.curve is not None for traced in wire.edges) for wire in wires)
+    if not (wires and endless and drawn):
+        box: Box = o.BRepTools.UVBounds_s(face)
+        return box
+    lows_u, highs_u, lows_v, highs_v = zip(*(wire.box for wire in wires), strict=True)
+    return min(lows_u), max(highs_u), min(lows_v), max(highs_v)
+
+
+def outermost(wires: list[Wire], surface: Any, face: Any) -> int:
+    """Which of the wires is around the others: as OCCT has it, the last one with the box of the one before in its own.
+
+    None of one or no wire: 0.
+    """
+    o = occt()
+    if len(wires) < 2:
+        return 0
+    if not isinstance(surface, (o.Geom_Plane, o.Geom_CylindricalSurface, o.Geom_ConicalSurface)):
+        found = o.BRepTools.OuterWire_s(face)
+        return next((k for k, wire in enumerate(wires) if wire.wire.IsSame(found)), -1)
+    best = 0
+    for k, wire in enumerate(wires):
+        (a, b, c, d), (p, q, r, s) = wire.box, wires[best].box
+        if a <= p and b >= q and c <= r and d >= s:
+            best = k
+    return best
