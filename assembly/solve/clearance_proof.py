@@ -21,8 +21,8 @@ from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
+from assembly.proximity.clearance.deforming import smaller_answer
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
-from assembly.proximity.clearance.slimming import slim_answer
 from assembly.proximity.clearance.touching import filled_bore, left_open, move_apart, off_contacts
 from assembly.proximity.extrema.pairs import ContactPair
 from assembly.solve.contact_pairs import contact_pairs, listed_contacts
@@ -160,8 +160,7 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
             for k, answer in enumerate(answers)
         ]
         for k in np.flatnonzero(conforming).tolist():
-            i, j = proof.pairs[k]
-            slim = slim_answer(proof, k, solution.q, touching, (proof.faces[i], proof.faces[j]))
+            slim = smaller_answer(proof, k, solution.q, touching)
             if slim is not None:
                 answers[k], conforming[k] = slim, False
     owned = owned_pairs(packed)
