@@ -20,6 +20,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.body_cells import BodyCells
+from assembly.proximity.clearance.cones import seated_answer
 from assembly.proximity.clearance.parting import least_affine
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.records import NODE
@@ -34,10 +35,13 @@ Faces = tuple[Face, ...]
 
 
 def smaller_answer(proof: ClearanceProof, k: int, q: Array, touching: float) -> Answer | None:
-    """What is proven of pair k, which no rigid move opens, with one body made slimmer or mapped; None if nothing is."""
+    """What is proven of pair k with one body made slimmer, taken off its seat, or mapped; None if nothing is."""
     shapes = tuple(proof.faces[body] for body in proof.pairs[k])
     slim = slim_answer(proof, k, q, touching, (shapes[0], shapes[1]))
-    return deformed_answer(proof, k, q, touching) if slim is None else slim
+    if slim is not None:
+        return slim
+    seated = seated_answer(proof, k, q, touching)
+    return deformed_answer(proof, k, q, touching) if seated is None else seated
 
 
 def deformed_answer(proof: ClearanceProof, k: int, q: Array, touching: float) -> Answer | None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-__all__ = ["least_affine", "least_move"]
+__all__ = ["least_affine", "least_move", "least_shift"]
 
 Array = NDArray[np.float64]
 # Residuals of the least squares problem, over what is asked, below which no move opens all contacts.
@@ -60,6 +60,11 @@ def least_affine(normals: Array, arms: Array, asked: Array, radius: float) -> Ar
         return None
     found[3:] /= radius
     return found.reshape(4, 3)
+
+
+def least_shift(normals: Array, asked: Array) -> Array | None:
+    """The least translation (3,) of b that opens contacts, as `least_move` has them; None where none does."""
+    return _least(normals, asked)
 
 
 def _least(rates: Array, asked: Array) -> Array | None:

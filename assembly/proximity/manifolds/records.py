@@ -24,3 +24,15 @@ FRAME_SIZE = size_of(FRAME)
 ROW = record_dtype("f8", normal=3, place=3, gap=1)
 row_at = record_view(ROW)
 ROW_SIZE = size_of(ROW)
+# A cylinder or a cone about an axis.
+ROUND = record_dtype(
+    "f8",
+    origin=3,  # a point of the axis; of a cone its apex
+    axis=3,  # of a cone toward where it is
+    half_angle=1,  # of a cone; 0 of a cylinder [rad]
+    radius=1,  # of a cylinder; 0 of a cone
+    low=1,  # from where to where it goes along the axis, from the origin
+    high=1,
+)
+round_at = record_view(ROUND)
+ROUND_SIZE = size_of(ROUND)
