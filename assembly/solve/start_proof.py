@@ -143,14 +143,14 @@ def _answers(proof: ClearanceProof, q: Array, touching: float) -> tuple[list[Ans
     for k, answer in enumerate(answers):
         if is_proven(answer):
             continue
+        smaller = smaller_answer(proof, k, q, touching)
+        if smaller is not None:
+            answers[k] = smaller
         # Of bodies that lie on each other without play a least gap is none.
-        if proof.minimum[k] > 0.0 or not conforms(proof, k, q, touching):
+        elif proof.minimum[k] > 0.0 or not conforms(proof, k, q, touching):
             return None, []
-        slim = smaller_answer(proof, k, q, touching)
-        if slim is None:
-            left.append(k)
         else:
-            answers[k] = slim
+            left.append(k)
     return answers, left
 
 

@@ -3,9 +3,11 @@
 A map T that takes no point of a body farther than t does what slimming does (`slimming.py`): a ball of a larger radius
 than t in what both bodies have in common has its middle m in the body that is mapped, and T(m) in the ball, and so in
 the other body. Where the mapped body is clear of that there is no such ball. T need not be rigid: a key that is made
-narrower is clear of both flanks of its keyway, and a translation takes it off the floor. So asked is
+smaller is clear of both flanks of its keyway, and a translation takes it off the floor. So asked is
 
-    the least |v|^2 + R^2 |W|^2   with   n_i.(v + W p_i) >= g - gap_i   for all rows i of all contact manifolds.
+    the least |v|^2 + R^2 |W|^2   with   n_i.(v + W p_i) >= g - gap_i   for all rows i of all contact manifolds,
+
+first with W = s I, after which what is round still is, and has an exact hull; then with any W.
 """
 
 from __future__ import annotations
@@ -21,12 +23,13 @@ from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.body_cells import BodyCells
 from assembly.proximity.clearance.cones import seated_answer
-from assembly.proximity.clearance.parting import least_affine
+from assembly.proximity.clearance.parting import least_affine, least_similar
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.records import NODE
 from assembly.proximity.clearance.slimming import slim_answer
 from assembly.proximity.clearance.touching import OPENED
 from assembly.proximity.manifolds.flat_manifolds import flat_manifolds
+from assembly.proximity.manifolds.line_manifolds import line_manifolds
 
 __all__ = ["deformed_answer", "smaller_answer"]
 
@@ -58,32 +61,32 @@ def deformed_answer(proof: ClearanceProof, k: int, q: Array, touching: float) ->
     shapes = tuple(proof.faces[body] for body in proof.pairs[k])
     turn, shift = proof.relative(k, q)
     least = float(proof.minimum[k])
-    found = flat_manifolds((shapes[0], shapes[1]), turn, shift, (least - touching, least + touching))
+    both, within = (shapes[0], shapes[1]), (least - touching, least + touching)
+    found = [*flat_manifolds(both, turn, shift, within), *line_manifolds(both, turn, shift, within)]
     if not found:
         return None
     normals, places, gaps = (
         np.concatenate([getattr(manifold, name) for _, manifold in found]) for name in ("normals", "places", "gaps")
     )
-    cells = proof.cells_of(k)
-    center = turn @ cells.root.center + shift
-    for part in OPENED if touching > 0.0 else ():
-        opening = least_affine(normals, places - center, part * touching - (gaps - least), float(cells.root.radius))
-        if opening is None:
-            return None
-        # Of the second body, in its own axes.
-        matrix = turn.T @ opening[1:].T @ turn
-        offset = turn.T @ opening[0] - matrix @ cells.root.center
-        far = _farthest(cells, matrix, offset)
-        if far <= touching:
-            break
-    else:
-        return None
-    mapped = _mapped(shapes[1], tuple(matrix.ravel().tolist()), tuple(offset.tolist()))
-    at = q[list(proof.pairs[k])]
-    (answer,) = ClearanceProof((shapes[0], mapped), [(0, 1)], [least]).look(at, touching)
-    if answer.verdict is not Verdict.CLEAR:
-        return None
-    return Answer(Verdict.TOUCHING, answer.bound - far, far)
+    cells, at = proof.cells_of(k), q[list(proof.pairs[k])]
+    arms = places - (turn @ cells.root.center + shift)
+    for least_map in (least_similar, least_affine):
+        # What opens by a part of what a point may be taken, with the first part for which none is taken farther.
+        for part in OPENED if touching > 0.0 else ():
+            opening = least_map(normals, arms, part * touching - (gaps - least), float(cells.root.radius))
+            if opening is None:
+                break
+            # Of the second body, in its own axes.
+            matrix = turn.T @ opening[1:].T @ turn
+            offset = turn.T @ opening[0] - matrix @ cells.root.center
+            far = _farthest(cells, matrix, offset)
+            if far <= touching:
+                mapped = _mapped(shapes[1], tuple(matrix.ravel().tolist()), tuple(offset.tolist()))
+                (answer,) = ClearanceProof((shapes[0], mapped), [(0, 1)], [least]).look(at, touching)
+                if answer.verdict is Verdict.CLEAR:
+                    return Answer(Verdict.TOUCHING, answer.bound - far, far)
+                break
+    return None
 
 
 def _farthest(cells: BodyCells, matrix: Array, offset: Array) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-__all__ = ["least_affine", "least_move", "least_shift"]
+__all__ = ["least_affine", "least_move", "least_shift", "least_similar"]
 
 Array = NDArray[np.float64]
 # Residuals of the least squares problem, over what is asked, below which no move opens all contacts.
@@ -39,6 +39,12 @@ def least_move(normals: Array, arms: Array, asked: Array, radius: float) -> Arra
     if move is not None:
         move[3:] /= radius
     return move
+
+
+def least_similar(normals: Array, arms: Array, asked: Array, radius: float) -> Array | None:
+    """The least x -> x + v + s x that opens contacts, in the sense of |v|^2 + R^2 s^2, as `least_affine` has it."""
+    found = _least(np.column_stack([normals, (arms * normals).sum(axis=1) / radius]), asked)
+    return None if found is None else np.vstack([found[:3], found[3] / radius * np.eye(3)])
 
 
 def least_affine(normals: Array, arms: Array, asked: Array, radius: float) -> Array | None:

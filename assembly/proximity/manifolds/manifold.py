@@ -39,3 +39,7 @@ class Manifold(ReadOnlyArrays):
     def rates(self) -> Array:
         """How gaps change by twists (v, w) of the second body: (m, 6)."""
         return np.hstack([self.normals, np.cross(self.places, self.normals)])
+
+    def turned(self, turn: Array, shift: Array) -> Manifold:
+        """The same with the bodies exchanged, where the first one is at x -> turn x + shift seen from the second."""
+        return Manifold(-self.normals @ turn.T, self.places @ turn.T + shift, self.gaps.copy(), self.bound)

@@ -78,15 +78,10 @@ def round_manifolds(
             manifold = round_manifold(one, other, turn, shift)
         else:
             turned = round_manifold(other, one, turn.T, -turn.T @ shift)
-            manifold = None if turned is None else _turned(turned, turn, shift)
+            manifold = None if turned is None else turned.turned(turn, shift)
         if manifold is not None and low <= manifold.gaps.min() and manifold.gaps.max() <= high:
             found.append(((i, j), manifold))
     return found
-
-
-def _turned(manifold: Manifold, turn: Array, shift: Array) -> Manifold:
-    """A manifold whose first body is at x -> turn x + shift, as one whose second body that is, seen from the other."""
-    return Manifold(-manifold.normals @ turn.T, manifold.places @ turn.T + shift, manifold.gaps.copy(), manifold.bound)
 
 
 def _fitting(ones: Faces, others: Faces) -> Iterator[tuple[int, int]]:

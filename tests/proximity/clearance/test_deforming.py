@@ -103,3 +103,17 @@ def test_a_solve_of_a_key_is_proven():
     solution = scene.solve()
     assert solution.success and solution.proved and (solution.q[1, :3] == (0.0, 0.3, 0.1)).all()
     assert not solution.crossings
+
+
+@pytest.mark.parametrize("shape", [asm.shapes.solid_cylinder(0.5, 2.0), asm.shapes.sphere(0.5)])
+def test_what_is_round_between_two_flanks(shape):
+    """A roller and a ball of a slot's width, on its floor or over it, touch; a little farther in they do not."""
+    for height in (0.5, 0.7):
+        assert answer_of(slot(1.0), shape, at(0.0, height, 0.1)).verdict is Verdict.TOUCHING
+    assert answer_of(slot(1.0), shape, at(0.0, 0.5 - 3.0 * TOUCHING, 0.1)) is None
+    assert answer_of(slot(1.0), shape, at(3.0 * TOUCHING, 0.5, 0.1)) is None
+    base, body = asm.Body("base", slot(1.0), fixed=True), asm.Body("round", shape, (0.0, 0.5, 0.1))
+    scene = asm.Assembly([base, body])
+    scene.constrain(asm.Clearance())
+    solution = scene.solve()
+    assert solution.success and solution.proved and (solution.q[1, :3] == (0.0, 0.5, 0.1)).all()
