@@ -153,16 +153,23 @@ def wall_bound(hollow, full, placed, ends):
     """A lower bound of the gap between a bore and a shaft at heights of the bore between two ends.
 
     Seen along the shaft a circle of the bore is an ellipse of half axes R and R cos(lean). How far it is from the
-    shaft's axis is a concave function of where its middle is, and so of the height: least at an end.
+    shaft's axis is a concave function of where its middle is, and so of the height: least at an end. Where that is
+    negative, a point of the shaft is deeper in the wall, across the bore's axis. Along the ray to it from there the
+    distance from the shaft's axis is convex, off at first, and r at last, at most (off + r) / cos(lean) away.
     """
     origin, b = placed
     lean = dot(triple(hollow.axis), b)
-    least = np.inf
+    least, most = np.inf, 0.0
     for k in range(2):
         c = sub(add(triple(hollow.origin), scale(ends[k], triple(hollow.axis))), origin)
-        off = sub(c, scale(dot(c, b), b))
-        least = min(least, hollow.radius * lean - sqrt(dot(off, off)) - full.radius)
-    return least
+        flat = sub(c, scale(dot(c, b), b))
+        off = sqrt(dot(flat, flat))
+        least, most = min(least, hollow.radius * lean - off - full.radius), max(most, off)
+    if least >= 0.0:
+        return least
+    if most >= full.radius:
+        return -np.inf
+    return least * (most + full.radius) / (lean * (full.radius - most))
 
 
 @kernel(inner=True)
