@@ -21,8 +21,8 @@ from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
+from assembly.proximity.clearance.deforming import smaller_answer
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
-from assembly.proximity.clearance.slimming import slim_answer
 from assembly.proximity.clearance.touching import filled_bore, left_open, move_apart, off_contacts
 from assembly.proximity.extrema.pairs import ContactPair
 from assembly.solve.contact_pairs import contact_pairs, listed_contacts
@@ -150,22 +150,20 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
     with lent_proof(packed, scene.bodies) as proof:
         wedged = _open_recognized(proof, solution.q, touching)
         answers = _first_looks(proof, solution.q, touching, wedged)
+        _make_smaller(proof, solution.q, touching, answers, wedged)
+        held = {k for k in wedged if conforms(proof, k, solution.q, touching)}
         left = [k for k, answer in enumerate(answers) if not is_proven(answer) or answer.depth > touching]
-        left = [k for k in left if k not in wedged]
+        left = [k for k in left if k not in held]
         near = near_contacts(solution, proof, NEAR * touching) if left else {}
         for k in left:
             answers[k] = _opened(proof, k, solution.q, near.get(k), touching)
-        conforming = [
-            answer.verdict is Verdict.UNDECIDED and (k in wedged or conforms(proof, k, solution.q, touching))
+        _make_smaller(proof, solution.q, touching, answers, set(left) - wedged)
+        asked = [
+            k
             for k, answer in enumerate(answers)
+            if answer.verdict is Verdict.UNDECIDED and (k in held or conforms(proof, k, solution.q, touching))
         ]
-        for k in np.flatnonzero(conforming).tolist():
-            i, j = proof.pairs[k]
-            slim = slim_answer(proof, k, solution.q, touching, (proof.faces[i], proof.faces[j]))
-            if slim is not None:
-                answers[k], conforming[k] = slim, False
     owned = owned_pairs(packed)
-    asked = [k for k, conform in enumerate(conforming) if conform]
     found_crossing = sampled(PosedBodies.of(solution), [owned[k][1] for k in asked], CTRL_C).crossing
     clear = {k for place, k in enumerate(asked) if place not in found_crossing}
     found = []
@@ -174,6 +172,14 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
         proved = proven and not (touched and item.minimum > 0.0)
         found.append(PairAnswer(item.name, (a.name, b.name), answer, proven or k in clear, proved))
     return found
+
+
+def _make_smaller(proof: ClearanceProof, q: Array, touching: float, answers: list[Answer], which: set[int]) -> None:
+    """Replace the answers to pairs that no rigid move opens where one of both made smaller is proven to be clear."""
+    for k in sorted(which):
+        smaller = smaller_answer(proof, k, q, touching) if answers[k].verdict is Verdict.UNDECIDED else None
+        if smaller is not None:
+            answers[k] = smaller
 
 
 def _open_recognized(proof: ClearanceProof, q: Array, touching: float) -> set[int]:
@@ -186,10 +192,10 @@ def _open_recognized(proof: ClearanceProof, q: Array, touching: float) -> set[in
         if proof.moves[k].any():
             continue
         off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, nothing_known)
-        if off is not None:
-            proof.moves[k] = off
-        elif conforms(proof, k, q, touching):
+        if off is None:
             wedged.add(k)
+        else:
+            proof.moves[k] = off
     return wedged
 
 

@@ -29,8 +29,8 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.body_cells import has_cells
+from assembly.proximity.clearance.deforming import smaller_answer
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
-from assembly.proximity.clearance.slimming import slim_answer
 from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
 from assembly.solve.clearance_proof import FEW
 from assembly.solve.interruption import Interruption
@@ -256,8 +256,7 @@ def _answers(
             answers[k] = answer
             # No move opens bodies one of which fills a bore.
             if answer.verdict is Verdict.UNDECIDED and not interruption.is_over():
-                i, j = rows[place]
-                slim = slim_answer(proof, place, posed.q, touching, (shapes[i], shapes[j]))
+                slim = smaller_answer(proof, place, posed.q, touching)
                 answers[k] = answer if slim is None else slim
     return answers
 

@@ -15,8 +15,8 @@ from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
+from assembly.proximity.clearance.deforming import smaller_answer
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.proximity.clearance.slimming import slim_answer
 from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import TRIES, PairAnswer, lent_proof, nothing_known, owned_pairs
@@ -143,15 +143,14 @@ def _answers(proof: ClearanceProof, q: Array, touching: float) -> tuple[list[Ans
     for k, answer in enumerate(answers):
         if is_proven(answer):
             continue
+        smaller = smaller_answer(proof, k, q, touching)
+        if smaller is not None:
+            answers[k] = smaller
         # Of bodies that lie on each other without play a least gap is none.
-        if proof.minimum[k] > 0.0 or not conforms(proof, k, q, touching):
+        elif proof.minimum[k] > 0.0 or not conforms(proof, k, q, touching):
             return None, []
-        i, j = proof.pairs[k]
-        slim = slim_answer(proof, k, q, touching, (proof.faces[i], proof.faces[j]))
-        if slim is None:
-            left.append(k)
         else:
-            answers[k] = slim
+            left.append(k)
     return answers, left
 
 

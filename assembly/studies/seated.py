@@ -21,7 +21,7 @@ from assembly.constraints.model.joints import Cylindrical, Planar, Spherical
 from assembly.geometry.recognition.forms import Cone, Cylinder, Plane, Sphere
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
-from assembly.proximity.clearance.elementary_faces import ElementaryFace, elementary_faces
+from assembly.proximity.manifolds.elementary_faces import ElementaryFace, elementary_faces
 from assembly.solve.clearance_proof import can_prove, lent_proof
 from assembly.solve.interruption import Interruption
 from assembly.studies.parting import is_stuck

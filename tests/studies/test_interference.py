@@ -106,9 +106,15 @@ def slotted(width):
 
 
 def test_what_no_certificate_tells_is_not_proved():
-    # No move opens both walls of a slot that a block fills.
+    # No map opens two bores at once that two pins of one body fill.
+    plate = SHAPES.plate(3.0, 2.0, 0.5, [(-0.9, 0.0, 0.3), (0.9, 0.0, 0.3)])
+    pin = SHAPES.solid_cylinder(0.3, 0.8)
+    pins = [f.transformed(translation=(x, 0.0, 0.0), name=f"{f.name} {x}") for x in (-0.9, 0.9) for f in pin]
+    fit = row(plate, pins, HERE)
+    assert (fit.kind, fit.proved) == ("touching", False)
+    # A block fills a slot.
     fit = row(slotted(1.0), SHAPES.box(1.0, 1.0, 1.0), at(0.0, 0.7, 1.5))
-    assert (fit.kind, fit.gap, fit.proved) == ("touching", 0.0, False)
+    assert (fit.kind, fit.gap, fit.proved) == ("touching", 0.0, True)
     # Points in a sheet are of no body: that the surfaces cross is proven.
     sheet = row(SHAPES.plane(4.0, 4.0), SMALL, at(0.2, 0.0, 0.3))
     assert (sheet.kind, sheet.proved, sheet.witness) == ("crossing", True, None)

@@ -21,8 +21,8 @@ class Clearance(Constraint):
     (`Manager`), each is a row gap >= minimum as long as it is near, and a step is never longer than to where something
     that is not listed could touch. A solve ends SOLVED only where every pair of bodies is proven clear, or clear after
     a move of one of them by what is called touching; a tick is held to the same, and so is the way to it
-    (`docs/certified.md`). Of faces that lie on each other without play neither can be proven: there samples stand in,
-    and `Solution.proved` is False. A solve that knows neither of a pair is STALLED and names it.
+    (`docs/certified.md`). Of some faces that lie on each other without play neither can be proven: there samples
+    stand in, and `Solution.proved` is False. A solve that knows neither of a pair is STALLED and names it.
 
     Pairs of points that a `Contact` of the same two bodies has are that contact's: its gap of zero is no violation. A
     `minimum` above zero does not ask for the place of the contact: what is reached from its points, between the two

@@ -24,7 +24,7 @@ from assembly.constraints.model.trim_contact import TrimContact
 from assembly.geometry.recognition.forms import Cylinder, Sphere
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
-from assembly.proximity.clearance.elementary_faces import ElementaryFace, elementary_faces
+from assembly.proximity.manifolds.elementary_faces import ElementaryFace, elementary_faces
 
 __all__ = ["LowerPair", "lower_pairs"]
 

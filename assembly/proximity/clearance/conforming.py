@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere, Torus
-from assembly.proximity.clearance.elementary_faces import elementary_faces
 from assembly.proximity.clearance.proof import ClearanceProof
+from assembly.proximity.manifolds.elementary_faces import elementary_faces
 
 __all__ = ["conforms", "lie_on_each_other"]
 

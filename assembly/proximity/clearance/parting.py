@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-__all__ = ["least_move"]
+__all__ = ["least_affine", "least_move", "least_shift", "least_similar"]
 
 Array = NDArray[np.float64]
 # Residuals of the least squares problem, over what is asked, below which no move opens all contacts.
@@ -35,9 +35,48 @@ def least_move(normals: Array, arms: Array, asked: Array, radius: float) -> Arra
     (6,) or None
         A translation and a rotation vector about the middle of b; None where contacts hold b from all sides.
     """
+    move = _least(np.column_stack([normals, np.cross(arms, normals) / radius]), asked)
+    if move is not None:
+        move[3:] /= radius
+    return move
+
+
+def least_similar(normals: Array, arms: Array, asked: Array, radius: float) -> Array | None:
+    """The least x -> x + v + s x that opens contacts, in the sense of |v|^2 + R^2 s^2, as `least_affine` has it."""
+    found = _least(np.column_stack([normals, (arms * normals).sum(axis=1) / radius]), asked)
+    return None if found is None else np.vstack([found[:3], found[3] / radius * np.eye(3)])
+
+
+def least_affine(normals: Array, arms: Array, asked: Array, radius: float) -> Array | None:
+    """The least affine map x -> x + v + W x that opens contacts, in the sense of |v|^2 + R^2 |W|^2.
+
+    Parameters
+    ----------
+    normals, arms, asked, radius
+        As of `least_move`; W by 1 counts as a way of R.
+
+    Returns
+    -------
+    (4, 3) or None
+        v and then the columns of W; None where no affine map opens all.
+    """
+    strains = arms[:, :, None] * normals[:, None, :] / radius
+    found = _least(np.column_stack([normals, strains.reshape(-1, 9)]), asked)
+    if found is None:
+        return None
+    found[3:] /= radius
+    return found.reshape(4, 3)
+
+
+def least_shift(normals: Array, asked: Array) -> Array | None:
+    """The least translation (3,) of b that opens contacts, as `least_move` has them; None where none does."""
+    return _least(normals, asked)
+
+
+def _least(rates: Array, asked: Array) -> Array | None:
+    """The shortest x with rates x >= asked, or None."""
     if asked.max() <= 0.0:
-        return np.zeros(6)
-    rates = np.column_stack([normals, np.cross(arms, normals) / radius])
+        return np.zeros(rates.shape[1])
     unit = float(asked.max())
     design = np.vstack([rates.T, asked / unit])
     goal = np.zeros(len(design))
@@ -46,6 +85,4 @@ def least_move(normals: Array, arms: Array, asked: Array, radius: float) -> Arra
     rest = design @ weights - goal
     if -rest[-1] <= NONE_LEFT:
         return None
-    move = -rest[:-1] / rest[-1] * unit
-    move[3:] /= radius
-    return np.asarray(move)
+    return np.asarray(-rest[:-1] / rest[-1] * unit)

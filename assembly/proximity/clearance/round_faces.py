@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
 
@@ -10,27 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
-from assembly.geometry.recognition.curves import Circle, curve_form
-from assembly.geometry.recognition.elementary import elementary_form
-from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere, Torus
+from assembly.geometry.recognition.forms import Cylinder, Plane, Sphere, Torus
 from assembly.geometry.splines import bezier
-from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.proximity.manifolds.elementary_faces import NEARLY, nearly_elementary
+from assembly.proximity.manifolds.flat_map import flat_map
 
-__all__ = ["Round", "nearly_elementary", "round_holes", "round_of", "round_parts"]
+__all__ = ["Round", "round_holes", "round_of", "round_parts"]
 
 Array = NDArray[np.float64]
 # A face that goes around less of a cylinder than about half is no round body.
 HALF = 0.95 * pi
-# [size of a face] Cylinders, balls and circles of files are off by some 1e-11; what they are off by is in their radii.
-NEARLY = 1e-10
 # [size of a face] A round hole of a file may be a curve through points of a circle, off by so much.
 HOLE = 1e-4
 # A ball of more than this part of a face's size is no ball that the face goes around.
 LARGEST_BALL = 0.7
 ROUNDED_UP = 1.0 + 1e-15
-# How far the corners of a flat face may be from a parallelogram, in parts of their largest coordinate.
-FLAT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,45 +59,9 @@ def _radius(radius: float, deviation: float, outward: bool) -> float:
     return (radius + deviation) * ROUNDED_UP if outward else (radius - deviation) / ROUNDED_UP
 
 
-@dataclass(frozen=True, eq=False)
-class _FlatMap:
-    """A flat surface as (u, v) -> origin + u along + v across, and how far it is from that."""
-
-    origin: Array
-    along: Array
-    across: Array
-    off: float
-
-    def circle(self, curves: Sequence[NurbsCurve], tolerance: float | None = None) -> Circle | None:
-        """The circle in space that curves of (u, v), one after another, go along, to a tolerance [length]."""
-        if max(curve.degree for curve in curves) < 2:
-            return None
-        parts = []
-        for curve in curves:
-            pieces = curve.bezier_pieces()
-            w = pieces[..., -1:]
-            space = self.origin * w + pieces[..., :1] * self.along + pieces[..., 1:2] * self.across
-            parts.append(np.concatenate([space, w], axis=-1))
-        circle = curve_form(parts, tolerance)
-        return circle if isinstance(circle, Circle) else None
-
-
-def _flat_map(surface: NurbsSurface) -> _FlatMap | None:
-    """The map of a flat surface whose parameters are lengths along two directions."""
-    net = surface.control_points
-    if net.shape != (2, 2, 3) or np.ptp(surface.weights) > 0.0:
-        return None
-    bent = float(np.abs(net[1, 1] - net[1, 0] - net[0, 1] + net[0, 0]).max())
-    if bent > FLAT * float(np.abs(net).max()):
-        return None
-    (u0, u1), (v0, v1) = surface.domain
-    along, across = (net[1, 0] - net[0, 0]) / (u1 - u0), (net[0, 1] - net[0, 0]) / (v1 - v0)
-    return _FlatMap(net[0, 0] - u0 * along - v0 * across, along, across, bent)
-
-
 def _disc(face: Face) -> Round | None:
     """A flat face whose outer boundary is a circle, as a cylinder without length."""
-    flat = _flat_map(face.surface)
+    flat = flat_map(face.surface)
     if flat is None or face.outer is None:
         return None
     circle = flat.circle(face.boundary[: len(face.chains[0])], NEARLY * face.surface.size)
@@ -115,7 +73,7 @@ def _disc(face: Face) -> Round | None:
 
 def round_holes(face: Face) -> list[Round]:
     """The circles of a flat face's round holes, as bores without length: all of the face is beyond each of them."""
-    flat = _flat_map(face.surface)
+    flat = flat_map(face.surface)
     if flat is None:
         return []
     found = []
@@ -128,14 +86,6 @@ def round_holes(face: Face) -> list[Round]:
         if off < circle.radius:
             found.append(Round(circle.center, circle.axis, off, (circle.radius - off) / ROUNDED_UP, 0.0, False))
     return found
-
-
-def nearly_elementary(surface: NurbsSurface) -> Form:
-    """What a surface is exactly if that is elementary, else what it is to within `NEARLY` of its size."""
-    exact = elementary_form(surface)
-    if isinstance(exact, Plane | Cylinder | Cone | Sphere | Torus):
-        return exact
-    return elementary_form(surface, NEARLY * surface.size)
 
 
 def round_of(face: Face) -> Round | None:

@@ -58,7 +58,7 @@ def slim_answer(proof: ClearanceProof, k: int, q: Array, touching: float, shapes
     slim = _slimmer(shapes[inner], tuple(center.tolist()), tuple(across.ravel().tolist()), part)
     both = (slim, shapes[1]) if inner == 0 else (shapes[0], slim)
     at = q[list(proof.pairs[k])]
-    other = ClearanceProof(both, [(0, 1)], [0.0])
+    other = ClearanceProof(both, [(0, 1)], [float(proof.minimum[k])])
     left = (1.0 - SLIMMER) * touching
     move = off_contacts(other, 0, at, left, lambda: None)
     if move is None:

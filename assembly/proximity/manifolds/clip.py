@@ -1,0 +1,187 @@
+"""What two regions of one plane have in common: which points of one are in the other one, and where borders cross."""
+
+from __future__ import annotations
+
+from math import hypot, sqrt
+
+from assembly._kernel import kernel
+from assembly.proximity.manifolds.records import segment_at
+
+
+@kernel(inline=True)
+def beside_chord(s, x, y):
+    """How far a point is on the left of a segment's chord."""
+    dx, dy = s.end[0] - s.begin[0], s.end[1] - s.begin[1]
+    return (dx * (y - s.begin[1]) - dy * (x - s.begin[0])) / hypot(dx, dy)
+
+
+@kernel(inner=True)
+def is_on_arc(s, x, y, tolerance):
+    """Whether a point of the circle of an arc is on that: it turns by a quarter at most, on one side of its chord."""
+    beside = beside_chord(s, x, y)
+    return beside <= tolerance if s.sweep > 0.0 else beside >= -tolerance
+
+
+@kernel(inner=True)
+def is_on_segment(s, x, y, tolerance):
+    """Whether a point is no farther than a tolerance from a segment."""
+    if s.radius > 0.0:
+        far = hypot(x - s.center[0], y - s.center[1])
+        return abs(far - s.radius) <= tolerance and is_on_arc(s, x, y, tolerance)
+    dx, dy = s.end[0] - s.begin[0], s.end[1] - s.begin[1]
+    length = hypot(dx, dy)
+    along = (dx * (x - s.begin[0]) + dy * (y - s.begin[1])) / length
+    return abs(beside_chord(s, x, y)) <= tolerance and -tolerance <= along <= length + tolerance
+
+
+@kernel(inner=True)
+def is_within(segments, x, y, tolerance):
+    """Whether a point is in a region, or no farther than a tolerance from its borders.
+
+    By how often a ray crosses the chords; what is between an arc and its chord is turned from in to out, or back.
+    """
+    inside = False
+    for k in range(len(segments)):
+        s = segment_at(segments, k)
+        if is_on_segment(s, x, y, tolerance):
+            return True
+        beside = beside_chord(s, x, y)
+        if (s.begin[1] > y) != (s.end[1] > y) and (beside >= 0.0) == (s.end[1] > s.begin[1]):
+            inside = not inside
+        if s.radius > 0.0 and hypot(x - s.center[0], y - s.center[1]) < s.radius:
+            if (beside < 0.0) if s.sweep > 0.0 else (beside >= 0.0):
+                inside = not inside
+    return inside
+
+
+@kernel(inline=True)
+def put_if(points, count, x, y, is_one):
+    """Write a point behind others if it is one; how many there are."""
+    if is_one:
+        points[count, 0] = x
+        points[count, 1] = y
+        return count + 1
+    return count
+
+
+@kernel(inner=True)
+def cross_lines(s, t, tolerance, points):
+    """Where two straight segments cross, not those along which they lie: points, and how many."""
+    ax, ay = s.end[0] - s.begin[0], s.end[1] - s.begin[1]
+    bx, by = t.end[0] - t.begin[0], t.end[1] - t.begin[1]
+    det = ax * by - ay * bx
+    if abs(det) <= 1e-12 * hypot(ax, ay) * hypot(bx, by):
+        return 0
+    part = ((t.begin[0] - s.begin[0]) * by - (t.begin[1] - s.begin[1]) * bx) / det
+    x, y = s.begin[0] + part * ax, s.begin[1] + part * ay
+    return put_if(points, 0, x, y, is_on_segment(s, x, y, tolerance) and is_on_segment(t, x, y, tolerance))
+
+
+@kernel(inner=True)
+def cross_line_arc(line, arc, tolerance, points):
+    """Where a straight segment crosses an arc, or comes as near to it as a tolerance."""
+    dx, dy = line.end[0] - line.begin[0], line.end[1] - line.begin[1]
+    length = hypot(dx, dy)
+    dx /= length
+    dy /= length
+    ex, ey = arc.center[0] - line.begin[0], arc.center[1] - line.begin[1]
+    along, beside = ex * dx + ey * dy, ex * dy - ey * dx
+    if abs(beside) > arc.radius + tolerance:
+        return 0
+    half = sqrt(max(arc.radius * arc.radius - beside * beside, 0.0))
+    count = 0
+    for i in range(2):
+        t = along - half if i == 0 else along + half
+        x, y = line.begin[0] + t * dx, line.begin[1] + t * dy
+        is_one = -tolerance <= t <= length + tolerance and is_on_arc(arc, x, y, tolerance)
+        count = put_if(points, count, x, y, is_one)
+    return count
+
+
+@kernel(inner=True)
+def cross_arcs(s, t, tolerance, points):
+    """Where two arcs cross, or come as near to each other as a tolerance, not those of one circle."""
+    dx, dy = t.center[0] - s.center[0], t.center[1] - s.center[1]
+    apart = hypot(dx, dy)
+    if apart <= tolerance or apart > s.radius + t.radius + tolerance:
+        return 0
+    if apart < abs(s.radius - t.radius) - tolerance:
+        return 0
+    along = 0.5 * (apart + (s.radius - t.radius) * (s.radius + t.radius) / apart)
+    half = sqrt(max(s.radius * s.radius - along * along, 0.0))
+    count = 0
+    for i in range(2):
+        beside = -half if i == 0 else half
+        x = s.center[0] + (along * dx - beside * dy) / apart
+        y = s.center[1] + (along * dy + beside * dx) / apart
+        is_one = is_on_arc(s, x, y, tolerance) and is_on_arc(t, x, y, tolerance)
+        count = put_if(points, count, x, y, is_one)
+    return count
+
+
+@kernel(inner=True)
+def cross_segments(s, t, tolerance, points):
+    """Where two segments cross: at most two points, and how many."""
+    if s.radius > 0.0 and t.radius > 0.0:
+        return cross_arcs(s, t, tolerance, points)
+    if s.radius > 0.0:
+        return cross_line_arc(t, s, tolerance, points)
+    if t.radius > 0.0:
+        return cross_line_arc(s, t, tolerance, points)
+    return cross_lines(s, t, tolerance, points)
+
+
+@kernel(inline=True)
+def are_beside(s, t, tolerance):
+    """Whether boxes around two segments are apart."""
+    r, q = s.radius, t.radius
+    for d in range(2):
+        low_s, high_s = min(s.begin[d], s.end[d]), max(s.begin[d], s.end[d])
+        low_t, high_t = min(t.begin[d], t.end[d]), max(t.begin[d], t.end[d])
+        if r > 0.0:
+            low_s, high_s = min(low_s, s.center[d] - r), max(high_s, s.center[d] + r)
+        if q > 0.0:
+            low_t, high_t = min(low_t, t.center[d] - q), max(high_t, t.center[d] + q)
+        if low_s > high_t + tolerance or low_t > high_s + tolerance:
+            return True
+    return False
+
+
+@kernel(inner=True)
+def convex_corners(points, count, order, tolerance):
+    """Corners of the convex hull of points, into `order`, counterclockwise; how many.
+
+    `order` has places for three times as many and two. Of what lies along a side, but for a tolerance, only the ends
+    are corners.
+    """
+    for i in range(count):
+        k = i
+        while k > 0 and (
+            points[order[k - 1], 0] > points[i, 0]
+            or (points[order[k - 1], 0] == points[i, 0] and points[order[k - 1], 1] > points[i, 1])
+        ):
+            order[k] = order[k - 1]
+            k -= 1
+        order[k] = i
+    for i in range(count):
+        order[2 * count + 2 + i] = order[i]
+    found = 0
+    # Along the lower side, then back along the upper one; of corners those before `first` stay.
+    for side in range(2):
+        first = found
+        for i in range(count):
+            new = order[2 * count + 2 + i] if side == 0 else order[3 * count + 1 - i]
+            while found - first >= 2 and not is_left_turn(points, order[found - 2], order[found - 1], new, tolerance):
+                found -= 1
+            order[found] = new
+            found += 1
+        found -= 1
+    return max(found, min(count, 1))
+
+
+@kernel(inline=True)
+def is_left_turn(points, a, b, c, tolerance):
+    """Whether b is a corner of a to c: on the right of these by more than a tolerance."""
+    dx, dy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
+    ex, ey = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+    return dx * ey - dy * ex < -tolerance * hypot(dx, dy)

@@ -1,0 +1,141 @@
+"""Manifolds of what is round and full on plane faces: a line of a cylinder or a cone, a point of a ball.
+
+What is round comes nearest to a plane with the normal n along the line that is on the side of -n. Its gap is affine
+along it, so that it is least at an end of what of it the plane's region has.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._record import rows_of
+from assembly.geometry.faces.face import Face
+from assembly.geometry.recognition.forms import Cone, Cylinder, Sphere
+from assembly.proximity.manifolds.elementary_faces import elementary_faces
+from assembly.proximity.manifolds.line_span import line_span
+from assembly.proximity.manifolds.manifold import Manifold
+from assembly.proximity.manifolds.records import FRAME
+from assembly.proximity.manifolds.regions import PlaneRegion, plane_region
+
+__all__ = ["line_manifold", "line_manifolds"]
+
+Array = NDArray[np.float64]
+# What is as near to a border is on it, in parts of the larger face's size.
+ON_BORDER = 1e-12
+# Lines that lean more than this sine do not lie on a plane.
+LYING = 0.5
+
+
+def line_manifold(region: PlaneRegion, form: Cylinder | Cone | Sphere, turn: Array, shift: Array) -> Manifold | None:
+    """The manifold of a plane face and what is round and full, at x -> turn x + shift seen from the face's body.
+
+    None where the line that is nearest to the plane leans by more than 30 degrees, is not on the face's side of it, or
+    is nowhere over the region. Gaps are along the plane's normal.
+    """
+    frame = rows_of(FRAME, region.frame[None])[0]
+    n = frame.normal
+    line = _nearest_line(form, turn.T @ n)
+    if line is None:
+        return None
+    ends = line @ turn.T + shift
+    off = ends - frame.origin
+    flat = np.column_stack([off @ frame.right, off @ frame.up])
+    size = max(region.size, float(np.linalg.norm(ends[1] - ends[0])))
+    ways = np.zeros((2, 2))
+    if isinstance(form, Sphere):
+        # A short line in its place.
+        flat = flat + ON_BORDER * size * np.array([[-1.0, 0.0], [1.0, 0.0]])
+    low, high = line_span(region.segments, flat.ravel(), ON_BORDER * size, ways)
+    if low > high or (high - low < 1e-9 and not isinstance(form, Sphere)):
+        return None
+    if isinstance(form, Sphere):
+        places, normals = ends[:1], n[None]
+    else:
+        way = ends[1] - ends[0]
+        places = ends[0] + np.array([[low], [high]]) * way
+        normals = np.array([_normal(frame, way, border) for border in ways])
+    gaps = (places - frame.origin) @ n
+    lean = float(np.abs(n @ (ends[1] - ends[0]))) / size
+    bound = float(gaps.min()) - form.deviation - region.deviation - 4.0 * lean * ON_BORDER * size
+    return Manifold(np.array(normals), places.copy(), gaps, bound)
+
+
+def _nearest_line(form: Cylinder | Cone | Sphere, n: Array) -> Array | None:
+    """The ends (2, 3) of the line of a surface that is on the side of -n; of a ball the point twice."""
+    if isinstance(form, Sphere):
+        return np.tile(form.center - form.radius * n, (2, 1))
+    side = n - (n @ form.axis) * form.axis
+    length = float(np.linalg.norm(side))
+    if length < LYING:
+        return None
+    side /= length
+    start, angle = form.turn.start, form.turn.angle
+    turned = np.arctan2(np.cross(start, -side) @ form.axis, start @ -side) % (2.0 * np.pi)
+    # Where a face ends at the line it has it.
+    if turned > angle + 1e-9 and turned < 2.0 * np.pi - 1e-9:
+        return None
+    heights = np.array(form.heights)
+    if isinstance(form, Cone):
+        radii, origin = heights * np.tan(form.half_angle), form.apex
+    else:
+        radii, origin = np.full(2, form.radius), form.point
+    line = origin + heights[:, None] * form.axis - radii[:, None] * side
+    way = line[1] - line[0]
+    return line if abs(float(way @ n)) <= LYING * float(np.linalg.norm(way)) else None
+
+
+def _normal(frame: np.record, way: Array, border: Array) -> Array:
+    """How the gap changes where a line ends: across it and the border that it ends at, so that m.n = 1."""
+    across = np.cross(border[0] * frame.right + border[1] * frame.up, way)
+    along = float(across @ frame.normal)
+    if abs(along) <= 1e-6 * float(np.linalg.norm(border) * np.linalg.norm(way)):
+        return np.array(frame.normal)
+    return np.asarray(across / along)
+
+
+@lru_cache(maxsize=256)
+def _faces(faces: tuple[Face, ...]) -> tuple[list[tuple[int, PlaneRegion]], list[tuple[int, Cylinder | Cone | Sphere]]]:
+    """The plane faces of a body, and those that are round and full, with their numbers."""
+    planes = [(k, region) for k, face in enumerate(faces) if (region := plane_region(face)) is not None]
+    rounds = [
+        (k, one.form)
+        for k, face in enumerate(faces)
+        for one in elementary_faces((face,))
+        if one.is_outward and isinstance(one.form, Cylinder | Cone | Sphere)
+    ]
+    return planes, rounds
+
+
+def line_manifolds(
+    shapes: tuple[tuple[Face, ...], tuple[Face, ...]], turn: Array, shift: Array, within: tuple[float, float]
+) -> list[tuple[tuple[int, int], Manifold]]:
+    """Manifolds of all pairs of a plane face and what is round, of either body, whose gaps are between two lengths.
+
+    Parameters
+    ----------
+    shapes : (tuple of Face, tuple of Face)
+        Of both bodies.
+    turn, shift : (3, 3), (3,)
+        The second body is at x -> turn x + shift, seen from the first.
+    within : (float, float)
+
+    Returns
+    -------
+    list of ((int, int), Manifold)
+        With the numbers of the faces.
+    """
+    (planes_a, rounds_a), (planes_b, rounds_b) = map(_faces, shapes)
+    low, high = within
+    found = [((i, j), line_manifold(region, form, turn, shift)) for i, region in planes_a for j, form in rounds_b]
+    for j, region in planes_b:
+        for i, form in rounds_a:
+            manifold = line_manifold(region, form, turn.T, -turn.T @ shift)
+            found.append(((i, j), None if manifold is None else manifold.turned(turn, shift)))
+    return [
+        (pair, manifold)
+        for pair, manifold in found
+        if manifold is not None and low <= manifold.gaps.min() and manifold.gaps.max() <= high
+    ]

@@ -1,0 +1,53 @@
+"""Which part of a straight line is in a region of its plane."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly.proximity.manifolds.clip import cross_segments, is_within
+from assembly.proximity.manifolds.flat_pair import tangent
+from assembly.proximity.manifolds.records import SEGMENT_SIZE, segment_at
+
+
+@kernel(signatures="(f8[:, ::1], f8[::1], f8, f8[:, ::1])", allocates=True)
+def line_span(segments, line, tolerance, ways):
+    """From where to where a line is in a region, in parts of its length: the outermost of its points there.
+
+    Parameters
+    ----------
+    segments : (n, SEGMENT_SIZE)
+    line : (4,)
+        Both ends, in the coordinates of the plane.
+    tolerance : float
+        What is no farther from a border is in the region.
+    ways : (2, 2)
+        Where the directions of borders are written that the line ends at; zero where it ends by itself.
+
+    Returns
+    -------
+    low, high : float
+        The first is more where nothing of the line is in the region.
+    """
+    one, points = np.zeros((1, SEGMENT_SIZE)), np.empty((2, 2))
+    s = segment_at(one, 0)
+    s.begin[0], s.begin[1], s.end[0], s.end[1] = line[0], line[1], line[2], line[3]
+    dx, dy = line[2] - line[0], line[3] - line[1]
+    low, high = np.inf, -np.inf
+    for i in range(2):
+        for k in range(2):
+            ways[i, k] = 0.0
+        if is_within(segments, line[2 * i], line[2 * i + 1], tolerance):
+            low, high = min(low, float(i)), max(high, float(i))
+    for k in range(len(segments)):
+        t = segment_at(segments, k)
+        for i in range(cross_segments(s, t, tolerance, points)):
+            x, y = points[i, 0], points[i, 1]
+            part = ((x - line[0]) * dx + (y - line[1]) * dy) / (dx * dx + dy * dy)
+            if part < low:
+                low = part
+                ways[0, 0], ways[0, 1] = tangent(t, x, y)
+            if part > high:
+                high = part
+                ways[1, 0], ways[1, 1] = tangent(t, x, y)
+    return low, high

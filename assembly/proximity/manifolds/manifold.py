@@ -1,0 +1,45 @@
+"""A contact manifold: the few places where two conforming faces are nearest, and a bound of the gap between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._read_only import ReadOnlyArrays
+
+__all__ = ["Manifold"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Manifold(ReadOnlyArrays):
+    """Rows of a pair of faces, in the axes of the first body.
+
+    Attributes
+    ----------
+    normals : (m, 3)
+        From the first body to the second. Where the second one is moved by a twist, a velocity v of what is at the
+        origin and a turn w about that, a gap changes at the rate normal.(v + w x place).
+    places : (m, 3)
+        Points of the second face.
+    gaps : (m,)
+        Negative where the second face is within the first body.
+    bound : float
+        No gap of the whole pair is less.
+    """
+
+    normals: Array
+    places: Array
+    gaps: Array
+    bound: float
+
+    def rates(self) -> Array:
+        """How gaps change by twists (v, w) of the second body: (m, 6)."""
+        return np.hstack([self.normals, np.cross(self.places, self.normals)])
+
+    def turned(self, turn: Array, shift: Array) -> Manifold:
+        """The same with the bodies exchanged, where the first one is at x -> turn x + shift seen from the second."""
+        return Manifold(-self.normals @ turn.T, self.places @ turn.T + shift, self.gaps.copy(), self.bound)
