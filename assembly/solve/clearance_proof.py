@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import side_faces
 from assembly.constraints.packing.scene import Packed
+from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
+from assembly.proximity.clearance.hulls.scene import hulled_answer
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
 from assembly.proximity.clearance.slimming import slim_answer
 from assembly.proximity.clearance.touching import filled_bore, left_open, move_apart, off_contacts
@@ -47,6 +49,7 @@ __all__ = [
     "opening_move",
     "owned_pairs",
     "prove_end",
+    "proven_pairs",
 ]
 
 Array = NDArray[np.float64]
@@ -93,13 +96,20 @@ def owned_pairs(packed: Packed) -> list[tuple[Clearance, tuple[Body, Body], bool
     ]
 
 
-def new_proof(packed: Packed, bodies: Sequence[Body]) -> ClearanceProof:
-    """A proof of all pairs that the clearances of a packed scene keep apart."""
+def proven_pairs(
+    packed: Packed, bodies: Sequence[Body]
+) -> tuple[list[tuple[Face, ...]], list[tuple[int, int]], list[float]]:
+    """Faces of bodies, pairs of their numbers that clearances keep apart, and least gaps, as a proof takes them."""
     number = {id(body): k for k, body in enumerate(bodies)}
     owned = owned_pairs(packed)
     rows = [(number[id(a)], number[id(b)]) for _, (a, b), _ in owned]
     minimum = [0.0 if touched else item.minimum for item, _, touched in owned]
-    return ClearanceProof([side_faces(body) for body in bodies], rows, minimum)
+    return [side_faces(body) for body in bodies], rows, minimum
+
+
+def new_proof(packed: Packed, bodies: Sequence[Body]) -> ClearanceProof:
+    """A proof of all pairs that the clearances of a packed scene keep apart."""
+    return ClearanceProof(*proven_pairs(packed, bodies))
 
 
 @contextmanager
@@ -161,7 +171,8 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
         ]
         for k in np.flatnonzero(conforming).tolist():
             i, j = proof.pairs[k]
-            slim = slim_answer(proof, k, solution.q, touching, (proof.faces[i], proof.faces[j]))
+            slim = hulled_answer(proof, k, solution.q, touching)
+            slim = slim or slim_answer(proof, k, solution.q, touching, (proof.faces[i], proof.faces[j]))
             if slim is not None:
                 answers[k], conforming[k] = slim, False
     owned = owned_pairs(packed)

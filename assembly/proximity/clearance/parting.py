@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-__all__ = ["least_move"]
+__all__ = ["least_change", "least_move"]
 
 Array = NDArray[np.float64]
 # Residuals of the least squares problem, over what is asked, below which no move opens all contacts.
@@ -35,9 +35,16 @@ def least_move(normals: Array, arms: Array, asked: Array, radius: float) -> Arra
     (6,) or None
         A translation and a rotation vector about the middle of b; None where contacts hold b from all sides.
     """
+    found = least_change(np.column_stack([normals, np.cross(arms, normals) / radius]), asked)
+    if found is not None:
+        found[3:] /= radius
+    return found
+
+
+def least_change(rates: Array, asked: Array) -> Array | None:
+    """The least vector (k,) along which gaps with rates (m, k) open by what is asked (m,); None where there is none."""
     if asked.max() <= 0.0:
-        return np.zeros(6)
-    rates = np.column_stack([normals, np.cross(arms, normals) / radius])
+        return np.zeros(rates.shape[1])
     unit = float(asked.max())
     design = np.vstack([rates.T, asked / unit])
     goal = np.zeros(len(design))
@@ -46,6 +53,4 @@ def least_move(normals: Array, arms: Array, asked: Array, radius: float) -> Arra
     rest = design @ weights - goal
     if -rest[-1] <= NONE_LEFT:
         return None
-    move = -rest[:-1] / rest[-1] * unit
-    move[3:] /= radius
-    return np.asarray(move)
+    return np.asarray(-rest[:-1] / rest[-1] * unit)

@@ -17,7 +17,7 @@ from assembly.geometry.splines import bezier
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["Round", "nearly_elementary", "round_holes", "round_of", "round_parts"]
+__all__ = ["FlatMap", "Round", "flat_map", "nearly_elementary", "round_holes", "round_of", "round_parts"]
 
 Array = NDArray[np.float64]
 # A face that goes around less of a cylinder than about half is no round body.
@@ -66,13 +66,19 @@ def _radius(radius: float, deviation: float, outward: bool) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _FlatMap:
+class FlatMap:
     """A flat surface as (u, v) -> origin + u along + v across, and how far it is from that."""
 
     origin: Array
     along: Array
     across: Array
     off: float
+
+    def points(self, curve: NurbsCurve) -> Array:
+        """The Bezier points in space (n, 3) of a curve of (u, v)."""
+        net = curve.bezier_pieces().reshape(-1, 3)
+        u, v = net[:, :1] / net[:, 2:], net[:, 1:2] / net[:, 2:]
+        return np.asarray(self.origin + u * self.along + v * self.across)
 
     def circle(self, curves: Sequence[NurbsCurve], tolerance: float | None = None) -> Circle | None:
         """The circle in space that curves of (u, v), one after another, go along, to a tolerance [length]."""
@@ -88,7 +94,7 @@ class _FlatMap:
         return circle if isinstance(circle, Circle) else None
 
 
-def _flat_map(surface: NurbsSurface) -> _FlatMap | None:
+def flat_map(surface: NurbsSurface) -> FlatMap | None:
     """The map of a flat surface whose parameters are lengths along two directions."""
     net = surface.control_points
     if net.shape != (2, 2, 3) or np.ptp(surface.weights) > 0.0:
@@ -98,12 +104,12 @@ def _flat_map(surface: NurbsSurface) -> _FlatMap | None:
         return None
     (u0, u1), (v0, v1) = surface.domain
     along, across = (net[1, 0] - net[0, 0]) / (u1 - u0), (net[0, 1] - net[0, 0]) / (v1 - v0)
-    return _FlatMap(net[0, 0] - u0 * along - v0 * across, along, across, bent)
+    return FlatMap(net[0, 0] - u0 * along - v0 * across, along, across, bent)
 
 
 def _disc(face: Face) -> Round | None:
     """A flat face whose outer boundary is a circle, as a cylinder without length."""
-    flat = _flat_map(face.surface)
+    flat = flat_map(face.surface)
     if flat is None or face.outer is None:
         return None
     circle = flat.circle(face.boundary[: len(face.chains[0])], NEARLY * face.surface.size)
@@ -115,7 +121,7 @@ def _disc(face: Face) -> Round | None:
 
 def round_holes(face: Face) -> list[Round]:
     """The circles of a flat face's round holes, as bores without length: all of the face is beyond each of them."""
-    flat = _flat_map(face.surface)
+    flat = flat_map(face.surface)
     if flat is None:
         return []
     found = []
