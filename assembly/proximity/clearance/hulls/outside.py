@@ -40,7 +40,8 @@ def is_outside(body: BodyHulls, other: BodyHulls, normals: Array, reach: Array, 
     beyond = (below[:, None] - reach > rounding).astype(np.float32)
     leads = (normals @ normals.T >= -ALONG).astype(np.float32)
     # Of every point, face and half line, whether it does not meet the face.
-    misses: NDArray[np.bool_] = np.asarray(beyond @ leads > 0.0)
+    misses = np.zeros(beyond.shape, dtype=bool)
+    misses[beyond @ leads > 0.0] = True
     for face, hollow in other.hollows:
         if hollow.axis.any():
             inside = hollow.depth_of(body.points) > rounding
@@ -50,8 +51,9 @@ def is_outside(body: BodyHulls, other: BodyHulls, normals: Array, reach: Array, 
                 leads_along &= along > 0.0
             misses[:, face] |= inside[:, None] & leads_along
     leaves = np.zeros(len(body.of_face), dtype=bool)
-    is_free: NDArray[np.bool_] = misses.all(axis=1)
-    leaves[body.owner[is_free.any(axis=1)]] = True
+    # The points of which a half line misses all faces.
+    free, _ = np.nonzero(np.asarray(misses.all(axis=1)))
+    leaves[body.owner[free]] = True
     if leaves.all() or not leaves.any():
         return bool(leaves.all())
     label = _connected(body, 0.5 * apart)
