@@ -15,6 +15,8 @@ from assembly.proximity.clearance.round_faces import FlatMap
 __all__ = ["hulls_of_flat"]
 
 Array = NDArray[np.float64]
+# Of every curve of a boundary the circle that it is on, or None.
+Arcs = list[Circle | None]
 # How far a corner of a polygon that counts as convex may be beyond its sides, in parts of the face's size.
 CONVEX = 1e-13
 # How near to a circle an arc of a boundary is, in parts of the face's size; it is added to or taken from its radius.
@@ -29,7 +31,18 @@ def hulls_of_flat(face: Face, flat: FlatMap, normal: Array, points: Array) -> li
         if (inward @ corners.T - (inward * corners).sum(axis=1)[:, None] < -CONVEX * face.surface.size).any():
             triangles = [(Discs.of_points(corners[list(rows)]), flat.off) for rows in triangles_of(corners, normal)]
             return parts_of_one([FaceHulls([triangle], [], points, normal, None) for triangle in triangles])
-    return [FaceHulls(_of_flat(face, flat), _holes(face, flat, normal), points, normal, None)]
+    tolerance = NEARLY * face.surface.size
+    arcs = [flat.circle([curve], tolerance) for curve in face.boundary] if face.outer is not None or face.holes else []
+    return [FaceHulls(_of_flat(face, flat, arcs), _holes(face, flat, normal, arcs), points, normal, None)]
+
+
+def _whole(face: Face, flat: FlatMap, chain: range, arcs: Arcs) -> Circle | None:
+    """The circle that all of a chain of a boundary is."""
+    if len(chain) == 1:
+        return arcs[chain[0]]
+    if any(arcs[k] is None for k in chain):
+        return None
+    return flat.circle([face.boundary[k] for k in chain], NEARLY * face.surface.size)
 
 
 def _corners(face: Face, flat: FlatMap, chain: int = 0) -> Array | None:
@@ -50,17 +63,16 @@ def _inward(corners: Array, normal: Array) -> Array:
     return np.asarray(ways / np.where(lengths > 0.0, lengths, 1.0)[:, None])
 
 
-def _of_flat(face: Face, flat: FlatMap) -> list[tuple[Discs, float]]:
+def _of_flat(face: Face, flat: FlatMap, arcs: Arcs) -> list[tuple[Discs, float]]:
     """Hulls of a flat face: of the control points of what goes around it, or of its circles and what is not round."""
     surface = face.surface
     if face.outer is None:
         return [(Discs.of_points(surface.control_points.reshape(-1, 3)), 0.0)]
-    curves = [face.boundary[k] for k in face.chains[0]]
-    whole = flat.circle(curves, NEARLY * surface.size)
+    whole = _whole(face, flat, face.chains[0], arcs)
     if whole is not None:
         return [(_disc(whole), whole.deviation + flat.off)]
-    nets = [flat.points(curve) for curve in curves]
-    circles = [flat.circle([curve], NEARLY * surface.size) for curve in curves]
+    nets = [flat.points(face.boundary[k]) for k in face.chains[0]]
+    circles = [arcs[k] for k in face.chains[0]]
     hulls = [(Discs.of_points(np.concatenate(nets)), flat.off)]
     if any(circle is not None for circle in circles):
         parts = [
@@ -75,7 +87,7 @@ def _disc(circle: Circle) -> Discs:
     return Discs(circle.center[None], circle.axis[None], np.array([circle.radius]))
 
 
-def _holes(face: Face, flat: FlatMap, normal: Array) -> list[Hollow | Prism]:
+def _holes(face: Face, flat: FlatMap, normal: Array, arcs: Arcs) -> list[Hollow | Prism]:
     """The holes of a flat face that are convex polygons; of others with an arc the largest disc about its middle."""
     found: list[Hollow | Prism] = []
     for number, chain in enumerate(face.chains[1:] if face.holes else (), 1):
@@ -83,17 +95,16 @@ def _holes(face: Face, flat: FlatMap, normal: Array) -> list[Hollow | Prism]:
         if corners is not None:
             found += _prism(corners, normal, face.surface.size, flat.off)
             continue
-        curves = [face.boundary[k] for k in chain]
-        whole = flat.circle(curves, NEARLY * face.surface.size)
+        whole = _whole(face, flat, chain, arcs)
         if whole is not None:
             found += _disc_hole(whole.center, normal, whole.radius - whole.deviation - flat.off)
             continue
-        circles = (flat.circle([curve], NEARLY * face.surface.size) for curve in curves if curve.degree > 1)
-        circle = next((circle for circle in circles if circle is not None), None)
+        circle = next((arcs[k] for k in chain if arcs[k] is not None), None)
         if circle is None or not _is_beside(face, flat, circle.center):
             continue
         # All of the boundary is beyond, so that the disc is wholly in the hole.
-        least = min(_distance(flat, curve, circle.center, face.surface.size) for curve in face.boundary)
+        curves = zip(face.boundary, arcs, strict=True)
+        least = min(_distance(flat, curve, arc, circle.center) for curve, arc in curves)
         found += _disc_hole(circle.center, normal, least - flat.off)
     return found
 
@@ -118,15 +129,14 @@ def _is_beside(face: Face, flat: FlatMap, point: Array) -> bool:
     return bool(face.locate(u, v) < 0)
 
 
-def _distance(flat: FlatMap, curve: NurbsCurve, center: Array, size: float) -> float:
-    """How far a boundary curve is from a point of a face's plane, at least; 0 where that is not known."""
+def _distance(flat: FlatMap, curve: NurbsCurve, circle: Circle | None, center: Array) -> float:
+    """How far a boundary curve, an arc or not, is from a point of a face's plane, at least; 0 where nobody knows."""
     net = flat.points(curve)
     if curve.degree == 1:
         begin, way = net[:-1], np.diff(net, axis=0)
         squared = np.maximum((way**2).sum(axis=1), np.finfo(float).tiny)
         part = np.clip(((center - begin) * way).sum(axis=1) / squared, 0.0, 1.0)
         return float(np.linalg.norm(begin + part[:, None] * way - center, axis=1).min())
-    circle = flat.circle([curve], NEARLY * size)
     if circle is None:
         return 0.0
     return max(abs(circle.radius - float(np.linalg.norm(circle.center - center))) - circle.deviation, 0.0)
