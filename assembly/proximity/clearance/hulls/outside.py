@@ -18,6 +18,8 @@ __all__ = ["is_outside"]
 Array = NDArray[np.float64]
 # How far from a right angle two unit vectors are at most that count as across each other, or parallel.
 ALONG = 4e-16
+# Products that are taken at most to tell of half lines.
+MOST = 200_000_000
 
 
 def is_outside(body: BodyHulls, other: BodyHulls, normals: Array, reach: Array, apart: float, rounding: float) -> bool:
@@ -36,6 +38,8 @@ def is_outside(body: BodyHulls, other: BodyHulls, normals: Array, reach: Array, 
     rounding : float
         What heights may be off.
     """
+    if len(body.points) * len(other.of_face) * len(normals) ** 2 > MOST:
+        return False
     below = body.points @ normals.T
     beyond = (below[:, None] - reach > rounding).astype(np.float32)
     leads = (normals @ normals.T >= -ALONG).astype(np.float32)

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.clearance.hulls import outside, pair
 from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body
 from assembly.proximity.clearance.hulls.pair import answer_by_hulls
 from assembly.proximity.clearance.hulls.scene import answers_by_hulls
@@ -107,8 +108,8 @@ def test_a_least_gap_is_kept():
 
 def test_bodies_within_others_are_not_told_to_be_clear():
     big, ball = asm.shapes.box(10, 10, 10), asm.shapes.sphere(1)
-    for pair in ((big, ball), (ball, big)):
-        assert told(*pair, at(0.3, 0.2, 0.1)) is None
+    for both in ((big, ball), (ball, big)):
+        assert told(*both, at(0.3, 0.2, 0.1)) is None
     hollow = turned_part([(0, -9), (9, -9), (9, 9), (0, 9)])
     assert told(hollow, ball, at(0.3, 0.2, 0.1)) is None
     # In the bore of a tube it is outside.
@@ -177,6 +178,14 @@ def test_of_a_scene_all_pairs_or_none():
     assert found[1].bound <= 80 and found[2].bound <= 70
     assert answers_by_hulls(shapes, pairs, [0.0, 0.0, 75.0], q, TOUCHING) is None
     assert answers_by_hulls(shapes, [], [], q, TOUCHING) == []
+
+
+@pytest.mark.parametrize("room", [outside, pair])
+def test_what_takes_longer_than_cells_is_left_to_them(room, monkeypatch):
+    first, second, pose = FITS["a pin in its bore"](-0.1)
+    assert told(first, second, pose) is not None
+    monkeypatch.setattr(room, "MOST", 100)
+    assert told(first, second, pose) is None
 
 
 def test_grooves_are_not_convex():
