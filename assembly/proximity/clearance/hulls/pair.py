@@ -146,7 +146,8 @@ class _Gaps:
         inward, borders = hollow.planes()
         heights = -(self.b if is_first else self.a).reach(-inward)[face_b if is_first else face_a]
         gaps = heights - borders
-        ones = np.flatnonzero(gaps < below)
+        # The depth in a hollow is a bound, and may be less than all of these: then the least one stands for it.
+        ones = np.flatnonzero(gaps <= max(below, float(gaps.min())))
         if is_first:
             return [_Contact(inward[k], float(heights[k]), float(gaps[k])) for k in ones]
         return [_Contact(-inward[k], -float(borders[k]), float(gaps[k])) for k in ones]
@@ -261,9 +262,10 @@ def _before(contact: _Contact, part: float, shift: Array) -> _Contact:
 def _directions(a: BodyHulls, b: BodyHulls) -> Array:
     """Unit vectors along which gaps are asked, and the opposite ones.
 
-    Normals and axes of both bodies, ways across what both go around, and the way from middle to middle.
+    Normals and axes of both bodies, ways across what both go around, the way from middle to middle, and the axes of
+    the coordinates: two balls about one center have none of the others.
     """
-    ways = [a.directions, b.directions, (b.ball[0] - a.ball[0])[None]]
+    ways = [a.directions, b.directions, (b.ball[0] - a.ball[0])[None], np.eye(3)]
     centers_a, axes_a = a.centers[:LINES, None], a.axes[:LINES, None]
     centers_b, axes_b = b.centers[None, :LINES], b.axes[None, :LINES]
     if a.centers.size and b.centers.size:

@@ -110,6 +110,7 @@ def test_bodies_within_others_are_not_told_to_be_clear():
     big, ball = asm.shapes.box(10, 10, 10), asm.shapes.sphere(1)
     for both in ((big, ball), (ball, big)):
         assert told(*both, at(0.3, 0.2, 0.1)) is None
+    assert told(asm.shapes.sphere(3), ball, at(0, 0, 0)) is None
     hollow = turned_part([(0, -9), (9, -9), (9, 9), (0, 9)])
     assert told(hollow, ball, at(0.3, 0.2, 0.1)) is None
     # In the bore of a tube it is outside.
