@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import side_faces
 from assembly.constraints.packing.scene import Packed
+from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
@@ -47,6 +48,7 @@ __all__ = [
     "opening_move",
     "owned_pairs",
     "prove_end",
+    "proven_pairs",
 ]
 
 Array = NDArray[np.float64]
@@ -93,13 +95,20 @@ def owned_pairs(packed: Packed) -> list[tuple[Clearance, tuple[Body, Body], bool
     ]
 
 
-def new_proof(packed: Packed, bodies: Sequence[Body]) -> ClearanceProof:
-    """A proof of all pairs that the clearances of a packed scene keep apart."""
+def proven_pairs(
+    packed: Packed, bodies: Sequence[Body]
+) -> tuple[list[tuple[Face, ...]], list[tuple[int, int]], list[float]]:
+    """Faces of bodies, pairs of their numbers that clearances keep apart, and least gaps, as a proof takes them."""
     number = {id(body): k for k, body in enumerate(bodies)}
     owned = owned_pairs(packed)
     rows = [(number[id(a)], number[id(b)]) for _, (a, b), _ in owned]
     minimum = [0.0 if touched else item.minimum for item, _, touched in owned]
-    return ClearanceProof([side_faces(body) for body in bodies], rows, minimum)
+    return [side_faces(body) for body in bodies], rows, minimum
+
+
+def new_proof(packed: Packed, bodies: Sequence[Body]) -> ClearanceProof:
+    """A proof of all pairs that the clearances of a packed scene keep apart."""
+    return ClearanceProof(*proven_pairs(packed, bodies))
 
 
 @contextmanager

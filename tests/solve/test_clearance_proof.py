@@ -106,7 +106,8 @@ def test_what_opened_contacts_elsewhere_is_no_proof_of_more_than_touching():
     scene.constrain(asm.Clearance())
     solution = scene.solve()
     touching = solution._touching * solution._packed.scale
-    (proof,) = solution._packed.proofs
+    with lent_proof(solution._packed, scene.bodies) as proof:
+        proof.look(solution.q, touching, np.array([[0.0, 0.0, 0.5 * touching, 0.0, 0.0, 0.0]]))
     proof.moves[:] = [0.0, 0.0, 1e-3, 0.0, 0.0, 0.0]
     (pair,) = prove_end(solution)
     assert pair.proved and pair.answer.depth <= touching

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-__all__ = ["least_affine", "least_move", "least_shift", "least_similar"]
+__all__ = ["least_affine", "least_change", "least_move", "least_shift", "least_similar"]
 
 Array = NDArray[np.float64]
 # Residuals of the least squares problem, over what is asked, below which no move opens all contacts.
@@ -35,7 +35,7 @@ def least_move(normals: Array, arms: Array, asked: Array, radius: float) -> Arra
     (6,) or None
         A translation and a rotation vector about the middle of b; None where contacts hold b from all sides.
     """
-    move = _least(np.column_stack([normals, np.cross(arms, normals) / radius]), asked)
+    move = least_change(np.column_stack([normals, np.cross(arms, normals) / radius]), asked)
     if move is not None:
         move[3:] /= radius
     return move
@@ -43,7 +43,7 @@ def least_move(normals: Array, arms: Array, asked: Array, radius: float) -> Arra
 
 def least_similar(normals: Array, arms: Array, asked: Array, radius: float) -> Array | None:
     """The least x -> x + v + s x that opens contacts, in the sense of |v|^2 + R^2 s^2, as `least_affine` has it."""
-    found = _least(np.column_stack([normals, (arms * normals).sum(axis=1) / radius]), asked)
+    found = least_change(np.column_stack([normals, (arms * normals).sum(axis=1) / radius]), asked)
     return None if found is None else np.vstack([found[:3], found[3] / radius * np.eye(3)])
 
 
@@ -61,7 +61,7 @@ def least_affine(normals: Array, arms: Array, asked: Array, radius: float) -> Ar
         v and then the columns of W; None where no affine map opens all.
     """
     strains = arms[:, :, None] * normals[:, None, :] / radius
-    found = _least(np.column_stack([normals, strains.reshape(-1, 9)]), asked)
+    found = least_change(np.column_stack([normals, strains.reshape(-1, 9)]), asked)
     if found is None:
         return None
     found[3:] /= radius
@@ -70,10 +70,10 @@ def least_affine(normals: Array, arms: Array, asked: Array, radius: float) -> Ar
 
 def least_shift(normals: Array, asked: Array) -> Array | None:
     """The least translation (3,) of b that opens contacts, as `least_move` has them; None where none does."""
-    return _least(normals, asked)
+    return least_change(normals, asked)
 
 
-def _least(rates: Array, asked: Array) -> Array | None:
+def least_change(rates: Array, asked: Array) -> Array | None:
     """The shortest x with rates x >= asked, or None."""
     if asked.max() <= 0.0:
         return np.zeros(rates.shape[1])

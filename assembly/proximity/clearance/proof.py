@@ -172,6 +172,11 @@ class ClearanceProof:
         """Whether all pairs were clear at their last looks, and these were at poses (n, 7)."""
         return self._at == q.tobytes() and bool((self.fronts.pair.known == 1.0).all())
 
+    @property
+    def has_looked(self) -> bool:
+        """Whether any pair was looked at since the proof was made."""
+        return bool(self._begun.any())
+
     def forget_poses(self) -> None:
         """From now on no way leads from the last poses."""
         self.fronts.pair.known = 0.0

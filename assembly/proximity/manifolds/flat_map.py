@@ -35,6 +35,12 @@ class FlatMap:
         space = self.origin * w + pieces[..., :1] * self.along + pieces[..., 1:2] * self.across
         return np.concatenate([space, w], axis=-1)
 
+    def points(self, curve: NurbsCurve) -> Array:
+        """The Bezier points in space (n, 3) of a curve of (u, v)."""
+        net = curve.bezier_pieces().reshape(-1, 3)
+        u, v = net[:, :1] / net[:, 2:], net[:, 1:2] / net[:, 2:]
+        return np.asarray(self.origin + u * self.along + v * self.across)
+
     def circle(self, curves: Sequence[NurbsCurve], tolerance: float | None = None) -> Circle | None:
         """The circle in space that curves of (u, v), one after another, go along, to a tolerance [length]."""
         if max(curve.degree for curve in curves) < 2:

@@ -1,0 +1,189 @@
+"""Convex hulls around the faces of a body, each made of discs and points, and how far they reach along directions.
+
+A hull is that of discs, and of points as discs without a radius, each with a ball of radius `pad` around it. Along a
+unit vector n a disc with center c, axis a and radius r reaches to
+
+    n.c + r |n - (n.a) a|,
+
+a hull to the largest of these and `pad` more. A face is within each of its hulls: of control points, and of the circles
+that a cylinder, a cone, a ball or a torus is made of. It reaches no farther than the least of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import product
+from math import tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.geometry.faces.equal_shapes import first_equal
+from assembly.geometry.faces.face import Face
+from assembly.proximity.clearance.hulls.face_hulls import hulls_of_face
+from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism
+
+__all__ = ["BodyHulls", "hulls_of_body"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+# Directions and axes of one body that are taken at most: of a body of very many faces others are not tried.
+MOST = 40
+# How far a cone may be beyond a hole that it goes through, in parts of the radius of that; its own is less by that.
+NEARLY = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class BodyHulls:
+    """Hulls of a body of f faces, in some axes.
+
+    Attributes
+    ----------
+    discs : Discs
+        Of all hulls, one hull after another.
+    first : (h,) of int
+        Where each hull begins among the discs.
+    pad : (h,)
+    of_face : (f,) of int
+        Where each face begins among the hulls.
+    points, owner : (p, 3), (p,) of int
+        Points that are on faces, corners among them, and the face of each.
+    hollows : tuple of (int, Hollow or Prism)
+        Convex sets into whose inside no point of a face goes, with the face.
+    directions : (d, 3)
+        Normals of flat faces and axes, up to their senses.
+    centers, axes : (r, 3)
+        Lines that faces go around; the axis of a ball is zero.
+    """
+
+    discs: Discs
+    first: Table
+    pad: Array
+    of_face: Table
+    points: Array
+    owner: Table
+    hollows: tuple[tuple[int, Hollow | Prism], ...]
+    directions: Array
+    centers: Array
+    axes: Array
+
+    def reach(self, normals: Array) -> Array:
+        """How far every face reaches along unit vectors (k, 3), at most: (f, k)."""
+        rows = self.discs.reach(normals)
+        return np.minimum.reduceat(np.maximum.reduceat(rows, self.first) + self.pad[:, None], self.of_face)
+
+    def within(self, hollow: Hollow | Prism) -> Array:
+        """How far every face is from the border of a hollow that it is within, at least: (f,); below zero outside."""
+        rows = hollow.depth(self.discs)
+        return np.maximum.reduceat(np.minimum.reduceat(rows, self.first) - self.pad, self.of_face)
+
+    def posed(self, turn: Array, shift: Array) -> BodyHulls:
+        """The same in other axes: x -> turn x + shift."""
+        return BodyHulls(
+            self.discs.posed(turn, shift),
+            self.first,
+            self.pad,
+            self.of_face,
+            self.points @ turn.T + shift,
+            self.owner,
+            tuple((face, hollow.posed(turn, shift)) for face, hollow in self.hollows),
+            self.directions @ turn.T,
+            self.centers @ turn.T + shift,
+            self.axes @ turn.T,
+        )
+
+    def scaled(self, part: float, shift: Array) -> BodyHulls:
+        """The same after x -> (1 - part) x + shift."""
+        left = 1.0 - part
+        return BodyHulls(
+            Discs(left * self.discs.centers + shift, self.discs.axes, left * self.discs.radii),
+            self.first,
+            left * self.pad,
+            self.of_face,
+            left * self.points + shift,
+            self.owner,
+            tuple((face, hollow.scaled(left, shift)) for face, hollow in self.hollows),
+            self.directions,
+            left * self.centers + shift,
+            self.axes,
+        )
+
+    @cached_property
+    def ball(self) -> tuple[Array, float]:
+        """Center and radius of a ball around all of the body."""
+        centers = self.discs.centers
+        middle = 0.5 * (centers.min(axis=0) + centers.max(axis=0))
+        beside = np.diff(np.append(self.first, len(centers)))
+        away = np.linalg.norm(centers - middle, axis=1) + self.discs.radii + np.repeat(self.pad, beside)
+        return middle, float(away.max())
+
+
+def hulls_of_body(faces: tuple[Face, ...]) -> BodyHulls:
+    """The hulls of a body's faces, in its own axes; equal shapes share them."""
+    return _made_of(first_equal(faces))
+
+
+@lru_cache(maxsize=256)
+def _made_of(faces: tuple[Face, ...]) -> BodyHulls:
+    by_face = [hulls_of_face(face) for face in faces]
+    found = [part for parts in by_face for part in parts]
+    hulls = [hull for face in found for hull in face.hulls]
+    sizes = [len(discs.radii) for discs, _ in hulls]
+    counts = [len(face.hulls) for face in found]
+    return BodyHulls(
+        Discs(*(np.concatenate(column) for column in zip(*(discs for discs, _ in hulls), strict=True))),
+        np.append(0, np.cumsum(sizes)[:-1]),
+        np.array([pad for _, pad in hulls]),
+        np.append(0, np.cumsum(counts)[:-1]),
+        np.concatenate([face.points for face in found]),
+        np.repeat(np.arange(len(found)), [len(face.points) for face in found]),
+        tuple(
+            (number, hollow) for number, face in enumerate(found) for hollow in (*face.hollows, *_seats(face, found))
+        ),
+        distinct([face.direction for face in found if face.direction is not None]),
+        *_lines(found),
+    )
+
+
+def _seats(face: FaceHulls, others: list[FaceHulls]) -> list[Hollow]:
+    """Cones of other faces that go through a round hole of a flat face: the face is beyond them as well."""
+    if face.direction is None or face.line is not None:
+        return []
+    found = []
+    holes = [hole for hole in face.hollows if isinstance(hole, Hollow)]
+    cones = [cone for other in others for cone in other.hollows if isinstance(cone, Hollow) and cone.slope > 0.0]
+    for hole, cone in product(holes, cones):
+        away = hole.center - cone.center
+        height = float(away @ cone.axis)
+        lean = float(np.linalg.norm(np.cross(hole.axis, cone.axis)))
+        off = float(np.linalg.norm(away - height * cone.axis)) + 4.0 * lean * (abs(height) + hole.radius)
+        beyond = off + cone.radius + height * tan(cone.slope) - hole.radius
+        if cone.is_wall and height > 0.0 and beyond < NEARLY * hole.radius:
+            found.append(cone._replace(radius=cone.radius - max(beyond, 0.0)))
+    return found
+
+
+def distinct(vectors: list[Array]) -> Array:
+    """Vectors (n, 3) without those that are others, or others turned around; so many at most."""
+    rows = np.array(vectors).reshape(-1, 3)
+    kept: list[int] = []
+    for k in range(len(rows)):
+        mine = rows[kept]
+        if not ((mine == rows[k]).all(axis=1) | (mine == -rows[k]).all(axis=1)).any():
+            kept.append(k)
+        if len(kept) == MOST:
+            break
+    return rows[kept]
+
+
+def _lines(found: list[FaceHulls]) -> tuple[Array, Array]:
+    """Centers and axes of what faces go around, each line once; so many at most."""
+    lines: list[tuple[Array, Array]] = []
+    for line in (face.line for face in found if face.line is not None):
+        if len(lines) == MOST:
+            break
+        off = [(line[0] - center, axis) for center, axis in lines if (axis == line[1]).all()]
+        if not any(np.linalg.norm(away - (away @ axis) * axis) == 0.0 for away, axis in off):
+            lines.append(line)
+    return np.array([line[0] for line in lines]).reshape(-1, 3), np.array([line[1] for line in lines]).reshape(-1, 3)

@@ -1,0 +1,142 @@
+"""Hulls of flat faces, in triangles where these are polygons that are not convex, and their holes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.geometry.faces.face import Face
+from assembly.geometry.recognition.curves import Circle
+from assembly.geometry.splines.curve import NurbsCurve
+from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, parts_of_one
+from assembly.proximity.clearance.hulls.triangles import triangles_of
+from assembly.proximity.manifolds.flat_map import FlatMap
+
+__all__ = ["hulls_of_flat"]
+
+Array = NDArray[np.float64]
+# Of every curve of a boundary the circle that it is on, or None.
+Arcs = list[Circle | None]
+# How far a corner of a polygon that counts as convex may be beyond its sides, in parts of the face's size.
+CONVEX = 1e-13
+# How near to a circle an arc of a boundary is, in parts of the face's size; it is added to or taken from its radius.
+NEARLY = 1e-10
+
+
+def hulls_of_flat(face: Face, flat: FlatMap, normal: Array, points: Array) -> list[FaceHulls]:
+    """What is known of a flat face: in triangles where it is a polygon that is not convex."""
+    corners = _corners(face, flat)
+    if corners is not None and not face.holes:
+        inward = _inward(corners, normal)
+        if (inward @ corners.T - (inward * corners).sum(axis=1)[:, None] < -CONVEX * face.surface.size).any():
+            triangles = [(Discs.of_points(corners[list(rows)]), flat.off) for rows in triangles_of(corners, normal)]
+            return parts_of_one([FaceHulls([triangle], [], points, normal, None) for triangle in triangles])
+    tolerance = NEARLY * face.surface.size
+    arcs = [flat.circle([curve], tolerance) for curve in face.boundary] if face.outer is not None or face.holes else []
+    return [FaceHulls(_of_flat(face, flat, arcs), _holes(face, flat, normal, arcs), points, normal, None)]
+
+
+def _whole(face: Face, flat: FlatMap, chain: range, arcs: Arcs) -> Circle | None:
+    """The circle that all of a chain of a boundary is."""
+    if len(chain) == 1:
+        return arcs[chain[0]]
+    if any(arcs[k] is None for k in chain):
+        return None
+    return flat.circle([face.boundary[k] for k in chain], NEARLY * face.surface.size)
+
+
+def _corners(face: Face, flat: FlatMap, chain: int = 0) -> Array | None:
+    """The corners in space (n, 3) of a chain of a flat face's boundary, or None where that has parts that are bent."""
+    if face.outer is None and chain == 0:
+        return None
+    curves = [face.boundary[k] for k in face.chains[chain]]
+    if any(curve.degree > 1 for curve in curves):
+        return None
+    # Each curve ends where the next one begins.
+    return np.concatenate([flat.points(curve)[::2] for curve in curves])
+
+
+def _inward(corners: Array, normal: Array) -> Array:
+    """Unit vectors to the left of a polygon's sides (n, 3), seen against its normal; zero of one without length."""
+    ways = np.cross(normal, np.roll(corners, -1, axis=0) - corners)
+    lengths = np.linalg.norm(ways, axis=1)
+    return np.asarray(ways / np.where(lengths > 0.0, lengths, 1.0)[:, None])
+
+
+def _of_flat(face: Face, flat: FlatMap, arcs: Arcs) -> list[tuple[Discs, float]]:
+    """Hulls of a flat face: of the control points of what goes around it, or of its circles and what is not round."""
+    surface = face.surface
+    if face.outer is None:
+        return [(Discs.of_points(surface.control_points.reshape(-1, 3)), 0.0)]
+    whole = _whole(face, flat, face.chains[0], arcs)
+    if whole is not None:
+        return [(_disc(whole), whole.deviation + flat.off)]
+    nets = [flat.points(face.boundary[k]) for k in face.chains[0]]
+    circles = [arcs[k] for k in face.chains[0]]
+    hulls = [(Discs.of_points(np.concatenate(nets)), flat.off)]
+    if any(circle is not None for circle in circles):
+        parts = [
+            Discs.of_points(net) if circle is None else _disc(circle) for net, circle in zip(nets, circles, strict=True)
+        ]
+        pad = max(circle.deviation for circle in circles if circle is not None) + flat.off
+        hulls.append((Discs(*(np.concatenate(column) for column in zip(*parts, strict=True))), pad))
+    return hulls
+
+
+def _disc(circle: Circle) -> Discs:
+    return Discs(circle.center[None], circle.axis[None], np.array([circle.radius]))
+
+
+def _holes(face: Face, flat: FlatMap, normal: Array, arcs: Arcs) -> list[Hollow | Prism]:
+    """The holes of a flat face that are convex polygons; of others with an arc the largest disc about its middle."""
+    found: list[Hollow | Prism] = []
+    for number, chain in enumerate(face.chains[1:] if face.holes else (), 1):
+        corners = _corners(face, flat, number)
+        if corners is not None:
+            found += _prism(corners, normal, face.surface.size, flat.off)
+            continue
+        whole = _whole(face, flat, chain, arcs)
+        if whole is not None:
+            found += _disc_hole(whole.center, normal, whole.radius - whole.deviation - flat.off)
+            continue
+        circle = next((arcs[k] for k in chain if arcs[k] is not None), None)
+        if circle is None or not _is_beside(face, flat, circle.center):
+            continue
+        # All of the boundary is beyond, so that the disc is wholly in the hole.
+        curves = zip(face.boundary, arcs, strict=True)
+        least = min(_distance(flat, curve, arc, circle.center) for curve, arc in curves)
+        found += _disc_hole(circle.center, normal, least - flat.off)
+    return found
+
+
+def _disc_hole(center: Array, normal: Array, radius: float) -> list[Hollow | Prism]:
+    return [Hollow(center, normal, radius)] if radius > 0.0 else []
+
+
+def _prism(corners: Array, normal: Array, size: float, off: float) -> list[Hollow | Prism]:
+    """The hole with these corners, which go around it clockwise, if it is convex."""
+    inward = -_inward(corners, normal)
+    inward, borders = inward[inward.any(axis=1)], (inward * corners).sum(axis=1)[inward.any(axis=1)]
+    if (inward @ corners.T - borders[:, None] < -CONVEX * size).any():
+        return []
+    return [Prism(normal, inward, borders + off)]
+
+
+def _is_beside(face: Face, flat: FlatMap, point: Array) -> bool:
+    """Whether a point of a flat face's plane is none of the face."""
+    ways = np.column_stack([flat.along, flat.across])
+    u, v = np.linalg.lstsq(ways, point - flat.origin, rcond=None)[0].tolist()
+    return bool(face.locate(u, v) < 0)
+
+
+def _distance(flat: FlatMap, curve: NurbsCurve, circle: Circle | None, center: Array) -> float:
+    """How far a boundary curve, an arc or not, is from a point of a face's plane, at least; 0 where nobody knows."""
+    net = flat.points(curve)
+    if curve.degree == 1:
+        begin, way = net[:-1], np.diff(net, axis=0)
+        squared = np.maximum((way**2).sum(axis=1), np.finfo(float).tiny)
+        part = np.clip(((center - begin) * way).sum(axis=1) / squared, 0.0, 1.0)
+        return float(np.linalg.norm(begin + part[:, None] * way - center, axis=1).min())
+    if circle is None:
+        return 0.0
+    return max(abs(circle.radius - float(np.linalg.norm(circle.center - center))) - circle.deviation, 0.0)

@@ -1,0 +1,171 @@
+"""Discs, what hulls are made of, and hollows: convex sets into which a face does not go."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Discs", "FaceHulls", "Hollow", "Prism", "parts_of_one"]
+
+Array = NDArray[np.float64]
+
+
+class Discs(NamedTuple):
+    """Discs, and points as discs without a radius, whose axes are zero: centers, axes (m, 3), radii (m,)."""
+
+    centers: Array
+    axes: Array
+    radii: Array
+
+    @classmethod
+    def of_points(cls, points: Array) -> Discs:
+        """Points (m, 3)."""
+        return cls(points, np.zeros_like(points), np.zeros(len(points)))
+
+    def reach(self, normals: Array) -> Array:
+        """How far each reaches along unit vectors (k, 3): (m, k)."""
+        far: Array = self.centers @ normals.T
+        (wide,) = np.nonzero(self.radii)
+        if len(wide):
+            axes = self.axes[wide]
+            # The part across the axis, and not the root of what is left of one, which is off by 1e-8 at zero.
+            across = normals - (axes @ normals.T)[..., None] * axes[:, None]
+            far[wide] += self.radii[wide, None] * np.sqrt((across**2).sum(axis=2))
+        return far
+
+    def posed(self, turn: Array, shift: Array) -> Discs:
+        """The same after x -> turn x + shift."""
+        return Discs(self.centers @ turn.T + shift, self.axes @ turn.T, self.radii)
+
+
+class Hollow(NamedTuple):
+    """A convex set: what is within a cylinder, one side of a cone, d(x) <= radius + h(x) tan(slope), or a ball.
+
+    Attributes
+    ----------
+    center, axis : (3,)
+        h(x) is the height along the axis over the center, d(x) the distance from it. The axis of a ball is zero.
+    radius : float
+    slope : float
+        Half the angle of a cone, whose radius grows along the axis [rad].
+    is_wall : bool
+        Whether the body is outside of it: nothing is in contact with a face from within the body.
+    """
+
+    center: Array
+    axis: Array
+    radius: float
+    slope: float = 0.0
+    is_wall: bool = True
+
+    def depth(self, discs: Discs) -> Array:
+        """How far discs (m,) are within, at least; below zero where they may not be."""
+        away = discs.centers - self.center
+        if not self.axis.any():
+            height = (away * discs.axes).sum(axis=1)
+            beside = np.sqrt(((away - height[:, None] * discs.axes) ** 2).sum(axis=1))
+            return np.asarray(self.radius - np.hypot(beside + discs.radii, height))
+        height = away @ self.axis
+        beside = np.sqrt(((away - height[:, None] * self.axis) ** 2).sum(axis=1))
+        lean = discs.axes - (discs.axes @ self.axis)[:, None] * self.axis
+        lowest = height - discs.radii * np.sqrt((lean**2).sum(axis=1))
+        inside = (self.radius - beside - discs.radii) * cos(self.slope)
+        return np.asarray(inside + lowest * sin(self.slope))
+
+    def depth_of(self, points: Array) -> Array:
+        """How far points (m, 3) are within."""
+        return self.depth(Discs.of_points(points))
+
+    def planes(self, count: int = 12) -> tuple[Array, Array]:
+        """Some half spaces that it is in: unit vectors inward (count, 3), and the heights of their borders."""
+        if not self.axis.any():
+            ways = _SPHERE
+            return -ways, -ways @ self.center - self.radius
+        across = np.cross(self.axis, np.eye(3)[np.abs(self.axis).argmin()])
+        across /= np.linalg.norm(across)
+        angle = 2.0 * pi / count * np.arange(count)[:, None]
+        around = np.cos(angle) * across + np.sin(angle) * np.cross(self.axis, across)
+        inward = sin(self.slope) * self.axis - cos(self.slope) * around
+        return inward, inward @ self.center - self.radius * cos(self.slope)
+
+    def posed(self, turn: Array, shift: Array) -> Hollow:
+        """The same after x -> turn x + shift."""
+        return self._replace(center=turn @ self.center + shift, axis=turn @ self.axis)
+
+    def scaled(self, left: float, shift: Array) -> Hollow:
+        """The same after x -> left x + shift."""
+        return self._replace(center=left * self.center + shift, radius=left * self.radius)
+
+
+class Prism(NamedTuple):
+    """What is within a polygon that is convex, and before and behind it.
+
+    Attributes
+    ----------
+    axis : (3,)
+        Across the polygon.
+    inward, borders : (n, 3), (n,)
+        Of each side, a unit vector from it into the polygon, and its height along that.
+    """
+
+    axis: Array
+    inward: Array
+    borders: Array
+    slope: float = 0.0
+    is_wall: bool = True
+
+    def depth(self, discs: Discs) -> Array:
+        """How far discs (m,) are within, at least; below zero where they may not be."""
+        return np.asarray((-discs.reach(-self.inward) - self.borders).min(axis=1))
+
+    def depth_of(self, points: Array) -> Array:
+        """How far points (m, 3) are within."""
+        return self.depth(Discs.of_points(points))
+
+    def planes(self) -> tuple[Array, Array]:
+        """The half spaces that it is in: unit vectors inward, and the heights of their borders."""
+        return self.inward, self.borders
+
+    def posed(self, turn: Array, shift: Array) -> Prism:
+        """The same after x -> turn x + shift."""
+        inward = self.inward @ turn.T
+        return self._replace(axis=turn @ self.axis, inward=inward, borders=self.borders + inward @ shift)
+
+    def scaled(self, left: float, shift: Array) -> Prism:
+        """The same after x -> left x + shift."""
+        return self._replace(borders=left * self.borders + self.inward @ shift)
+
+
+_SPHERE = np.array([[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z], dtype=float)
+_SPHERE /= np.linalg.norm(_SPHERE, axis=1, keepdims=True)
+
+
+class FaceHulls(NamedTuple):
+    """What is known of a face.
+
+    Attributes
+    ----------
+    hulls : list of (Discs, float)
+        Each with the radius of a ball around all of it.
+    hollows : list of Hollow or Prism
+    points : (p, 3)
+        Points of it.
+    direction : (3,) or None
+        Its normal if it is flat, or its axis.
+    line : (center, axis) or None
+        What it goes around; the axis of a ball is zero.
+    """
+
+    hulls: list[tuple[Discs, float]]
+    hollows: list[Hollow | Prism]
+    points: Array
+    direction: Array | None
+    line: tuple[Array, Array] | None
+
+
+def parts_of_one(parts: list[FaceHulls]) -> list[FaceHulls]:
+    """Parts of one face, which is connected: of all but the first one point of it is enough."""
+    return [parts[0], *(part._replace(points=part.points[:1]) for part in parts[1:])]

@@ -1,0 +1,168 @@
+"""Hulls of faces hold samples of these, and no sample is in a hollow; depths of discs are bounds of sampled ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from assembly.geometry.shapes.plane_curves import circle
+from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body
+from assembly.proximity.clearance.hulls.hollows import Discs, Hollow, Prism
+from assembly.proximity.clearance.hulls.triangles import triangles_of
+from tests.proximity.clearance.scenes import direction, faces_of
+from tests.studies.machined import bolt, socket, turned_part
+
+# Of coordinates of up to 60.
+OFF = 2e-12
+GROOVE = [(-30, -20), (30, -20), (30, 0), (10, 0), (14.6, -8), (-14.6, -8), (-10, 0), (-30, 0)]
+
+
+def polygon(corners):
+    return [asm.NurbsCurve([p, q], [0, 0, 1, 1], 1) for p, q in zip(corners, corners[1:] + corners[:1], strict=True)]
+
+
+def square_hole(at=4.0):
+    return polygon([(at, -2.0), (at, 2.0), (at + 5.0, 2.0), (at + 5.0, -2.0)])
+
+
+def slotted():
+    """A plate with a slot between half circles, whose hole is no circle."""
+    half = np.sqrt(0.5)
+    ends = [
+        asm.NurbsCurve(points, [0, 0, 0, 1, 1, 2, 2, 2], 2, [1, half, 1, half, 1])
+        for points in (
+            [(3, -2), (5, -2), (5, 0), (5, 2), (3, 2)],
+            [(-3, 2), (-5, 2), (-5, 0), (-5, -2), (-3, -2)],
+        )
+    ]
+    sides = [asm.NurbsCurve(ends_of, [0, 0, 1, 1], 1) for ends_of in ([(3, 2), (-3, 2)], [(-3, -2), (3, -2)])]
+    loop = [ends[0], sides[0], ends[1], sides[1]]
+    return asm.shapes.extrusion(polygon([(-20, -10), (20, -10), (20, 10), (-20, 10)]), 6.0, [loop])
+
+
+SHAPES = {
+    "plate": asm.shapes.plate(60, 40, 10, [(0, 0, 4.5), (10, 5, 2.0)]),
+    "pin": asm.shapes.solid_cylinder(4, 40),
+    "bolt": bolt(4, 30, 6.5, 8),
+    "socket": socket(10, 18, 16),
+    "seat": turned_part([(5, -8.66), (25, -8.66), (25, 0), (10, 0)]),
+    "ball": asm.shapes.sphere(4),
+    "torus": asm.shapes.torus(6.0, 1.5),
+    "groove": asm.shapes.extrusion(polygon(GROOVE), 30.0),
+    "square hole": asm.shapes.extrusion([circle(12.0)], 5.0, [square_hole()]),
+    "slot": slotted(),
+}
+
+
+def samples(face):
+    """Points of a face, on a grid."""
+    (u0, u1), (v0, v1) = face.surface.domain
+    u, v = (grid.ravel() for grid in np.meshgrid(np.linspace(u0, u1, 23), np.linspace(v0, v1, 23)))
+    mine = face.contains(u, v)
+    return face.surface.evaluate(u[mine], v[mine])
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_face_is_within_its_hulls(name):
+    rng = np.random.default_rng(1)
+    normals = np.array([*np.eye(3), *-np.eye(3), *(direction(rng) for _ in range(60))])
+    for face in faces_of(SHAPES[name]):
+        points = samples(face)
+        assert len(points) > 3
+        reach = hulls_of_body((face,)).reach(normals)
+        within = (points @ normals.T <= reach[:, None] + OFF).all(axis=2)
+        assert within.any(axis=0).all(), face
+        # And no hull is much larger: along one of these at least a part ends where the face does.
+        assert (reach.max(axis=0) - (points @ normals.T).max(axis=0)).min() < 1e-9, face
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_no_point_of_a_face_is_in_its_hollows(name):
+    for face in faces_of(SHAPES[name]):
+        for number, hollow in hulls_of_body((face,)).hollows:
+            assert number >= 0
+            assert hollow.depth_of(samples(face)).max() <= OFF, face
+
+
+def test_a_flat_face_is_beside_the_cone_that_goes_through_its_hole():
+    faces = faces_of(SHAPES["seat"])
+    hulls = hulls_of_body(faces)
+    cones = [(k, hollow) for k, hollow in hulls.hollows if hollow.slope > 0.0]
+    # The seat itself, the top around it, and the bottom.
+    assert len(cones) == 3
+    for number, cone in cones:
+        assert cone.depth_of(samples(faces[number])).max() <= 1e-8
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_points_are_of_the_face(name):
+    """Each is within a hull, and beside every hollow."""
+    rng = np.random.default_rng(5)
+    normals = np.array([*np.eye(3), *-np.eye(3), *(direction(rng) for _ in range(60))])
+    for face in faces_of(SHAPES[name]):
+        hulls = hulls_of_body((face,))
+        assert (hulls.points @ normals.T <= hulls.reach(normals)[:, None] + OFF).all(axis=2).any(axis=0).all()
+        for _, hollow in hulls.hollows:
+            assert hollow.depth_of(hulls.points).max() <= OFF
+
+
+@pytest.mark.parametrize(
+    "hollow",
+    [
+        Hollow(np.array([0.3, 0.1, -0.2]), np.array([0.0, 0.0, 1.0]), 2.0),
+        Hollow(np.array([0.3, 0.1, -5.0]), np.array([0.0, 0.6, 0.8]), 0.0, 0.7),
+        Hollow(np.array([0.3, 0.1, -0.2]), np.zeros(3), 2.5),
+        Prism(np.array([0.0, 0.0, 1.0]), np.array([[1.0, 0, 0], [0, 1, 0], [-0.6, -0.8, 0]]), np.array([-2.0, -2, -2])),
+    ],
+    ids=["cylinder", "cone", "ball", "prism"],
+)
+def test_depths_of_discs_are_bounds(hollow):
+    rng = np.random.default_rng(2)
+    angle = np.linspace(0.0, 2.0 * np.pi, 200)
+    inside = 0
+    for _ in range(60):
+        center, axis, radius = 0.5 * rng.normal(size=3), direction(rng), rng.uniform(0.1, 0.8)
+        across = np.linalg.svd(axis[None])[2][1:]
+        rim = center + radius * (np.cos(angle)[:, None] * across[0] + np.sin(angle)[:, None] * across[1])
+        depth = hollow.depth(Discs(center[None], axis[None], np.array([radius])))[0]
+        sampled = hollow.depth_of(rim).min()
+        assert depth <= sampled + 1e-14
+        # Within by the half spaces as well.
+        inward, borders = hollow.planes()
+        if depth > 0.0:
+            inside += 1
+            assert (rim @ inward.T >= borders - 1e-12).all()
+    assert inside > 5
+
+
+def test_poses_and_scales_move_all_of_it():
+    rng = np.random.default_rng(3)
+    turn, shift = Rotation.random(random_state=4).as_matrix(), rng.normal(size=3)
+    normals = np.array([direction(rng) for _ in range(9)])
+    for shape in SHAPES.values():
+        hulls = hulls_of_body(faces_of(shape))
+        posed, scaled = hulls.posed(turn, shift), hulls.scaled(0.25, shift)
+        assert posed.reach(normals) == pytest.approx(hulls.reach(normals @ turn) + normals @ shift, abs=OFF)
+        assert scaled.reach(normals) == pytest.approx(0.75 * hulls.reach(normals) + normals @ shift, abs=OFF)
+        points = 9.0 * rng.normal(size=(20, 3))
+        for (_, one), (_, two), (_, three) in zip(hulls.hollows, posed.hollows, scaled.hollows, strict=True):
+            depth = one.depth_of(points)
+            assert two.depth_of(points @ turn.T + shift) == pytest.approx(depth, abs=OFF)
+            assert three.depth_of(0.75 * points + shift) == pytest.approx(0.75 * depth, abs=OFF)
+
+
+@pytest.mark.parametrize("corners", [GROOVE, [(0, 0), (4, 0), (4, 1), (2, 1), (1, 1), (1, 3), (0, 3)]])
+def test_triangles_are_the_polygon(corners):
+    flat = np.column_stack([np.array(corners, dtype=float), np.zeros(len(corners))])
+    parts = triangles_of(flat, np.array([0.0, 0.0, 1.0]))
+    assert all(len(part) == 3 for part in parts)
+
+    def area(rows):
+        x, y = flat[list(rows), 0], flat[list(rows), 1]
+        return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+    areas = [area(part) for part in parts]
+    assert min(areas) >= 0.0
+    assert sum(areas) == pytest.approx(area(range(len(flat))), rel=1e-12)

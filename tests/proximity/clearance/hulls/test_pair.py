@@ -1,0 +1,196 @@
+"""What hulls tell of two bodies is so, by judges of closed form; of bodies that fit each other they tell it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from assembly.kinematics.pose import rotation_matrix
+from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.clearance.hulls import outside, pair
+from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body
+from assembly.proximity.clearance.hulls.pair import answer_by_hulls
+from assembly.proximity.clearance.hulls.scene import answers_by_hulls
+from tests.proximity.clearance.hulls.test_face_hulls import GROOVE, polygon, square_hole
+from tests.proximity.clearance.scenes import at, faces_of, poses, proof_of, start_of
+from tests.studies.machined import bolt, socket, turned_part
+from tests.validation import exact_solids as exact
+from tests.validation.crossing_judge import Motion, crossing_depth
+
+TOUCHING = 1e-7
+PLATE = asm.shapes.plate(60, 40, 10, [(0, 0, 4.0)])
+
+
+def dovetail(wider=0.0):
+    t = 8.0 / np.tan(np.radians(60.0))
+    groove = [(-30, -20), (30, -20), (30, 0), (10, 0), (10 + t, -8), (-10 - t, -8), (-10, 0), (-30, 0)]
+    tail = [(-10 - t - wider, -8), (10 + t + wider, -8), (10 + wider, 0), (10, 6), (-10, 6), (-10 - wider, 0)]
+    return asm.shapes.extrusion(polygon(groove), 120.0), asm.shapes.extrusion(polygon(tail), 40.0)
+
+
+def plug(thicker=0.0):
+    seat = turned_part([(5, -5 * 3**0.5), (25, -5 * 3**0.5), (25, 0), (10, 0)])
+    s = 3**0.5
+    return seat, turned_part([(0, -4 * s), (6 + thicker, -4 * s), (12 + thicker, 2 * s), (0, 2 * s)])
+
+
+FITS = {
+    "plates": lambda off: (PLATE, PLATE, at(5, 3, 10 - off)),
+    "a pin in its bore": lambda off: (PLATE, asm.shapes.solid_cylinder(4 + off, 40), at(0, 0, 4)),
+    "a pin no longer than its bore": lambda off: (PLATE, asm.shapes.solid_cylinder(4 + off, 10), at(0, 0, 0)),
+    "a bore over its pin": lambda off: (asm.shapes.solid_cylinder(4 + off, 40), PLATE, at(0, 0, 4)),
+    "a bolt on its plate": lambda off: (PLATE, bolt(4 + off, 30, 6.5, 8), at(0, 0, 5)),
+    "a ball in its socket": lambda off: (socket(10, 18, 16), asm.shapes.sphere(10 + off), at(0, 0, 0)),
+    "a plug in its seat": lambda off: (*plug(2.0 * off), at(0, 0, 0)),
+    "a dovetail": lambda off: (*dovetail(2.0 * off), at(0, 0, 3)),
+    "a block in a square hole": lambda off: (
+        asm.shapes.extrusion(polygon([(-20, -20), (20, -20), (20, 20), (-20, 20)]), 9.0, [square_hole(-2.5)]),
+        asm.shapes.box(5 + 2 * off, 4 + 2 * off, 30),
+        at(0, 0, 2),
+    ),
+    "a cylinder on two flanks": lambda off: (
+        asm.shapes.extrusion(polygon([(-25, -20), (25, -20), (25, 12), (16, 12), (0, -4), (-16, 12), (-25, 12)]), 60.0),
+        asm.shapes.solid_cylinder(10 + off, 80),
+        at(0, -4 + 10 * 2**0.5, 0),
+    ),
+}
+
+
+def told(first, second, pose, touching=TOUCHING, least=0.0):
+    hulls = hulls_of_body(faces_of(second)).posed(rotation_matrix(pose[3:]), pose[:3])
+    return answer_by_hulls(hulls_of_body(faces_of(first)), hulls, least, touching)
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_bodies_that_fit_touch(name):
+    answer = told(*FITS[name](0.0))
+    assert answer is not None and answer.verdict is Verdict.TOUCHING
+    assert 0.0 < answer.depth <= TOUCHING
+    # Their boundaries are no nearer than the opened ones, less what was moved.
+    assert answer.bound <= 1e-12
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_bodies_that_are_too_large_are_not_told_to_touch(name):
+    assert told(*FITS[name](8.0 * TOUCHING)) is None
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_bodies_with_play_are_clear_and_proven_so(name):
+    play = 0.05
+    first, second, pose = FITS[name](-play)
+    if name == "a cylinder on two flanks":
+        # A smaller one stays on one of them.
+        pose = pose + [0.0, play, 0.0, 0.0, 0.0, 0.0, 0.0]
+    if name in ("a bolt on its plate", "a dovetail"):
+        # The head and the floor still touch.
+        pose = pose + ([0, 0, play, 0, 0, 0, 0] if "bolt" in name else [0, 0.25 * play, 0, 0, 0, 0, 0])
+    answer = told(first, second, pose)
+    assert answer is not None and answer.verdict is Verdict.CLEAR and answer.bound > 0.0
+    (proven,) = proof_of(first, second).look(poses(pose), TOUCHING)
+    # Cells of a cone in its seat are more than a proof may take.
+    assert proven.verdict is (Verdict.UNDECIDED if name == "a plug in its seat" else Verdict.CLEAR)
+
+
+def test_without_touching_nothing_touches():
+    assert all(told(*FITS[name](0.0), touching=0.0) is None for name in FITS)
+
+
+def test_a_least_gap_is_kept():
+    answer = told(PLATE, PLATE, at(5, 3, 10.5), least=0.5)
+    assert answer is not None and answer.verdict is Verdict.TOUCHING and answer.bound == pytest.approx(0.5, abs=1e-12)
+    answer = told(PLATE, PLATE, at(5, 3, 10.5), least=0.4)
+    assert answer is not None and answer.verdict is Verdict.CLEAR and 0.4 < answer.bound <= 0.5
+    assert told(PLATE, PLATE, at(5, 3, 10.5), least=0.6) is None
+
+
+def test_bodies_within_others_are_not_told_to_be_clear():
+    big, ball = asm.shapes.box(10, 10, 10), asm.shapes.sphere(1)
+    for both in ((big, ball), (ball, big)):
+        assert told(*both, at(0.3, 0.2, 0.1)) is None
+    assert told(asm.shapes.sphere(3), ball, at(0, 0, 0)) is None
+    hollow = turned_part([(0, -9), (9, -9), (9, 9), (0, 9)])
+    assert told(hollow, ball, at(0.3, 0.2, 0.1)) is None
+    # In the bore of a tube it is outside.
+    tube = turned_part([(4, -9), (9, -9), (9, 9), (4, 9)])
+    answer = told(tube, ball, at(0.3, 0.2, 0.1))
+    assert answer is not None and answer.verdict is Verdict.CLEAR and answer.bound <= 4 - 1 - np.hypot(0.3, 0.2)
+
+
+def test_random_pairs_are_judged(cases):
+    """Whatever may be moved so that hulls tell something: what bodies have in common is no deeper than that."""
+    seen = {None: 0, Verdict.CLEAR: 0, Verdict.TOUCHING: 0}
+    for number in range(20, 20 + cases(20, 400)):
+        begin = start_of(number)
+        motion = Motion.of(begin.pose)
+        depth = crossing_depth(begin.a, begin.b, motion)
+        for touching in (1e-9, 1e-2):
+            answer = told(begin.a.shape, begin.b.shape, begin.pose, touching * begin.size)
+            seen[None if answer is None else answer.verdict] += 1
+            assert answer is None or depth <= answer.depth + 1e-13, begin
+    assert all(seen.values()), seen
+
+
+PARTS = {
+    "plate": exact.plate(3.0, 2.0, 0.3, [(-0.7, 0.0, 0.5), (0.7, 0.1, 0.4)]),
+    "pin": exact.pin(0.4, 1.2),
+    "short pin": exact.pin(0.4, 0.2),
+    "L": exact.polygonal([(-0.6, -0.6), (0.6, -0.6), (0.6, -0.2), (-0.2, -0.2), (-0.2, 0.6), (-0.6, 0.6)], 0.5, "L"),
+    "box": exact.box(0.4, 0.8, 0.5),
+    "tube": exact.tube(0.5, 0.4, 1.0),
+    "ball": exact.ball(0.4),
+}
+NEAR = {
+    ("plate", "pin"): (0.7, 0.1, 0.1),
+    ("plate", "short pin"): (0.7, 0.1, 0.0),
+    ("plate", "tube"): (-0.7, 0.0, 0.2),
+    ("L", "box"): (0.0, 0.2, 0.1),
+    ("tube", "pin"): (0.0, 0.0, 0.2),
+    ("tube", "ball"): (0.0, 0.0, 0.1),
+    ("plate", "box"): (0.1, 0.3, 0.4),
+}
+
+
+@pytest.mark.parametrize("names", NEAR)
+def test_pairs_that_all_but_fit_are_judged(names, cases):
+    """Moved and turned by about as much as may be opened."""
+    rng = np.random.default_rng(6)
+    one, other = (PARTS[name] for name in names)
+    found = 0
+    for _ in range(cases(6, 200)):
+        t = 10.0 ** rng.uniform(-4, -1.5)
+        turn = Rotation.from_rotvec(0.3 * t * rng.normal(size=3) * rng.integers(2))
+        pose = np.r_[np.array(NEAR[names]) + 0.5 * t * rng.normal(size=3), turn.as_quat(scalar_first=True)]
+        depth = crossing_depth(one, other, Motion.of(pose))
+        answer = told(one.shape, other.shape, pose, t)
+        found += answer is not None
+        assert answer is None or depth <= answer.depth + 1e-13, (names, pose, t)
+    assert found
+
+
+def test_of_a_scene_all_pairs_or_none():
+    q = np.array([at(0, 0, 0), at(5, 3, 10), at(0, 0, 90)])
+    shapes, pairs = [faces_of(PLATE)] * 3, [(0, 1), (0, 2), (1, 2)]
+    found = answers_by_hulls(shapes, pairs, [0.0, 0.0, 0.0], q, TOUCHING)
+    assert found is not None
+    assert [answer.verdict for answer in found] == [Verdict.TOUCHING, Verdict.CLEAR, Verdict.CLEAR]
+    assert found[1].bound <= 80 and found[2].bound <= 70
+    assert answers_by_hulls(shapes, pairs, [0.0, 0.0, 75.0], q, TOUCHING) is None
+    assert answers_by_hulls(shapes, [], [], q, TOUCHING) == []
+
+
+@pytest.mark.parametrize("room", [outside, pair])
+def test_what_takes_longer_than_cells_is_left_to_them(room, monkeypatch):
+    first, second, pose = FITS["a pin in its bore"](-0.1)
+    assert told(first, second, pose) is not None
+    monkeypatch.setattr(room, "MOST", 100)
+    assert told(first, second, pose) is None
+
+
+def test_grooves_are_not_convex():
+    """In a groove, beside the walls that its ends' hulls would cover."""
+    block = asm.shapes.extrusion(polygon(GROOVE), 30.0)
+    answer = told(block, asm.shapes.box(6, 4, 50), at(0, -3, 0))
+    assert answer is not None and answer.verdict is Verdict.CLEAR and 0.0 < answer.bound <= 3.0
