@@ -107,24 +107,32 @@ class _FirstSolve:
     def _put_together(self, together: PutTogether) -> list[Solution]:
         """The same, from where bodies were put together without clearances; none where these are not found.
 
-        An objective alone may ask for bodies that are in each other anyhow. These are put together where some of their
-        faces nearly fit, and begin where these do.
+        Of bodies that are in each other there, some faces may nearly fit: then a solve begins where these do. An
+        objective alone may ask for bodies that are in each other anyhow, and puts none together of which none fit.
         """
         there = together.solution
         if there is None or self.interruption.is_over():
             return []
         poses = there.q.copy()
-        solution = unhindered_at(self.scene, there, self.q, self.settings, self.starts, self.interruption)
-        if solution is None and self.scene.objectives:
-            seat = seated(self.scene, poses, self._touching, self.interruption)
-            if seat is not None:
-                solution = self._from(seat)
-        if solution is None and together.is_asked:
+        solution = self._unhindered(poses, True)
+        seat = None if solution else seated(self.scene, poses, self._touching, self.interruption)
+        if seat is not None:
+            solution = None if self.scene.objectives else self._unhindered(seat, False)
+            solution = solution or self._where_it_fits(seat)
+        if together.is_asked and (solution is None or not solution.success) and not self.interruption.is_over():
             solution = self._where_it_fits(poses)
         if solution is None or not together.is_meant(self.scene, solution):
             return []
         solution.put_together = True
         return [solution]
+
+    def _unhindered(self, poses: Array, is_minimum: bool) -> Solution | None:
+        """The solution at poses, if rows hold and it is proven that no clearance pushes there.
+
+        Poses that are no minimum without clearances are taken as they stand: moves are measured from these.
+        """
+        reference = self.q if is_minimum else None
+        return unhindered_at(self.scene, poses, is_minimum, reference, self.settings, self.starts, self.interruption)
 
     @property
     def _touching(self) -> float:

@@ -74,26 +74,27 @@ def unhindered(
 
 def unhindered_at(
     scene: Assembly,
-    there: Solution,
-    reference: Array,
+    poses: Array,
+    is_minimum: bool,
+    reference: Array | None,
     settings: Array,
     starts: Mapping[str, ArrayLike] | None,
     interruption: Interruption,
 ) -> Solution | None:
-    """The same from a solution without clearances, whatever objective there is; moves are measured from a reference.
+    """The same from poses (n, 7) at which rows hold, whatever objective there is.
 
-    No way to there is asked for.
+    No way to there is asked for. Of a minimum without clearances it is known that it is one. Moves are measured from a
+    reference (n, 7), or from the poses.
     """
     packed = scene.packed()
     if scene._scene is None or packed.corners or not (can_prove(packed) and is_for_proofs(packed)):
         return None
-    start = partial(scene._start, packed, there.q.copy(), starts)
+    start = partial(scene._start, packed, poses, starts)
     load(packed, start)
     begin = perf_counter()
     outcome = rows_alone(packed, interruption, settings, start(), reference)
-    if outcome.code == UNSURE and outcome.state[packed.results_at + COUNT] == 0.0:
-        # That it is a minimum is known of the solution without clearances.
-        outcome = outcome._replace(code=SOLVED, order=there._order)
+    if is_minimum and outcome.code == UNSURE and outcome.state[packed.results_at + COUNT] == 0.0:
+        outcome = outcome._replace(code=SOLVED)
     prove = partial(prove_start, packed, scene.bodies)
     return _where_clear(scene, outcome, begin, settings, prove, interruption)
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.studies.put_together import put_together
-from tests.studies.machined import bolt, disturbed
+from tests.studies.machined import bolt, disturbed, turned_part
 
 # [length] What holds to 1e-12 of some hundred.
 HOLDS = 1e-9
@@ -237,3 +237,46 @@ def test_rings_that_an_objective_draws_apart_stay_linked():
     free.minimize(asm.PointDistance(scene.bodies[1].point(0, 0, 0), (3.5, 0.0, 0.0)))
     solution = free.solve()
     assert solution.success and not solution.put_together and passes_through(solution)
+
+
+def test_what_nearly_fits_where_contacts_hold_is_seated_there(cases):
+    """A stepped shaft in bores of two walls, its shoulder to be flush: rows took 65 steps for such a one."""
+    walls = [
+        asm.Body("thin", asm.shapes.plate(60, 60, 16, [(0, 0, 8.02)]), (0, 0, -8), fixed=True),
+        asm.Body("thick", asm.shapes.plate(60, 60, 16, [(0, 0, 12.02)]), (0, 0, 40), fixed=True),
+    ]
+    corners = [(0, -30), (8, -30), (8, 0), (12, 0), (12, 70), (0, 70)]
+    rng = np.random.default_rng(5)
+    for _ in range(cases(2, 20)):
+        pose = disturbed(rng, np.r_[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 1.0, 0.035)
+        shaft = asm.Body("shaft", turned_part(corners), pose[:3], pose[3:])
+        scene = asm.Assembly([*walls, shaft])
+        seat = next(face.name for face in turned_part(corners) if face.name == "face 2")
+        scene.constrain(asm.Contact(walls[0].face("top"), shaft.face(seat), "seat", edges=False), asm.Clearance())
+        solution = scene.solve()
+        assert solution.success and solution.proved
+        up = Rotation.from_quat(solution.q[2, 3:], scalar_first=True).apply([0.0, 0.0, 1.0])
+        assert up == pytest.approx([0.0, 0.0, 1.0], abs=HOLDS)
+        assert solution.q[2, 2] == pytest.approx(0.0, abs=HOLDS) and np.hypot(*solution.q[2, :2]) <= 0.02 + HOLDS
+        # Before any row of a clearance is asked for, where contacts alone put the shaft into a wall.
+        assert solution.iterations == 0 or not solution.put_together
+
+
+def test_the_three_lugs_of_a_hinge_are_joined_by_a_pin_that_is_drawn_in():
+    """A leaf between two lugs, and a pin through all three with a play of 0.05, drawn home from apart."""
+    lug = asm.shapes.plate(30, 40, 10, [(0, 8, 5.05)])
+    lugs = [asm.Body(name, lug, (0, -8, z), fixed=True) for name, z in (("below", 0.0), ("above", 22.0))]
+    leaf = asm.Body("leaf", asm.shapes.plate(30, 60, 12, [(0, 18, 5.05)]), (1, -85, 12), (0.999, 0.02, 0.03, 0.0))
+    pin = asm.Body("pin", bolt(5, 40, 8, 4), (2, 1, 90), (0.999, -0.03, 0.02, 0.0))
+    scene = asm.Assembly([*lugs, leaf, pin])
+    scene.constrain(asm.Clearance())
+    for x, y, z in ((10, 0, 0), (0, 10, 0), (0, 0, 10)):
+        scene.minimize(asm.PointDistance(leaf.point(x, y, z), (x, y - 18, z + 11)))
+    for x, y in ((6, 0), (-6, 0), (0, 6), (0, -6)):
+        scene.minimize(asm.PointDistance(pin.point(x, y, 0), (x, y, 25.0)))
+    solution = scene.solve()
+    assert solution.success and solution.put_together
+    # The head comes down onto the lug by 2 too few: four points, 2 each.
+    assert solution.objective == pytest.approx(4 * 2.0**2, rel=1e-9)
+    assert solution.pose("leaf").position == pytest.approx([0.0, -18.0, 11.0], abs=1e-6)
+    assert solution.pose("pin").position[2] == pytest.approx(27.0, abs=1e-6)
