@@ -63,7 +63,8 @@ class Options:
         they need not be parted, and no contact of these goes deeper. For parts of files 1e-6 is right, say.
     keep_topology : bool
         Under a clearance, whether bodies are never put together without it, from a start at which joints or contacts
-        do not hold: to there they may pass through each other (`Solution.put_together` tells).
+        do not hold, or from which an objective draws bodies together: to there they may pass through each other
+        (`Solution.put_together` tells).
     verbose : int
         1 prints a table of the iterations after the solve; nothing is printed at 0.
     """

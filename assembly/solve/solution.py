@@ -47,8 +47,9 @@ class Solution(Result):
     restarted : bool
         Whether the constraints did not hold near the start, and the solution was found from another one.
     put_together : bool
-        Whether, where joints or contacts did not hold at the start, bodies were put together without clearances first:
-        to there they may have passed through each other. The option `keep_topology` forbids it.
+        Whether, where joints or contacts did not hold at the start, or an objective alone drew bodies together, they
+        were put together without clearances first: to there they may have passed through each other. The option
+        `keep_topology` forbids it.
     way : Way or None
         Of a solve with `swept=True`: how far its way is clear, and of a BLOCKED one what is in the way.
     feasibility : float

@@ -70,14 +70,14 @@ class _FirstSolve:
         together = put_together(self.scene, self.q, self.starts, self.options, self.interruption)
         ways = []
         if together is not None and not together.keeps_topology:
-            ways.append(self._put_together(together))
+            ways += self._put_together(together)
         if not self._is_done(ways):
             ways.append(self.scene._solved(self.settings, self.q, self.starts, self.interruption))
             # What holds as it stands is not moved.
             if not (ways[-1].success and (ways[-1].q == self.q).all()) and not self.interruption.is_over():
                 ways += self._from_apart(ways[-1].success)
         if not self._is_done(ways) and together is not None and together.keeps_topology:
-            ways.append(self._put_together(together))
+            ways += self._put_together(together)
         failed = ways[-1]
         if not self._is_done(ways) and not self.options.get("keep_topology"):
             ways += self._from_parted_end(failed)
@@ -104,18 +104,44 @@ class _FirstSolve:
             return solution
         return self.scene._solved(self.settings, poses, self.starts, self.interruption)
 
-    def _put_together(self, together: PutTogether) -> Solution:
-        """The same, from where bodies were put together without clearances."""
-        solution = unhindered_at(
-            self.scene, together.poses, self.q, self.settings, self.starts, self.interruption
-        ) or self._where_it_fits(together.poses)
+    def _put_together(self, together: PutTogether) -> list[Solution]:
+        """The same, from where bodies were put together without clearances; none where these are not found.
+
+        Of bodies that are in each other there, some faces may nearly fit: then a solve begins where these do. An
+        objective alone may ask for bodies that are in each other anyhow, and puts none together of which none fit.
+        """
+        there = together.solution
+        if there is None or self.interruption.is_over():
+            return []
+        poses = there.q.copy()
+        solution = self._unhindered(poses, True)
+        seat = None if solution else seated(self.scene, poses, self._touching, self.interruption)
+        if seat is not None:
+            solution = None if self.scene.objectives else self._unhindered(seat, False)
+            solution = solution or self._where_it_fits(seat)
+        if together.is_asked and (solution is None or not solution.success) and not self.interruption.is_over():
+            solution = self._where_it_fits(poses)
+        if solution is None or not together.is_meant(self.scene, solution):
+            return []
         solution.put_together = True
-        return solution
+        return [solution]
+
+    def _unhindered(self, poses: Array, is_minimum: bool) -> Solution | None:
+        """The solution at poses, if rows hold and it is proven that no clearance pushes there.
+
+        Poses that are no minimum without clearances are taken as they stand: moves are measured from these.
+        """
+        reference = self.q if is_minimum else None
+        return unhindered_at(self.scene, poses, is_minimum, reference, self.settings, self.starts, self.interruption)
+
+    @property
+    def _touching(self) -> float:
+        """What bodies may be in each other and still touch, a length."""
+        return float(self.settings[ALLOWED_OVERLAP]) * self.scene.packed().scale
 
     def _from_apart(self, is_solved: bool) -> list[Solution]:
         """Solves from where bodies that are stuck in each other fit, or are parted; fewer where there is a solution."""
-        touching = float(self.settings[ALLOWED_OVERLAP]) * self.scene.packed().scale
-        ways = []
+        touching, ways = self._touching, []
         seat = seated(self.scene, self.q, touching, self.interruption)
         if seat is not None:
             ways.append(self._from(seat) if is_solved else self._where_it_fits(seat))
@@ -133,7 +159,7 @@ class _FirstSolve:
 
         An objective leads bodies through a thin one in a step. Beside where it leads, steps are short.
         """
-        touching = float(self.settings[ALLOWED_OVERLAP]) * self.scene.packed().scale
+        touching = self._touching
         ways: list[Solution] = []
         for _ in range(PARTED_ENDS):
             apart = parted(self.scene, end.q.copy(), touching, self.interruption)

@@ -25,9 +25,9 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.solve.attempts.attempts import load, rows_alone
 from assembly.solve.clearance_proof import PairAnswer, can_prove
 from assembly.solve.interruption import Interruption
-from assembly.solve.loop.settings import ALLOWED_OVERLAP, FIT, SOLVED
+from assembly.solve.loop.settings import ALLOWED_OVERLAP, COUNT, FIT, SOLVED, UNSURE
 from assembly.solve.scene import Status
-from assembly.solve.second_order.leave import Fit
+from assembly.solve.second_order.leave import Fit, Outcome
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import is_for_proofs, prove_start, prove_way
 from assembly.studies.standing_start import with_contacts
@@ -64,49 +64,58 @@ def unhindered(
         return None
     if not last.success or packed.corners:
         return None
+    start = partial(scene._start, packed, last, starts)
+    load(packed, start)
+    begin = perf_counter()
+    outcome = rows_alone(packed, interruption, settings, start())
     prove = partial(prove_way, packed, scene.bodies, last.q)
-    return _by_rows_alone(scene, partial(scene._start, packed, last, starts), settings, prove, interruption)
+    return _where_clear(scene, outcome, begin, settings, prove, interruption)
 
 
 def unhindered_at(
     scene: Assembly,
     poses: Array,
-    reference: Array,
+    is_minimum: bool,
+    reference: Array | None,
     settings: Array,
     starts: Mapping[str, ArrayLike] | None,
     interruption: Interruption,
 ) -> Solution | None:
-    """The same from poses (n, 7) at which rows hold, whatever objective there is; moves are measured from a reference.
+    """The same from poses (n, 7) at which rows hold, whatever objective there is.
 
-    No way to there is asked for.
+    No way to there is asked for. Of a minimum without clearances it is known that it is one. Moves are measured from a
+    reference (n, 7), or from the poses.
     """
     packed = scene.packed()
     if scene._scene is None or packed.corners or not (can_prove(packed) and is_for_proofs(packed)):
         return None
+    start = partial(scene._start, packed, poses, starts)
+    load(packed, start)
+    begin = perf_counter()
+    outcome = rows_alone(packed, interruption, settings, start(), reference)
+    if is_minimum and outcome.code == UNSURE and outcome.state[packed.results_at + COUNT] == 0.0:
+        outcome = outcome._replace(code=SOLVED)
     prove = partial(prove_start, packed, scene.bodies)
-    return _by_rows_alone(scene, partial(scene._start, packed, poses, starts), settings, prove, interruption, reference)
+    return _where_clear(scene, outcome, begin, settings, prove, interruption)
 
 
-def _by_rows_alone(
+def _where_clear(
     scene: Assembly,
-    start: Callable[[], Array],
+    outcome: Outcome,
+    begin: float,
     settings: Array,
     prove: Callable[[Array, float], list[PairAnswer] | None],
     interruption: Interruption,
-    reference: Array | None = None,
 ) -> Solution | None:
-    """The solution that rows alone lead to from a start, if they do, and it is proven there that bodies are clear."""
-    packed = scene.packed()
-    load(packed, start)
-    begin = perf_counter()
-    code, state, history, *_ = rows_alone(packed, interruption, settings, start(), reference)
+    """The solution that rows alone have led to, if they did, and it is proven there that bodies are clear."""
+    packed, (code, state, history, order, _) = scene.packed(), outcome
     if code != SOLVED or interruption.is_over():
         return None
     touching = float(settings[ALLOWED_OVERLAP])
     answers = prove(state, touching)
     if answers is None or scene._scene is None or interruption.is_over():
         return None
-    solution = Solution(scene._scene, packed, state, Status.SOLVED, 0.0, history, fit=Fit(float(settings[FIT])))
+    solution = Solution(scene._scene, packed, state, Status.SOLVED, 0.0, history, order, Fit(float(settings[FIT])))
     solution._touching, solution._clear = touching, answers
     solution._lists = partial(with_contacts, scene)
     solution.seconds = perf_counter() - begin

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.studies.put_together import put_together
-from tests.studies.machined import bolt, disturbed
+from tests.studies.machined import bolt, disturbed, turned_part
 
 # [length] What holds to 1e-12 of some hundred.
 HOLDS = 1e-9
@@ -130,7 +130,7 @@ def test_there_is_none_where_joints_hold_or_cannot():
     scene = linked(0.0)
     assert put_together(scene, np.array(scene.q), None, {}, CTRL_C) is None
     scene.constrain(asm.Distance(scene.bodies[0].point(0, 0, 0), scene.bodies[1].point(0, 0, 0), 3.0, "contradiction"))
-    assert put_together(scene, np.array(scene.q), None, {}, CTRL_C) is None
+    assert put_together(scene, np.array(scene.q), None, {}, CTRL_C).solution is None
     ball = asm.Body("ball", asm.shapes.sphere(0.1), (0.0, 0.0, 3.0))
     alone = asm.Assembly([scene.bodies[0], ball])
     alone.constrain(asm.Clearance())
@@ -159,3 +159,124 @@ def test_turns_are_those_that_were_asked_for(angle):
 def test_keep_topology_is_true_or_false(value):
     with pytest.raises(TypeError, match="keep_topology is .*; expected True or False"):
         linked(0.05).solve(keep_topology=value)
+
+
+def drawn(rng, radius, amount, away=(5.0, -3.0, 60.0)):
+    """A pin of radius 4 over a plate with a hole, drawn to where it is home in the hole and by an amount beyond."""
+    plate = asm.Body("plate", asm.shapes.plate(60, 40, 12, [(8, 0, radius)]), fixed=True)
+    home = np.array([8.0, 0.0, 4.0])
+    pose = disturbed(rng, np.r_[home + away, 1.0, 0.0, 0.0, 0.0], 1.5, 0.15)
+    pin = asm.Body("pin", asm.shapes.solid_cylinder(4, 40), pose[:3], pose[3:])
+    scene = asm.Assembly([plate, pin])
+    scene.constrain(asm.Clearance())
+    for along in (-12.0, 12.0):
+        scene.minimize(asm.PointDistance(pin.point(0, 0, along), home + (0, 0, along) + np.array(amount)))
+    return scene
+
+
+@pytest.mark.parametrize("away", [(5.0, -3.0, 60.0), (0.0, 2.0, -70.0)], ids=["over", "under"])
+@pytest.mark.parametrize("radius", [4.0, 4.5])
+def test_what_an_objective_alone_draws_into_its_hole_is_put_there(radius, away, cases):
+    """Without, pins came to rest on the plate: another minimum."""
+    rng = np.random.default_rng(2)
+    for _ in range(cases(1, 10)):
+        for amount in ((0.0, 0.0, 0.0), (3.0, 1.0, 0.0)) if radius > 4.0 else ((0.0, 0.0, 0.0),):
+            scene = drawn(rng, radius, amount, away)
+            solution = scene.solve()
+            assert solution.success and solution.put_together and solution.proved
+            # The pin leans on the wall along a line, for the way is across the axis.
+            pull = np.linalg.norm(amount)
+            play = min(pull, radius - 4.0)
+            assert solution.objective == pytest.approx(2.0 * (pull - play) ** 2, rel=1e-9, abs=1e-15)
+            kept = scene.solve(keep_topology=True)
+            assert not kept.put_together and not (kept.success and kept.objective < solution.objective - 1e-9)
+
+
+@pytest.mark.parametrize("depth", [1.0, 0.4])
+def test_what_an_objective_draws_through_a_plate_comes_to_rest_on_it(depth):
+    """A box over a plate, drawn to where it is below it, or in it: bodies beside each other stay on their sides."""
+    plate = asm.Body("plate", asm.shapes.box(4, 4, 0.5), fixed=True)
+    box = asm.Body("box", asm.shapes.box(0.6, 0.6, 0.6), (0.1, 0.2, 3.0), (0.99, 0.1, 0.05, 0.0))
+    scene = asm.Assembly([plate, box])
+    scene.constrain(asm.Clearance())
+    for x, y in ((0.3, 0.3), (-0.3, 0.3), (0.3, -0.3)):
+        scene.minimize(asm.PointDistance(box.point(x, y, -0.3), (x, y, -0.3 - depth)))
+    solution = scene.solve()
+    assert solution.success and solution.q[1, 2] == pytest.approx(0.25 + 0.3, abs=1e-9)
+
+
+def test_what_is_drawn_into_a_plate_from_below_stays_below():
+    plate = asm.Body("plate", asm.shapes.box(4, 4, 0.5), fixed=True)
+    box = asm.Body("box", asm.shapes.box(0.6, 0.6, 0.6), (0.1, 0.2, -2.0))
+    scene = asm.Assembly([plate, box])
+    scene.constrain(asm.Clearance())
+    for x, y in ((0.3, 0.3), (-0.3, 0.3), (0.3, -0.3)):
+        scene.minimize(asm.PointDistance(box.point(x, y, -0.3), (x, y, 0.24)))
+    solution = scene.solve()
+    assert not solution.put_together and solution.q[1, 2] < -0.55 + 1e-9
+
+
+def test_what_an_objective_draws_into_each_other_without_fitting_stays_on_its_side():
+    """Two balls, one drawn into the other one: nothing is put together there, and the nearest place is the answer."""
+    one = asm.Body("one", asm.shapes.sphere(1.0), fixed=True)
+    two = asm.Body("two", asm.shapes.sphere(0.5), (0.3, 0.2, 3.0))
+    scene = asm.Assembly([one, two])
+    scene.constrain(asm.Clearance())
+    scene.minimize(asm.PointDistance(two.point(0, 0, 0), (0.0, 0.0, 0.2)))
+    together = put_together(scene, np.array(scene.q), None, {}, CTRL_C)
+    assert not together.keeps_topology and not together.is_asked and together.solution.success
+    solution = scene.solve()
+    assert solution.success and not solution.put_together
+    assert np.linalg.norm(solution.q[1, :3]) == pytest.approx(1.5, abs=1e-9)
+
+
+def test_rings_that_an_objective_draws_apart_stay_linked():
+    scene = linked(0.0)
+    free = asm.Assembly(scene.bodies)
+    free.constrain(asm.Clearance())
+    free.minimize(asm.PointDistance(scene.bodies[1].point(0, 0, 0), (3.5, 0.0, 0.0)))
+    solution = free.solve()
+    assert solution.success and not solution.put_together and passes_through(solution)
+
+
+def test_what_nearly_fits_where_contacts_hold_is_seated_there(cases):
+    """A stepped shaft in bores of two walls, its shoulder to be flush: rows took 65 steps for such a one."""
+    walls = [
+        asm.Body("thin", asm.shapes.plate(60, 60, 16, [(0, 0, 8.02)]), (0, 0, -8), fixed=True),
+        asm.Body("thick", asm.shapes.plate(60, 60, 16, [(0, 0, 12.02)]), (0, 0, 40), fixed=True),
+    ]
+    corners = [(0, -30), (8, -30), (8, 0), (12, 0), (12, 70), (0, 70)]
+    rng = np.random.default_rng(5)
+    for _ in range(cases(2, 20)):
+        pose = disturbed(rng, np.r_[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 1.0, 0.035)
+        shaft = asm.Body("shaft", turned_part(corners), pose[:3], pose[3:])
+        scene = asm.Assembly([*walls, shaft])
+        seat = next(face.name for face in turned_part(corners) if face.name == "face 2")
+        scene.constrain(asm.Contact(walls[0].face("top"), shaft.face(seat), "seat", edges=False), asm.Clearance())
+        solution = scene.solve()
+        assert solution.success and solution.proved
+        up = Rotation.from_quat(solution.q[2, 3:], scalar_first=True).apply([0.0, 0.0, 1.0])
+        assert up == pytest.approx([0.0, 0.0, 1.0], abs=HOLDS)
+        assert solution.q[2, 2] == pytest.approx(0.0, abs=HOLDS) and np.hypot(*solution.q[2, :2]) <= 0.02 + HOLDS
+        # Before any row of a clearance is asked for, where contacts alone put the shaft into a wall.
+        assert solution.iterations == 0 or not solution.put_together
+
+
+def test_the_three_lugs_of_a_hinge_are_joined_by_a_pin_that_is_drawn_in():
+    """A leaf between two lugs, and a pin through all three with a play of 0.05, drawn home from apart."""
+    lug = asm.shapes.plate(30, 40, 10, [(0, 8, 5.05)])
+    lugs = [asm.Body(name, lug, (0, -8, z), fixed=True) for name, z in (("below", 0.0), ("above", 22.0))]
+    leaf = asm.Body("leaf", asm.shapes.plate(30, 60, 12, [(0, 18, 5.05)]), (1, -85, 12), (0.999, 0.02, 0.03, 0.0))
+    pin = asm.Body("pin", bolt(5, 40, 8, 4), (2, 1, 90), (0.999, -0.03, 0.02, 0.0))
+    scene = asm.Assembly([*lugs, leaf, pin])
+    scene.constrain(asm.Clearance())
+    for x, y, z in ((10, 0, 0), (0, 10, 0), (0, 0, 10)):
+        scene.minimize(asm.PointDistance(leaf.point(x, y, z), (x, y - 18, z + 11)))
+    for x, y in ((6, 0), (-6, 0), (0, 6), (0, -6)):
+        scene.minimize(asm.PointDistance(pin.point(x, y, 0), (x, y, 25.0)))
+    solution = scene.solve()
+    assert solution.success and solution.put_together
+    # The head comes down onto the lug by 2 too few: four points, 2 each.
+    assert solution.objective == pytest.approx(4 * 2.0**2, rel=1e-9)
+    assert solution.pose("leaf").position == pytest.approx([0.0, -18.0, 11.0], abs=1e-6)
+    assert solution.pose("pin").position[2] == pytest.approx(27.0, abs=1e-6)

@@ -191,20 +191,33 @@ class ClearanceProof:
         a, b = self.pairs[k]
         return self.forest.cells[self._number[a]], self.forest.cells[self._number[b]]
 
-    def is_apart(self, k: int, q: Array, distance: float, budget: int) -> bool:
-        """Whether it is proven, within a budget, that bodies of pair k are farther apart and none is in the other."""
+    def is_apart(self, k: int, q: Array, distance: float, budget: int, moves: Array | None = None) -> bool:
+        """Whether it is proven, within a budget, that bodies of pair k are farther apart and none is in the other.
+
+        After the pair's move of `moves` (pairs, 6) if they are given; the distance is not below zero.
+        """
         needed, budgets = self.fronts.pair.needed, self.fronts.counts.budget
         before, needed[k] = float(needed[k]), distance
         usual, budgets[k] = int(budgets[k]), budget
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         tasks[k] = BEGUN_ANEW
-        still = np.zeros((len(self.pairs), 6))
-        self._run(q, 0.0, still, tasks)
+        self._run(q, 0.0, np.zeros((len(self.pairs), 6)) if moves is None else moves, tasks)
         found = self._codes[k] == CLEAR and self.nested(k) is False
         # Gaps of this front are those over another length.
         needed[k], budgets[k], self._begun[k] = before, usual, False
         self.fronts.pair.known[k] = 0.0
         return bool(found)
+
+    def plane_between(self, k: int, q: Array, moves: Array | None = None) -> Array | None:
+        """The normal, from the first body to the second, of a plane that parts the boxes around both bodies of pair k.
+
+        In the scene's axes; after the pair's move of `moves` (pairs, 6) if they are given. None where no plane is
+        found. What is in a bore of the other body is apart from it, too, but by no plane.
+        """
+        if not self.is_apart(k, q, 0.0, 1, moves) or rows_of(NODES, self.fronts.nodes[k])[0].how != BY_PLANE:
+            return None
+        normal: Array = rows_of(PARTED, self.fronts.parted[k])[0].normal
+        return rotation_matrix(q[self.pairs[k][0], 3:]) @ normal
 
     def _run(self, q: Array, touching: float, moves: Array, tasks: Table) -> None:
         self.fronts.pair.touch = touching
@@ -257,6 +270,8 @@ class ClearanceProof:
             return Answer(Verdict.UNDECIDED, part=part)
         bound = self.bound(k)
         if nested:
+            # Of a body within another one cells are many, and other ones than where it is beside it.
+            self._begun[k] = False
             return Answer(Verdict.ENCLOSED, bound, bound)
         far = self.move_length(k, q, move)
         if far > 0.0:

@@ -17,9 +17,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import rows_of
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program.records import BODY_F, BODY_G, ONE_SIDED, ROW, ROW_TABLE
-from assembly.proximity.features.solid_contact import ALLOWED, IDLE, STAYS, TRACK
+from assembly.kinematics.pose import rotation_matrix
+from assembly.proximity.features.holding import HELD_F, HELD_G
+from assembly.proximity.features.solid_contact import ALLOWED, IDLE, STAYS, TRACK, TRACKED_PAIR
 from assembly.solve.loop.settings import FIT, GATHER, PENALTY, PENALTY_FLOOR, PLACES, SOLVED, UNSURE
 from assembly.solve.second_order.leave import Fit, Outcome
 
@@ -117,19 +120,35 @@ def _left_alone(table: Table, rows: Sequence[int]) -> Table:
 def _take_nearest(packed: Packed, state: Array, row: int, holds: bool) -> None:
     """Let a contact begin with the pair of the corner that is nearest, where one is listed for it; whether it holds it.
 
-    Of solids that touch a search from nothing finds points that they have in common, and no pair.
+    Of solids that touch a search from nothing finds points that they have in common, and no pair. A clearance may list
+    the two bodies the other way around.
     """
     tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
     gaps = state[packed.residuals_at :]
     sides = packed.sides[row]
-    first, nearest = len(packed.contacts), -1
+    first, nearest, is_turned = len(packed.contacts), -1, False
     for k, (pair, _) in enumerate(packed.listed(state)):
-        known = pair >= 0 and all(one is other for one, other in zip(packed.kept_pairs[pair], sides, strict=True))
-        if known and (nearest < 0 or gaps[first + k] < gaps[first + nearest]):
-            nearest = k
+        if pair < 0 or not (nearest < 0 or gaps[first + k] < gaps[first + nearest]):
+            continue
+        a, b = packed.kept_pairs[pair]
+        if (a is sides[0] and b is sides[1]) or (a is sides[1] and b is sides[0]):
+            nearest, is_turned = k, a is not sides[0]
     if nearest >= 0:
         tracked[row] = tracked[first + nearest]
+        if is_turned:
+            contact = packed.table[packed.table[ROW_TABLE] + ROW * row :]
+            q = state[: packed.contacts_at].reshape(-1, 7)
+            _turn_around(tracked[row], q[contact[BODY_F], 3:], q[contact[BODY_G], 3:])
         # Nothing is allowed to it yet.
         tracked[row, [IDLE, ALLOWED]] = 0.0
         if not holds:
             tracked[row, STAYS] = 0.0
+
+
+def _turn_around(tracked: Array, turn_f: Array, turn_g: Array) -> None:
+    """Make a tracked pair of bodies g and f, (TRACK,), that of f and g; the quaternions of both."""
+    (pair,) = rows_of(TRACKED_PAIR, tracked[None])
+    pair.parameters = pair.parameters[[2, 3, 0, 1]]
+    pair.feature_f, pair.feature_g = pair.feature_g, pair.feature_f
+    pair.normal = -rotation_matrix(turn_f).T @ rotation_matrix(turn_g) @ pair.normal
+    pair.stays = {HELD_F: HELD_G, HELD_G: HELD_F}.get(float(pair.stays), pair.stays)

@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from assembly.constraints.packing.earlier import is_earlier, taken_over
-from assembly.proximity.features.solid_contact import STAYS, TRACK
-from assembly.solve.attempts.corners import corners_first
+from assembly.proximity.features.holding import HELD_F, HELD_G
+from assembly.proximity.features.solid_contact import STAYS, TRACK, tracked_at
+from assembly.solve.attempts.corners import _turn_around, corners_first
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.loop.settings import SOLVED
 from assembly.solve.second_order.leave import Outcome
@@ -222,3 +223,22 @@ def test_a_corner_that_would_have_to_pull_is_not_held(pull):
     assert found is not None and found.code == SOLVED
     # First it is held, with its features; then it may switch.
     assert begun[0] > 0.0 and begun[1:] == ([0.0] if pull > 0.0 else [])
+
+
+def test_a_pair_that_is_listed_the_other_way_around_is_turned_around():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        turn_f, turn_g = turned(rng, 2.0), turned(rng, 2.0)
+        before = rng.normal(size=TRACK)
+        pair = tracked_at(before, 0)
+        pair.stays, pair.feature_f, pair.feature_g = HELD_F, 3.0, 7.0
+        after = before.copy()
+        # From g to f it was, with the normal in the axes of g.
+        _turn_around(after, turn_f, turn_g)
+        turned_pair = tracked_at(after, 0)
+        assert turned_pair.stays == HELD_G and (turned_pair.feature_f, turned_pair.feature_g) == (7.0, 3.0)
+        assert np.array_equal(turned_pair.parameters, np.roll(pair.parameters, 2))
+        world_f, world_g = (Rotation.from_quat(turn, scalar_first=True) for turn in (turn_f, turn_g))
+        assert world_f.apply(turned_pair.normal) == pytest.approx(-world_g.apply(pair.normal), abs=1e-14)
+        _turn_around(after, turn_g, turn_f)
+        assert after == pytest.approx(before, abs=1e-14)
