@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from assembly.proximity.features.features import FeatureStatus as FeatureStatus
     from assembly.proximity.features.features import FeatureTracker as FeatureTracker
     from assembly.proximity.features.features import closest_features as closest_features
+    from assembly.proximity.manifolds.query import ContactManifold as ContactManifold
+    from assembly.proximity.manifolds.query import contact_manifold as contact_manifold
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
@@ -56,6 +58,8 @@ else:
             "ControlRun": "assembly.proximity.controllers.control",
             "ControlStatus": "assembly.proximity.controllers.control",
             "Controller": "assembly.proximity.controllers.control",
+            "ContactManifold": "assembly.proximity.manifolds.query",
+            "contact_manifold": "assembly.proximity.manifolds.query",
             "GainBounds": "assembly.proximity.controllers.bounds",
             "Hypotheses": "assembly.proximity.controllers.bounds",
             "convergence_hypotheses": "assembly.proximity.controllers.bounds",

@@ -1,0 +1,110 @@
+"""Contact manifolds of faces of bodies in the world: where, which way, how far, and how that changes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.errors import InputError
+from assembly.kinematics.pose import retract
+from assembly.proximity import contact_manifold
+
+# A pose of everything, so that world and body axes are others.
+AWAY = asm.Pose((30.0, -20.0, 7.0), (0.8, 0.2, -0.4, 0.4))
+
+
+def pose_of(place, turn=(1.0, 0.0, 0.0, 0.0)):
+    return AWAY @ asm.Pose(place, turn)
+
+
+def block(size, place, turn=(1.0, 0.0, 0.0, 0.0)):
+    pose = pose_of(place, turn)
+    return asm.Body("block", asm.shapes.box(*size), pose.position, pose.quaternion)
+
+
+def plate():
+    return asm.Body("plate", asm.shapes.plate(100, 60, 10, [(20, 0, 8)]), AWAY.position, AWAY.quaternion)
+
+
+def test_a_block_over_the_edge_of_a_plate():
+    base, lid = plate(), block((30, 20, 10), (45.0, 0.0, 10.5))
+    found = contact_manifold(base.face("top"), lid.face("bottom"))
+    # What both have in common: 30 to 50 by -10 to 10, seen along the normal.
+    local = np.sort([tuple(np.round(AWAY.inverse().apply(place), 9)) for place in found.places], axis=0)
+    assert len(local) == 4
+    assert (local.min(axis=0)[:2].tolist(), local.max(axis=0)[:2].tolist()) == ([30.0, -10.0], [50.0, 10.0])
+    np.testing.assert_allclose(found.gaps, found.gaps[0], rtol=0, atol=1e-12)
+    assert found.bound == pytest.approx(found.gaps.min(), abs=1e-9) and found.bound <= found.gaps.min()
+    np.testing.assert_allclose(found.normals, np.tile(AWAY.matrix[:3, 2], (4, 1)), rtol=0, atol=1e-12)
+
+
+def rate_pairs():
+    base, pin = plate(), asm.Body("pin", asm.shapes.solid_cylinder(7.9, 30.0))
+    pin.pose = pose_of((20.02, 0.01, 0.0), (np.cos(5e-4), np.sin(5e-4), 0.0, 0.0))
+    lid = block((30, 20, 10), (45.0, 0.0, 10.5), turn=(np.cos(0.01), np.sin(0.006), np.sin(0.008), 0.0))
+    rod = asm.Body("rod", asm.shapes.solid_cylinder(3.0, 20.0))
+    rod.pose = pose_of((-20.0, 5.0, 8.2), (np.cos(0.78), np.sin(0.78), 0.0, 0.0))
+    (bore,) = base.faces.cylinders(hole=True)
+    (wall,), (side,) = pin.faces.cylinders(), rod.faces.cylinders()
+    return {"flat": (base.face("top"), lid.face("bottom")), "bore": (bore, wall), "line": (base.face("top"), side)}
+
+
+@pytest.mark.parametrize("kind", ["flat", "bore", "line"])
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_rates_are_those_of_gaps(kind, exchanged):
+    """Central differences, of either body; rows of rings and lines keep their direction, off by the lean squared."""
+    a, b = rate_pairs()[kind][:: -1 if exchanged else 1]
+    poses = a.body.pose, b.body.pose
+    found = contact_manifold(a, b, poses=poses)
+    assert found is not None and found.bound <= found.gaps.min()
+    rng, step = np.random.default_rng(2), 1e-6
+    for side, rates in enumerate(found.rates()):
+        for twist in rng.normal(size=(5, 6)) * [1, 1, 1, 0.02, 0.02, 0.02]:
+            ends = []
+            for sign in (1.0, -1.0):
+                rows = np.array([poses[side].q])
+                moved = retract(rows, sign * step * twist[None])[0]
+                pair = [*poses]
+                pair[side] = asm.Pose(moved[:3], moved[3:])
+                ends.append(contact_manifold(a, b, poses=tuple(pair)).gaps)
+            differences = (ends[0] - ends[1]) / (2.0 * step)
+            np.testing.assert_allclose(rates @ twist, differences, rtol=0, atol=2e-3 if kind == "bore" else 1e-6)
+
+
+def seen_from(a, b):
+    """Points of the face b from the body of a."""
+    u, v = (np.linspace(*ends, 200) for ends in b.face.surface.domain)
+    points = b.face.surface.evaluate(u[:, None], v[None, :]).reshape(-1, 3)
+    return a.body.pose.inverse().apply(b.body.pose.apply(points))
+
+
+def test_the_bound_holds_of_points():
+    """Points of the pin's wall within the plate, and of the rod over it: none is nearer, and some nearly as near."""
+    a, b = rate_pairs()["bore"]
+    points = seen_from(a, b)
+    within = points[np.abs(points[:, 2]) <= 5.0]
+    gap = (8.0 - np.hypot(within[:, 0] - 20.0, within[:, 1])).min()
+    assert gap - 2e-3 < contact_manifold(a, b).bound <= gap
+    a, b = rate_pairs()["line"]
+    gap = seen_from(a, b)[:, 2].min() - 5.0
+    assert gap - 2e-3 < contact_manifold(a, b).bound <= gap
+
+
+def test_faces_that_have_nothing_in_common():
+    base, lid = plate(), block((30, 20, 10), (200.0, 0.0, 10.5))
+    assert contact_manifold(base.face("top"), lid.face("bottom")) is None
+    assert contact_manifold(base.face("top"), block((30, 20, 10), (0, 0, 30)).face("top")) is None
+
+
+def test_bad_input():
+    base, lid = plate(), block((30, 20, 10), (0, 0, 10.5))
+    ring = asm.Body("ring", asm.shapes.torus(5.0, 1.0))
+    with pytest.raises(TypeError, match="a is 3; expected a face of a body"):
+        contact_manifold(3, lid.face("bottom"))
+    with pytest.raises(InputError, match="of one body; expected faces of two bodies"):
+        contact_manifold(lid.face("top"), lid.face("bottom"))
+    with pytest.raises(InputError, match="a plane and a torus; expected planes with edges of lines and arcs"):
+        contact_manifold(lid.face("top"), ring.faces[0])
+    with pytest.raises(TypeError, match="poses is 3; expected two poses"):
+        contact_manifold(lid.face("top"), base.faces[0], poses=3)
