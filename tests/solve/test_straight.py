@@ -118,6 +118,23 @@ def test_what_has_changed_or_needs_more_goes_the_whole_way():
     assert begun.success and straight_of(apart, begun) is None and apart.solve(begun).proved
 
 
+def test_numbers_set_since_are_those_of_the_next_solve():
+    ground, link = asm.Body("ground", fixed=True), asm.Body("link")
+    hinge = asm.Revolute(ground.frame(), link, "hinge", angle=0.3)
+    scene = asm.Assembly([ground, link])
+    scene.constrain(hinge)
+    begun = scene.solve()
+    hinge.frame_a.place(at=(1.0, 2.0, 0.0))
+    moved = scene.solve(begun)
+    np.testing.assert_allclose(moved.pose(link).position, (1.0, 2.0, 0.0), rtol=0, atol=1e-12)
+    # And those set in another scene change nothing here.
+    asm.Revolute(ground, link, "other").frame_a.place(at=(5.0, 0.0, 0.0))
+    np.testing.assert_array_equal(scene.solve(moved).q, moved.q)
+    link.fixed = True
+    with pytest.raises(asm.errors.InputError):
+        scene.solve(moved)
+
+
 def test_another_thread_goes_straight_as_well():
     scene, change = four_bar()
     begun = scene.solve()
