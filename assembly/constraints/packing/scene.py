@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from assembly._address import clock_address
 from assembly.constraints.model.clearance import Clearance
-from assembly.constraints.model.constraint import Constraint, RowConstraint, structure_changes
+from assembly.constraints.model.constraint import Constraint, Equation, RowConstraint, structure_changes
 from assembly.constraints.model.contact import Contact, lone_surfaces, side_face
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import Objective, Posture
@@ -124,8 +124,6 @@ class Packed(ManagerLast):
     clearances : list of Clearance
     clearance_pairs : list of list of (Body, Body)
         The pairs of bodies of every clearance.
-    is_loop_alone : bool
-        Whether a solve that goes on from another one is a run of the loop and nothing else, if that arrives.
     keeps_apart : bool
         Whether a clearance keeps two bodies apart, so that ends of solves are to be proven.
     corners : list of ContactCorners
@@ -212,9 +210,6 @@ class Packed(ManagerLast):
         if self.clearance_rows:
             # The first update sees what crosses at the start as well, if it is no deeper than this.
             self._memory = fresh_memory(len(self.kept_pairs), self.clearance_rows, LARGEST_MARGIN)
-        # What has no extent may have outgrown its size; corners are tried first; clearances are looked after.
-        needs_more = self._has_no_extent or self.keeps_apart or self.clearance_rows > 0 or bool(self.corners)
-        self.is_loop_alone = not needs_more
         self.asked: Asked = []
         self.workspaces: list[tuple[Array, Array, Table]] = []
         self.proofs: list[ClearanceProof] = []
@@ -302,12 +297,7 @@ class Packed(ManagerLast):
         rows.add_joints(unknown_blocks)
         rows.add_expressions()
         table = rows.write(bodies)
-        self._values = rows.values
-        self._sources = [item for item in self._values if item[0].source is not None]
-        # What every solve reads of them: where a value is kept, where it goes, its unit, whether it is a length.
-        self._reads = [
-            (*equation.place(), at, unit, not equation.terms[0][1].is_angle) for equation, at, unit in self._sources
-        ]
+        self._keep_values(rows.values)
         self.rows = len(table)
         self.owners = np.array(rows.owners, dtype=np.int64)
         self.one_sided = table[:, layout.ONE_SIDED] == 1
@@ -321,6 +311,23 @@ class Packed(ManagerLast):
         by_owner = np.argsort(self.owners, kind="stable")
         ends = np.searchsorted(self.owners[by_owner], np.arange(len(constraints) + 1))
         self.spans = [by_owner[first:last] for first, last in pairwise(ends)]
+
+    def _keep_values(self, values: list[tuple[Equation, int, float]]) -> None:
+        """Keep the equations of rows that have a value, where it is in the pool, and its unit."""
+        self._values = values
+        self._sources = [item for item in values if item[0].source is not None]
+        # What every solve reads of them: where a value is kept, where it goes, its unit, whether it is a length.
+        self._reads = [
+            (*equation.place(), at, unit, not equation.terms[0][1].is_angle) for equation, at, unit in self._sources
+        ]
+
+    @property
+    def is_loop_alone(self) -> bool:
+        """Whether a solve that goes on from another one is a run of the loop and nothing else, if that arrives.
+
+        What has no extent may have outgrown its size; corners are tried first; clearances are looked after.
+        """
+        return not (self._has_no_extent or self.keeps_apart or self.clearance_rows > 0 or bool(self.corners))
 
     @property
     def pair_rows(self) -> int:
