@@ -13,7 +13,7 @@ from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.step.documents import StepError, document_of
-from assembly.step.faces import read_face
+from assembly.step.faces import Edges, read_face
 from assembly.step.occt import occt, parts, quiet
 from assembly.step.profiles import Unreadable
 from assembly.step.tree import Color, Part, free_labels, leaves
@@ -83,8 +83,7 @@ def read_shape(
         Our unit of length in a millimeter.
     """
     o = occt()
-    edges = o.ShapeMap()
-    o.TopExp.MapShapes_s(shape, o.TopAbs_EDGE, edges)
+    edges = Edges(shape)
     name, own_color = said(shape)
     made = Shape([], own_color or color, name, [], [])
     taken: set[str] = set()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite
 from typing import Any
 
@@ -16,10 +17,11 @@ from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.occt import occt, parts
 from assembly.step.profiles import Unreadable
+from assembly.step.projected import Side
 from assembly.step.surfaces import Patch, patch
 from assembly.step.trims import Edge, chained, edge_curve, head_to_tail
 
-__all__ = ["Read", "read_face"]
+__all__ = ["Edges", "Read", "read_face"]
 
 Array = NDArray[np.float64]
 # OCCT stands for "unbounded" with numbers beyond this one.
@@ -57,7 +59,53 @@ def _is_seam(edge: Any, face: Any) -> bool:
     return bool(occt().BRep_Tool.IsClosed_s(edge, face))
 
 
-def _loop(wire: Any, face: Any, where: Patch, edges: Any) -> tuple[list[Edge], float] | None:
+class Edges:
+    """The edges of a solid, by their numbers from 1, and the two faces that meet at each."""
+
+    def __init__(self, shape: Any) -> None:
+        o = occt()
+        self.shape = shape
+        self._map = o.ShapeMap()
+        o.TopExp.MapShapes_s(shape, o.TopAbs_EDGE, self._map)
+        self._patches: dict[int, Patch | None] = {}
+
+    def index(self, edge: Any) -> int:
+        """The number of an edge."""
+        return int(self._map.FindIndex(edge))
+
+    @cached_property
+    def _faces(self) -> dict[int, list[Any]]:
+        """The faces of each edge, made forward."""
+        o = occt()
+        found: dict[int, list[Any]] = {}
+        for face in parts(self.shape, o.TopAbs_FACE):
+            forward = o.as_face(face.Oriented(o.TopAbs_FORWARD))
+            for edge in parts(forward, o.TopAbs_EDGE):
+                found.setdefault(self.index(edge), []).append(forward)
+        return found
+
+    def beyond(self, edge: Any, face: Any) -> Side | None:
+        """The surface, with the edge's curve on it, of the face on the other side of an edge; None if not just one."""
+        o = occt()
+        around = self._faces[self.index(edge)]
+        others = [one for one in around if not one.IsSame(face)]
+        if len(around) != 2 or len(others) != 1:
+            return None
+        low, high = o.BRep_Tool.Range_s(edge, others[0])
+        flat = o.BRep_Tool.CurveOnSurface_s(edge, others[0], low, high)
+        if flat is None or not np.allclose(o.BRep_Tool.Range_s(edge, face), (low, high), rtol=1e-9, atol=0.0):
+            return None
+        key = hash(others[0])
+        if key not in self._patches:
+            try:
+                self._patches[key] = patch(o.BRep_Tool.Surface_s(others[0]), o.BRepTools.UVBounds_s(others[0]))
+            except (Unreadable, InputError):
+                self._patches[key] = None
+        there = self._patches[key]
+        return None if there is None else Side(flat, there)
+
+
+def _loop(wire: Any, face: Any, where: Patch, edges: Edges) -> tuple[list[Edge], float] | None:
     """The boundary curves of a wire; None where nothing is left of it but seams and poles."""
     o = occt()
     row, ordered = _edges(wire, face)
@@ -65,7 +113,7 @@ def _loop(wire: Any, face: Any, where: Patch, edges: Any) -> tuple[list[Edge], f
     bare = all(o.BRep_Tool.Degenerated_s(edge) or _is_seam(edge, face) for edge in row)
     if not row or (bare and len(seams) % 2 == 0):
         return None
-    curves = [edge_curve(edge, face, where, f"edge {edges.FindIndex(edge)}") for edge in row]
+    curves = [edge_curve(edge, face, where, f"edge {edges.index(edge)}", edges.beyond) for edge in row]
     return chained(curves if ordered else head_to_tail(curves, where), where)
 
 
@@ -79,7 +127,7 @@ def _scaled(where: Patch, scale: float) -> tuple[NurbsSurface, Array]:
     return NurbsSurface(scale * surface.control_points, knots, surface.degree, surface.weights), factors
 
 
-def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Read:
+def read_face(face: Any, edges: Edges, name: str | None, scale: float = 1.0) -> Read:
     """A face of OCCT, its surface and its loops.
 
     Parameters
@@ -87,7 +135,7 @@ def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Re
     face
         TopoDS_Face.
     edges
-        Map of the solid's edges, which numbers them.
+        Those of the solid, with their numbers.
     name : str, optional
     scale : float
         Our unit of length in a millimeter.
@@ -128,6 +176,9 @@ def read_face(face: Any, edges: Any, name: str | None, scale: float = 1.0) -> Re
                 holes.append(loop)
         reverse = face.Orientation() == o.TopAbs_REVERSED
         made_face = Face(made_surface, outer, holes, name=name, reversed=reverse, tolerance=tolerance)
+        if outer is None and not holes:
+            # The edge of a surface that is damaged may bound no face, which is otherwise found when it is asked for.
+            made_face.boundary  # noqa: B018
         return Read(made_face, deviation, gap)
     except InputError as error:
         raise Unreadable(str(error)) from error

@@ -7,6 +7,7 @@ ends mapped; any other curve, a helix say, has no rational form and is interpola
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -14,15 +15,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
 from assembly.step.occt import occt
-from assembly.step.profiles import Direction, Spline, Straight, Unreadable, approximated, profile, spline
+from assembly.step.profiles import Direction, Spline, Straight, Unreadable, approximated, crossings, profile, spline
+from assembly.step.projected import Side, is_loose, projected
 from assembly.step.surfaces import Patch
 
-__all__ = ["Edge", "chained", "crossings", "edge_curve", "head_to_tail"]
+__all__ = ["Edge", "chained", "edge_curve", "head_to_tail"]
 
 Array = NDArray[np.float64]
 # Deviation allowed to curves without rational form, over the shorter side of the surface's domain.
@@ -48,6 +49,8 @@ class Edge:
         Of its interpolation in (u, v).
     seam : bool
         Whether the face has it on both sides.
+    loose : bool
+        Whether it has a tolerance of its own: its ends are less certain than those of others.
     """
 
     curve: Spline
@@ -56,6 +59,7 @@ class Edge:
     name: str
     deviation: float
     seam: bool = False
+    loose: bool = False
 
     @cached_property
     def ends(self) -> Array:
@@ -88,17 +92,6 @@ class Edge:
         return NurbsCurve(points * scales, self.curve.knots, self.curve.degree, weights, name=self.name)
 
 
-def crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:
-    """Parameters at which a sampled function takes one of the values of the joints."""
-    found = []
-    for joint in joints:
-        sides = values - joint
-        for k in np.flatnonzero(sides[:-1] * sides[1:] < 0.0):
-            found.append(brentq(lambda t, joint=joint: function(t) - joint, at[k], at[k + 1], xtol=1e-15, rtol=1e-15))
-        found.extend(at[sides == 0.0].tolist())
-    return found
-
-
 def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: float) -> tuple[Spline, float]:
     """A plane curve of OCCT's (u, v) mapped to ours by interpolation."""
     points, weights = source.cartesian
@@ -127,8 +120,12 @@ def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: floa
     return approximated(mapped, breaks, tolerance)
 
 
-def edge_curve(edge: Any, face: Any, patch: Patch, name: str) -> Edge:
+def edge_curve(
+    edge: Any, face: Any, patch: Patch, name: str, beyond: Callable[[Any, Any], Side | None] = lambda *_: None
+) -> Edge:
     """The curve of an edge on a face (which is taken forward), mapped to our parameters.
+
+    `beyond` finds the surface of the face on the other side of an edge, if there is one; only for edges that are off.
 
     Raises
     ------
@@ -140,9 +137,18 @@ def edge_curve(edge: Any, face: Any, patch: Patch, name: str) -> Edge:
     raw = o.BRep_Tool.CurveOnSurface_s(edge, face, low, high)
     if raw is None:
         raise Unreadable("an edge has no curve in the surface's parameters")
-    source, _, deviation = profile(raw, low, high, cut=True)
-    line, level = _level_line(source, patch)
-    if line is not None:
+    line, level, deviation = None, (False, False), 0.0
+    seam = o.BRep_Tool.IsClosed_s(edge, face)
+    anew = None
+    loose = is_loose(edge)
+    if loose and not seam:
+        anew = projected(edge, Side(raw, patch), beyond(edge, face), low, high)
+    if anew is None:
+        source, _, deviation = profile(raw, low, high, cut=True)
+        line, level = _level_line(source, patch)
+    if anew is not None:
+        made, deviation = anew
+    elif line is not None:
         made = line
     elif isinstance(patch.u, Straight) and isinstance(patch.v, Straight):
         points, weights = source.cartesian
@@ -156,7 +162,7 @@ def edge_curve(edge: Any, face: Any, patch: Patch, name: str) -> Edge:
     for vertex in (o.TopExp.FirstVertex_s(edge), o.TopExp.LastVertex_s(edge)):
         if not vertex.IsNull():
             tolerance = max(tolerance, o.BRep_Tool.Tolerance_s(vertex))
-    return Edge(made, level, tolerance, name, deviation, o.BRep_Tool.IsClosed_s(edge, face))
+    return Edge(made, level, tolerance, name, deviation, seam, loose)
 
 
 def _level_line(source: Spline, patch: Patch) -> tuple[Spline | None, tuple[bool, bool]]:
@@ -224,11 +230,15 @@ def chained(edges: list[Edge], patch: Patch) -> tuple[list[Edge], float]:
     ends, level = np.array([edge.ends for edge in rows]), np.array([edge.level for edge in rows])
     # A ring closes up to a period, and so does its joint.
     ring = np.where(open_, 0.0, np.round((ends[0, 0] - ends[-1, 1]) / whole)) * periods
-    # Joint k is where edge k begins; what is level in one of both edges keeps its coordinate.
+    # Joint k is where edge k begins: where the end that is not loose is; else what is level keeps its coordinate.
     before, after = np.roll(ends[:, 1], 1, axis=0) + 0.0, ends[:, 0]
     before[0] += ring
     last_level = np.roll(level, 1, axis=0)
     joints = np.where(last_level != level, np.where(last_level, before, after), 0.5 * (before + after))
+    loose = np.array([edge.loose for edge in rows])
+    last_loose = np.roll(loose, 1)
+    joints[loose & ~last_loose] = before[loose & ~last_loose]
+    joints[last_loose & ~loose] = after[last_loose & ~loose]
     worst = _checked_gaps(rows, before, after, patch)
     _match_seams(rows, joints, period)
     stops = np.roll(joints, -1, axis=0)

@@ -12,7 +12,7 @@ import pytest
 
 import assembly as asm
 from assembly.step import StepError, StepWarning, bodies, reader
-from assembly.step.faces import read_face
+from assembly.step.faces import Edges, read_face
 from assembly.step.occt import quiet, settings
 from assembly.step.profiles import Unreadable
 from tests.step import forked
@@ -148,8 +148,7 @@ def test_sheets_are_bodies_too(tmp_path):
 @pytest.mark.parametrize("name", ["boss", "drilled torus", "wedge of a sphere", "crossed cylinders", "loft", "torus"])
 def test_what_goes_through_a_file_is_what_was_there(tmp_path, name):
     shape = MODELS[name]()
-    numbers = O.ShapeMap()
-    O.TopExp.MapShapes_s(shape, O.TopAbs_EDGE, numbers)
+    numbers = Edges(shape)
     direct = [read_face(face, numbers, None).face for face in faces(shape)]
     file = File()
     file.part(shape, name)
