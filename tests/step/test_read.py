@@ -351,6 +351,14 @@ def test_nothing_is_left_of_a_process_that_ended(damaged, monkeypatch, tmp_path)
     assert not list((tmp_path / "apart").iterdir())
 
 
+def test_occt_is_not_waited_for_without_end(damaged, monkeypatch):
+    child = "import time; from assembly.step import documents; documents._loaded = lambda *_: time.sleep(60.0)\n"
+    monkeypatch.setattr(reader, "_APART", child + reader._APART)
+    monkeypatch.setattr(reader, "FOR_OCCT", (1.0, 0.0))
+    with pytest.raises(StepError, match="are damaged, and OCCT has not read the rest in 1 seconds"):
+        asm.read_step(damaged)
+
+
 @pytest.mark.parametrize(
     ("child", "why"),
     [
