@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite
 from typing import Any
@@ -16,7 +16,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.occt import occt, parts
-from assembly.step.profiles import Unreadable
+from assembly.step.profiles import Unreadable, point
 from assembly.step.projected import Side
 from assembly.step.surfaces import Patch, patch
 from assembly.step.trims import Edge, chained, edge_curve, head_to_tail
@@ -26,6 +26,8 @@ __all__ = ["Edges", "Read", "read_face"]
 Array = NDArray[np.float64]
 # OCCT stands for "unbounded" with numbers beyond this one.
 _FAR = 1e50
+# What a file may forgive at most, over the size of the part: a tolerance of a meter makes no faces meet.
+_FORGIVEN = 1e-2
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,19 @@ class Edges:
                 found.setdefault(self.index(edge), []).append(forward)
         return found
 
+    def bounded(self, edge: Edge, where: Patch) -> Edge:
+        """An edge of a face, its tolerance at most a share of the size of the part or the face, whichever is larger."""
+        if edge.tolerance <= _FORGIVEN * where.surface.size:
+            return edge
+        return replace(edge, tolerance=min(edge.tolerance, _FORGIVEN * max(where.surface.size, self._size)))
+
+    @cached_property
+    def _size(self) -> float:
+        """Diagonal of the box around the vertices; zero where there are none."""
+        o = occt()
+        points = [point(o.BRep_Tool.Pnt_s(o.as_vertex(one))) for one in parts(self.shape, o.TopAbs_VERTEX)]
+        return float(np.linalg.norm(np.ptp(np.array(points), axis=0))) if points else 0.0
+
     def beyond(self, edge: Any, face: Any) -> Side | None:
         """The surface, with the edge's curve on it, of the face on the other side of an edge; None if not just one."""
         o = occt()
@@ -114,6 +129,7 @@ def _loop(wire: Any, face: Any, where: Patch, edges: Edges) -> tuple[list[Edge],
     if not row or (bare and len(seams) % 2 == 0):
         return None
     curves = [edge_curve(edge, face, where, f"edge {edges.index(edge)}", edges.beyond) for edge in row]
+    curves = [edges.bounded(edge, where) for edge in curves]
     return chained(curves if ordered else head_to_tail(curves, where), where)
 
 

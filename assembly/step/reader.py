@@ -96,6 +96,8 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     Planes, cylinders, cones, spheres, tori, swept surfaces and splines are exact rational surfaces, and so are their
     trims, up to curves around an axis that have no rational form (helices, intersections): those are followed to
     1e-10 of the face's extent in (u, v). Ends of edges that the file leaves apart within its tolerance are joined.
+    What a file's tolerance forgives, trims that leave their surface and ends that are apart, is at most a hundredth of
+    the part's size. Faces end where their surfaces cross, where a file has edges beside these.
     Faces are a little smaller than the patches of their surfaces. Shells and faces outside of any solid become bodies
     too. What bounds no face, as wires, points and annotations, is not read. Files of parts that the file refers to are
     looked for beside it.

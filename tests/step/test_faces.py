@@ -180,6 +180,15 @@ def test_trims_overshoot_a_spline_by_no_more_than_the_file_s_tolerance(scale):
     tight = sheet_of(corners, range(4), True, surface=surface, tolerance=1e-3)
     with pytest.raises(Unreadable, match="outer leaves the domain"):
         read_face(tight, Edges(tight), None, scale)
+    # A hundredth of the part's size, here of the square's diagonal, is the most that any tolerance forgives.
+    for far, tolerance in ((0.013, 0.014), (0.016, 1e3)):
+        corners = [(-far, 0.0), (1.0, 0.0), (1.0, 1.0), (-far, 1.0)]
+        sheet = sheet_of(corners, range(4), True, surface=surface, tolerance=tolerance)
+        if far < 0.01 * np.sqrt(2.0):
+            assert read_face(sheet, Edges(sheet), None, scale).face.area() == pytest.approx((1.0 + far) * scale**2)
+        else:
+            with pytest.raises(Unreadable, match="outer leaves the domain"):
+                read_face(sheet, Edges(sheet), None, scale)
 
 
 def test_a_gap_beyond_the_tolerance_is_unreadable():
