@@ -40,6 +40,7 @@ class Source:
     """A file as a document of OCCT, in millimeters, with the number of its faces.
 
     `absent` are files that it refers to and that are not there; of a damaged file what is whole is in the document.
+    `names` are those of its bodies in their order, where the document has them not.
     """
 
     file: Path
@@ -47,6 +48,7 @@ class Source:
     count: int
     absent: tuple[str, ...] = ()
     damaged: bool = False
+    names: tuple[str | None, ...] = ()
 
 
 def solids_of(path: str) -> Iterator[Any]:
@@ -132,6 +134,7 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
         built = 0
         taken: set[str] = set()
         read: dict[str, list[Shape]] = {}
+        said = iter(source.names)
         for label in free_labels(root):
             for leaf in leaves(label, o.TopLoc_Location(), file.stem, None):
                 entry = o.TCollection_AsciiString()
@@ -145,13 +148,14 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
                         missing += [f"{leaf.name!r}, {text}" for text in shape.missing]
                         inexact += [f"{leaf.name!r}, {text}" for text in shape.inexact]
                 for shape in read[key]:
+                    own, at = next(said, None) or shape.name, leaf.name or file.stem
                     try:
                         pose = _pose(leaf.location, scale)
                     except Unreadable as reason:
                         missing.append(f"{leaf.name!r}: {reason}")
                         continue
                     if shape.faces:
-                        name = unique(shape.name or leaf.name or file.stem, taken)
+                        name = unique(own or at, taken)
                         body = Body(name, shape.faces, pose.position, pose.quaternion)
                         body.color = leaf.color or shape.color
                         bodies.append(body)
