@@ -265,6 +265,27 @@ def test_nothing_is_printed_and_occt_s_settings_are_left_as_they_were(nested, ca
     assert (O.Interface_Static.IVal_s("read.stepcaf.subshapes.name"), O.XCAFDoc_ShapeTool.AutoNaming_s()) == before
 
 
+@pytest.mark.parametrize(
+    ("pattern", "other"),
+    [
+        (r"COLOUR_RGB\('',[\d.]+,", "COLOUR_RGB('',"),
+        (r"(STYLED_ITEM\('color',)\(#\d+\)", r"\1.T."),
+        (r"(SURFACE_STYLE_USAGE\(.BOTH.,)#\d+", r"\1'x'"),
+        (r"(PRESENTATION_STYLE_ASSIGNMENT)\(\(", r"\1(12,("),
+    ],
+)
+def test_damaged_styles_cost_colors_and_no_process(nested, monkeypatch, pattern, other):
+    monkeypatch.setattr(reader, "_read_apart", lambda *_: pytest.fail("another process was started"))
+    text, count = re.subn(pattern, other, nested.read_text(), count=1)
+    assert count == 1
+    whole = asm.read_step(nested)
+    nested.write_text(text)
+    with pytest.warns(StepWarning, match=r"machine.step: \d of its styles are damaged: colors are left out"):
+        bodies = asm.read_step(nested)
+    assert [body.name for body in bodies] == [body.name for body in whole]
+    assert all(body.color is None for body in bodies) and len(bodies[0].faces) == len(whole[0].faces)
+
+
 @pytest.fixture
 def damaged(tmp_path):
     """A box whose third plane is without its placement."""
