@@ -123,7 +123,15 @@ def _broken_entities(reader: Any) -> tuple[int, int]:
     broken = (type(model.Value(k)).__name__ for k in range(1, model.NbEntities() + 1) if model.IsErrorEntity(k))
     kinds = [kind for kind in broken if not _is_beside(kind)]
     styles = sum(kind.startswith("StepVisual_") for kind in kinds)
-    return len(kinds) - styles, styles
+    values = (model.Value(k) for k in range(1, model.NbEntities() + 1))
+    flat = sum(_is_flat(value) for value in values if type(value).__name__ == "StepGeom_Axis2Placement3d")
+    return len(kinds) - styles + flat, styles
+
+
+def _is_flat(placement: Any) -> bool:
+    """Whether the location of a placement in space is a point of the plane: OCCT would read a third coordinate."""
+    location = placement.Location()
+    return location is not None and location.NbCoordinates() < 3
 
 
 def _is_beside(kind: str) -> bool:

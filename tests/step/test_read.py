@@ -12,6 +12,7 @@ import pytest
 
 import assembly as asm
 from assembly.step import StepError, StepWarning, bodies, reader
+from assembly.step.documents import document_of
 from assembly.step.faces import Edges, read_face
 from assembly.step.occt import quiet, settings
 from assembly.step.profiles import Unreadable
@@ -370,6 +371,15 @@ def test_nothing_is_left_of_a_process_that_ended(damaged, monkeypatch, tmp_path)
     with pytest.raises(StepError, match="OCCT cannot read the rest"):
         asm.read_step(damaged, strict=False)
     assert not list((tmp_path / "apart").iterdir())
+
+
+def test_a_placement_at_a_point_of_the_plane_is_damage(nested):
+    # OCCT reads its third coordinate, which ended the process.
+    text = nested.read_text()
+    flat = re.search(r"#(\d+) = CARTESIAN_POINT\('',\([^,)]*,[^,)]*\)\)", text)[1]
+    nested.write_text(re.sub(r"(AXIS2_PLACEMENT_3D\('',)#\d+", rf"\1#{flat}", text, count=1))
+    with quiet(), pytest.raises(StepError, match=r"machine.step'; 1 of its entities are damaged"):
+        document_of(str(nested))
 
 
 def test_occt_is_not_waited_for_without_end(damaged, monkeypatch):
