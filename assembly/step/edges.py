@@ -110,4 +110,4 @@ class Edges:
             except (Unreadable, InputError):
                 self._patches[k] = None
         there = self._patches[k]
-        return None if there is None else Side(flat, there)
+        return None if there is None else Side(flat, there, low, high)

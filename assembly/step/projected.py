@@ -9,16 +9,20 @@ are not looked at.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.errors import InputError
+from assembly.geometry.splines.curve import NurbsCurve
 from assembly.step.occt import occt
-from assembly.step.profiles import Spline, Unreadable, approximated, crossings, knot_row, point
+from assembly.step.profiles import Spline, Unreadable, approximated, crossings, knot_row, point, profile
 from assembly.step.surfaces import CONFUSION, Patch
 
-__all__ = ["Side", "is_loose", "projected"]
+__all__ = ["Side", "is_loose", "points_of", "projected"]
 
 Array = NDArray[np.float64]
 # How far a curve may be off its edge, over the size of the surface: less changes no digit that counts.
@@ -41,7 +45,36 @@ _DAMPED = 1e-6
 def _cross(a: Array, b: Array) -> Array:
     """Cross products of rows; NumPy's own takes ten times as long for a few."""
     x, y = a.T, b.T
-    return np.column_stack([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]])
+    return np.array([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]).T
+
+
+def _dot(a: Array, b: Array) -> Array:
+    """Products of rows."""
+    made: Array = np.einsum("ij,ij->i", a, b)
+    return made
+
+
+def _norm(a: Array) -> Array:
+    """Lengths of rows."""
+    return np.sqrt(_dot(a, a))
+
+
+def points_of(curve: Any, low: float, high: float) -> Callable[[Array], Array]:
+    """Points of a curve of OCCT at parameters in an interval: of its spline where that is exact, which is quicker."""
+    o = occt()
+    exact = (o.Geom_Line, o.Geom_Circle, o.Geom_Ellipse, o.Geom_BSplineCurve, o.Geom_BezierCurve)
+    flat = (o.Geom2d_Line, o.Geom2d_Circle, o.Geom2d_Ellipse, o.Geom2d_BSplineCurve, o.Geom2d_BezierCurve)
+    if isinstance(curve, exact + flat):
+        try:
+            source, along, _ = profile(curve, low, high, cut=True)
+            points, weights = source.cartesian
+            made = NurbsCurve(points, source.knots, source.degree, weights)
+        except (Unreadable, InputError):
+            pass
+        else:
+            first, last = made.domain
+            return lambda t: made.evaluate(np.minimum(np.maximum(along(t), first), last))
+    return lambda t: np.array([point(curve.Value(x)) for x in t.tolist()])
 
 
 class Side:
@@ -53,21 +86,32 @@ class Side:
         Geom2d_Curve.
     patch
         The surface.
+    low, high
+        Ends of the curve.
     """
 
-    def __init__(self, flat: Any, patch: Patch) -> None:
-        self.flat, self.patch = flat, patch
+    def __init__(self, flat: Any, patch: Patch, low: float, high: float) -> None:
+        self.patch = patch
         self.low, self.high = np.array(patch.surface.domain).T
+        self.side = self.high - self.low
         self.is_closed = np.array(patch.surface.closed)
+        # Where a coordinate ends; one that comes around does not.
+        self._least, self._most = np.where(self.is_closed, [[-np.inf], [np.inf]], [self.low, self.high])
+        self._is_ring = bool(self.is_closed.any())
+        self._flat = flat, low, high
+
+    @cached_property
+    def _points(self) -> Callable[[Array], Array]:
+        return points_of(*self._flat)
 
     def given(self, t: Array) -> Array:
         """Parameters (n, 2) of the surface on the curve."""
-        there = np.array([point(self.flat.Value(x)) for x in t.tolist()])
-        return np.column_stack([self.patch.u(there[:, 0]), self.patch.v(there[:, 1])])
+        there = self._points(t)
+        return np.array([self.patch.u(there[:, 0]), self.patch.v(there[:, 1])]).T
 
     def _frame(self, uv: Array) -> tuple[Array, Array, Array]:
-        side = self.high - self.low
-        at = np.clip(np.where(self.is_closed, self.low + np.mod(uv - self.low, side), uv), self.low, self.high)
+        at = np.where(self.is_closed, self.low + np.mod(uv - self.low, self.side), uv) if self._is_ring else uv
+        at = np.minimum(np.maximum(at, self.low), self.high)
         s, su, sv = self.patch.surface.evaluate(at[:, 0], at[:, 1], 1)
         return s, su, sv
 
@@ -75,22 +119,24 @@ class Side:
         """Gauss-Newton's step (n, 2) toward the feet of points, how far above the surface they are, and its normals."""
         s, su, sv = self._frame(uv)
         off = points - s
-        a, b, c = (su * su).sum(axis=1), (su * sv).sum(axis=1), (sv * sv).sum(axis=1)
-        f, g = (su * off).sum(axis=1), (sv * off).sum(axis=1)
+        a, b, c = _dot(su, su), _dot(su, sv), _dot(sv, sv)
+        f, g = _dot(su, off), _dot(sv, off)
         # Where a parameter has no direction, at poles, it stays.
-        is_whole = a * c - b * b > 1e-12 * a * c
-        both = np.column_stack([c * f - b * g, a * g - b * f]) / np.where(is_whole, a * c - b * b, 1.0)[:, None]
-        alone = np.column_stack([f / np.maximum(a, 1e-300), g / np.maximum(c, 1e-300)])
-        is_long = np.sqrt(np.column_stack([a, c])) * (self.high - self.low) > 1e-9 * self.patch.surface.size
-        step = np.where(is_whole[:, None], both, np.where(is_long, alone, 0.0))
+        both, product = a * c - b * b, a * c
+        is_whole = both > 1e-12 * product
+        step = np.array([c * f - b * g, a * g - b * f]).T / np.where(is_whole, both, 1.0)[:, None]
+        if not is_whole.all():
+            alone = np.array([f / np.maximum(a, 1e-300), g / np.maximum(c, 1e-300)]).T
+            is_long = np.sqrt(np.array([a, c]).T) * self.side > 1e-9 * self.patch.surface.size
+            step = np.where(is_whole[:, None], step, np.where(is_long, alone, 0.0))
         normals = _cross(su, sv)
-        normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
-        return step, (normals * off).sum(axis=1), normals
+        normals /= np.maximum(_norm(normals), 1e-300)[:, None]
+        return step, _dot(normals, off), normals
 
     def moved(self, uv: Array, step: Array) -> Array:
         """Parameters after a step, within an open domain."""
-        there = uv + step
-        return np.where(self.is_closed, there, np.clip(there, self.low, self.high))
+        made: Array = np.minimum(np.maximum(uv + step, self._least), self._most)
+        return made
 
     def feet(self, points: Array, start: Array) -> Array:
         """Parameters (n, 2) of the surface's points that are nearest to others.
@@ -103,7 +149,7 @@ class Side:
         uv, far, before = start, np.inf, np.inf
         for _ in range(_STEPS):
             there = self.moved(uv, self.step(uv, points)[0])
-            far = float((np.abs(there - uv) / (self.high - self.low)).max())
+            far = float((np.abs(there - uv) / self.side).max())
             uv = there
             # The last steps are rounding's, whatever the coordinates.
             if far <= _LAST or not far <= 0.25 or (far <= 1e3 * _LAST and far >= 0.5 * before):
@@ -117,13 +163,10 @@ class Side:
 class _Edge:
     """An edge in space, the surface that it is projected onto, and the one on its other side if there is one."""
 
-    def __init__(self, space: Any, own: Side, other: Side | None) -> None:
+    def __init__(self, space: Any, low: float, high: float, own: Side, other: Side | None) -> None:
         self.space, self.own, self.other = space, own, other
+        self.points = points_of(space, low, high)
         self.size = own.patch.surface.size
-
-    def points(self, t: Array) -> Array:
-        """Of the edge (n, 3)."""
-        return np.array([point(self.space.Value(x)) for x in t.tolist()])
 
     def off(self, t: Array) -> float:
         """How far the curve on the surface is from where the projection is, across the curve, at most.
@@ -135,9 +178,9 @@ class _Edge:
         across = su * (there - given)[:, :1] + sv * (there - given)[:, 1:]
         slopes = np.gradient(given, t, axis=0)
         along = su * slopes[:, :1] + sv * slopes[:, 1:]
-        along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
-        across -= (across * along).sum(axis=1)[:, None] * along
-        return float(np.linalg.norm(across, axis=1).max())
+        along /= np.maximum(_norm(along), 1e-300)[:, None]
+        across -= _dot(across, along)[:, None] * along
+        return float(_norm(across).max())
 
     def projection(self, t: Array) -> Array:
         """Parameters (n, 2) on the surface, of the intersection where there is one."""
@@ -154,10 +197,10 @@ class _Edge:
             step, high, normals = self.own.step(own, found)
             step_there, high_there, normals_there = other.step(there, found)
             own, there = self.own.moved(own, step), other.moved(there, step_there)
-            cosine = (normals * normals_there).sum(axis=1)
+            cosine = _dot(normals, normals_there)
             if count < 2:
                 # Feet of the edge itself, by one step.
-                sine = np.linalg.norm(_cross(normals, normals_there), axis=1)
+                sine = _norm(_cross(normals, normals_there))
                 share = -np.expm1(-((sine / _CROSSING) ** 4))
                 if count == 0:
                     continue
@@ -167,7 +210,7 @@ class _Edge:
             gaps = gaps / (2.0 - 2.0 * cosine + _DAMPED)
             back = sums[:, None] * (normals + normals_there) + gaps[:, None] * (normals - normals_there)
             found = found - back
-            if float((share * np.linalg.norm(back, axis=1)).max()) <= last:
+            if float((share * _norm(back)).max()) <= last:
                 break
         moved: Array = points + share[:, None] * (found - points)
         return moved
@@ -227,7 +270,7 @@ def projected(edge: Any, own: Side, other: Side | None, low: float, high: float)
     space = o.BRep_Tool.Curve_s(edge, 0.0, 0.0)
     if space is None or not np.allclose(o.BRep_Tool.Range_s(edge), (low, high), rtol=1e-9, atol=1e-9 * (high - low)):
         return None
-    made = _Edge(space, own, other)
+    made = _Edge(space, low, high, own, other)
     try:
         if not made.off(np.linspace(low, high, 2 * _PLACES)) > _OFF * made.size:
             return None

@@ -223,8 +223,8 @@ def _projected(traced: Traced, wire: Wire, patch: Patch, edges: Edges) -> _Draft
     """The curve of a loose edge projected; None where the one there will do, or none is."""
     if traced.curve is None or traced.seam:
         return None
-    side, other = Side(traced.curve, patch), edges.beyond(traced, wire.face)
-    made = projected(traced.edge, side, other, traced.low, traced.high)
+    low, high = traced.low, traced.high
+    made = projected(traced.edge, Side(traced.curve, patch, low, high), edges.beyond(traced, wire.face), low, high)
     return None if made is None else _Draft(made[0], (False, False), made[1])
 
 

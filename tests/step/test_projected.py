@@ -11,7 +11,7 @@ from assembly.step import trims
 from assembly.step.bodies import read_shape
 from assembly.step.carriers import spline_curve
 from assembly.step.profiles import approximated, point
-from assembly.step.projected import Side, is_loose, projected
+from assembly.step.projected import Side, is_loose, points_of, projected
 from assembly.step.surfaces import patch
 from tests.step.models import MODELS, O, cylinder, edges, faces, parts, without
 
@@ -76,7 +76,7 @@ def test_edges_of_one_surface_alone_end_at_its_nearest_points():
                 continue
             low, high = O.BRep_Tool.Range_s(edge)
             flat = O.BRep_Tool.CurveOnSurface_s(edge, face, low, high)
-            curve, deviation = projected(edge, Side(flat, where), None, low, high)
+            curve, deviation = projected(edge, Side(flat, where, low, high), None, low, high)
             assert deviation < 1e-9
             points, _ = curve.cartesian
             assert points.shape[1] == 2
@@ -100,3 +100,20 @@ def test_edges_that_are_followed_well_are_not_looked_at(name, monkeypatch):
     monkeypatch.setattr(trims, "projected", lambda *_: pytest.fail("an edge was projected"))
     made = read_shape(MODELS[name](), lambda _: (None, None), None, 1.0)
     assert made.faces and not made.missing
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_points_of_curves_are_occt_s(name):
+    shape = MODELS[name]()
+    for face in faces(shape):
+        for edge in map(O.as_edge, parts(face, O.TopAbs_EDGE)):
+            if O.BRep_Tool.Degenerated_s(edge):
+                continue
+            low, high = O.BRep_Tool.Range_s(edge)
+            for curve in (O.BRep_Tool.Curve_s(edge, 0.0, 0.0), O.BRep_Tool.CurveOnSurface_s(edge, face, low, high)):
+                at = np.linspace(low, high, 23)
+                wanted = np.array([point(curve.Value(x)) for x in at.tolist()])
+                # Two formulas for the same points, their ends included.
+                np.testing.assert_allclose(
+                    points_of(curve, low, high)(at), wanted, rtol=0, atol=3e-14 * (1.0 + abs(wanted).max())
+                )
