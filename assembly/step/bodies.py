@@ -13,11 +13,11 @@ from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.step.documents import StepError, document_of
+from assembly.step.edges import Edges
 from assembly.step.faces import read_face
 from assembly.step.occt import occt, parts, quiet
 from assembly.step.profiles import Unreadable
 from assembly.step.tree import Color, Part, free_labels, leaves
-from assembly.step.trims import Tolerances
 
 __all__ = ["Source", "bodies_in", "read_shape", "solids_in", "solids_of", "unique"]
 
@@ -41,6 +41,7 @@ class Source:
     """A file as a document of OCCT, in millimeters, with the number of its faces.
 
     `absent` are files that it refers to and that are not there; of a damaged file what is whole is in the document.
+    `names` are those of its bodies in their order, where the document has them not.
     """
 
     file: Path
@@ -48,6 +49,7 @@ class Source:
     count: int
     absent: tuple[str, ...] = ()
     damaged: bool = False
+    names: tuple[str | None, ...] = ()
 
 
 def solids_of(path: str) -> Iterator[Any]:
@@ -84,18 +86,16 @@ def read_shape(
         Our unit of length in a millimeter.
     """
     o = occt()
-    edges = o.ShapeMap()
-    o.TopExp.MapShapes_s(shape, o.TopAbs_EDGE, edges)
+    edges = Edges(shape)
     name, own_color = said(shape)
     made = Shape([], own_color or color, name, [], [])
     taken: set[str] = set()
-    tolerances = Tolerances()
     for k, face in enumerate(parts(shape, o.TopAbs_FACE), 1):
         face = o.as_face(face)
         own, tint = said(face)
         label = unique(own or f"face {k}", taken)
         try:
-            read = read_face(face, edges, label, scale, tolerances)
+            read = read_face(face, edges, label, scale)
         except Unreadable as reason:
             made.missing.append(f"{label!r}: {reason}")
             continue
@@ -135,6 +135,7 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
         built = 0
         taken: set[str] = set()
         read: dict[str, list[Shape]] = {}
+        said = iter(source.names)
         for label in free_labels(root):
             for leaf in leaves(label, o.TopLoc_Location(), file.stem, None):
                 entry = o.TCollection_AsciiString()
@@ -148,13 +149,14 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
                         missing += [f"{leaf.name!r}, {text}" for text in shape.missing]
                         inexact += [f"{leaf.name!r}, {text}" for text in shape.inexact]
                 for shape in read[key]:
+                    own, at = next(said, None) or shape.name, leaf.name or file.stem
                     try:
                         pose = _pose(leaf.location, scale)
                     except Unreadable as reason:
                         missing.append(f"{leaf.name!r}: {reason}")
                         continue
                     if shape.faces:
-                        name = unique(shape.name or leaf.name or file.stem, taken)
+                        name = unique(own or at, taken)
                         body = Body(name, shape.faces, pose.position, pose.quaternion)
                         body.color = leaf.color or shape.color
                         bodies.append(body)

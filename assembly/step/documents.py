@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -91,12 +92,21 @@ def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
         with settings({"read.stepcaf.subshapes.name": 1, "read.step.product.mode": 1}):
             if reader.ReadFile(file) != o.IFSelect_RetDone:
                 raise StepError(f"path is {path!r}; expected a STEP file, and OCCT cannot parse it")
-            if not damaged and (broken := _broken_entities(reader)):
-                raise Damaged(f"path is {path!r}; {broken} of its entities are damaged")
+            shapes, styles = _broken_entities(reader)
+            if shapes and not damaged:
+                raise Damaged(f"path is {path!r}; {shapes} of its entities are damaged")
+            if styles:
+                warnings.warn(
+                    f"{Path(path).name}: {styles} of its styles are damaged: colors are left out",
+                    StepWarning,
+                    stacklevel=6,
+                )
             document = o.TDocStd_Document(o.TCollection_ExtendedString("XmlOcaf"))
             o.XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
-            for mode in ("SetColorMode", "SetNameMode"):
-                getattr(reader, mode)(True)
+            # Of styles only these make something.
+            for mode in ("SetColorMode", "SetLayerMode", "SetGDTMode", "SetMatMode", "SetViewMode"):
+                getattr(reader, mode)(not styles and mode == "SetColorMode")
+            reader.SetNameMode(True)
             if not reader.Transfer(document):
                 raise StepError(f"path is {path!r}; OCCT finds no shapes in it")
     finally:
@@ -104,11 +114,24 @@ def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
     return document, _face_count(reader)
 
 
-def _broken_entities(reader: Any) -> int:
-    """Number of entities that OCCT could not load, and that it may make shapes or colors of."""
+def _broken_entities(reader: Any) -> tuple[int, int]:
+    """Numbers of entities that OCCT could not load: those that it makes shapes of, and those that say how these look.
+
+    OCCT asks nothing of the latter where it is to make no colors.
+    """
     model = reader.Reader().WS().Model()
-    broken = (k for k in range(1, model.NbEntities() + 1) if model.IsErrorEntity(k))
-    return sum(not _is_beside(type(model.Value(k)).__name__) for k in broken)
+    broken = (type(model.Value(k)).__name__ for k in range(1, model.NbEntities() + 1) if model.IsErrorEntity(k))
+    kinds = [kind for kind in broken if not _is_beside(kind)]
+    styles = sum(kind.startswith("StepVisual_") for kind in kinds)
+    values = (model.Value(k) for k in range(1, model.NbEntities() + 1))
+    flat = sum(_is_flat(value) for value in values if type(value).__name__ == "StepGeom_Axis2Placement3d")
+    return len(kinds) - styles + flat, styles
+
+
+def _is_flat(placement: Any) -> bool:
+    """Whether the location of a placement in space is a point of the plane: OCCT would read a third coordinate."""
+    location = placement.Location()
+    return location is not None and location.NbCoordinates() < 3
 
 
 def _is_beside(kind: str) -> bool:

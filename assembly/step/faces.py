@@ -14,10 +14,11 @@ from assembly.geometry.faces.boundary import OVERSHOOT
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.step.edges import Edges
 from assembly.step.occt import occt
 from assembly.step.profiles import Unreadable
 from assembly.step.surfaces import Patch, patch
-from assembly.step.trims import Edge, Tolerances, chained, curves_of, edge_curves, head_to_tail
+from assembly.step.trims import Edge, chained, curves_of, edge_curves, head_to_tail
 from assembly.step.wires import Wire, bounds, outermost, wires_of
 
 __all__ = ["Read", "read_face"]
@@ -36,11 +37,11 @@ class Read:
     gap: float
 
 
-def _loop(wire: Wire, where: Patch, edges: Any, tolerances: Tolerances) -> tuple[list[Edge], float] | None:
+def _loop(wire: Wire, where: Patch, edges: Edges) -> tuple[list[Edge], float] | None:
     """The boundary curves of a wire; None where nothing is left of it but seams and poles."""
     if not wire.edges or wire.is_bare:
         return None
-    curves = edge_curves(wire.edges, where, edges, tolerances)
+    curves = edge_curves(wire, where, edges)
     return chained(curves if wire.ordered else head_to_tail(curves, where), where)
 
 
@@ -54,9 +55,7 @@ def _scaled(where: Patch, scale: float) -> tuple[NurbsSurface, Array]:
     return NurbsSurface(scale * surface.control_points, knots, surface.degree, surface.weights), factors
 
 
-def read_face(
-    face: Any, edges: Any, name: str | None, scale: float = 1.0, tolerances: Tolerances | None = None
-) -> Read:
+def read_face(face: Any, edges: Edges, name: str | None, scale: float = 1.0) -> Read:
     """A face of OCCT, its surface and its loops.
 
     Parameters
@@ -64,12 +63,10 @@ def read_face(
     face
         TopoDS_Face.
     edges
-        Map of the solid's edges, which numbers them.
+        Those of the solid, with their numbers.
     name : str, optional
     scale : float
         Our unit of length in a millimeter.
-    tolerances
-        Of the solid's edges.
 
     Raises
     ------
@@ -77,7 +74,6 @@ def read_face(
         Saying why.
     """
     o = occt()
-    known = Tolerances() if tolerances is None else tolerances
     forward = o.as_face(face.Oriented(o.TopAbs_FORWARD))
     surface = o.BRep_Tool.Surface_s(forward)
     if surface is None:
@@ -96,7 +92,7 @@ def read_face(
         # What the file says of its edges and vertices, and at least what faces forgive by themselves.
         tolerance = OVERSHOOT * made_surface.size
         for k, wire in enumerate(wires):
-            made = _loop(wire, where, edges, known)
+            made = _loop(wire, where, edges)
             if made is None:
                 continue
             gap = max(gap, made[1])
@@ -109,6 +105,9 @@ def read_face(
                 holes.append(loop)
         reverse = face.Orientation() == o.TopAbs_REVERSED
         made_face = Face(made_surface, outer, holes, name=name, reversed=reverse, tolerance=tolerance)
+        if outer is None and not holes:
+            # The edge of a surface that is damaged may bound no face, which is otherwise found when it is asked for.
+            made_face.boundary  # noqa: B018
         return Read(made_face, deviation, gap)
     except InputError as error:
         raise Unreadable(str(error)) from error

@@ -14,6 +14,7 @@ from assembly.solve.solution import Solution
 from assembly.step.bodies import Source, bodies_in
 from assembly.step.documents import StepError, StepWarning, checked_unit
 from assembly.step.occt import occt, parts, quiet, settings
+from assembly.step.placed import placed_bodies
 from assembly.step.writer import document_of_bodies
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ __all__ = ["read_brep", "read_iges", "write_brep", "write_iges"]
 _IGES, _BREP = (".igs", ".iges"), (".brep", ".brp")
 # Gaps of faces that are sewn to solids [mm]: what IGES files of other programs have at their edges.
 _SEWN = 1e-3
+# IGES' number of solids by their boundaries (manifold solid B-rep objects).
+_SOLID = 186
 
 
 def read_iges(path: str | PathLike[str], *, unit: str = "mm", strict: bool = True) -> list[Body]:
@@ -57,10 +60,12 @@ def read_iges(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
         document = _document()
         if not _is_iges(file) or reader.ReadFile(str(file)) != o.IFSelect_RetDone or not reader.Transfer(document):
             raise StepError(f"path is {str(file)!r}; expected an IGES file with shapes, and OCCT finds none")
-        shape = reader.OneShape()
-        if not parts(shape, o.TopAbs_SOLID):
+        shape, names = reader.OneShape(), _names_of_solids(reader.IGESModel())
+        solids = len(parts(shape, o.TopAbs_SOLID))
+        if not solids:
             document = _document_with(_sewn(shape))
-    return _bodies(Source(file, document, len(parts(shape, o.TopAbs_FACE))), scale, strict)
+    names = names if len(names) == solids else ()
+    return _bodies(Source(file, document, len(parts(shape, o.TopAbs_FACE)), names=names), scale, strict)
 
 
 def read_brep(path: str | PathLike[str], *, unit: str = "mm", strict: bool = True) -> list[Body]:
@@ -81,7 +86,7 @@ def write_iges(
 ) -> None:
     """Write bodies to an IGES file (solids, in millimeters), each where it stands; see `write_step`.
 
-    Names of bodies and of faces do not come back from there, colors do.
+    Names of solids and colors come back from there; names of faces, and of bodies that do not close, do not.
 
     Raises
     ------
@@ -104,12 +109,19 @@ def write_iges(
 def write_brep(
     path: str | PathLike[str], what: Assembly | Solution | Body | Sequence[Body], *, unit: str = "mm"
 ) -> None:
-    """Write bodies to a BREP file, OCCT's own, in millimeters, without names and colors; see `write_step`.
+    """Write bodies to a BREP file, OCCT's own, in millimeters; see `write_step`.
+
+    BREP files have no names and no colors: what is read from one has the name of the file.
 
     Raises
     ------
     StepError, InputError, ImportError
         As `write_step`, and a path that does not end in .brep or .brp.
+
+    Warns
+    -----
+    StepWarning
+        Several bodies, whose names are lost.
     """
     file = _named(path, _BREP)
     o = occt()
@@ -117,6 +129,13 @@ def write_brep(
         document = document_of_bodies(file, what, checked_unit(unit))
         if not o.BRepTools.Write_s(o.XCAFDoc_ShapeTool.GetShape_s(document.root), str(file)):
             raise StepError(f"path is {str(file)!r}; OCCT cannot write there")
+    names = [body.name for body, _ in placed_bodies(what) if body.faces]
+    if len(names) > 1:
+        warnings.warn(
+            f"{file.name}: BREP files have no names: those of {len(names)} bodies are left out",
+            StepWarning,
+            stacklevel=2,
+        )
 
 
 def _there(path: str | PathLike[str]) -> Path:
@@ -138,6 +157,13 @@ def _is_iges(file: Path) -> bool:
     with file.open("rb") as stream:
         line = stream.readline(200)
     return line[72:73] in (b"S", b"B", b"C")
+
+
+def _names_of_solids(model: Any) -> tuple[str | None, ...]:
+    """The names that a file gives its solids, in its order: of properties, where labels have eight characters only."""
+    solids = (model.Entity(k) for k in range(1, model.NbEntities() + 1))
+    found = [solid for solid in solids if solid.TypeNumber() == _SOLID]
+    return tuple(solid.NameValue().ToCString() if solid.HasName() else None for solid in found)
 
 
 def _document() -> Any:

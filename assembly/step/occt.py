@@ -79,7 +79,7 @@ def occt() -> Any:
     for name, (eight, module, seven) in _CONTAINERS.items():
         names[name] = getattr(containers, eight) if containers else getattr(import_module(f"OCP.{module}"), seven)
     # Both versions know the casts; they differ in the suffix that marks a static function.
-    for kind in ("Edge", "Face", "Shell", "Solid", "Wire"):
+    for kind in ("Edge", "Face", "Shell", "Solid", "Vertex", "Wire"):
         names[f"as_{kind.lower()}"] = getattr(names["TopoDS"], f"{kind}_s", None) or getattr(names["TopoDS"], kind)
     return SimpleNamespace(**names)
 

@@ -21,13 +21,25 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from assembly._read_only import read_only
 from assembly.errors import AssemblyError
 from assembly.geometry.splines import bezier
 from assembly.step.occt import occt
 
-__all__ = ["Direction", "Spline", "Straight", "Turning", "Unreadable", "approximated", "arc", "profile", "spline"]
+__all__ = [
+    "Direction",
+    "Spline",
+    "Straight",
+    "Turning",
+    "Unreadable",
+    "approximated",
+    "arc",
+    "crossings",
+    "profile",
+    "spline",
+]
 
 Array = NDArray[np.float64]
 # Part of the extent by which surfaces reach beyond their face, so that trims lie inside their domain.
@@ -207,6 +219,17 @@ def approximated(function: Callable[[Array], Array], breaks: Array, tolerance: f
     stack[1:, 0] = stack[:-1, -1]
     at = np.append(begins[:1], ends)
     return spline(bezier.joined(stack), bezier.full_knots(at, _DEGREE), _DEGREE), worst
+
+
+def crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:
+    """Parameters at which a sampled function takes one of the values of the joints."""
+    found = []
+    for joint in joints:
+        sides = values - joint
+        for k in np.flatnonzero(sides[:-1] * sides[1:] < 0.0):
+            found.append(brentq(lambda t, joint=joint: function(t) - joint, at[k], at[k + 1], xtol=1e-15, rtol=1e-15))
+        found.extend(at[sides == 0.0].tolist())
+    return found
 
 
 @lru_cache(maxsize=1)

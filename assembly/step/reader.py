@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 import warnings
+from collections.abc import Callable
 from os import PathLike, fspath
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,18 +22,24 @@ from assembly.step.occt import quiet
 
 __all__ = ["read_step"]
 
-# Seconds that a damaged file may take, kernels that are compiled for the first time included.
+# Seconds that a damaged file may take, kernels that are compiled for the first time included; and those that OCCT may
+# take of them, of any file and a megabyte of text: fifty times as much as of clean ones. It is OCCT that may not end.
 PATIENCE = 240.0
+FOR_OCCT = (6.0, 20.0)
 # Exit codes from which on Windows means a crash; elsewhere they are negative.
 ENDED = 0xC0000000
 # What is raised in this one is raised again in the process that asked. It ends without OCCT's taking anything down.
 # Arrays that come back as bytes beside the rest are read-only, as those of bodies are.
 _APART = """
-import os, pickle, sys
+import faulthandler, os, pickle, sys
+from assembly.step.occt import occt
 from assembly.step.reader import bodies_of
-path, unit, strict, answer = sys.argv[1:]
+path, unit, strict, seconds, answer = sys.argv[1:]
+occt()
+# OCCT's shapes are there once our own begins to read them, and it does come to an end.
+faulthandler.dump_traceback_later(float(seconds), exit=True)
 try:
-    found = bodies_of(path, unit, strict == "True", os.path.dirname(answer))
+    found = bodies_of(path, unit, strict == "True", os.path.dirname(answer), faulthandler.cancel_dump_traceback_later)
 except Exception as error:
     found = error
 arrays = []
@@ -45,11 +52,13 @@ os._exit(0)
 
 def _read_apart(path: str, unit: str, strict: bool, damage: str) -> tuple[list[Body], list[str]]:
     """`bodies_of` in another process, which OCCT may end, or not end."""
+    least, more = FOR_OCCT
+    seconds = least + more * 1e-6 * Path(path).stat().st_size
     with TemporaryDirectory() as folder:
         answer = Path(folder) / "answer"
         try:
             ended = subprocess.run(
-                [sys.executable or "python", "-P", "-c", _APART, path, unit, str(strict), str(answer)],
+                [sys.executable or "python", "-P", "-c", _APART, path, unit, str(strict), str(seconds), str(answer)],
                 env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sys.path))},
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
@@ -62,6 +71,8 @@ def _read_apart(path: str, unit: str, strict: bool, damage: str) -> tuple[list[B
             raise StepError(f"{damage}, and reading the rest took more than {PATIENCE:g} seconds") from None
         except OSError as error:
             raise StepError(f"{damage}, and no other process can be started to read it: {error}") from None
+        if ended.returncode == 1 and "Timeout (" in ended.stderr:
+            raise StepError(f"{damage}, and OCCT has not read the rest in {seconds:.0f} seconds")
         if 0 < ended.returncode < ENDED:
             raise StepError(f"{damage}, and another process cannot read it: {ended.stderr.strip()[-200:]}")
         if ended.returncode != 0:
@@ -85,6 +96,8 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     Planes, cylinders, cones, spheres, tori, swept surfaces and splines are exact rational surfaces, and so are their
     trims, up to curves around an axis that have no rational form (helices, intersections): those are followed to
     1e-10 of the face's extent in (u, v). Ends of edges that the file leaves apart within its tolerance are joined.
+    What a file's tolerance forgives, trims that leave their surface and ends that are apart, is at most a hundredth of
+    the part's size. Faces end where their surfaces cross, where a file has edges beside these.
     Faces are a little smaller than the patches of their surfaces. Shells and faces outside of any solid become bodies
     too. What bounds no face, as wires, points and annotations, is not read. Files of parts that the file refers to are
     looked for beside it.
@@ -141,9 +154,15 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     return bodies
 
 
-def bodies_of(path: str, unit: str, strict: bool, folder: str | None = None) -> tuple[list[Body], list[str]]:
-    """The bodies of a file, also of one that is damaged if there is a folder, and what there is to warn of."""
+def bodies_of(
+    path: str, unit: str, strict: bool, folder: str | None = None, loaded: Callable[[], None] = lambda: None
+) -> tuple[list[Body], list[str]]:
+    """The bodies of a file, also of one that is damaged if there is a folder, and what there is to warn of.
+
+    `loaded` is called when OCCT has read the file.
+    """
     with quiet():
         document, count, absent = document_of(path, folder)
+        loaded()
         found = Source(Path(path), document, count, tuple(absent), folder is not None)
         return bodies_in(found, 1.0 / checked_unit(unit), strict)

@@ -25,8 +25,7 @@ from assembly.geometry.splines.curve_parts import sampled
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.carriers import carrier_of, spline_curve
 from assembly.step.occt import occt, parts
-from assembly.step.profiles import approximated
-from assembly.step.trims import crossings
+from assembly.step.profiles import approximated, crossings
 
 __all__ = ["Sewn", "sewn"]
 

@@ -9,20 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
+from assembly.step.edges import Edges
 from assembly.step.occt import occt
-from assembly.step.profiles import Direction, Spline, Unreadable, approximated, profile, spline
+from assembly.step.profiles import Direction, Spline, Unreadable, approximated, crossings, profile, spline
+from assembly.step.projected import Side, projected
 from assembly.step.surfaces import Patch
-from assembly.step.wires import Traced
+from assembly.step.wires import Traced, Wire
 
-__all__ = ["Edge", "Segment", "Tolerances", "chained", "crossings", "curves_of", "edge_curves", "head_to_tail"]
+__all__ = ["Edge", "Segment", "chained", "curves_of", "edge_curves", "head_to_tail"]
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
@@ -59,6 +60,8 @@ class Edge(NamedTuple):
         Of its interpolation in (u, v).
     seam : bool
         Whether the face has it on both sides.
+    loose : bool
+        Whether it has a tolerance of its own: its ends are less certain than those of others.
     """
 
     curve: Spline | Segment
@@ -67,6 +70,7 @@ class Edge(NamedTuple):
     name: str
     deviation: float
     seam: bool = False
+    loose: bool = False
 
     @property
     def corners(self) -> tuple[Pair, Pair]:
@@ -127,17 +131,6 @@ def curves_of(edges: Sequence[Edge], scales: Array) -> list[NurbsCurve]:
     return made
 
 
-def crossings(values: Array, at: Array, function: Any, joints: Array) -> list[float]:
-    """Parameters at which a sampled function takes one of the values of the joints."""
-    found = []
-    for joint in joints:
-        sides = values - joint
-        for k in np.flatnonzero(sides[:-1] * sides[1:] < 0.0):
-            found.append(brentq(lambda t, joint=joint: function(t) - joint, at[k], at[k + 1], xtol=1e-15, rtol=1e-15))
-        found.extend(at[sides == 0.0].tolist())
-    return found
-
-
 def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: float) -> tuple[Spline, float]:
     """A plane curve of OCCT's (u, v) mapped to ours by interpolation."""
     points, weights = source.cartesian
@@ -166,26 +159,6 @@ def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: floa
     return approximated(mapped, breaks, tolerance)
 
 
-class Tolerances:
-    """Tolerances of the edges of a solid and of their ends [mm], each asked for once."""
-
-    def __init__(self) -> None:
-        self._known: dict[int, float] = {}
-
-    def of(self, edge: Any, number: int) -> float:
-        """The largest of an edge, which has this number, and of its vertices."""
-        known = self._known.get(number)
-        if known is None:
-            o = occt()
-            known = o.BRep_Tool.Tolerance_s(edge)
-            for vertex in (o.TopExp.FirstVertex_s(edge), o.TopExp.LastVertex_s(edge)):
-                if not vertex.IsNull():
-                    known = max(known, o.BRep_Tool.Tolerance_s(vertex))
-            if number:
-                self._known[number] = known
-        return known
-
-
 class _Draft(NamedTuple):
     """An edge whose ends are in OCCT's (u, v) yet where it is level or a line."""
 
@@ -194,19 +167,17 @@ class _Draft(NamedTuple):
     deviation: float
 
 
-def edge_curves(row: Sequence[Traced], patch: Patch, edges: Any, tolerances: Tolerances) -> list[Edge]:
+def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> list[Edge]:
     """The curves of the edges of a wire mapped to our parameters.
 
     Parameters
     ----------
-    row
-        Several on a face.
+    wire
+        On a face.
     patch
         What that is on.
     edges
-        Map of the solid's edges, which numbers them.
-    tolerances
-        Of the solid's edges.
+        Those of the solid.
 
     Raises
     ------
@@ -214,7 +185,13 @@ def edge_curves(row: Sequence[Traced], patch: Patch, edges: Any, tolerances: Tol
         An edge has no curve on the face, or one that cannot be carried over.
     """
     o = occt()
-    drafts = [_draft(traced, patch) for traced in row]
+    size = patch.surface.size
+    rows = []
+    drafts = []
+    for traced in wire.edges:
+        known = edges.known(traced.edge)
+        rows.append(known)
+        drafts.append((_projected(traced, wire, patch, edges) if known.loose else None) or _draft(traced, patch))
     # Ends of all curves that are level are mapped at once.
     level = [draft for draft in drafts if draft.level[0] or draft.level[1]]
     places = np.array([(draft.curve.start, draft.curve.end) for draft in level if isinstance(draft.curve, Segment)])
@@ -223,15 +200,14 @@ def edge_curves(row: Sequence[Traced], patch: Patch, edges: Any, tolerances: Tol
         mapped = np.column_stack([patch.u(mapped[:, 0]), patch.v(mapped[:, 1])])
     points = iter(mapped.tolist())
     made = []
-    for traced, (curve, sides, deviation) in zip(row, drafts, strict=True):
-        edge = traced.edge
+    for traced, known, (curve, sides, deviation) in zip(wire.edges, rows, drafts, strict=True):
         if sides[0] or sides[1]:
             (u, v), (x, y) = next(points), next(points)
             curve = Segment((u, v), (x, y))
-        if edge.Orientation() == o.TopAbs_REVERSED:
+        if traced.edge.Orientation() == o.TopAbs_REVERSED:
             curve = _reversed(curve)
-        number = edges.FindIndex(edge)
-        made.append(Edge(curve, sides, tolerances.of(edge, number), f"edge {number}", deviation, traced.seam))
+        tolerance = edges.forgiven(known.tolerance, size)
+        made.append(Edge(curve, sides, tolerance, known.name, deviation, traced.seam, known.loose))
     return made
 
 
@@ -241,6 +217,15 @@ def _reversed(curve: Spline | Segment) -> Spline | Segment:
         both = curve.low + curve.high
         return Segment(curve.end, curve.start, both - curve.high, both - curve.low)
     return Spline(curve.points[::-1], curve.knots[0] + curve.knots[-1] - curve.knots[::-1], curve.degree)
+
+
+def _projected(traced: Traced, wire: Wire, patch: Patch, edges: Edges) -> _Draft | None:
+    """The curve of a loose edge projected; None where the one there will do, or none is."""
+    if traced.curve is None or traced.seam:
+        return None
+    low, high = traced.low, traced.high
+    made = projected(traced.edge, Side(traced.curve, patch, low, high), edges.beyond(traced, wire.face), low, high)
+    return None if made is None else _Draft(made[0], (False, False), made[1])
 
 
 def _draft(traced: Traced, patch: Patch) -> _Draft:
@@ -340,10 +325,8 @@ def chained(edges: list[Edge], patch: Patch) -> tuple[list[Edge], float]:
     before[0] = (before[0][0] + ring[0], before[0][1] + ring[1])
     after = [start for start, _ in corners]
     worst = _checked_gaps(rows, before, after, patch)
-    levels = [edge.level for edge in rows[-1:] + rows[:-1]]
     joints = [
-        (_joint(last[0], edge.level[0], b[0], a[0]), _joint(last[1], edge.level[1], b[1], a[1]))
-        for last, edge, b, a in zip(levels, rows, before, after, strict=True)
+        _joint(last, edge, b, a) for last, edge, b, a in zip(rows[-1:] + rows[:-1], rows, before, after, strict=True)
     ]
     _match_seams(rows, joints, periods)
     stops = joints[1:] + joints[:1]
@@ -360,11 +343,15 @@ def _whole(to: Pair, at: Pair, periods: Pair) -> Pair:
     )
 
 
-def _joint(last_level: bool, level: bool, before: float, after: float) -> float:
-    """A coordinate of the joint of two edges: what is level in one of both keeps it."""
-    if last_level != level:
-        return before if last_level else after
-    return 0.5 * (before + after)
+def _joint(last: Edge, edge: Edge, before: Pair, after: Pair) -> Pair:
+    """Where two edges meet: at the end of the one that is not loose; else what is level in one of both keeps it."""
+    if last.loose != edge.loose:
+        return before if edge.loose else after
+    u, v = (
+        0.5 * (b + a) if last_level == level else b if last_level else a
+        for last_level, level, b, a in zip(last.level, edge.level, before, after, strict=True)
+    )
+    return u, v
 
 
 def _checked_gaps(rows: list[Edge], before: list[Pair], after: list[Pair], patch: Patch) -> float:

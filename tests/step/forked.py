@@ -24,7 +24,7 @@ def run(command, *, timeout, **_):
             nowhere = os.open(os.devnull, os.O_RDWR)
             for stream in range(3):
                 os.dup2(nowhere, stream)
-            sys.argv = ["-c", *command[4:]]
+            sys.argv, sys.stderr = ["-c", *command[4:]], os.fdopen(2, "w")
             exec(command[3], {"__name__": "__main__"})
         finally:
             # The code ends the process itself where nothing goes wrong.

@@ -5,6 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
+from assembly.step.edges import Edges
 from assembly.step.faces import read_face
 from assembly.step.profiles import Unreadable
 from assembly.step.surfaces import patch
@@ -20,8 +21,7 @@ ELLIPTIC = 2.0 * pi * np.linalg.norm(np.cross(_SLOPES, (0.3, 4.0, 0.1)), axis=1)
 
 
 def read(shape, **options):
-    numbers = O.ShapeMap()
-    O.TopExp.MapShapes_s(shape, O.TopAbs_EDGE, numbers)
+    numbers = Edges(shape)
     return [read_face(face, numbers, f"face {k}", **options) for k, face in enumerate(faces(shape))]
 
 
@@ -114,14 +114,14 @@ def test_a_unit_scales_lengths_and_parameters_of_length(name):
 def test_what_has_no_end_is_unreadable():
     face = O.BRepBuilderAPI_MakeFace(O.gp_Pln()).Face()
     with pytest.raises(Unreadable, match="no boundary, and its surface no end"):
-        read_face(face, O.ShapeMap(), None)
+        read_face(face, Edges(face), None)
 
 
 def test_triangles_are_unreadable():
     face = O.TopoDS_Face()
     O.BRep_Builder().MakeFace(face)
     with pytest.raises(Unreadable, match="no surface"):
-        read_face(face, O.ShapeMap(), None)
+        read_face(face, Edges(face), None)
 
 
 def sheet_of(points, order, shared, ends=None, surface=None, tolerance=1e-7):
@@ -154,13 +154,15 @@ PENTAGON = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.5, 1.5), (0.0, 1.0)]
 @pytest.mark.parametrize("shared", [True, False])
 @pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (0, 2, 1, 4, 3)])
 def test_edges_may_stand_in_any_order_and_lack_common_vertices(shared, order):
-    found = read_face(sheet_of(PENTAGON, order, shared), O.ShapeMap(), None)
+    sheet = sheet_of(PENTAGON, order, shared)
+    found = read_face(sheet, Edges(sheet), None)
     assert found.face.area() == pytest.approx(1.25, rel=1e-14)
 
 
 def test_gaps_within_the_tolerance_are_closed_and_said():
     ends = [*PENTAGON[1:], (0.0, 1e-7)]
-    found = read_face(sheet_of(PENTAGON, range(5), True, ends), O.ShapeMap(), None)
+    sheet = sheet_of(PENTAGON, range(5), True, ends)
+    found = read_face(sheet, Edges(sheet), None)
     assert found.gap == pytest.approx(1e-7, rel=1e-6)
     assert found.face.area() == pytest.approx(1.25, abs=1e-7)
     # Lines along u or v stay so: of the two ends that are apart, each moves along its own line.
@@ -175,13 +177,23 @@ def test_trims_overshoot_a_spline_by_no_more_than_the_file_s_tolerance(scale):
     surface = O.GeomConvert.SurfaceToBSplineSurface_s(square)
     corners = [(-2e-3, 0.0), (1.0, 0.0), (1.0, 1.0), (-2e-3, 1.0)]
     loose = sheet_of(corners, range(4), True, surface=surface, tolerance=3e-3)
-    assert read_face(loose, O.ShapeMap(), None, scale).face.area() == pytest.approx(1.002 * scale**2, rel=1e-12)
+    assert read_face(loose, Edges(loose), None, scale).face.area() == pytest.approx(1.002 * scale**2, rel=1e-12)
     tight = sheet_of(corners, range(4), True, surface=surface, tolerance=1e-3)
     with pytest.raises(Unreadable, match="outer leaves the domain"):
-        read_face(tight, O.ShapeMap(), None, scale)
+        read_face(tight, Edges(tight), None, scale)
+    # A hundredth of the part's size, here of the square's diagonal, is the most that any tolerance forgives.
+    for far, tolerance in ((0.013, 0.014), (0.016, 1e3)):
+        corners = [(-far, 0.0), (1.0, 0.0), (1.0, 1.0), (-far, 1.0)]
+        sheet = sheet_of(corners, range(4), True, surface=surface, tolerance=tolerance)
+        if far < 0.01 * np.sqrt(2.0):
+            assert read_face(sheet, Edges(sheet), None, scale).face.area() == pytest.approx((1.0 + far) * scale**2)
+        else:
+            with pytest.raises(Unreadable, match="outer leaves the domain"):
+                read_face(sheet, Edges(sheet), None, scale)
 
 
 def test_a_gap_beyond_the_tolerance_is_unreadable():
     ends = [*PENTAGON[1:], (0.0, 1e-3)]
+    sheet = sheet_of(PENTAGON, range(5), True, ends)
     with pytest.raises(Unreadable, match=r"two edges that should meet are 0\.001 mm apart"):
-        read_face(sheet_of(PENTAGON, range(5), True, ends), O.ShapeMap(), None)
+        read_face(sheet, Edges(sheet), None)

@@ -7,7 +7,7 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
-from assembly.step.documents import StepError
+from assembly.step.documents import StepError, StepWarning
 
 pytest.importorskip("OCP")
 # Surfaces are written exactly; what is left is how edges are followed, and sums of some ten faces.
@@ -16,7 +16,9 @@ FORMATS = {"iges": (asm.read_iges, asm.write_iges), "brep": (asm.read_brep, asm.
 
 
 def bodies():
-    plate = asm.Body("plate", asm.shapes.plate(40.0, 30.0, 5.0, [(5.0, 3.0, 4.0)]), (1.0, 2.0, 3.0), color=(1, 0, 0))
+    plate = asm.Body(
+        "a plate with a hole", asm.shapes.plate(40.0, 30.0, 5.0, [(5.0, 3.0, 4.0)]), (1.0, 2.0, 3.0), color=(1, 0, 0)
+    )
     turn = np.array([0.8, 0.0, 0.6, 0.0])
     ball = asm.Body("ball", asm.shapes.sphere(3.0), (50.0, 0.0, 0.0), turn)
     ring = asm.Body("ring", asm.shapes.torus(6.0, 2.0), (0.0, 50.0, 7.0), turn)
@@ -34,7 +36,11 @@ def places(given):
 def test_what_is_written_is_read_again(tmp_path, kind, unit):
     read, write = FORMATS[kind]
     path = tmp_path / f"parts.{kind}"
-    write(path, bodies(), unit=unit)
+    if kind == "brep":
+        with pytest.warns(StepWarning, match="parts.brep: BREP files have no names: those of 4 bodies are left out"):
+            write(path, bodies(), unit=unit)
+    else:
+        write(path, bodies(), unit=unit)
     found = read(path, unit=unit)
     assert len(found) == 4 and [len(body.faces) for body in found] == [7, 1, 1, 3]
     for one, other in zip(places(found), places(bodies()), strict=True):
@@ -43,6 +49,10 @@ def test_what_is_written_is_read_again(tmp_path, kind, unit):
     kinds = [face.kind for body in found for face in body.faces]
     assert kinds.count("sphere") == kinds.count("torus") == 1 and kinds.count("cylinder") == 2
     if kind == "iges":
+        assert [body.name for body in found] == ["a plate with a hole", "ball", "ring", "rod"]
+        # Each is the body of its name.
+        for one, other in zip(found, bodies(), strict=True):
+            assert one.volume == pytest.approx(other.volume, rel=CLOSE)
         assert found[0].color is not None or found[0].faces[0].face.color is not None
 
 

@@ -12,6 +12,8 @@ import pytest
 
 import assembly as asm
 from assembly.step import StepError, StepWarning, bodies, reader
+from assembly.step.documents import document_of
+from assembly.step.edges import Edges
 from assembly.step.faces import read_face
 from assembly.step.occt import quiet, settings
 from assembly.step.profiles import Unreadable
@@ -148,8 +150,7 @@ def test_sheets_are_bodies_too(tmp_path):
 @pytest.mark.parametrize("name", ["boss", "drilled torus", "wedge of a sphere", "crossed cylinders", "loft", "torus"])
 def test_what_goes_through_a_file_is_what_was_there(tmp_path, name):
     shape = MODELS[name]()
-    numbers = O.ShapeMap()
-    O.TopExp.MapShapes_s(shape, O.TopAbs_EDGE, numbers)
+    numbers = Edges(shape)
     direct = [read_face(face, numbers, None).face for face in faces(shape)]
     file = File()
     file.part(shape, name)
@@ -185,7 +186,7 @@ def test_a_face_that_cannot_be_read_is_named(tmp_path, monkeypatch):
     file.part(joined(box(), box(1.0, 1.0, 1.0, (0, 0, 3))), "tower")
     path = file.write(tmp_path / "tower.step")
 
-    def fails(face, edges, name, scale, tolerances):
+    def fails(face, edges, name, scale):
         if name == "face 3":
             raise Unreadable("two edges that should meet are 1 mm apart")
         return read_face(face, edges, name, scale)
@@ -264,6 +265,27 @@ def test_nothing_is_printed_and_occt_s_settings_are_left_as_they_were(nested, ca
     asm.read_step(nested)
     assert capfd.readouterr().out == ""
     assert (O.Interface_Static.IVal_s("read.stepcaf.subshapes.name"), O.XCAFDoc_ShapeTool.AutoNaming_s()) == before
+
+
+@pytest.mark.parametrize(
+    ("pattern", "other"),
+    [
+        (r"COLOUR_RGB\('',[\d.]+,", "COLOUR_RGB('',"),
+        (r"(STYLED_ITEM\('color',)\(#\d+\)", r"\1.T."),
+        (r"(SURFACE_STYLE_USAGE\(.BOTH.,)#\d+", r"\1'x'"),
+        (r"(PRESENTATION_STYLE_ASSIGNMENT)\(\(", r"\1(12,("),
+    ],
+)
+def test_damaged_styles_cost_colors_and_no_process(nested, monkeypatch, pattern, other):
+    monkeypatch.setattr(reader, "_read_apart", lambda *_: pytest.fail("another process was started"))
+    text, count = re.subn(pattern, other, nested.read_text(), count=1)
+    assert count == 1
+    whole = asm.read_step(nested)
+    nested.write_text(text)
+    with pytest.warns(StepWarning, match=r"machine.step: \d of its styles are damaged: colors are left out"):
+        bodies = asm.read_step(nested)
+    assert [body.name for body in bodies] == [body.name for body in whole]
+    assert all(body.color is None for body in bodies) and len(bodies[0].faces) == len(whole[0].faces)
 
 
 @pytest.fixture
@@ -350,6 +372,23 @@ def test_nothing_is_left_of_a_process_that_ended(damaged, monkeypatch, tmp_path)
     with pytest.raises(StepError, match="OCCT cannot read the rest"):
         asm.read_step(damaged, strict=False)
     assert not list((tmp_path / "apart").iterdir())
+
+
+def test_a_placement_at_a_point_of_the_plane_is_damage(nested):
+    # OCCT reads its third coordinate, which ended the process.
+    text = nested.read_text()
+    flat = re.search(r"#(\d+) = CARTESIAN_POINT\('',\([^,)]*,[^,)]*\)\)", text)[1]
+    nested.write_text(re.sub(r"(AXIS2_PLACEMENT_3D\('',)#\d+", rf"\1#{flat}", text, count=1))
+    with quiet(), pytest.raises(StepError, match=r"machine.step'; 1 of its entities are damaged"):
+        document_of(str(nested))
+
+
+def test_occt_is_not_waited_for_without_end(damaged, monkeypatch):
+    child = "import time; from assembly.step import documents; documents._loaded = lambda *_: time.sleep(60.0)\n"
+    monkeypatch.setattr(reader, "_APART", child + reader._APART)
+    monkeypatch.setattr(reader, "FOR_OCCT", (1.0, 0.0))
+    with pytest.raises(StepError, match="are damaged, and OCCT has not read the rest in 1 seconds"):
+        asm.read_step(damaged)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,8 @@ import pytest
 import assembly as asm
 from assembly.step.bodies import solids_in
 from assembly.step.documents import document_of
-from assembly.step.occt import occt, quiet
+from assembly.step.occt import occt, parts, quiet
+from assembly.step.projected import is_loose
 from assembly.step.syntax import first_fault, is_step
 from assembly.step.tree import Part, free_labels, leaves
 from tests.step.models import O, areas, faces, off, volumes
@@ -62,12 +63,26 @@ def test_the_text_has_the_form_of_a_step_file(file):
         assert first_fault(text[:at] + b")" + text[at:]) is not None
 
 
+def loose_area(face):
+    """Area of a strip along the edges of a face that are looser than others, as wide as their tolerances."""
+    found, length = 0.0, O.GProp_GProps()
+    for edge in map(O.as_edge, parts(face, O.TopAbs_EDGE)):
+        if is_loose(edge):
+            O.BRepGProp.LinearProperties_s(edge, length)
+            found += O.BRep_Tool.Tolerance_s(edge) * length.Mass()
+    return found
+
+
 def test_areas_and_volumes_are_occt_s(file):
     path, bodies = file
     for body, (shape, _) in zip(bodies, occt_solids(path), strict=True):
         found = faces(shape)
         for side, face in zip(body.faces, found, strict=True):
-            assert off(side.face.area(), areas(face)) < 1e-6, (body.name, side.name)
+            # Where edges are beside their surfaces, OCCT ends faces at projections of these.
+            assert off(side.face.area(), areas(face)) < 1e-6 + loose_area(face) / side.face.area(), (
+                body.name,
+                side.name,
+            )
         assert off(sum(side.face.volume_integral() for side in body.faces), volumes(shape)) < 1e-6
 
 
@@ -91,11 +106,30 @@ def test_a_round_trip_keeps_everything(file, tmp_path):
     assert [(b.name, b.color, len(b.faces)) for b in back] == [(b.name, b.color, len(b.faces)) for b in bodies]
     for mine, other in zip(bodies, back, strict=True):
         np.testing.assert_allclose(other.pose.matrix, mine.pose.matrix, rtol=0, atol=1e-9)
-        # The files leave faces up to 1e-2 mm apart at some edges, where a new file has one curve for both: along a face
-        # of 20 mm that is some 1e-4 of its area.
+        # Faces end where their surfaces cross, and so in the new file; nist_ctc_01 has edges whose surfaces are tangent
+        # at one end, where a hundredth of a millimeter between the two remains along a tenth of the edge.
         for side in mine.faces:
-            assert other.face(side.name).face.area() == pytest.approx(side.face.area(), rel=1e-4)
+            assert other.face(side.name).face.area() == pytest.approx(side.face.area(), rel=1e-5)
         wanted = sum(side.face.area() for side in mine.faces)
-        assert sum(side.face.area() for side in other.faces) == pytest.approx(wanted, rel=1e-6)
+        assert sum(side.face.area() for side in other.faces) == pytest.approx(wanted, rel=1e-8)
         wanted = sum(side.face.volume_integral() for side in mine.faces)
-        assert sum(side.face.volume_integral() for side in other.faces) == pytest.approx(wanted, rel=1e-6)
+        assert sum(side.face.volume_integral() for side in other.faces) == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "volume", "close"),
+    [
+        # Ellipses in space, which OCCT follows to 3e-3 mm on their cylinders.
+        ("y-belt-tensioner.stp", 5790.3945514, 1e-9),
+        # Splines that meet cylinders 5e-3 mm beside them, tangent: what is between belongs to no face.
+        ("s1-c5-214/s1-c5-214.stp", 1237857.45, 1e-6),
+    ],
+)
+def test_edges_beside_their_surfaces_are_read_once_and_for_all(tmp_path, name, volume, close):
+    bodies = asm.read_step(Path(FOLDER) / name)
+    asm.write_step(tmp_path / "again.step", bodies)
+    back = asm.read_step(tmp_path / "again.step")
+    assert [len(body.faces) for body in back] == [len(body.faces) for body in bodies]
+    for some in (bodies, back):
+        found = sum(side.face.volume_integral() for body in some for side in body.faces)
+        assert found == pytest.approx(volume, rel=close)

@@ -11,6 +11,7 @@ import assembly as asm
 from assembly.geometry.splines.bezier import full_knots
 from assembly.step import StepError, StepWarning
 from assembly.step.documents import UNITS
+from assembly.step.edges import Edges
 from assembly.step.faces import read_face
 from assembly.step.occt import parts
 from assembly.step.solids import sewn
@@ -90,13 +91,12 @@ def test_trims_of_a_disc_about_its_center(tmp_path, name):
 @pytest.mark.parametrize("name", MODELS)
 def test_sewn_faces_are_the_solid_they_came_from(name):
     shape = MODELS[name]()
-    numbers = O.ShapeMap()
-    O.TopExp.MapShapes_s(shape, O.TopAbs_EDGE, numbers)
+    numbers = Edges(shape)
     direct = [read_face(face, numbers, None).face for face in faces(shape)]
     made = sewn(direct, 1.0)
     assert made.closed and O.BRepCheck_Analyzer(made.shape).IsValid()
     assert len(parts(made.shape, O.TopAbs_FACE)) == len(direct)
-    O.TopExp.MapShapes_s(made.shape, O.TopAbs_EDGE, numbers)
+    numbers = Edges(made.shape)
     back = [read_face(face, numbers, None).face for face in faces(made.shape)]
     assert off(sum(face.area() for face in back), [sum(face.area() for face in direct)]) < 1e-9
     assert off(sum(face.volume_integral() for face in back), [sum(face.volume_integral() for face in direct)]) < 1e-8
@@ -110,8 +110,7 @@ def test_sewn_faces_are_the_solid_they_came_from(name):
 @pytest.mark.parametrize("name", ["boss", "drilled torus", "drilled cone", "wedge of a sphere", "crossed cylinders"])
 def test_a_round_trip_keeps_shapes(tmp_path, name):
     shape = MODELS[name]()
-    numbers = O.ShapeMap()
-    O.TopExp.MapShapes_s(shape, O.TopAbs_EDGE, numbers)
+    numbers = Edges(shape)
     body = asm.Body(name, [read_face(face, numbers, f"side {k}").face for k, face in enumerate(faces(shape))])
     (back,) = again(tmp_path / "part.step", body)
     assert {side.name for side in back.faces} == {side.name for side in body.faces}
