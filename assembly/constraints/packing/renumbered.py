@@ -85,7 +85,7 @@ def renumbered(
                 pool[place - 1] = factor * (1.0 if second.is_angle else scale) / unit
             pool[place] = 0.0
             other._values.append((equation, place, unit))
-        other._sources = [item for item in other._values if item[0].source is not None]
+        other._find_sources()
         other._standing_units = np.array([1.0 if item.is_angle else scale for item in packed._turned.told])
     writer = _PoolWriter(packed, scale)
     terms = TermPacking(cast(SceneWriter, writer), bodies, other.reference, other.unit)

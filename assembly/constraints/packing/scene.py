@@ -237,6 +237,13 @@ class Packed(ManagerLast):
                 f"expected from {LEAST_UNIT:g} to {1.0 / LEAST_UNIT:g}"
             )
 
+    def _find_sources(self) -> None:
+        """Keep which values have a source; of those what every solve reads: where it is, where it goes, its unit."""
+        self._sources = [item for item in self._values if item[0].source is not None]
+        self._reads = [
+            (*equation.place(), at, unit, not equation.terms[0][1].is_angle) for equation, at, unit in self._sources
+        ]
+
     def _write(
         self, bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
     ) -> None:
@@ -303,11 +310,7 @@ class Packed(ManagerLast):
         rows.add_expressions()
         table = rows.write(bodies)
         self._values = rows.values
-        self._sources = [item for item in self._values if item[0].source is not None]
-        # What every solve reads of them: where a value is kept, where it goes, its unit, whether it is a length.
-        self._reads = [
-            (*equation.place(), at, unit, not equation.terms[0][1].is_angle) for equation, at, unit in self._sources
-        ]
+        self._find_sources()
         self.rows = len(table)
         self.owners = np.array(rows.owners, dtype=np.int64)
         self.one_sided = table[:, layout.ONE_SIDED] == 1

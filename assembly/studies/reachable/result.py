@@ -127,8 +127,8 @@ class Workspace(ReadOnlyArrays):
     def gradient(self, parameters: Parameter | Sequence[Parameter]) -> Array:
         """How the area or volume changes with numbers of the scene, (p,): the boundary integral of its normal velocity.
 
-        Each place of the boundary is solved for again, and its distance from where the tip was drawn to is derived. Those
-        whose distance has no derivative move as the others do on average.
+        Each place of the boundary is solved for again, and its distance from where the tip was drawn to is derived.
+        Those whose distance has no derivative move as the others do on average.
 
         Raises
         ------
