@@ -102,6 +102,9 @@ if TYPE_CHECKING:
     from assembly.studies.interference.report import interference as interference
     from assembly.studies.reachable import Workspace as Workspace
     from assembly.studies.reachable import workspace as workspace
+    from assembly.studies.synthesis.dimensions import synthesize as synthesize
+    from assembly.studies.synthesis.result import Synthesis as Synthesis
+    from assembly.studies.synthesis.station import Station as Station
     from assembly.studies.tolerances.distributions import Normal as Normal
     from assembly.studies.tolerances.distributions import Uniform as Uniform
     from assembly.studies.tolerances.result import Tolerances as Tolerances
@@ -176,6 +179,9 @@ else:
             "Step": "assembly.tracking.tick",
             "Symmetric": "assembly.constraints.model.groups",
             "Tangent": "assembly.constraints.model.tangent",
+            "Station": "assembly.studies.synthesis.station",
+            "Synthesis": "assembly.studies.synthesis.result",
+            "synthesize": "assembly.studies.synthesis.dimensions",
             "Tolerances": "assembly.studies.tolerances.result",
             "Trace": "assembly.tracking.trace",
             "TrackLog": "assembly.tracking.log",

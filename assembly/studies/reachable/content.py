@@ -10,11 +10,13 @@ from scipy.spatial import cKDTree
 
 from assembly.studies.reachable.grid import Grid
 
-__all__ = ["Content", "content"]
+__all__ = ["Content", "boundary_shares", "content"]
 
 Array = NDArray[np.float64]
 # Points a side of a cell at which it is asked whether they are in the set.
 _SIDE = {2: 10, 3: 6}
+# [cells] How far from the boundary points count for its length or area, less the farther they are.
+_BAND = 0.5
 
 
 class Content(NamedTuple):
@@ -49,24 +51,57 @@ def _beside(reached: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.i
     low = reached.min(axis=0) - 1
     counts = reached.max(axis=0) + 2 - low
     weights = np.cumprod(np.concatenate([[1], counts[:-1]]))
-    steps = np.stack(np.meshgrid(*[(-1, 0, 1)] * dimension, indexing="ij"), axis=-1).reshape(-1, dimension)
     inside = (reached - low) @ weights
-    around = inside[:, None] + steps @ weights
+    around = inside[:, None] + _steps(dimension) @ weights
     is_in = np.isin(around, inside)
     near = np.unique(around[~is_in])
     cells = near[:, None] // weights % counts + low
     return cells, reached[~is_in.all(axis=1)]
 
 
-def _shares(grid: Grid, cells: NDArray[np.int64], places: Array, normals: Array) -> Array:
-    """Which part of each cell (k, d) is in the set, (k,)."""
+def boundary_shares(grid: Grid, reached: NDArray[np.int64], places: Array, normals: Array) -> Array:
+    """The length or area of the boundary that each of its places (m, 3) stands for, (m,); zero for many.
+
+    The estimate counts points behind the tangent plane of the nearest place. Its derivative has a Dirac function of the
+    height over that plane, here a hat of half a cell to either side: what the boundary's curvature adds on one side it
+    takes away on the other. At a corner that goes into the set a place may stand for up to a cell too much, for its
+    plane goes on in the set.
+    """
+    near, cut = _beside(reached)
+    # Cells that are next to those through which the boundary goes, as well.
+    beside = np.concatenate([cut, near])
+    band = np.unique((beside[:, None] + _steps(grid.dimension)).reshape(-1, grid.dimension), axis=0)
+    height, nearest = _heights(grid, _points(grid, band), places, normals)
+    hat = np.maximum(0.0, 1.0 - np.abs(height) / _BAND) / _BAND
+    each = grid.size ** (grid.dimension - 1) / _SIDE[grid.dimension] ** grid.dimension
+    result: Array = each * np.bincount(nearest, hat, len(places))
+    return result
+
+
+def _steps(dimension: int) -> NDArray[np.int64]:
+    """From a cell to all that share a side, an edge or a corner with it, and to itself."""
+    return np.stack(np.meshgrid(*[(-1, 0, 1)] * dimension, indexing="ij"), axis=-1).reshape(-1, dimension)
+
+
+def _points(grid: Grid, cells: NDArray[np.int64]) -> Array:
+    """Points of cells (k, d) at which it is asked whether they are in the set, cell after cell, in units of cells."""
     count = _SIDE[grid.dimension]
     steps = (np.arange(count) + 0.5) / count
     offsets = np.stack(np.meshgrid(*[steps] * grid.dimension, indexing="ij"), axis=-1).reshape(-1, grid.dimension)
-    points = (cells[:, None, :] + offsets).reshape(-1, grid.dimension)
+    result: Array = (cells[:, None, :] + offsets).reshape(-1, grid.dimension)
+    return result
+
+
+def _heights(grid: Grid, points: Array, places: Array, normals: Array) -> tuple[Array, NDArray[np.int64]]:
+    """How far points (k, d) are before the tangent plane at the place nearest to each, in cells; and which that is."""
     # In units of cells, along the grid's axes.
     flat, sides = grid.flat(places), normals @ grid.axes.T
     _, nearest = cKDTree(flat).query(points)
-    behind = ((points - flat[nearest]) * sides[nearest]).sum(axis=1) <= 0.0
+    return ((points - flat[nearest]) * sides[nearest]).sum(axis=1), nearest
+
+
+def _shares(grid: Grid, cells: NDArray[np.int64], places: Array, normals: Array) -> Array:
+    """Which part of each cell (k, d) is in the set, (k,)."""
+    behind = _heights(grid, _points(grid, cells), places, normals)[0] <= 0.0
     result: Array = behind.reshape(len(cells), -1).mean(axis=1)
     return result

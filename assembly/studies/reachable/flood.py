@@ -58,8 +58,8 @@ class Flood:
     most : int
         Cells that may be reached.
     reached : dict of cell -> list of (poses (n, 7), marks (n, 19))
-    limits : dict of cell -> list of (place, outward normal)
-        Of cells beside reached ones whose middles are not reached: where the tip stopped.
+    limits : dict of cell -> list of (place, outward normal, poses (n, 7))
+        Of cells beside reached ones whose middles are not reached: where the tip stopped on the way there.
     undecided : set of cell
         Cells at which a solve has not ended; none of them is reached.
     solves : int
@@ -72,7 +72,7 @@ class Flood:
     flips: int
     most: int
     reached: dict[Cell, list[tuple[Array, Array]]] = field(default_factory=dict)
-    limits: dict[Cell, list[tuple[Array, Array]]] = field(default_factory=dict)
+    limits: dict[Cell, list[tuple[Array, Array, Array]]] = field(default_factory=dict)
     undecided: set[Cell] = field(default_factory=set)
     solves: int = 0
     _done: set[tuple[int, Cell]] = field(default_factory=set)
@@ -113,7 +113,7 @@ class Flood:
             place = self.tip.place(stop)
             length = float(np.linalg.norm(target - place))
             if length <= _FAR * self.grid.size:
-                self.limits.setdefault(cell, []).append((place, (target - place) / length))
+                self.limits.setdefault(cell, []).append((place, (target - place) / length, stop.poses))
             if start.flips < self.flips and start.cell in self.reached:
                 back = self._drawn(self.grid.center(start.cell), self._mirrored(start.stop, stop))
                 if back.is_there:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +13,15 @@ from scipy.spatial import cKDTree
 from assembly._read_only import ReadOnlyArrays
 from assembly.assembly import Assembly
 from assembly.constraints.model.dexterity import Dexterity
+from assembly.derivatives.implicit import several
+from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError
 from assembly.kinematics.picture_mesh import PictureMesh
 from assembly.solve.forces.end_effector import dexterity_value
-from assembly.studies.reachable.content import Content
+from assembly.studies.reachable.content import Content, boundary_shares
 from assembly.studies.reachable.drawn_tip import DrawnTip
 from assembly.studies.reachable.grid import Grid
+from assembly.studies.reachable.moving_boundary import BoundaryStops, boundary_integral
 from assembly.studies.reachable.picture import cell_values, cells_picture
 
 if TYPE_CHECKING:
@@ -60,6 +64,8 @@ class Workspace(ReadOnlyArrays):
     solves: int
     grid: Grid = field(repr=False)
     scene: Assembly = field(repr=False)
+    _targets: Array = field(repr=False)
+    _stops: Array = field(repr=False)
     _drawn: DrawnTip = field(repr=False)
 
     @property
@@ -117,6 +123,24 @@ class Workspace(ReadOnlyArrays):
             for distance, k in zip(np.atleast_1d(distances), np.atleast_1d(nearest), strict=True)
             if distance <= reach
         )
+
+    def gradient(self, parameters: Parameter | Sequence[Parameter]) -> Array:
+        """How the area or volume changes with numbers of the scene, (p,): the boundary integral of its normal velocity.
+
+        Each place of the boundary is solved for again, and its distance from where the tip was drawn to is derived.
+        Those whose distance has no derivative move as the others do on average.
+
+        Raises
+        ------
+        InputError, TypeError
+            A scene whose numbers are others than when the workspace was found, no cells, a parameter that enters
+            nothing.
+        """
+        if not len(self.cells) or not len(self.boundary):
+            raise InputError("the workspace has no cells, or no boundary; expected an area or a volume")
+        shares = boundary_shares(self.grid, self.cells, self.boundary, self.normals)
+        stops = BoundaryStops(self._drawn, self.grid.size, self.boundary, self._targets, self._stops)
+        return boundary_integral(stops, shares, several("parameters", parameters, Parameter))
 
     def dexterity(self, measure: Dexterity) -> Array:
         """The measure of a `Dexterity` with the tip in each cell, at the pose that `poses` has, (k,).

@@ -97,9 +97,8 @@ def _found(scene: Assembly, flood: Flood) -> Workspace:
     grid = flood.grid
     order = sorted(flood.reached)
     cells = np.array(order, dtype=np.int64).reshape(-1, grid.dimension)
-    limits = [limit for at in sorted(flood.limits) for limit in flood.limits[at]]
-    places = np.array([place for place, _ in limits]).reshape(-1, 3)
-    normals = np.array([normal for _, normal in limits]).reshape(-1, 3)
+    limits = [(grid.center(at), *limit) for at in sorted(flood.limits) for limit in flood.limits[at]]
+    targets, places, normals = (np.array([limit[k] for limit in limits]).reshape(-1, 3) for k in range(3))
     return Workspace(
         cells=cells,
         poses=np.array([flood.reached[at][0][0] for at in order]).reshape(len(cells), len(scene.bodies), 7),
@@ -110,6 +109,8 @@ def _found(scene: Assembly, flood: Flood) -> Workspace:
         solves=flood.solves,
         grid=grid,
         scene=scene,
+        _targets=targets,
+        _stops=np.array([limit[3] for limit in limits]).reshape(len(limits), len(scene.bodies), 7),
         _drawn=flood.tip,
     )
 

@@ -1,0 +1,1 @@
+"""Dimensions of a mechanism that are found for what it is to do."""

@@ -1,0 +1,130 @@
+"""Dimensions found by optimizers, against closed forms of a slider-crank and of arms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.errors import InputError
+
+RADIUS, LENGTH = 2.0, 5.0
+
+
+def slider_crank():
+    ground, crank, rod = asm.Body("ground", fixed=True), asm.Body("crank"), asm.Body("rod", position=(1.5, 1.3, 0))
+    piston = asm.Body("piston", position=(6, 0, 0))
+    hinge = asm.Revolute(ground, crank, "hinge", angle=0.7)
+    pin = asm.Revolute(crank.frame(at=(RADIUS, 0, 0)), rod, "pin")
+    wrist = asm.Revolute(rod.frame(at=(LENGTH, 0, 0)), piston, "wrist")
+    guide = asm.Prismatic(ground.frame(z=(1, 0, 0)), piston.frame(z=(1, 0, 0)), "guide")
+    scene = asm.Assembly([ground, crank, rod, piston])
+    scene.constrain(hinge, pin, wrist, guide)
+    angle = asm.Parameter(hinge, "angle")
+    radius = asm.Parameter(pin.frame_a, "origin", "x", name="radius")
+    length = asm.Parameter(wrist.frame_a, "origin", "x", name="length")
+    return scene, asm.Measure(guide), angle, radius, length
+
+
+def stroke(radius, length, angle):
+    return radius * np.cos(angle) + np.sqrt(length**2 - (radius * np.sin(angle)) ** 2)
+
+
+def test_two_strokes_give_two_lengths_back():
+    scene, slide, angle, radius, length = slider_crank()
+    stations = [asm.Station({angle: a}, {slide: stroke(1.7, 5.6, a)}) for a in (0.2, 1.2, 2.2)]
+    found = asm.synthesize(scene, stations, {radius: (1.0, 3.0), length: (4.0, 8.0)})
+    assert found.success, found
+    np.testing.assert_allclose(found.values, [1.7, 5.6], rtol=0, atol=1e-10)
+    assert found.evaluations <= 10
+    assert (radius.value, length.value, angle.value) == (RADIUS, LENGTH, 0.7)
+    found.apply()
+    assert radius.value == found.values[0] and found.found[length] == length.value
+    assert "radius" in str(found) and "evaluations" in str(found)
+
+
+def test_the_greatest_of_a_measure_is_made_least_within_bounds():
+    """A slider that stays near at two angles, with a rod no shorter than 2.2 cranks."""
+    scene, slide, angle, radius, length = slider_crank()
+    stations = [asm.Station({angle: a}) for a in (0.5, 1.0)]
+
+    def ratio(values):
+        return values[1] - 2.2 * values[0], (-2.2, 1.0)
+
+    sides = {radius: (1.5, 3.0), length: (3.0, 8.0)}
+    found = asm.synthesize(scene, slide, sides, stations=stations, subject_to=[(ratio, 0.0, None)])
+    # The shortest crank, and the shortest rod that it may have.
+    assert found.success, found
+    np.testing.assert_allclose(found.values, [1.5, 3.3], rtol=0, atol=1e-9)
+    assert found.cost == pytest.approx(stroke(1.5, 3.3, 0.5), abs=1e-9)
+    assert found.violation < 1e-9
+
+
+def test_two_stations_share_the_greatest_measure():
+    """How far the piston is from a place between two strokes: the best rod puts both as far from it."""
+    scene, _, angle, _, length = slider_crank()
+    far = asm.Measure((scene.bodies[3], scene.bodies[0].point(5.0, 0.0, 0.0)))
+    stations = [asm.Station({angle: a}) for a in (0.3, 2.6)]
+    found = asm.synthesize(scene, far, {length: (4.0, 7.0)}, stations=stations)
+    first, second = found.measures
+    assert found.success and first == pytest.approx(second, abs=1e-8)
+    assert found.cost == pytest.approx(first, abs=1e-8)
+
+
+def test_squares_with_a_bound_on_a_measure():
+    """Two strokes wanted, and the one at the second station not over 4.5: the bound holds, and its residual is left."""
+    scene, slide, angle, radius, length = slider_crank()
+    stations = [asm.Station({angle: 0.4}, {slide: 7.0}, weight=2.0), asm.Station({angle: 1.6}, {slide: 5.0})]
+    free = asm.synthesize(scene, stations, {radius: (1.0, 3.0), length: (4.0, 8.0)})
+    assert free.success and np.abs(free.residuals).max() < 1e-10
+    held = asm.synthesize(scene, stations, {radius: (1.0, 3.0), length: (4.0, 8.0)}, subject_to=[(slide, None, 6.9)])
+    assert held.success, held
+    # The second can still be met; the first is 0.1 short, by its weight 0.2.
+    np.testing.assert_allclose(held.residuals, [-0.2, 0.0], rtol=0, atol=1e-6)
+    assert held.measures[[0, 2]] == pytest.approx([6.9, 5.0], abs=1e-6)
+
+
+def test_steps_to_where_there_is_no_solution_are_shortened_and_told():
+    """A stroke of 2 with the crank upright wants a rod so short that Newton's first step makes it shorter than it."""
+    scene, slide, angle, radius, length = slider_crank()
+    wanted = stroke(RADIUS, 2.05, 1.5)
+    found = asm.synthesize(scene, [asm.Station({angle: 1.5}, {slide: wanted})], {length: (0.5, 8.0)})
+    assert found.success, found
+    assert found.values[0] == pytest.approx(2.05, abs=1e-9)
+    assert found.failures and "no solution" in found.failures[0]
+    bounded = asm.synthesize(
+        scene, [asm.Station({angle: 1.5}, {slide: wanted})], {length: (0.5, 8.0)}, subject_to=[(slide, -10.0, None)]
+    )
+    assert bounded.success, bounded
+    assert bounded.values[0] == pytest.approx(2.05, abs=1e-6)
+
+
+def test_same_input_same_output():
+    results = []
+    for _ in range(2):
+        scene, slide, angle, radius, length = slider_crank()
+        stations = [asm.Station({angle: a}, {slide: stroke(1.7, 5.6, a)}) for a in (0.2, 1.2)]
+        results.append(asm.synthesize(scene, stations, {radius: (1.0, 3.0), length: (4.0, 8.0)}))
+    assert results[0].values.tobytes() == results[1].values.tobytes()
+
+
+def test_what_cannot_be_used_is_told():
+    scene, slide, angle, radius, length = slider_crank()
+    station = asm.Station({angle: 0.7}, {slide: 6.0})
+    with pytest.raises(InputError, match="either side"):
+        asm.synthesize(scene, [station], {radius: (2.5, 3.0)})
+    with pytest.raises(InputError, match="nothing is wanted"):
+        asm.synthesize(scene, [asm.Station({angle: 0.7})], {radius: (1.5, 3.0)})
+    with pytest.raises(InputError, match="one of the two"):
+        asm.synthesize(scene, slide, {radius: (1.5, 3.0)}, stations=[station])
+    with pytest.raises(InputError, match="or either"):
+        asm.synthesize(scene, [station], {radius: (1.5, 3.0)}, subject_to=[(slide, None, None)])
+    with pytest.raises(TypeError, match="expected a Parameter"):
+        asm.Station({slide: 0.7}, {slide: 6.0})
+    with pytest.raises(asm.ResponseError, match="station 1"):
+        radius.value, length.value = 2.0, 1.9
+        asm.synthesize(
+            scene,
+            [asm.Station({angle: 0.1}, {slide: 4.0}), asm.Station({angle: 1.5}, {slide: 1.0})],
+            {radius: (1.5, 3.0)},
+        )
