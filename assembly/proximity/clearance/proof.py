@@ -159,11 +159,15 @@ class ClearanceProof:
 
     def clear_answers(self, q: Array, moves: Array) -> list[Answer]:
         """What is proven of all pairs at poses (n, 7) at which they stayed clear, after moves (pairs, 6)."""
-        bounds = [self.bound(k) for k in range(len(self.pairs))]
-        answers = [Answer(Verdict.CLEAR, bound, swept=True) for bound in bounds]
+        pair = self.fronts.pair
+        bounds = pair.soonest - pair.travelled + pair.needed
+        # Only of pairs with nodes in bores of second bodies: one pair after the other takes longer.
+        for k in np.flatnonzero(bounds == -np.inf).tolist():
+            bounds[k] = self.bound(k)
+        answers = [Answer(Verdict.CLEAR, bound, swept=True) for bound in bounds.tolist()]
         for k in np.flatnonzero(moves.any(axis=1)).tolist():
             far = self.move_length(k, q, moves[k])
-            answers[k] = Answer(Verdict.TOUCHING, bounds[k] - far, far, swept=True)
+            answers[k] = Answer(Verdict.TOUCHING, float(bounds[k]) - far, far, swept=True)
         return answers
 
     def not_clear(self) -> list[int]:
