@@ -37,6 +37,8 @@ ROOM = 512
 WORK = (3, 64)
 # Points of each connected part of a boundary.
 POINTS = 12
+# Of the corners of a box.
+_SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
 
 class PackedForest:
@@ -139,6 +141,26 @@ class PackedForest:
         self._links = np.concatenate([self._links, np.zeros_like(self._links)])
         self._nodes = np.concatenate([self._nodes, np.zeros_like(self._nodes)])
         return True
+
+    def room_in_bores(self, walls: Table, within: Table, turn: Array, shift: Array) -> float:
+        """How far nodes are from the walls of bores in which they are, at least: `room_in_bore` of all at once.
+
+        Parameters
+        ----------
+        walls, within : (n,) of int
+            Rows of nodes, in pairs.
+        turn, shift : (3, 3), (3,)
+            The pose of the nodes that are within, seen from the walls' body.
+        """
+        # Plain records: columns as attributes take longer than all the sums.
+        bore, node = (self._nodes[at].view(NODE)[:, 0] for at in (walls, within))
+        is_cell = self._links[within].view(LINKS)[:, 0]["face"] != NONE
+        of_box = node["center"][:, None] + _SIGNS @ (node["half"][..., None] * node["axes"])
+        corners = np.where(is_cell[:, None, None], np.concatenate([node["corner"]] * 2, axis=1), of_box)
+        off, axis = corners @ turn.T + (shift - bore["spine"])[:, None], bore["ruling"][:, None]
+        off = off - (off @ axis.transpose(0, 2, 1)) * axis
+        most = np.sqrt((off**2).sum(axis=2).max(axis=1))
+        return float((bore["bore"] - most - node["disc"] - node["rho"]).min(initial=np.inf))
 
     def shells(self, body: int) -> list[Array]:
         """Of every connected part of a body's boundary a few points of it, (n, 3)."""

@@ -25,6 +25,7 @@ from assembly.proximity.clearance.look import (
     look_at_pairs,
 )
 from assembly.proximity.clearance.records import (
+    BY_BORE_B,
     BY_PLANE,
     CLEAR,
     CROSSING,
@@ -44,6 +45,8 @@ GROWN, MANY = 2, 200
 LONGER = 1.0 + 1e-12
 # Of smaller bodies, and of larger ones than one over it, nothing is proven: products of six lengths are no numbers.
 LEAST_SIZE = 1e-30
+# What rounding may take from the room in a bore, in parts of coordinates.
+ROUNDING = 4e-15
 # Places in the stack of a ray.
 STACK = 4096
 
@@ -157,11 +160,14 @@ class ClearanceProof:
     def clear_answers(self, q: Array, moves: Array) -> list[Answer]:
         """What is proven of all pairs at poses (n, 7) at which they stayed clear, after moves (pairs, 6)."""
         pair = self.fronts.pair
-        bounds = (pair.soonest - pair.travelled + pair.needed).tolist()
-        answers = [Answer(Verdict.CLEAR, bound, swept=True) for bound in bounds]
+        bounds = pair.soonest - pair.travelled + pair.needed
+        # Only of pairs with nodes in bores of second bodies: one pair after the other takes longer.
+        for k in np.flatnonzero(bounds == -np.inf).tolist():
+            bounds[k] = self.bound(k)
+        answers = [Answer(Verdict.CLEAR, bound, swept=True) for bound in bounds.tolist()]
         for k in np.flatnonzero(moves.any(axis=1)).tolist():
             far = self.move_length(k, q, moves[k])
-            answers[k] = Answer(Verdict.TOUCHING, bounds[k] - far, far, swept=True)
+            answers[k] = Answer(Verdict.TOUCHING, float(bounds[k]) - far, far, swept=True)
         return answers
 
     def not_clear(self) -> list[int]:
@@ -252,8 +258,19 @@ class ClearanceProof:
 
     def bound(self, k: int) -> float:
         """A lower bound of the distance of pair k at its last look, where that ended clear."""
-        pair = self.fronts.pair[k]
-        return float(float(pair.soonest - pair.travelled) + float(pair.needed))
+        pair, count = self.fronts.pair[k], int(self.fronts.counts.count[k])
+        needed, travelled = float(pair.needed), float(pair.travelled)
+        if pair.soonest > -np.inf:
+            return float(pair.soonest) - travelled + needed
+        # Nodes in bores of the second body never keep a gap: they are asked at every pose, and so at this one.
+        expiry = self.fronts.parted[k, :count].view(PARTED)[:, 0]["expiry"]
+        links = self.fronts.nodes[k, :count].view(NODES)[:, 0]
+        in_bore = links["how"] == BY_BORE_B
+        kept = float(expiry[~in_bore].min(initial=np.inf)) - travelled + needed
+        turn, shift = pair.turn.reshape(3, 3), pair.shift
+        within = self.forest.room_in_bores(links["b"][in_bore], links["a"][in_bore], turn.T, -shift @ turn)
+        # The look that ended clear has found the least gap kept.
+        return max(min(kept, within - ROUNDING * float(pair.far)), needed)
 
     def _answer(self, k: int, q: Array, move: Array, swept: bool) -> Answer:
         pair, code = self.fronts.pair[k], int(self._codes[k])

@@ -83,6 +83,39 @@ def test_bounds_are_near_where_bodies_are(cases):
         check_answer(proof.look(poses(begin.pose), 0.0)[0], begin)
 
 
+@pytest.mark.parametrize("number", [401, 797])
+def test_bounds_of_what_is_in_bores_of_second_bodies(number):
+    """At 2e-5 and 4e-6 of each other, where the walls of bores are the nearest."""
+    begin = start_of(number)
+    first, second, pose = begin.a.shape, begin.b.shape, poses(begin.pose)
+    for proof, at_pose in ((proof_of(first, second), pose), (proof_of(second, first), pose[::-1])):
+        (answer,) = proof.look(at_pose, 0.0)
+        assert answer.verdict is Verdict.CLEAR
+        assert 0.9 * begin.distance < answer.bound <= begin.distance + CLOSE
+
+
+@pytest.mark.parametrize("least", [0.0, 3e-5])
+@pytest.mark.parametrize("pin", ["bare", "with a collar"])
+def test_bounds_of_pins_in_bores_of_second_bodies(pin, least):
+    """Off the middle by e they are 1e-4 - e apart, where they are looked at and where ways are proven to lead."""
+    shape = [*asm.shapes.solid_cylinder(0.4 - 1e-4, 2.0)]
+    if pin == "with a collar":
+        shape += [
+            asm.Face(f.surface.transformed(np.eye(3), (0, 0, 1.5)), name=f"collar {k}", reversed=f.reversed)
+            for k, f in enumerate(faces_of(asm.shapes.box(1.2, 1.2, 0.4)))
+        ]
+    proof = proof_of(shape, parts()["plate"].shape, least)
+    for way, off in enumerate((0.0, 3e-5, 6e-5, 1e-5)):
+        at_pose, still = poses(UPRIGHT, at(0.7 + off, 0.1, 0.3)), np.zeros((1, 6))
+        if way < 2:
+            (answer,) = proof.look(at_pose, 0.0)
+        else:
+            assert proof.stays_clear(at_pose, 0.0, still)
+            (answer,) = proof.clear_answers(at_pose, still)
+        assert answer.verdict is Verdict.CLEAR
+        assert max(0.99 * (1e-4 - off), least) < answer.bound <= 1e-4 - off + 1e-14
+
+
 def test_the_least_gap_is_kept(cases):
     for number in range(cases(4, 400)):
         begin, _ = way_of(number)
