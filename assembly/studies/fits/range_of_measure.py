@@ -12,7 +12,7 @@ while all bodies are drawn a little aside, to either side, and the other end. Th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import inf, pi
+from math import inf, isfinite, nan, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,17 +31,18 @@ from assembly.studies.fits.result import End, Play
 __all__ = ["play"]
 
 Array = NDArray[np.float64]
-# In sizes of the scene: the first step, the longest one, and what counts as none. Twice as long, and thin walls may be
-# stepped through; half as long, and it takes more of them.
-_FIRST, _LONGEST, _REST = 0.01, 0.32, 1e-9
-# Steps until the measure is solved for alone, whatever it does: by then it went 50 sizes.
+# In sizes of the scene: the first step, the longest one, and the gain of a step at which it rests, a slope of 0.003.
+# Twice as long, and thin walls may be stepped through; half as long, and it takes more of them. Where nothing is in the
+# way but limits, steps that nothing shortens grow.
+_FIRST, _LONGEST, _REST = 0.01, 0.32, 1e-7
+# Steps until the measure is solved for alone, whatever it does: by then it went 2 sizes, or 60 where steps grow.
 _STEPS = 200
 # A step that is not this part of the last one is shortened by something.
 _FREE = 0.9
 # Steps that fail are tried again at a quarter of the length, so often.
 _SHORTER = 4
 # [scene's size, rad] How far bodies are drawn aside for other starts, and in how many directions.
-_ASIDE, _DIRECTIONS = 0.03, 2
+_ASIDE, _DIRECTIONS = 0.03, 1
 # [rad] Angles are taken from near where they are: as far from there they are asked for anew. A joint that turned so
 # often about is free to.
 _NEAR, _TURNED = 2.0, 4.0 * pi
@@ -91,16 +92,16 @@ def play(scene: Assembly, solution: Solution, of: Measure) -> Play:
                 break
         assert best is not None
         ends.append(best)
-        if best.solution.success:
+        if isfinite(best.value):
             starts.append(best.solution.q)
     return Play(of, nominal, *ends)
 
 
 def _better(best: End, end: End, sign: float) -> End:
     """The farther one of two ends; of those that are equal but for rounding the first."""
-    if end.status is Status.UNBOUNDED or (end.solution.success and not best.solution.success):
+    if end.status is Status.UNBOUNDED or not isfinite(best.value):
         return end
-    if not end.solution.success:
+    if not isfinite(end.value):
         return best
     gain = sign * (best.value - end.value)
     return end if gain > 1e-12 * max(abs(best.value), end.scene.packed().scale) else best
@@ -133,14 +134,15 @@ class _Descent:
 
     def __init__(self, scene: Assembly, measure: Measure, term: MeasureTerm, sign: float) -> None:
         self._scene, self._measure, self._term, self._sign = scene, measure, term, sign
-        self._size = scene.packed().scale
+        packed = scene.packed()
+        self._size, self._may_grow = packed.scale, not (packed.keeps_apart or packed.contacts)
 
     def end(self, q: Array, value: float) -> End:
         """From poses (n, 7); an angle there is within half a turn of `value`."""
         term, size, sign = self._term, self._size, self._sign
         begin = center = value if term.turns else 0.0
         length, last, failed = _FIRST * size, inf, 0
-        goal, near = term.objective(sign, center), None
+        goal, near, rests = term.objective(sign, center), None, False
         start: Array | Solution = q
         for _ in range(_STEPS):
             if near is None:
@@ -155,9 +157,10 @@ class _Descent:
                 length, near, last, failed, start = 0.25 * length, None, inf, failed + 1, before
                 continue
             start = found
-            if moved < _REST * size:
+            if self._at(goal, before) - self._at(goal, found.q) < _REST * size:
+                rests = True
                 break
-            if moved > _FREE * last and length < _LONGEST * size:
+            if self._may_grow and moved > _FREE * last and length < _LONGEST * size:
                 length, near, start = 2.0 * length, None, found.q
             last = moved
             if term.turns:
@@ -172,8 +175,13 @@ class _Descent:
         solution = alone.solve(q, radius=_FIRST)
         if term.turns and abs(center - begin) > _TURNED:
             solution.status = Status.UNBOUNDED
-        reached = center + self._at(goal, solution.q) * sign / term.unit if term.turns else 0.0
-        return End.of(alone, solution, reached if term.turns else self._measure.value(solution), sign)
+        reached = self._measure.value(solution)
+        if term.turns:
+            reached = center + self._at(goal, solution.q) * sign / term.unit
+        if rests and self._moved(q, solution.q) > 4.0 * _FIRST * size:
+            # It jumped, to where no short steps lead.
+            reached = nan
+        return End.of(alone, solution, reached, sign)
 
     def _at(self, goal: Objective, q: Array) -> float:
         rows = [self._scene.bodies.index(body) for body in self._term.bodies]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import inf, nan
+from math import inf, isfinite, nan
 
 from assembly.assembly import Assembly
 from assembly.derivatives.measure import Measure
@@ -64,7 +64,7 @@ class Play:
     @property
     def success(self) -> bool:
         """Whether both ends were found."""
-        return self.least.solution.success and self.most.solution.success
+        return isfinite(self.least.value) and isfinite(self.most.value)
 
     @property
     def width(self) -> float:
@@ -77,7 +77,7 @@ class Play:
             f"from {self.least.value:.8g} to {self.most.value:.8g}   play {self.width:.6g}"
         ]
         for name, end in (("least", self.least), ("most", self.most)):
-            if not end.solution.success:
+            if not isfinite(end.value):
                 what = "unbounded" if end.status is Status.UNBOUNDED else "not found"
                 lines.append(f"  {name}: {what}, {end.status.name}: {end.solution.message}")
         return "\n".join(lines)

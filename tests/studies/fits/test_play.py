@@ -7,6 +7,7 @@ from math import acos, asin, atan2, hypot, inf, tan
 import pytest
 
 import assembly as asm
+from assembly.errors import InputError
 
 
 def tilt(hole, pin, thickness):
@@ -122,3 +123,29 @@ def test_a_plate_on_two_pins():
     for component in ("x", "y"):
         shift = asm.play(scene, solution, asm.Measure(floor, component))
         assert [shift.least.value, shift.most.value] == pytest.approx([-0.1, 0.1], abs=1e-11)
+
+
+def test_a_ball_in_a_socket_with_play():
+    # A ball of radius 2.9 in a spherical shell of radius 3: its center is within 0.1 of that of the shell.
+    shell = asm.Body("shell", [asm.Face(asm.shapes.sphere(3.0), reversed=True)], fixed=True)
+    ball = asm.Body("ball", asm.shapes.sphere(2.9), position=(0.02, 0.01, 0.0))
+    scene = asm.Assembly([shell, ball])
+    scene.constrain(asm.Clearance())
+    for component in ("x", "z"):
+        found = asm.play(scene, scene.solve(), asm.Measure(ball, component))
+        assert [found.least.value, found.most.value] == pytest.approx([-0.1, 0.1], abs=1e-10)
+
+
+def test_what_is_refused():
+    scene, tip = loose_pin()
+    solution, x = scene.solve(), asm.Measure(tip, "x")
+    with pytest.raises(TypeError, match="expected a Measure"):
+        asm.play(scene, solution, tip)
+    with pytest.raises(TypeError, match="expected a Solution"):
+        asm.play(scene, solution.q, x)
+    with pytest.raises(InputError, match="of another scene"):
+        asm.play(asm.Assembly([asm.Body("a"), asm.Body("b")]), solution, x)
+    with pytest.raises(InputError, match="expected a place, a distance or a coordinate"):
+        asm.play(scene, solution, asm.Measure("objective"))
+    with pytest.raises(InputError, match="fixed bodies alone"):
+        asm.play(scene, solution, asm.Measure(scene.bodies[0], "x"))
