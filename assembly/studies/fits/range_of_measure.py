@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import inf, isfinite, nan, pi
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,10 @@ from assembly.kinematics.pose import retract
 from assembly.solve.attempts.starts import moving_rows
 from assembly.solve.scene import Status
 from assembly.solve.solution import Solution
-from assembly.studies.fits.measure_term import MeasureTerm
 from assembly.studies.fits.result import End, Play
+
+if TYPE_CHECKING:
+    from assembly.studies.fits.measure_term import MeasureTerm
 
 __all__ = ["play"]
 
@@ -72,6 +75,9 @@ def play(scene: Assembly, solution: Solution, of: Measure) -> Play:
     InputError, TypeError
         A solution that failed or of another scene, a measure of another kind.
     """
+    # With CasADi, which stacks without play do not need.
+    from assembly.studies.fits.measure_term import MeasureTerm
+
     if not isinstance(of, Measure):
         raise TypeError(f"of is {of!r}; expected a Measure")
     if not isinstance(solution, Solution):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from math import acos, asin, atan2, hypot, inf, tan
+from math import acos, asin, atan2, hypot, inf, sqrt, tan
 
 import pytest
 
 import assembly as asm
 from assembly.errors import InputError
+from tests.studies.machined import socket
 
 
 def tilt(hole, pin, thickness):
@@ -126,14 +127,15 @@ def test_a_plate_on_two_pins():
 
 
 def test_a_ball_in_a_socket_with_play():
-    # A ball of radius 2.9 in a spherical shell of radius 3: its center is within 0.1 of that of the shell.
-    shell = asm.Body("shell", [asm.Face(asm.shapes.sphere(3.0), reversed=True)], fixed=True)
-    ball = asm.Body("ball", asm.shapes.sphere(2.9), position=(0.02, 0.01, 0.0))
-    scene = asm.Assembly([shell, ball])
-    scene.constrain(asm.Clearance())
-    for component in ("x", "z"):
-        found = asm.play(scene, scene.solve(), asm.Measure(ball, component))
-        assert [found.least.value, found.most.value] == pytest.approx([-0.1, 0.1], abs=1e-10)
+    # A ball of radius 2.9 in half a sphere of radius 3: its center is within 0.1 of that of the socket, and is kept
+    # 0.05 below it.
+    cup = asm.Body("cup", socket(3.0, 6.0, 6.0), fixed=True)
+    ball = asm.Body("ball", asm.shapes.sphere(2.9), position=(0.02, 0.01, -0.05))
+    scene = asm.Assembly([cup, ball])
+    scene.constrain(asm.Clearance(), asm.PointOnPlane(ball.point(0, 0, 0), cup.frame((0, 0, -0.05))))
+    found = asm.play(scene, scene.solve(), asm.Measure(ball, "x"))
+    most = sqrt(0.1**2 - 0.05**2)
+    assert [found.least.value, found.most.value] == pytest.approx([-most, most], abs=1e-10)
 
 
 def test_what_is_refused():
