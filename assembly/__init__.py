@@ -97,6 +97,8 @@ if TYPE_CHECKING:
     from assembly.step import write_brep as write_brep
     from assembly.step import write_iges as write_iges
     from assembly.step import write_step as write_step
+    from assembly.studies.fits import Play as Play
+    from assembly.studies.fits import play as play
     from assembly.studies.interference.clash import Clash as Clash
     from assembly.studies.interference.clash import Interference as Interference
     from assembly.studies.interference.report import interference as interference
@@ -158,6 +160,7 @@ else:
             "Parametric": "assembly.kinematics.parametric",
             "Perpendicular": "assembly.constraints.model.joints",
             "Planar": "assembly.constraints.model.joints",
+            "Play": "assembly.studies.fits",
             "PointDistance": "assembly.constraints.model.objectives",
             "PointOnLine": "assembly.constraints.model.placements",
             "PointOnPlane": "assembly.constraints.model.placements",
@@ -202,6 +205,7 @@ else:
             "errors": "assembly.errors",
             "interference": "assembly.studies.interference.report",
             "load": "assembly.scene_file",
+            "play": "assembly.studies.fits",
             "proximity": "assembly.proximity",
             "read_brep": "assembly.step",
             "read_iges": "assembly.step",

@@ -49,9 +49,8 @@ def _scatter(found: Tolerances, k: int, axes: Axes) -> None:
 
 
 def _shares(found: Tolerances, k: int, axes: Axes) -> None:
-    """Bars of what each parameter adds, the most first."""
-    shares = 100.0 * found.contributions[k]
-    order = np.argsort(-shares, kind="stable")
-    axes.barh([found.parameters[i].name for i in order.tolist()], shares[order], color="tab:blue")
+    """Bars of what each parameter adds, and play, the most first."""
+    names, shares = zip(*found.shares(k), strict=True)
+    axes.barh(names, [100.0 * share for share in shares], color="tab:blue")
     axes.invert_yaxis()
     axes.set_xlabel("contribution [%]")

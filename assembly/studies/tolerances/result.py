@@ -13,6 +13,7 @@ from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.result import Sensitivity
 from assembly.errors import InputError
+from assembly.studies.fits.result import Play
 from assembly.studies.tolerances.distributions import Distribution
 
 if TYPE_CHECKING:
@@ -65,6 +66,10 @@ class Tolerances(ReadOnlyArrays):
     samples : Samples or None
     limits : (m, 2)
         What is accepted; infinite without a limit.
+    ranges : tuple of Play
+        With play: the range of each measure, `nominal` being somewhere in it; else empty.
+    play_variances : (m,)
+        What play adds to the variances: that of a uniform distribution over the range.
     """
 
     of: tuple[Measure, ...]
@@ -77,18 +82,39 @@ class Tolerances(ReadOnlyArrays):
     mean_shift: Array
     samples: Samples | None = field(repr=False)
     limits: Array = field(repr=False)
+    ranges: tuple[Play, ...] = field(repr=False)
+    play_variances: Array
 
     @property
     def sigma(self) -> Array:
         """Standard deviations of the measures by root sum square, (m,)."""
-        result: Array = np.sqrt(self.variances.sum(axis=1))
+        result: Array = np.sqrt(self._total)
         return result
 
     @property
     def contributions(self) -> Array:
-        """Shares of the parameters in the variances, (m, p); rows sum to one."""
-        total = self.variances.sum(axis=1, keepdims=True)
+        """Shares of the parameters in the variances, (m, p); with that of play rows sum to one."""
+        total = self._total[:, None]
         result: Array = np.divide(self.variances, total, out=np.zeros_like(self.variances), where=total > 0.0)
+        return result
+
+    @property
+    def play_contributions(self) -> Array:
+        """Shares of play in the variances, (m,)."""
+        total = self._total
+        result: Array = np.divide(self.play_variances, total, out=np.zeros_like(total), where=total > 0.0)
+        return result
+
+    def shares(self, k: int) -> list[tuple[str, float]]:
+        """Names of the parameters, and play where it counts, with their shares in measure k; the largest first."""
+        named = [(parameter.name, float(self.contributions[k, i])) for i, parameter in enumerate(self.parameters)]
+        if self.ranges:
+            named.append(("play", float(self.play_contributions[k])))
+        return sorted(named, key=lambda item: -item[1])
+
+    @property
+    def _total(self) -> Array:
+        result: Array = self.variances.sum(axis=1) + self.play_variances
         return result
 
     @property
@@ -127,12 +153,12 @@ class Tolerances(ReadOnlyArrays):
             )
             if self.samples is not None:
                 lines.append(f"  samples: mean {self.mean[k]:.8g}   sigma {self.sampled_sigma[k]:.6g}")
-            order = np.argsort(-self.contributions[k], kind="stable")
-            width = max(len(parameter.name) for parameter in self.parameters)
-            lines += [
-                f"  {self.parameters[i].name:<{width}}  {100.0 * self.contributions[k, i]:6.2f} %"
-                for i in order.tolist()
-            ]
+            shares = self.shares(k)
+            width = max(len(name) for name, _ in shares)
+            lines += [f"  {name:<{width}}  {100.0 * share:6.2f} %" for name, share in shares]
+            if self.ranges:
+                low, high = self.ranges[k].least.value, self.ranges[k].most.value
+                lines.append(f"  play from {low:.8g} to {high:.8g}")
         if self.samples is not None:
             count = len(self.samples.values)
             lines.append(f"{count} samples, {self.samples.failed} without a solution")

@@ -5,6 +5,10 @@ differences from their values, independent of each other. Its variance is the su
 it goes is the sum of |d_i| times the half widths. To second order its mean moves by half the sum of f_ii sigma_i^2.
 Where the derivatives from below and above differ (a one-sided row at its bound), x_i moves the measure by a half of
 each: with m = E|x_i| its mean moves by (d+ - d-) m / 2, and its mean square is (d+^2 + d-^2) sigma_i^2 / 2.
+
+With play a measure is a + u (b - a), from the least a to the most b of its range, u anywhere between 0 and 1. Both ends
+have derivatives; a mean of the two is that of the middle. The variance has (b - a)^2 / 12 besides, the worst case goes
+from the worst of a to that of b.
 """
 
 from __future__ import annotations
@@ -19,18 +23,17 @@ from assembly.derivatives.implicit import sensitivity, several
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.response import values_set
-from assembly.derivatives.result import Sensitivity
 from assembly.errors import InputError, integer
 from assembly.solve.solution import Solution
+from assembly.studies.fits import End, Play
+from assembly.studies.fits import play as range_of
 from assembly.studies.tolerances.distributions import Distribution, Normal, Uniform
+from assembly.studies.tolerances.first_order import FirstOrder
 from assembly.studies.tolerances.result import Samples, Tolerances
 
 __all__ = ["tolerances"]
 
 Array = NDArray[np.float64]
-# [sigma] Steps of the differences of first derivatives that give second ones: of the second order and, by the half of
-# it, of the fourth.
-_STEP = 0.5
 
 
 def tolerances(
@@ -42,6 +45,7 @@ def tolerances(
     samples: int = 0,
     seed: int = 0,
     limits: Mapping[Measure, tuple[float | None, float | None]] | None = None,
+    play: bool = False,
 ) -> Tolerances:
     """What scatter of parameters does to measures of a solution.
 
@@ -59,6 +63,9 @@ def tolerances(
         Of the draws; the same seed gives the same bits.
     limits : mapping of Measure -> (lower, upper), optional
         What is accepted, None for a side without limit: `yields` says how many samples are within all of them.
+    play : bool
+        Whether parts are loose in their fits as well (`asm.play`): a measure is anywhere between the ends of its range,
+        with the same chance, and dimensions move both ends. Objectives of the scene do not count then.
 
     Returns
     -------
@@ -68,37 +75,45 @@ def tolerances(
     Raises
     ------
     InputError, TypeError
-        Arguments that cannot be used, a measure without a derivative, or one that a free motion changes.
+        Arguments that cannot be used, a measure without a derivative, or one that a free motion changes; with play an
+        end of a range that is unbounded or not found.
     """
     measures: tuple[Measure, ...] = several("of", of, Measure)
     names, scatter = _scatter(parameters)
     count = integer("samples", samples, 0, 10**7)
     integer("seed", seed, 0, 2**63 - 1)
     bounds = _bounds(limits, measures, count)
-    rates = _rates(scene, solution, measures, names)
-    sigmas, widths, means = (
-        np.array([getattr(each, what) for each in scatter]) for what in ("sigma", "half_width", "mean_of_absolute")
-    )
-    low, high = rates.shrinking, rates.growing
-    shares = 0.5 * (low**2 + high**2) * sigmas**2 - (0.5 * (high - low) * means) ** 2
-    # Each parameter at either end of its range, where it does most to either side.
-    ends = np.stack([-low * widths, high * widths, np.zeros_like(low)])
+    if not isinstance(play, (bool, np.bool_)):
+        raise TypeError(f"play is {play!r}; expected True or False")
     nominal = np.array([measure.value(solution) for measure in measures])
-    worst = nominal[:, None] + np.column_stack([ends.min(axis=0).sum(axis=1), ends.max(axis=0).sum(axis=1)])
-    # Where the two sides differ the mean moves by that much more than by what is bent.
-    bent = np.where(low == high, _second_derivatives(scene, solution, measures, names, sigmas), 0.0)
-    drawn = _sampled(scene, solution, measures, names, scatter, count, seed) if count else None
+    rng = np.random.default_rng(seed)
+    inputs = _drawn(names, scatter, rng, count)
+    ranges = _ranges(scene, solution, measures) if play else ()
+    if play:
+        low, high = [each.least for each in ranges], [each.most for each in ranges]
+        least, most = (_joined(side, measures, names, scatter) for side in (low, high))
+        first = _between(least, most)
+        bottom, top = (np.array([end.value for end in side]) for side in (low, high))
+        ends = [_sampled_ends(side, measures, names, inputs) for side in (low, high)]
+        values = ends[0] + rng.uniform(size=ends[0].shape) * (ends[1] - ends[0])
+    else:
+        first = least = most = FirstOrder.of(scene, solution, measures, names, scatter)
+        bottom = top = nominal
+        values = _sampled(scene, solution, measures, names, inputs)
+    worst = np.column_stack([bottom + least.reach(scatter)[:, 0], top + most.reach(scatter)[:, 1]])
     return Tolerances(
         of=measures,
         parameters=names,
         distributions=scatter,
         nominal=nominal,
-        derivatives=rates,
-        variances=shares,
+        derivatives=sensitivity(scene, solution, measures, names),
+        variances=first.variances(scatter),
         worst=worst,
-        mean_shift=(0.5 * (high - low) * means + 0.5 * bent * sigmas**2).sum(axis=1),
-        samples=drawn,
+        mean_shift=0.5 * (bottom + top) - nominal + first.mean_shift(scatter),
+        samples=Samples(inputs, values) if count else None,
         limits=bounds,
+        ranges=ranges,
+        play_variances=(top - bottom) ** 2 / 12.0,
     )
 
 
@@ -136,65 +151,45 @@ def _bounds(
     return result
 
 
-def _rates(
-    scene: Assembly, solution: Solution, measures: Sequence[Measure], parameters: Sequence[Parameter]
-) -> Sensitivity:
-    """Derivatives on either side of all parameters."""
-    rates = sensitivity(scene, solution, measures, parameters)
-    loose = [measure.name for measure, is_loose in zip(measures, rates.undetermined, strict=True) if is_loose]
-    if loose:
-        raise InputError(f"measures {loose} change with a motion that the scene leaves free; expected determined ones")
-    if not (np.isfinite(rates.shrinking).all() and np.isfinite(rates.growing).all()):
-        reasons = "; ".join(f"{name}: {reason}" for name, reason in rates.reasons.items())
-        raise InputError(f"of has measures without a derivative; {reasons}")
-    return rates
+def _between(least: FirstOrder, most: FirstOrder) -> FirstOrder:
+    """Derivatives of the middles of ranges."""
+    return FirstOrder(*(0.5 * (low + high) for low, high in zip(least, most, strict=True)))
 
 
-def _second_derivatives(
-    scene: Assembly, solution: Solution, measures: Sequence[Measure], parameters: Sequence[Parameter], sigmas: Array
-) -> Array:
-    """Second derivatives of measures along each parameter, (m, p); NaN where the scene cannot be solved beside it."""
-    result = np.full((len(measures), len(parameters)), np.nan)
-    for k, (parameter, sigma) in enumerate(zip(parameters, sigmas, strict=True)):
-        step = _STEP * sigma
-        slopes = [_beside(scene, solution, measures, parameter, part * step) for part in (-2, -1, 1, 2)]
-        farther_below, below, above, farther_above = slopes
-        near, far = (above - below) / (2.0 * step), (farther_above - farther_below) / (4.0 * step)
-        result[:, k] = (4.0 * near - far) / 3.0
-    return result
+def _joined(
+    side: Sequence[End], measures: Sequence[Measure], parameters: Sequence[Parameter], scatter: Sequence[Distribution]
+) -> FirstOrder:
+    """Derivatives of each measure at an end of its range."""
+    each = [
+        FirstOrder.of(end.scene, end.solution, [measure], parameters, scatter)
+        for end, measure in zip(side, measures, strict=True)
+    ]
+    return FirstOrder(*(np.vstack(parts) for parts in zip(*each, strict=True)))
 
 
-def _beside(
-    scene: Assembly, solution: Solution, measures: Sequence[Measure], parameter: Parameter, step: float
-) -> Array:
-    """First derivatives (m,) with a parameter changed by a step; NaN where there are none."""
-    none = np.full(len(measures), np.nan)
-    try:
-        with values_set([parameter], [parameter.value + step]):
-            moved = scene.solve(solution)
-            if not moved.success:
-                return none
-            slopes = sensitivity(scene, moved, measures, parameter)
-    except InputError:  # a value that the scene cannot have
-        return none
-    found: Array = 0.5 * (slopes.shrinking[:, 0] + slopes.growing[:, 0])
+def _ranges(scene: Assembly, solution: Solution, measures: Sequence[Measure]) -> tuple[Play, ...]:
+    """The range of every measure; raises for an end that was not found."""
+    found = tuple(range_of(scene, solution, measure) for measure in measures)
+    for each in found:
+        if not each.success:
+            raise InputError(f"of has a measure without a range; expected one with two ends\n{each}")
     return found
 
 
-def _sampled(
-    scene: Assembly,
-    solution: Solution,
-    measures: Sequence[Measure],
-    parameters: Sequence[Parameter],
-    scatter: Sequence[Distribution],
-    count: int,
-    seed: int,
-) -> Samples:
-    """Measures of solves with drawn values; NaN where the scene cannot be solved with them."""
-    rng = np.random.default_rng(seed)
+def _drawn(
+    parameters: Sequence[Parameter], scatter: Sequence[Distribution], rng: np.random.Generator, count: int
+) -> Array:
+    """Values of the parameters, (count, p)."""
     differences = np.column_stack([each.draw(rng, count) for each in scatter])
-    inputs = np.array([parameter.value for parameter in parameters]) + differences
-    values = np.full((count, len(measures)), np.nan)
+    result: Array = np.array([parameter.value for parameter in parameters]) + differences
+    return result
+
+
+def _sampled(
+    scene: Assembly, solution: Solution, measures: Sequence[Measure], parameters: Sequence[Parameter], inputs: Array
+) -> Array:
+    """Measures (k, m) of solves with drawn values; NaN where the scene cannot be solved with them."""
+    values = np.full((len(inputs), len(measures)), np.nan)
     for row, drawn in zip(values, inputs, strict=True):
         try:
             with values_set(parameters, drawn):
@@ -203,4 +198,15 @@ def _sampled(
             continue
         if found.success:
             row[:] = [measure.value(found) for measure in measures]
-    return Samples(inputs, values)
+    return values
+
+
+def _sampled_ends(
+    side: Sequence[End], measures: Sequence[Measure], parameters: Sequence[Parameter], inputs: Array
+) -> Array:
+    """The same at one end of the ranges."""
+    each = [
+        _sampled(end.scene, end.solution, [measure], parameters, inputs)
+        for end, measure in zip(side, measures, strict=True)
+    ]
+    return np.hstack(each)
