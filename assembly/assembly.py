@@ -15,6 +15,7 @@ from assembly.constraints.packing.corners import corners_of
 from assembly.constraints.packing.scene import MOST_CROWDING
 from assembly.errors import InputError
 from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.changes import changes
 from assembly.kinematics.pose import pose_rows
 from assembly.packed_contents import PackedContents
 from assembly.solve.attempts.attempts import attempt, load
@@ -106,7 +107,8 @@ class Assembly(PackedContents):
             Check `success`; the status and the message say what happened otherwise.
         """
         is_plain = starts is None and time_limit is None and callback is None and swept is False and not options
-        if is_plain and type(q0) is Solution:
+        # What was set in place, enabled or fixed since the last solve has to be noticed first.
+        if is_plain and type(q0) is Solution and self._seen is changes():
             straight = straight_from(q0, self._scene, self._packed, bool(self._objectives))
             if straight is not None:
                 return straight

@@ -77,15 +77,15 @@ def renumbered(
         pool[at : at + 24] = frame_numbers(pair.frame_a, pair.frame_b, scale)
         at += 24
     if scale != packed.scale:
-        other._values = []
+        values = []
         for equation, place, _ in packed._values:
             (_, first), *others = equation.terms
             unit = 1.0 if first.is_angle else scale
             for factor, second in others:
                 pool[place - 1] = factor * (1.0 if second.is_angle else scale) / unit
             pool[place] = 0.0
-            other._values.append((equation, place, unit))
-        other._sources = [item for item in other._values if item[0].source is not None]
+            values.append((equation, place, unit))
+        other._take_values(values)
         other._standing_units = np.array([1.0 if item.is_angle else scale for item in packed._turned.told])
     writer = _PoolWriter(packed, scale)
     terms = TermPacking(cast(SceneWriter, writer), bodies, other.reference, other.unit)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from assembly._address import clock_address
 from assembly.constraints.model.clearance import Clearance
-from assembly.constraints.model.constraint import Constraint, RowConstraint, structure_changes
+from assembly.constraints.model.constraint import Constraint, Equation, RowConstraint, structure_changes
 from assembly.constraints.model.contact import Contact, lone_surfaces, side_face
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import Objective, Posture
@@ -302,12 +302,7 @@ class Packed(ManagerLast):
         rows.add_joints(unknown_blocks)
         rows.add_expressions()
         table = rows.write(bodies)
-        self._values = rows.values
-        self._sources = [item for item in self._values if item[0].source is not None]
-        # What every solve reads of them: where a value is kept, where it goes, its unit, whether it is a length.
-        self._reads = [
-            (*equation.place(), at, unit, not equation.terms[0][1].is_angle) for equation, at, unit in self._sources
-        ]
+        self._take_values(rows.values)
         self.rows = len(table)
         self.owners = np.array(rows.owners, dtype=np.int64)
         self.one_sided = table[:, layout.ONE_SIDED] == 1
@@ -321,6 +316,15 @@ class Packed(ManagerLast):
         by_owner = np.argsort(self.owners, kind="stable")
         ends = np.searchsorted(self.owners[by_owner], np.arange(len(constraints) + 1))
         self.spans = [by_owner[first:last] for first, last in pairwise(ends)]
+
+    def _take_values(self, values: list[tuple[Equation, int, float]]) -> None:
+        """Have values of rows: an equation, its place in the pool, its unit each."""
+        self._values = values
+        self._sources = [item for item in values if item[0].source is not None]
+        # What every solve reads of them: where a value is kept, where it goes, its unit, whether it is a length.
+        self._reads = [
+            (*equation.place(), at, unit, not equation.terms[0][1].is_angle) for equation, at, unit in self._sources
+        ]
 
     @property
     def pair_rows(self) -> int:
