@@ -35,16 +35,23 @@ def values_set(parameters: Sequence[Parameter], values: ArrayLike) -> Iterator[N
         set_values(parameters, np.asarray(values, dtype=np.float64))
         yield
     finally:
-        for parameter, value in zip(parameters, before, strict=True):
-            if parameter.value != value:
-                parameter.value = value
+        set_values(parameters, np.array(before))
 
 
 def set_values(parameters: Sequence[Parameter], values: Array) -> None:
-    """Set those that differ, in order."""
-    for parameter, value in zip(parameters, values.tolist(), strict=True):
-        if parameter.value != value:
-            parameter.value = value
+    """Set those that differ, in order; but one that another one is in the way of, a limit of a limit, after it."""
+    asked = [pair for pair in zip(parameters, values.tolist(), strict=True) if pair[0].value != pair[1]]
+    while asked:
+        refused, error = [], None
+        for parameter, value in asked:
+            try:
+                parameter.value = value
+            except InputError as found:
+                refused.append((parameter, value))
+                error = error or found
+        if error is not None and len(refused) == len(asked):
+            raise error
+        asked = refused
 
 
 class Response:
