@@ -151,3 +151,19 @@ def test_limits_that_pass_each_other_are_set_and_set_back(order):
     with pytest.raises(asm.errors.InputError, match="expected lower <= upper"):
         f(values[::-1])
     assert slide.limits == (-1.0, 0.5)
+
+
+def test_values_that_the_scene_cannot_have_cost_the_penalty_as_well(crank):
+    scene, travel, radius, length, angle = crank
+    angle._number.owner.limits = (0.0, 1.0)
+    f = asm.Response(scene, travel, angle, penalty=99.0)
+    found, rates = f.both([1.5])
+    assert found == 99.0 and not rates.any() and f.failures == 1 and angle.value == 0.7
+    with pytest.raises(asm.errors.InputError, match="expected a value within the limits"):
+        asm.Response(scene, travel, angle)([1.5])
+    with pytest.raises(TypeError, match="scene is 3; expected an Assembly"):
+        asm.Response(3, travel, angle)
+    with pytest.raises(TypeError, match="scene is 3; expected an Assembly"):
+        asm.sensitivity(3, scene.solve(), travel, angle)
+    with pytest.raises(TypeError, match="limits is 5; expected a mapping"):
+        asm.tolerances(scene, scene.solve(), travel, {angle: asm.Normal(0.1)}, samples=1, limits=5)
