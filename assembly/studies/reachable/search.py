@@ -165,5 +165,5 @@ class _Region:
         """Whether places (..., 3) are in it."""
         if self._box is None:
             return np.ones(places.shape[:-1], dtype=bool)
-        inside: NDArray[np.bool_] = ((self._box[0] <= places) & (places <= self._box[1])).all(axis=-1)
-        return inside
+        inside = (self._box[0] <= places) & (places <= self._box[1])
+        return np.asarray(inside.all(axis=-1))
