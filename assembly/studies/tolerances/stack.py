@@ -146,7 +146,8 @@ def _rates(
     loose = [measure.name for measure, is_loose in zip(measures, rates.undetermined, strict=True) if is_loose]
     if loose:
         raise InputError(
-            f"measures {loose} change with a motion that the scene leaves free, or are forces that rows share; expected determined ones"
+            f"measures {loose} change with a motion that the scene leaves free, or are forces that rows share; "
+            "expected determined ones"
         )
     if not (np.isfinite(rates.shrinking).all() and np.isfinite(rates.growing).all()):
         reasons = "; ".join(f"{name}: {reason}" for name, reason in rates.reasons.items())
