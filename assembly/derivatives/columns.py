@@ -173,12 +173,9 @@ def _add_size(problem: Problem, parameters: Sequence[Parameter], slopes: Array, 
     if value or slope.any():
         scene = (problem.bodies, problem.constraints, problem.objectives)
         for r, parameter in enumerate(parameters):
-            # Values count for the size where nothing has an extent.
-            of_values = isinstance(parameter._number, RowNumber) and not problem.packed._has_no_extent
-            if not of_values and not isinstance(parameter._number, TargetNumber):
-                rate = size_rate(parameter, problem.packed.scale, scene)
-                slopes[:, r] += rate * slope
-                values[r] += rate * value
+            rate = size_rate(parameter, problem.packed.scale, scene)
+            slopes[:, r] += rate * slope
+            values[r] += rate * value
 
 
 def by_frames(problem: Problem, here: Evaluated) -> Array:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.model.contents import Contents
 from assembly.constraints.packing.renumbered import have_same_numbers
 from assembly.constraints.program.contact import TOUCHING
 from assembly.derivatives.columns import Columns, Frames, Problem, columns_of
@@ -26,7 +27,7 @@ from assembly.solve.solution import Solution
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["sensitivity", "several"]
+__all__ = ["sensitivity", "several", "the_scene"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -55,6 +56,7 @@ def sensitivity(
     InputError, TypeError
         A solution that failed, or of other numbers than the scene has now; a parameter that enters nothing.
     """
+    the_scene(scene)
     measures = several("of", of, Measure)
     parameters = several("wrt", wrt, Parameter)
     problem, pushing, weak = _problem(scene, solution, measures, parameters)
@@ -66,6 +68,13 @@ def sensitivity(
         for moves in {id(below): below, id(above): above}.values()
     ]
     return _result(problem, measures, parameters, (below, above), moving, rates)
+
+
+def the_scene(scene: Assembly) -> Assembly:
+    """A scene, and nothing else."""
+    if not isinstance(scene, Contents):
+        raise TypeError(f"scene is {scene!r}; expected an Assembly")
+    return scene
 
 
 def several(name: str, value: Any, kind: type) -> tuple[Any, ...]:

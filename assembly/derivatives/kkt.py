@@ -65,6 +65,8 @@ class Moves:
         Rows ask for what they cannot have together: there is no solution beside this one.
     drifts : (p,) bool
         The objective has a slope along a motion without curvature.
+    shared : (m, k)
+        Forces of rows of length one that are in balance with each other: rows that repeat each other share a force.
     """
 
     steps: Array
@@ -73,6 +75,7 @@ class Moves:
     rank: int
     contradicts: Flags
     drifts: Flags
+    shared: Array
 
 
 def solve_system(system: System, held: Flags) -> Moves:
@@ -104,7 +107,9 @@ def solve_system(system: System, held: Flags) -> Moves:
     pulled = -right[:rank] @ (system.slopes_by + system.hessian @ steps)
     forces = np.zeros((len(held), count))
     forces[rows] = scales[:, None] * (left[:, :rank] @ (pulled / values[:rank, None]))
-    return Moves(steps, forces, free, rank, contradicts, drifts)
+    shared = np.zeros((len(held), len(rows) - rank))
+    shared[rows] = scales[:, None] * left[:, rank:]
+    return Moves(steps, forces, free, rank, contradicts, drifts, shared)
 
 
 def one_sided_moves(system: System, held: Flags, open_rows: Flags, sign: float) -> Moves | None:
@@ -138,4 +143,5 @@ def one_sided_moves(system: System, held: Flags, open_rows: Flags, sign: float) 
         min(moves.rank for moves in best),
         lost | np.array([bool(moves.contradicts[k]) for k, moves in enumerate(best)]),
         np.array([bool(moves.drifts[k]) for k, moves in enumerate(best)]),
+        max((moves.shared for moves in best), key=lambda shared: shared.shape[1]),
     )

@@ -33,7 +33,7 @@ def rates_of(
     moving: NDArray[np.int64],
     moves: Moves,
 ) -> tuple[Array, Flags]:
-    """Derivatives (m, p) of measures in the user's units, and which of them a free motion changes, (m,)."""
+    """Derivatives (m, p) of measures in the user's units; which of them a free motion or a shared force changes."""
     here, scale = problem.here, problem.packed.scale
     steps = np.zeros((len(here.gradient), len(parameters)))
     steps[moving] = moves.steps
@@ -62,7 +62,19 @@ def rates_of(
     if moves.free.shape[1]:
         changed = np.abs(slopes[:, moving] @ moves.free).max(axis=1)
         loose = changed > FREE * np.maximum(1.0, np.abs(slopes).max(axis=1))
+    for i, item in enumerate(measures):
+        if item.kind == "wrench":
+            loose[i] = _is_shared(problem, item, moves)
     return rates, loose
+
+
+def _is_shared(problem: Problem, item: Measure, moves: Moves) -> bool:
+    """Whether forces that are in balance change a wrench: then it is no function of the pose."""
+    own = problem.packed.spans[next(k for k, each in enumerate(problem.constraints) if each is item.thing)]
+    assert item.on is not None
+    at = 6 * problem.index(item.on) + item.axis
+    changed = np.abs(problem.here.jacobian[own, at] @ moves.shared[own])
+    return bool(changed.max(initial=0.0) > FREE)
 
 
 def _row_of(problem: Problem, item: Measure) -> int:

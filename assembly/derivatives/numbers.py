@@ -60,6 +60,10 @@ class Number(ABC):
     def set(self, value: float) -> None:
         """Set it, a finite number; what the scene cannot have raises an `InputError`."""
 
+    def put(self, value: float) -> None:
+        """The same for a while, of what is measured and not solved: what the scene cannot have may not raise."""
+        self.set(value)
+
 
 class RowNumber(Number):
     """The driven value or a limit of a freedom, or the offset of a constraint: what a row equals, or is bounded by."""
@@ -91,6 +95,11 @@ class RowNumber(Number):
             lower, upper = self.owner.lower, self.owner.upper
             self.owner.limits = (value, upper) if self.attribute == "lower" else (lower, value)
         count_number()
+
+    def put(self, value: float) -> None:
+        """Set it for a while, beyond limits perhaps."""
+        name = f"_{self.attribute}" if isinstance(self.owner, Freedom) else self.attribute
+        setattr(self.owner, name, value)
 
 
 class FrameNumber(Number):

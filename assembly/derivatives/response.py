@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.derivatives.implicit import sensitivity, several
+from assembly.derivatives.implicit import sensitivity, several, the_scene
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
 from assembly.errors import AssemblyError, InputError, number
@@ -27,6 +27,10 @@ class ResponseError(AssemblyError, RuntimeError):
     """A response has no value where it was asked for: the scene cannot be solved with these numbers."""
 
 
+class Refused(InputError):
+    """Values of parameters that a scene cannot have."""
+
+
 @contextmanager
 def values_set(parameters: Sequence[Parameter], values: ArrayLike) -> Iterator[None]:
     """Numbers of a scene are others meanwhile. Where one is refused none of them is changed."""
@@ -35,16 +39,23 @@ def values_set(parameters: Sequence[Parameter], values: ArrayLike) -> Iterator[N
         set_values(parameters, np.asarray(values, dtype=np.float64))
         yield
     finally:
-        for parameter, value in zip(parameters, before, strict=True):
-            if parameter.value != value:
-                parameter.value = value
+        set_values(parameters, np.array(before))
 
 
 def set_values(parameters: Sequence[Parameter], values: Array) -> None:
-    """Set those that differ, in order."""
-    for parameter, value in zip(parameters, values.tolist(), strict=True):
-        if parameter.value != value:
-            parameter.value = value
+    """Set those that differ, in order; but one that another one is in the way of, a limit of a limit, after it."""
+    asked = [pair for pair in zip(parameters, values.tolist(), strict=True) if pair[0].value != pair[1]]
+    while asked:
+        refused, error = [], None
+        for parameter, value in asked:
+            try:
+                parameter.value = value
+            except InputError as found:
+                refused.append((parameter, value))
+                error = error or found
+        if error is not None and len(refused) == len(asked):
+            raise Refused(str(error)) from error
+        asked = refused
 
 
 class Response:
@@ -65,7 +76,8 @@ class Response:
     follow : bool
         Whether a solve starts from the last one instead: for sweeps along a branch, where values depend on the way.
     penalty : float, optional
-        The value of all measures where the scene cannot be solved, with a Jacobian of zeros; by default that raises.
+        The value of all measures where the scene cannot be solved, or cannot have the values, with a Jacobian of
+        zeros; by default that raises.
 
     Raises
     ------
@@ -87,7 +99,7 @@ class Response:
     ) -> None:
         if not isinstance(follow, bool):
             raise InputError(f"follow is {follow!r}; expected True or False")
-        self._scene = scene
+        self._scene = the_scene(scene)
         self._is_one = isinstance(of, Measure)
         self._of = several("of", of, Measure)
         self._wrt = several("wrt", wrt, Parameter)
@@ -127,25 +139,34 @@ class Response:
 
     def _at(self, values: ArrayLike, with_rates: bool) -> tuple[Array, Array]:
         """Measures (m,), and derivatives (m, p) where they are asked for."""
-        rates = np.zeros((len(self._of), len(self._wrt)))
         asked = self._asked(values)
-        with values_set(self._wrt, asked):
-            solution = self._scene.solve(self._last if self._follow else self._start)
-            if not solution.success and self._penalty is not None:
-                self.failures += 1
-                return np.full(len(self._of), self._penalty), rates
-            self._last = self._checked(solution, asked)
-            found = np.array([measure.value(solution) for measure in self._of])
-            if with_rates:
-                derived = sensitivity(self._scene, solution, self._of, self._wrt)
-                rates = derived.matrix.copy()
-                if derived.undetermined.any():
-                    loose = [m.name for m, is_loose in zip(self._of, derived.undetermined, strict=True) if is_loose]
-                    raise ResponseError(f"measures {loose} change with a motion that the scene leaves free")
-                if not np.isfinite(rates).all():
-                    told = "; ".join(f"{name}: {reason}" for name, reason in derived.reasons.items())
-                    raise ResponseError(f"there is no derivative at {asked.tolist()}; {told or derived}")
-            return found, rates
+        try:
+            with values_set(self._wrt, asked):
+                solution = self._scene.solve(self._last if self._follow else self._start)
+                if solution.success or self._penalty is None:
+                    self._last = self._checked(solution, asked)
+                    return self._told(solution, asked, with_rates)
+        except Refused:
+            if self._penalty is None:
+                raise
+        self.failures += 1
+        return np.full(len(self._of), self._penalty), np.zeros((len(self._of), len(self._wrt)))
+
+    def _told(self, solution: Solution, asked: Array, with_rates: bool) -> tuple[Array, Array]:
+        """What there is to tell of a solution with the values that are set."""
+        found, rates = np.array([m.value(solution) for m in self._of]), np.zeros((len(self._of), len(self._wrt)))
+        if with_rates:
+            derived = sensitivity(self._scene, solution, self._of, self._wrt)
+            rates = derived.matrix.copy()
+            if derived.undetermined.any():
+                loose = [m.name for m, is_loose in zip(self._of, derived.undetermined, strict=True) if is_loose]
+                raise ResponseError(
+                    f"measures {loose} change with a motion that the scene leaves free, or are forces that rows share"
+                )
+            if not np.isfinite(rates).all():
+                told = "; ".join(f"{name}: {reason}" for name, reason in derived.reasons.items())
+                raise ResponseError(f"there is no derivative at {asked.tolist()}; {told or derived}")
+        return found, rates
 
     def _asked(self, values: ArrayLike) -> Array:
         try:

@@ -32,7 +32,8 @@ class Sensitivity(ReadOnlyArrays):
     shrinking, growing : (m, p)
         The derivatives from below and from above. They differ where a one-sided row is at its bound without a force.
     undetermined : (m,) bool
-        Measures that a free motion changes: of these the derivative is that of the least move.
+        Measures that a free motion changes: of these the derivative is that of the least move. And forces that rows
+        which repeat each other share: of these it is that of the least forces.
     twists : mapping of body's name to (p, 6)
         The bodies' twists a unit of each parameter; `poses` has them by parameter.
     multipliers : mapping of constraint's name to (rows, p)
@@ -76,7 +77,8 @@ class Sensitivity(ReadOnlyArrays):
         lines = ["  ".join([f"{'d / d':<{first}}", *(f"{h:>{w}}" for h, w in zip(heads, widths, strict=True))])]
         for i, name in enumerate(names):
             cells = [f"{self._cell(i, k):>{width}}" for k, width in enumerate(widths)]
-            note = "  undetermined: a free motion changes it" if self.undetermined[i] else ""
+            way = "rows that repeat each other share it" if self.of[i].kind == "wrench" else "a free motion changes it"
+            note = f"  undetermined: {way}" if self.undetermined[i] else ""
             lines.append("  ".join([f"{name:<{first}}", *cells]) + note)
         lines.append(f"rank {self.rank} of the rows that hold")
         return "\n".join([*lines, *(f"{name}: {reason}" for name, reason in self.reasons.items())])

@@ -1,7 +1,7 @@
 """What an objective owes to the scene's size: a posture counts turns of bodies without a shape by half of it.
 
-A frame placed anew may make the scene larger, and a turn in a posture weightier. All else that is divided by the size
-is multiplied by it again.
+A frame placed anew, or a distance that is longer than the bodies, may make the scene larger, and a turn in a posture
+weightier. All else that is divided by the size is multiplied by it again.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ def size_rate(
         try:
             for k, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
                 for sign in (1.0, -1.0):
-                    number.set(middle + sign * k * step)
+                    number.put(middle + sign * k * step)
                     rate += sign * weight / step * (scene_size(*scene) - size)
         finally:
-            number.set(middle)
+            number.put(middle)
     return rate

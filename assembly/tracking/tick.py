@@ -33,7 +33,10 @@ class TrackStatus(Enum):
     HELD = "no further pose was found that holds; the last one that does is returned"
     BAD_TARGET = "the target is no finite point or pose; nothing moved"
     VIOLATED = "the constraints hold at no pose that was found; the violation says by how much"
-    CHANGED = "a constraint gained or lost a row since the tracker was made; nothing moved, make another one"
+    CHANGED = (
+        "a constraint gained or lost a row since the tracker was made, or a frame, a shape, a least gap or what is "
+        "fixed or enabled was set anew; nothing moved, make another one"
+    )
 
 
 class Step(ReadOnlyArrays):

@@ -14,10 +14,12 @@ from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import structure_changes
 from assembly.constraints.model.objectives import FrameDistance, PointDistance
 from assembly.constraints.packing.corners import body_of
+from assembly.constraints.packing.renumbered import numbers_told
 from assembly.constraints.packing.scene import structure_of
 from assembly.constraints.program.records import CLOCK_AT, MANAGER_RECORD
 from assembly.errors import FARTHEST, InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.changes import changes
 from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.proximity.features.solid_contact import STAYS, TRACK
 from assembly.proximity.manager.records import (
@@ -217,6 +219,7 @@ class Tracker(InOneProcess):
         self._packed: Packed = inner.packed()
         assert inner._scene is not None
         self._scene: Scene = inner._scene
+        self._edits, self._numbers = changes(), self._told()
         self._settings = _tick_settings(limit, iterations, second_order)
         self._budget = budget
         if budget is not None:
@@ -288,7 +291,8 @@ class Tracker(InOneProcess):
         """
         begin = perf_counter()
         packed = self._packed
-        changed = packed.stamp != structure_changes() and self._has_changed()
+        is_new = packed.stamp != structure_changes() or self._edits is not changes()
+        changed = is_new and self._has_changed()
         row = None if changed else self._aimed(target)
         if row is None:
             status = TrackStatus.CHANGED if changed else TrackStatus.BAD_TARGET
@@ -344,12 +348,15 @@ class Tracker(InOneProcess):
         return TrackStatus.HELD
 
     def _has_changed(self) -> bool:
-        """Whether a constraint of the scene, and not of another one, gained or lost a row."""
+        """Whether a constraint of the scene, and not of another one, gained or lost a row, or a number was set anew."""
         packed = self._packed
-        if packed.structure != structure_of(self._inner.constraints):
+        if packed.structure != structure_of(self._inner._seated_constraints()) or self._told() != self._numbers:
             return True
-        packed.stamp = structure_changes()
+        packed.stamp, self._edits = structure_changes(), changes()
         return False
+
+    def _told(self) -> list[object]:
+        return numbers_told(self._packed, self._inner.bodies, self._inner.constraints)
 
     def _where(self) -> Array:
         """The target that the loop has."""

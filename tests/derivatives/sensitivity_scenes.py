@@ -271,7 +271,21 @@ def leaning():
     return Case(scene, of, [size, asm.Parameter(goal, "target", "z"), asm.Parameter(deck.frame_b, "origin", "x")])
 
 
+def tethered():
+    """Bodies smaller than the tether between them, whose length is the size by which a posture counts turns."""
+    ground, hub, kite = asm.Body("ground", fixed=True), asm.Body("hub", position=(1, 0, 0)), asm.Body("kite")
+    scene = asm.Assembly([ground, hub, kite])
+    pole = asm.PointOnLine(hub.point(0.5, 0, 0), ground.frame(z=(0, 0.3, 1)), "pole", distance=1.4)
+    tether = asm.Distance(hub.point(0, 1, 0), kite.point(0.2, 0, 0), 2.6, "tether")
+    goal = asm.PointDistance(kite.point(0, 1, 0), (4.0, 4.0, 3.0))
+    scene.constrain(pole, tether)
+    scene.minimize(goal, asm.Posture(scene.q, weight=0.2))
+    of = [asm.Measure(hub, "x"), asm.Measure(kite, "y"), asm.Measure(tether, "fx", on=kite), asm.Measure("objective")]
+    wrt = [asm.Parameter(pole, "distance"), asm.Parameter(tether, "value"), asm.Parameter(pole.frame_a, "origin", "x")]
+    return Case(scene, of, wrt)
+
+
 CASES = {
     case.__name__: case
-    for case in (slider_crank, ball_in_v, rocker, cam, clips, pushed, kept_apart, trimmed, geared, leaning)
+    for case in (slider_crank, ball_in_v, rocker, cam, clips, pushed, kept_apart, trimmed, geared, leaning, tethered)
 }

@@ -133,3 +133,37 @@ def test_bad_arguments(crank):
     length.value = 0.5
     with pytest.raises(asm.ResponseError, match="no solution with radius = 2"):
         asm.Response(scene, travel, radius)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_limits_that_pass_each_other_are_set_and_set_back(order):
+    """In one order the lower limit would pass the upper one on the way there, in the other on the way back."""
+    ground, block = asm.Body("ground", fixed=True), asm.Body("block")
+    scene = asm.Assembly([ground, block])
+    slide = asm.Prismatic(ground, block, "slide", limits=(-1.0, 0.5))
+    scene.constrain(slide)
+    scene.minimize(asm.PointDistance(block.point(0, 0, 0), (0.0, 0.0, 9.0)))
+    f = asm.Response(scene, asm.Measure(slide), [asm.Parameter(slide, "limits", k) for k in order])
+    values = np.array([1.0, 2.0])[list(order)]
+    # Rows are held to 1e-10 of the scene's size.
+    assert np.isclose(f(values), 2.0, rtol=0, atol=1e-9)
+    assert slide.limits == (-1.0, 0.5)
+    with pytest.raises(asm.errors.InputError, match="expected lower <= upper"):
+        f(values[::-1])
+    assert slide.limits == (-1.0, 0.5)
+
+
+def test_values_that_the_scene_cannot_have_cost_the_penalty_as_well(crank):
+    scene, travel, radius, length, angle = crank
+    angle._number.owner.limits = (0.0, 1.0)
+    f = asm.Response(scene, travel, angle, penalty=99.0)
+    found, rates = f.both([1.5])
+    assert found == 99.0 and not rates.any() and f.failures == 1 and angle.value == 0.7
+    with pytest.raises(asm.errors.InputError, match="expected a value within the limits"):
+        asm.Response(scene, travel, angle)([1.5])
+    with pytest.raises(TypeError, match="scene is 3; expected an Assembly"):
+        asm.Response(3, travel, angle)
+    with pytest.raises(TypeError, match="scene is 3; expected an Assembly"):
+        asm.sensitivity(3, scene.solve(), travel, angle)
+    with pytest.raises(TypeError, match="limits is 5; expected a mapping"):
+        asm.tolerances(scene, scene.solve(), travel, {angle: asm.Normal(0.1)}, samples=1, limits=5)

@@ -183,3 +183,26 @@ def test_a_dexterity_is_differenced_by_frames():
     found = differences(case, solution, case.wrt[0], 1e-2)
     # Hessians of dexterities are differences themselves, to 1e-6 or so.
     assert np.abs(found - d.matrix[:, 0]).max() < 1e-5
+
+
+def test_forces_that_rows_share_are_undetermined():
+    """A plane four-bar has three rows too many: what its hinges hold across the plane is no function of the pose."""
+    ground, crank, rod, rocker = (
+        asm.Body(name, fixed=name == "ground") for name in ("ground", "crank", "rod", "rocker")
+    )
+    rod.pose, rocker.pose = asm.Pose((0.8, 1.8, 0)), asm.Pose((4, 0, 0))
+    scene = asm.Assembly([ground, crank, rod, rocker])
+    hinge = asm.Revolute(ground, crank, "hinge", limits=(0.0, 1.1))
+    pin = asm.Revolute(crank.frame(at=(2, 0, 0)), rod, "pin")
+    last = asm.Revolute(rod.frame(at=(4, 0, 0)), rocker.frame(at=(3, 0, 0)), "last")
+    scene.constrain(hinge, pin, last, asm.Revolute(ground.frame(at=(4, 0, 0)), rocker, "foot"))
+    scene.minimize(asm.PointDistance(rod.point(2, 1, 0), (-5.0, 4.0, 0.0)))
+    bound = asm.Parameter(hinge, "limits", 1)
+    of = [asm.Measure(pin, name, on=rod) for name in ("fx", "fy", "fz", "tx", "ty", "tz")]
+    case = Case(scene, [*of, asm.Measure(rod, "x")], [bound])
+    solution, d = derived(case)
+    assert abs(solution.values["hinge.angle"] - 1.1) < 1e-9
+    assert d.undetermined.tolist() == [False, False, True, True, True, False, False]
+    assert "undetermined: rows that repeat each other share it" in str(d)
+    found = differences(case, solution, bound, 1e-3)
+    assert np.abs(found - d.matrix[:, 0])[~d.undetermined].max() < 1e-8 * max(1.0, np.abs(found).max())

@@ -144,3 +144,33 @@ def test_another_thread_goes_straight_as_well():
     thread.start()
     thread.join()
     np.testing.assert_array_equal(there[0].q, here.q)
+
+
+def set_place(scene):
+    scene.constraints[1].frame_a.place(at=(1.1, 0.0, 0.0))
+
+
+def disable(scene):
+    scene.constraints[3].enabled = False
+
+
+def fix(scene):
+    scene.bodies[1].fixed = True
+
+
+@pytest.mark.parametrize(("edit", "rows"), [(set_place, "the same"), (disable, "fewer"), (fix, "fewer")])
+def test_what_was_edited_is_noticed_before_it_goes_straight(edit, rows):
+    scene, change = four_bar()
+    # The second solve goes straight, and so would the third.
+    begun = scene.solve(scene.solve())
+    fresh, _ = four_bar()
+    for each in (scene, fresh):
+        edit(each)
+    if rows == "the same":
+        here = scene.solve(begun)
+        # The multipliers of a warm start are other ones: the same place to rounding, not to the bit.
+        assert here.success and np.allclose(here.q, fresh.solve(begun.q).q, rtol=0, atol=1e-12)
+        assert not np.array_equal(here.q, begun.q)
+    else:
+        with pytest.raises(asm.errors.InputError, match="q0 is a solution of another assembly"):
+            scene.solve(begun)

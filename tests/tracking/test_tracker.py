@@ -338,6 +338,33 @@ def test_a_tracker_says_that_a_row_came_or_went(values, attribute, value):
     assert tracker.step((1.0, 0.1, 0.0)).status is not TrackStatus.CHANGED
 
 
+def test_a_tracker_says_that_something_was_set_anew():
+    """What a tick has in its table does not follow: a frame, what is fixed, what is enabled, a least gap."""
+    ground, arm = asm.Body("ground", asm.shapes.sphere(0.1), (5, 5, 5), fixed=True), asm.Body("arm")
+    ball = asm.Body("ball", asm.shapes.sphere(0.1), (2, 0, 0))
+    scene = asm.Assembly([ground, arm, ball])
+    shoulder, elbow = asm.Revolute(ground.frame(at=(-5, -5, -5)), arm, "s"), asm.Revolute(arm.frame(at=(2, 0, 0)), ball)
+    gap = asm.Clearance(minimum=0.1)
+    scene.constrain(shoulder, elbow, gap)
+    tracker = scene.tracker(ball.point(1, 0, 0))
+    place = asm.Parameter(elbow.frame_a, "origin", "x")
+    edits = [(place, "value", 1.5, 2.0), (elbow, "enabled", False, True), (arm, "fixed", True, False)]
+    edits.append((asm.Parameter(gap, "minimum"), "value", 0.2, 0.1))
+    for thing, name, other, was in edits:
+        assert tracker.step((2.9, 0.3, 0.0)).status is not TrackStatus.CHANGED
+        before = tracker.q
+        setattr(thing, name, other)
+        step = tracker.step((0.0, 2.9, 0.0))
+        assert step.status is TrackStatus.CHANGED and np.array_equal(step.q, before)
+        setattr(thing, name, was)
+    # Another scene's numbers are no concern of it; nor are constraints that were disabled when it was made.
+    elbow.enabled = False
+    tracker = scene.tracker(arm.point(2, 0, 0))
+    hinge()[0].frame_a.place(at=(0.0, 0.0, 1.0))
+    hinge()[0].angle = 0.2
+    assert tracker.step((1.9, 0.3, 0.0)).status is not TrackStatus.CHANGED
+
+
 def test_a_driven_value_or_a_limit_may_change_between_ticks():
     joint, tracker = hinge(limits=(-0.5, 0.5))
     for limit in (0.5, 0.2):

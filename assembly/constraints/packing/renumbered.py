@@ -28,7 +28,7 @@ from assembly.kinematics.changes import numbers_set
 if TYPE_CHECKING:
     from assembly.constraints.packing.scene import Packed
 
-__all__ = ["have_same_numbers", "renumbered"]
+__all__ = ["have_same_numbers", "numbers_told", "renumbered"]
 
 Array = NDArray[np.float64]
 # The numbers of a posture's reference, behind its weight and before its lever.
@@ -114,6 +114,19 @@ def have_same_numbers(one: Packed, other: Packed) -> bool:
     for at in _following_postures(one):
         apart[at + 1 : at + 1 + REFERENCE] = False
     return not apart.any()
+
+
+def numbers_told(packed: Packed, bodies: Sequence[Body], constraints: Sequence[Constraint]) -> list[object]:
+    """What was set anew where two lists differ: fixed bodies, what is asked for, frames, least gaps, faces.
+
+    Driven values, limits, offsets and targets are not among it: they are read in every solve.
+    """
+    pairs = [*packed._frames, *(term for term, _ in packed._turns)]
+    sides = (side for pair in pairs for side in (getattr(pair, name, None) for name in ("frame_a", "frame_b", "frame")))
+    frames = [(side.origin.tobytes(), side.axes.tobytes()) for side in sides if side is not None]
+    asked = [body.fixed for body in bodies], [item._is_asked for item in constraints]
+    faces = [side.face for body in bodies for side in body.faces]
+    return [asked, frames, [item.minimum for item in packed.clearances], faces]
 
 
 def _following_postures(packed: Packed) -> list[int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -27,18 +28,25 @@ class Content(NamedTuple):
     estimate: float
 
 
-def content(grid: Grid, reached: NDArray[np.int64], places: Array, normals: Array) -> Content:
+def content(
+    grid: Grid,
+    reached: NDArray[np.int64],
+    places: Array,
+    normals: Array,
+    within: Callable[[Array], NDArray[np.bool_]],
+) -> Content:
     """Area or volume, from the cells (k, d) reached and places (m, 3) of the boundary with outward normals.
 
     A cell all of whose neighbors are reached counts whole. Of the others a point counts where it is behind the tangent
-    plane of the boundary at the place nearest to it, which is off by the square of the cell's size.
+    plane of the boundary at the place nearest to it, which is off by the square of the cell's size, and where it is
+    `within` the region, that is told of points (m, 3) of the world.
     """
     near, cut = _beside(reached)
     inner = grid.content * (len(reached) - len(cut))
     outer = grid.content * (len(reached) + len(near))
-    if not len(places) or not len(reached):
-        return Content(inner, outer, grid.content * len(reached))
-    shares = _shares(grid, np.concatenate([cut, near]), places, normals)
+    if not len(reached):
+        return Content(inner, outer, 0.0)
+    shares = _shares(grid, np.concatenate([cut, near]), places, normals, within)
     return Content(inner, outer, inner + grid.content * float(shares.sum()))
 
 
@@ -100,8 +108,17 @@ def _heights(grid: Grid, points: Array, places: Array, normals: Array) -> tuple[
     return ((points - flat[nearest]) * sides[nearest]).sum(axis=1), nearest
 
 
-def _shares(grid: Grid, cells: NDArray[np.int64], places: Array, normals: Array) -> Array:
+def _shares(
+    grid: Grid,
+    cells: NDArray[np.int64],
+    places: Array,
+    normals: Array,
+    within: Callable[[Array], NDArray[np.bool_]],
+) -> Array:
     """Which part of each cell (k, d) is in the set, (k,)."""
-    behind = _heights(grid, _points(grid, cells), places, normals)[0] <= 0.0
+    points = _points(grid, cells)
+    behind = within(grid.origin + grid.size * points @ grid.axes)
+    if len(places):
+        behind &= _heights(grid, points, places, normals)[0] <= 0.0
     result: Array = behind.reshape(len(cells), -1).mean(axis=1)
     return result

@@ -81,7 +81,11 @@ class Flood:
     def run(self, first: Cell, stop: Stop, within: Callable[[Cell], bool]) -> None:
         """All cells that can be reached from a pose at which the tip is in the first cell."""
         start = _Reached(first, stop, 0)
-        for cell in (first, *self.grid.around(first)):
+        cells = [cell for cell in (first, *self.grid.around(first)) if within(cell)]
+        if not cells:
+            place = self.tip.place(stop).tolist()
+            raise InputError(f"within has no cell beside the tip, which starts at {place}; expected a box around it")
+        for cell in cells:
             self._try(cell, start)
         while self._waiting:
             start = self._waiting.popleft()

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.assembly import Assembly
-from assembly.errors import InputError, integer, positive, vector
+from assembly.errors import InputError, integer, items, positive, vector
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import pose_rows
 from assembly.solve.solution import Solution
@@ -52,7 +52,8 @@ def workspace(
     starts : several (n, 7) or Solution, optional
         Poses from which it is looked as well: places that the tip comes to only by another assembly of the mechanism.
     within : ((3,), (3,)), optional
-        Lower and upper corner of the box of the world in which it is looked, for tips that go on without end.
+        Lower and upper corner of the box of the world in which it is looked, for tips that go on without end. The tip
+        starts in it; area and volume are those of what is in it.
     flips : int
         How often the search may go on in another configuration where the mechanism is straight or folded; see Notes.
     most : int
@@ -82,17 +83,18 @@ def workspace(
     integer("most", most, 1, 10**7)
     first = _solved(scene, None)
     grid = grid_of(plane, first.pose(point.body).apply(point.coordinates), size)
-    is_within = _Region(grid, within)
+    region = _Region(grid, within)
     drawn = DrawnTip(scene, point, grid)
     flood = Flood(grid, drawn, 0.5 * scene.packed().scale, flips, most)
-    for start in (first, *(_solved(scene, each, f"starts[{k}]") for k, each in enumerate(starts))):
+    others = items("starts", starts, "poses or solutions")
+    for start in (first, *(_solved(scene, each, f"starts[{k}]") for k, each in enumerate(others))):
         place = start.pose(point.body).apply(point.coordinates)
         stop = drawn.to(grid.origin + (place - grid.origin) @ grid.axes.T @ grid.axes, start.q)
-        flood.run(grid.cell(drawn.place(stop)), stop, is_within)
-    return _found(scene, flood)
+        flood.run(grid.cell(drawn.place(stop)), stop, region)
+    return _found(scene, flood, region)
 
 
-def _found(scene: Assembly, flood: Flood) -> Workspace:
+def _found(scene: Assembly, flood: Flood, region: _Region) -> Workspace:
     """Cells, poses and boundary in order."""
     grid = flood.grid
     order = sorted(flood.reached)
@@ -104,7 +106,7 @@ def _found(scene: Assembly, flood: Flood) -> Workspace:
         poses=np.array([flood.reached[at][0][0] for at in order]).reshape(len(cells), len(scene.bodies), 7),
         boundary=places,
         normals=normals,
-        content=content(grid, cells, places, normals),
+        content=content(grid, cells, places, normals, region.holds),
         undecided=len(flood.undecided),
         solves=flood.solves,
         grid=grid,
@@ -142,19 +144,27 @@ def _solved(scene: Assembly, start: ArrayLike | Solution | None, name: str = "th
 
 
 class _Region:
-    """Whether the middle of a cell is in a box of the world."""
+    """The box of the world in which it is looked."""
 
     def __init__(self, grid: Grid, box: tuple[ArrayLike, ArrayLike] | None) -> None:
         self._grid = grid
         self._box = None
         if box is not None:
-            low, high = vector("within[0]", box[0]), vector("within[1]", box[1])
+            corners = items("within", box, "a lower and an upper corner")
+            if len(corners) != 2:
+                raise InputError(f"within is {box!r}; expected a lower and an upper corner")
+            low, high = vector("within[0]", corners[0]), vector("within[1]", corners[1])
             if not (low < high).all():
                 raise InputError(f"within is {box!r}; expected a lower and an upper corner")
             self._box = low, high
 
     def __call__(self, cell: Cell) -> bool:
+        """Whether the middle of a cell is in it."""
+        return bool(self.holds(self._grid.center(cell)))
+
+    def holds(self, places: Array) -> NDArray[np.bool_]:
+        """Whether places (..., 3) are in it."""
         if self._box is None:
-            return True
-        center = self._grid.center(cell)
-        return bool((self._box[0] <= center).all() and (center <= self._box[1]).all())
+            return np.ones(places.shape[:-1], dtype=bool)
+        inside = (self._box[0] <= places) & (places <= self._box[1])
+        return np.asarray(inside.all(axis=-1))

@@ -54,7 +54,8 @@ class FirstOrder(NamedTuple):
         loose = [measure.name for measure, is_loose in zip(measures, rates.undetermined, strict=True) if is_loose]
         if loose:
             raise InputError(
-                f"measures {loose} change with a motion that the scene leaves free; expected determined ones"
+                f"measures {loose} change with a motion that the scene leaves free, or are forces that rows share; "
+                "expected determined ones"
             )
         low, high = rates.shrinking, rates.growing
         if not (np.isfinite(low).all() and np.isfinite(high).all()):

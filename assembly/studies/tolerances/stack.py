@@ -135,6 +135,8 @@ def _bounds(
     result = np.tile([-np.inf, np.inf], (len(measures), 1))
     if limits is None:
         return result
+    if not isinstance(limits, Mapping):
+        raise TypeError(f"limits is {limits!r}; expected a mapping of Measure to (lower, upper)")
     if not count:
         raise InputError("limits are given without samples; expected samples=..., of which those within are counted")
     for measure, pair in limits.items():

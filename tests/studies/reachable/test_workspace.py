@@ -170,6 +170,18 @@ def test_tips_that_go_on_without_end():
         asm.workspace(scene, carriage, cell=0.1, plane="xy", most=500)
     found = asm.workspace(scene, carriage, cell=0.1, plane="xy", within=((-1, -0.5, -1), (1, 0.5, 1)))
     assert len(found.cells) == 200
+    # No place of it is a boundary, and cells beside the region are no part of it.
+    assert found.estimate == pytest.approx(2.0, rel=1e-12)
+
+
+def test_a_region_cuts_cells():
+    """The upper half of the ring, and a band of 0.07 below: half the ring, and two strips 1.2 long."""
+    found = asm.workspace(*planar_arm((LONG, SHORT)), cell=0.05, plane="xy", within=((-2, -0.07, -1), (2, 2, 1)))
+    assert found.centers[:, 1].min() > -0.07
+    # Less what circles bend away in the strips, at most 1e-3; cells are sampled at a tenth of their sides.
+    assert found.estimate == pytest.approx(0.5 * AREA + 2 * 0.07 * 2 * SHORT, abs=2e-3)
+    with pytest.raises(InputError, match="within has no cell beside the tip, which starts at"):
+        asm.workspace(*planar_arm((LONG, SHORT)), cell=0.1, plane="xy", within=((-1, -1, -1), (0, 1, 1)))
 
 
 def test_the_same_search_gives_the_same_bits():
@@ -216,6 +228,9 @@ def test_sides_of_a_volume_look_outward():
         ({"cell": 0.1, "plane": "xz"}, InputError, "plane is 'xz'; expected a frame of a fixed body, 'xy'"),
         ({"cell": 0.1, "flips": -1}, InputError, "flips is -1"),
         ({"cell": 0.1, "within": ((1, 1, 1), (0, 2, 2))}, InputError, "expected a lower and an upper corner"),
+        ({"cell": 0.1, "within": 3}, TypeError, "within is 3; expected a lower and an upper corner"),
+        ({"cell": 0.1, "within": ((0, 0, 0),)}, InputError, "expected a lower and an upper corner"),
+        ({"cell": 0.1, "starts": 5}, TypeError, "starts is 5; expected poses or solutions"),
         ({"cell": 0.1, "starts": [np.zeros((2, 7))]}, InputError, "starts"),
     ],
 )
