@@ -13,11 +13,11 @@ from tests.test_bad_input import contact, pair
 @pytest.mark.parametrize(
     ("make", "name", "settable"),
     [
-        (lambda: asm.Revolute(*pair()), "angle_limits", "'angle', 'limits'"),
-        (lambda: asm.Distance(*pair(), 1.0), "distance", "'limits', 'value'"),
+        (lambda: asm.Revolute(*pair()), "angle_limits", "'angle', 'enabled', 'limits'"),
+        (lambda: asm.Distance(*pair(), 1.0), "distance", "'enabled', 'limits', 'value'"),
         (lambda: asm.PointDistance(pair()[1].point(0, 0, 0), (0, 0, 0)), "targets", "'target'"),
-        (lambda: contact(), "minimum", "no change at all"),
-        (lambda: pair()[1], "position", "'color', 'pose'"),
+        (lambda: contact(), "minimum", "'enabled'"),
+        (lambda: pair()[1], "position", "'color', 'fixed', 'picture', 'pose'"),
     ],
     ids=["joint", "value", "objective", "contact", "body"],
 )
