@@ -153,6 +153,8 @@ def _answers(proof: ClearanceProof, q: Array, touching: float) -> tuple[list[Ans
         if is_proven(answer):
             continue
         smaller = smaller_answer(proof, k, q, touching)
+        if smaller is not None and smaller.verdict in CROSSED:
+            return None, []
         if smaller is not None:
             answers[k] = smaller
         # Of bodies that lie on each other without play a least gap is none.

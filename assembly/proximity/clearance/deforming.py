@@ -23,6 +23,7 @@ from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.body_cells import BodyCells
 from assembly.proximity.clearance.cones import seated_answer
+from assembly.proximity.clearance.overlapped import overlap_answer
 from assembly.proximity.clearance.parting import least_affine, least_similar
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.records import NODE
@@ -38,13 +39,19 @@ Faces = tuple[Face, ...]
 
 
 def smaller_answer(proof: ClearanceProof, k: int, q: Array, touching: float) -> Answer | None:
-    """What is proven of pair k with one body made slimmer, taken off its seat, or mapped; None if nothing is."""
+    """What is proven of pair k with one body made slimmer, taken off its seat, or mapped; None if nothing is.
+
+    That they cross where they lie on each other, too: samples do not see what is in each other by little.
+    """
     shapes = tuple(proof.faces[body] for body in proof.pairs[k])
     slim = slim_answer(proof, k, q, touching, (shapes[0], shapes[1]))
     if slim is not None:
         return slim
     seated = seated_answer(proof, k, q, touching)
-    return deformed_answer(proof, k, q, touching) if seated is None else seated
+    if seated is not None:
+        return seated
+    deformed = deformed_answer(proof, k, q, touching)
+    return overlap_answer(proof, k, q, touching) if deformed is None else deformed
 
 
 def deformed_answer(proof: ClearanceProof, k: int, q: Array, touching: float) -> Answer | None:
