@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.clearance.overlapped import overlap_answer
+from tests.proximity.clearance.scenes import at, poses, proof_of
 
 SIZE = 2.0
 
@@ -44,11 +47,14 @@ def test_one_that_fits_is_not_said_to_cross():
         assert solution.success and (solution.q == fits.q).all() and not solution.crossings
 
 
-def test_planes_that_overlap_beside_bodies_are_no_crossing():
-    """Two thin plates side by side: their far sides face each other from inside, but nothing is in both."""
-    a = asm.Body("a", asm.shapes.box(2, 2, 1e-4), fixed=True)
-    b = asm.Body("b", asm.shapes.box(2, 2, 1e-4), (2.0 + 1e-6, 0, 5e-5))
-    side = asm.Assembly([a, b])
-    side.constrain(asm.Clearance())
-    solution = side.solve()
-    assert solution.success and solution.proved and (solution.q == side.q).all()
+def test_far_sides_of_thin_parts_are_no_crossing():
+    """A thin plate below another one: the top of the upper and the bottom of the lower face each other from inside."""
+    thin = asm.shapes.box(2.0, 2.0, 1e-4)
+    for height, answer in ((-2e-4, None), (-5e-5, Verdict.CROSSING)):
+        proof = proof_of(thin, thin)
+        found = overlap_answer(proof, 0, poses(at(0.1, 0.2, height)), 1e-8)
+        assert (found and found.verdict) is answer
+        if found:
+            # Inside of both, as deep as the planes are in each other.
+            assert found.depth == pytest.approx(1e-4 + height, rel=1e-9)
+            assert -5e-5 < found.place[2] < 5e-5 + height

@@ -99,6 +99,10 @@ def test_a_stop_that_is_just_reached_counts_half():
     assert found.mean_shift[0] == pytest.approx(-sigma / np.sqrt(2.0 * np.pi), rel=1e-9)
     assert found.sigma[0] ** 2 == pytest.approx(sigma**2 * (0.5 - 0.5 / np.pi), rel=1e-9)
     assert found.worst[0] == pytest.approx([1.0 - 3.0 * sigma, 1.0], abs=1e-9)
+    # min(0, x) of x within w: mean -w / 4, mean square w^2 / 6.
+    even = asm.tolerances(scene, solution, place, {stop: asm.Uniform(sigma)})
+    assert even.mean_shift[0] == pytest.approx(-0.25 * sigma, rel=1e-9)
+    assert even.sigma[0] ** 2 == pytest.approx(sigma**2 * (1.0 / 6.0 - 1.0 / 16.0), rel=1e-9)
     assert found.mean[0] == pytest.approx(1.0 + found.mean_shift[0], abs=3.0 * sigma / np.sqrt(4000))
     assert found.sampled_sigma[0] == pytest.approx(found.sigma[0], rel=0.05)
 
