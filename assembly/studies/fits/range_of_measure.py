@@ -29,6 +29,7 @@ from assembly.solve.solution import Solution
 from assembly.studies.fits.result import End, Play
 
 if TYPE_CHECKING:
+    from assembly.constraints.model.expression import Expression
     from assembly.studies.fits.measure_term import MeasureTerm
 
 __all__ = ["play"]
@@ -189,9 +190,9 @@ class _Descent:
             reached = nan
         return End.of(alone, solution, reached, sign)
 
-    def _at(self, goal: Objective, q: Array) -> float:
+    def _at(self, goal: Expression, q: Array) -> float:
         rows = [self._scene.bodies.index(body) for body in self._term.bodies]
-        return float(goal.values(q[rows])[0])  # type: ignore[attr-defined]
+        return float(goal.values(q[rows])[0])
 
     def _moved(self, q: Array, other: Array) -> float:
         """How far the bodies went, in the user's unit, and turns times half the scene's size."""
