@@ -107,7 +107,7 @@ def read_face(face: Any, edges: Edges, name: str | None, scale: float = 1.0) -> 
         made_face = Face(made_surface, outer, holes, name=name, reversed=reverse, tolerance=tolerance)
         if outer is None and not holes:
             # The edge of a surface that is damaged may bound no face, which is otherwise found when it is asked for.
-            made_face.boundary  # noqa: B018
+            _ = made_face.boundary
         return Read(made_face, deviation, gap)
     except InputError as error:
         raise Unreadable(str(error)) from error

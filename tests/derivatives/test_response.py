@@ -28,13 +28,16 @@ def crank():
     return scene, asm.Measure(guide), radius, length, asm.Parameter(hinge, "angle", name="angle")
 
 
-def stroke(r, l, a):  # noqa: E741
-    return r * np.cos(a) + np.sqrt(l**2 - (r * np.sin(a)) ** 2)
+def stroke(radius, length, angle):
+    return radius * np.cos(angle) + np.sqrt(length**2 - (radius * np.sin(angle)) ** 2)
 
 
-def slopes(r, l, a):  # noqa: E741
-    along = np.sqrt(l**2 - (r * np.sin(a)) ** 2)
-    return np.array([np.cos(a) - r * np.sin(a) ** 2 / along, l / along, -r * np.sin(a) * (1.0 + r * np.cos(a) / along)])
+def slopes(radius, length, angle):
+    sine, cosine = np.sin(angle), np.cos(angle)
+    along = np.sqrt(length**2 - (radius * sine) ** 2)
+    return np.array(
+        [cosine - radius * sine**2 / along, length / along, -radius * sine * (1.0 + radius * cosine / along)]
+    )
 
 
 def test_values_and_derivatives_are_those_of_the_closed_form(crank):
