@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     from assembly.kinematics.parametric import Parametric as Parametric
     from assembly.kinematics.picture_mesh import PictureMesh as PictureMesh
     from assembly.kinematics.pose import Pose as Pose
+    from assembly.kinematics.pose import deg as deg
     from assembly.proximity.extrema.pairs import ContactPair as ContactPair
     from assembly.proximity.manager.events import Event as Event
     from assembly.scene_file import load as load
@@ -166,6 +167,7 @@ else:
             "PointOnPlane": "assembly.constraints.model.placements",
             "PictureMesh": "assembly.kinematics.picture_mesh",
             "Pose": "assembly.kinematics.pose",
+            "deg": "assembly.kinematics.pose",
             "Posture": "assembly.constraints.model.objectives",
             "Prismatic": "assembly.constraints.model.joints",
             "RackPinion": "assembly.constraints.model.couplings",

@@ -35,6 +35,6 @@ def lazy_names(
         return value
 
     def __dir__() -> list[str]:
-        return sorted({*vars(sys.modules[package]), *modules})
+        return sorted(modules)
 
     return __getattr__, __dir__, sorted(modules)

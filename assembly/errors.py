@@ -19,6 +19,7 @@ __all__ = [
     "AssemblyError",
     "InputError",
     "KnownSettings",
+    "UnknownNameError",
     "bounded",
     "check_coordinates",
     "check_encodable",
@@ -47,6 +48,13 @@ class AssemblyError(Exception):
 
 class InputError(AssemblyError, ValueError):
     """An argument that cannot be used; the text says which, what came and what was expected."""
+
+
+class UnknownNameError(InputError, KeyError):
+    """A name that is none of those of a result; a `KeyError`, too."""
+
+    # That of `KeyError` puts quotes around the sentence.
+    __str__ = Exception.__str__
 
 
 class KnownSettings:

@@ -97,6 +97,10 @@ print([m for m in {HEAVY} if m in sys.modules and m in ("casadi", "matplotlib", 
 def test_public_names_resolve(package, name):
     value = getattr(package, name)
     assert name in dir(package)
+    if isinstance(value, float):
+        # A constant has no name of its own.
+        assert name == "deg"
+        return
     assert value.__name__.rpartition(".")[2] == name
     assert value.__doc__
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._html import Table, as_html
 from assembly._read_only import ReadOnlyArrays
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
@@ -82,6 +83,16 @@ class Sensitivity(ReadOnlyArrays):
             lines.append("  ".join([f"{name:<{first}}", *cells]) + note)
         lines.append(f"rank {self.rank} of the rows that hold")
         return "\n".join([*lines, *(f"{name}: {reason}" for name, reason in self.reasons.items())])
+
+    def _repr_html_(self) -> str:
+        heads = [f"{item.name} [{item.unit}]" if item.unit else item.name for item in self.wrt]
+        rows = [
+            (f"{item.name} [{item.unit}]", *(self._cell(i, k) for k in range(len(heads))))
+            for i, item in enumerate(self.of)
+        ]
+        notes = [f"{item.name}: undetermined" for item, free in zip(self.of, self.undetermined, strict=True) if free]
+        notes += [f"{name}: {reason}" for name, reason in self.reasons.items()]
+        return as_html(Table(("d / d", *heads), list(rows)), f"rank {self.rank} of the rows that hold", *notes)
 
     def _cell(self, i: int, k: int) -> str:
         low, high = self.shrinking[i, k], self.growing[i, k]

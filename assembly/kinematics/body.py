@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
@@ -9,8 +11,9 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._html import Table, as_html
 from assembly._read_only import ReadOnlyArrays
-from assembly.errors import InputError, KnownSettings, check_coordinates, checked_color, positive, text, vector
+from assembly.errors import InputError, check_coordinates, checked_color, positive, text, vector
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body_face import BodyFace
@@ -18,9 +21,9 @@ from assembly.kinematics.changes import count_edit, count_number
 from assembly.kinematics.parametric import Parametric
 from assembly.kinematics.picture_mesh import PictureMesh
 from assembly.kinematics.pose import Pose, direction, length
+from assembly.kinematics.weighed import Weighed
 
 if TYPE_CHECKING:
-    from assembly.proximity.features.mass import MassProperties
     from assembly.selection.edges import Edges
     from assembly.selection.faces import Faces
     from assembly.selection.vertices import Vertices
@@ -36,6 +39,22 @@ def _place(name: str, value: ArrayLike) -> Array:
     place = vector(name, value)
     check_coordinates(name, place.tolist())
     return _frozen(place)
+
+
+def _given_pose(position: ArrayLike, quaternion: ArrayLike, pose: Pose | None) -> Pose:
+    """The pose that a body is made with."""
+    if pose is None:
+        if isinstance(quaternion, (tuple, list)) and list(quaternion) == [0, 0, 0, 1]:
+            warnings.warn(
+                "quaternion is (0, 0, 0, 1), half a turn about z: (w, x, y, z) is expected, scipy has w last; "
+                "say pose=Pose.from_axis_angle((0, 0, 1), pi) where it is meant",
+                stacklevel=3,
+            )
+        # Pose takes what is like an array, which its fields do not say: they are tuples once it is made.
+        return Pose(position, quaternion)  # type: ignore[arg-type]  # Pose converts them
+    if not np.array_equal(position, (0, 0, 0)) or not np.array_equal(quaternion, (1, 0, 0, 0)):
+        raise InputError("pose is given beside position or quaternion; expected one of both")
+    return pose
 
 
 def _flag(name: str, value: Any) -> bool:
@@ -115,7 +134,7 @@ class OpposedFrame(Frame):
         self.base._stand(origin, axes * np.array([1.0, -1.0, -1.0]))
 
 
-class Body(KnownSettings):
+class Body(Weighed):
     """A rigid body. Its pose may be set anew, and whether it is fixed; its name and its shape are for life.
 
     Parameters
@@ -134,6 +153,8 @@ class Body(KnownSettings):
         Mass a volume, positive; for life, as faces are.
     picture : PictureMesh, optional
         Triangles that the body is drawn with in the place of its faces; settable.
+    pose : Pose, optional
+        Where the body stands, in the place of position and quaternion.
 
     Raises
     ------
@@ -151,12 +172,12 @@ class Body(KnownSettings):
         color: Sequence[float] | None = None,
         density: float = 1.0,
         picture: PictureMesh | None = None,
+        *,
+        pose: Pose | None = None,
     ) -> None:
         self._name = text("name", name)
         self._fixed = _flag("fixed", fixed)
-        # Pose takes what is like an array, which its fields do not say: they are tuples once it is made.
-        self._pose = Pose(position, quaternion)  # type: ignore[arg-type]  # Pose converts them
-        check_coordinates("position", self._pose.position.tolist())
+        self.pose = _given_pose(position, quaternion, pose)
         self._shape = shape if isinstance(shape, Parametric) else None
         self._faces = self._selectable(self._named(shape.made() if isinstance(shape, Parametric) else shape))
         if self._shape is not None:
@@ -210,49 +231,6 @@ class Body(KnownSettings):
     def faces(self) -> Faces:
         """Faces in the order they were given: a tuple, of which `faces.planes(...)`, `faces(">Z")` ... select some."""
         return self._faces
-
-    @property
-    def density(self) -> float:
-        """Mass a volume."""
-        return self._density
-
-    @property
-    def mass_properties(self) -> MassProperties:
-        """Volume, area, mass, center of mass and inertia at once, and how wrong the volume may be.
-
-        Raises
-        ------
-        InputError
-            A body whose faces enclose nothing: without a shape, open, or with normals that look inward.
-        """
-        from assembly.proximity.features.mass import mass_properties
-
-        return mass_properties(self.name, tuple(side.face for side in self._faces), self._density)
-
-    @property
-    def area(self) -> float:
-        """Area of all faces; of an open body as well."""
-        return float(sum(side.face.area() for side in self._faces))
-
-    @property
-    def volume(self) -> float:
-        """What the faces enclose; see `mass_properties`."""
-        return self.mass_properties.volume
-
-    @property
-    def mass(self) -> float:
-        """Density times volume; see `mass_properties`."""
-        return self.mass_properties.mass
-
-    @property
-    def center_of_mass(self) -> Array:
-        """Center of mass in body coordinates, (3,); see `mass_properties`."""
-        return self.mass_properties.center_of_mass
-
-    @property
-    def inertia(self) -> Array:
-        """Inertia about the center of mass along the body's axes, (3, 3); see `mass_properties`."""
-        return self.mass_properties.inertia
 
     @property
     def edges(self) -> Edges:
@@ -353,6 +331,12 @@ class Body(KnownSettings):
 
     def __repr__(self) -> str:
         return f"Body({self.name!r}, {len(self.faces)} faces{', fixed' if self.fixed else ''})"
+
+    def _repr_html_(self) -> str:
+        kinds = Counter(str(side.kind) for side in self.faces)
+        where = ", ".join(f"{x:.6g}" for x in self.pose.row)
+        title = f"body {self.name!r}{', fixed' if self.fixed else ''} at x y z qw qx qy qz = {where}"
+        return as_html(title, Table(("faces", "count"), list(kinds.items())))
 
     @property
     def q(self) -> Array:

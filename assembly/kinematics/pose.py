@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import hypot, sqrt
+from math import hypot, pi, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +23,7 @@ __all__ = [
     "Pose",
     "angular_velocity_map",
     "axes_quaternion",
+    "deg",
     "direction",
     "length",
     "multiply",
@@ -35,6 +36,8 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
+# A degree in radians: `90 * deg` is a right angle.
+deg = pi / 180.0
 # A body's place where none is given: x y z qw qx qy qz.
 IDENTITY_ROW = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 # A quaternion typed to two digits is off by less; a forgotten normalization is off by more.
@@ -236,6 +239,25 @@ class Pose(ReadOnlyArrays):
         along = direction("axis", axis)
         half = 0.5 * number("angle", angle)
         return cls(position, np.concatenate([[np.cos(half)], np.sin(half) * along]))  # type: ignore[arg-type]  # likewise
+
+    @classmethod
+    def from_matrix(cls, matrix: ArrayLike) -> Pose:
+        """The pose of a homogeneous matrix (4, 4), as `matrix` gives it, or of a rotation (3, 3) alone.
+
+        Raises
+        ------
+        InputError
+            The columns x, y, z are not unit vectors at right angles, or the last row is not 0 0 0 1.
+        """
+        size = 3 if np.shape(matrix) == (3, 3) else 4
+        m = real_array("matrix", matrix, (size, size))
+        if size == 3:
+            return cls(quaternion=axes_quaternion(m))
+        if m[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
+            raise InputError(
+                f"matrix has the last row {m[3].tolist()}; expected 0 0 0 1, the position in the last column"
+            )
+        return cls(m[:3, 3], axes_quaternion(m[:3, :3]))
 
     @property
     def q(self) -> Array:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._named import Named
 from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.constraints.model.joint import Joint, Sense
 from assembly.constraints.packing.scene import Packed
@@ -163,10 +164,10 @@ class Result(ReadOnlyArrays):
 
     def _by_constraint(self, each: Array) -> dict[str, float]:
         """The largest of what every constraint's rows have."""
-        return {
-            constraint.name: float(each[rows].max(initial=0.0))
+        return Named(
+            (constraint.name, float(each[rows].max(initial=0.0)))
             for constraint, rows in zip(self._scene.constraints, self._packed.spans, strict=True)
-        }
+        )
 
     @property
     def _allowed(self) -> float:
@@ -191,10 +192,10 @@ class Result(ReadOnlyArrays):
         packed = self._packed
         forces = self._state[packed.multipliers_at : packed.residuals_at] * packed.unit
         forces = np.where(packed.lengths, forces / packed.scale, forces)
-        return {
-            constraint.name: read_only(forces[rows])
+        return Named(
+            (constraint.name, read_only(forces[rows]))
             for constraint, rows in zip(self._scene.constraints, packed.spans, strict=True)
-        }
+        )
 
     @property
     def axes(self) -> dict[str, Sense]:
@@ -206,7 +207,7 @@ class Result(ReadOnlyArrays):
         """Every freedom of every joint, "joint.freedom": lengths in the user's unit, angles in radians."""
         packed, state = self._ended
         near = dict(zip(map(id, packed._angles), state[packed.angles], strict=True))
-        values = {}
+        values: Named[float] = Named()
         for joint in self._scene.constraints:
             if not isinstance(joint, Joint):
                 continue

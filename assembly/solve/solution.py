@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._named import Named
 from assembly.constraints.program.records import IMPLICIT
 from assembly.errors import InputError
 from assembly.proximity.extrema.pairs import ContactPair
@@ -137,7 +138,7 @@ class Solution(Result):
         if self._is_lost:
             from assembly.solve.diagnosis.lost import violations
 
-            return violations(self)
+            return Named(violations(self))
         return self._largest(1.0)
 
     @cached_property
@@ -145,7 +146,7 @@ class Solution(Result):
         """What every constraint exerts on each of its bodies, by their names."""
         from assembly.solve.forces.statics import wrenches
 
-        return wrenches(self)
+        return Named(wrenches(self))
 
     @cached_property
     def mobility(self) -> Mobility:
@@ -176,7 +177,7 @@ class Solution(Result):
         """The extremal pair of every contact at `q`, found again from the loop's parameters."""
         from assembly.solve.contact_pairs import contact_pairs
 
-        return contact_pairs(self)
+        return Named(contact_pairs(self))
 
     @cached_property
     def crossings(self) -> tuple[tuple[str, str], ...]:
@@ -249,3 +250,8 @@ class Solution(Result):
         from assembly.solve.words import table
 
         return table(self)
+
+    def _repr_html_(self) -> str:
+        from assembly.solve.words import html_table
+
+        return html_table(self)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from assembly._html import Table, as_html
 from assembly.errors import InputError
 from assembly.solve.loop.settings import CULPRIT, IMPROPER
 from assembly.solve.result import Iteration
@@ -75,8 +76,8 @@ def _crossing_lines(solution: Solution) -> list[str]:
     return lines + [f"  {a} and {b} cross, which a joint or a coupling ties" for a, b in joined]
 
 
-def table(solution: Solution) -> str:
-    """What `print` shows of a solution."""
+def _first_lines(solution: Solution) -> list[str]:
+    """Status, figures, degrees of freedom, axes that were chosen, bodies that cross."""
     lines = [
         f"{solution.status.name}: {solution.message}",
         f"objective {solution.objective:.6g}   feasibility {solution.feasibility:.1e}   "
@@ -92,9 +93,31 @@ def table(solution: Solution) -> str:
         else:
             lines[1] += f"   {freedoms} degree{'' if freedoms == 1 else 's'} of freedom"
     lines += [f"  {name:<24} axes {sense}, which was nearest" for name, sense in solution.axes.items()]
-    lines += _crossing_lines(solution)
-    worst = sorted(solution.violations.items(), key=lambda item: -item[1])[:5]
-    lines += [f"  {name:<24} violation {value:.1e}" for name, value in worst]
+    return lines + _crossing_lines(solution)
+
+
+def _worst(solution: Solution) -> list[tuple[str, float]]:
+    """The constraints that are violated most."""
+    return sorted(solution.violations.items(), key=lambda item: -item[1])[:5]
+
+
+def html_table(solution: Solution) -> str:
+    """What a notebook shows of a solution."""
+    rows = zip(solution._scene.bodies, solution.q.tolist(), strict=True)
+    return as_html(
+        *_first_lines(solution),
+        Table(("constraint", "violation"), [(name, f"{value:.1e}") for name, value in _worst(solution)]),
+        Table(
+            ("body", "x", "y", "z", "qw", "qx", "qy", "qz", ""),
+            [(body.name, *row, "fixed" if body.fixed else "") for body, row in rows],
+        ),
+    )
+
+
+def table(solution: Solution) -> str:
+    """What `print` shows of a solution."""
+    lines = _first_lines(solution)
+    lines += [f"  {name:<24} violation {value:.1e}" for name, value in _worst(solution)]
     for body, row in zip(solution._scene.bodies, solution.q, strict=True):
         place = " ".join(f"{value:9.4f}" for value in row)
         lines.append(f"  {body.name:<24} {place}{'   fixed' if body.fixed else ''}")

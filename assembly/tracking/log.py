@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._copies import InOneProcess
+from assembly._html import Table, as_html
 from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.errors import InputError, integer, number, positive
 
@@ -258,12 +259,22 @@ class TrackLog(ReadOnlyArrays):
         ]
         if self.budget is not None:
             lines.append(f"late      {self.late.size} of {len(self)}, budget {1e6 * self.budget:.4g} us")
-        lines.append(f"violation {self.worst_violation:.1e} at worst, in tick {int(self.feasibility.argmax())}")
+        return "\n".join(lines + self._last_lines())
+
+    def _last_lines(self) -> list[str]:
+        lines = [f"violation {self.worst_violation:.1e} at worst, in tick {int(self.feasibility.argmax())}"]
         found = np.bincount(self.status, minlength=len(self.statuses)).tolist()
         listed = ", ".join(f"{count} {name}" for name, count in zip(self.statuses, found, strict=True) if count)
         lines.append(f"status    {listed}")
         lines.append(f"events    {', '.join(f'{count} {name}' for name, count in self.kinds.items()) or 'none'}")
-        return "\n".join(lines)
+        return lines
+
+    def _repr_html_(self) -> str:
+        span = self.times[-1] - self.times[0]
+        late = [] if self.budget is None else [f"late {self.late.size}, budget {1e6 * self.budget:.4g} us"]
+        ticks = tuple(float(f"{1e6 * self.percentile(p):.4g}") for p in _PERCENTILES.values())
+        table = Table(("", *_PERCENTILES), [("tick [us]", *ticks)])
+        return as_html(f"{len(self)} ticks over {span:.6g} s", table, *late, *self._last_lines())
 
 
 class Recorder(InOneProcess):

@@ -202,7 +202,7 @@ class Tracker(InOneProcess):
             raise InputError(f"tolerance is {limit:g}; expected a part of the scene's size from 1e-14 to 1e-3")
         if not isinstance(second_order, (bool, np.bool_)):
             raise InputError(f"second_order is {second_order!r}; expected True or False")
-        self._scene_given = scene
+        self._scene_given, self._follow = scene, follow
         self._touching = touching
         poses = _begin(scene, q0, touching)
         held = follow if isinstance(follow, Body) else follow.body
@@ -270,6 +270,9 @@ class Tracker(InOneProcess):
         self._others = bool(packed._sources) or len(packed._targets) + len(packed._turns) > 1
         # Other values of constraints may ask for another pose than the one that a tick goes on from, or goes back to.
         self._settings[CARRIES] = float(budget is not None and not packed._sources)
+
+    def __repr__(self) -> str:
+        return f"Tracker({self._scene_given!r}, follow={self._follow!r}, stiffness={2.0 * self._hand.weight:g})"
 
     @property
     def scene(self) -> Assembly:

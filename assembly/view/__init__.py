@@ -9,6 +9,7 @@ from assembly._lazy import lazy_names
 if TYPE_CHECKING:
     from assembly.view.animation import animate as animate
     from assembly.view.browser import show as show
+    from assembly.view.in_notebook import notebook as notebook
     from assembly.view.page import save_html as save_html
     from assembly.view.playback import replay as replay
 else:
@@ -16,6 +17,7 @@ else:
         __name__,
         {
             "animate": "assembly.view.animation",
+            "notebook": "assembly.view.in_notebook",
             "replay": "assembly.view.playback",
             "save_html": "assembly.view.page",
             "show": "assembly.view.browser",

@@ -25,7 +25,7 @@ from assembly.studies.interference.clash import Interference
 from assembly.view.commands import Command, commands, packed
 from assembly.view.picture import DIRECTION, draw
 
-__all__ = ["player", "save_html", "write_page"]
+__all__ = ["page_text", "player", "save_html", "write_page"]
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -127,17 +127,21 @@ def _base64(data: bytes) -> str:
     return b64encode(compress(data, mtime=0)).decode("ascii")
 
 
+def page_text(title: str, drawing: Iterable[Command], controls: str = "") -> str:
+    """A page of commands."""
+    data = b"".join(len(each).to_bytes(4, "big") + each for each in map(packed, drawing))
+    return _PAGE.format(title=escape(title), viewer=_packed_viewer(), drawing=_base64(data), player=controls)
+
+
 def write_page(path: str | PathLike[str], title: str | None, drawing: Iterable[Command], controls: str = "") -> None:
     """Write a page of commands; the file's name is the title where none is given."""
-    data = b"".join(len(each).to_bytes(4, "big") + each for each in map(packed, drawing))
     if title is not None and not isinstance(title, str):
         raise InputError(f"title is {title!r}; expected a string or None")
     if title is not None:
         check_encodable("title", title)
     # The name of a file may be none that UTF-8 has.
-    heading = escape(Path(path).stem.encode(errors="replace").decode() if title is None else title)
-    page = _PAGE.format(title=heading, viewer=_packed_viewer(), drawing=_base64(data), player=controls)
-    Path(path).write_text(page, encoding="utf-8")
+    heading = Path(path).stem.encode(errors="replace").decode() if title is None else title
+    Path(path).write_text(page_text(heading, drawing, controls), encoding="utf-8")
 
 
 def player(frames: int, loop: bool) -> str:

@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._html import Table, as_html
 from assembly._read_only import read_only
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.expression import Expression
@@ -69,12 +70,56 @@ class Contents:
         """Terms with their signs: 1 minimized, -1 maximized."""
         return tuple(self._objectives)
 
+    def _repr_html_(self) -> str:
+        rows = [(body.name, len(body.faces), "fixed" if body.fixed else "") for body in self._bodies]
+        held = [
+            (item.name, type(item).__name__, ", ".join(body.name for body in item.bodies)) for item in self._constraints
+        ]
+        terms = [("minimize" if sign > 0.0 else "maximize", repr(term)) for sign, term in self._objectives]
+        return as_html(
+            repr(self),
+            Table(("body", "faces", ""), list(rows)),
+            Table(("constraint", "kind", "bodies"), list(held)),
+            Table(("objective", ""), list(terms)),
+        )
+
     def body(self, name: str) -> Body:
         """The body of that name."""
         if isinstance(name, str) and name in self._named:
             return self._named[name]
         known = ", ".join(repr(body.name) for body in self._bodies)
         raise InputError(f"name is {name!r}; expected " + (f"one of {known}" if known else "a body, but there is none"))
+
+    def __getitem__(self, name: str) -> Body:
+        """The body of that name, as `body` gives it."""
+        if isinstance(name, str) and name not in self._named and name in self._taken:
+            raise InputError(f"name is {name!r}, that of a constraint; expected a body, or scene.constraint({name!r})")
+        return self.body(name)
+
+    def __contains__(self, body: object) -> bool:
+        """Whether a body, given itself or its name, is in the assembly."""
+        if isinstance(body, str):
+            return body in self._named
+        return isinstance(body, Body) and self._named.get(body.name) is body
+
+    # Without it Python would go through the bodies by numbers, which `[]` does not take.
+    __iter__ = None
+
+    def constraint(self, name: str) -> Constraint:
+        """The constraint of that name.
+
+        Raises
+        ------
+        InputError
+            There is none; the message lists those that there are.
+        """
+        for item in self._constraints:
+            if item.name == name:
+                return item
+        known = ", ".join(repr(item.name) for item in self._constraints)
+        raise InputError(
+            f"name is {name!r}; expected " + (f"one of {known}" if known else "a constraint, but there is none")
+        )
 
     def add(self, body: Body) -> Body:
         """Add a body and return it."""
@@ -93,6 +138,8 @@ class Contents:
     def constrain(self, *constraints: Constraint) -> None:
         """Add constraints; their names must be distinct and their bodies in the assembly."""
         for constraint in constraints:
+            if isinstance(constraint, (list, tuple)):
+                raise TypeError("constraint is a sequence; expected each for itself: constrain(*constraints)")
             if not isinstance(constraint, Constraint):
                 raise TypeError(
                     f"constraint is {constraint!r}; expected a Contact or a trim of one, a Clearance, a joint, "

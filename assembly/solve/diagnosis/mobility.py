@@ -18,6 +18,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._html import Table, as_html
 from assembly._read_only import ReadOnlyArrays
 from assembly.constraints.packing.scene import Packed
 from assembly.errors import integer, positive
@@ -253,7 +254,7 @@ class Mobility(ReadOnlyArrays):
     def _conflicting_lines(self) -> list[str]:
         return [f"  conflicting: {_listed(names)}" for names in self.conflicting_sets]
 
-    def __str__(self) -> str:
+    def _first_lines(self) -> list[str]:
         many = "degree" if self.dof == 1 else "degrees"
         lines = [
             f"{self.dof} {many} of freedom; Grubler's count is {self.grubler}: {self.rows} rows of rank {self.rank}"
@@ -266,14 +267,26 @@ class Mobility(ReadOnlyArrays):
         if not self._worst <= self._held:
             lines.append(f"  the pose violates constraints by {self.feasibility:.3g}; counts are those of this pose")
             lines += _known("conflicting constraints", self._conflicting_lines)
-        for k, motion in enumerate(self.free_motions[:MOST_MOTIONS]):
-            for body, twist, place in zip(self._scene.bodies, motion, self.q[:, :3], strict=True):
-                words = _words(twist, place, self.size)
-                if words:
-                    lines.append(f"  motion {k}  {body.name:<20} {words}")
+        return lines
+
+    def _motions(self) -> list[tuple[int, str, str]]:
+        """Of the first free motions: the number, a body that moves, and how, in words."""
+        return [
+            (k, body.name, words)
+            for k, motion in enumerate(self.free_motions[:MOST_MOTIONS])
+            for body, twist, place in zip(self._scene.bodies, motion, self.q[:, :3], strict=True)
+            if (words := _words(twist, place, self.size))
+        ]
+
+    def __str__(self) -> str:
+        lines = self._first_lines() + [f"  motion {k}  {name:<20} {words}" for k, name, words in self._motions()]
         if self.dof > MOST_MOTIONS:
             lines.append(f"  and {self.dof - MOST_MOTIONS} motions more")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        more = [f"and {self.dof - MOST_MOTIONS} motions more"] if self.dof > MOST_MOTIONS else []
+        return as_html(*self._first_lines(), Table(("motion", "body", "how it moves"), list(self._motions())), *more)
 
 
 def _interruption(time_limit: float | None) -> Interruption:

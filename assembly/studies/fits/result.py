@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import inf, isfinite, nan
 
+from assembly._html import printed
 from assembly.assembly import Assembly
 from assembly.derivatives.measure import Measure
 from assembly.solve.scene import Status
@@ -70,6 +71,9 @@ class Play:
     def width(self) -> float:
         """From the least value to the most; infinite or NaN where an end is."""
         return self.most.value - self.least.value
+
+    def _repr_html_(self) -> str:
+        return printed(self)
 
     def __str__(self) -> str:
         lines = [

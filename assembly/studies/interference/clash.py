@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._html import Table, as_html
 from assembly._read_only import ReadOnlyArrays
 
 if TYPE_CHECKING:
@@ -125,6 +126,14 @@ class Interference(ReadOnlyArrays):
         """Whether all pairs were searched."""
         return not any(row.kind == "undecided" for row in self.rows)
 
+    def _repr_html_(self) -> str:
+        return as_html(self._counts(), Table(_HEADINGS, [row.cells for row in self.rows]))
+
+    def _counts(self) -> str:
+        counts = {kind: sum(row.kind == kind for row in self.rows) for kind in get_args(Kind)}
+        found = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count) or "none"
+        return f"{self.pairs} pairs, within {self.margin:g}: {found}"
+
     def __str__(self) -> str:
         lines = [_HEADINGS, *(row.cells for row in self.rows)]
         widths = [max(len(line[k]) for line in lines) for k in range(len(_HEADINGS))]
@@ -136,9 +145,7 @@ class Interference(ReadOnlyArrays):
             ).rstrip()
             for line in lines
         ]
-        counts = {kind: sum(row.kind == kind for row in self.rows) for kind in get_args(Kind)}
-        found = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count) or "none"
-        return "\n".join([f"{self.pairs} pairs, within {self.margin:g}: {found}", *(text if self.rows else [])])
+        return "\n".join([self._counts(), *(text if self.rows else [])])
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write a file of comma-separated values, a line a row; what is not known is empty."""

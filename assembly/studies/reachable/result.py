@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from assembly._html import printed
 from assembly._read_only import ReadOnlyArrays
 from assembly.assembly import Assembly
 from assembly.constraints.model.dexterity import Dexterity
@@ -87,6 +88,9 @@ class Workspace(ReadOnlyArrays):
     def centers(self) -> Array:
         """Middles of the cells reached, in the world, (k, 3)."""
         return self.grid.centers(self.cells)
+
+    def _repr_html_(self) -> str:
+        return printed(self)
 
     def __str__(self) -> str:
         what = "area" if self.grid.dimension == 2 else "volume"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._html import printed
 from assembly._read_only import ReadOnlyArrays
 from assembly.derivatives.parameter import Parameter
 
@@ -64,6 +65,9 @@ class Synthesis(ReadOnlyArrays):
         """Give the scene's parameters the values that were found."""
         for parameter, value in self.found.items():
             parameter.value = value
+
+    def _repr_html_(self) -> str:
+        return printed(self)
 
     def __str__(self) -> str:
         width = max(len(parameter.name) for parameter in self.parameters)

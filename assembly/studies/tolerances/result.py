@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._html import printed
 from assembly._read_only import ReadOnlyArrays
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
@@ -165,6 +166,9 @@ class Tolerances(ReadOnlyArrays):
             if np.isfinite(self.limits).any():
                 lines.append(f"within the limits: {100.0 * self.yields:.2f} %")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return printed(self)
 
     def plot(self) -> Figure:
         """Histograms of the samples, and bars of the contributions, a row a measure, by matplotlib.
