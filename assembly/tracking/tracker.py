@@ -275,6 +275,11 @@ class Tracker(InOneProcess):
         return f"Tracker({self._scene_given!r}, follow={self._follow!r}, stiffness={2.0 * self._hand.weight:g})"
 
     @property
+    def follow(self) -> Point | Frame | Body:
+        """What the hand holds."""
+        return self._follow
+
+    @property
     def scene(self) -> Assembly:
         """The assembly that was given."""
         return self._scene_given

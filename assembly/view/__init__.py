@@ -9,6 +9,8 @@ from assembly._lazy import lazy_names
 if TYPE_CHECKING:
     from assembly.view.animation import animate as animate
     from assembly.view.browser import show as show
+    from assembly.view.dragging.page import Live as Live
+    from assembly.view.dragging.page import live as live
     from assembly.view.in_notebook import notebook as notebook
     from assembly.view.page import save_html as save_html
     from assembly.view.playback import replay as replay
@@ -17,6 +19,8 @@ else:
         __name__,
         {
             "animate": "assembly.view.animation",
+            "Live": "assembly.view.dragging.page",
+            "live": "assembly.view.dragging.page",
             "notebook": "assembly.view.in_notebook",
             "replay": "assembly.view.playback",
             "save_html": "assembly.view.page",

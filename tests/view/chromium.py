@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-# Network addresses do not resolve for it. It reads what it is told from file 3 and answers into file 4.
+# Network addresses but this machine do not resolve for it. It reads from file 3 what it is told, and answers into 4.
 FLAGS = (
     "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
     "--disable-component-update --disable-sync --disable-extensions --disable-dev-shm-usage --hide-scrollbars "
     "--use-angle=swiftshader --enable-unsafe-swiftshader --remote-debugging-pipe"
-).split() + ["--host-resolver-rules=MAP * ~NOTFOUND"]
+).split() + ["--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"]
 # The viewer's menu is no part of a picture.
 NO_MENU = "<style>.dg { display: none }</style></head>"
 # Virtual milliseconds that a page has before it is looked at, and seconds that an answer may take.
@@ -97,6 +97,29 @@ class Chromium:
         self._wait("Emulation.virtualTimeBudgetExpired")
         yield session
         self._ask("Target.closeTarget", targetId=target)
+
+    @contextmanager
+    def visited(self, url: str, width: int = 640, height: int = 400) -> Iterator[str]:
+        """The session of a page of a server of this machine, in real time."""
+        target = self._ask("Target.createTarget", url="about:blank")["targetId"]
+        session = self._ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        size = {"width": width, "height": height, "deviceScaleFactor": 1.0, "mobile": False}
+        self._ask("Emulation.setDeviceMetricsOverride", session, **size)
+        self._ask("Page.enable", session)
+        self._ask("Page.navigate", session, url=url)
+        self._wait("Page.loadEventFired")
+        yield session
+        self._ask("Target.closeTarget", targetId=target)
+
+    def mouse(self, session: str, kind: str, x: float, y: float, pressed: bool = True) -> None:
+        """Send a page an event of the left button: "mousePressed", "mouseMoved" or "mouseReleased"."""
+        held = {"button": "left", "buttons": 1, "clickCount": 1} if pressed else {"button": "none", "buttons": 0}
+        self._ask("Input.dispatchMouseEvent", session, type=kind, x=x, y=y, **held)
+
+    def shot(self, session: str, picture: Path) -> None:
+        """Write a PNG of a page that is open."""
+        found = self._ask("Page.captureScreenshot", session, format="png")
+        picture.write_bytes(base64.b64decode(found["data"]))
 
     def _wait(self, event: str) -> None:
         """Until an event has come, which may have been before the answer to what was asked last."""

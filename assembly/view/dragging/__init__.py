@@ -1,0 +1,1 @@
+"""A scene that people drag with the mouse: the loop that follows them, and the page that shows it."""

@@ -1,0 +1,118 @@
+"""A scripted mouse drags a paper clip in Chromium: it moves, contacts hold, and no wire crosses."""
+
+import runpy
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.view.mesh import body_mesh
+
+pytest.importorskip("viser", reason="the page is viser's: extra `live`")
+# Seconds for a page to come up where a processor draws it that others use as well.
+PATIENCE = 120.0
+EXAMPLE = Path(__file__).parents[3] / "examples" / "take_hold.py"
+
+
+@pytest.fixture(scope="module")
+def clips():
+    return runpy.run_path(str(EXAMPLE))["two_clips"]()
+
+
+def wait_for(what, patience=PATIENCE):
+    end = time.monotonic() + patience
+    while not what():
+        assert time.monotonic() < end, "it did not come"
+        time.sleep(0.05)
+
+
+def on_screen(page, client, points):
+    """Pixels (n, 2) of points of the scene."""
+    camera = client.camera
+    w, x, y, z = camera.wxyz
+    turn = asm.Pose(quaternion=(w, x, y, z)).matrix[:3, :3]
+    seen = (page._frame.there(points) - np.array(camera.position)) @ turn
+    focal = 0.5 * camera.image_height / np.tan(0.5 * camera.fov)
+    return focal * seen[:, :2] / seen[:, 2:] + 0.5 * np.array([camera.image_width, camera.image_height])
+
+
+def test_a_mouse_drags_a_clip(browser, clips):
+    start = clips.solve().q
+    with (
+        asm.view.live(clips, start, port=0) as page,
+        browser.visited(page.url.replace("localhost", "127.0.0.1")) as tab,
+    ):
+        wait_for(lambda: page._server.get_clients())
+        (client,) = page._server.get_clients().values()
+        row = page.q[1]
+        corners = asm.Pose(row[:3], row[3:]).apply(body_mesh(clips["green"]).vertices)
+
+        def grabbed():
+            # The lower end of the clip, a little inside of its outline.
+            pixels = on_screen(page, client, corners)
+            x, y = pixels[pixels[:, 1].argmax()] - (0.0, 4.0)
+            browser.mouse(tab, "mouseMoved", x, y, pressed=False)
+            browser.mouse(tab, "mousePressed", x, y)
+            for k in range(1, 16):
+                browser.mouse(tab, "mouseMoved", x + 4.0 * k, y - 2.0 * k)
+                time.sleep(0.03)
+            end = time.monotonic() + 3.0
+            while page.shown.held != "green" and time.monotonic() < end:
+                time.sleep(0.05)
+            if page.shown.held != "green":
+                # The page was not drawn yet.
+                browser.mouse(tab, "mouseReleased", x + 60.0, y - 30.0)
+            return page.shown.held == "green"
+
+        wait_for(grabbed)
+        wait_for(lambda: np.abs(page.q[1] - start[1]).max() > 0.5)
+        shown = page.shown
+        assert shown.violation < 1e-9 and np.isfinite(shown.q).all()
+        browser.mouse(tab, "mouseReleased", 0.0, 0.0)
+        wait_for(lambda: page.shown.holder is None)
+        moved = page.q
+    # What the page showed is a pose of the scene: contacts hold, and nothing crosses.
+    assert np.array_equal(moved[0], start[0]) and not np.array_equal(moved[1], start[1])
+    checked = clips.solve(moved, max_iterations=0)
+    assert checked.feasibility < 1e-9 and checked.crossings == ()
+
+
+def test_a_browser_that_leaves_lets_go(browser, clips):
+    with asm.view.live(clips, port=0) as page:
+        with browser.visited(page.url.replace("localhost", "127.0.0.1")):
+            wait_for(lambda: page._server.get_clients())
+            (number,) = page._server.get_clients()
+            page._session.ask(lambda: page._session.grab("green", clips["green"].pose.position, number))
+            wait_for(lambda: page.shown.holder == number)
+        wait_for(lambda: page.shown.holder is None)
+        assert page.shown.status == "nothing is held"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"port": -1}, "port"),
+        ({"port": 70000}, "port"),
+        ({"host": ""}, "host is ''"),
+        ({"stiffness": 0.0}, "stiffness"),
+    ],
+)
+def test_arguments_are_checked(clips, options, message):
+    with pytest.raises(asm.errors.InputError, match=message):
+        asm.view.live(clips, **options)
+
+
+def test_a_scene_is_expected():
+    with pytest.raises(TypeError, match="expected an Assembly"):
+        asm.view.live([])
+    with pytest.raises(asm.errors.InputError, match="no bodies"):
+        asm.view.live(asm.Assembly())
+
+
+def test_the_command_says_what_is_wrong(tmp_path, capsys):
+    from assembly.live import main
+
+    assert main([str(tmp_path / "none.json")]) == 2
+    assert "none.json" in capsys.readouterr().err
