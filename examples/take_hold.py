@@ -1,7 +1,7 @@
 """Two paper clips to take hold of: drag the green one with the mouse, and it slides along the red one, which is fixed.
 
-Serves a page until Ctrl-C. A click on a clip shows axes and rings by which it is turned; what is dragged keeps touching,
-and nothing crosses.
+Serves a page until Ctrl-C. A click on a clip shows axes and rings by which it is turned; what is dragged keeps
+touching, and nothing crosses.
 """
 
 from __future__ import annotations
