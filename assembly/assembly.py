@@ -107,8 +107,8 @@ class Assembly(PackedContents):
             Check `success`; the status and the message say what happened otherwise.
         """
         is_plain = starts is None and time_limit is None and callback is None and swept is False and not options
-        # Where a number or a body was set since, it may be one of this scene: `packed` looks.
-        if is_plain and type(q0) is Solution and self._seen is changes():
+        # Where a body or a constraint was set since, it may be one of this scene: `packed` looks.
+        if is_plain and type(q0) is Solution and (self._seen is changes() or self._follows_numbers()):
             straight = straight_from(q0, self._scene, self._packed, bool(self._objectives))
             if straight is not None:
                 return straight

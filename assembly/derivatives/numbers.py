@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint, Freedom
 from assembly.constraints.model.objectives import FrameDistance, PointDistance
-from assembly.errors import InputError
+from assembly.errors import InputError, check_coordinates
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace, Frame
@@ -94,7 +94,7 @@ class RowNumber(Number):
         else:
             lower, upper = self.owner.lower, self.owner.upper
             self.owner.limits = (value, upper) if self.attribute == "lower" else (lower, value)
-        count_number()
+        count_number(self.owner)
 
     def put(self, value: float) -> None:
         """Set it for a while, beyond limits perhaps."""
@@ -129,9 +129,10 @@ class FrameOrigin(FrameNumber):
 
     def set(self, value: float) -> None:
         """Set it."""
+        check_coordinates(AXES[self.axis], [value])
         origin = self.frame.origin.copy()
         origin[self.axis] = value
-        self.frame.place(at=origin)
+        self.frame._move(origin)
 
     def twist(self, turn: Array, scale: float) -> Array:
         """The twist of the frame a unit of the number."""
@@ -189,7 +190,7 @@ class TargetNumber(Number):
             self.term.target = place
         else:
             self.term.target = Pose(place, self.term.target.quaternion)
-        count_number()
+        count_number(self.term)
 
 
 class LeastGap(Number):

@@ -7,7 +7,7 @@ the size of a scene with contacts, the scene is packed anew.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -17,13 +17,14 @@ from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.dexterity import Dexterity
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import Objective, Posture
+from assembly.constraints.packing.number_places import NumberPlaces
 from assembly.constraints.packing.scene_size import size_and_extent
 from assembly.constraints.packing.scene_writer import SceneWriter, frame_numbers
 from assembly.constraints.packing.terms import TermPacking
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.objective_terms import POSTURE, POSTURE_PARAMETERS, TERM
 from assembly.kinematics.body import Body
-from assembly.kinematics.changes import numbers_set
+from assembly.kinematics.changes import numbers_set, set_since
 
 if TYPE_CHECKING:
     from assembly.constraints.packing.scene import Packed
@@ -52,10 +53,30 @@ class _PoolWriter:
 def renumbered(
     packed: Packed,
     bodies: Sequence[Body],
+    constraints: Callable[[], Sequence[Constraint]],
+    objectives: Sequence[tuple[float, Objective]],
+) -> Packed | None:
+    """The scene with its numbers of now, itself where these are no others; None where it has to be packed anew.
+
+    `constraints` gives those that are packed, for who needs them.
+    """
+    things = set_since(packed.numbers)
+    if things is not None:
+        if packed.number_places is None:
+            packed.number_places = NumberPlaces(packed, bodies, constraints(), objectives)
+        other = packed.number_places.renumbered(packed, things, bodies[0].pose.position)
+        if other is not None:
+            return other
+    return _compared(packed, bodies, constraints(), objectives)
+
+
+def _compared(
+    packed: Packed,
+    bodies: Sequence[Body],
     constraints: Sequence[Constraint],
     objectives: Sequence[tuple[float, Objective]],
 ) -> Packed | None:
-    """The scene with its numbers of now, itself where these are no others; None where it has to be packed anew."""
+    """The same, where all numbers are written anew and compared: the size is another one, or shapes are."""
     goals = objectives or [(1.0, Posture())]
     faces = [side.face for body in bodies for side in body.faces]
     if packed.clearance_rows or any(isinstance(term, (Dexterity, Expression)) for _, term in goals):
