@@ -101,6 +101,8 @@ class Packed(ManagerLast):
         What the last solve was asked for.
     number_places : NumberPlaces or None
         Where numbers are that were set anew; the same of twins, which have them in the same places.
+    derivative_plans : dict
+        How solutions are derived (`derivatives/plan.py`), of the scene and its twins.
     has_size : bool
         Whether the scene has a size.
     before : Packed or None
@@ -217,6 +219,7 @@ class Packed(ManagerLast):
         self.proofs: list[ClearanceProof] = []
         self.stood: Stood | None = None
         self.number_places: NumberPlaces | None = None
+        self.derivative_plans: dict[Any, Any] = {}
         self.kept_at = self.memory_at + self._memory.size
         self.rows_table[layout.KEPT] = self.kept_at
         self.kept_size = int(kept_size(self.rows_table))
@@ -420,7 +423,14 @@ class Packed(ManagerLast):
     def __getstate__(self) -> dict[str, Any]:
         # In copies it is in the same place.
         self._write_manager()
-        return {**self.__dict__, "workspaces": [], "proofs": [], "stood": None, "number_places": None}
+        return {
+            **self.__dict__,
+            "workspaces": [],
+            "proofs": [],
+            "stood": None,
+            "number_places": None,
+            "derivative_plans": {},
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # Addresses are those of one process; a copy, or what another process wrote, takes its own.
