@@ -246,6 +246,8 @@ class Assembly(PackedContents):
             q0._list_contacts()
         while True:
             packed = self.packed()
+            if self._turns_near:
+                turns = np.array([self._turns_near.get(angle, 0.0) for angle in packed._angles])
             apart = None
             if isinstance(q0, Solution) and q0._fit is not None and q0._packed.rows == packed.rows:
                 apart = q0._fit.apart

@@ -13,7 +13,7 @@ from typing import TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.constraints.model.constraint import Constraint, structure_changes
+from assembly.constraints.model.constraint import Constraint, Coordinate, structure_changes
 from assembly.constraints.model.contact import Contact, lone_surfaces
 from assembly.constraints.model.contents import Contents
 from assembly.constraints.model.joint import Joint, Sense
@@ -45,6 +45,7 @@ class PackedContents(Contents):
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._packed: Packed | None = None
         self._asked_for: list[bool] = []  # of every body whether it is fixed, of every constraint whether it counts
+        self._turns_near: Mapping[Coordinate, float] = {}  # where angles are, of solves that begin at poses
         self._crowding = 1  # how many times as many places as clearances ask for
         self._has_changed()
         super().__init__(bodies)
@@ -217,6 +218,15 @@ class PackedContents(Contents):
             yield
         finally:
             self._axes_at = None
+
+    @contextmanager
+    def _angles_near(self, values: Mapping[Coordinate, float]) -> Iterator[None]:
+        """Have angles start near values where solves begin at poses: these do not tell how often an angle turned."""
+        self._turns_near = values
+        try:
+            yield
+        finally:
+            self._turns_near = {}
 
     def _given(self, q0: ArrayLike | None) -> Array:
         """Poses (n, 7) of a start."""
