@@ -271,7 +271,8 @@ class Assembly(PackedContents):
                 if status is not Status.SOLVED and self._objectives:
                     from assembly.solve.diagnosis.unbounded import Asked, has_strayed, status_of
 
-                    asked = Asked(self.bodies, self.constraints, self._objectives)
+                    constraints = tuple(item for item in self._constraints if item._is_asked)
+                    asked = Asked(self.bodies, constraints, self._objectives)
                     status = status_of(status, asked, packed, settings, start, state, interruption)
                     ended_early = status is Status.ITERATION_LIMIT and has_strayed(packed, settings, state)
                     if ended_early and not interruption.is_over():

@@ -143,7 +143,7 @@ def _aside(scene: Assembly, q: Array, turns: Turns) -> Iterator[tuple[Array, Tur
 def _with(scene: Assembly, *objectives: Objective) -> Assembly:
     """The scene's bodies and constraints with other objectives."""
     result = Assembly(scene.bodies)
-    result.constrain(*scene.constraints)
+    result._take_constraints(scene.constraints)
     result.minimize(*objectives)
     return result
 
