@@ -263,6 +263,11 @@ def add_measures(plan, table, given, out):
                 slopes[i, j] = rows[measure.row, j]
             for r in range(plan.parameters):
                 own[i, r] = rows_by[measure.row, r]
+            # The row is the gap less the least one, which is a parameter perhaps.
+            for other in range(plan.entry_count):
+                entry = entry_at(table, plan.entries + ENTRY_SIZE * other)
+                if entry.kind == ROW and entry.at == measure.row:
+                    own[i, entry.parameter] -= entry.sign / pool_header_at(given[0], 0).scale
         elif measure.kind == PLACE:
             for a in range(3):
                 way[a] = 1.0 if a == measure.axis else 0.0

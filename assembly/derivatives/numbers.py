@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint, Freedom
+from assembly.constraints.model.contact import Contact
 from assembly.constraints.model.objectives import FrameDistance, PointDistance
 from assembly.errors import InputError, check_coordinates
 from assembly.geometry.faces.face import Face
@@ -194,19 +195,19 @@ class TargetNumber(Number):
 
 
 class LeastGap(Number):
-    """The least gap of a clearance."""
+    """The least gap of a clearance, or of a contact."""
 
-    def __init__(self, clearance: Clearance) -> None:
-        self.clearance = clearance
-        self.name = f"{clearance.name}.minimum"
+    def __init__(self, owner: Clearance | Contact) -> None:
+        self.owner = owner
+        self.name = f"{owner.name}.minimum"
 
     def get(self) -> float:
         """The number now."""
-        return self.clearance.minimum
+        return self.owner.minimum
 
     def set(self, value: float) -> None:
         """Set it."""
-        self.clearance.minimum = value
+        self.owner.minimum = value
 
 
 class ShapeNumber(Number):

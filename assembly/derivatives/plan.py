@@ -28,7 +28,7 @@ from assembly.derivatives.least_steps import least_steps
 from assembly.derivatives.linearized import linearize
 from assembly.derivatives.measure import Measure, place_of
 from assembly.derivatives.measured import FREE
-from assembly.derivatives.numbers import FrameOrigin, FrameTurn, RowNumber, TargetNumber, turn_rates
+from assembly.derivatives.numbers import FrameOrigin, FrameTurn, LeastGap, RowNumber, TargetNumber, turn_rates
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.probed import ProbedScene
 from assembly.derivatives.result import Layout, Moved, Sensitivity
@@ -164,6 +164,11 @@ class Plan:
                         sign = 1 if number.attribute == "upper" else -1
                         is_length = int(not equation.terms[0][1].is_angle)
                         entry = {"kind": records.ROW, "at": row, "is_length": is_length, "sign": sign}
+                        entries.append(entry | {"parameter": r})
+            elif isinstance(number, LeastGap):
+                for row, contact in enumerate(packed.contacts):
+                    if contact is number.owner:
+                        entry = {"kind": records.ROW, "at": row, "is_length": 1, "sign": -1}
                         entries.append(entry | {"parameter": r})
             elif isinstance(number, TargetNumber):
                 for term, at in packed._targets:

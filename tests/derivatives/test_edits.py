@@ -201,7 +201,8 @@ def _chain():
     """A ground and three bars with hinges between them, the last one's end drawn to a place."""
     bodies = [asm.Body("ground", fixed=True), *(asm.Body(f"bar {k}", position=(k, 0.2, 0)) for k in range(3))]
     scene = asm.Assembly(bodies)
-    joints = [asm.Revolute(a.frame(at=(1, 0, 0)), b, f"joint {k}") for k, (a, b) in enumerate(zip(bodies, bodies[1:]))]
+    pairs = zip(bodies, bodies[1:], strict=False)
+    joints = [asm.Revolute(a.frame(at=(1, 0, 0)), b, f"joint {k}") for k, (a, b) in enumerate(pairs)]
     scene.constrain(*joints)
     return scene, bodies, joints
 

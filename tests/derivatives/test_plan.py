@@ -10,10 +10,10 @@ from assembly.constraints.packing.scene_size import scene_size
 from assembly.derivatives.implicit import _derived
 from assembly.derivatives.kkt import System, solve_system
 from assembly.derivatives.least_steps import least_steps
-from assembly.derivatives.numbers import FrameOrigin, FrameTurn, RowNumber, TargetNumber
+from assembly.derivatives.numbers import FrameOrigin, FrameTurn, LeastGap, RowNumber, TargetNumber
 from tests.derivatives.sensitivity_scenes import CASES, Case, differences, rocker, slider_crank
 
-PLANNED = (FrameOrigin, FrameTurn, RowNumber, TargetNumber)
+PLANNED = (FrameOrigin, FrameTurn, LeastGap, RowNumber, TargetNumber)
 
 
 def grasped():
@@ -32,7 +32,9 @@ def planned(case):
     return Case(case.scene, [item for item in case.of if item.kind != "wrench"], wrt, case.q0)
 
 
-@pytest.mark.parametrize("name", ["slider_crank", "rocker", "cam", "clips", "pushed", "trimmed", "leaning", "grasped"])
+@pytest.mark.parametrize(
+    "name", ["slider_crank", "rocker", "cam", "clips", "pushed", "filmed", "trimmed", "leaning", "grasped"]
+)
 def test_derivatives_are_those_of_the_general_way(name):
     case = planned((CASES | {"grasped": grasped})[name]())
     solution = case.solved()

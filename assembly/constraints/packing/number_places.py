@@ -54,6 +54,8 @@ class NumberPlaces:
         self._size = MeasuredSize(bodies, constraints, objectives)
         self._bodies = {id(body) for body in bodies}
         self._clearances = {id(item): k for k, item in enumerate(packed.clearances)}
+        self._contacts = {id(item): (item, at) for item, at in zip(packed.contacts, packed.gaps, strict=True)}
+        self._has_corners = bool(packed.corners)
         self._ends = list(accumulate(map(len, packed.pairs_of_kept)))
         # Of every frame where its origin is in the pool, and whether axes are behind it.
         self._frames: dict[int, tuple[Frame, list[tuple[int, Frame, bool]]]] = {}
@@ -88,12 +90,18 @@ class NumberPlaces:
         """
         frames: list[int] = []
         clearances: list[Clearance] = []
+        contacts: list[int] = []
         for thing in things:
             key = id(thing)
             if key in self._bodies or key in self._tips:
                 return None
             if key in self._frames:
                 frames.append(key)
+            elif key in self._contacts:
+                if self._has_corners or packed.clearances:
+                    # Corners have the gap of their contact, and clearances allow none.
+                    return None
+                contacts.append(key)
             elif isinstance(thing, Clearance) and key in self._clearances:
                 if packed._unwritten is not None:
                     return None
@@ -106,9 +114,11 @@ class NumberPlaces:
             return None
         changed = [own for key in frames for own in self._changed(packed, key, is_next)]
         gaps = [own for item in clearances for own in self._gaps_of(packed, item) if packed.pool[own[0]] != own[1]]
-        if any((packed.pool[at] > 0.0) != (gap > 0.0) for at, gap in gaps):
+        if clearances and any((packed.pool[at] > 0.0) != (gap > 0.0) for at, gap in gaps):
             # Contacts stand in other places beside a least gap that is none.
             return None
+        films = [(at, item.minimum / packed.scale) for item, at in map(self._contacts.__getitem__, contacts)]
+        gaps += [film for film in films if packed.rows_pool[film[0]] != film[1]]
         if not changed and not gaps:
             packed.numbers = self._numbers
             return packed

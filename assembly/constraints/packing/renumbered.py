@@ -147,7 +147,8 @@ def numbers_told(packed: Packed, bodies: Sequence[Body], constraints: Sequence[C
     frames = [(side.origin.tobytes(), side.axes.tobytes()) for side in sides if side is not None]
     asked = [body.fixed for body in bodies], [item._is_asked for item in constraints]
     faces = [side.face for body in bodies for side in body.faces]
-    return [asked, frames, [item.minimum for item in packed.clearances], faces]
+    gaps = [item.minimum for item in packed.clearances] + [item.minimum for item in packed.contacts]
+    return [asked, frames, gaps, faces]
 
 
 def _following_postures(packed: Packed) -> list[int]:

@@ -20,7 +20,7 @@ from assembly.constraints.model.trim_contact import TrimContact
 from assembly.constraints.packing import addresses
 from assembly.constraints.packing import manager as manager_packing
 from assembly.constraints.packing.asked import Asked
-from assembly.constraints.packing.corners import ContactCorners, Kept, SidePair, corners_of
+from assembly.constraints.packing.corners import ContactCorners, Kept, SidePair, check_gaps, corners_of
 from assembly.constraints.packing.elimination_order import FEW, block_record
 from assembly.constraints.packing.manager import WatchedPairs
 from assembly.constraints.packing.manager_last import ManagerLast
@@ -125,6 +125,8 @@ class Packed(ManagerLast):
         The sides of every contact; faces where it is one of whole surfaces.
     whole : list of bool
         Whether a contact is one of two whole surfaces, without edges.
+    gaps : list of int
+        Where the pool has the least gap of every contact.
     clearances : list of Clearance
     clearance_pairs : list of list of (Body, Body)
         The pairs of bodies of every clearance.
@@ -188,6 +190,7 @@ class Packed(ManagerLast):
         self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
         self.clearance_pairs = manager_packing.clearance_pairs(self.clearances, bodies)
         self.keeps_apart = any(self.clearance_pairs)
+        check_gaps(self.contacts, self.clearances, self.clearance_pairs)
         listed = corners_of(self.contacts, self.whole, self.clearances, self.clearance_pairs) if corners else []
         self.corners: list[ContactCorners] = listed
         self.kept: list[Kept] = [*self.clearances, *listed]
@@ -304,6 +307,7 @@ class Packed(ManagerLast):
         rows.add_expressions()
         table = rows.write(bodies)
         self._keep_values(rows.values)
+        self.gaps = rows.gaps
         self.rows = len(table)
         self.owners = np.array(rows.owners, dtype=np.int64)
         self.one_sided = table[:, layout.ONE_SIDED] == 1
