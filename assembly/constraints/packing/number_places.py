@@ -41,6 +41,11 @@ class NumberPlaces:
     packed : Packed
     bodies, constraints, objectives
         What it was packed of.
+
+    Attributes
+    ----------
+    size : float or None
+        The scene's size when numbers were last set, where it was measured.
     """
 
     def __init__(
@@ -51,6 +56,7 @@ class NumberPlaces:
         objectives: Sequence[tuple[float, Objective]],
     ) -> None:
         self._numbers = numbers_set()
+        self.size: float | None = None
         self._size = MeasuredSize(bodies, constraints, objectives)
         self._bodies = {id(body) for body in bodies}
         self._clearances = {id(item): k for k, item in enumerate(packed.clearances)}
@@ -88,6 +94,7 @@ class NumberPlaces:
         reference : (3,)
             Where the first body is, which positions are relative to.
         """
+        self.size = None
         frames: list[int] = []
         clearances: list[Clearance] = []
         contacts: list[int] = []
@@ -110,7 +117,8 @@ class NumberPlaces:
         # Else another packing with the same places was asked for meanwhile.
         self._size.read(frames if is_next else self._size.frames)
         self._numbers = numbers_set()
-        if self._size.size() != packed.scale or not packed.has_size or packed._reference != reference.tolist():
+        self.size = self._size.size()
+        if self.size != packed.scale or not packed.has_size or packed._reference != reference.tolist():
             return None
         changed = [own for key in frames for own in self._changed(packed, key, is_next)]
         gaps = [own for item in clearances for own in self._gaps_of(packed, item) if packed.pool[own[0]] != own[1]]

@@ -67,23 +67,30 @@ def renumbered(
         other = packed.number_places.renumbered(packed, things, bodies[0].pose.position)
         if other is not None:
             return other
-    return _compared(packed, bodies, constraints(), objectives)
+    size = None if things is None or packed.number_places is None else packed.number_places.size
+    return _compared(packed, bodies, constraints, objectives, size)
 
 
 def _compared(
     packed: Packed,
     bodies: Sequence[Body],
-    constraints: Sequence[Constraint],
+    constraints: Callable[[], Sequence[Constraint]],
     objectives: Sequence[tuple[float, Objective]],
+    size: float | None,
 ) -> Packed | None:
-    """The same, where all numbers are written anew and compared: the size is another one, or shapes are."""
+    """The same, where all numbers are written anew and compared: the size is another one, or shapes are.
+
+    The size is measured in full where it is None.
+    """
     goals = objectives or [(1.0, Posture())]
     faces = [side.face for body in bodies for side in body.faces]
     if packed.clearance_rows or any(isinstance(term, (Dexterity, Expression)) for _, term in goals):
         return None
     if len(faces) != len(packed.faces) or any(a is not b for a, b in zip(faces, packed.faces, strict=True)):
         return None
-    size, has_no_extent = size_and_extent(bodies, constraints, objectives)
+    has_no_extent = False
+    if size is None:
+        size, has_no_extent = size_and_extent(bodies, constraints(), objectives)
     scale = size if size > 0.0 else 1.0
     if scale != packed.scale and packed.pair_rows:
         return None
