@@ -112,7 +112,12 @@ def slopes(
         each = derived["seconds"] / count
         found += [
             figure(f"{what}: derivatives by {count} parameters, each", "seconds", each),
-            figure(f"{what}: derivatives by {count} parameters, each over a warm solve", "ratio", each / solved["seconds"], reach=0.1),
+            figure(
+                f"{what}: derivatives by {count} parameters, each over a warm solve",
+                "ratio",
+                each / solved["seconds"],
+                reach=0.1,
+            ),
         ]
     return [*found, figure(f"{what}: a warm solve after a step", "seconds", solved["seconds"])]
 
