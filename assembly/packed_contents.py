@@ -107,9 +107,11 @@ class PackedContents(Contents):
             packed.lineage = before.lineage
         if packed is before:
             return packed
-        if packed.number_places is not None and packed.scale == before.scale and self._scene is not None:
+        if packed.number_places is not None and packed.number_places is before.number_places and self._scene:
             # What solutions speak of is the same.
             packed.before, self._packed = before.before, packed
+            if packed.scale != before.scale:
+                self._scene = self._scene.of_size(packed.scale)
         else:
             self._take_packed(packed, before.before)
         return packed

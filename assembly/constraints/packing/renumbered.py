@@ -19,7 +19,7 @@ from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import Objective, Posture
 from assembly.constraints.packing.number_places import NumberPlaces
 from assembly.constraints.packing.scene_size import size_and_extent
-from assembly.constraints.packing.scene_writer import SceneWriter, frame_numbers
+from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.packing.terms import TermPacking
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.objective_terms import POSTURE, POSTURE_PARAMETERS, TERM
@@ -100,10 +100,11 @@ def _compared(
     other._measure_by(scale, bodies, goals)
     pool = other.rows_pool
     pool[: layout.POOL_HEADER - 2] = other._pool_header()[: layout.POOL_HEADER - 2]
-    at = packed.frames_at
-    for pair in packed._frames:
-        pool[at : at + 24] = frame_numbers(pair.frame_a, pair.frame_b, scale)
-        at += 24
+    frames = [frame for pair in packed._frames for frame in (pair.frame_a, pair.frame_b)]
+    if frames:
+        block = pool[packed.frames_at :][: 12 * len(frames)].reshape(-1, 4, 3)
+        block[:, 0] = np.array([frame.origin for frame in frames]) / scale
+        block[:, 1:] = np.array([frame.axes for frame in frames]).transpose(0, 2, 1)
     if scale != packed.scale:
         values = []
         for equation, place, _ in packed._values:
