@@ -239,3 +239,26 @@ def test_a_goal_without_bounds_beside_what_is_disabled():
     scene.minimize(asm.Weight([block]))
     hinge.enabled = False
     assert scene.solve().status is asm.Status.UNBOUNDED
+
+
+def test_a_least_gap_of_a_contact_is_held_saved_and_no_clearance_beside_it(tmp_path):
+    plate = asm.Body("plate", asm.shapes.plane(20.0, 20.0), fixed=True)
+    ball = asm.Body("ball", asm.shapes.sphere(1.0), (0.3, 0.2, 3.0))
+    scene = asm.Assembly([plate, ball])
+    film = asm.Contact(plate, ball, "film", minimum=0.25)
+    scene.constrain(film)
+    assert scene.solve().pose(ball).position[2] == pytest.approx(1.25, abs=1e-11)
+    scene.save(tmp_path / "film.json")
+    again = asm.load(tmp_path / "film.json")
+    assert again.constraints[0].minimum == 0.25
+    for value in (-0.1, float("nan")):
+        with pytest.raises(asm.errors.InputError, match="minimum is"):
+            film.minimum = value
+    assert film.minimum == 0.25
+    scene.constrain(asm.Clearance([plate, ball], minimum=0.1, name="apart"))
+    with pytest.raises(
+        asm.errors.InputError, match="contact 'film' has the minimum 0.25 and clearance 'apart' is of its bodies"
+    ):
+        scene.solve()
+    film.minimum = 0.0
+    assert scene.solve().success
