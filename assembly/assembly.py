@@ -107,8 +107,8 @@ class Assembly(PackedContents):
             Check `success`; the status and the message say what happened otherwise.
         """
         is_plain = starts is None and time_limit is None and callback is None and swept is False and not options
-        # Where a number or a body was set since, it may be one of this scene: `packed` looks.
-        if is_plain and type(q0) is Solution and self._seen is changes():
+        # Where a body or a constraint was set since, it may be one of this scene: `packed` looks.
+        if is_plain and type(q0) is Solution and (self._seen is changes() or self._follows_numbers()):
             straight = straight_from(q0, self._scene, self._packed, bool(self._objectives))
             if straight is not None:
                 return straight
@@ -246,6 +246,8 @@ class Assembly(PackedContents):
             q0._list_contacts()
         while True:
             packed = self.packed()
+            if self._turns_near:
+                turns = np.array([self._turns_near.get(angle, 0.0) for angle in packed._angles])
             apart = None
             if isinstance(q0, Solution) and q0._fit is not None and q0._packed.rows == packed.rows:
                 apart = q0._fit.apart
@@ -269,7 +271,8 @@ class Assembly(PackedContents):
                 if status is not Status.SOLVED and self._objectives:
                     from assembly.solve.diagnosis.unbounded import Asked, has_strayed, status_of
 
-                    asked = Asked(self.bodies, self.constraints, self._objectives)
+                    constraints = tuple(item for item in self._constraints if item._is_asked)
+                    asked = Asked(self.bodies, constraints, self._objectives)
                     status = status_of(status, asked, packed, settings, start, state, interruption)
                     ended_early = status is Status.ITERATION_LIMIT and has_strayed(packed, settings, state)
                     if ended_early and not interruption.is_over():

@@ -13,7 +13,7 @@ from typing import TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.constraints.model.constraint import Constraint, structure_changes
+from assembly.constraints.model.constraint import Constraint, Coordinate, structure_changes
 from assembly.constraints.model.contact import Contact, lone_surfaces
 from assembly.constraints.model.contents import Contents
 from assembly.constraints.model.joint import Joint, Sense
@@ -45,6 +45,7 @@ class PackedContents(Contents):
     def __init__(self, bodies: Iterable[Body] = ()) -> None:
         self._packed: Packed | None = None
         self._asked_for: list[bool] = []  # of every body whether it is fixed, of every constraint whether it counts
+        self._turns_near: Mapping[Coordinate, float] = {}  # where angles are, of solves that begin at poses
         self._crowding = 1  # how many times as many places as clearances ask for
         self._has_changed()
         super().__init__(bodies)
@@ -52,8 +53,8 @@ class PackedContents(Contents):
     def _has_changed(self) -> None:
         # Packed anew: of copies what a solve of the one has changed there the other does not know.
         self._packed = None
-        # The counts (`kinematics/changes.py`) when it was as it is packed.
-        self._seen: tuple[int, int] | None = None
+        # What was set anew (`kinematics/changes.py`) when it was as it is packed.
+        self._seen: tuple[int, object] | None = None
         self._scene: Scene | None = None
         self._corners = False  # whether corners of contacts of solids are listed
         self._lower_pairs: list[LowerPair] | None = None
@@ -90,6 +91,8 @@ class PackedContents(Contents):
 
     def _notice_edits(self) -> None:
         """Forget how the scene is packed if a body became fixed or free, or a constraint enabled or disabled."""
+        if self._seen is not None and self._seen[1] is changes()[1]:
+            return
         asked = [body.fixed for body in self._bodies] + [item._is_asked for item in self._constraints]
         if asked != self._asked_for:
             self._asked_for = asked
@@ -97,15 +100,31 @@ class PackedContents(Contents):
 
     def _with_numbers_of_now(self, before: Packed) -> Packed:
         """The scene packed with the numbers that it has now: in the same places, or anew where they make others."""
-        constraints = self._seated_constraints()
-        packed: Packed | None = renumbered(before, self._bodies, constraints, self._objectives)
+        packed: Packed | None = renumbered(before, self._bodies, self._seated_constraints, self._objectives)
         if packed is None:
+            constraints = self._seated_constraints()
             packed = Packed(self._bodies, constraints, self._objectives, self._crowding, self._corners)
             packed.lineage = before.lineage
         if packed is before:
             return packed
-        self._take_packed(packed, before.before)
+        if packed.number_places is not None and packed.number_places is before.number_places and self._scene:
+            # What solutions speak of is the same.
+            packed.before, self._packed = before.before, packed
+            if packed.scale != before.scale:
+                self._scene = self._scene.of_size(packed.scale)
+        else:
+            self._take_packed(packed, before.before)
         return packed
+
+    def _follows_numbers(self) -> bool:
+        """Have the numbers of now, where nothing else was set anew since the scene was packed; whether that is so."""
+        seen, now = self._seen, changes()
+        if seen is None or seen[1] is not now[1] or self._packed is None:
+            return False
+        self._lower_pairs = None
+        self._with_numbers_of_now(self._packed)
+        self._seen = now
+        return True
 
     def _pack(self, before: Packed | None) -> Packed:
         """Pack the scene, which was packed otherwise before."""
@@ -201,6 +220,15 @@ class PackedContents(Contents):
             yield
         finally:
             self._axes_at = None
+
+    @contextmanager
+    def _angles_near(self, values: Mapping[Coordinate, float]) -> Iterator[None]:
+        """Have angles start near values where solves begin at poses: these do not tell how often an angle turned."""
+        self._turns_near = values
+        try:
+            yield
+        finally:
+            self._turns_near = {}
 
     def _given(self, q0: ArrayLike | None) -> Array:
         """Poses (n, 7) of a start."""

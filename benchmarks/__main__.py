@@ -43,6 +43,7 @@ BENCHMARKS = (
     "tracking",
     "tracking_errors",
     "mechanisms",
+    "derivatives",
     "joint_errors",
     "laws",
     "accuracy",

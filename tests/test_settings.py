@@ -16,7 +16,7 @@ from tests.test_bad_input import contact, pair
         (lambda: asm.Revolute(*pair()), "angle_limits", "'angle', 'enabled', 'limits'"),
         (lambda: asm.Distance(*pair(), 1.0), "distance", "'enabled', 'limits', 'value'"),
         (lambda: asm.PointDistance(pair()[1].point(0, 0, 0), (0, 0, 0)), "targets", "'target'"),
-        (lambda: contact(), "minimum", "'enabled'"),
+        (lambda: contact(), "least", "'enabled', 'minimum'"),
         (lambda: pair()[1], "position", "'color', 'fixed', 'picture', 'pose'"),
     ],
     ids=["joint", "value", "objective", "contact", "body"],

@@ -208,7 +208,7 @@ def _of_row(problem: Problem, number: RowNumber, rows: Array) -> bool:
 def _of_least_gap(problem: Problem, number: LeastGap, rows: Array) -> bool:
     """The same of the contacts of a clearance."""
     packed = problem.packed
-    own = [k for k, item in enumerate(problem.constraints) if item is number.clearance]
+    own = [k for k, item in enumerate(problem.constraints) if item is number.owner]
     table = packed.table_at(problem.state)
     kept = packed.owners == (own[0] if own else -1)
     bodies = table[table[layout.ROW_TABLE] :][: layout.ROW * packed.rows].reshape(-1, layout.ROW)[:, layout.BODY_F]

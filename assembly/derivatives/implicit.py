@@ -10,14 +10,16 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.contents import Contents
 from assembly.constraints.packing.renumbered import have_same_numbers
+from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program.contact import TOUCHING
 from assembly.derivatives.columns import Columns, Frames, Problem, columns_of
 from assembly.derivatives.kkt import Moves, System, one_sided_moves, solve_system
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.measured import rates_of
 from assembly.derivatives.parameter import Parameter
+from assembly.derivatives.plan import layout_of, plan_of
 from assembly.derivatives.probed import Evaluated, ProbedScene
-from assembly.derivatives.result import Sensitivity
+from assembly.derivatives.result import Moved, Sensitivity
 from assembly.errors import InputError, items
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
@@ -59,6 +61,16 @@ def sensitivity(
     the_scene(scene)
     measures = several("of", of, Measure)
     parameters = several("wrt", wrt, Parameter)
+    packed, state = _checked(scene, solution)
+    plan = plan_of(solution, scene.bodies, (measures, parameters))
+    planned = None if plan is None else plan.derived(packed, state)
+    return planned if planned is not None else _derived(scene, solution, measures, parameters)
+
+
+def _derived(
+    scene: Assembly, solution: Solution, measures: Sequence[Measure], parameters: Sequence[Parameter]
+) -> Sensitivity:
+    """The general way: for all there is."""
     problem, pushing, weak = _problem(scene, solution, measures, parameters)
     columns = columns_of(problem, parameters)
     system, moving = _system(problem, columns)
@@ -88,10 +100,8 @@ def several(name: str, value: Any, kind: type) -> tuple[Any, ...]:
     return given
 
 
-def _problem(
-    scene: Assembly, solution: Solution, measures: Sequence[Measure], parameters: Sequence[Parameter]
-) -> tuple[Problem, Flags, Flags]:
-    """The solution as it is derived; which rows hold, and which are at their bound without a force."""
+def _checked(scene: Assembly, solution: Solution) -> tuple[Packed, Array]:
+    """How the scene of a solution is packed, and its state."""
     if not isinstance(solution, Solution):
         raise TypeError(f"solution is {solution!r}; expected a Solution")
     if not solution.success:
@@ -102,6 +112,14 @@ def _problem(
     packed.refresh()
     if not _are_same(packed.asked, solution._asked):
         raise InputError("solution is of other values or targets than the scene has now; expected one solved with them")
+    return packed, state
+
+
+def _problem(
+    scene: Assembly, solution: Solution, measures: Sequence[Measure], parameters: Sequence[Parameter]
+) -> tuple[Problem, Flags, Flags]:
+    """The solution as it is derived; which rows hold, and which are at their bound without a force."""
+    packed, state = _checked(scene, solution)
     bodies = scene.bodies
     turns = np.array([rotation_matrix(row) for row in state[: packed.contacts_at].reshape(-1, 7)[:, 3:]])
     frames = Frames(packed, parameters, turns, bodies)
@@ -222,11 +240,7 @@ def _result(
     steps[moving] = below.steps if both else 0.5 * (below.steps + above.steps)
     lost = np.isnan(matrix).all(axis=0) if measures else np.zeros(len(parameters), dtype=bool)
     steps[:, lost] = np.nan
-    scales = np.repeat([packed.scale, 1.0], 3)
-    twists = {body.name: (steps[6 * k : 6 * k + 6].T * scales) for k, body in enumerate(problem.bodies)}
-    forces = (below.forces if both else 0.5 * (below.forces + above.forces))[: packed.rows] * packed.unit
-    forces = np.where(packed.lengths[:, None], forces / packed.scale, forces)
-    multipliers = {item.name: forces[rows] for item, rows in zip(problem.constraints, packed.spans, strict=True)}
+    forces = (below.forces if both else 0.5 * (below.forces + above.forces))[: packed.rows]
     return Sensitivity(
         tuple(measures),
         tuple(parameters),
@@ -234,8 +248,7 @@ def _result(
         shrinking,
         growing,
         loose,
-        twists,
-        multipliers,
         below.rank,
         reasons,
+        Moved(layout_of(problem.bodies, problem.constraints, packed, True), steps, forces, packed.scale, packed.unit),
     )

@@ -26,7 +26,7 @@ Flags = NDArray[np.bool_]
 DEPENDENT, FLAT = 1e-7, 1e-8
 # What rows that repeat each other may ask for differently, over what is asked, and still agree.
 AGREE = 1e-7
-# Rows without a force, all of whose combinations are tried; what they may be broken by.
+# Rows without a force, all of whose combinations are tried where there is no metric; what they may be broken by.
 MOST_OPEN, WITHIN = 10, 1e-9
 
 
@@ -115,25 +115,28 @@ def solve_system(system: System, held: Flags) -> Moves:
 def one_sided_moves(system: System, held: Flags, open_rows: Flags, sign: float) -> Moves | None:
     """The derivative as parameters grow (1), or shrink (-1), each alone, where open rows may hold or leave their bound.
 
-    None where no choice of them, or more than one with different steps, is a solution; at most `MOST_OPEN` are tried.
+    With curvature along all that held rows leave, the step is the least one in that metric: a least distance program a
+    parameter says which open rows hold. Without it several steps may be: all choices of rows are tried. None where
+    there are too many for that, more than `MOST_OPEN`.
     """
     rows = np.flatnonzero(open_rows)
-    if len(rows) > MOST_OPEN:
+    metric = _metric(system, held)
+    if metric is None and len(rows) > MOST_OPEN:
         return None
-    count = system.rows_by.shape[1]
-    found: list[Moves | None] = [None] * count
-    for size in range(len(rows) + 1):
-        for chosen in combinations(rows.tolist(), size):
-            choice = held.copy()
-            choice[list(chosen)] = True
-            moves = solve_system(system, choice)
-            rates = sign * (system.jacobian[rows] @ moves.steps + system.rows_by[rows])
-            forces = sign * moves.forces[rows]
-            holds = (rates >= -WITHIN).all(axis=0) & (forces <= WITHIN).all(axis=0) & ~moves.contradicts
-            for k in np.flatnonzero(holds):
-                found[k] = found[k] or moves
-        if all(moves is not None for moves in found):
-            break
+    chosen = (
+        _tried(system, held, rows, sign)
+        if metric is None
+        else [_held_by_least_distance(system, held, rows, sign, metric, k) for k in range(system.rows_by.shape[1])]
+    )
+    found: list[Moves | None] = []
+    known: dict[bytes, Moves] = {}
+    for k, choice in enumerate(chosen):
+        moves = None
+        if choice is not None:
+            moves = known.setdefault(choice.tobytes(), solve_system(system, choice))
+            if not _holds(system, moves, rows, sign)[k]:
+                moves = None
+        found.append(moves)
     best = [moves or solve_system(system, held) for moves in found]
     lost = np.array([moves is None for moves in found])
     return Moves(
@@ -145,3 +148,72 @@ def one_sided_moves(system: System, held: Flags, open_rows: Flags, sign: float) 
         np.array([bool(moves.drifts[k]) for k, moves in enumerate(best)]),
         max((moves.shared for moves in best), key=lambda shared: shared.shape[1]),
     )
+
+
+def _holds(system: System, moves: Moves, rows: NDArray[np.int64], sign: float) -> Flags:
+    """Of every parameter whether no open row is broken, and none pulls."""
+    rates = sign * (system.jacobian[rows] @ moves.steps + system.rows_by[rows])
+    forces = sign * moves.forces[rows]
+    return (rates >= -WITHIN).all(axis=0) & (forces <= WITHIN).all(axis=0) & ~moves.contradicts
+
+
+def _metric(system: System, held: Flags) -> Array | None:
+    """B (n, d) of the steps B v that held rows leave, whose curvature is |v|^2; None where it is not positive."""
+    scaled = system.jacobian[held]
+    lengths = np.sqrt((scaled**2).sum(axis=1))
+    scaled = scaled[lengths > DEPENDENT] / lengths[lengths > DEPENDENT, None]
+    _, values, right = np.linalg.svd(scaled, full_matrices=True)
+    basis = right[int(np.count_nonzero(values > DEPENDENT)) :].T
+    curvatures, ways = np.linalg.eigh(basis.T @ system.hessian @ basis)
+    if not (curvatures > FLAT * max(1.0, float(np.abs(system.hessian).max()))).all():
+        return None
+    metric: Array = basis @ (ways / np.sqrt(curvatures))
+    return metric
+
+
+def _held_by_least_distance(
+    system: System, held: Flags, rows: NDArray[np.int64], sign: float, metric: Array, k: int
+) -> Flags | None:
+    """Rows that hold as parameter k grows or shrinks: of the least v with A v + rates >= 0 in the open rows.
+
+    Its dual is a least square with multipliers of one sign (Lawson and Hanson, Solving Least Squares Problems, 23.4).
+    None where there is no v.
+    """
+    from scipy.optimize import nnls  # a quarter of a second of import
+
+    alone = System(
+        system.jacobian, system.hessian, system.rows_by[:, [k]], system.slopes_by[:, [k]], system.is_least_move
+    )
+    rates = sign * (system.jacobian[rows] @ solve_system(alone, held).steps[:, 0] + system.rows_by[rows, k])
+    across = system.jacobian[rows] @ metric
+    lengths = np.sqrt((across**2).sum(axis=1))
+    # What held rows leave no way to change is as it is; what is broken by rounding is not.
+    stays = lengths <= DEPENDENT * np.maximum(1.0, np.abs(system.jacobian[rows]).max(axis=1, initial=0.0))
+    if (rates[stays] < -WITHIN).any():
+        return None
+    lacking = np.where(rates < -WITHIN, -rates, np.minimum(-rates, 0.0))[~stays]
+    choice = held.copy()
+    if not (lacking > 0.0).any():
+        return choice
+    parts = across[~stays] / lengths[~stays, None]
+    lacking = lacking / lengths[~stays]
+    lacking = lacking / np.abs(lacking).max()
+    amounts, distance = nnls(np.vstack([parts.T, lacking]), np.append(np.zeros(parts.shape[1]), 1.0))
+    if not distance > DEPENDENT:
+        return None
+    choice[rows[~stays][amounts > 0.0]] = True
+    return choice
+
+
+def _tried(system: System, held: Flags, rows: NDArray[np.int64], sign: float) -> list[Flags | None]:
+    """The same of every parameter, by trying all choices, the smallest first."""
+    found: list[Flags | None] = [None] * system.rows_by.shape[1]
+    for size in range(len(rows) + 1):
+        for chosen in combinations(rows.tolist(), size):
+            choice = held.copy()
+            choice[list(chosen)] = True
+            for k in np.flatnonzero(_holds(system, solve_system(system, choice), rows, sign)):
+                found[k] = choice if found[k] is None else found[k]
+        if all(choice is not None for choice in found):
+            break
+    return found

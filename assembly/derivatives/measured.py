@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from assembly.derivatives.columns import Columns, Problem, by_frames, differences
 from assembly.derivatives.kkt import Moves
 from assembly.derivatives.measure import Measure, place_of, world
-from assembly.derivatives.numbers import ControlPoint, ControlWeight, FrameNumber, FrameOrigin, ShapeNumber
+from assembly.derivatives.numbers import ControlPoint, ControlWeight, FrameNumber, FrameOrigin, LeastGap, ShapeNumber
 from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError
 from assembly.solve.forces.statics import bodies_of
@@ -53,6 +53,10 @@ def rates_of(
         elif item.kind == "gap":
             row = _row_of(problem, item)
             slopes[i], own[i], units[i] = here.jacobian[row], columns.rows[row], scale
+            for r, parameter in enumerate(parameters):
+                # The row is the gap less the least one.
+                if isinstance(parameter._number, LeastGap) and parameter._number.owner is item.thing:
+                    own[i, r] += 1.0 / scale
         else:
             _of_place(problem, item, slopes[i], own[i])
     rates = units * (slopes @ steps + own)

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint, Freedom
+from assembly.constraints.model.contact import Contact
 from assembly.constraints.model.objectives import FrameDistance, PointDistance
-from assembly.errors import InputError
+from assembly.errors import InputError, check_coordinates
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace, Frame
@@ -94,7 +95,7 @@ class RowNumber(Number):
         else:
             lower, upper = self.owner.lower, self.owner.upper
             self.owner.limits = (value, upper) if self.attribute == "lower" else (lower, value)
-        count_number()
+        count_number(self.owner)
 
     def put(self, value: float) -> None:
         """Set it for a while, beyond limits perhaps."""
@@ -129,9 +130,10 @@ class FrameOrigin(FrameNumber):
 
     def set(self, value: float) -> None:
         """Set it."""
+        check_coordinates(AXES[self.axis], [value])
         origin = self.frame.origin.copy()
         origin[self.axis] = value
-        self.frame.place(at=origin)
+        self.frame._move(origin)
 
     def twist(self, turn: Array, scale: float) -> Array:
         """The twist of the frame a unit of the number."""
@@ -189,23 +191,23 @@ class TargetNumber(Number):
             self.term.target = place
         else:
             self.term.target = Pose(place, self.term.target.quaternion)
-        count_number()
+        count_number(self.term)
 
 
 class LeastGap(Number):
-    """The least gap of a clearance."""
+    """The least gap of a clearance, or of a contact."""
 
-    def __init__(self, clearance: Clearance) -> None:
-        self.clearance = clearance
-        self.name = f"{clearance.name}.minimum"
+    def __init__(self, owner: Clearance | Contact) -> None:
+        self.owner = owner
+        self.name = f"{owner.name}.minimum"
 
     def get(self) -> float:
         """The number now."""
-        return self.clearance.minimum
+        return self.owner.minimum
 
     def set(self, value: float) -> None:
         """Set it."""
-        self.clearance.minimum = value
+        self.owner.minimum = value
 
 
 class ShapeNumber(Number):

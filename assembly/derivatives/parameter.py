@@ -9,6 +9,7 @@ import numpy as np
 
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint, Freedom
+from assembly.constraints.model.contact import Contact
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.objectives import FrameDistance, PointDistance
 from assembly.derivatives.numbers import (
@@ -53,7 +54,7 @@ class Parameter(KnownSettings):
     | a coupling | "offset" |
     | a frame, `joint.frame_a` | "origin" or "turn", "x", "y" or "z": in the axes of its body |
     | `PointDistance`, `FrameDistance` | "target", "x", "y" or "z" |
-    | `Clearance` | "minimum" |
+    | `Clearance`, `Contact` | "minimum" |
     | `Parametric`, or a body with such a shape | the name of one of its numbers |
     | a face of a body, `body.face("top")` | "control_points", (i, j, "z"); "weights", (i, j) |
     | a function that makes faces of a number | the number: `asm.Body("ball", parameter.shape)` |
@@ -130,7 +131,7 @@ def _number_of(thing: Thing, field: Any, index: Any) -> Number:
     if isinstance(thing, (PointDistance, FrameDistance)):
         _expect(field, "target")
         return TargetNumber(thing, _axis(index))
-    if isinstance(thing, Clearance):
+    if isinstance(thing, (Clearance, Contact)):
         _expect(field, "minimum")
         return LeastGap(thing)
     if isinstance(thing, Freedom):

@@ -134,7 +134,7 @@ class ProbedScene:
         self._put_terms_on(probes)
         rows = table[table[layout.ROW_TABLE] :][: layout.ROW * packed.rows].reshape(-1, layout.ROW).copy()
         of_joints = np.flatnonzero(rows[:, layout.KIND] == layout.JOINT_ROW)
-        sides = np.array(joints, dtype=np.int64)[:, :2]
+        sides = np.array(joints, dtype=np.int64).reshape(-1, layout.JOINT_RECORD)[:, :2]
         rows[of_joints, layout.BODY_F : layout.BODY_G + 1] = sides[rows[of_joints, FIRST_JOINT]]
         for second in rows[of_joints, SECOND]:
             if second >= 0:

@@ -4,20 +4,54 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly._html import Table, as_html
-from assembly._read_only import ReadOnlyArrays
+from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError
 
-__all__ = ["Sensitivity"]
+__all__ = ["Layout", "Moved", "Sensitivity"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+
+class Layout(NamedTuple):
+    """Where twists of bodies stand among unknowns, and rows of constraints among multipliers.
+
+    Attributes
+    ----------
+    bodies, constraints : tuple of str
+        Names.
+    blocks : tuple of int
+        Of every body its block of six unknowns; -1: it does not move.
+    spans : sequence of (rows,) int
+        Of every constraint its rows.
+    lengths : (m,) bool
+        Whether a row is a length.
+    """
+
+    bodies: tuple[str, ...]
+    constraints: tuple[str, ...]
+    blocks: tuple[int, ...]
+    spans: Sequence[NDArray[np.int64]]
+    lengths: Flags
+
+
+class Moved(NamedTuple):
+    """What unknowns (n, p) and multipliers (m, p) change by a unit of each parameter, scaled, and their units."""
+
+    layout: Layout
+    steps: Array
+    forces: Array
+    scale: float
+    unit: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +69,6 @@ class Sensitivity(ReadOnlyArrays):
     undetermined : (m,) bool
         Measures that a free motion changes: of these the derivative is that of the least move. And forces that rows
         which repeat each other share: of these it is that of the least forces.
-    twists : mapping of body's name to (p, 6)
-        The bodies' twists a unit of each parameter; `poses` has them by parameter.
-    multipliers : mapping of constraint's name to (rows, p)
-        Derivatives of `Solution.multipliers`.
     rank : int
         Of the rows that hold at the solution.
     reasons : mapping of parameter's name to str
@@ -50,10 +80,10 @@ class Sensitivity(ReadOnlyArrays):
     shrinking: Array
     growing: Array
     undetermined: Flags
-    twists: Mapping[str, Array]
-    multipliers: Mapping[str, Array]
     rank: int
     reasons: Mapping[str, str]
+    # What twists and multipliers are made of when they are read.
+    _moved: Moved
 
     def __getitem__(self, pair: tuple[Measure, Parameter]) -> float:
         """The derivative of a measure by a parameter; NaN where there is none."""
@@ -64,6 +94,23 @@ class Sensitivity(ReadOnlyArrays):
         """The derivatives as the parameter shrinks, and as it grows."""
         at = _place("measure", measure, self.of), _place("parameter", parameter, self.wrt)
         return float(self.shrinking[at]), float(self.growing[at])
+
+    @cached_property
+    def twists(self) -> Mapping[str, Array]:
+        """Of every body, by name, its twists a unit of each parameter (p, 6); `poses` has them by parameter."""
+        moved = self._moved
+        scales = np.repeat([moved.scale, 1.0], 3)
+        none = np.zeros((6, len(self.wrt)))
+        blocks = [moved.steps[6 * k : 6 * k + 6] if k >= 0 else none for k in moved.layout.blocks]
+        return {name: read_only(block.T * scales) for name, block in zip(moved.layout.bodies, blocks, strict=True)}
+
+    @cached_property
+    def multipliers(self) -> Mapping[str, Array]:
+        """Derivatives of `Solution.multipliers`: of every constraint, by name, (rows, p)."""
+        moved, layout = self._moved, self._moved.layout
+        forces = moved.forces * moved.unit
+        forces = np.where(layout.lengths[:, None], forces / moved.scale, forces)
+        return {name: read_only(forces[rows]) for name, rows in zip(layout.constraints, layout.spans, strict=True)}
 
     @property
     def poses(self) -> dict[str, dict[Parameter, Array]]:

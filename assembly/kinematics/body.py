@@ -102,10 +102,15 @@ class Frame(ReadOnlyArrays):
         self._stand(other.origin, other.axes)
         self.__dict__.pop("_turned", None)
 
+    def _move(self, origin: Array) -> None:
+        """Have another origin, an array of its own, and the same axes."""
+        self.__dict__["origin"] = _frozen(origin)
+        count_number(self)
+
     def _stand(self, origin: Array, axes: Array) -> None:
         """Have another origin and other axes, orthonormal ones."""
         self.__dict__.update(origin=_frozen(origin.copy()), axes=_frozen(axes.copy()))
-        count_number()
+        count_number(self)
 
 
 class OpposedFrame(Frame):
@@ -327,7 +332,7 @@ class Body(Weighed):
         for side, face in zip(self._faces, faces, strict=True):
             side._take(face)
         self._size, self._edges = None, None
-        count_number()
+        count_number(self)
 
     def __repr__(self) -> str:
         return f"Body({self.name!r}, {len(self.faces)} faces{', fixed' if self.fixed else ''})"

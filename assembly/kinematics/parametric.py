@@ -7,7 +7,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from assembly.errors import InputError, number
-from assembly.kinematics.changes import count_number
 
 if TYPE_CHECKING:
     from assembly.kinematics.body import Body
@@ -89,7 +88,6 @@ class Parametric:
             raise
         for body, faces in zip(self._bodies, replacements, strict=True):
             body._take_faces(faces)
-        count_number()
 
     def __repr__(self) -> str:
         numbers = ", ".join(f"{name}={value!r}" for name, value in self._numbers.items())

@@ -3,7 +3,7 @@
 A file is one object, and every field must be there:
 
     format       "assembly-scene"
-    version      4
+    version      5
     surfaces     [{name, degree [p, q], knots [U, V], control_points [n_u][n_v][3], weights [n_u][n_v]}]
     faces        [{surface, name, reversed, color [red, green, blue], outer (a loop), holes [loops]}]
     bodies       [{name, fixed, position [3], quaternion [w, x, y, z], color [red, green, blue], density,
@@ -13,7 +13,7 @@ A file is one object, and every field must be there:
 
 Fields of a constraint by its type:
 
-    contact         a {body, face}, b {body, face}, unilateral, edges
+    contact         a {body, face}, b {body, face}, unilateral, edges, minimum
     fixed           frame_a, frame_b, axes
     revolute        frame_a, frame_b, axes, angle, limits
     prismatic       frame_a, frame_b, axes, slide, limits
@@ -68,7 +68,8 @@ radians. A coupling refers to joints of the same file, which may stand after it.
 text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers are the shortest decimals that give
 back the same doubles.
 
-Older versions are read, too. Version 3 had no pictures, no distances from lines and no `touch`; version 2 had no
+Older versions are read, too. Version 4 had no least gaps of contacts; version 3 had no pictures, no distances from
+lines and no `touch`; version 2 had no
 densities; version 1 had no faces, colors, loops, edges and trims either, and a `shape` was [{surface, name, reversed}].
 """
 

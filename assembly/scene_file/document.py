@@ -9,6 +9,7 @@ from typing import Any
 
 from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import Constraint
+from assembly.constraints.model.tangent import ContactTangent
 from assembly.errors import InputError
 from assembly.scene_file.fields import at, bad, each, members, whole, written
 from assembly.scene_file.kinds import BODY, CONSTRAINTS, FACE, OBJECTIVES, SURFACE
@@ -18,7 +19,7 @@ from assembly.scene_file.references import refers_to_others
 __all__ = ["load", "save"]
 
 FORMAT = "assembly-scene"
-VERSION = 4
+VERSION = 5
 _SIGNS = {1: "minimized", -1: "maximized"}
 
 
@@ -53,6 +54,10 @@ def _document(scene: Assembly) -> dict[str, Any]:
             what = "is of fixed bodies alone" if item.enabled else "is disabled"
             raise InputError(
                 f"constraint {item.name!r} {what}, which files do not hold; expected scene.remove of it first"
+            )
+        if isinstance(item, ContactTangent) and item.minimum:
+            raise InputError(
+                f"tangent {item.name!r} has a minimum, which files do not hold; expected a Contact with it"
             )
     parts = Parts(scene, VERSION, {item.name: item for item in scene.constraints})
     # Bodies first, then their faces: both tables are numbered as their entries come.

@@ -260,7 +260,13 @@ EXPRESSION = Record(
 CONSTRAINTS = OneOf(
     {
         "contact": Record(
-            Contact, NAME, Field("a", SIDE), Field("b", SIDE), UNILATERAL, Field("edges", Plain(flag), since=2)
+            Contact,
+            NAME,
+            Field("a", SIDE),
+            Field("b", SIDE),
+            UNILATERAL,
+            Field("edges", Plain(flag), since=2),
+            Field("minimum", NUMBER, since=5),
         ),
         "fixed": Record(Fixed, NAME, *FRAMES, AXES),
         "revolute": Record(Revolute, NAME, *FRAMES, AXES, *_free("angle")),

@@ -61,6 +61,12 @@ class Scene:
         self.axes: dict[str, Sense] = {}
         self._wished: slice | NDArray[np.int64] | None = None
 
+    def of_size(self, scale: float) -> Scene:
+        """The same with another size."""
+        other = Scene(self.bodies, self.constraints, self.contacts, self.sides, scale, self.seats)
+        other.axes, other._wished = self.axes, self._wished
+        return other
+
     def wished(self, packed: Packed) -> slice | NDArray[np.int64]:
         """Where the pool has what the objective asks for and may change between solves: targets and postures."""
         if self._wished is None:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.model.constraint import structure_changes
+from assembly.constraints.packing.earlier import with_numbers_of
 from assembly.constraints.packing.scene import Packed
 from assembly.solve.attempts.attempts import run
 from assembly.solve.interruption import CTRL_C
@@ -41,7 +42,10 @@ def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, w
     wishes : bool
         Whether the scene has an objective.
     """
-    if packed is None or scene is None or packed is not begun._ended.packed:
+    if packed is None or scene is None:
+        return None
+    earlier = begun._ended.packed
+    if packed is not earlier and (packed.number_places is None or packed.number_places is not earlier.number_places):
         return None
     if not packed.is_loop_alone or begun._fit is not None or packed.stamp != structure_changes():
         return None
@@ -49,7 +53,7 @@ def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, w
         # The loop is not there yet, or another thread is in it.
         return None
     begin = perf_counter()
-    state = begun._ended.state.copy()
+    state = begun._ended.state.copy() if packed is earlier else with_numbers_of(packed, earlier, begun._ended.state)
     packed.refresh()
     packed.start_angles(state, True)
     settings = scene_settings({}, CTRL_C, wishes, True)

@@ -50,7 +50,7 @@ def with_axes_of_the_rest(
     if not others or interruption.is_over():
         return failed
     rest = type(scene)(scene.bodies)
-    rest.constrain(*others)
+    rest._take_constraints(others)
     named = None if starts is None else {name: starts[name] for name in starts}
     held = rest._from_start(given, named, options, interruption)
     if not held.success or interruption.is_over():

@@ -98,7 +98,7 @@ def put_together(
     if settings.keep_topology or settings.max_iterations == 0 or not can_prove(packed):
         return None
     inner = type(scene)(scene.bodies)
-    inner.constrain(*others)
+    inner._take_constraints(others)
     for sign, objective in scene.objectives:
         (inner.minimize if sign > 0.0 else inner.maximize)(objective)
     as_it_is = inner._settings(options | {"max_iterations": 0}, interruption, warm=False)

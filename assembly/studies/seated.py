@@ -74,7 +74,7 @@ def seated(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     if not joints or interruption.is_over():
         return None
     inner = type(scene)(scene.bodies)
-    inner.constrain(*others, *joints)
+    inner._take_constraints([*others, *joints])
     poses = inner._from_start(q, None, {}, interruption).q
     return poses.copy() if np.isfinite(poses).all() else None
 

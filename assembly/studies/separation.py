@@ -86,7 +86,7 @@ def separated(scene: Assembly, q: Array, options: Mapping[str, Any], interruptio
             elif often[names] > TRIES:
                 _part(crossing, q, rows, touching)
         helper = type(scene)(scene.bodies)
-        helper.constrain(*others, *contacts)
+        helper._take_constraints([*others, *contacts])
         solution = helper._from_start(q, None, dict(options), interruption)
         if solution.success:
             poses = [solution.q]

@@ -118,7 +118,7 @@ def _hand_at(follow: Point | Frame | Body, row: Array, weight: float) -> PointDi
 def _with_hand(scene: Assembly, hand: PointDistance | FrameDistance) -> Assembly:
     """The same scene with one more objective."""
     inner = Assembly(scene.bodies)
-    inner.constrain(*scene.constraints)
+    inner._take_constraints(scene.constraints)
     for sign, objective in scene.objectives:
         (inner.minimize if sign > 0.0 else inner.maximize)(objective)
     inner.minimize(hand)

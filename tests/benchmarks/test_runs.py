@@ -34,6 +34,7 @@ def slope(what):
         "wires",
         "tracking",
         "mechanisms",
+        "derivatives",
         "laws",
         "accuracy",
         "growth",

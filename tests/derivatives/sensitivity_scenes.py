@@ -198,6 +198,33 @@ def kept_apart(minimum=0.3):
     return Case(scene, of, [asm.Parameter(least, "minimum"), asm.Parameter(goal, "target", "x"), size])
 
 
+def filmed():
+    """A ball over a plate by a film, in a V of two more films that keep it at their least gaps or farther."""
+    hump = asm.shapes.sphere(8.0)
+    ground = asm.Body("ground", hump, fixed=True)
+    left, right = (
+        asm.Body("left", asm.shapes.sphere(1.0), (-0.4, 0.3, 9.2)),
+        asm.Body("right", asm.shapes.sphere(1.5), (2, 0, 10)),
+    )
+    scene = asm.Assembly([ground, left, right])
+    films = [
+        asm.Contact(ground, left, "one", minimum=0.2),
+        asm.Contact(ground, right, "two", minimum=0.1),
+        asm.Contact(left, right, "between", unilateral=True, minimum=0.3),
+    ]
+    scene.constrain(*films)
+    goals = [asm.PointDistance(body.point(0, 0, 0), (0.5, 0.2, 8.0)) for body in (left, right)]
+    scene.minimize(*goals, asm.Posture(scene.q, weight=0.1))
+    of = [
+        asm.Measure(left, "x"),
+        asm.Measure(right, "z"),
+        asm.Measure(films[1]),
+        asm.Measure(films[2]),
+        asm.Measure("objective"),
+    ]
+    return Case(scene, of, [asm.Parameter(item, "minimum") for item in films])
+
+
 def trimmed():
     """A ball on a plate whose contact is kept in a circle, drawn out of it."""
     size = asm.Parameter(asm.shapes.sphere, 1.0, name="radius")
@@ -287,5 +314,18 @@ def tethered():
 
 CASES = {
     case.__name__: case
-    for case in (slider_crank, ball_in_v, rocker, cam, clips, pushed, kept_apart, trimmed, geared, leaning, tethered)
+    for case in (
+        slider_crank,
+        ball_in_v,
+        rocker,
+        cam,
+        clips,
+        pushed,
+        kept_apart,
+        filmed,
+        trimmed,
+        geared,
+        leaning,
+        tethered,
+    )
 }

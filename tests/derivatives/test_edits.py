@@ -195,3 +195,70 @@ def test_what_is_set_in_another_scene_changes_nothing_of_this_one():
     other.scene.constraints[2].enabled = False
     # Packed as it was: the solution is one of the scene as it is.
     assert scene.solve(solution).iterations == 0 and scene.packed() is solution._packed
+
+
+def _chain():
+    """A ground and three bars with hinges between them, the last one's end drawn to a place."""
+    bodies = [asm.Body("ground", fixed=True), *(asm.Body(f"bar {k}", position=(k, 0.2, 0)) for k in range(3))]
+    scene = asm.Assembly(bodies)
+    pairs = zip(bodies, bodies[1:], strict=False)
+    joints = [asm.Revolute(a.frame(at=(1, 0, 0)), b, f"joint {k}") for k, (a, b) in enumerate(pairs)]
+    scene.constrain(*joints)
+    return scene, bodies, joints
+
+
+def test_what_is_between_fixed_bodies_is_no_obstacle_to_trackers_ranges_and_starts():
+    scene, bodies, joints = _chain()
+    joints[2].freedom("angle").limits = (-0.5, 0.4)
+    assert scene.solve().success
+    bodies[1].fixed = True
+    tracker = scene.tracker(bodies[3].point(1, 0, 0))
+    assert tracker.step(tracker.q[3, :3]).status is not asm.TrackStatus.CHANGED
+    solution = scene.solve()
+    found = asm.play(scene, solution, asm.Measure(joints[2]))
+    assert (found.least.value, found.most.value) == pytest.approx((-0.5, 0.4), abs=1e-9)
+    bodies[1].fixed = False
+    assert tracker.step(tracker.q[3, :3]).status is asm.TrackStatus.CHANGED
+    # A clearance has bodies put together first, in a scene of their own.
+    one, two = asm.Body("one", asm.shapes.box(1, 1, 1)), asm.Body("two", asm.shapes.box(1, 1, 1), (0.2, 3, 0))
+    base = asm.Body("base", fixed=True)
+    apart = asm.Assembly([base, one, two])
+    apart.constrain(asm.Fixed(base, one, "held"), asm.Clearance([one, two]))
+    apart.constrain(asm.Prismatic(base.frame(at=(0, 1.5, 0)), two, "guide", slide=0.0))
+    one.fixed = True
+    assert apart.solve().success
+
+
+def test_a_goal_without_bounds_beside_what_is_disabled():
+    """What an objective may fall along without end is looked for with what is asked alone."""
+    ground, arm = asm.Body("ground", fixed=True), asm.Body("arm")
+    block = asm.Body("block", asm.shapes.box(1, 1, 1))
+    scene = asm.Assembly([ground, arm, block])
+    hinge = asm.Revolute(ground, arm, "hinge", angle=0.3)
+    scene.constrain(hinge, asm.Prismatic(ground, block, "rail"))
+    scene.minimize(asm.Weight([block]))
+    hinge.enabled = False
+    assert scene.solve().status is asm.Status.UNBOUNDED
+
+
+def test_a_least_gap_of_a_contact_is_held_saved_and_no_clearance_beside_it(tmp_path):
+    plate = asm.Body("plate", asm.shapes.plane(20.0, 20.0), fixed=True)
+    ball = asm.Body("ball", asm.shapes.sphere(1.0), (0.3, 0.2, 3.0))
+    scene = asm.Assembly([plate, ball])
+    film = asm.Contact(plate, ball, "film", minimum=0.25)
+    scene.constrain(film)
+    assert scene.solve().pose(ball).position[2] == pytest.approx(1.25, abs=1e-11)
+    scene.save(tmp_path / "film.json")
+    again = asm.load(tmp_path / "film.json")
+    assert again.constraints[0].minimum == 0.25
+    for value in (-0.1, float("nan")):
+        with pytest.raises(asm.errors.InputError, match="minimum is"):
+            film.minimum = value
+    assert film.minimum == 0.25
+    scene.constrain(asm.Clearance([plate, ball], minimum=0.1, name="apart"))
+    with pytest.raises(
+        asm.errors.InputError, match="contact 'film' has the minimum 0.25 and clearance 'apart' is of its bodies"
+    ):
+        scene.solve()
+    film.minimum = 0.0
+    assert scene.solve().success

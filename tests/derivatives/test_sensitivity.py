@@ -8,6 +8,7 @@ import pytest
 import assembly as asm
 from assembly.derivatives.columns import columns_of
 from assembly.derivatives.implicit import _problem
+from assembly.derivatives.kkt import System, _tried, one_sided_moves, solve_system
 from tests.derivatives.sensitivity_scenes import (
     CASES,
     Case,
@@ -206,3 +207,47 @@ def test_forces_that_rows_share_are_undetermined():
     assert "undetermined: rows that repeat each other share it" in str(d)
     found = differences(case, solution, bound, 1e-3)
     assert np.abs(found - d.matrix[:, 0])[~d.undetermined].max() < 1e-8 * max(1.0, np.abs(found).max())
+
+
+def test_any_number_of_rows_at_their_bounds_has_one_sided_derivatives():
+    """Blocks on rails, each at its stop and drawn to where it is: a stop that comes pushes, one that goes does not."""
+    ground, count = asm.Body("ground", fixed=True), 14
+    blocks = [asm.Body(f"block {k}") for k in range(count)]
+    scene = asm.Assembly([ground, *blocks])
+    rails = [
+        asm.Prismatic(ground.frame(at=(3 * k, 0, 0)), block, f"rail {k}", limits=(0.5, 4.0))
+        for k, block in enumerate(blocks)
+    ]
+    goals = [asm.PointDistance(block.point(0, 0, 0), (3 * k, 0, 0.5)) for k, block in enumerate(blocks)]
+    scene.constrain(*rails)
+    scene.minimize(*goals)
+    solution = scene.solve(stationarity=1e-13)
+    of = [asm.Measure(rails[3]), asm.Measure(rails[9])]
+    stop, goal = asm.Parameter(rails[3], "limits", 0), asm.Parameter(goals[9], "target", "z")
+    d = asm.sensitivity(scene, solution, of, [stop, goal])
+    # Objectives are squares: where the stop stands the block goes with it, or stays at its goal.
+    assert d.one_sided(of[0], stop) == pytest.approx((0.0, 1.0), abs=1e-12)
+    assert d.one_sided(of[1], goal) == pytest.approx((0.0, 1.0), abs=1e-12)
+    assert d[of[1], stop] == d[of[0], goal] == 0.0
+
+
+def test_least_distances_choose_the_rows_that_trying_all_would():
+    rng = np.random.default_rng(1)
+    for _ in range(25):
+        n, held_rows, open_rows = 6, int(rng.integers(0, 4)), int(rng.integers(1, 8))
+        m = held_rows + open_rows
+        jacobian = rng.normal(size=(m, n))
+        if open_rows > 2:
+            jacobian[-1] = jacobian[-2] + jacobian[-3]
+        root = rng.normal(size=(n, n))
+        hessian = root @ root.T + 0.1 * np.eye(n)
+        system = System(jacobian, hessian, rng.normal(size=(m, 3)), rng.normal(size=(n, 3)))
+        held = np.arange(m) < held_rows
+        for sign in (1.0, -1.0):
+            found = one_sided_moves(system, held, ~held, sign)
+            tried = _tried(system, held, np.flatnonzero(~held), sign)
+            for k, choice in enumerate(tried):
+                assert found.contradicts[k] == (choice is None)
+                if choice is not None:
+                    steps = solve_system(system, choice).steps[:, k]
+                    assert np.abs(found.steps[:, k] - steps).max() < 1e-9 * max(1.0, np.abs(steps).max())

@@ -123,7 +123,7 @@ class Clearance(Constraint):
         if not least >= 0.0:
             raise InputError(f"minimum is {least:g}; expected a length of zero or more")
         self._minimum = least
-        count_number()
+        count_number(self)
 
     @property
     def merge_radius(self) -> float:

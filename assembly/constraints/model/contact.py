@@ -6,17 +6,18 @@ import numpy as np
 
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.tracked_sizes import check_parameters
-from assembly.errors import InputError
+from assembly.errors import InputError, bounded
 from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.smooth_faces import has_creases
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
+from assembly.kinematics.changes import count_number
 
 __all__ = ["Contact", "lone_surfaces", "side_face", "side_faces"]
 
 
 class Contact(Constraint):
-    """The extremal gap of two faces is zero (or, one-sided, not negative).
+    """The extremal gap of two faces is zero (or, one-sided, not negative), or another least gap.
 
     The gap is that of the pair of points the solve tracks from its start; where it lies on the faces is free. With
     edges the pair is one of features, faces, edges or vertices, and switches between them as the bodies move; without,
@@ -35,6 +36,9 @@ class Contact(Constraint):
     edges : bool, optional
         Whether the faces' edges and vertices take part. By default where a side has several faces, or one with loops
         or creases; without them a contact that would have to leave a surface is lost.
+    minimum : float
+        The gap instead of zero, or the least one: a film, a shim, a grinding allowance. Settable between solves. Not
+        beside a `Clearance` of the same two bodies.
 
     Raises
     ------
@@ -51,6 +55,7 @@ class Contact(Constraint):
         unilateral: bool = False,
         *,
         edges: bool | None = None,
+        minimum: float = 0.0,
     ) -> None:
         for label, side in (("a", a), ("b", b)):
             if not isinstance(side, (Body, BodyFace)):
@@ -66,6 +71,7 @@ class Contact(Constraint):
         if not isinstance(unilateral, (bool, np.bool_)):
             raise InputError(f"unilateral is {unilateral!r}; expected True or False")
         self._unilateral = bool(unilateral)
+        self._minimum = _least(minimum)
         if edges is not None and not isinstance(edges, (bool, np.bool_)):
             raise InputError(f"edges is {edges!r}; expected True, False or None")
         sides = [side_faces(side) for side in (a, b)]
@@ -90,6 +96,16 @@ class Contact(Constraint):
         return self._unilateral
 
     @property
+    def minimum(self) -> float:
+        """The gap, or the least one; settable between solves."""
+        return self._minimum
+
+    @minimum.setter
+    def minimum(self, value: float) -> None:
+        self._minimum = _least(value)
+        count_number(self)
+
+    @property
     def edges(self) -> bool:
         """Whether edges and vertices take part."""
         return self._edges
@@ -105,7 +121,18 @@ class Contact(Constraint):
         return self.b if isinstance(self.b, Body) else self.b.body
 
     def __repr__(self) -> str:
-        return f"Contact({self.a!r}, {self.b!r}, name={self.name!r}{', unilateral=True' if self.unilateral else ''})"
+        said = (
+            f"{', unilateral=True' if self.unilateral else ''}{f', minimum={self.minimum:g}' if self.minimum else ''}"
+        )
+        return f"Contact({self.a!r}, {self.b!r}, name={self.name!r}{said})"
+
+
+def _least(value: float) -> float:
+    """A least gap."""
+    least = bounded("minimum", value)
+    if not least >= 0.0:
+        raise InputError(f"minimum is {least:g}; expected a length of zero or more")
+    return least
 
 
 def side_faces(side: Body | BodyFace) -> tuple[Face, ...]:

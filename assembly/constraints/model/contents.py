@@ -155,9 +155,14 @@ class Contents:
                 )
             if constraint.bodies and all(body.fixed for body in constraint.bodies):
                 raise InputError(f"constraint {constraint.name!r} is between two fixed bodies; expected one that moves")
+            self._take_constraints([constraint])
+
+    def _take_constraints(self, constraints: Iterable[Constraint]) -> None:
+        """Add constraints of another scene of these bodies, some of which may be fixed by now."""
+        for constraint in constraints:
             self._constraints.append(constraint)
             self._taken.add(constraint.name)
-            self._has_changed()
+        self._has_changed()
 
     def remove(self, constraint: Constraint | str) -> Constraint:
         """Take a constraint, or the one of that name, out of the assembly, and return it.

@@ -19,7 +19,7 @@ from assembly.errors import InputError
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.brep.solid import is_one_smooth
 
-__all__ = ["ContactCorners", "Kept", "SidePair", "body_of", "corners_of"]
+__all__ = ["ContactCorners", "Kept", "SidePair", "body_of", "check_gaps", "corners_of"]
 
 Side = Body | BodyFace
 SidePair = tuple[Side, Side]
@@ -56,7 +56,6 @@ class ContactCorners:
     """The corners of a contact of solids; see `Kept`."""
 
     contact: Contact
-    minimum: float = 0.0
     merge_radius: float = 1e-6
     slots: int = SLOTS
     corners: bool = True
@@ -65,6 +64,11 @@ class ContactCorners:
     def name(self) -> str:
         """That of the contact, which its corners are part of."""
         return self.contact.name
+
+    @property
+    def minimum(self) -> float:
+        """That of the contact."""
+        return self.contact.minimum
 
     @property
     def pair(self) -> SidePair:
@@ -98,6 +102,21 @@ def corners_of(
         if not (is_whole or fixed or known or smooth) and all(_has_size(body) for body in contact.bodies):
             found.append(ContactCorners(contact))
     return found
+
+
+def check_gaps(
+    contacts: Sequence[Contact],
+    clearances: Sequence[Clearance],
+    pairs_of_clearances: Sequence[Sequence[tuple[Body, Body]]],
+) -> None:
+    """Raise where a contact with a least gap is of two bodies that a clearance has: whose gap it is nobody says."""
+    for contact in contacts:
+        for clearance, pairs in zip(clearances, pairs_of_clearances, strict=True) if contact.minimum > 0.0 else ():
+            if any({*contact.bodies} == {*pair} for pair in pairs):
+                raise InputError(
+                    f"contact {contact.name!r} has the minimum {contact.minimum:g} and clearance {clearance.name!r} "
+                    "is of its bodies, too; expected exclude=... there, or a minimum of zero"
+                )
 
 
 def _has_size(body: Body) -> bool:

@@ -12,7 +12,7 @@ from assembly.proximity.features.solid_contact import TRACK
 if TYPE_CHECKING:
     from assembly.constraints.packing.scene import Packed
 
-__all__ = ["is_earlier", "is_same_scene", "stretch", "taken_over"]
+__all__ = ["is_earlier", "is_same_scene", "stretch", "taken_over", "with_numbers_of"]
 
 Array = NDArray[np.float64]
 
@@ -52,6 +52,19 @@ def taken_over(earlier: Packed, packed: Packed, state: Array) -> Array:
     multipliers[now:] = state[earlier.multipliers_at + before : earlier.residuals_at]
     multipliers *= earlier.unit / packed.unit
     multipliers[packed.lengths] *= packed.scale / earlier.scale
+    return taken
+
+
+def with_numbers_of(packed: Packed, earlier: Packed, state: Array) -> Array:
+    """A copy of a state of a twin, which has other numbers in the same places, with multipliers in the units of now.
+
+    What is kept in it for the next solve has the version of the twin, and is not taken for that of now.
+    """
+    taken = state.copy()
+    if packed.unit != earlier.unit or packed.scale != earlier.scale:
+        multipliers = taken[packed.multipliers_at : packed.residuals_at]
+        multipliers *= earlier.unit / packed.unit
+        multipliers[packed.lengths] *= packed.scale / earlier.scale
     return taken
 
 

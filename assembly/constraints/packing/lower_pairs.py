@@ -93,7 +93,7 @@ def lower_pairs(constraints: Sequence[Constraint]) -> list[LowerPair]:
     trimmed = {item.contact.name for item in constraints if isinstance(item, TrimContact)}
     found = []
     for number, item in enumerate(constraints):
-        if isinstance(item, Contact) and not item.unilateral and item.name not in trimmed:
+        if isinstance(item, Contact) and not item.unilateral and not item.minimum and item.name not in trimmed:
             pair = _lower_pair(number, item)
             if pair is not None:
                 found.append(pair)

@@ -7,7 +7,7 @@ the size of a scene with contacts, the scene is packed anew.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -17,13 +17,14 @@ from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.dexterity import Dexterity
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import Objective, Posture
+from assembly.constraints.packing.number_places import NumberPlaces
 from assembly.constraints.packing.scene_size import size_and_extent
-from assembly.constraints.packing.scene_writer import SceneWriter, frame_numbers
+from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.packing.terms import TermPacking
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.objective_terms import POSTURE, POSTURE_PARAMETERS, TERM
 from assembly.kinematics.body import Body
-from assembly.kinematics.changes import numbers_set
+from assembly.kinematics.changes import numbers_set, set_since
 
 if TYPE_CHECKING:
     from assembly.constraints.packing.scene import Packed
@@ -52,17 +53,44 @@ class _PoolWriter:
 def renumbered(
     packed: Packed,
     bodies: Sequence[Body],
-    constraints: Sequence[Constraint],
+    constraints: Callable[[], Sequence[Constraint]],
     objectives: Sequence[tuple[float, Objective]],
 ) -> Packed | None:
-    """The scene with its numbers of now, itself where these are no others; None where it has to be packed anew."""
+    """The scene with its numbers of now, itself where these are no others; None where it has to be packed anew.
+
+    `constraints` gives those that are packed, for who needs them.
+    """
+    things = set_since(packed.numbers)
+    if things is not None:
+        if packed.number_places is None:
+            packed.number_places = NumberPlaces(packed, bodies, constraints(), objectives)
+        other = packed.number_places.renumbered(packed, things, bodies[0].pose.position)
+        if other is not None:
+            return other
+    size = None if things is None or packed.number_places is None else packed.number_places.size
+    return _compared(packed, bodies, constraints, objectives, size)
+
+
+def _compared(
+    packed: Packed,
+    bodies: Sequence[Body],
+    constraints: Callable[[], Sequence[Constraint]],
+    objectives: Sequence[tuple[float, Objective]],
+    size: float | None,
+) -> Packed | None:
+    """The same, where all numbers are written anew and compared: the size is another one, or shapes are.
+
+    The size is measured in full where it is None.
+    """
     goals = objectives or [(1.0, Posture())]
     faces = [side.face for body in bodies for side in body.faces]
     if packed.clearance_rows or any(isinstance(term, (Dexterity, Expression)) for _, term in goals):
         return None
     if len(faces) != len(packed.faces) or any(a is not b for a, b in zip(faces, packed.faces, strict=True)):
         return None
-    size, has_no_extent = size_and_extent(bodies, constraints, objectives)
+    has_no_extent = False
+    if size is None:
+        size, has_no_extent = size_and_extent(bodies, constraints(), objectives)
     scale = size if size > 0.0 else 1.0
     if scale != packed.scale and packed.pair_rows:
         return None
@@ -72,10 +100,11 @@ def renumbered(
     other._measure_by(scale, bodies, goals)
     pool = other.rows_pool
     pool[: layout.POOL_HEADER - 2] = other._pool_header()[: layout.POOL_HEADER - 2]
-    at = packed.frames_at
-    for pair in packed._frames:
-        pool[at : at + 24] = frame_numbers(pair.frame_a, pair.frame_b, scale)
-        at += 24
+    frames = [frame for pair in packed._frames for frame in (pair.frame_a, pair.frame_b)]
+    if frames:
+        block = pool[packed.frames_at :][: 12 * len(frames)].reshape(-1, 4, 3)
+        block[:, 0] = np.array([frame.origin for frame in frames]) / scale
+        block[:, 1:] = np.array([frame.axes for frame in frames]).transpose(0, 2, 1)
     if scale != packed.scale:
         values = []
         for equation, place, _ in packed._values:
@@ -126,7 +155,8 @@ def numbers_told(packed: Packed, bodies: Sequence[Body], constraints: Sequence[C
     frames = [(side.origin.tobytes(), side.axes.tobytes()) for side in sides if side is not None]
     asked = [body.fixed for body in bodies], [item._is_asked for item in constraints]
     faces = [side.face for body in bodies for side in body.faces]
-    return [asked, frames, [item.minimum for item in packed.clearances], faces]
+    gaps = [item.minimum for item in packed.clearances] + [item.minimum for item in packed.contacts]
+    return [asked, frames, gaps, faces]
 
 
 def _following_postures(packed: Packed) -> list[int]:

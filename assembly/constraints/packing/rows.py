@@ -42,6 +42,8 @@ class RowPacking:
     ----------
     owners : list of int
         The constraint of every row.
+    gaps : list of int
+        Where the pool has the least gap of every contact.
     values : list of (Equation, int, float)
         Equations of joints, where the value of each is in the pool, and what one of it counts in the user's units.
     """
@@ -49,6 +51,7 @@ class RowPacking:
     def __init__(self, writer: SceneWriter, constraints: Sequence[Constraint]) -> None:
         self.owners: list[int] = []
         self.values: list[tuple[Equation, int, float]] = []
+        self.gaps: list[int] = []
         self._writer = writer
         self._constraints = constraints
         self._numbers = {id(constraint): k for k, constraint in enumerate(constraints)}
@@ -73,10 +76,12 @@ class RowPacking:
         known: dict[tuple[int, bool], int] = {}
         for contact, pair, is_whole in zip(contacts, sides, whole, strict=True):
             row = [layout.CONTACT_ROW, *writer.places_of(contact.bodies), int(contact.unilateral), 0, 1]
+            _, gap = writer.add(pool=[contact.minimum / writer.scale, 0.0])
+            self.gaps.append(gap)
             if is_whole:
-                row += [*(writer.surface(known, side_faces(side)[0]) for side in pair), -1, -1, layout.ZERO]
+                row += [*(writer.surface(known, side_faces(side)[0]) for side in pair), -1, -1, gap]
             else:
-                row += [-1, -1, *(writer.shell(side_faces(side)) for side in pair), layout.ZERO]
+                row += [-1, -1, *(writer.shell(side_faces(side)) for side in pair), gap]
             self._add(contact, row)
 
     def add_clearance_rows(self, owners: Sequence[Constraint], places: Sequence[int]) -> None:

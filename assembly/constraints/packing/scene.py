@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from copy import copy
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +20,7 @@ from assembly.constraints.model.trim_contact import TrimContact
 from assembly.constraints.packing import addresses
 from assembly.constraints.packing import manager as manager_packing
 from assembly.constraints.packing.asked import Asked
-from assembly.constraints.packing.corners import ContactCorners, Kept, SidePair, corners_of
+from assembly.constraints.packing.corners import ContactCorners, Kept, SidePair, check_gaps, corners_of
 from assembly.constraints.packing.elimination_order import FEW, block_record
 from assembly.constraints.packing.manager import WatchedPairs
 from assembly.constraints.packing.manager_last import ManagerLast
@@ -45,6 +44,7 @@ from assembly.proximity.manager.events import fresh_memory, listed_places
 from assembly.proximity.manager.parameters import LARGEST_MARGIN
 
 if TYPE_CHECKING:
+    from assembly.constraints.packing.number_places import NumberPlaces
     from assembly.proximity.clearance.proof import ClearanceProof
 
 __all__ = ["MORE_PLACES", "MOST_CROWDING", "Packed", "structure_of"]
@@ -99,6 +99,10 @@ class Packed(ManagerLast):
         Poses, with pairs of contacts, that were proven to hold as they stand; what touching was; what was proven.
     asked : Asked
         What the last solve was asked for.
+    number_places : NumberPlaces or None
+        Where numbers are that were set anew; the same of twins, which have them in the same places.
+    derivative_plans : dict
+        How solutions are derived (`derivatives/plan.py`), of the scene and its twins.
     has_size : bool
         Whether the scene has a size.
     before : Packed or None
@@ -121,6 +125,8 @@ class Packed(ManagerLast):
         The sides of every contact; faces where it is one of whole surfaces.
     whole : list of bool
         Whether a contact is one of two whole surfaces, without edges.
+    gaps : list of int
+        Where the pool has the least gap of every contact.
     clearances : list of Clearance
     clearance_pairs : list of list of (Body, Body)
         The pairs of bodies of every clearance.
@@ -184,6 +190,7 @@ class Packed(ManagerLast):
         self.clearances = [constraint for constraint in constraints if isinstance(constraint, Clearance)]
         self.clearance_pairs = manager_packing.clearance_pairs(self.clearances, bodies)
         self.keeps_apart = any(self.clearance_pairs)
+        check_gaps(self.contacts, self.clearances, self.clearance_pairs)
         listed = corners_of(self.contacts, self.whole, self.clearances, self.clearance_pairs) if corners else []
         self.corners: list[ContactCorners] = listed
         self.kept: list[Kept] = [*self.clearances, *listed]
@@ -214,6 +221,8 @@ class Packed(ManagerLast):
         self.workspaces: list[tuple[Array, Array, Table]] = []
         self.proofs: list[ClearanceProof] = []
         self.stood: Stood | None = None
+        self.number_places: NumberPlaces | None = None
+        self.derivative_plans: dict[Any, Any] = {}
         self.kept_at = self.memory_at + self._memory.size
         self.rows_table[layout.KEPT] = self.kept_at
         self.kept_size = int(kept_size(self.rows_table))
@@ -298,6 +307,7 @@ class Packed(ManagerLast):
         rows.add_expressions()
         table = rows.write(bodies)
         self._keep_values(rows.values)
+        self.gaps = rows.gaps
         self.rows = len(table)
         self.owners = np.array(rows.owners, dtype=np.int64)
         self.one_sided = table[:, layout.ONE_SIDED] == 1
@@ -417,7 +427,14 @@ class Packed(ManagerLast):
     def __getstate__(self) -> dict[str, Any]:
         # In copies it is in the same place.
         self._write_manager()
-        return {**self.__dict__, "workspaces": [], "proofs": [], "stood": None}
+        return {
+            **self.__dict__,
+            "workspaces": [],
+            "proofs": [],
+            "stood": None,
+            "number_places": None,
+            "derivative_plans": {},
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # Addresses are those of one process; a copy, or what another process wrote, takes its own.
@@ -469,11 +486,14 @@ class Packed(ManagerLast):
 
     def twin(self) -> Packed:
         """The same with a pool of its own, of which anything may be changed."""
-        other = copy(self)
-        other.rows_pool = self.rows_pool.copy()
-        other.pool[layout.VERSION] = float(next(_versions))
+        self._write_manager()
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other.rows_table, other.rows_pool = self.rows_table.copy(), self.rows_pool.copy()
+        other.rows_table[layout.DEEPEST_AT] = 0
+        other.rows_pool[layout.VERSION] = float(next(_versions))
         # Solves of the one and of the other work in the same memory, one after another.
-        other.workspaces, other.proofs = self.workspaces, self.proofs
+        other.stood = None
         return other
 
     def as_asked(self, asked: Asked) -> Packed:

@@ -11,10 +11,10 @@ from assembly.constraints.model.constraint import Constraint, Equation
 from assembly.constraints.model.dexterity import Dexterity
 from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance, Posture, Weight
 from assembly.errors import FARTHEST, InputError
-from assembly.kinematics.body import Body
+from assembly.kinematics.body import Body, Frame
 from assembly.kinematics.pose import length
 
-__all__ = ["check_reach", "scene_size", "size_and_extent"]
+__all__ = ["LEAST", "MOST", "Objectives", "check_reach", "equations_of", "marks_of", "scene_size", "size_and_extent"]
 
 Array = NDArray[np.float64]
 Objectives = Sequence[tuple[float, Objective]]
@@ -74,29 +74,40 @@ def _checked(size: float, marks: Mapping[Body, Sequence[Array]]) -> float:
     return size
 
 
-def _marks(
+def marks_of(
     bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Objectives
-) -> dict[Body, list[Array]]:
-    """The frames and points that constraints and objectives have on every body, in its coordinates."""
-    marks: dict[Body, list[Array]] = {body: [] for body in bodies}
+) -> dict[Body, list[Frame | Array]]:
+    """The frames and points that constraints and objectives have on every body; points in its coordinates."""
+    marks: dict[Body, list[Frame | Array]] = {body: [] for body in bodies}
     # Rows of a joint have their frames in common.
-    for pair in dict.fromkeys(item.frames for equation in _equations(constraints) for _, item in equation.terms):
+    for pair in dict.fromkeys(item.frames for equation in equations_of(constraints) for _, item in equation.terms):
         for frame in (pair.frame_a, pair.frame_b):
-            marks[frame.body].append(frame.origin)
+            marks[frame.body].append(frame)
     for _, term in objectives:
         if isinstance(term, PointDistance):
             marks[term.point.body].append(term.point.coordinates)
         elif isinstance(term, FrameDistance):
-            marks[term.frame.body].append(term.frame.origin)
+            marks[term.frame.body].append(term.frame)
         elif isinstance(term, Weight):
             for body, (_, center) in zip(term.bodies, term.points, strict=True):
                 marks[body].append(center)
         elif isinstance(term, Dexterity):
-            marks[term.tip_task.tip.body].append(term.tip_task.origin)
+            tip = term.tip_task.tip
+            marks[tip.body].append(tip if isinstance(tip, Frame) else term.tip_task.origin)
     return marks
 
 
-def _equations(constraints: Iterable[Constraint]) -> Iterable[Equation]:
+def _marks(
+    bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Objectives
+) -> dict[Body, list[Array]]:
+    """The same, all as places (3,) in the bodies' coordinates."""
+    return {
+        body: [mark.origin if isinstance(mark, Frame) else mark for mark in marks]
+        for body, marks in marks_of(bodies, constraints, objectives).items()
+    }
+
+
+def equations_of(constraints: Iterable[Constraint]) -> Iterable[Equation]:
     """The rows of joints and couplings."""
     return (equation for item in constraints for equation in getattr(item, "equations", ()))
 
@@ -107,7 +118,7 @@ def _lengths(constraints: Iterable[Constraint]) -> tuple[float, float]:
     Asked for are distances, driven slides, offsets, and what something slides a radian, as a nut or a rack does.
     """
     asked, limits = [0.0], []
-    for equation in _equations(constraints):
+    for equation in equations_of(constraints):
         (_, first), *others = equation.terms
         if first.is_angle:
             continue

@@ -208,7 +208,7 @@ class Snapshot:
             if constraint.unilateral and not one_sided:
                 return None
             sides, whole = self._sides[constraint.name]
-            return Contact(*sides, constraint.name, constraint.unilateral, edges=not whole)
+            return Contact(*sides, constraint.name, constraint.unilateral, edges=not whole, minimum=constraint.minimum)
         if isinstance(constraint, Clearance):
             return constraint if one_sided else None
         if isinstance(constraint, TrimContact):

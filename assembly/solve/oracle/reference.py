@@ -124,7 +124,11 @@ class ReferenceSolver:
         rows, terms, free = self._rows, self._terms, [poses.poses[k] for k in self._moving]
         contacts = [ca.MX.sym("contact", 4) for _ in self._pairs]
         units = [ca.dot(pose[3:], pose[3:]) - 1 for pose in free]
-        extremal = [pair.rows(poses.poses, poses.turns, s) for pair, s in zip(self._pairs, contacts, strict=True)]
+        gaps = [ca.DM([0.0, 0.0, 0.0, 0.0, item.minimum / self._packed.scale]) for item in self._packed.contacts]
+        extremal = [
+            pair.rows(poses.poses, poses.turns, s) - gap
+            for pair, s, gap in zip(self._pairs, contacts, gaps, strict=True)
+        ]
         bodies, pairs, others = len(free), len(extremal), rows.rows.numel()
         # Rows of unit quaternions, five a contact, of which the last is the gap, the others, definitions.
         self._places = bodies + np.concatenate([4 + 5 * np.arange(pairs), 5 * pairs + np.arange(others)])

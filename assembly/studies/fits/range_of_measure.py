@@ -11,7 +11,7 @@ while all bodies are drawn a little aside, to either side, and the other end. Th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import inf, isfinite, nan, pi
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.assembly import Assembly
+from assembly.constraints.model.constraint import Coordinate
 from assembly.constraints.model.objectives import Objective, Posture
 from assembly.derivatives.measure import Measure
 from assembly.errors import InputError
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 __all__ = ["play"]
 
 Array = NDArray[np.float64]
+# Angles that are tracked, past whole turns: poses do not tell these.
+Turns = Mapping[Coordinate, float]
 # In sizes of the scene: the first step, the longest one, and the gain of a step at which it rests, a slope of 0.003.
 # Twice as long, and thin walls may be stepped through; half as long, and it takes more of them. Where nothing is in the
 # way but limits, steps that nothing shortens grow.
@@ -47,8 +50,8 @@ _FREE = 0.9
 _SHORTER = 4
 # [scene's size, rad] How far bodies are drawn aside for other starts, and in how many directions.
 _ASIDE, _DIRECTIONS = 0.03, 1
-# [rad] Angles are taken from near where they are: as far from there they are asked for anew. A joint that turned so
-# often about is free to.
+# [rad] Angles are taken from near where they are: as far from there they are asked for anew. A joint without a stop
+# that turned so often about is free to.
 _NEAR, _TURNED = 2.0, 4.0 * pi
 
 
@@ -88,19 +91,20 @@ def play(scene: Assembly, solution: Solution, of: Measure) -> Play:
     if solution._scene.bodies != scene.bodies:
         raise InputError("solution is one of another scene, or of this one with other bodies; expected its own")
     term, nominal = MeasureTerm(of, scene.packed().scale), of.value(solution)
-    starts = [solution.q, *_aside(scene, solution.q)]
+    turns = _turns_of(solution)
+    starts = [(solution.q, turns, nominal), *((*found, nominal) for found in _aside(scene, solution.q, turns))]
     ends: list[End] = []
     for sign in (1.0, -1.0):
         best: End | None = None
-        for q in starts:
-            end = _Descent(scene, of, term, sign).end(q, nominal)
+        for q, turns, value in starts:
+            end = _Descent(scene, of, term, sign).end(q, turns, value)
             best = end if best is None else _better(best, end, sign)
             if best.status is Status.UNBOUNDED:
                 break
         assert best is not None
         ends.append(best)
         if isfinite(best.value):
-            starts.append(best.solution.q)
+            starts.append((best.solution.q, _turns_of(best.solution), best.value))
     return Play(of, nominal, *ends)
 
 
@@ -114,7 +118,13 @@ def _better(best: End, end: End, sign: float) -> End:
     return end if gain > 1e-12 * max(abs(best.value), end.scene.packed().scale) else best
 
 
-def _aside(scene: Assembly, q: Array) -> Iterator[Array]:
+def _turns_of(solution: Solution) -> Turns:
+    """The angles of a solution, past whole turns."""
+    packed = solution._packed
+    return dict(zip(packed._angles, solution._state[packed.angles].tolist(), strict=True))
+
+
+def _aside(scene: Assembly, q: Array, turns: Turns) -> Iterator[tuple[Array, Turns]]:
     """Poses that hold, with bodies drawn aside from poses (n, 7): some directions, and each of them mirrored."""
     rng, moving = np.random.default_rng(0), moving_rows(scene.bodies)
     sizes = np.repeat([scene.packed().scale, 1.0], 3)
@@ -123,15 +133,17 @@ def _aside(scene: Assembly, q: Array) -> Iterator[Array]:
         for side in (1.0, -1.0):
             aim = q.copy()
             aim[moving] = retract(q[moving], side * way)
-            found = _with(scene, Posture(aim)).solve(q)
+            near = _with(scene, Posture(aim))
+            with near._angles_near(turns):
+                found = near.solve(q)
             if found.success:
-                yield found.q
+                yield found.q, _turns_of(found)
 
 
 def _with(scene: Assembly, *objectives: Objective) -> Assembly:
     """The scene's bodies and constraints with other objectives."""
     result = Assembly(scene.bodies)
-    result.constrain(*scene.constraints)
+    result._take_constraints(scene.constraints)
     result.minimize(*objectives)
     return result
 
@@ -142,10 +154,13 @@ class _Descent:
     def __init__(self, scene: Assembly, measure: Measure, term: MeasureTerm, sign: float) -> None:
         self._scene, self._measure, self._term, self._sign = scene, measure, term, sign
         packed = scene.packed()
+        # An angle with a stop on this side does not turn for ever.
+        stops = measure.thing.limits if term.turns else None
+        self._turned = _TURNED if stops is None or stops[0 if sign > 0.0 else 1] is None else inf
         self._size, self._may_grow = packed.scale, not (packed.keeps_apart or packed.contacts)
 
-    def end(self, q: Array, value: float) -> End:
-        """From poses (n, 7); an angle there is within half a turn of `value`."""
+    def end(self, q: Array, turns: Turns, value: float) -> End:
+        """From poses (n, 7) and the angles there; a measured one is within half a turn of `value`."""
         term, size, sign = self._term, self._size, self._sign
         begin = center = value if term.turns else 0.0
         length, last, failed = _FIRST * size, inf, 0
@@ -155,7 +170,8 @@ class _Descent:
             if near is None:
                 # The term's slope is about one.
                 near = _with(self._scene, goal, Posture(weight=0.5 / length))
-            found = near.solve(start)
+            with near._angles_near(turns):
+                found = near.solve(start)
             before = start if isinstance(start, np.ndarray) else start.q
             moved = self._moved(before, found.q)
             if not found.success or moved > 4.0 * length:
@@ -163,7 +179,7 @@ class _Descent:
                     break
                 length, near, last, failed, start = 0.25 * length, None, inf, failed + 1, before
                 continue
-            start = found
+            start, turns = found, _turns_of(found)
             if self._at(goal, before) - self._at(goal, found.q) < _REST * size:
                 rests = True
                 break
@@ -175,12 +191,13 @@ class _Descent:
                 if abs(beyond) > _NEAR:
                     center += beyond
                     goal, near, start = term.objective(sign, center), None, found.q
-                if abs(center - begin) > _TURNED:
+                if abs(center - begin) > self._turned:
                     break
         q = start if isinstance(start, np.ndarray) else start.q
         alone = _with(self._scene, goal)
-        solution = alone.solve(q, radius=_FIRST)
-        if term.turns and abs(center - begin) > _TURNED:
+        with alone._angles_near(turns):
+            solution = alone.solve(q, radius=_FIRST)
+        if term.turns and abs(center - begin) > self._turned:
             solution.status = Status.UNBOUNDED
         reached = self._measure.value(solution)
         if term.turns:

@@ -125,11 +125,12 @@ def _near(scene: Assembly, q: Array, shaped: Sequence[int], margin: float) -> It
 
 def _relation(scene: Assembly, a: Body, b: Body) -> Relation:
     """What the constraints of a scene say of two of its bodies."""
-    if joined_pairs((a, b), scene.constraints):
+    enabled = [item for item in scene.constraints if item.enabled]
+    if joined_pairs((a, b), enabled):
         return "joined"
-    if not free_pairs((a, b), scene.constraints):
+    if not free_pairs((a, b), enabled):
         return "excluded"
-    contacts = (item for item in scene.constraints if isinstance(item, Contact))
+    contacts = (item for item in enabled if isinstance(item, Contact))
     return "contact" if any({*item.bodies} == {a, b} for item in contacts) else "free"
 
 

@@ -65,7 +65,7 @@ class DrawnTip:
             plane = Body(name, None, grid.origin, turn, fixed=True)
             bodies.append(plane)
         self.scene = Assembly(bodies)
-        self.scene.constrain(*scene.constraints)
+        self.scene._take_constraints(scene.constraints)
         if plane is not None:
             self.scene.constrain(PointOnPlane(tip, plane, f"tip in the {plane.name}"))
         self.scene.minimize(self._aim)

@@ -136,7 +136,7 @@ def _solved(scene: Assembly, start: ArrayLike | Solution | None, name: str = "th
     if start is not None and not isinstance(start, Solution):
         start = pose_rows(name, start)
     still = Assembly(scene.bodies)
-    still.constrain(*scene.constraints)
+    still._take_constraints(scene.constraints)
     solution = still.solve(start.q if isinstance(start, Solution) else start)
     if not solution.success:
         raise InputError(f"scene has no pose near {name} at which all holds; {solution.message}")

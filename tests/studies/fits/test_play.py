@@ -151,3 +151,15 @@ def test_what_is_refused():
         asm.play(scene, solution, asm.Measure("objective"))
     with pytest.raises(InputError, match="fixed bodies alone"):
         asm.play(scene, solution, asm.Measure(scene.bodies[0], "x"))
+
+
+@pytest.mark.parametrize("limits", [(-3.0, 3.5), (-4.0, 4.0), (0.0, 7.0), (-10.0, 9.0)])
+def test_a_hinge_turns_from_stop_to_stop(limits):
+    """Poses do not tell how often it turned: every solve on the way starts near the angle of the one before."""
+    ground, arm = asm.Body("ground", fixed=True), asm.Body("arm")
+    scene = asm.Assembly([ground, arm])
+    hinge = asm.Revolute(ground, arm, "hinge", limits=limits)
+    scene.constrain(hinge)
+    found = asm.play(scene, scene.solve(), asm.Measure(hinge))
+    assert found.success, found
+    assert (found.least.value, found.most.value) == pytest.approx(limits, abs=1e-9)

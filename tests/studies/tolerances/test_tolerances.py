@@ -7,6 +7,7 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
+from assembly.studies.tolerances.first_order import FirstOrder
 
 
 def stack(lengths):
@@ -194,3 +195,30 @@ def test_play_between_stops_that_scatter():
     slide.limits = (-0.5, None)
     with pytest.raises(InputError, match="without a range"):
         asm.tolerances(scene, scene.solve(), place, {low: asm.Uniform(0.02)}, play=True)
+
+
+def _drawn_arm(limit):
+    """An arm of length 2 whose tip is drawn to (2, y), y = 1: it points there, unless a stop is before."""
+    ground, arm = asm.Body("ground", fixed=True), asm.Body("arm")
+    scene = asm.Assembly([ground, arm])
+    scene.constrain(asm.Revolute(ground, arm, "hinge", limits=(-1.0, limit)))
+    goal = asm.PointDistance(arm.point(2, 0, 0), (2.0, 1.0, 0.0))
+    scene.minimize(goal)
+    return scene, asm.Measure(arm.point(2, 0, 0), "x"), asm.Parameter(goal, "target", "y")
+
+
+@pytest.mark.parametrize(("beyond", "share"), [(0.0, 0.5), (0.003, 1.0), (1.0, 1.0), (-0.1, 0.0)])
+def test_second_derivatives_are_those_of_either_side_of_a_stop(beyond, share):
+    scene, tip, height = _drawn_arm(np.arctan2(1.0, 2.0) + beyond)
+    solution = scene.solve(stationarity=1e-13)
+    first = FirstOrder.of(scene, solution, [tip], [height], [asm.Normal(0.05)])
+    # Of 4 / sqrt(4 + y^2); the stop takes the other side's share.
+    bent = -4.0 * 5.0**-1.5 + 12.0 * 5.0**-2.5
+    assert first.bent[0, 0] == pytest.approx(share * bent, abs=1e-3 if beyond == 0.0 else 1e-5)
+
+
+def test_a_stop_next_to_a_solution_leaves_second_derivatives_open():
+    scene, tip, height = _drawn_arm(np.arctan2(1.0, 2.0) + 1e-7)
+    solution = scene.solve(stationarity=1e-13)
+    found = asm.tolerances(scene, solution, tip, {height: asm.Normal(0.05)})
+    assert np.isnan(found.mean_shift[0]) and "mean shift not known" in str(found)

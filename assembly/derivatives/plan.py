@@ -1,0 +1,340 @@
+"""How solutions of a scene are derived by the same parameters again and again: what depends on its structure alone.
+
+A plan stays with the packed scene and its twins of other numbers. With it all derivatives of a solution are three
+compiled calls: evaluate (`curvature_at`), linearize, and step (`least_steps`). What is rarer goes the general way of
+`derivatives/implicit.py`, which gives the same: numbers that make faces, wrenches, pairs at folds, dexterities,
+clearances, rows at their bounds without a force, and ranks and curvatures that are in doubt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import accumulate
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.model.constraint import Constraint
+from assembly.constraints.model.objectives import FrameDistance
+from assembly.constraints.packing.measured_size import base_of
+from assembly.constraints.packing.scene import Packed
+from assembly.constraints.packing.scene_writer import frame_numbers
+from assembly.constraints.program import records as layout
+from assembly.constraints.program.contact import TOUCHING
+from assembly.constraints.program.objective_terms import POSTURE, POSTURE_QUATERNION, TERM
+from assembly.derivatives import linearized as records
+from assembly.derivatives.columns import Frames
+from assembly.derivatives.least_steps import least_steps
+from assembly.derivatives.linearized import linearize
+from assembly.derivatives.measure import Measure, place_of
+from assembly.derivatives.measured import FREE
+from assembly.derivatives.numbers import FrameOrigin, FrameTurn, LeastGap, RowNumber, TargetNumber, turn_rates
+from assembly.derivatives.parameter import Parameter
+from assembly.derivatives.probed import ProbedScene
+from assembly.derivatives.result import Layout, Moved, Sensitivity
+from assembly.kinematics.body import Body, Frame
+from assembly.solve.second_order.curvature import curvature_at
+from assembly.solve.second_order.dense import PUSHING, UNBALANCED
+from assembly.solve.solution import Solution
+
+__all__ = ["Plan", "layout_of", "plan_of"]
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int64]
+# Plans that a scene keeps; with more the first are made anew.
+MOST_PLANS = 8
+# Unknowns up to which the plain loops of `least_steps` take less time than singular values of LAPACK.
+MOST_UNKNOWNS = 96
+# Numbers of a pair of frames in a pool.
+FRAMES = 24
+KINDS = {"coordinate": records.COORDINATE, "gap": records.GAP, "place": records.PLACE, "distance": records.DISTANCE}
+
+
+class Unplanned(Exception):
+    """What is asked for goes the general way."""
+
+
+def plan_of(
+    solution: Solution, bodies: Sequence[Body], asked: tuple[Sequence[Measure], Sequence[Parameter]]
+) -> Plan | None:
+    """The plan of measures and parameters, made at first use; None where there is none."""
+    plans = solution._packed.derivative_plans
+    key = (*map(id, asked[0]), 0, *map(id, asked[1]))
+    if key not in plans:
+        while len(plans) >= MOST_PLANS:
+            del plans[next(iter(plans))]
+        # Measures and parameters are kept with their plan, so that their identities are not those of others.
+        try:
+            plans[key] = asked, Plan(solution, bodies, asked)
+        except Unplanned:
+            plans[key] = asked, None
+    plan: Plan | None = plans[key][1]
+    return plan
+
+
+def layout_of(
+    bodies: Sequence[Body], constraints: Sequence[Constraint], packed: Packed, has_all: bool = False
+) -> Layout:
+    """Where unknowns and rows of a scene are: unknowns of the moving bodies, or of all, in the bodies' order."""
+    moving = list(accumulate(not body.fixed for body in bodies))
+    blocks = [k if has_all else (-1 if body.fixed else moving[k] - 1) for k, body in enumerate(bodies)]
+    names = tuple(body.name for body in bodies), tuple(item.name for item in constraints)
+    return Layout(*names, tuple(blocks), packed.spans, packed.lengths)
+
+
+class Plan:
+    """What measures of solutions change by, in three calls.
+
+    Parameters
+    ----------
+    solution : Solution
+    bodies : sequence of Body
+    asked : (measures, parameters)
+
+    Raises
+    ------
+    Unplanned
+        Something is asked for that goes the general way.
+    """
+
+    def __init__(
+        self, solution: Solution, bodies: Sequence[Body], asked: tuple[Sequence[Measure], Sequence[Parameter]]
+    ) -> None:
+        packed, state = solution._packed, solution._state
+        self._layout = layout_of(bodies, solution._scene.constraints, packed)
+        self._measures, self._parameters = tuple(asked[0]), tuple(asked[1])
+        self._unknowns = 6 * (max(self._layout.blocks) + 1)
+        if packed.end_effectors or packed.clearance_rows or self._unknowns > MOST_UNKNOWNS:
+            raise Unplanned
+        if not packed.is_implicit and _has_sized_turns(packed, bodies):
+            raise Unplanned
+        places = {id(body): k for k, body in enumerate(bodies)}
+        eyes = np.broadcast_to(np.eye(3), (len(bodies), 3, 3))
+        self._frames = Frames(packed, self._parameters, eyes, bodies)
+        coordinates = [item.thing.coordinate for item in self._measures if item.kind == "coordinate"]
+        # Coordinates that no row has, whose frames stand behind the pool.
+        pairs = dict.fromkeys(coordinate.frames for coordinate in coordinates)
+        self._pairs = [pair for pair in pairs if pair not in packed._frames]
+        probed = ProbedScene(packed, state, bodies, self._frames.each, coordinates)
+        self._table, self._most = probed.table, probed._most
+        self._behind = probed.pool[packed.pool.size + FRAMES * len(self._pairs) :]
+        self._hosts = np.array(probed.hosts, dtype=np.int64)
+        self._figures = [0.5 * body.size for body in bodies]
+        # Figures that are read anew: rates of turns, and places of frames that are measured.
+        self._turned: list[tuple[int, FrameTurn]] = []
+        self._placed: list[tuple[int, Frame]] = []
+        entries = self._entries(packed, places)
+        measured = self._measured(packed, places)
+        self._numbers = np.array(self._figures)
+        self._plan = self._written(packed, entries, measured)
+        m, e, n, p = packed.rows, len(coordinates), self._unknowns, len(self._parameters)
+        k = len(self._measures)
+        shapes = [(m + e, n), (n, n), (m, p), (e, p), (n, p), (p,), (k, n), (k, p), (n,)]
+        ends = np.cumsum([int(np.prod(shape)) for shape in shapes]).tolist()
+        self._parts = list(zip([0, *ends], ends, shapes, strict=False))
+        self._one_sided = packed.one_sided if packed.one_sided.any() else None
+        self._lengths = [k for k, item in enumerate(self._measures) if item.kind == "gap" or _is_slide(item)]
+        self._objectives = [k for k, item in enumerate(self._measures) if item.kind == "objective"]
+
+    def _entries(self, packed: Packed, places: dict[int, int]) -> list[dict[str, int]]:
+        """What parameters add, and where."""
+        origins: dict[int, int] = {}
+        for k, pair in enumerate(packed._frames):
+            for side, frame in enumerate((pair.frame_a, pair.frame_b)):
+                origins[id(base_of(frame))] = packed.frames_at + 24 * k + 12 * side
+        for term, at in packed._targets:
+            if isinstance(term, FrameDistance):
+                origins.setdefault(id(base_of(term.frame)), at - 3)
+        probes = {id(frame): k for k, frame in enumerate(self._frames.each)}
+        entries: list[dict[str, int]] = []
+        for r, parameter in enumerate(self._parameters):
+            number, before = parameter._number, len(entries)
+            if self._frames.numbers[r] is not None:
+                assert isinstance(number, (FrameOrigin, FrameTurn))
+                entry = {"kind": records.ORIGIN, "axis": number.axis, "probe": probes[id(number.frame)]}
+                if isinstance(number, FrameTurn):
+                    entry |= {"kind": records.TURN, "at": origins[id(number.frame)], "rates": len(self._figures)}
+                    self._turned.append((len(self._figures), number))
+                    self._figures += np.eye(3).ravel().tolist()
+                entries.append(entry | {"parameter": r})
+            elif isinstance(number, RowNumber):
+                for row, (equation, _, _) in zip(packed.value_rows.tolist(), packed._values, strict=True):
+                    source = equation.source
+                    if source is not None and source[0] is number.owner and source[1] == number.attribute:
+                        sign = 1 if number.attribute == "upper" else -1
+                        is_length = int(not equation.terms[0][1].is_angle)
+                        entry = {"kind": records.ROW, "at": row, "is_length": is_length, "sign": sign}
+                        entries.append(entry | {"parameter": r})
+            elif isinstance(number, LeastGap):
+                for row, contact in enumerate(packed.contacts):
+                    if contact is number.owner:
+                        entry = {"kind": records.ROW, "at": row, "is_length": 1, "sign": -1}
+                        entries.append(entry | {"parameter": r})
+            elif isinstance(number, TargetNumber):
+                for term, at in packed._targets:
+                    if term is number.term:
+                        entry = {"kind": records.TARGET, "axis": number.axis, "at": at, "parameter": r}
+                        entries.append(entry | {"body": places[id(term.bodies[0])]})
+            if len(entries) == before:
+                raise Unplanned
+        return entries
+
+    def _measured(self, packed: Packed, places: dict[int, int]) -> list[dict[str, int]]:
+        """What is measured, and where."""
+        measured: list[dict[str, int]] = []
+        probes = {id(frame): k for k, frame in enumerate(self._frames.each)}
+        coordinates = 0
+        for i, item in enumerate(self._measures):
+            if item.kind not in KINDS and item.kind != "objective":
+                raise Unplanned
+            if item.kind == "coordinate":
+                measured.append({"kind": records.COORDINATE, "number": i, "row": coordinates})
+                coordinates += 1
+            elif item.kind == "gap":
+                rows = [k for k, contact in enumerate(packed.contacts) if contact is item.thing]
+                if not rows:
+                    raise Unplanned
+                measured.append({"kind": records.GAP, "number": i, "row": rows[0]})
+            elif item.kind != "objective":
+                sides = item.thing if item.kind == "distance" else (item.thing,)
+                for kind, side in zip((KINDS[item.kind], records.END), sides, strict=False):
+                    body, place = place_of(side)
+                    if id(body) not in places:
+                        raise Unplanned
+                    entry = {"kind": kind, "number": i, "axis": item.axis, "body": places[id(body)]}
+                    probe = -1
+                    if isinstance(side, Frame):
+                        self._placed.append((len(self._figures), side))
+                        probe = probes.get(id(base_of(side)), -1)
+                    measured.append(entry | {"at": len(self._figures), "probe": probe})
+                    self._figures += place.tolist()
+        return measured
+
+    def _written(self, packed: Packed, entries: list[dict[str, int]], measured: list[dict[str, int]]) -> Table:
+        """The table of the plan."""
+        blocks = np.array(self._layout.blocks, dtype=np.int64)
+        parts: list[Table] = [np.zeros(records.PLAN_SIZE, dtype=np.int64), blocks, self._hosts]
+        parts += [_record(records.ENTRY, entry) for entry in entries]
+        parts += [_record(records.MEASURE, entry) for entry in measured]
+        table = np.concatenate(parts)
+        header = records.plan_at(table, 0)
+        header.bodies, header.probes = blocks.size, self._hosts.size
+        header.rows, header.unknowns, header.implicit = packed.rows, self._unknowns, int(packed.is_implicit)
+        header.coordinates = sum(entry["kind"] == records.COORDINATE for entry in measured)
+        header.blocks, header.hosts = records.PLAN_SIZE, records.PLAN_SIZE + blocks.size
+        header.entries, header.entry_count = header.hosts + self._hosts.size, len(entries)
+        header.parameters, header.measure_count = len(self._parameters), len(measured)
+        header.measures = header.entries + records.ENTRY_SIZE * len(entries)
+        header.measured = len(self._measures)
+        return table
+
+    def _figures_of_now(self, packed: Packed) -> Array:
+        figures = self._numbers.copy()
+        count = len(self._layout.blocks)
+        levers = figures[:count]
+        levers /= packed.scale
+        levers[levers == 0.0] = 0.5
+        for at, number in self._turned:
+            if "_turned" in number.frame.__dict__:
+                figures[at : at + 9] = turn_rates(number._turned()[1]).ravel()
+        for at, frame in self._placed:
+            figures[at : at + 3] = frame.origin
+        return figures
+
+    def derived(self, packed: Packed, state: Array) -> Sensitivity | None:
+        """The derivatives at a solution; None where it is one of those that go the general way."""
+        bodies, rows = packed.contacts_at, packed.rows
+        if self._hosts.size:
+            probes = state[:bodies].reshape(-1, 7)[self._hosts].ravel()
+            probed = np.concatenate((state[:bodies], probes, state[bodies:]))
+        else:
+            probed = state.copy()
+        pool = packed.rows_pool
+        if self._behind.size:
+            more = [frame_numbers(pair.frame_a, pair.frame_b, packed.scale) for pair in self._pairs]
+            pool = np.concatenate((pool, *more, self._behind))
+        most, columns = self._most
+        forces = np.zeros(most)
+        if not packed.is_implicit:
+            forces[:rows] = state[packed.multipliers_at : packed.residuals_at]
+        evaluated = np.empty(1 + most + columns + most * columns + columns * columns)
+        if curvature_at(self._table, pool, probed, forces, evaluated, None) != 0:
+            return None
+        out = np.zeros(self._parts[-1][1])
+        if not linearize(self._plan, pool, state, self._figures_of_now(packed), forces, evaluated, out):
+            return None
+        parts = [out[first:end].reshape(shape) for first, end, shape in self._parts]
+        jacobian, hessian, rows_by, _, slopes_by, values, slopes, own, left = parts
+        if not packed.is_implicit and max(left.max(), -left.min()) > UNBALANCED:
+            return None
+        held = self._held(packed, evaluated[1 : 1 + rows], forces[:rows])
+        if held is None:
+            return None
+        return self._stepped(
+            packed, held, (jacobian[:rows], hessian, rows_by, slopes_by), (values, slopes, own, forces)
+        )
+
+    def _held(self, packed: Packed, residual: Array, forces: Array) -> Table | slice | None:
+        """The rows that hold; None where one of them is at its bound without a force."""
+        if self._one_sided is None:
+            return slice(None)
+        one_sided = self._one_sided
+        touching = np.abs(residual) <= TOUCHING
+        pushing = touching & (forces < -PUSHING)
+        if (one_sided & touching & ~pushing).any():
+            return None
+        return np.flatnonzero(~one_sided | pushing)
+
+    def _stepped(
+        self,
+        packed: Packed,
+        held: Table | slice,
+        system: tuple[Array, Array, Array, Array],
+        measured: tuple[Array, Array, Array, Array],
+    ) -> Sensitivity | None:
+        """The step, and what measures change by; None where ranks are in doubt, or rows contradict each other."""
+        jacobian, hessian, rows_by, slopes_by = system
+        values, slopes, rates, multipliers = measured
+        rows_held, asked = jacobian[held], rows_by[held]
+        (r, n), p = rows_held.shape, asked.shape[1]
+        steps, forces, free, shared = np.empty((n, p)), np.empty((r, p)), np.empty((n, n)), np.empty((r, r))
+        rank, contradicting = least_steps(rows_held, hessian, asked, slopes_by, steps, forces, free, shared)
+        if rank < 0 or contradicting:
+            return None
+        rates += slopes @ steps
+        for i in self._lengths:
+            rates[i] *= packed.scale
+        for i in self._objectives:
+            rates[i] = (values + multipliers[: packed.rows] @ rows_by) * packed.unit
+        # No negative zeros.
+        rates += 0.0
+        loose = np.zeros(len(self._measures), dtype=bool)
+        if packed.is_implicit and rank < n:
+            changed = np.abs(slopes @ free[:, : n - rank]).max(axis=1)
+            loose = changed > FREE * np.maximum(1.0, np.abs(slopes).max(axis=1))
+        everywhere = forces
+        if not isinstance(held, slice):
+            everywhere = np.zeros((packed.rows, p))
+            everywhere[held] = forces
+        moved = Moved(self._layout, steps, everywhere, packed.scale, packed.unit)
+        return Sensitivity(self._measures, self._parameters, rates, rates, rates, loose, rank, {}, moved)
+
+
+def _record(dtype: np.dtype[np.void], fields: dict[str, int]) -> Table:
+    """A record with these fields, and zeros."""
+    record = np.zeros(1, dtype=dtype)
+    for name, value in fields.items():
+        record[name] = value
+    return record.view(np.int64)
+
+
+def _is_slide(item: Measure) -> bool:
+    return item.kind == "coordinate" and item.unit == "length"
+
+
+def _has_sized_turns(packed: Packed, bodies: Sequence[Body]) -> bool:
+    """Whether a posture counts turns by the scene's size, which numbers may change (`derivatives/size.py`)."""
+    table = packed.rows_table
+    terms = table[table[layout.TERM_TABLE] :][: TERM * table[layout.TERMS]].reshape(-1, TERM).tolist()
+    drawn = {at - POSTURE_QUATERNION for _, at in packed._turns}
+    return any(kind == POSTURE and at not in drawn and not bodies[k].size for kind, k, at, *_ in terms)
