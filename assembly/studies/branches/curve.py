@@ -151,8 +151,12 @@ class Curve:
             except np.linalg.LinAlgError:
                 raise LostError from None
         tangent = tangent / np.linalg.norm(self.bordering(tangent))
-        sign, size = np.linalg.slogdet(np.vstack([matrix, self.bordering(tangent)]))
-        return Point(place, problem.here.residual, equations, matrix, basis, tangent, float(sign * np.exp(size)))
+        determinant = 0.0
+        if matrix.shape[1] == k + 1:
+            # Of more or fewer equations there is none, and no branch.
+            sign, size = np.linalg.slogdet(np.vstack([matrix, self.bordering(tangent)]))
+            determinant = float(sign * np.exp(size))
+        return Point(place, problem.here.residual, equations, matrix, basis, tangent, determinant)
 
     def bordering(self, step: Array) -> Array:
         """A step (k + 1,) without multipliers, which do not count in lengths."""
