@@ -16,9 +16,8 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view
 from assembly.constraints.program.primitives import COINCIDENT, SLIDE, SWING
-from assembly.geometry.vec import cross, dot, sub
+from assembly.geometry.vec import blend, cross, dot, quaternion_matrix, sub
 from assembly.kinematics.motion import exponential
-from assembly.geometry.vec import quaternion_matrix
 
 # Bodies, the first of a joint's coordinates, and how many it has.
 TREE_JOINT = record_dtype("i8", parent=1, child=1, first=1, count=1)
@@ -32,6 +31,8 @@ closing_row_at, closing_frames_at = record_view(CLOSING_ROW), record_view(CLOSIN
 STEPS, CLOSED, LONGEST = 60, 1e-13, 0.7
 # The damping over the square of what rows are off by, and what is left of it at the end.
 DAMPING, LEAST = 1e-3, 1e-15
+# 1 + cosine of axes that are opposed but for rounding.
+OPPOSED = 1e-14
 
 
 @kernel(inner=True)
@@ -100,12 +101,12 @@ def closing_slopes(kind, component, frame_a, frame_b, record):
     elif kind == SWING:
         z = axis_of(frame_b, 2)
         cosine = dot(axis_of(frame_a, 2), z)
-        sine = math.sqrt(max(0.0, 1.0 - cosine * cosine))
-        factor = math.atan2(sine, cosine) / sine if sine > 1e-6 else 1.0
+        # 2 sin(theta / 2) in the direction that z_b leans to: opposed axes are no root of it, nor do steps lead there.
+        above = max(1.0 + cosine, OPPOSED)
+        factor = math.sqrt(2.0 / above)
         a = axis_of(frame_a, component)
         value = factor * dot(a, z)
-        h = cross(z, a)
-        h = (factor * h[0], factor * h[1], factor * h[2])
+        h = blend(factor, cross(z, a), -0.5 * value / above, cross(z, axis_of(frame_a, 2)))
     else:
         x = axis_of(frame_b, 0)
         y = axis_of(frame_b, 1)
