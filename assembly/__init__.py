@@ -97,6 +97,11 @@ if TYPE_CHECKING:
     from assembly.step import write_brep as write_brep
     from assembly.step import write_iges as write_iges
     from assembly.step import write_step as write_step
+    from assembly.studies.branches.configuration import configuration as configuration
+    from assembly.studies.branches.following import follow as follow
+    from assembly.studies.branches.options import FollowOptions as FollowOptions
+    from assembly.studies.branches.result import Branch as Branch
+    from assembly.studies.branches.result import BranchEvent as BranchEvent
     from assembly.studies.fits import Play as Play
     from assembly.studies.fits import play as play
     from assembly.studies.interference.clash import Clash as Clash
@@ -124,6 +129,8 @@ else:
             "Angle": "assembly.constraints.model.placements",
             "Assembly": "assembly.assembly",
             "Body": "assembly.kinematics.body",
+            "Branch": "assembly.studies.branches.result",
+            "BranchEvent": "assembly.studies.branches.result",
             "Clash": "assembly.studies.interference.clash",
             "Clearance": "assembly.constraints.model.clearance",
             "Coaxial": "assembly.constraints.model.mates",
@@ -141,6 +148,7 @@ else:
             "Face": "assembly.geometry.faces.face",
             "Fixed": "assembly.constraints.model.joints",
             "Flush": "assembly.constraints.model.mates",
+            "FollowOptions": "assembly.studies.branches.options",
             "FormulaCurve": "assembly.geometry.splines.formula_curve",
             "FrameDistance": "assembly.constraints.model.objectives",
             "Gear": "assembly.constraints.model.couplings",
@@ -199,10 +207,12 @@ else:
             "Workspace": "assembly.studies.reachable",
             "Wrench": "assembly.solve.forces.statics",
             "cad": "assembly.cad",
+            "configuration": "assembly.studies.branches.configuration",
             "curves": "assembly.geometry.shapes.curves",
             "dexterity_ellipsoid": "assembly.solve.forces.end_effector",
             "dexterity_value": "assembly.solve.forces.end_effector",
             "errors": "assembly.errors",
+            "follow": "assembly.studies.branches.following",
             "interference": "assembly.studies.interference.report",
             "load": "assembly.scene_file",
             "play": "assembly.studies.fits",

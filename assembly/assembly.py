@@ -290,7 +290,7 @@ class Assembly(PackedContents):
     def solve_all(
         self,
         *,
-        starts: int | str | Sequence[ArrayLike | Solution] = 16,
+        starts: int | str | Sequence[ArrayLike | Solution] | Array = 16,
         seed: int = 0,
         time_limit: float | None = None,
         executor: Executor | None = None,

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["Executor", "solve_all"]
 
 Array = NDArray[np.float64]
-Starts = int | str | Sequence[ArrayLike | Solution]
+Starts = int | str | Sequence[ArrayLike | Solution] | Array
 # Starts at a time; of an executor's task. Of "all": as few at least, as many at most, and by how many times more than
 # led to the last new solution. A branch that one start in 40 leads to is missed once in 25 times by the fewest.
 BATCH, TASK, FEWEST, MOST, AGAIN = 64, 16, 128, 4096, 4
@@ -86,7 +86,7 @@ def _given(starts: Starts, scene: Assembly) -> list[Array] | None:
         if starts != "all":
             raise InputError(f"starts is {starts!r}; expected a number, 'all', or poses and solutions")
         return None
-    if isinstance(starts, Sequence) or (isinstance(starts, np.ndarray) and starts.ndim > 0):
+    if isinstance(starts, (Sequence, np.ndarray)):
         rows = [item.q if isinstance(item, Solution) else item for item in starts]
         return [pose_rows(f"starts[{k}]", row, len(scene.bodies)) for k, row in enumerate(rows)]
     integer("starts", starts, 1, 10**6)

@@ -154,7 +154,7 @@ def _way(body: int, above: Mapping[int, tuple[int, _Axis] | None]) -> list[_Axis
 
 
 def _determinant(loop: Sequence[_Axis]) -> float | None:
-    """Of the screws of a loop's freedoms, if they are six; lengths over the loop's own. None where it is always zero."""
+    """Of the screws of six freedoms, lengths over the loop's own. None of more or fewer, or where it is always zero."""
     middle = np.mean([axis.place for axis in loop], axis=0)
     size = max(float(np.linalg.norm(axis.place - middle)) for axis in loop)
     if size == 0.0:

@@ -25,11 +25,12 @@ from assembly.derivatives.probed import Evaluated, ProbedScene
 from assembly.errors import InputError
 from assembly.kinematics.pose import retract, rotation_matrix
 from assembly.solve.dense.jacobian import rows_of
+from assembly.solve.diagnosis.nearby_poses import moves
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["Curve", "Place", "Point"]
+__all__ = ["Curve", "LostError", "Place", "Point"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -207,8 +208,6 @@ class Curve:
 
     def between(self, here: Place, there: Place) -> Array:
         """The twists (n,) that lead from a place to another one, lengths over the size."""
-        from assembly.solve.diagnosis.nearby_poses import moves
-
         return moves(here.q[self.moving], there.q[self.moving], self.scale).ravel()
 
     def objective(self, place: Place) -> float:
@@ -299,4 +298,3 @@ class Curve:
         rows = here.jacobian[np.ix_(self.held, self.columns)]
         forces[self.held] = -np.linalg.lstsq(rows.T, here.gradient[self.columns], rcond=DEPENDENT)[0]
         return replace(place, forces=forces)
-

@@ -74,7 +74,9 @@ class Step:
         return found
 
     def _root(self, value: Callable[[Point], float]) -> tuple[float, Point]:
-        """Where a value, whose sign is another one at the end of the step, is zero."""
+        """Where a value that has another sign at the end of the step is zero; its beginning, where it has not."""
+        if value(self.here) * value(self.there) >= 0.0:
+            return 0.0, self.here
         last: dict[float, Point] = {0.0: self.here}
 
         def at(along: float) -> float:
@@ -108,17 +110,15 @@ class Step:
 
     def _of_rows(self) -> list[Found]:
         """One-sided rows that reach their bounds, and that push no more."""
+        packed, held, least = self.here.place.packed, self.curve.held, self.curve.tolerance
         found = []
-        packed, held = self.here.place.packed, self.curve.held
-        for row in np.flatnonzero(packed.one_sided):
-            kind = "contact" if packed.pairs[row] >= 0 else "limit"
+        for row in np.flatnonzero(packed.one_sided).tolist():
+            is_contact = packed.pairs[row] >= 0
             if held[row]:
                 if self.there.place.forces[row] > 0.0 > self.here.place.forces[row]:
-                    words = "contact opened" if kind == "contact" else "limit left"
-                    found.append(self._event(words, int(row), lambda point, r=row: float(point.place.forces[r]), True))
-            elif self.there.residual[row] < 0.0 < self.here.residual[row]:
-                words = "contact closed" if kind == "contact" else "limit reached"
-                found.append(self._event(words, int(row), lambda point, r=row: float(point.residual[r]), True))
+                    found.append(self._event("contact opened" if is_contact else "limit left", row, _force(row), True))
+            elif self.there.residual[row] < -least <= self.here.residual[row]:
+                found.append(self._event("contact closed" if is_contact else "limit reached", row, _gap(row), True))
         return found
 
     def _crossing(self) -> list[Found]:
@@ -141,14 +141,25 @@ class Step:
         root = float(real[np.abs(real).argmin()])
         near = points[int(np.abs(nodes - root).argmin())].place
         told = [np.append(self.curve.between(near, point.place), point.place.value) for point in points]
-        *twists, value = np.polynomial.chebyshev.chebval(
-            root, np.polynomial.chebyshev.chebfit(nodes, np.array(told), POINTS - 1)
-        ).tolist()
+        series = np.polynomial.chebyshev.chebfit(nodes, np.array(told), POINTS - 1)
+        there = np.array(np.polynomial.chebyshev.chebval(root, series))
         state, curve = near.state.copy(), self.curve
         q = state[: near.packed.contacts_at].reshape(-1, 7)
-        steps = np.reshape(twists, (-1, 6)) * np.repeat([curve.scale, 1.0], 3)
+        steps = there[:-1].reshape(-1, 6) * np.repeat([curve.scale, 1.0], 3)
         q[curve.moving] = retract(q[curve.moving], steps)
-        return [Found("crossing", -1, middle + part * root, Place(near.packed, state, value, near.forces), None)]
+        return [
+            Found("crossing", -1, middle + part * root, Place(near.packed, state, float(there[-1]), near.forces), None)
+        ]
+
+
+def _force(row: int) -> Callable[[Point], float]:
+    """The multiplier of a row at a point."""
+    return lambda point: float(point.place.forces[row])
+
+
+def _gap(row: int) -> Callable[[Point], float]:
+    """The residual of a row at a point."""
+    return lambda point: float(point.residual[row])
 
 
 def closing(step: Step, start: Point, is_angle: bool) -> tuple[Found, float] | None:

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 __all__ = ["follow"]
 
 Array = NDArray[np.float64]
+# Singular values of the equations, over the largest, that are none where a branch begins.
+FLAT = 1e-10
+EXPECTED = "expected rows that determine the poses, or an objective that has one best pose"
 # Forces that push, over the objective's unit, and one-sided rows that are at their bound.
 PUSHING, AT_BOUND = 1e-9, 1e-9
 # By how much a step may be longer than the last one; and how far the corrector may lead, in parts of the step.
@@ -158,7 +161,8 @@ class _Follower:
                 return way
             step, events, off = found
             for event in events:
-                way.add(event.place, along + event.along)
+                if event.along > 0.0:
+                    way.add(event.place, along + event.along)
                 way.events.append((len(way.places) - 1, event))
             last = events[-1] if events and events[-1].ends else None
             if last is None:
@@ -170,8 +174,9 @@ class _Follower:
                 continue
             way.closure = off
             along += last.along
-            after = None if last.kind in ("end of range", "closed loop") else _switched(curve, here, last)
-            if after is None:
+            after = None if last.kind in ("end of range", "closed loop") else _switched(curve, last)
+            # A row that comes and goes at one place ends the branch: there is no way on that pushes or opens.
+            if after is None or (curve is not self.first and last.along == 0.0):
                 return way
             curve, here = after
             length = settings.first_step
@@ -230,9 +235,7 @@ def _begun(curve: Curve, place: Place) -> tuple[Curve, Point]:
     if rank == n and not wishes:
         return curve, _settled(curve, point)
     if not wishes:
-        raise InputError(
-            f"scene leaves {n - rank} motions free with {curve.parameter.name} given; expected none, or an objective"
-        )
+        raise InputError(f"scene leaves {n - rank} motions free with {curve.parameter.name} given; {EXPECTED}")
     at_bound = packed.one_sided & (np.abs(point.residual) <= AT_BOUND)
     if rank == n and not at_bound.any():
         return curve, _settled(curve, point)
@@ -246,7 +249,12 @@ def _begun(curve: Curve, place: Place) -> tuple[Curve, Point]:
         held = held & ~open_rows
     if not (held & packed.one_sided).any() and rank == n:
         return curve, _settled(curve, point)
-    return pushing, _settled(pushing, pushing.point(balanced))
+    point = pushing.point(balanced)
+    values = np.linalg.svd(point.matrix, compute_uv=False)
+    flat = int(np.count_nonzero(values <= FLAT * values[0]))
+    if flat:
+        raise InputError(f"objective does not tell {flat} of the motions that rows leave free; {EXPECTED}")
+    return pushing, _settled(pushing, point)
 
 
 def _settled(curve: Curve, point: Point) -> Point:
@@ -257,7 +265,7 @@ def _settled(curve: Curve, point: Point) -> Point:
     return found
 
 
-def _switched(curve: Curve, here: Point, event: Found) -> tuple[Curve, Point] | None:
+def _switched(curve: Curve, event: Found) -> tuple[Curve, Point] | None:
     """The equations with a row more that pushes, or one less, and the point; None where the branch ends there."""
     row, place = event.row, event.place
     comes = not curve.held[row]

@@ -62,6 +62,7 @@ def axis_of(a, k):
 
 @kernel(inline=True)
 def shift_of(a):
+    """The place of a pose."""
     return (a[9], a[10], a[11])
 
 
@@ -200,9 +201,7 @@ def move_joint(joint, fixed, step, share, motion, scratch):
 
 
 @kernel(
-    signatures=(
-        "(i8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[::1])"
-    ),
+    signatures=("(i8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[::1])"),
     allocates=True,
 )
 def close_loops(joints, frames, rows, row_frames, motions, poses, off):
@@ -228,7 +227,7 @@ def close_loops(joints, frames, rows, row_frames, motions, poses, off):
     columns, scratch = np.empty((k, 9)), np.empty((3, 12))
     residual, jacobian, matrix, step = np.empty(m), np.empty((m, k)), np.empty((k, k)), np.empty(k)
     for s in range(motions.shape[0]):
-        for i in range(STEPS):
+        for _ in range(STEPS):
             place_bodies(joints, frames, motions[s], poses[s], columns, scratch)
             square = close_rows(rows, row_frames, poses[s], columns, moves, residual, jacobian, scratch)
             off[s] = math.sqrt(square)

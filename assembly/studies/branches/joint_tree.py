@@ -77,7 +77,7 @@ class JointTree:
     carried : list of int
         Bodies that the tree carries; others that move are where a start has them.
     loops_close : bool
-        Whether Newton's method in the joints' coordinates knows all rows; else starts hold the joints of the tree alone.
+        Whether Newton's method in the joints' coordinates knows all rows; else starts hold the tree's joints alone.
     """
 
     def __init__(self, scene: Assembly) -> None:
@@ -168,7 +168,7 @@ class JointTree:
         return not isinstance(joint, Spherical) or coordinate.kind == COINCIDENT
 
     def drawn(self, rng: np.random.Generator, count: int) -> Array:
-        """Motions (count, e, 12) of the tree's joints: freedoms within their limits, angles any where there are none."""
+        """Motions (count, e, 12) of the tree's joints, freedoms within their limits; any angle where there are none."""
         motions = np.zeros((count, len(self._tree), 12))
         motions[:, :, [0, 4, 8]] = 1.0
         for k, item in enumerate(self._tree):
@@ -232,7 +232,8 @@ def _any_turns(rng: np.random.Generator, count: int) -> Array:
 
 def _quaternions(turns: Array) -> Array:
     """Unit quaternions (k, 4) of rotations (k, 3, 3): of the four that are multiples of it, the longest column of
-    4 e e^T."""
+    4 e e^T.
+    """
     diagonal = turns[:, [0, 1, 2], [0, 1, 2]].T
     a, b, c = diagonal
     x, y, z = turns[:, 2, 1] - turns[:, 1, 2], turns[:, 0, 2] - turns[:, 2, 0], turns[:, 1, 0] - turns[:, 0, 1]
