@@ -68,6 +68,7 @@ class Branch(ReadOnlyArrays):
     poses : (k, n, 7)
     of : tuple of Measure
     measures : (k, m)
+        Angles of joints go on past whole turns.
     events : tuple of BranchEvent
         In order along the branch; each has a row of its own but the ends that are no points.
     closed : bool
@@ -142,19 +143,30 @@ def branch_of(curve: Curve, ways: Sequence[Way], measures: tuple[Measure, ...]) 
         )
         for row, found in events
     )
-    poses = np.array([place.q for place in places])
+    start = len(rest[0].places) - 1 if rest else 0
     return Branch(
         curve.parameter,
         np.array([place.value for place in places]),
         np.array(lengths),
-        poses,
+        np.array([place.q for place in places]),
         measures,
-        np.array([[_measured(curve, item, place) for item in measures] for place in places]).reshape(len(places), -1),
+        _columns(curve, measures, places, start),
         told,
         ahead.closure is not None,
         float("nan") if ahead.closure is None else ahead.closure,
-        len(rest[0].places) - 1 if rest else 0,
+        start,
     )
+
+
+def _columns(curve: Curve, measures: Sequence[Measure], places: Sequence[Place], start: int) -> Array:
+    """Measures (k, m) at places; angles go on past whole turns from what they are at the start."""
+    rows = [[_measured(curve, item, place) for item in measures] for place in places]
+    told = np.array(rows, dtype=np.float64).reshape(len(places), len(measures))
+    for k, item in enumerate(measures):
+        if item.kind == "coordinate" and item.unit == "rad":
+            turned = np.unwrap(told[:, k])
+            told[:, k] = turned + (told[start, k] - turned[start])
+    return told
 
 
 def _measured(curve: Curve, measure: Measure, place: Place) -> float:
