@@ -97,11 +97,11 @@ if TYPE_CHECKING:
     from assembly.step import write_brep as write_brep
     from assembly.step import write_iges as write_iges
     from assembly.step import write_step as write_step
-    from assembly.studies.branches.configuration import configuration as configuration
     from assembly.studies.branches.following import follow as follow
     from assembly.studies.branches.options import FollowOptions as FollowOptions
     from assembly.studies.branches.result import Branch as Branch
     from assembly.studies.branches.result import BranchEvent as BranchEvent
+    from assembly.studies.branches.signs import configuration as configuration
     from assembly.studies.fits import Play as Play
     from assembly.studies.fits import play as play
     from assembly.studies.interference.clash import Clash as Clash
@@ -207,7 +207,7 @@ else:
             "Workspace": "assembly.studies.reachable",
             "Wrench": "assembly.solve.forces.statics",
             "cad": "assembly.cad",
-            "configuration": "assembly.studies.branches.configuration",
+            "configuration": "assembly.studies.branches.signs",
             "curves": "assembly.geometry.shapes.curves",
             "dexterity_ellipsoid": "assembly.solve.forces.end_effector",
             "dexterity_value": "assembly.solve.forces.end_effector",

@@ -21,8 +21,8 @@ from assembly.solve.attempts.starts import moving_rows, scattered
 from assembly.solve.interruption import Interruption
 from assembly.solve.scene import Status
 from assembly.solve.solution import Solution
-from assembly.studies.branches.configuration import differ
 from assembly.studies.branches.joint_tree import JointTree
+from assembly.studies.branches.signs import differ
 from assembly.studies.distinct import are_one
 
 if TYPE_CHECKING:

@@ -31,9 +31,11 @@ from assembly.solve.solution import Solution
 __all__ = ["configuration", "differ"]
 
 Array = NDArray[np.float64]
-# Axes whose cosine is within this of one are parallel; numbers below ZERO, of order one otherwise, have no sign: twice
-# the root of what a pose may be off by beside a singular one.
-PARALLEL, ZERO = 1e-9, 1e-8
+# Axes whose cosine is within this of one are parallel. Numbers of order one that are below ZERO have no sign: beside a
+# dead center a pose is as exact as the root of twice what rows may be off by, 2e-13.
+PARALLEL, ZERO = 1e-9, 1e-6
+# Singular values of screws that are always dependent.
+DEPENDENT = 1e-8
 # Freedoms of joints that are one screw each: about the axis, along it.
 SCREWS = {Revolute: ("angle",), Prismatic: ("slide",), Cylindrical: ("angle", "slide"), Fixed: ()}
 
@@ -170,4 +172,4 @@ def _determinant(loop: Sequence[_Axis]) -> float | None:
         return None
     values = np.linalg.svd(np.array(screws), compute_uv=False)
     # Of a planar loop with six freedoms several are zero.
-    return float(np.linalg.det(np.array(screws))) if values[-2] > ZERO else None
+    return float(np.linalg.det(np.array(screws))) if values[-2] > DEPENDENT else None
