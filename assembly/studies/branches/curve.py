@@ -214,6 +214,13 @@ class Curve:
         """The objective at a place, over its unit."""
         return self._derived(place)[1].here.value
 
+    def rate(self, point: Point, row: int) -> float:
+        """What a row's residual grows by along a point's tangent."""
+        place, problem, columns = self._derived(point.place)
+        slopes = problem.here.jacobian[row, self.columns] * self._stretch(place.packed)
+        by = float(columns.rows[row, 0]) * self.unit
+        return float(slopes @ point.tangent[: self.columns.size]) + by * float(point.tangent[-1])
+
     def owner(self, row: int) -> str:
         """The name of the constraint that asks for a row."""
         scene = self.scene._scene

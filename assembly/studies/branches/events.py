@@ -48,8 +48,8 @@ class Step:
     curve : Curve
     here, there : Point
     length : float
-    low, high : float
-        The range of the parameter.
+    ends : (float, float)
+        Of the range of the parameter.
     """
 
     def __init__(self, curve: Curve, here: Point, there: Point, length: float, ends: tuple[float, float]) -> None:

@@ -285,16 +285,8 @@ def _switched(curve: Curve, event: Found) -> tuple[Curve, Point] | None:
         change = (point.basis @ point.tangent[n:-1])[int(held[:row].sum())]
         sign = -1.0 if change > 0.0 else 1.0
     else:
-        rate = _rate(other, point, row)
+        rate = other.rate(point, row)
         sign = -1.0 if rate < 0.0 else 1.0
     if len(point.equations) != len(point.tangent) - 1 or point.basis.shape[1] > n:
         return None
     return other, other.point(point.place, sign * other.bordering(point.tangent), point.basis)
-
-
-def _rate(curve: Curve, point: Point, row: int) -> float:
-    """What a row's residual grows by along a point's tangent."""
-    _, problem, columns = curve._derived(point.place)
-    rates = problem.here.jacobian[row, curve.columns] * curve._stretch(point.place.packed)
-    n = curve.columns.size
-    return float(rates @ point.tangent[:n] + columns.rows[row, 0] * curve.unit * point.tangent[-1])
