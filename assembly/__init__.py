@@ -98,6 +98,11 @@ if TYPE_CHECKING:
     from assembly.step import write_brep as write_brep
     from assembly.step import write_iges as write_iges
     from assembly.step import write_step as write_step
+    from assembly.studies.branches.following import follow as follow
+    from assembly.studies.branches.options import FollowOptions as FollowOptions
+    from assembly.studies.branches.result import Branch as Branch
+    from assembly.studies.branches.result import BranchEvent as BranchEvent
+    from assembly.studies.branches.signs import configuration as configuration
     from assembly.studies.fits import Play as Play
     from assembly.studies.fits import play as play
     from assembly.studies.interference.clash import Clash as Clash
@@ -125,6 +130,8 @@ else:
             "Angle": "assembly.constraints.model.placements",
             "Assembly": "assembly.assembly",
             "Body": "assembly.kinematics.body",
+            "Branch": "assembly.studies.branches.result",
+            "BranchEvent": "assembly.studies.branches.result",
             "Clash": "assembly.studies.interference.clash",
             "Clearance": "assembly.constraints.model.clearance",
             "Coaxial": "assembly.constraints.model.mates",
@@ -142,6 +149,7 @@ else:
             "Face": "assembly.geometry.faces.face",
             "Fixed": "assembly.constraints.model.joints",
             "Flush": "assembly.constraints.model.mates",
+            "FollowOptions": "assembly.studies.branches.options",
             "FormulaCurve": "assembly.geometry.splines.formula_curve",
             "FrameDistance": "assembly.constraints.model.objectives",
             "Gear": "assembly.constraints.model.couplings",
@@ -201,10 +209,12 @@ else:
             "Workspace": "assembly.studies.reachable",
             "Wrench": "assembly.solve.forces.statics",
             "cad": "assembly.cad",
+            "configuration": "assembly.studies.branches.signs",
             "curves": "assembly.geometry.shapes.curves",
             "dexterity_ellipsoid": "assembly.solve.forces.end_effector",
             "dexterity_value": "assembly.solve.forces.end_effector",
             "errors": "assembly.errors",
+            "follow": "assembly.studies.branches.following",
             "interference": "assembly.studies.interference.report",
             "load": "assembly.scene_file",
             "play": "assembly.studies.fits",

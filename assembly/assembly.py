@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from os import PathLike
 from time import perf_counter
@@ -37,6 +37,7 @@ from assembly.solve.straight import straight_from
 
 if TYPE_CHECKING:
     from assembly.solve.diagnosis.mobility import Mobility
+    from assembly.studies.multistart import Executor
     from assembly.tracking.tracker import Tracker
 
 __all__ = ["Assembly"]
@@ -290,33 +291,46 @@ class Assembly(PackedContents):
             self._pack_with_more_places()
 
     def solve_all(
-        self, *, starts: int = 16, seed: int = 0, time_limit: float | None = None, **options: Any
+        self,
+        *,
+        starts: int | str | Sequence[ArrayLike | Solution] | Array = 16,
+        seed: int = 0,
+        time_limit: float | None = None,
+        executor: Executor | None = None,
+        **options: Any,
     ) -> list[Solution]:
         """The distinct solutions found from several starts: the bodies' poses, then random ones.
 
+        Random starts are where joints let bodies be: values of freedoms within limits, angles any where there are none,
+        along a tree of joints from fixed bodies on, and loops are closed from there in the joints' coordinates. A body
+        that no joint carries is shifted by up to the scene's size along each axis, and turned any way.
+
         Parameters
         ----------
-        starts : int
-            How many; the first is the bodies' poses. Of the others every moving body is shifted by up to the scene's
-            size along each axis, and turned any way.
+        starts : int, "all", or sequence of (n, 7) and Solution
+            How many; the first is the bodies' poses. "all": 128 at least, and four times as many as led to the last
+            solution that is new, up to 4,096. Or the starts themselves; solutions may be of any scene of these bodies.
         seed : int
             Of the random starts: the same seed, the same starts.
         time_limit : float, optional
             Seconds after which no start is begun any more, and the last one ends.
+        executor : Executor, optional
+            One of `concurrent.futures`, or one like it: solves are submitted to it, the scene pickled. What is found
+            is the same.
         **options
             See `Options`.
 
         Returns
         -------
         list of Solution
-            The successful ones, the smallest objective first. Poses within 1e-6 of each other (lengths over the scene's
-            size, radians) are one, and so are two between which all poses on the straight way are as good. A
-            `Posture` without a reference, and the objective of a scene that has none, are measured from the bodies'
-            poses in all of them.
+            The successful ones, the smallest objective first. Solutions in another configuration (`configuration`) are
+            two. Else poses within 1e-6 of each other (lengths over the scene's size, radians) are one, and so are two
+            between which all poses on the straight way are as good. A `Posture` without a reference, and the objective
+            of a scene that has none, are measured from the bodies' poses in all of them.
         """
         from assembly.studies.multistart import solve_all
 
-        return solve_all(self, starts, seed, Interruption(time_limit), options)
+        return solve_all(self, starts, seed, Interruption(time_limit), options, executor)
 
     def tracker(self, follow: Point | Frame | Body, **options: Any) -> Tracker:
         """What follows a hand that holds a point or a frame of a body.

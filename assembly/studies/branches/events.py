@@ -1,0 +1,186 @@
+"""What happens along a step of a branch, and where exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import pi, remainder
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from assembly.kinematics.pose import retract
+from assembly.studies.branches.curve import Curve, Place, Point
+
+__all__ = ["Found", "Step", "closing"]
+
+Array = NDArray[np.float64]
+# Lengths along a branch are found to this.
+EXACT = 1e-15
+# A crossing is interpolated between so many points about it, within this part of the step to either side.
+POINTS, ABOUT = 8, 0.3
+# Points of a branch that are the same one.
+SAME = 1e-7
+
+
+class NotFoundError(Exception):
+    """No point was found within a step: a shorter one may tell."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """An event: what kind, the row or the name that it is of, how far along the step, and where."""
+
+    kind: str
+    row: int
+    along: float
+    place: Place
+    point: Point | None
+    ends: bool = False
+
+
+class Step:
+    """A step along a branch, from a point to the one after it, and the points between.
+
+    Parameters
+    ----------
+    curve : Curve
+    here, there : Point
+    length : float
+    ends : (float, float)
+        Of the range of the parameter.
+    """
+
+    def __init__(self, curve: Curve, here: Point, there: Point, length: float, ends: tuple[float, float]) -> None:
+        self.curve, self.here, self.there, self.length, self.ends = curve, here, there, length, ends
+
+    def at(self, along: float) -> Point:
+        """The point in the plane across the step's beginning at a part of its length."""
+        if along == self.length:
+            return self.there
+        point = self.curve.corrected(self.here, along * self.here.tangent)
+        if point is None:
+            raise NotFoundError
+        return point
+
+    def events(self) -> list[Found]:
+        """The events of the step, in order; none after one that ends the branch, or changes which rows hold."""
+        found = [*self._at_ends(), *self._of_rows(), *self._turning(), *self._crossing()]
+        found.sort(key=lambda event: event.along)
+        for k, event in enumerate(found):
+            if event.ends:
+                return found[: k + 1]
+        return found
+
+    def _root(self, value: Callable[[Point], float]) -> tuple[float, Point]:
+        """Where a value that has another sign at the end of the step is zero; its beginning, where it has not."""
+        if value(self.here) * value(self.there) >= 0.0:
+            return 0.0, self.here
+        last: dict[float, Point] = {0.0: self.here}
+
+        def at(along: float) -> float:
+            last[along] = last.get(along) or self.at(along)
+            return value(last[along])
+
+        along = float(brentq(at, 0.0, self.length, xtol=EXACT, rtol=4.0 * np.finfo(float).eps))
+        return along, last.get(along) or self.at(along)
+
+    def _event(self, kind: str, row: int, value: Callable[[Point], float], ends: bool = False) -> Found:
+        along, point = self._root(value)
+        return Found(kind, row, along, point.place, point, ends)
+
+    def _at_ends(self) -> list[Found]:
+        """Where the parameter leaves its range."""
+        low, high = self.ends
+        value = self.there.place.value
+        end = high if value > high else low if value < low else None
+        if end is None:
+            return []
+        bound = end
+        event = self._event("end of range", -1, lambda point: point.place.value - bound, True)
+        # The value is the end of the range, and not a rounding beside it.
+        return [replace(event, place=replace(event.place, value=bound))]
+
+    def _turning(self) -> list[Found]:
+        """Where the parameter turns back."""
+        if self.here.tangent[-1] * self.there.tangent[-1] < 0.0:
+            return [self._event("turning point", -1, lambda point: float(point.tangent[-1]))]
+        return []
+
+    def _of_rows(self) -> list[Found]:
+        """One-sided rows that reach their bounds, and that push no more."""
+        packed, held, least = self.here.place.packed, self.curve.held, self.curve.tolerance
+        found = []
+        for row in np.flatnonzero(packed.one_sided).tolist():
+            is_contact = packed.pairs[row] >= 0
+            if held[row]:
+                if self.there.place.forces[row] > 0.0 > self.here.place.forces[row]:
+                    found.append(self._event("contact opened" if is_contact else "limit left", row, _force(row), True))
+            elif self.there.residual[row] < -least <= self.here.residual[row]:
+                found.append(self._event("contact closed" if is_contact else "limit reached", row, _gap(row), True))
+        return found
+
+    def _crossing(self) -> list[Found]:
+        """Where another branch crosses: the bordered determinant changes its sign.
+
+        At the crossing itself rows have no one direction, and a corrector no step. The branch goes through it smoothly:
+        determinant and poses are interpolated between points about it.
+        """
+        if not self.here.determinant * self.there.determinant < 0.0:
+            return []
+        middle = float(brentq(lambda s: self.at(s).determinant, 0.0, self.length, xtol=1e-3 * self.length, rtol=1e-3))
+        nodes = np.cos(pi * (np.arange(POINTS) + 0.5) / POINTS)
+        part = ABOUT * self.length
+        points = [self.at(middle + part * node) for node in nodes.tolist()]
+        values = np.polynomial.chebyshev.chebfit(nodes, [point.determinant for point in points], POINTS - 1)
+        roots = np.polynomial.chebyshev.chebroots(values)
+        real = roots[np.abs(roots.imag) < 1e-6].real
+        if not real.size:
+            raise NotFoundError
+        root = float(real[np.abs(real).argmin()])
+        near = points[int(np.abs(nodes - root).argmin())].place
+        told = [np.append(self.curve.between(near, point.place), point.place.value) for point in points]
+        series = np.polynomial.chebyshev.chebfit(nodes, np.array(told), POINTS - 1)
+        there = np.array(np.polynomial.chebyshev.chebval(root, series))
+        state, curve = near.state.copy(), self.curve
+        q = state[: near.packed.contacts_at].reshape(-1, 7)
+        steps = there[:-1].reshape(-1, 6) * np.repeat([curve.scale, 1.0], 3)
+        q[curve.moving] = retract(q[curve.moving], steps)
+        return [
+            Found("crossing", -1, middle + part * root, Place(near.packed, state, float(there[-1]), near.forces), None)
+        ]
+
+
+def _force(row: int) -> Callable[[Point], float]:
+    """The multiplier of a row at a point."""
+    return lambda point: float(point.place.forces[row])
+
+
+def _gap(row: int) -> Callable[[Point], float]:
+    """The residual of a row at a point."""
+    return lambda point: float(point.residual[row])
+
+
+def closing(step: Step, start: Point, is_angle: bool) -> tuple[Found, float] | None:
+    """Where a step comes back to the start of the branch, if it does, and how far from it; an angle by whole turns."""
+    curve = step.curve
+    border = curve.bordering(start.tangent)
+
+    def gap(point: Point) -> Array:
+        apart = (point.place.value - start.place.value) / curve.unit
+        apart = remainder(apart, 2.0 * pi) if is_angle else apart
+        gap = np.zeros(len(start.tangent))
+        gap[: curve.columns.size], gap[-1] = curve.between(start.place, point.place), apart
+        return gap
+
+    if len(border) != len(step.here.tangent):
+        return None
+    before, after = gap(step.here), gap(step.there)
+    if not border @ before < 0.0 <= border @ after or np.linalg.norm(before) > 2.0 * step.length:
+        return None
+    along, point = step._root(lambda point: float(border @ gap(point)))
+    off = float(np.linalg.norm(gap(point)))
+    if off > SAME or border @ point.tangent < 0.0:
+        return None
+    return Found("closed loop", -1, along, point.place, point, True), off

@@ -1,0 +1,48 @@
+"""A rocker's angle, followed around the whole loop of a four-bar, though it cannot turn around.
+
+A crank that turns around drives a rocker that swings. Seen from the rocker, its two ends are dead centers: at each the
+branch of solutions turns back, and the crank goes on. Prints the branch's events beside what cosines say, and how
+well the loop closes; writes follow_branch.html, where the mechanism runs along its branch, and follow_branch.png where
+matplotlib is installed.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from math import acos, pi
+
+import assembly as asm
+
+CRANK, COUPLER, ROCKER, GROUND = 1.0, 3.0, 2.5, 3.2
+
+
+def dead_center(reach: float) -> float:
+    """The rocker's angle where crank and coupler lie along each other."""
+    return pi - acos((GROUND**2 + ROCKER**2 - reach**2) / (2.0 * GROUND * ROCKER))
+
+
+def main() -> asm.Branch:
+    ground = asm.Body("ground", fixed=True)
+    crank, coupler, rocker = (asm.Body(name) for name in ("crank", "coupler", "rocker"))
+    drive = asm.Revolute(ground, crank, "crank")
+    pivot = asm.Revolute(ground.frame(at=(GROUND, 0, 0)), rocker, "rocker", angle=2.0)
+    pins = [
+        asm.Revolute(crank.frame(at=(CRANK, 0, 0)), coupler, "pin"),
+        asm.Revolute(coupler.frame(at=(COUPLER, 0, 0)), rocker.frame(at=(ROCKER, 0, 0)), "wrist"),
+    ]
+    scene = asm.Assembly([ground, crank, coupler, rocker])
+    scene.constrain(drive, pivot, *pins)
+
+    angle = asm.Parameter(pivot, "angle", name="rocker")
+    branch = asm.follow(scene, angle, 0.0, pi, of=asm.Measure(drive))
+    print(branch)
+    for reach in (COUPLER + CRANK, COUPLER - CRANK):
+        print(f"dead center by cosines: {dead_center(reach):.12g}")
+    asm.view.animate(scene, branch.poses, "follow_branch.html", seconds=8.0)
+    if find_spec("matplotlib"):
+        branch.plot().savefig("follow_branch.png", dpi=100)
+    return branch
+
+
+if __name__ == "__main__":
+    main()
