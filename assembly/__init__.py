@@ -97,6 +97,7 @@ if TYPE_CHECKING:
     from assembly.step import write_brep as write_brep
     from assembly.step import write_iges as write_iges
     from assembly.step import write_step as write_step
+    from assembly.studies.batches.result import Batch as Batch
     from assembly.studies.fits import Play as Play
     from assembly.studies.fits import play as play
     from assembly.studies.interference.clash import Clash as Clash
@@ -185,6 +186,7 @@ else:
             "Station": "assembly.studies.synthesis.station",
             "Synthesis": "assembly.studies.synthesis.result",
             "synthesize": "assembly.studies.synthesis.dimensions",
+            "Batch": "assembly.studies.batches.result",
             "Tolerances": "assembly.studies.tolerances.result",
             "Trace": "assembly.tracking.trace",
             "TrackLog": "assembly.tracking.log",
