@@ -44,6 +44,7 @@ BENCHMARKS = (
     "tracking_errors",
     "mechanisms",
     "joint_errors",
+    "batches",
     "laws",
     "accuracy",
     "step",

@@ -147,7 +147,8 @@ def _solve_slices(packed: Packed, settings: Array, writes: Writes, begun: Array,
         # The next slice is taken under the interpreter's lock.
         for first in slices:
             span = Span(first, min(first + SLICE, len(ended)), loop)
-            solve_rows(desk, settings, writes, begun, ended, span, packed.end_effectors)
+            # Signatures have plain tuples.
+            solve_rows(tuple(desk), settings, tuple(writes), begun, ended, tuple(span), packed.end_effectors)
             if threads == 1:
                 CTRL_C.is_over()
 
