@@ -62,14 +62,17 @@ def begun_states(
         states = [_begun(scene, packed, item) for item in starts]
         return np.array([state[: packed.memory_at] if places else state for state in states])
     check_reach("a coordinate of the start", float(np.abs(starts[..., :3]).max()), packed.scale)
-    sided = any(isinstance(item, ContactTangent) and not item.edges for item in packed.contacts)
-    if packed._turned.chosen or sided:
-        if values and packed._turned.chosen:
-            return None
-        return np.array([scene._start(packed, q, None)[: packed.memory_at] for q in starts])
+    if values and packed._turned.chosen:
+        return None
     begun = np.zeros((len(starts), packed.memory_at))
     begun[:, : packed.contacts_at] = starts.reshape(len(starts), -1)
     begun[:, packed.contacts_at : packed.angles_at] = np.nan
+    if any(isinstance(item, ContactTangent) for item in packed.contacts):
+        for state in begun:
+            scene._place_tangents(packed, state)
+    if packed._turned.chosen:
+        for state in begun:
+            packed.start_angles(state, warm=False)
     return begun
 
 
