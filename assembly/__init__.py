@@ -103,6 +103,7 @@ if TYPE_CHECKING:
     from assembly.studies.branches.result import Branch as Branch
     from assembly.studies.branches.result import BranchEvent as BranchEvent
     from assembly.studies.branches.signs import configuration as configuration
+    from assembly.studies.batches.result import Batch as Batch
     from assembly.studies.fits import Play as Play
     from assembly.studies.fits import play as play
     from assembly.studies.interference.clash import Clash as Clash
@@ -195,6 +196,7 @@ else:
             "Station": "assembly.studies.synthesis.station",
             "Synthesis": "assembly.studies.synthesis.result",
             "synthesize": "assembly.studies.synthesis.dimensions",
+            "Batch": "assembly.studies.batches.result",
             "Tolerances": "assembly.studies.tolerances.result",
             "Trace": "assembly.tracking.trace",
             "TrackLog": "assembly.tracking.log",

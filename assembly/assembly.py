@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from os import PathLike
 from time import perf_counter
@@ -36,8 +36,11 @@ from assembly.solve.solution import Solution
 from assembly.solve.straight import straight_from
 
 if TYPE_CHECKING:
+    from assembly.derivatives.measure import Measure
+    from assembly.derivatives.parameter import Parameter
     from assembly.solve.diagnosis.mobility import Mobility
     from assembly.studies.multistart import Executor
+    from assembly.studies.batches.result import Batch
     from assembly.tracking.tracker import Tracker
 
 __all__ = ["Assembly"]
@@ -331,6 +334,56 @@ class Assembly(PackedContents):
         from assembly.studies.multistart import solve_all
 
         return solve_all(self, starts, seed, Interruption(time_limit), options, executor)
+
+    def solve_many(
+        self,
+        q0s: ArrayLike | Solution | Sequence[Solution] | None = None,
+        *,
+        parameters: Mapping[Parameter, ArrayLike] | None = None,
+        of: Iterable[Measure] = (),
+        threads: int | None = None,
+        retry: bool = True,
+        **options: Any,
+    ) -> Batch:
+        """Solve from many starts, or with many values of parameters, in compiled calls over threads.
+
+        Rows are independent of each other: they do not depend on the number of threads. A start has the same bits as
+        `solve` has from it; with parameters lengths are counted in the size that the scene has now.
+
+        Parameters
+        ----------
+        q0s : (n, bodies, 7), (bodies, 7), Solution or sequence of Solution, optional
+            Where rows begin, or where all of them do; the bodies' own poses by default.
+        parameters : mapping of Parameter -> (n,), optional
+            Values for every row. Those of the scene are the same afterwards.
+        of : iterable of Measure
+            What is told of every row.
+        threads : int, optional
+            By default as many as there are processors for this process.
+        retry : bool
+            Whether rows at which the loop does not arrive are solved again by all that `solve` tries, one after the
+            other: False leaves them as the loop did.
+        **options
+            See `Options`.
+
+        Returns
+        -------
+        Batch
+            A row a solve; rows that fail are rows.
+
+        Raises
+        ------
+        InputError, TypeError
+            Wrong shapes, values that the scene cannot have, parameters of another scene.
+
+        Notes
+        -----
+        Scenes with clearances, contacts that are lower pairs, nearest axes, and parameters that make faces are solved
+        row by row in the interpreter (`Batch.alone`).
+        """
+        from assembly.studies.batches.solving import solve_many
+
+        return solve_many(self, q0s, parameters, of, threads, retry, options)
 
     def tracker(self, follow: Point | Frame | Body, **options: Any) -> Tracker:
         """What follows a hand that holds a point or a frame of a body.

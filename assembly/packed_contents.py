@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TypeGuard
+from copy import copy
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +19,7 @@ from assembly.constraints.model.contact import Contact, lone_surfaces
 from assembly.constraints.model.contents import Contents
 from assembly.constraints.model.joint import Joint, Sense
 from assembly.constraints.model.tangent import ContactTangent
-from assembly.constraints.packing.earlier import is_earlier, is_same_scene, taken_over
+from assembly.constraints.packing.earlier import adopted, is_alike, is_earlier, is_same_scene, taken_over
 from assembly.constraints.packing.lower_pairs import LowerPair, lower_pairs
 from assembly.constraints.packing.renumbered import renumbered
 from assembly.constraints.packing.scene import MORE_PLACES, Packed, structure_of
@@ -62,6 +63,14 @@ class PackedContents(Contents):
         self._seats: tuple[tuple[int, Seat], ...] = ()  # where the last solve began
         self._axes_at: Array | None = None  # where axes are nearest, if that is not where a solve begins
         self._packings: dict[tuple[tuple[int, Seat], ...], tuple[Packed | None, Scene | None]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What pickles and deep copies have: what the scene is of, and not how it is packed, which takes 100 times it.
+
+        That a solve needed more places or rows of corners is kept: the copy solves as the original does.
+        """
+        other = copy(self)
+        return {**other.__dict__, "_corners": self._corners}
 
     def packed(self) -> Packed:
         """The scene as the compiled loop reads it; made at first use."""
@@ -190,27 +199,33 @@ class PackedContents(Contents):
                 return
             kept = self._packings.items()
             known = (key for key, (other, _) in kept if other is not None and is_same_scene(packed, other))
-            seats: tuple[tuple[int, Seat], ...] = next(known, self._seats)
+            seats = next(known, None)
+            if seats is None:
+                # Of another scene like this one: seats are those where it ended.
+                seats = self._seats_at(q0.q, {}) if len(q0.q) == len(self._bodies) else self._seats
         else:
-            if self._lower_pairs is None:
-                self._lower_pairs = lower_pairs(self._constraints)
-                self._nearest = {k: item for k, item in enumerate(self._constraints) if _takes_nearest(item)}
-            if not self._lower_pairs and not self._nearest:
-                return
-            poses = dict(zip(self._bodies, self._given(q0), strict=True))
-            named = starts if isinstance(starts, Mapping) else {}
-            found = [(pair.number, pair.at(poses)) for pair in self._lower_pairs]
-            seats = tuple(
-                (k, joint) for k, joint in found if joint is not None and self._constraints[k].name not in named
-            )
-            if self._axes_at is not None:
-                poses = dict(zip(self._bodies, self._axes_at, strict=True))
-            seats += tuple((k, joint._nearest_at(poses)) for k, joint in self._nearest.items())
+            seats = self._seats_at(q0, starts if isinstance(starts, Mapping) else {})
         if seats != self._seats:
             self._packings[self._seats] = self._packed, self._scene
             self._packed, self._scene = self._packings.pop(seats, (None, None))
             self._seen = None
             self._seats = seats
+
+    def _seats_at(self, q0: ArrayLike | None, named: Mapping[str, ArrayLike]) -> tuple[tuple[int, Seat], ...]:
+        """The seats of a start, but for contacts whose pairs the user names."""
+        if self._lower_pairs is None:
+            self._lower_pairs = lower_pairs(self._constraints)
+            self._nearest = {k: item for k, item in enumerate(self._constraints) if _takes_nearest(item)}
+        if not self._lower_pairs and not self._nearest:
+            return self._seats
+        poses = dict(zip(self._bodies, self._given(q0), strict=True))
+        found = [(pair.number, pair.at(poses)) for pair in self._lower_pairs]
+        seats: tuple[tuple[int, Seat], ...] = tuple(
+            (k, joint) for k, joint in found if joint is not None and self._constraints[k].name not in named
+        )
+        if self._axes_at is not None:
+            poses = dict(zip(self._bodies, self._axes_at, strict=True))
+        return seats + tuple((k, joint._nearest_at(poses)) for k, joint in self._nearest.items())
 
     @contextmanager
     def _axes_as_at(self, q: Array) -> Iterator[None]:
@@ -259,13 +274,19 @@ class PackedContents(Contents):
         packed.start_angles(state, isinstance(q0, Solution))
         return state
 
-    @staticmethod
-    def _state_of(name: str, packed: Packed, solution: Solution) -> Array:
-        if solution._ended.packed is packed:
-            return solution._ended.state
-        if is_earlier(solution._ended.packed, packed):
-            return taken_over(solution._ended.packed, packed, solution._ended.state)
-        raise InputError(f"{name} is a solution of another assembly, or of this one before a change; expected its own")
+    def _state_of(self, name: str, packed: Packed, solution: Solution) -> Array:
+        ended = solution._ended
+        if ended.packed is packed:
+            return ended.state
+        if is_earlier(ended.packed, packed):
+            return taken_over(ended.packed, packed, ended.state)
+        theirs = _told(solution._scene.bodies, solution._scene.constraints)
+        if theirs == _told(self._bodies, self._seated_constraints()) and is_alike(ended.packed, packed):
+            return adopted(ended.packed, packed, ended.state)
+        raise InputError(
+            f"{name} is a solution of another assembly, or of this one before a change; expected its own, "
+            "or one of a scene with the same bodies and constraints by name"
+        )
 
     def _place_tangents(self, packed: Packed, state: Array) -> None:
         """Start tangents at pairs on the side that they ask for."""
@@ -297,6 +318,12 @@ class PackedContents(Contents):
             state[at + 4 : at + TRACK] = 0.0
             # Rows that the last solve left are of other pairs.
             state[packed.kept_at :] = 0.0
+
+
+def _told(bodies: Iterable[Body], constraints: Iterable[Constraint]) -> tuple[list[object], list[object]]:
+    """What two scenes have in common that are the same but for numbers: one was pickled, say, or built anew."""
+    solids = [(body.name, body.fixed, [side.name for side in body.faces]) for body in bodies]
+    return [*solids], [(type(item), item.name) for item in constraints]
 
 
 def _takes_nearest(item: Constraint) -> TypeGuard[Joint]:

@@ -45,6 +45,7 @@ BENCHMARKS = (
     "mechanisms",
     "derivatives",
     "joint_errors",
+    "batches",
     "laws",
     "accuracy",
     "step",

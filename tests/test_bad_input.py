@@ -44,7 +44,9 @@ def solve_with_short_reference():
 
 
 def solve_from_a_stranger():
-    return touching().solve(touching().solve())
+    other = touching()
+    other.add(asm.Body("c", BALL, (0, 5, 0)))
+    return touching().solve(other.solve())
 
 
 def solve_from_before_a_change():

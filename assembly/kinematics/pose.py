@@ -16,6 +16,7 @@ from math import hypot, pi, sqrt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._copies import FoundAgain
 from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.errors import InputError, check_coordinates, number, real_array, vector
 
@@ -208,7 +209,7 @@ def retract(q: ArrayLike, twist: ArrayLike) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose(ReadOnlyArrays):
+class Pose(FoundAgain, ReadOnlyArrays):
     """A rigid placement, body to world: p_w = R(quaternion) p_b + position.
 
     Parameters

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.packing.asked import asked_between, asked_change
+from assembly.constraints.packing.earlier import is_same_scene
 from assembly.errors import InputError
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
@@ -83,7 +84,9 @@ def swept_solve(
         raise InputError(f"q0 is {type(start).__name__!r} with swept=True; expected a Solution, where the way begins")
     start._list_contacts()
     packed = scene.packed()
-    scene._state_of("q0", packed, start)
+    if not is_same_scene(start._ended.packed, packed):
+        # What its way begins with, proofs and what was asked for, is of that scene.
+        raise InputError("q0 is a solution of another assembly with swept=True, or before a change; expected its own")
     if not (start.success or start.way is not None):
         raise InputError(f"q0 is {start.status.name} with swept=True; expected a solution at which constraints hold")
     if not packed.keeps_apart:

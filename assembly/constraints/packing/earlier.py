@@ -1,4 +1,7 @@
-"""States of a scene as it was packed before: of another size, or with fewer places for contacts of clearances."""
+"""States of a scene as it was packed before: of another size, or with fewer places for contacts of clearances.
+
+Another scene with the same bodies and rows (a pickle of this one, one that was built again) may give a state as well.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.program import records as layout
 from assembly.proximity.features.solid_contact import TRACK
 
 if TYPE_CHECKING:
     from assembly.constraints.packing.scene import Packed
 
-__all__ = ["is_earlier", "is_same_scene", "stretch", "taken_over", "with_numbers_of"]
+__all__ = ["adopted", "is_alike", "is_earlier", "is_same_scene", "stretch", "taken_over", "with_numbers_of"]
 
 Array = NDArray[np.float64]
 
@@ -65,6 +69,26 @@ def with_numbers_of(packed: Packed, earlier: Packed, state: Array) -> Array:
         multipliers = taken[packed.multipliers_at : packed.residuals_at]
         multipliers *= earlier.unit / packed.unit
         multipliers[packed.lengths] *= packed.scale / earlier.scale
+    return taken
+
+
+def is_alike(one: Packed, packed: Packed) -> bool:
+    """Whether two scenes have the same unknowns, rows and tracked values, whatever the numbers in them."""
+    unknowns = [
+        each.rows_table[each.rows_table[layout.UNKNOWN_BLOCKS] :][: each.count].tolist() for each in (one, packed)
+    ]
+    counts = [(each.tracked - each.pair_rows, len(each._angles), each.is_implicit) for each in (one, packed)]
+    return (
+        one.count == packed.count and counts[0] == counts[1] and unknowns[0] == unknowns[1] and one.has_rows_of(packed)
+    )
+
+
+def adopted(other: Packed, packed: Packed, state: Array) -> Array:
+    """A state of another scene that is alike (`is_alike`) in this one; pairs of other faces are to be found anew."""
+    taken = taken_over(other, packed, state)
+    nets = [[face.surface.control_points for face in each.faces] for each in (other, packed)]
+    if packed.contacts and not all(np.array_equal(a, b) for a, b in zip(*nets, strict=True)):
+        taken[packed.contacts_at : packed.contacts_at + TRACK * len(packed.contacts)] = np.nan
     return taken
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._copies import FoundAgain
 from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, checked_color, items, positive
 from assembly.geometry.faces.boundary import Boundary, LoopLike, make_boundary
@@ -36,7 +37,7 @@ class BoundaryPoint(ReadOnlyArrays):
     point: NDArray[np.float64]
 
 
-class Face:
+class Face(FoundAgain):
     """A surface with a side that is outside, and with a boundary: what is left of it after trimming.
 
     Parameters
@@ -102,6 +103,11 @@ class Face:
         if outer is not None or self._holes:
             self._boundary = make_boundary(surface, outer, self._holes, tolerance)
             self.surface = self._boundary.surface
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Loops are made with the face.
+        made = {"_boundary": self._boundary} if self._outer is not None or self._holes else {}
+        return {**super().__getstate__(), **made}
 
     @cached_property
     def _boundary(self) -> Boundary:

@@ -16,6 +16,7 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._copies import FoundAgain
 from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, check_encodable, integer, is_masked, number, real_array, vector
 from assembly.geometry.splines import bezier
@@ -98,7 +99,7 @@ def checked_table_degree(curve: NurbsCurve) -> None:
         )
 
 
-class NurbsCurve(ReadOnlyArrays):
+class NurbsCurve(FoundAgain, ReadOnlyArrays):
     """A rational B-spline curve.
 
     Parameters

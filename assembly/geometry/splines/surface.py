@@ -15,6 +15,7 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._copies import FoundAgain
 from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, integer, number, real_array
 from assembly.geometry.splines import bezier
@@ -42,7 +43,7 @@ def _pair(name: str, value: Any) -> tuple[Any, Any]:
     return value[0], value[1]
 
 
-class NurbsSurface(ReadOnlyArrays):
+class NurbsSurface(FoundAgain, ReadOnlyArrays):
     """A rational tensor-product B-spline surface. Its outward normal is Su x Sv.
 
     Parameters
@@ -107,6 +108,10 @@ class NurbsSurface(ReadOnlyArrays):
         (a, b), (c, d) = self.domain
         domain = f"[{a:g}, {b:g}] x [{c:g}, {d:g}]"
         return f"NurbsSurface({label}{n} x {m} control points, degree {self.degree}, domain {domain})"
+
+    def __getstate__(self) -> dict[str, Any]:
+        # All of it as a face (`whole_face`) is made again.
+        return {name: value for name, value in super().__getstate__().items() if name != "_whole_face"}
 
     @cached_property
     def size(self) -> float:

@@ -390,7 +390,7 @@ def test_tolerance_can_be_given():
         (lambda s: s.mobility(drives=1), "drives is 1; expected True or False"),
         (lambda s: s.mobility(tolerance=0.0), "tolerance is 0; expected a positive number"),
         (lambda s: s.mobility(np.zeros((2, 7))), "q has shape"),
-        (lambda s: s.mobility(planar_four_bar().solve()), "q is a solution of another assembly"),
+        (lambda s: s.mobility(bricard().solve()), "q is a solution of another assembly"),
         (lambda s: s.mobility().trajectory(1), "k is 1; expected an integer from 0 to 0"),
         (lambda s: s.mobility().trajectory(0, amplitude=0.0), "amplitude is 0; expected a positive number"),
         (lambda s: s.mobility().trajectory(0, frames=2), "frames is 2; expected an integer from 5"),

@@ -1,0 +1,204 @@
+"""A batch of solves: rows through the loop in slices, on threads, and what is left by itself."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.constraints.packing.scene import Packed
+from assembly.derivatives.measure import Measure
+from assembly.derivatives.numbers import FrameOrigin
+from assembly.derivatives.parameter import Parameter
+from assembly.errors import InputError, integer, items
+from assembly.solve.attempts.attempts import new_workspace
+from assembly.solve.interruption import CTRL_C, STATUSES
+from assembly.solve.loop.settings import ASK_ADDRESS, COUNT, OBJECTIVE, SCATTER, SOLVED, UNSURE, VIOLATION
+from assembly.solve.loop_address import loop_address
+from assembly.solve.solution import Solution
+from assembly.studies.batches.columns import parameter_columns, set_all, writes_of
+from assembly.studies.batches.measured import can_measure, measured
+from assembly.studies.batches.result import Batch
+from assembly.studies.batches.rows import Desk, Span, Writes, solve_rows
+from assembly.studies.batches.starts import begun_states, starts_of
+
+if TYPE_CHECKING:
+    from assembly.assembly import Assembly
+
+__all__ = ["solve_many"]
+
+Array = NDArray[np.float64]
+# Rows of a slice: what a thread solves before anybody can stop it. A slice begins in some 10 us. Chosen.
+SLICE = 128
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What a batch is asked for."""
+
+    scene: Assembly
+    starts: Array | list[Solution]
+    parameters: tuple[Parameter, ...]
+    values: Array
+    of: tuple[Measure, ...]
+    options: Mapping[str, Any]
+    count: int
+
+    def start(self, k: int) -> Array | Solution:
+        """Where row k begins."""
+        return self.starts[k if len(self.starts) > 1 else 0]
+
+
+def solve_many(
+    scene: Assembly,
+    q0s: Any,
+    parameters: Mapping[Parameter, Any] | None,
+    of: Iterable[Measure],
+    threads: int | None,
+    retry: bool,
+    options: Mapping[str, Any],
+) -> Batch:
+    """See `Assembly.solve_many`."""
+    begin = perf_counter()
+    count = _processors() if threads is None else integer("threads", threads, 1, 1024)
+    if not isinstance(retry, (bool, np.bool_)):
+        raise InputError(f"retry is {retry!r}; expected True or False")
+    if options.get("verbose"):
+        raise InputError(f"verbose is {options['verbose']!r} of a batch; expected 0, a table is of one solve")
+    measures = items("of", of, "measures")
+    for item in measures:
+        if not isinstance(item, Measure):
+            raise TypeError(f"of has {item!r}; expected a Measure")
+    starts = starts_of(scene, q0s)
+    columns = parameter_columns(scene, parameters)
+    rows = len(columns[1]) if columns[0] else len(starts)
+    if len(starts) not in (1, rows):
+        raise InputError(f"q0s has {len(starts)} rows; expected 1, or {rows} as parameters have")
+    asked = _Asked(scene, starts, *columns, measures, options, rows)
+    out = _empty(asked)
+    left = _by_the_loop(asked, out, min(count, -(-rows // SLICE)), bool(retry))
+    _by_themselves(asked, out, left)
+    return Batch(**out, parameters=asked.parameters, values=asked.values, of=measures, seconds=perf_counter() - begin)
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _empty(asked: _Asked) -> dict[str, Any]:
+    """The arrays of a result."""
+    n = asked.count
+    return {
+        "q": np.empty((n, len(asked.scene.bodies), 7)),
+        "status": np.full(n, None, dtype=object),
+        "objective": np.empty(n),
+        "feasibility": np.empty(n),
+        "iterations": np.zeros(n, dtype=np.int64),
+        "alone": np.zeros(n, dtype=bool),
+        "measures": np.full((n, len(asked.of)), np.nan),
+    }
+
+
+def _by_the_loop(asked: _Asked, out: dict[str, Any], threads: int, retry: bool) -> Sequence[int]:
+    """Solve what is a run of the loop and nothing else; the rows that are left."""
+    scene, everything = asked.scene, range(asked.count)
+    first = asked.start(0)
+    scene._take_seats(first)
+    packed = scene.packed()
+    if not packed.is_loop_alone or scene._lower_pairs or scene._nearest:
+        return everything
+    if not all(can_measure(packed, item) for item in asked.of):
+        return everything
+    packed.refresh()
+    writes = writes_of(packed, asked.parameters, asked.values, asked.count)
+    places = any(isinstance(item._number, FrameOrigin) for item in asked.parameters)
+    begun = None if writes is None else begun_states(scene, packed, asked.starts, bool(asked.parameters), places)
+    if writes is None or begun is None:
+        return everything
+    warm = isinstance(asked.starts, list)
+    settings = scene._settings(dict(asked.options), CTRL_C, warm)
+    ended = np.empty((asked.count, packed.memory_at))
+    _solve_slices(packed, settings, writes, begun, ended, threads)
+    codes = ended[:, packed.results_at].astype(np.int64)
+    left = codes != SOLVED if retry else codes == UNSURE
+    if not warm and packed.chooses_turns:
+        # Bodies that were gathered may be on other turns.
+        left |= ended[:, packed.results_at + SCATTER] == 1.0
+    if isinstance(asked.starts, list):
+        left |= np.array([item._fit is not None for item in asked.starts])
+    _tell(packed, asked, out, ended, writes)
+    return np.flatnonzero(left).tolist()
+
+
+def _solve_slices(packed: Packed, settings: Array, writes: Writes, begun: Array, ended: Array, threads: int) -> None:
+    """Solve all rows in place, on so many threads; an exception of a signal's handler is raised between slices."""
+    loop = loop_address(packed.end_effectors)
+    slices = iter(range(0, len(ended), SLICE))
+
+    def work(settings: Array) -> None:
+        own = packed.rows_table.copy(), packed.rows_pool.copy(), np.zeros(packed._state_size)
+        desk = Desk(*own, *new_workspace(packed))
+        # The next slice is taken under the interpreter's lock.
+        for first in slices:
+            span = Span(first, min(first + SLICE, len(ended)), loop)
+            # Signatures have plain tuples.
+            solve_rows(tuple(desk), settings, tuple(writes), begun, ended, tuple(span), packed.end_effectors)
+            if threads == 1:
+                CTRL_C.is_over()
+
+    if threads == 1:
+        work(settings)
+        return
+    quiet = settings.copy()
+    quiet[ASK_ADDRESS] = 0.0
+    with ThreadPoolExecutor(threads) as pool:
+        futures = [pool.submit(work, quiet) for _ in range(threads)]
+        try:
+            for future in futures:
+                future.result()
+        except BaseException:
+            for _ in slices:
+                pass
+            raise
+
+
+def _tell(packed: Packed, asked: _Asked, out: dict[str, Any], ended: Array, writes: Writes) -> None:
+    """What rows of the loop ended with."""
+    results = ended[:, packed.results_at :]
+    codes = results[:, 0].astype(np.int64)
+    out["q"][:] = ended[:, : packed.contacts_at].reshape(out["q"].shape)
+    out["status"][:] = [STATUSES[code] if code < len(STATUSES) else None for code in codes.tolist()]
+    out["objective"][:] = results[:, OBJECTIVE] * packed.unit
+    out["iterations"][:] = results[:, COUNT]
+    residuals = ended[:, packed.residuals_at : packed.results_at]
+    off = np.where(packed.one_sided, np.maximum(-residuals, 0.0), np.abs(residuals))
+    out["feasibility"][:] = np.where(results[:, VIOLATION] == np.inf, np.inf, off.max(axis=1, initial=0.0))
+    solved = codes == SOLVED
+    if asked.of and solved.any():
+        own = Writes(writes.places, writes.turns, writes.numbers[solved])
+        columns = asked.parameters, asked.values[solved] if asked.parameters else asked.values
+        out["measures"][solved] = measured(packed, asked.of, ended[solved], own, columns)
+
+
+def _by_themselves(asked: _Asked, out: dict[str, Any], rows: Sequence[int]) -> None:
+    """Solve rows one after the other, with all that `Assembly.solve` tries."""
+    before = [item.value for item in asked.parameters]
+    try:
+        for k in rows:
+            if asked.parameters:
+                set_all(asked.parameters, asked.values[k].tolist())
+            solution = asked.scene.solve(asked.start(k), **asked.options)
+            out["q"][k], out["status"][k], out["alone"][k] = solution.q, solution.status, True
+            out["objective"][k], out["feasibility"][k] = solution.objective, solution.feasibility
+            out["iterations"][k] = solution.iterations
+            told = [item.value(solution) for item in asked.of] if solution.success else np.nan
+            out["measures"][k] = told
+    finally:
+        if asked.parameters and len(rows):
+            set_all(asked.parameters, before)

@@ -1,0 +1,275 @@
+"""A batch of solves: the bits of single ones, whoever solves them and in what order; failures are rows."""
+
+from __future__ import annotations
+
+import dataclasses
+import signal
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.constraints.model.dexterity import Dexterity
+from assembly.errors import InputError
+from assembly.kinematics.pose import rotation_matrix
+from assembly.studies.batches import solving
+from benchmarks.linkages import boxes
+from benchmarks.linkages import four_bar as spatial_four_bar
+from tests.derivatives.sensitivity_scenes import clips
+
+
+def near(scene, count, spread, seed=0):
+    """Starts beside a solution, with turned bodies."""
+    rng = np.random.default_rng(seed)
+    q0s = np.repeat(scene.solve().q[None], count, 0)
+    moving = [k for k, body in enumerate(scene.bodies) if not body.fixed]
+    q0s[:, moving] += spread * rng.normal(size=(count, len(moving), 7))
+    q0s[..., 3:] /= np.linalg.norm(q0s[..., 3:], axis=2, keepdims=True)
+    return q0s
+
+
+def linkage():
+    return spatial_four_bar()[0]
+
+
+def limited():
+    """Turns of limited angles are told by where rows begin."""
+    scene, crank = spatial_four_bar()
+    crank.angle = None
+    crank.freedom().limits = (0.1, 0.5)
+    scene.minimize(asm.PointDistance(scene.bodies[2].point(1.5, 0.4, 0.2), (1.0, 2.0, 3.0)))
+    return scene
+
+
+def touching():
+    return clips().scene
+
+
+def dexterous():
+    scene, crank = spatial_four_bar()
+    crank.angle = None
+    crank.freedom().limits = (-1.0, 1.0)
+    scene.maximize(Dexterity(scene.bodies[2].point(1.5, 0.4, 0.2), [crank]))
+    return scene
+
+
+def kept_apart():
+    balls = [asm.Body(name, asm.shapes.sphere(1.0), (2.5 * k, 0, 0), fixed=k == 0) for k, name in enumerate("ab")]
+    scene = asm.Assembly(balls)
+    scene.constrain(asm.Clearance())
+    scene.minimize(asm.PointDistance(balls[1].point(0, 0, 0), (0.5, 0.0, 0.0)))
+    return scene
+
+
+def judged(scene, q):
+    """The largest violation of the joints' rows, in plain numpy: points and axes of the spatial four-bar."""
+    off = []
+    for joint in scene.constraints:
+        a, b = joint.frame_a, joint.frame_b
+        rows = [q[scene.bodies.index(frame.body)] for frame in (a, b)]
+        turns = [rotation_matrix(row[3:]) for row in rows]
+        (p, u), (r, v) = (
+            (row[:3] + turn @ frame.origin, turn @ frame.axes)
+            for row, turn, frame in zip(rows, turns, (a, b), strict=True)
+        )
+        off += [*(p - r)]
+        if isinstance(joint, asm.Revolute):
+            off += [*np.cross(u[:, 2], v[:, 2])]
+    return float(np.abs(off).max())
+
+
+@pytest.mark.parametrize(
+    ("make", "spread", "alone"),
+    [
+        (linkage, 0.3, 0),
+        (limited, 0.02, 3),
+        (touching, 1e-3, 3),
+        (dexterous, 0.02, 6),
+        (lambda: boxes(2, 0), 0.2, 6),
+        (kept_apart, 0.0, 6),
+    ],
+    ids=["linkage", "limited", "touching", "dexterous", "boxes", "kept apart"],
+)
+def test_a_row_has_the_bits_of_a_solve(make, spread, alone):
+    scene = make()
+    q0s = near(scene, 6, spread)
+    batch = scene.solve_many(q0s, threads=1)
+    assert len(batch) == 6 and int(batch.alone.sum()) <= alone
+    for k, q0 in enumerate(q0s):
+        single = scene.solve(q0)
+        assert batch.status[k] is single.status and batch.iterations[k] == single.iterations
+        np.testing.assert_array_equal(batch.q[k], single.q)
+        assert batch.feasibility[k] == single.feasibility and batch.objective[k] == single.objective
+    # And again, from solutions.
+    found = [scene.solve(q0) for q0 in q0s]
+    warm = scene.solve_many(found, threads=1)
+    for k, one in enumerate(found):
+        np.testing.assert_array_equal(warm.q[k], scene.solve(one).q)
+
+
+def test_nothing_depends_on_threads_or_order():
+    scene = linkage()
+    q0s = near(scene, 1000, 0.3)
+    one = scene.solve_many(q0s, threads=1)
+    order = np.random.default_rng(1).permutation(len(q0s))
+    for other in (scene.solve_many(q0s, threads=3), scene.solve_many(q0s[order], threads=2)):
+        back = other.q if np.array_equal(other.q, one.q) else other.q[np.argsort(order)]
+        np.testing.assert_array_equal(back, one.q)
+    assert one.success.all() and not one.alone.any()
+    assert max(judged(scene, q) for q in one.q) < 1e-12
+    np.testing.assert_array_equal(scene.solve_many(q0s[:1]).q, one.q[:1])
+
+
+def sizes(scene, crank, count, seed=0):
+    """Parameters of the spatial four-bar: a link's length, where the rocker has its joint, the drive."""
+    rng = np.random.default_rng(seed)
+    return {
+        asm.Parameter(scene.constraints[1].frame_a, "origin", "x"): rng.uniform(0.8, 1.1, count),
+        asm.Parameter(scene.constraints[2].frame_b, "origin", "y"): rng.uniform(1.8, 2.3, count),
+        asm.Parameter(crank, "angle"): rng.uniform(-4.0, 9.0, count),
+    }
+
+
+@pytest.mark.parametrize("warm", [False, True])
+def test_rows_of_parameters_are_scenes_with_these_numbers(warm):
+    scene, crank = spatial_four_bar()
+    coupler, rocker = scene.bodies[2:]
+    of = [
+        asm.Measure(scene.constraints[3], name="rocker"),
+        asm.Measure(coupler.point(1.0, 0.5, 0.0), "z"),
+        asm.Measure((scene.constraints[1].frame_a, rocker)),
+        asm.Measure("objective"),
+    ]
+    start = scene.solve() if warm else None
+    columns = sizes(scene, crank, 300)
+    before = [item.value for item in columns]
+    batch = scene.solve_many(start, parameters=columns, of=of, threads=2)
+    assert [item.value for item in columns] == before and batch.success.all() and not batch.alone.any()
+    assert np.array_equal(scene.solve(start).q, scene.solve(start).q)
+    assert batch.values.shape == (300, 3) and batch.measure("rocker").shape == (300,)
+    for k in range(0, 300, 30):
+        for item, values in columns.items():
+            item.value = float(values[k])
+        single = scene.solve(start)
+        np.testing.assert_allclose(batch.q[k], single.q, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(batch.measures[k], [item.value(single) for item in of], rtol=0, atol=2e-13)
+        assert judged(scene, batch.q[k]) < 1e-12
+
+
+def test_targets_limits_and_contacts_are_numbers_of_rows():
+    scene = clips().scene
+    (_, goal), *_ = scene.objectives
+    touch = scene.constraints[0]
+    target = np.array(goal.target)
+    columns = {asm.Parameter(goal, "target", axis): target[k] + np.linspace(0, 0.5, 5) for k, axis in enumerate("xyz")}
+    of = [asm.Measure(touch), asm.Measure("objective")]
+    batch = scene.solve_many(scene.solve(), parameters=columns, of=of)
+    start = scene.solve()
+    for k in range(5):
+        goal.target = [values[k] for values in columns.values()]
+        single = scene.solve(start)
+        np.testing.assert_array_equal(batch.q[k], single.q)
+        assert abs(batch.measures[k, 0]) < 1e-12 * 40 and batch.objective[k] == single.objective
+    limited_scene = limited()
+    hinge = limited_scene.constraints[0]
+    asked = {"lower": np.array([0.1, 0.6]), "upper": np.array([0.5, 0.7])}
+    ends = {asm.Parameter(hinge.freedom(), name): at for name, at in asked.items()}
+    angle = limited_scene.solve_many(parameters=ends, of=[asm.Measure(hinge)]).measures[:, 0]
+    assert (angle >= asked["lower"] - 1e-12).all() and (angle <= asked["upper"] + 1e-12).all()
+
+
+def test_rows_that_fail_are_rows():
+    scene, crank = spatial_four_bar()
+    length = asm.Parameter(scene.constraints[1].frame_a, "origin", "x")
+    columns = {length: np.array([1.0, 9.0, 1.1])}
+    of = [asm.Measure(scene.bodies[3], "x")]
+    loop = scene.solve_many(parameters=columns, of=of, retry=False)
+    assert loop.success.tolist() == [True, False, True] and not loop.alone.any()
+    whole = scene.solve_many(parameters=columns, of=of)
+    assert whole.status[1] is asm.Status.INFEASIBLE and whole.alone.tolist() == [False, True, False]
+    for batch in (loop, whole):
+        assert np.isnan(batch.measures[:, 0]).tolist() == [False, True, False] and batch.feasibility[1] > 0.1
+        assert "SOLVED" in str(batch) and repr(batch) == "Batch(3 rows, 2 solved)"
+    np.testing.assert_array_equal(whole.q[[0, 2]], loop.q[[0, 2]])
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        loop.seconds = 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        loop.q[0] = 0.0
+
+
+def test_faces_of_parameters_are_made_row_by_row():
+    ground = asm.Body("ground", asm.shapes.plane(20, 20), fixed=True)
+    ball = asm.Body("ball", asm.Parametric(asm.shapes.sphere, radius=1.0), (0, 0, 2.0))
+    scene = asm.Assembly([ground, ball])
+    scene.constrain(asm.Contact(ground, ball))
+    batch = scene.solve_many(parameters={asm.Parameter(ball, "radius"): [0.5, 1.5]}, of=[asm.Measure(ball, "z")])
+    np.testing.assert_allclose(batch.measures[:, 0], [0.5, 1.5], rtol=0, atol=1e-12)
+    assert batch.alone.all() and ball.shape.numbers["radius"] == 1.0
+
+
+class Stop(Exception):
+    """What a handler raises."""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers of signals on this system")
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_signal_ends_a_batch(threads, monkeypatch):
+    scene = linkage()
+    q0s = np.repeat(near(scene, 200, 0.3), 200, 0)
+
+    def stop(*_):
+        raise Stop
+
+    slices = []
+    solve_rows = solving.solve_rows
+    monkeypatch.setattr(solving, "solve_rows", lambda *given: slices.append(0) or solve_rows(*given))
+    before = signal.signal(signal.SIGALRM, stop)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.05)
+        with pytest.raises(Stop):
+            scene.solve_many(q0s, threads=threads)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert len(slices) < len(q0s) / solving.SLICE
+    assert scene.solve_many(q0s[:2]).success.all()
+
+
+def test_bad_input():
+    scene, crank = spatial_four_bar()
+    angle = asm.Parameter(crank, "angle")
+    other = asm.Parameter(spatial_four_bar()[1], "angle")
+    q0s = np.repeat(scene.q[None], 2, 0)
+    q0s[1, 2, 3] = 3.0
+    for call, error, text in [
+        (lambda: scene.solve_many(np.zeros((2, 3, 7))), InputError, r"q0s has shape \(2, 3, 7\)"),
+        (lambda: scene.solve_many(q0s), InputError, r"q0s\[1, 2, 3:\] is .* a unit quaternion"),
+        (lambda: scene.solve_many([scene.solve(), 3]), TypeError, r"q0s\[1\] is 3; expected a Solution"),
+        (lambda: scene.solve_many(limited().solve()), InputError, "q0 is a solution of another assembly"),
+        (lambda: scene.solve_many(parameters=[angle]), TypeError, "expected a mapping of Parameter"),
+        (lambda: scene.solve_many(parameters={"angle": [1.0]}), TypeError, "the key 'angle'; expected a Parameter"),
+        (lambda: scene.solve_many(parameters={other: [1.0]}), InputError, "of another scene"),
+        (lambda: scene.solve_many(parameters={angle: [1.0, np.nan]}), InputError, r"is nan; expected finite"),
+        (lambda: scene.solve_many(q0s[:0], parameters={angle: [1.0]}), InputError, "q0s has shape"),
+        (
+            lambda: scene.solve_many(np.repeat(scene.q[None], 2, 0), parameters={angle: [1.0] * 3}),
+            InputError,
+            "q0s has 2 rows; expected 1, or 3",
+        ),
+        (lambda: scene.solve_many(threads=0), InputError, "threads is 0"),
+        (lambda: scene.solve_many(retry=1), InputError, "retry is 1; expected True or False"),
+        (lambda: scene.solve_many(of=["x"]), TypeError, "of has 'x'; expected a Measure"),
+        (lambda: scene.solve_many(verbose=1), InputError, "verbose is 1 of a batch"),
+        (lambda: scene.solve_many(tolerances=1), InputError, "option 'tolerances' is unknown"),
+        (limited_batch, InputError, "expected lower <= upper"),
+    ]:
+        with pytest.raises(error, match=text):
+            call()
+    assert angle.value == 0.3
+
+
+def limited_batch():
+    scene = limited()
+    freedom = scene.constraints[0].freedom()
+    columns = {asm.Parameter(freedom, "lower"): [0.1, 0.6], asm.Parameter(freedom, "upper"): [0.5, 0.5]}
+    return scene.solve_many(parameters=columns)
