@@ -98,12 +98,12 @@ if TYPE_CHECKING:
     from assembly.step import write_brep as write_brep
     from assembly.step import write_iges as write_iges
     from assembly.step import write_step as write_step
+    from assembly.studies.batches.result import Batch as Batch
     from assembly.studies.branches.following import follow as follow
     from assembly.studies.branches.options import FollowOptions as FollowOptions
     from assembly.studies.branches.result import Branch as Branch
     from assembly.studies.branches.result import BranchEvent as BranchEvent
     from assembly.studies.branches.signs import configuration as configuration
-    from assembly.studies.batches.result import Batch as Batch
     from assembly.studies.fits import Play as Play
     from assembly.studies.fits import play as play
     from assembly.studies.interference.clash import Clash as Clash

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from assembly.derivatives.measure import Measure
     from assembly.derivatives.parameter import Parameter
     from assembly.solve.diagnosis.mobility import Mobility
-    from assembly.studies.multistart import Executor
     from assembly.studies.batches.result import Batch
+    from assembly.studies.multistart import Executor
     from assembly.tracking.tracker import Tracker
 
 __all__ = ["Assembly"]
