@@ -60,6 +60,9 @@ class Assembly(PackedContents):
     weights' ratios aside, and starts may change between solves without packing again.
     """
 
+    # Whether solves that fail are left at that: what goes along a branch is to end where the branch does.
+    _stays_near = False
+
     def __repr__(self) -> str:
         return f"Assembly({len(self._bodies)} bodies, {len(self._constraints)} constraints)"
 
@@ -137,6 +140,8 @@ class Assembly(PackedContents):
         interruption: Interruption,
     ) -> Solution:
         """A solve that failed, again with other axes or from elsewhere, where that may help."""
+        if self._stays_near:
+            return solution
         if solution.axes and not isinstance(q0, Solution) and not swept:
             from assembly.studies.nearest_axes import with_axes_of_the_rest
 

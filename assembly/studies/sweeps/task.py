@@ -1,0 +1,53 @@
+"""What is sent to a worker: nothing that this file imports loads Numba, so that the worker may be told what to load."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import platform
+import sys
+import threading
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from assembly.studies.sweeps.work import ChunkDone
+
+__all__ = ["compute", "portable_variables"]
+
+# Of every thread the studies that it worked for last, unpickled.
+_known = threading.local()
+MOST_KNOWN = 2
+
+
+def portable_variables() -> dict[str, str]:
+    """Environment variables of kernels that round the same on all processors of a kind.
+
+    Those of `assembly._kernel.targets`, which nobody can import without Numba, who reads them when it is imported.
+    """
+    is_x86 = platform.machine().lower() in ("x86_64", "amd64")
+    return {"NUMBA_CPU_NAME": "x86-64-v3" if is_x86 else "generic", "NUMBA_CPU_FEATURES": ""}
+
+
+def compute(job: bytes, key: str, chunk: bytes) -> ChunkDone:
+    """Solve a chunk of a study's runs, in any process or thread.
+
+    Parameters
+    ----------
+    job : bytes
+        The scene, its parameters and the measures, pickled.
+    key : str
+        Of these bytes: a worker that has them unpickled already does not do it again.
+    chunk : bytes
+        The runs, pickled.
+    """
+    if "numba" not in sys.modules:
+        os.environ.update(portable_variables())
+    from assembly.studies.sweeps.work import Worker
+
+    workers: dict[str, Any] = _known.__dict__.setdefault("workers", {})
+    if key not in workers:
+        while len(workers) >= MOST_KNOWN:
+            del workers[next(iter(workers))]
+        workers[key] = Worker(pickle.loads(job))
+    done: ChunkDone = workers[key].compute(pickle.loads(chunk))
+    return done
