@@ -112,7 +112,7 @@ if TYPE_CHECKING:
     from assembly.studies.sweeps.plans import starts as starts
     from assembly.studies.sweeps.result import Study as Study
     from assembly.studies.sweeps.scheduling import StudyError as StudyError
-    from assembly.studies.sweeps.study import study as study
+    from assembly.studies.sweeps.run_study import study as study
     from assembly.studies.synthesis.dimensions import synthesize as synthesize
     from assembly.studies.synthesis.result import Synthesis as Synthesis
     from assembly.studies.synthesis.station import Station as Station
@@ -201,7 +201,7 @@ else:
             "rows": "assembly.studies.sweeps.plans",
             "sobol": "assembly.studies.sweeps.plans",
             "starts": "assembly.studies.sweeps.plans",
-            "study": "assembly.studies.sweeps.study",
+            "study": "assembly.studies.sweeps.run_study",
             "synthesize": "assembly.studies.synthesis.dimensions",
             "Tolerances": "assembly.studies.tolerances.result",
             "Trace": "assembly.tracking.trace",

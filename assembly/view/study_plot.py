@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -50,7 +50,7 @@ def _map(found: Study, name: str, axes: Axes) -> None:
         lines = found.plan.axes
         order = [np.argsort(line, kind="stable") for line in lines]
         field = values.reshape(len(lines[0]), len(lines[1]))[np.ix_(*order)]
-        drawn = axes.pcolormesh(lines[0][order[0]], lines[1][order[1]], field.T, shading="nearest", cmap="viridis")
+        drawn: Any = axes.pcolormesh(lines[0][order[0]], lines[1][order[1]], field.T, shading="nearest", cmap="viridis")
     else:
         held = found.success
         axes.plot(found.table[x][~held], found.table[y][~held], "x", color="lightgray", markersize=3.0)

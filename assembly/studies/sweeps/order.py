@@ -28,8 +28,8 @@ def curve_order(parts: Array) -> Rows:
 
     Notes
     -----
-    J. Skilling, Programming the Hilbert curve, AIP Conference Proceedings 707 (2004), 381. Rows of one cell of the curve
-    stay in their order; of more than 62 numbers the first 62 count.
+    J. Skilling, Programming the Hilbert curve, AIP Conference Proceedings 707 (2004), 381. Rows of one cell of the
+    curve stay in their order; of more than 62 numbers the first 62 count.
     """
     used = parts[:, :KEY_BITS]
     dimensions = used.shape[1]

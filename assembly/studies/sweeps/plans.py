@@ -214,8 +214,8 @@ def as_plan(plan: Any) -> Plan:
         return plan
     if isinstance(plan, (str, bytes, Mapping)) or not isinstance(plan, Iterable):
         raise TypeError(
-            f"plan is {plan!r}; expected asm.grid, asm.sobol, asm.latin_hypercube, asm.rows, asm.starts, or dictionaries "
-            "of parameter -> value"
+            f"plan is {plan!r}; expected asm.grid, asm.sobol, asm.latin_hypercube, asm.rows, asm.starts, or "
+            "dictionaries of parameter -> value"
         )
     given = list(plan)
     if not given:

@@ -66,7 +66,8 @@ class _Waiting:
         a_row = self._spent / self._solved if self._solved else FIRST_GUESS
         share = a_row * self._left / (SHARES * self._workers)
         most = min(self._seconds, share) / a_row
-        chosen, rows = [], 0
+        chosen: list[int] = []
+        rows = 0
         while self._ready and (not chosen or rows < most):
             number = heapq.heappop(self._ready)
             chosen.append(number)

@@ -43,7 +43,7 @@ class Task(NamedTuple):
 
 
 class RunDone(NamedTuple):
-    """What came of a run, a row a place in the lists; `starts` where others may begin, None where nothing was solved."""
+    """What came of a run, a row a place in the lists; `starts` are where others may begin, None without one."""
 
     number: int
     rows: list[int]

@@ -17,7 +17,7 @@ from assembly.errors import InputError, positive
 from assembly.studies.sweeps.folder import Folder
 from assembly.studies.sweeps.identity import manifest_of
 from assembly.studies.sweeps.measuring import columns_of
-from assembly.studies.sweeps.plans import Plan, as_plan
+from assembly.studies.sweeps.plans import as_plan
 from assembly.studies.sweeps.result import Study, new_study
 from assembly.studies.sweeps.scheduling import Executor, StudyError, in_process, on_executor
 from assembly.studies.sweeps.table import Table
@@ -117,7 +117,7 @@ def _computed(
             if kernels and done.kernels != kernels:
                 raise StudyError(
                     f"rows were computed by kernels for {kernels}, and others now by kernels for {done.kernels}, which "
-                    f"may round otherwise; expected one kind: start workers as fresh processes, which take portable ones"
+                    "may round otherwise; expected one kind: fresh processes as workers take portable ones"
                 )
             kernels = done.kernels
             for run in done.runs:
