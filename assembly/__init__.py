@@ -111,8 +111,8 @@ if TYPE_CHECKING:
     from assembly.studies.sweeps.plans import sobol as sobol
     from assembly.studies.sweeps.plans import starts as starts
     from assembly.studies.sweeps.result import Study as Study
-    from assembly.studies.sweeps.scheduling import StudyError as StudyError
     from assembly.studies.sweeps.run_study import study as study
+    from assembly.studies.sweeps.scheduling import StudyError as StudyError
     from assembly.studies.synthesis.dimensions import synthesize as synthesize
     from assembly.studies.synthesis.result import Synthesis as Synthesis
     from assembly.studies.synthesis.station import Station as Station

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-__all__ = ["Progress", "checked_progress", "watched"]
+__all__ = ["Advance", "Progress", "checked_progress", "watched"]
 
 # What the argument `progress` may be: whether a bar is shown, or who is called with what is done and what there is.
 Progress = bool | Callable[[int, int], object]

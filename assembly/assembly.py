@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 from functools import partial
 from os import PathLike
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._progress import Progress
 from assembly.constraints.packing.corners import corners_of
 from assembly.constraints.packing.scene import MOST_CROWDING
 from assembly.errors import InputError
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 __all__ = ["Assembly"]
 
 Array = NDArray[np.float64]
+_LOG = logging.getLogger("assembly.solve")
 # How a solve may end where solids come to lie on each other, and corners are not listed.
 AT_KINKS = (Status.STALLED, Status.ITERATION_LIMIT, Status.INFEASIBLE, Status.CONTACT_LOST)
 
@@ -128,6 +131,8 @@ class Assembly(PackedContents):
             solution = self._tried_otherwise(solution, q0, starts, swept, options, interruption)
         if options and Options.of(options).verbose:
             print(solution.iteration_table())
+        if _LOG.isEnabledFor(logging.DEBUG):
+            _LOG.debug("%s, %d iterations, %.6f s", solution.status.name, solution.iterations, solution.seconds)
         return solution
 
     def _tried_otherwise(
@@ -292,7 +297,13 @@ class Assembly(PackedContents):
             self._pack_with_more_places()
 
     def solve_all(
-        self, *, starts: int = 16, seed: int = 0, time_limit: float | None = None, **options: Any
+        self,
+        *,
+        starts: int = 16,
+        seed: int = 0,
+        time_limit: float | None = None,
+        progress: Progress = False,
+        **options: Any,
     ) -> list[Solution]:
         """The distinct solutions found from several starts: the bodies' poses, then random ones.
 
@@ -305,6 +316,9 @@ class Assembly(PackedContents):
             Of the random starts: the same seed, the same starts.
         time_limit : float, optional
             Seconds after which no start is begun any more, and the last one ends.
+        progress : bool or callable
+            True shows a bar of the starts; a function is called with how many are done, and of how many, and ends the
+            search where it returns True. After Ctrl-C the solutions that were found are returned.
         **options
             See `Options`.
 
@@ -318,7 +332,7 @@ class Assembly(PackedContents):
         """
         from assembly.studies.multistart import solve_all
 
-        return solve_all(self, starts, seed, Interruption(time_limit), options)
+        return solve_all(self, starts, seed, Interruption(time_limit), progress, options)
 
     def tracker(self, follow: Point | Frame | Body, **options: Any) -> Tracker:
         """What follows a hand that holds a point or a frame of a body.

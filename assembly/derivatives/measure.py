@@ -85,7 +85,7 @@ class Measure:
         if self.kind == "objective":
             return solution.objective
         if self.kind == "coordinate":
-            return solution.values[f"{self.thing.joint.name}.{self.thing.name}"]
+            return solution._value(self.thing.joint, self.thing.name)
         if self.kind == "gap":
             return solution.contacts[self.thing.name].gap
         if self.kind == "wrench":

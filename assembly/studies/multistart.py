@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from assembly._progress import Progress, checked_progress, watched
 from assembly.errors import integer
 from assembly.solve.attempts.postures import postures_from
 from assembly.solve.attempts.starts import moving_rows, scattered
@@ -19,9 +21,16 @@ if TYPE_CHECKING:
 
 __all__ = ["solve_all"]
 
+_LOG = logging.getLogger("assembly.studies")
+
 
 def solve_all(
-    scene: Assembly, starts: int, seed: int, interruption: Interruption, options: Mapping[str, Any]
+    scene: Assembly,
+    starts: int,
+    seed: int,
+    interruption: Interruption,
+    progress: Progress,
+    options: Mapping[str, Any],
 ) -> list[Solution]:
     """See `Assembly.solve_all`."""
     count = integer("starts", starts, 1, 10**6)
@@ -29,13 +38,20 @@ def solve_all(
     packed = scene.packed()
     moving = moving_rows(scene.bodies)
     found: list[Solution] = []
-    with postures_from(packed, scene.q):
-        for start in range(count):
-            q = scene.q if start == 0 else scattered(rng, scene.q, moving, packed.scale)
-            solution = scene._from_start(q, None, dict(options), interruption)
-            if solution.success and not any(are_one(solution, other) for other in found):
-                found.append(solution)
-            if interruption.is_over():
-                break
+    checked_progress(progress)
+    begun = 0
+    with postures_from(packed, scene.q), watched(progress, "solve_all", count, "start") as advance:
+        try:
+            for start in range(count):
+                begun = start
+                q = scene.q if start == 0 else scattered(rng, scene.q, moving, packed.scale)
+                solution = scene._from_start(q, None, dict(options), interruption)
+                if solution.success and not any(are_one(solution, other) for other in found):
+                    found.append(solution)
+                if not advance(1) or interruption.is_over():
+                    break
+        except KeyboardInterrupt:
+            # What is found is found.
+            _LOG.warning("solve_all was interrupted in start %d of %d", begun + 1, count)
     # Of equal objectives, which are so up to rounding only where a scene is symmetric, the first found comes first.
     return sorted(found, key=lambda solution: solution.objective)

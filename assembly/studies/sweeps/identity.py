@@ -70,4 +70,4 @@ def _measure_hash(column: Column) -> str:
     code = function.__code__
     numbers = [each for each in code.co_consts if isinstance(each, (int, float, str))]
     parts = repr((code.co_code, code.co_names, numbers, function.__defaults__)).encode()
-    return f"{function.__module__}.{function.__qualname__} {hashlib.sha256(parts).hexdigest()[:16]}"
+    return f"{function.__qualname__} {hashlib.sha256(parts).hexdigest()[:16]}"

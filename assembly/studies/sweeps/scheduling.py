@@ -80,11 +80,18 @@ def in_process(job: Job, table: Table, seconds: float, take: Take, say: Callable
     """Compute a study here; `say` hears how many rows were solved, and may end it."""
     worker = Worker(job)
     waiting = _Waiting(table, seconds, 1)
-    while waiting:
-        tasks = [table.task(number) for number in waiting.chunk()]
-        done = worker.compute(tasks, say)
-        if not take(done) or len(done.runs) < len(tasks):
-            return
+    goes_on = True
+
+    def heard(count: int) -> bool:
+        nonlocal goes_on
+        goes_on = say(count)
+        return goes_on
+
+    while waiting and goes_on:
+        done = worker.compute([table.task(number) for number in waiting.chunk()], heard)
+        take(done)
+        if done.interrupted:
+            raise KeyboardInterrupt
         waiting.took(done)
 
 
@@ -106,10 +113,12 @@ def on_executor(job: Job, table: Table, seconds: float, take: Take, executor: Ex
             future = answers.get()
             under_way.discard(future)
             done: ChunkDone = future.result()
-            waiting_on = take(done)
-            waiting.took(done)
-            if not waiting_on:
+            goes_on = take(done)
+            if done.interrupted:
+                raise KeyboardInterrupt
+            if not goes_on:
                 return
+            waiting.took(done)
     finally:
         for future in under_way:
             future.cancel()

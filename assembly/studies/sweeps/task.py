@@ -50,4 +50,7 @@ def compute(job: bytes, key: str, chunk: bytes) -> ChunkDone:
             del workers[next(iter(workers))]
         workers[key] = Worker(pickle.loads(job))
     done: ChunkDone = workers[key].compute(pickle.loads(chunk))
+    if done.interrupted:
+        # It was stopped amid a row, wherever that left the numbers of its scene.
+        del workers[key]
     return done

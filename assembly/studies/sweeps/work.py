@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from assembly.assembly import Assembly
 from assembly.derivatives.parameter import Parameter
+from assembly.errors import InputError
 from assembly.solve.attempts.starts import moving_rows, scattered
 from assembly.solve.solution import Solution
 from assembly.studies.sweeps.chain import ERROR, Chain, Start, Told
@@ -55,11 +56,12 @@ class RunDone(NamedTuple):
 
 
 class ChunkDone(NamedTuple):
-    """Runs, the seconds that they took, and the processor that the kernels are compiled for."""
+    """Runs, the seconds that they took, the processor that the kernels are compiled for, whether Ctrl-C ended it."""
 
     runs: list[RunDone]
     seconds: float
     kernels: str
+    interrupted: bool = False
 
 
 class Worker:
@@ -73,14 +75,18 @@ class Worker:
         self._nothing = [float("nan")] * len(job.columns)
 
     def compute(self, tasks: Sequence[Task], say: Callable[[int], bool] = lambda _: True) -> ChunkDone:
-        """Solve runs; where `say`, which hears how many rows were solved, says no, those that are done."""
+        """Solve runs; where `say`, which hears how many rows were solved, says no, or Ctrl-C, those that are done."""
         begin = perf_counter()
-        done = []
-        for task in tasks:
-            done.append(self._run(task))
-            if not say(len(task.rows)):
-                break
-        return ChunkDone(done, perf_counter() - begin, kernels_of())
+        done: list[RunDone] = []
+        is_interrupted = False
+        try:
+            for task in tasks:
+                done.append(self._run(task))
+                if not say(len(task.rows)):
+                    break
+        except KeyboardInterrupt:
+            is_interrupted = True
+        return ChunkDone(done, perf_counter() - begin, kernels_of(), is_interrupted)
 
     def solution(self, task: Task, row: int) -> Told:
         """That of one row of a run."""
@@ -132,7 +138,10 @@ class Worker:
         for column in self._job.columns:
             try:
                 found.append(measured(column, solution))
+            except InputError as error:
+                found.append(float("nan"))
+                wrong = wrong or str(error)
             except Exception as error:
                 found.append(float("nan"))
-                wrong = wrong or f"measure {column.name!r}: {type(error).__name__}: {error}"
+                wrong = wrong or f"measure {column.name!r} raised {type(error).__name__}: {error}"
         return found, wrong

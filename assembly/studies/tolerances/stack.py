@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._progress import Advance, Progress, checked_progress, watched
 from assembly.assembly import Assembly
 from assembly.derivatives.implicit import sensitivity, several
 from assembly.derivatives.measure import Measure
@@ -46,6 +47,7 @@ def tolerances(
     seed: int = 0,
     limits: Mapping[Measure, tuple[float | None, float | None]] | None = None,
     play: bool = False,
+    progress: Progress = False,
 ) -> Tolerances:
     """What scatter of parameters does to measures of a solution.
 
@@ -66,6 +68,8 @@ def tolerances(
     play : bool
         Whether parts are loose in their fits as well (`asm.play`): a measure is anywhere between the ends of its range,
         with the same chance, and dimensions move both ends. Objectives of the scene do not count then.
+    progress : bool or callable
+        True shows a bar of the samples' solves; a function is called with how many are done, and of how many.
 
     Returns
     -------
@@ -85,6 +89,7 @@ def tolerances(
     bounds = _bounds(limits, measures, count)
     if not isinstance(play, (bool, np.bool_)):
         raise TypeError(f"play is {play!r}; expected True or False")
+    checked_progress(progress)
     nominal = np.array([measure.value(solution) for measure in measures])
     rng = np.random.default_rng(seed)
     inputs = _drawn(names, scatter, rng, count)
@@ -94,12 +99,14 @@ def tolerances(
         least, most = (_joined(side, measures, names, scatter) for side in (low, high))
         first = _between(least, most)
         bottom, top = (np.array([end.value for end in side]) for side in (low, high))
-        ends = [_sampled_ends(side, measures, names, inputs) for side in (low, high)]
+        with watched(progress, "tolerances", 2 * len(measures) * count, "solve") as advance:
+            ends = [_sampled_ends(side, measures, names, inputs, advance) for side in (low, high)]
         values = ends[0] + rng.uniform(size=ends[0].shape) * (ends[1] - ends[0])
     else:
         first = least = most = FirstOrder.of(scene, solution, measures, names, scatter)
         bottom = top = nominal
-        values = _sampled(scene, solution, measures, names, inputs)
+        with watched(progress, "tolerances", count, "solve") as advance:
+            values = _sampled(scene, solution, measures, names, inputs, advance)
     worst = np.column_stack([bottom + least.reach(scatter)[:, 0], top + most.reach(scatter)[:, 1]])
     return Tolerances(
         of=measures,
@@ -188,11 +195,17 @@ def _drawn(
 
 
 def _sampled(
-    scene: Assembly, solution: Solution, measures: Sequence[Measure], parameters: Sequence[Parameter], inputs: Array
+    scene: Assembly,
+    solution: Solution,
+    measures: Sequence[Measure],
+    parameters: Sequence[Parameter],
+    inputs: Array,
+    advance: Advance,
 ) -> Array:
     """Measures (k, m) of solves with drawn values; NaN where the scene cannot be solved with them."""
     values = np.full((len(inputs), len(measures)), np.nan)
     for row, drawn in zip(values, inputs, strict=True):
+        advance(1)
         try:
             with values_set(parameters, drawn):
                 found = scene.solve(solution)
@@ -204,11 +217,15 @@ def _sampled(
 
 
 def _sampled_ends(
-    side: Sequence[End], measures: Sequence[Measure], parameters: Sequence[Parameter], inputs: Array
+    side: Sequence[End],
+    measures: Sequence[Measure],
+    parameters: Sequence[Parameter],
+    inputs: Array,
+    advance: Advance,
 ) -> Array:
     """The same at one end of the ranges."""
     each = [
-        _sampled(end.scene, end.solution, [measure], parameters, inputs)
+        _sampled(end.scene, end.solution, [measure], parameters, inputs, advance)
         for end, measure in zip(side, measures, strict=True)
     ]
     return np.hstack(each)
