@@ -1,7 +1,9 @@
 """How a plan is cut into runs, by its rows alone: who begins where, whatever computes them, and when.
 
-Of the rows in their order every 1,024th is solved first, one from the other. From each of these every 32nd of the
-rows up to the next one is, and from each of these the 31 rows up to the next one. Each of these chains is a run.
+Of 10,000 rows in their order every 1,024th is solved first, one from the other. From each of these every 32nd of the
+rows up to the next one is, and from each of these the 31 rows up to the next one. Each of these chains is a run. Of
+more rows the first of them are every 32,768th, and so on: no chain is longer than 32, so that workers need not wait for
+one.
 """
 
 from __future__ import annotations
@@ -37,31 +39,27 @@ class Run(NamedTuple):
 
 def cut(order: NDArray[np.int64]) -> list[Run]:
     """The runs of rows in an order (n,), those first from which others begin."""
-    coarse = order[:: RUN * RUN]
-    blocks = [order[at : at + RUN * RUN] for at in range(0, len(order), RUN * RUN)]
-    middle = [block[RUN::RUN] for block in blocks]
-    # Numbers: the coarse run, one of every block that has more than 32 rows, then the fine ones.
-    runs: list[Run] = []
-    numbered = 1
-    numbers = []
-    for rows in middle:
-        numbers.append(numbered if len(rows) else None)
-        numbered += bool(len(rows))
-    fine: list[Run] = []
-    of_block: list[list[int]] = []
-    for block in blocks:
-        of_block.append([])
-        for at in range(0, len(block), RUN):
-            rows = block[at + 1 : at + RUN]
-            if len(rows):
-                of_block[-1].append(numbered + len(fine))
-                fine.append(Run(rows, int(block[at]), ()))
-    first = [own[0] for own, block in zip(of_block, blocks, strict=True) if len(block) > 1]
-    runs.append(Run(coarse, None, (*(number for number in numbers if number is not None), *first)))
-    for block, rows, own in zip(blocks, middle, of_block, strict=True):
-        if len(rows):
-            runs.append(Run(rows, int(block[0]), tuple(own[1:])))
-    return runs + fine
+    count, stride = len(order), 1
+    while stride * RUN < count:
+        stride *= RUN
+    rows, starts = [order[::stride]], [-1]
+    # Of every place in the order the run that it is in.
+    owner = np.zeros(count, dtype=np.int64)
+    while stride > 1:
+        stride //= RUN
+        for head in range(0, count, stride * RUN):
+            places = slice(head + stride, head + stride * RUN, stride)
+            if head + stride < count:
+                owner[places] = len(rows)
+                rows.append(order[places])
+                starts.append(head)
+    begins: list[list[int]] = [[] for _ in rows]
+    for number, start in enumerate(starts[1:], 1):
+        begins[owner[start]].append(number)
+    return [
+        Run(own, None if start < 0 else int(order[start]), tuple(others))
+        for own, start, others in zip(rows, starts, begins, strict=True)
+    ]
 
 
 def cut_apart(count: int) -> list[Run]:

@@ -175,7 +175,8 @@ def test_tables_of_other_libraries():
     frame = found.to_pandas()
     assert isinstance(frame, pandas.DataFrame) and frame["out"].tolist() == found["out"].tolist()
     again = asm.study(scene, asm.rows(frame, [angle, crank]), out)
-    assert np.allclose(again["out"], found["out"], rtol=0.0, atol=1e-12)
+    # Solved in another order, and each to 2e-13 of the size.
+    assert np.allclose(again["out"], found["out"], rtol=0.0, atol=1e-11)
     pytest.importorskip("xarray", reason="xarray, of the extra tables, is not installed")
     data = found.to_xarray()
     assert float(data["out"].sel(angle=1.0, crank=1.5)) == found["out"][3]
