@@ -10,6 +10,7 @@ import heapq
 import os
 import pickle
 from collections.abc import Callable
+from concurrent.futures import BrokenExecutor
 from queue import SimpleQueue
 from typing import Any, Protocol
 
@@ -38,7 +39,7 @@ class Executor(Protocol):
 
 
 class StudyError(AssemblyError, RuntimeError):
-    """A study's workers ended, or disagree about what they compute with."""
+    """A study's workers were ended, or disagree about what they compute with."""
 
 
 class _Waiting:
@@ -112,7 +113,13 @@ def on_executor(job: Job, table: Table, seconds: float, take: Take, executor: Ex
                 future.add_done_callback(answers.put)
             future = answers.get()
             under_way.discard(future)
-            done: ChunkDone = future.result()
+            try:
+                done: ChunkDone = future.result()
+            except BrokenExecutor as error:
+                raise StudyError(
+                    "a worker was ended, and with it its executor; expected workers with the memory they need: with a "
+                    "folder= the same call goes on from what is finished"
+                ) from error
             goes_on = take(done)
             if done.interrupted:
                 raise KeyboardInterrupt

@@ -14,9 +14,12 @@ if TYPE_CHECKING:
 
 __all__ = ["compute", "portable_variables"]
 
-# Of every thread the studies that it worked for last, unpickled.
-_known = threading.local()
+# The studies that this process worked for last, unpickled.
+_known: dict[str, Any] = {}
 MOST_KNOWN = 2
+# Threads take turns: what was set anew is counted for the process (`kinematics/changes.py`), and most of a row is
+# Python.
+_turn = threading.RLock()
 
 
 def portable_variables() -> dict[str, str]:
@@ -44,13 +47,13 @@ def compute(job: bytes, key: str, chunk: bytes) -> ChunkDone:
         os.environ.update(portable_variables())
     from assembly.studies.sweeps.work import Worker
 
-    workers: dict[str, Any] = _known.__dict__.setdefault("workers", {})
-    if key not in workers:
-        while len(workers) >= MOST_KNOWN:
-            del workers[next(iter(workers))]
-        workers[key] = Worker(pickle.loads(job))
-    done: ChunkDone = workers[key].compute(pickle.loads(chunk))
-    if done.interrupted:
-        # It was stopped amid a row, wherever that left the numbers of its scene.
-        del workers[key]
-    return done
+    with _turn:
+        if key not in _known:
+            while len(_known) >= MOST_KNOWN:
+                del _known[next(iter(_known))]
+            _known[key] = Worker(pickle.loads(job))
+        done: ChunkDone = _known[key].compute(pickle.loads(chunk))
+        if done.interrupted:
+            # It was stopped amid a row, wherever that left the numbers of its scene.
+            del _known[key]
+        return done

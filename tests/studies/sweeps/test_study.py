@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -195,6 +195,27 @@ def test_plots(names, found):
             other.get_ylabel() for other in axes.figure.axes
         )
         pyplot.close(axes.figure)
+
+
+class Broken:
+    """An executor whose only process is gone."""
+
+    def submit(self, function, *args):
+        future = Future()
+        future.set_exception(BrokenExecutor("gone"))
+        return future
+
+
+def test_an_executor_that_breaks_says_how_to_go_on():
+    with pytest.raises(asm.StudyError, match="with a folder= the same call goes on"):
+        asm.study(*narrow(40), executor=Broken())
+
+
+def test_workers_of_other_kernels_are_refused(monkeypatch):
+    names = iter(["x86-64-v3", "znver9", "znver9", "znver9"])
+    monkeypatch.setattr("assembly.studies.sweeps.work.kernels_of", lambda: next(names))
+    with pytest.raises(asm.StudyError, match="kernels for x86-64-v3, and others now by kernels for znver9"):
+        asm.study(*narrow(), chunk_seconds=1e-3)
 
 
 def test_workers_take_the_kernels_that_are_portable():
