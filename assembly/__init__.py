@@ -111,6 +111,15 @@ if TYPE_CHECKING:
     from assembly.studies.interference.report import interference as interference
     from assembly.studies.reachable import Workspace as Workspace
     from assembly.studies.reachable import workspace as workspace
+    from assembly.studies.sweeps.plans import Plan as Plan
+    from assembly.studies.sweeps.plans import grid as grid
+    from assembly.studies.sweeps.plans import latin_hypercube as latin_hypercube
+    from assembly.studies.sweeps.plans import rows as rows
+    from assembly.studies.sweeps.plans import sobol as sobol
+    from assembly.studies.sweeps.plans import starts as starts
+    from assembly.studies.sweeps.result import Study as Study
+    from assembly.studies.sweeps.run_study import study as study
+    from assembly.studies.sweeps.scheduling import StudyError as StudyError
     from assembly.studies.synthesis.dimensions import synthesize as synthesize
     from assembly.studies.synthesis.result import Synthesis as Synthesis
     from assembly.studies.synthesis.station import Station as Station
@@ -195,6 +204,15 @@ else:
             "Tangent": "assembly.constraints.model.tangent",
             "Station": "assembly.studies.synthesis.station",
             "Synthesis": "assembly.studies.synthesis.result",
+            "Plan": "assembly.studies.sweeps.plans",
+            "Study": "assembly.studies.sweeps.result",
+            "StudyError": "assembly.studies.sweeps.scheduling",
+            "grid": "assembly.studies.sweeps.plans",
+            "latin_hypercube": "assembly.studies.sweeps.plans",
+            "rows": "assembly.studies.sweeps.plans",
+            "sobol": "assembly.studies.sweeps.plans",
+            "starts": "assembly.studies.sweeps.plans",
+            "study": "assembly.studies.sweeps.run_study",
             "synthesize": "assembly.studies.synthesis.dimensions",
             "Batch": "assembly.studies.batches.result",
             "Tolerances": "assembly.studies.tolerances.result",

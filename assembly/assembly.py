@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from os import PathLike
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._progress import Progress
 from assembly.constraints.packing.corners import corners_of
 from assembly.constraints.packing.scene import MOST_CROWDING
 from assembly.errors import InputError
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
 __all__ = ["Assembly"]
 
 Array = NDArray[np.float64]
+_LOG = logging.getLogger("assembly.solve")
 # How a solve may end where solids come to lie on each other, and corners are not listed.
 AT_KINKS = (Status.STALLED, Status.ITERATION_LIMIT, Status.INFEASIBLE, Status.CONTACT_LOST)
 
@@ -63,6 +66,9 @@ class Assembly(PackedContents):
     The scene is packed once, at the first solve after a change of its bodies, constraints or terms. Targets,
     weights' ratios aside, and starts may change between solves without packing again.
     """
+
+    # Whether solves that fail are left at that: what goes along a branch is to end where the branch does.
+    _stays_near = False
 
     def __repr__(self) -> str:
         return f"Assembly({len(self._bodies)} bodies, {len(self._constraints)} constraints)"
@@ -129,6 +135,8 @@ class Assembly(PackedContents):
             solution = self._tried_otherwise(solution, q0, starts, swept, options, interruption)
         if options and Options.of(options).verbose:
             print(solution.iteration_table())
+        if _LOG.isEnabledFor(logging.DEBUG):
+            _LOG.debug("%s, %d iterations, %.6f s", solution.status.name, solution.iterations, solution.seconds)
         return solution
 
     def _tried_otherwise(
@@ -141,6 +149,8 @@ class Assembly(PackedContents):
         interruption: Interruption,
     ) -> Solution:
         """A solve that failed, again with other axes or from elsewhere, where that may help."""
+        if self._stays_near:
+            return solution
         if solution.axes and not isinstance(q0, Solution) and not swept:
             from assembly.studies.nearest_axes import with_axes_of_the_rest
 
@@ -300,6 +310,7 @@ class Assembly(PackedContents):
         seed: int = 0,
         time_limit: float | None = None,
         executor: Executor | None = None,
+        progress: Progress = False,
         **options: Any,
     ) -> list[Solution]:
         """The distinct solutions found from several starts: the bodies' poses, then random ones.
@@ -320,6 +331,9 @@ class Assembly(PackedContents):
         executor : Executor, optional
             One of `concurrent.futures`, or one like it: solves are submitted to it, the scene pickled. What is found
             is the same.
+        progress : bool or callable
+            True shows a bar of the starts; a function is called with how many are done, and of how many, and ends the
+            search where it returns True. After Ctrl-C the solutions that were found are returned.
         **options
             See `Options`.
 
@@ -333,7 +347,7 @@ class Assembly(PackedContents):
         """
         from assembly.studies.multistart import solve_all
 
-        return solve_all(self, starts, seed, Interruption(time_limit), options, executor)
+        return solve_all(self, starts, seed, Interruption(time_limit), options, executor, progress)
 
     def solve_many(
         self,

@@ -12,7 +12,7 @@ from assembly.constraints.model.contact import Contact
 from assembly.constraints.model.joint import Joint
 from assembly.errors import InputError, text
 from assembly.kinematics.body import Body, Frame, Point
-from assembly.kinematics.pose import rotation_matrix
+from assembly.kinematics.pose import rotation_of
 from assembly.solve.solution import Solution
 
 __all__ = ["Measure"]
@@ -85,7 +85,7 @@ class Measure:
         if self.kind == "objective":
             return solution.objective
         if self.kind == "coordinate":
-            return solution.values[f"{self.thing.joint.name}.{self.thing.name}"]
+            return solution._value(self.thing.joint, self.thing.name)
         if self.kind == "gap":
             return solution.contacts[self.thing.name].gap
         if self.kind == "wrench":
@@ -93,7 +93,7 @@ class Measure:
             return float(solution.wrenches[self.thing.name][self.on.name].vector[self.axis])
         sides = self.thing if self.kind == "distance" else (self.thing,)
         rows = [solution.q[solution._scene.index(place_of(side)[0])] for side in sides]
-        places = [world(side, row[:3], rotation_matrix(row[3:]))[0] for side, row in zip(sides, rows, strict=True)]
+        places = [_place(side, row) for side, row in zip(sides, rows, strict=True)]
         return float(np.linalg.norm(places[1] - places[0])) if len(places) == 2 else float(places[0][self.axis])
 
     def __repr__(self) -> str:
@@ -105,6 +105,12 @@ def place_of(thing: Point | Frame | Body) -> tuple[Body, Array]:
     if isinstance(thing, Body):
         return thing, np.zeros(3)
     return thing.body, thing.coordinates if isinstance(thing, Point) else thing.origin
+
+
+def _place(thing: Point | Frame | Body, row: Array) -> Array:
+    """Where a place is, with its body at the pose row (7,)."""
+    result: Array = row[:3] + rotation_of(row[3:]) @ place_of(thing)[1]
+    return result
 
 
 def world(thing: Point | Frame | Body, position: Array, rotation: Array) -> tuple[Array, Array]:

@@ -34,6 +34,7 @@ __all__ = [
     "rotate",
     "rotate_jacobian",
     "rotation_matrix",
+    "rotation_of",
 ]
 
 Array = NDArray[np.float64]
@@ -128,8 +129,12 @@ def multiply(a: ArrayLike, b: ArrayLike) -> Array:
 
 def rotation_matrix(quaternion: ArrayLike) -> Array:
     """Rotation (3, 3) of the normalized quaternion."""
-    e = nonzero_quaternion("quaternion", quaternion)
-    e /= sqrt(e @ e)
+    return rotation_of(nonzero_quaternion("quaternion", quaternion))
+
+
+def rotation_of(quaternion: Array) -> Array:
+    """The same of one that is known to be a quaternion, as that of a solution is, without looking."""
+    e = quaternion / sqrt(quaternion @ quaternion)
     u = e[1:]
     w, x, y, z = e.tolist()
     # (w^2 - |u|^2) I + 2 (w [u]x + u u^T) in plain floats: arrays this small take three times the time.

@@ -16,7 +16,7 @@ from assembly.scene_file.kinds import BODY, CONSTRAINTS, FACE, OBJECTIVES, SURFA
 from assembly.scene_file.records import Listed, Parts
 from assembly.scene_file.references import refers_to_others
 
-__all__ = ["load", "save"]
+__all__ = ["load", "save", "scene_text"]
 
 FORMAT = "assembly-scene"
 VERSION = 5
@@ -44,8 +44,12 @@ def save(scene: Assembly, path: str | PathLike[str]) -> None:
     """
     if not isinstance(scene, Assembly):
         raise TypeError(f"scene is {scene!r}; expected an Assembly")
-    text = written(_document(scene))
-    Path(path).write_text(text + "\n", encoding="ascii")
+    Path(path).write_text(scene_text(scene), encoding="ascii")
+
+
+def scene_text(scene: Assembly) -> str:
+    """What `save` writes."""
+    return written(_document(scene)) + "\n"
 
 
 def _document(scene: Assembly) -> dict[str, Any]:

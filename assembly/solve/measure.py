@@ -26,7 +26,7 @@ from assembly.constraints.program.primitives import (
     TURN,
 )
 from assembly.kinematics.body import Frame
-from assembly.kinematics.pose import rotation_matrix
+from assembly.kinematics.pose import rotation_of
 
 __all__ = ["JointRow", "Near", "Standing", "measure", "standing"]
 
@@ -50,7 +50,7 @@ def standing(coordinate: Coordinate, q: Array, places: tuple[int, int]) -> Stand
     """The frames of a coordinate whose bodies are rows `places` of q, (n, 7)."""
 
     def arm_and_axes(frame: Frame, row: Array) -> tuple[Array, Array]:
-        turn = rotation_matrix(row[3:])
+        turn = rotation_of(row[3:])
         return turn @ frame.origin, turn @ frame.axes
 
     pair, (i, j) = coordinate.frames, places

@@ -205,20 +205,22 @@ class Result(ReadOnlyArrays):
     @cached_property
     def values(self) -> dict[str, float]:
         """Every freedom of every joint, "joint.freedom": lengths in the user's unit, angles in radians."""
+        return Named(
+            (f"{joint.name}.{name}", self._value(joint, name))
+            for joint in self._scene.constraints
+            if isinstance(joint, Joint)
+            for name in joint.freedoms
+        )
+
+    def _value(self, joint: Joint, name: str) -> float:
+        """One freedom of one joint."""
         packed, state = self._ended
-        near = dict(zip(map(id, packed._angles), state[packed.angles], strict=True))
-        values: Named[float] = Named()
-        for joint in self._scene.constraints:
-            if not isinstance(joint, Joint):
-                continue
-            for name in joint.freedoms:
-                coordinate = joint._coordinate_in(name, self._scene.axes.get(joint.name))
-                pair = coordinate.frames
-                frames = standing(
-                    coordinate, self.q, (self._scene.index(pair.frame_a.body), self._scene.index(pair.frame_b.body))
-                )
-                values[f"{joint.name}.{name}"] = measure(coordinate, frames, float(near.get(id(coordinate), 0.0)))
-        return values
+        coordinate = joint._coordinate_in(name, self._scene.axes.get(joint.name))
+        near = next((k for k, other in enumerate(packed._angles) if other is coordinate), None)
+        pair = coordinate.frames
+        places = self._scene.index(pair.frame_a.body), self._scene.index(pair.frame_b.body)
+        frames = standing(coordinate, self.q, places)
+        return measure(coordinate, frames, 0.0 if near is None else float(state[packed.angles][near]))
 
     def _wished_pool(self) -> Array:
         """The pool with the objective as it was in this solve."""

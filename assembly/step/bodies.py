@@ -41,7 +41,8 @@ class Source:
     """A file as a document of OCCT, in millimeters, with the number of its faces.
 
     `absent` are files that it refers to and that are not there; of a damaged file what is whole is in the document.
-    `names` are those of its bodies in their order, where the document has them not.
+    `names` are those of its bodies in their order, where the document has them not. `advance` hears of faces that were
+    read.
     """
 
     file: Path
@@ -50,6 +51,7 @@ class Source:
     absent: tuple[str, ...] = ()
     damaged: bool = False
     names: tuple[str | None, ...] = ()
+    advance: Callable[[int], object] = bool
 
 
 def solids_of(path: str) -> Iterator[Any]:
@@ -144,6 +146,7 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
                 if key not in read:
                     part = Part(leaf.label)
                     read[key] = [read_shape(shape, part.said, part.color, scale) for shape in solids_in(part.shape)]
+                    source.advance(sum(len(shape.faces) + len(shape.missing) for shape in read[key]))
                     for shape in read[key]:
                         built += len(shape.faces) + len(shape.missing)
                         missing += [f"{leaf.name!r}, {text}" for text in shape.missing]

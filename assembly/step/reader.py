@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import pickle
 import subprocess
@@ -11,9 +12,11 @@ from collections.abc import Callable
 from os import PathLike, fspath
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import perf_counter
 
 import numpy as np
 
+from assembly._progress import Progress, checked_progress, watched
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.step.bodies import Source, bodies_in
@@ -21,6 +24,8 @@ from assembly.step.documents import Damaged, Malformed, StepError, StepWarning, 
 from assembly.step.occt import quiet
 
 __all__ = ["read_step"]
+
+_LOG = logging.getLogger("assembly.step")
 
 # Seconds that a damaged file may take, kernels that are compiled for the first time included; and those that OCCT may
 # take of them, of any file and a megabyte of text: fifty times as much as of clean ones. It is OCCT that may not end.
@@ -84,7 +89,9 @@ def _read_apart(path: str, unit: str, strict: bool, damage: str) -> tuple[list[B
     return found  # type: ignore[no-any-return]  # It is what the child found.
 
 
-def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = True) -> list[Body]:
+def read_step(
+    path: str | PathLike[str], *, unit: str = "mm", strict: bool = True, progress: Progress = False
+) -> list[Body]:
     """The solids of a STEP file, a body each.
 
     A part that the file's assembly uses several times becomes as many bodies, which share their faces. Geometry stays
@@ -111,6 +118,8 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     strict : bool
         Raise where a face cannot be read, or the text is damaged. Otherwise faces are left out, statements too, and
         warnings say which and why.
+    progress : bool or callable
+        True shows a bar of faces; a function is called with how many faces are read, and of how many.
 
     Returns
     -------
@@ -125,7 +134,7 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     FileNotFoundError
         No such file.
     ImportError
-        OCCT is not installed: pip install "assembly-solver[step]".
+        OCCT is not installed: pip install "assembly-solver[step]"; tqdm is not, with progress=True.
 
     Warns
     -----
@@ -136,12 +145,14 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     checked_unit(unit)
     if not isinstance(strict, (bool, np.bool_)):
         raise InputError(f"strict is {strict!r}; expected True or False")
+    checked_progress(progress)
     file = Path(fspath(path))
     if not file.is_file():
         raise FileNotFoundError(f"path is {str(file)!r}; {'a folder' if file.is_dir() else 'no such file'}")
     damage = ""
+    begin = perf_counter()
     try:
-        bodies, left = bodies_of(str(file), unit, bool(strict))
+        bodies, left = bodies_of(str(file), unit, bool(strict), progress=progress)
     except Damaged as reason:
         damage = str(reason)
         if strict and isinstance(reason, Malformed):
@@ -151,11 +162,17 @@ def read_step(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
         left.append(f"{damage}, and what OCCT makes of the rest was read")
     for line in left:
         warnings.warn(line, StepWarning, stacklevel=2)
+    _LOG.info("%s: %d bodies, read in %.2f s", file.name, len(bodies), perf_counter() - begin)
     return bodies
 
 
 def bodies_of(
-    path: str, unit: str, strict: bool, folder: str | None = None, loaded: Callable[[], None] = lambda: None
+    path: str,
+    unit: str,
+    strict: bool,
+    folder: str | None = None,
+    loaded: Callable[[], None] = lambda: None,
+    progress: Progress = False,
 ) -> tuple[list[Body], list[str]]:
     """The bodies of a file, also of one that is damaged if there is a folder, and what there is to warn of.
 
@@ -164,5 +181,6 @@ def bodies_of(
     with quiet():
         document, count, absent = document_of(path, folder)
         loaded()
-        found = Source(Path(path), document, count, tuple(absent), folder is not None)
-        return bodies_in(found, 1.0 / checked_unit(unit), strict)
+        with watched(progress, "reading", count, "face") as advance:
+            found = Source(Path(path), document, count, tuple(absent), folder is not None, advance=advance)
+            return bodies_in(found, 1.0 / checked_unit(unit), strict)

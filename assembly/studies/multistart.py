@@ -6,14 +6,16 @@ in the coordinates of joints, which takes microseconds a start. Ends that are on
 
 from __future__ import annotations
 
+import logging
 import pickle
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._progress import Advance, Progress, checked_progress, watched
 from assembly.errors import InputError, integer
 from assembly.kinematics.pose import pose_rows
 from assembly.solve.attempts.postures import postures_from
@@ -57,6 +59,9 @@ class End(NamedTuple):
     q: Array
 
 
+_LOG = logging.getLogger("assembly.studies")
+
+
 def solve_all(
     scene: Assembly,
     starts: Starts,
@@ -64,18 +69,26 @@ def solve_all(
     interruption: Interruption,
     options: Mapping[str, Any],
     executor: Executor | None = None,
+    progress: Progress = False,
 ) -> list[Solution]:
     """See `Assembly.solve_all`."""
     number = integer("seed", seed, 0, 2**63 - 1)
     if executor is not None and not hasattr(executor, "submit"):
         raise TypeError(f"executor is {executor!r}; expected one of concurrent.futures, or another one with submit")
     given = _given(starts, scene)
-    search = _Search(scene, dict(options), interruption, executor)
-    with postures_from(scene.packed(), scene.q):
-        if given is not None:
-            search.solve(given)
-        else:
-            _from_drawn(search, starts, np.random.default_rng(number))
+    checked_progress(progress)
+    # Of "all" nobody knows how many there will be: the fewest are told.
+    total = len(given) if given is not None else FEWEST if isinstance(starts, str) else int(starts)  # type: ignore[arg-type]  # a number by now
+    with postures_from(scene.packed(), scene.q), watched(progress, "solve_all", total, "start") as advance:
+        search = _Search(scene, dict(options), interruption, executor, advance)
+        try:
+            if given is not None:
+                search.solve(given)
+            else:
+                _from_drawn(search, starts, np.random.default_rng(number))
+        except KeyboardInterrupt:
+            # What is found is found.
+            _LOG.warning("solve_all was interrupted after %d starts", search.count)
     # Of equal objectives, which are so up to rounding only where a scene is symmetric, the first found comes first.
     return sorted(search.found, key=lambda solution: solution.objective)
 
@@ -99,7 +112,7 @@ def _from_drawn(search: _Search, starts: Starts, rng: np.random.Generator) -> No
     moving = moving_rows(scene.bodies)
     search.solve([scene.q])
     most = MOST if isinstance(starts, str) else int(starts)  # type: ignore[arg-type]  # a number by now
-    while search.count < most and not search.interruption.is_over():
+    while search.count < most and not search.is_over():
         if isinstance(starts, str) and search.count >= max(FEWEST, AGAIN * search.newest):
             return
         if tree is None:
@@ -141,9 +154,11 @@ class _Search:
     options: dict[str, Any]
     interruption: Interruption
     executor: Executor | None
+    advance: Advance
     found: list[Solution] = field(default_factory=list)
     count: int = 0  # of starts
     newest: int = 0  # the start that led to the last new solution
+    is_enough: bool = False  # whoever watches wants no more
     _seen: list[Array] = field(default_factory=list)
 
     def solve(self, starts: Sequence[Array], merge: bool = False, off: Array | None = None) -> None:
@@ -155,6 +170,7 @@ class _Search:
         asked = [
             (self.count + k + 1, q) for k, q in enumerate(starts) if closes[k] and not (merge and self._is_seen(q))
         ]
+        self.count += len(starts)
         for number, solution in self._ends(asked):
             is_new = solution.success and not any(
                 are_one(solution, other) and not differ(solution, other) for other in self.found
@@ -162,7 +178,11 @@ class _Search:
             if is_new:
                 self.found.append(solution)
                 self.newest = max(self.newest, number)
-        self.count += len(starts)
+            self._told(1)
+        self._told(len(starts) - len(asked))
+
+    def _told(self, count: int) -> None:
+        self.is_enough = not self.advance(count) or self.is_enough
 
     def _is_seen(self, q: Array) -> bool:
         """Whether a start is one that was solved from; it is from now on."""
@@ -172,24 +192,27 @@ class _Search:
         self._seen.append(place)
         return False
 
-    def _ends(self, asked: Sequence[tuple[int, Array]]) -> list[tuple[int, Solution]]:
-        """Solutions from numbered starts, in order; those that there is time for."""
-        ends: list[tuple[int, Solution]] = []
+    def _ends(self, asked: Sequence[tuple[int, Array]]) -> Iterator[tuple[int, Solution]]:
+        """Solutions from numbered starts, in order; those that there is time for, and that are wanted."""
         if self.executor is None or len(asked) < 2:
-            for number, q in asked:
-                if ends and self.interruption.is_over():
-                    break
-                ends.append((number, self.scene._from_start(q, None, self.options, self.interruption)))
-            return ends
+            for k, (number, q) in enumerate(asked):
+                if k and self.is_over():
+                    return
+                yield number, self.scene._from_start(q, None, self.options, self.interruption)
+            return
         whole = pickle.dumps(self.scene)
         tasks = [asked[first : first + TASK] for first in range(0, len(asked), TASK)]
         running = [self.executor.submit(_solved, whole, self.scene.q, [q for _, q in t], self.options) for t in tasks]
         for task, future in zip(tasks, running, strict=True):
-            if self.interruption.is_over():
+            if self.is_over():
                 future.cancel()
                 continue
-            ends += [(number, self._taken(end)) for (number, _), end in zip(task, future.result(), strict=True)]
-        return ends
+            for (number, _), end in zip(task, future.result(), strict=True):
+                yield number, self._taken(end)
+
+    def is_over(self) -> bool:
+        """Whether no start is to be begun any more."""
+        return self.is_enough or self.interruption.is_over()
 
     def _taken(self, end: End) -> Solution:
         """A solution of this scene from what another process tells."""

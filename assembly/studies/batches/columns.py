@@ -94,7 +94,7 @@ def set_all(parameters: Sequence[Parameter], values: Sequence[float]) -> None:
     for item, value in zip(parameters, values, strict=True):
         if isinstance(item._number, RowNumber):
             item._number.put(float(value))
-            count_number()
+            count_number(item._number.owner)
         else:
             item.value = float(value)
 

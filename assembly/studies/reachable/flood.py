@@ -64,6 +64,8 @@ class Flood:
         Cells at which a solve has not ended; none of them is reached.
     solves : int
         How many there were.
+    advance : callable
+        Hears of each.
     """
 
     grid: Grid
@@ -75,6 +77,7 @@ class Flood:
     limits: dict[Cell, list[tuple[Array, Array, Array]]] = field(default_factory=dict)
     undecided: set[Cell] = field(default_factory=set)
     solves: int = 0
+    advance: Callable[[int], object] = bool
     _done: set[tuple[int, Cell]] = field(default_factory=set)
     _waiting: deque[_Reached] = field(default_factory=deque)
 
@@ -125,6 +128,7 @@ class Flood:
 
     def _drawn(self, target: Array, start: Stop | Array) -> Stop:
         self.solves += 1
+        self.advance(1)
         return self.tip.to(target, start.solution if isinstance(start, Stop) else start)
 
     def _mirrored(self, start: Stop, stop: Stop) -> Array:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._progress import Progress, checked_progress, watched
 from assembly.assembly import Assembly
 from assembly.errors import InputError, integer, items, positive, vector
 from assembly.kinematics.body import Body, Frame, Point
@@ -33,6 +34,7 @@ def workspace(
     within: tuple[ArrayLike, ArrayLike] | None = None,
     flips: int = 1,
     most: int = 200_000,
+    progress: Progress = False,
 ) -> Workspace:
     """The set of places that a tip can reach with all constraints, limits and clearances (paper 001, section 3.1).
 
@@ -58,6 +60,9 @@ def workspace(
         How often the search may go on in another configuration where the mechanism is straight or folded; see Notes.
     most : int
         Cells after which the search ends with an error.
+    progress : bool or callable
+        True shows a bar of the solves; a function is called with how many there were, twice: nobody knows how many
+        there will be.
 
     Returns
     -------
@@ -81,16 +86,18 @@ def workspace(
     size = positive("cell", cell)
     integer("flips", flips, 0, 64)
     integer("most", most, 1, 10**7)
+    checked_progress(progress)
     first = _solved(scene, None)
     grid = grid_of(plane, first.pose(point.body).apply(point.coordinates), size)
     region = _Region(grid, within)
     drawn = DrawnTip(scene, point, grid)
     flood = Flood(grid, drawn, 0.5 * scene.packed().scale, flips, most)
     others = items("starts", starts, "poses or solutions")
-    for start in (first, *(_solved(scene, each, f"starts[{k}]") for k, each in enumerate(others))):
-        place = start.pose(point.body).apply(point.coordinates)
-        stop = drawn.to(grid.origin + (place - grid.origin) @ grid.axes.T @ grid.axes, start.q)
-        flood.run(grid.cell(drawn.place(stop)), stop, region)
+    with watched(progress, "workspace", 0, "solve") as flood.advance:
+        for start in (first, *(_solved(scene, each, f"starts[{k}]") for k, each in enumerate(others))):
+            place = start.pose(point.body).apply(point.coordinates)
+            stop = drawn.to(grid.origin + (place - grid.origin) @ grid.axes.T @ grid.axes, start.q)
+            flood.run(grid.cell(drawn.place(stop)), stop, region)
     return _found(scene, flood, region)
 
 

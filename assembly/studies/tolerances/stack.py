@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._progress import Advance, Progress, checked_progress, watched
 from assembly.assembly import Assembly
 from assembly.derivatives.implicit import sensitivity, several
 from assembly.derivatives.measure import Measure
@@ -46,6 +47,7 @@ def tolerances(
     seed: int = 0,
     limits: Mapping[Measure, tuple[float | None, float | None]] | None = None,
     play: bool = False,
+    progress: Progress = False,
 ) -> Tolerances:
     """What scatter of parameters does to measures of a solution.
 
@@ -66,6 +68,8 @@ def tolerances(
     play : bool
         Whether parts are loose in their fits as well (`asm.play`): a measure is anywhere between the ends of its range,
         with the same chance, and dimensions move both ends. Objectives of the scene do not count then.
+    progress : bool or callable
+        True shows a bar of the samples' solves; a function is called with how many are done, and of how many.
 
     Returns
     -------
@@ -83,8 +87,7 @@ def tolerances(
     count = integer("samples", samples, 0, 10**7)
     integer("seed", seed, 0, 2**63 - 1)
     bounds = _bounds(limits, measures, count)
-    if not isinstance(play, (bool, np.bool_)):
-        raise TypeError(f"play is {play!r}; expected True or False")
+    _check_flags(play, progress)
     nominal = np.array([measure.value(solution) for measure in measures])
     rng = np.random.default_rng(seed)
     inputs = _drawn(names, scatter, rng, count)
@@ -94,13 +97,12 @@ def tolerances(
         least, most = (_joined(side, measures, names, scatter) for side in (low, high))
         first = _between(least, most)
         bottom, top = (np.array([end.value for end in side]) for side in (low, high))
-        ends = [_sampled_ends(side, measures, names, inputs) for side in (low, high)]
+        ends = _sampled_ends((low, high), measures, names, inputs, progress)
         values = ends[0] + rng.uniform(size=ends[0].shape) * (ends[1] - ends[0])
     else:
         first = least = most = FirstOrder.of(scene, solution, measures, names, scatter)
         bottom = top = nominal
-        values = _sampled(scene, solution, measures, names, inputs)
-    worst = np.column_stack([bottom + least.reach(scatter)[:, 0], top + most.reach(scatter)[:, 1]])
+        values = _watched(scene, solution, measures, names, inputs, progress)
     return Tolerances(
         of=measures,
         parameters=names,
@@ -108,13 +110,19 @@ def tolerances(
         nominal=nominal,
         derivatives=sensitivity(scene, solution, measures, names),
         variances=first.variances(scatter),
-        worst=worst,
+        worst=np.column_stack([bottom + least.reach(scatter)[:, 0], top + most.reach(scatter)[:, 1]]),
         mean_shift=0.5 * (bottom + top) - nominal + first.mean_shift(scatter),
         samples=Samples(inputs, values) if count else None,
         limits=bounds,
         ranges=ranges,
         play_variances=(top - bottom) ** 2 / 12.0,
     )
+
+
+def _check_flags(play: bool, progress: Progress) -> None:
+    if not isinstance(play, (bool, np.bool_)):
+        raise TypeError(f"play is {play!r}; expected True or False")
+    checked_progress(progress)
 
 
 def _scatter(parameters: Mapping[Parameter, Distribution]) -> tuple[tuple[Parameter, ...], tuple[Distribution, ...]]:
@@ -188,11 +196,17 @@ def _drawn(
 
 
 def _sampled(
-    scene: Assembly, solution: Solution, measures: Sequence[Measure], parameters: Sequence[Parameter], inputs: Array
+    scene: Assembly,
+    solution: Solution,
+    measures: Sequence[Measure],
+    parameters: Sequence[Parameter],
+    inputs: Array,
+    advance: Advance,
 ) -> Array:
     """Measures (k, m) of solves with drawn values; NaN where the scene cannot be solved with them."""
     values = np.full((len(inputs), len(measures)), np.nan)
     for row, drawn in zip(values, inputs, strict=True):
+        advance(1)
         try:
             with values_set(parameters, drawn):
                 found = scene.solve(solution)
@@ -203,12 +217,34 @@ def _sampled(
     return values
 
 
-def _sampled_ends(
-    side: Sequence[End], measures: Sequence[Measure], parameters: Sequence[Parameter], inputs: Array
+def _watched(
+    scene: Assembly,
+    solution: Solution,
+    measures: Sequence[Measure],
+    parameters: Sequence[Parameter],
+    inputs: Array,
+    progress: Progress,
 ) -> Array:
-    """The same at one end of the ranges."""
-    each = [
-        _sampled(end.scene, end.solution, [measure], parameters, inputs)
-        for end, measure in zip(side, measures, strict=True)
-    ]
-    return np.hstack(each)
+    """The same, watched."""
+    with watched(progress, "tolerances", len(inputs), "solve") as advance:
+        return _sampled(scene, solution, measures, parameters, inputs, advance)
+
+
+def _sampled_ends(
+    sides: Sequence[Sequence[End]],
+    measures: Sequence[Measure],
+    parameters: Sequence[Parameter],
+    inputs: Array,
+    progress: Progress,
+) -> list[Array]:
+    """The same at both ends of the ranges."""
+    with watched(progress, "tolerances", 2 * len(measures) * len(inputs), "solve") as advance:
+        return [
+            np.hstack(
+                [
+                    _sampled(end.scene, end.solution, [measure], parameters, inputs, advance)
+                    for end, measure in zip(side, measures, strict=True)
+                ]
+            )
+            for side in sides
+        ]

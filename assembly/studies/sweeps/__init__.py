@@ -1,0 +1,1 @@
+"""Studies: thousands of solves, planned, cut into runs, spread over workers, stored and resumed."""

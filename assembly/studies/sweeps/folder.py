@@ -1,0 +1,182 @@
+"""What is finished of a study, on disk: a manifest that says what it is of, and a file of lines a chunk.
+
+A part is written beside its place and moved there as a whole, and says at its end how many rows it has. So a process
+that is killed leaves whole parts, and at most one unfinished file, which the next one removes; what a power failure
+tore has no such end, and its rows are solved again.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from assembly.errors import InputError
+from assembly.studies.sweeps.chain import Start
+from assembly.studies.sweeps.table import Table
+from assembly.studies.sweeps.work import ChunkDone, RunDone
+
+__all__ = ["Folder"]
+
+MANIFEST, LOCK, PART, UNFINISHED = "manifest.json", "lock", "part-", "unfinished-"
+
+
+class Folder:
+    """The folder of one study; one process at a time writes to it.
+
+    Parameters
+    ----------
+    path : str or path
+        Made if it is not there.
+    manifest : mapping
+        What the study is of, as JSON has it.
+
+    Attributes
+    ----------
+    kernels : str
+        The processor that kernels of the parts were compiled for; empty without parts.
+
+    Raises
+    ------
+    InputError
+        It is the folder of another study, or another process is at it.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], manifest: Mapping[str, Any]) -> None:
+        self.path = Path(path)
+        if self.path.exists() and not self.path.is_dir():
+            raise InputError(f"folder is {str(path)!r}, which is a file; expected a folder, or a name for one")
+        self.path.mkdir(parents=True, exist_ok=True)
+        self.kernels = ""
+        self._lock = _locked(self.path)
+        try:
+            self._check(json.loads(json.dumps(manifest)))
+            for left in self.path.glob(f"{UNFINISHED}*"):
+                left.unlink()
+            # Never a name that was there before: what was read is not written over.
+            numbers = [int(path.stem.removeprefix(PART)) for path in self._parts()]
+            self._next = max(numbers, default=-1) + 1
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Let another process have it."""
+        self._lock.close()
+
+    def read(self, table: Table) -> None:
+        """Take over what is finished."""
+        for path in self._parts():
+            runs = self._runs(path, table)
+            for run in runs:
+                if not table.done[run.number]:
+                    table.take(run)
+
+    def write(self, done: ChunkDone) -> None:
+        """Keep a chunk."""
+        self.kernels = done.kernels
+        lines = [json.dumps({"kernels": done.kernels})]
+        for run in done.runs:
+            for k, row in enumerate(run.rows):
+                # Written by hand: half of what a chunk costs would be that JSON looks at what all lines have.
+                measures = ", ".join([repr(x) if math.isfinite(x) else "null" for x in run.values[k]])
+                line = (
+                    f'{{"row": {row}, "run": {run.number}, "status": "{run.status[k]}", '
+                    f'"iterations": {run.iterations[k]}, "measures": [{measures}]'
+                )
+                if run.messages[k]:
+                    line += f', "message": {json.dumps(run.messages[k])}'
+                if run.starts:
+                    start = run.starts[k]
+                    line += f', "start": {json.dumps(start and [start.values.tolist(), start.q.tolist()])}'
+                lines.append(line + "}")
+        lines.append(json.dumps({"rows": len(lines) - 1}))
+        self._put(f"{PART}{self._next:06d}.jsonl", "\n".join(lines) + "\n")
+        self._next += 1
+
+    def _parts(self) -> list[Path]:
+        return sorted(path for path in self.path.glob(f"{PART}*.jsonl") if path.stem.removeprefix(PART).isdigit())
+
+    def _check(self, manifest: dict[str, Any]) -> None:
+        """Write the manifest, or compare it with the one that is there."""
+        there = self.path / MANIFEST
+        if not there.exists():
+            if self._parts():
+                raise InputError(
+                    f"folder {str(self.path)!r} has parts of a study and no {MANIFEST}; expected another one"
+                )
+            self._put(MANIFEST, json.dumps(manifest, indent=1) + "\n")
+            return
+        try:
+            before = json.loads(there.read_text(encoding="utf-8"))
+        except ValueError:
+            before = None
+        if not isinstance(before, dict) or before.get("format") != manifest["format"]:
+            raise InputError(f"folder {str(self.path)!r} has a {MANIFEST} of something else; expected that of a study")
+        for key in manifest:
+            if before.get(key) != manifest[key]:
+                raise InputError(
+                    f"folder {str(self.path)!r} is of a study with another {key}: {_shown(before.get(key))} there, "
+                    f"{_shown(manifest[key])} here; expected the same, or another folder"
+                )
+
+    def _put(self, name: str, text: str) -> None:
+        """Write a file so that it is there as a whole or not at all."""
+        with tempfile.NamedTemporaryFile(
+            "w", dir=self.path, prefix=UNFINISHED, delete=False, encoding="utf-8", newline="\n"
+        ) as file:
+            file.write(text)
+        os.replace(file.name, self.path / name)
+
+    def _runs(self, path: Path, table: Table) -> list[RunDone]:
+        """The runs of a part; none of one that is damaged."""
+        try:
+            head, *lines, end = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+            if end != {"rows": len(lines)}:
+                return []
+            found: dict[int, RunDone] = {}
+            for line in lines:
+                run = found.setdefault(line["run"], RunDone(line["run"], [], [], [], [], [], []))
+                run.rows.append(line["row"])
+                run.status.append(line["status"])
+                run.messages.append(line.get("message", ""))
+                run.iterations.append(line["iterations"])
+                run.values.append([math.nan if x is None else x for x in line["measures"]])
+                if "start" in line:
+                    start = line["start"]
+                    run.starts.append(start and Start(*map(np.array, start)))
+            runs = list(found.values())
+            # What a run is of is told by the plan.
+            is_whole = all(run.rows == table.runs[run.number].rows.tolist() for run in runs)
+        except (ValueError, KeyError, IndexError, TypeError, AttributeError):
+            return []
+        if not is_whole:
+            return []
+        self.kernels = self.kernels or head["kernels"]
+        return runs
+
+
+def _locked(path: Path) -> IO[str]:
+    """A file of the folder that this process alone has; its lock ends with the process, however that ends."""
+    file = open(path / LOCK, "w", encoding="ascii")  # noqa: SIM115
+    with suppress(ImportError):
+        import fcntl
+
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            file.close()
+            raise InputError(f"folder {str(path)!r} is written to by another process; expected one at a time") from None
+    return file
+
+
+def _shown(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."

@@ -1,0 +1,138 @@
+"""Studies: designs by the thousand, solved along branches, on one machine or many, watched, stopped and resumed."""
+
+from __future__ import annotations
+
+import logging
+from contextlib import closing, nullcontext
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from assembly._progress import Progress, checked_progress, watched
+from assembly.assembly import Assembly
+from assembly.derivatives.implicit import the_scene
+from assembly.derivatives.response import values_set
+from assembly.errors import InputError, positive
+from assembly.studies.sweeps.folder import Folder
+from assembly.studies.sweeps.identity import manifest_of
+from assembly.studies.sweeps.measuring import columns_of
+from assembly.studies.sweeps.plans import as_plan
+from assembly.studies.sweeps.result import Study, new_study
+from assembly.studies.sweeps.scheduling import Executor, StudyError, in_process, on_executor
+from assembly.studies.sweeps.table import Table
+from assembly.studies.sweeps.work import ChunkDone, Job
+
+__all__ = ["study"]
+
+_LOG = logging.getLogger("assembly.studies")
+# Columns that every table has.
+OWN = ("row", "status", "message", "iterations")
+
+
+def study(
+    scene: Assembly,
+    plan: Any,
+    of: Any,
+    *,
+    executor: Executor | None = None,
+    folder: str | PathLike[str] | None = None,
+    progress: Progress = False,
+    chunk_seconds: float = 0.5,
+) -> Study:
+    """Solve a scene for every row of a plan, and measure it.
+
+    Parameters
+    ----------
+    scene : Assembly
+        Its numbers are what they were afterwards.
+    plan : Plan, or iterable of dictionaries Parameter -> value
+        ``asm.grid``, ``asm.sobol``, ``asm.latin_hypercube``, ``asm.rows``, ``asm.starts``.
+    of : Measure or function of a solution, several, or a mapping of names to them
+        What is told of every row. Functions give finite numbers; for workers they have names in a module.
+    executor : Executor, optional
+        Where it is computed: of `concurrent.futures`, `mpi4py.futures` or executorlib, or a client of Dask. By default
+        here. The bits of the results are the same.
+    folder : str or path, optional
+        Where what is finished is kept. A call with the folder of an earlier one goes on from there.
+    progress : bool or callable
+        True shows a bar; a function is called with how many rows are done, and of how many, and stops the study where
+        it returns True.
+    chunk_seconds : float
+        How long what a worker is given at a time takes, about; it does not change the results.
+
+    Returns
+    -------
+    Study
+        A row a design, those that failed as well. After Ctrl-C the rows that are done.
+
+    Raises
+    ------
+    InputError, TypeError
+        Arguments that cannot be used; the folder of another study.
+    StudyError
+        Workers run kernels of different processors.
+    """
+    the_scene(scene)
+    designs = as_plan(plan)
+    columns = columns_of(of)
+    names = [*OWN, *designs.names]
+    for column in columns:
+        if column.name in names:
+            raise InputError(
+                f"of has the name {column.name!r}, which another column has; expected one of its own: name="
+            )
+    for name in designs.names:
+        if name in OWN:
+            raise InputError(f"plan has a parameter of the name {name!r}, as every table; expected another one: name=")
+    if executor is not None and not callable(getattr(executor, "submit", None)):
+        raise TypeError(f"executor is {executor!r}; expected an Executor with submit, or a client of Dask")
+    checked_progress(progress)
+    seconds = positive("chunk_seconds", chunk_seconds)
+    job = Job(scene, designs.parameters, columns, designs.seed if designs.kind == "starts" else None)
+    table = Table(designs.values, designs.runs(), len(columns))
+    before = np.array([parameter.value for parameter in designs.parameters])
+    kept = None if folder is None else Folder(folder, manifest_of(scene, designs, columns))
+    with closing(kept) if kept is not None else nullcontext(), values_set(designs.parameters, before):
+        kernels = _computed(job, table, kept, executor, progress, seconds)
+    return new_study(table, designs, job, kernels)
+
+
+def _computed(
+    job: Job, table: Table, kept: Folder | None, executor: Executor | None, progress: Progress, seconds: float
+) -> str:
+    """Fill the table; the processor of the kernels that did."""
+    if kept is not None:
+        kept.read(table)
+    kernels = kept.kernels if kept is not None else ""
+    count = len(table.values)
+    found = count - table.rows_left
+    _LOG.info("a study of %d rows begins, %d are done", count, found)
+    with watched(progress, "study", count, "row") as advance:
+        if found:
+            advance(found)
+
+        def take(done: ChunkDone) -> bool:
+            nonlocal kernels
+            if kernels and done.kernels != kernels:
+                raise StudyError(
+                    f"rows were computed by kernels for {kernels}, and others now by kernels for {done.kernels}, which "
+                    "may round otherwise; expected one kind: fresh processes as workers take portable ones"
+                )
+            kernels = done.kernels
+            for run in done.runs:
+                table.take(run)
+            if kept is not None:
+                kept.write(done)
+            solved = sum(len(run.rows) for run in done.runs)
+            _LOG.debug("a chunk of %d runs, %d rows, took %.3f s", len(done.runs), solved, done.seconds)
+            return True if executor is None else advance(solved)
+
+        try:
+            if executor is None:
+                in_process(job, table, seconds, take, advance)
+            else:
+                on_executor(job, table, seconds, take, executor)
+        except KeyboardInterrupt:
+            _LOG.warning("the study was interrupted with %d of %d rows done", count - table.rows_left, count)
+    return kernels

@@ -1,0 +1,156 @@
+"""Runs handed to workers in chunks, as long as they take, until all are done.
+
+Of an executor nothing is used but `submit`, and that its futures say when they are done.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import heapq
+import os
+import pickle
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor
+from queue import SimpleQueue
+from typing import Any, Protocol
+
+from assembly.errors import AssemblyError, InputError
+from assembly.studies.sweeps.table import Table
+from assembly.studies.sweeps.task import compute
+from assembly.studies.sweeps.work import ChunkDone, Job, Worker
+
+__all__ = ["Executor", "StudyError", "in_process", "on_executor"]
+
+# What a row is taken to take before any is measured, in seconds.
+FIRST_GUESS = 1e-3
+# Chunks that a worker has to come at least, where there are rows for them: so that workers end at one time.
+SHARES = 8
+# Chunks that wait for each worker, so that none is idle while a chunk comes back.
+AHEAD = 2
+# Takes a chunk that is done: whether the study goes on.
+Take = Callable[[ChunkDone], bool]
+
+
+class Executor(Protocol):
+    """What runs a function elsewhere: of `concurrent.futures`, `mpi4py.futures`, executorlib, or a client of Dask."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any) -> Any:
+        """A future of fn(*args)."""
+
+
+class StudyError(AssemblyError, RuntimeError):
+    """A study's workers were ended, or disagree about what they compute with."""
+
+
+class _Waiting:
+    """Runs that are ready, the coarse ones first, and how long a row takes."""
+
+    def __init__(self, table: Table, seconds: float, workers: int) -> None:
+        self._table, self._seconds, self._workers = table, seconds, workers
+        self._ready = table.ready()
+        self._left = table.rows_left
+        self._spent, self._solved = 0.0, 0
+
+    def __bool__(self) -> bool:
+        return bool(self._ready)
+
+    def took(self, done: ChunkDone) -> None:
+        """Learn how long rows take, and which runs may begin now."""
+        for run in done.runs:
+            for number in self._table.begun_by(run.number):
+                heapq.heappush(self._ready, number)
+            self._solved += len(run.rows)
+        self._spent += done.seconds
+
+    def chunk(self) -> list[int]:
+        """The next runs: for so many seconds, or less near the end."""
+        a_row = self._spent / self._solved if self._solved else FIRST_GUESS
+        share = a_row * self._left / (SHARES * self._workers)
+        most = min(self._seconds, share) / a_row
+        chosen: list[int] = []
+        rows = 0
+        while self._ready and (not chosen or rows < most):
+            number = heapq.heappop(self._ready)
+            chosen.append(number)
+            rows += len(self._table.runs[number].rows)
+        self._left -= rows
+        return chosen
+
+
+def in_process(job: Job, table: Table, seconds: float, take: Take, say: Callable[[int], bool]) -> None:
+    """Compute a study here; `say` hears how many rows were solved, and may end it."""
+    worker = Worker(job)
+    waiting = _Waiting(table, seconds, 1)
+    goes_on = True
+
+    def heard(count: int) -> bool:
+        nonlocal goes_on
+        goes_on = say(count)
+        return goes_on
+
+    while waiting and goes_on:
+        done = worker.compute([table.task(number) for number in waiting.chunk()], heard)
+        take(done)
+        if done.interrupted:
+            raise KeyboardInterrupt
+        waiting.took(done)
+
+
+def on_executor(job: Job, table: Table, seconds: float, take: Take, executor: Executor) -> None:
+    """Compute a study on workers. What they have not begun is called off where it ends early."""
+    packed = _pickled(job)
+    key = hashlib.sha256(packed).hexdigest()
+    workers = _workers_of(executor)
+    waiting = _Waiting(table, seconds, workers)
+    answers: SimpleQueue[Any] = SimpleQueue()
+    under_way: set[Any] = set()
+    try:
+        while waiting or under_way:
+            while waiting and len(under_way) < AHEAD * workers:
+                tasks = [table.task(number) for number in waiting.chunk()]
+                future = executor.submit(compute, packed, key, pickle.dumps(tasks))
+                under_way.add(future)
+                future.add_done_callback(answers.put)
+            future = answers.get()
+            under_way.discard(future)
+            try:
+                done: ChunkDone = future.result()
+            except BrokenExecutor as error:
+                raise StudyError(
+                    "a worker was ended, and with it its executor; expected workers with the memory they need: with a "
+                    "folder= the same call goes on from what is finished"
+                ) from error
+            goes_on = take(done)
+            if done.interrupted:
+                raise KeyboardInterrupt
+            if not goes_on:
+                return
+            waiting.took(done)
+    finally:
+        for future in under_way:
+            future.cancel()
+
+
+def _pickled(job: Job) -> bytes:
+    """What workers are sent once a chunk."""
+    try:
+        return pickle.dumps(job)
+    except Exception as error:
+        try:
+            import cloudpickle
+        except ImportError:
+            pass
+        else:
+            packed: bytes = cloudpickle.dumps(job)
+            return packed
+        raise InputError(
+            f"of has what cannot be sent to workers: {error}; expected functions of a module, or executor=None"
+        ) from error
+
+
+def _workers_of(executor: Any) -> int:
+    """How many chunks an executor computes at a time, where it says so; it decides nothing but the size of chunks."""
+    count = getattr(executor, "_max_workers", None)
+    if count is None and hasattr(executor, "nthreads"):
+        count = sum(executor.nthreads().values())
+    return count if isinstance(count, int) and count > 0 else os.cpu_count() or 1
