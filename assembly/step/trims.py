@@ -138,13 +138,8 @@ def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: floa
     breaks = curve.breaks()
     at = sampled(breaks, 17)
     values = curve.evaluate(at)
-    cuts = [breaks]
-    for axis, along in enumerate(maps):
-        joints = along.joints(values[:, axis].min(), values[:, axis].max())
-        cuts.append(
-            np.array(crossings(values[:, axis], at, lambda t, axis=axis: float(curve.evaluate(t)[axis]), joints))
-        )
-    breaks = np.unique(np.concatenate(cuts))
+    joints = [along.joints(column.min(), column.max()) for along, column in zip(maps, values.T, strict=True)]
+    breaks = np.unique(np.append(breaks, crossings(values, at, curve.evaluate, joints)))
     short = 1e-9 * (breaks[-1] - breaks[0])
     keep = np.append(True, np.diff(breaks) > short)
     keep[-1] = True
