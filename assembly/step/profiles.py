@@ -198,22 +198,23 @@ def approximated(function: Callable[[Array], Array], breaks: Array, tolerance: f
     parts, solve, check = _interpolation()
     found: list[tuple[Array, Array, Array]] = []
     worst = 0.0
-    # Stretches of one halving are asked for at once; of those that do not fit, the halves of the first come first.
-    todo = [(breaks[:-1], breaks[1:], 0)]
-    while todo:
-        low, high, depth = todo.pop()
+    low, high = breaks[:-1], breaks[1:]
+    # Stretches of one halving are asked for at once.
+    for depth in range(_HALVINGS + 1):
         asked = function((low[:, None] + (high - low)[:, None] * parts).ravel()).reshape(len(low), len(parts), -1)
         pieces = solve @ asked[:, : _DEGREE + 1]
         pieces[:, 0], pieces[:, -1] = asked[:, 0], asked[:, _DEGREE]
         errors = np.abs(check @ pieces - asked[:, _DEGREE + 1 :]).max(axis=(1, 2))
         fits = ~(errors > tolerance)
-        if depth == _HALVINGS and not fits.all():
-            raise Unreadable(f"a curve bends too sharply to be followed to {tolerance:.1g}")
         found.append((low[fits], high[fits], pieces[fits]))
         worst = max(worst, float(errors[fits].max(initial=0.0)))
-        for k in np.flatnonzero(~fits)[::-1]:
-            middle = 0.5 * (low[k] + high[k])
-            todo.append((np.array([low[k], middle]), np.array([middle, high[k]]), depth + 1))
+        if fits.all():
+            break
+        if depth == _HALVINGS:
+            raise Unreadable(f"a curve bends too sharply to be followed to {tolerance:.1g}")
+        low, high = low[~fits], high[~fits]
+        middle = 0.5 * (low + high)
+        low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
     begins, ends, stack = (np.concatenate(column) for column in zip(*found, strict=True))
     order = np.argsort(begins)
     begins, ends, stack = begins[order], ends[order], stack[order]

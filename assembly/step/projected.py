@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from assembly.step.occt import occt
 from assembly.step.profiles import Spline, Unreadable, approximated, crossings, knot_row, point, profile
 from assembly.step.surfaces import CONFUSION, Patch
 
-__all__ = ["Side", "is_loose", "points_of", "projected"]
+__all__ = ["Side", "Space", "is_loose", "points_of", "projected", "space_of"]
 
 Array = NDArray[np.float64]
 # How far a curve may be off its edge, over the size of the surface: less changes no digit that counts.
@@ -61,6 +61,25 @@ def points_of(curve: Any, low: float, high: float) -> Callable[[Array], Array]:
             first, last = made.domain
             return lambda t: made.evaluate(np.minimum(np.maximum(along(t), first), last))
     return lambda t: np.array([point(curve.Value(x)) for x in t.tolist()])
+
+
+class Space(NamedTuple):
+    """An edge's curve in space, Geom_Curve, its ends, and its points."""
+
+    curve: Any
+    low: float
+    high: float
+    points: Callable[[Array], Array]
+
+
+def space_of(edge: Any) -> Space | None:
+    """The curve of an edge in space, if it has one."""
+    o = occt()
+    curve = o.BRep_Tool.Curve_s(edge, 0.0, 0.0)
+    if curve is None:
+        return None
+    low, high = o.BRep_Tool.Range_s(edge)
+    return Space(curve, low, high, points_of(curve, low, high))
 
 
 class Side:
@@ -122,9 +141,8 @@ class Side:
 class _Edge:
     """An edge in space, the surface that it is projected onto, and the one on its other side if there is one."""
 
-    def __init__(self, space: Any, low: float, high: float, own: Side, other: Side | None) -> None:
+    def __init__(self, space: Space, own: Side, other: Side | None) -> None:
         self.space, self.own, self.other = space, own, other
-        self.points = points_of(space, low, high)
         self.size = own.patch.surface.size
 
     def off(self, t: Array) -> float:
@@ -143,14 +161,14 @@ class _Edge:
 
     def projection(self, t: Array) -> Array:
         """Parameters (n, 2) on the surface, of the intersection where there is one."""
-        points, start = np.ascontiguousarray(self.points(t)), self.own.given(t)
+        points, start = np.ascontiguousarray(self.space.points(t)), self.own.given(t)
         if self.other is not None:
             move_between(self.own.ground, self.other.ground, points, np.hstack([start, self.other.given(t)]))
         return self.own.feet(points, start)
 
     def joints(self, low: float, high: float) -> Array:
         """Parameters between which the projection is smooth: between knots of the edge and of the surface."""
-        space, breaks = self.space, np.array([low, high])
+        space, breaks = self.space.curve, np.array([low, high])
         while hasattr(space, "BasisCurve"):
             space = space.BasisCurve()
         if hasattr(space, "Knots"):
@@ -179,28 +197,26 @@ def is_loose(edge: Any) -> bool:
     return o.BRep_Tool.Tolerance_s(edge) > 2.0 * CONFUSION and not o.BRep_Tool.Degenerated_s(edge)
 
 
-def projected(edge: Any, own: Side, other: Side | None, low: float, high: float) -> tuple[Spline, float] | None:
+def projected(space: Space, own: Side, other: Side | None, low: float, high: float) -> tuple[Spline, float] | None:
     """The curve in our (u, v) of a loose edge that is projected onto a surface; None where the one there is will do.
 
     Parameters
     ----------
-    edge
-        TopoDS_Edge.
+    space
+        The edge.
     own, other
         Its surface, and the one of the face beyond it.
     low, high
-        Ends of its curves.
+        Ends of its curves on surfaces.
 
     Returns
     -------
     spline, deviation
         The deviation is that of the interpolation, in (u, v).
     """
-    o = occt()
-    space = o.BRep_Tool.Curve_s(edge, 0.0, 0.0)
-    if space is None or not np.allclose(o.BRep_Tool.Range_s(edge), (low, high), rtol=1e-9, atol=1e-9 * (high - low)):
+    if not np.allclose((space.low, space.high), (low, high), rtol=1e-9, atol=1e-9 * (high - low)):
         return None
-    made = _Edge(space, low, high, own, other)
+    made = _Edge(space, own, other)
     try:
         if not made.off(np.linspace(low, high, 2 * _PLACES)) > _OFF * made.size:
             return None

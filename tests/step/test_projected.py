@@ -11,7 +11,7 @@ from assembly.step import trims
 from assembly.step.bodies import read_shape
 from assembly.step.carriers import spline_curve
 from assembly.step.profiles import approximated, point
-from assembly.step.projected import Side, is_loose, points_of, projected
+from assembly.step.projected import Side, is_loose, points_of, projected, space_of
 from assembly.step.surfaces import patch
 from tests.step.models import MODELS, O, cylinder, edges, faces, parts, without
 
@@ -76,7 +76,7 @@ def test_edges_of_one_surface_alone_end_at_its_nearest_points():
                 continue
             low, high = O.BRep_Tool.Range_s(edge)
             flat = O.BRep_Tool.CurveOnSurface_s(edge, face, low, high)
-            curve, deviation = projected(edge, Side(flat, where, low, high), None, low, high)
+            curve, deviation = projected(space_of(edge), Side(flat, where, low, high), None, low, high)
             assert deviation < 1e-9
             points, _ = curve.cartesian
             assert points.shape[1] == 2
