@@ -123,9 +123,13 @@ def _counted(reader: Any) -> tuple[int, int, int]:
     everything = range(1, model.NbEntities() + 1)
     values = list(map(model.Value, everything))
     kinds = [type(value).__name__ for value in values]
-    broken = [kind for k, kind in zip(everything, kinds, strict=True) if model.IsErrorEntity(k) and not _is_beside(kind)]
+    broken = [
+        kind for k, kind in zip(everything, kinds, strict=True) if model.IsErrorEntity(k) and not _is_beside(kind)
+    ]
     styles = sum(kind.startswith("StepVisual_") for kind in broken)
-    flat = sum(_is_flat(value) for value, kind in zip(values, kinds, strict=True) if kind == "StepGeom_Axis2Placement3d")
+    flat = sum(
+        _is_flat(value) for value, kind in zip(values, kinds, strict=True) if kind == "StepGeom_Axis2Placement3d"
+    )
     faces = sum(kind in ("StepShape_AdvancedFace", "StepShape_FaceSurface") for kind in kinds)
     return len(broken) - styles + flat, styles, faces
 

@@ -247,8 +247,9 @@ def crossings(values: Array, at: Array, function: Callable[[Array], Array], join
     low, high, below, above, which, wanted = (np.concatenate(column) for column in zip(*rows, strict=True))
     which = which.astype(np.int64)
 
-    def apart(t: Array, rows: Array) -> Array:
-        return function(t)[np.arange(t.size), which[rows]] - wanted[rows]
+    def apart(t: Array, rows: NDArray[np.int64]) -> Array:
+        there: Array = function(t)[np.arange(t.size), which[rows]]
+        return there - wanted[rows]
 
     found.append(_roots(apart, (low, high), (below, above)))
     return np.concatenate(found)
