@@ -248,8 +248,8 @@ def crossings(values: Array, at: Array, function: Callable[[Array], Array], join
     which = which.astype(np.int64)
 
     def apart(t: Array, rows: NDArray[np.int64]) -> Array:
-        there: Array = function(t)[np.arange(t.size), which[rows]]
-        return there - wanted[rows]
+        gap: Array = function(t)[np.arange(t.size), which[rows]] - wanted[rows]
+        return gap
 
     found.append(_roots(apart, (low, high), (below, above)))
     return np.concatenate(found)
