@@ -17,6 +17,7 @@ from assembly.assembly import Assembly
 from assembly.constraints.model.couplings import Gear, Linear, RackPinion
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.joints import Fixed, Planar, Prismatic, Revolute
+from assembly.constraints.model.mates import Insert
 from assembly.errors import InputError, positive
 from assembly.files.primitives import Primitive, primitives_of
 from assembly.files.robot import Inertial, Robot, UrdfError
@@ -45,8 +46,16 @@ class _Link:
     def sides(self) -> tuple[Frame, Frame]:
         """The joint's frames on the parent and on the body."""
         assert self.joint is not None
-        a, b = self.joint.frame_a, self.joint.frame_b
+        a, b = _frames(self.joint)
         return (a, b) if b.body is self.body else (b, a)
+
+
+def _frames(joint: Joint) -> tuple[Frame, Frame]:
+    """The frames of a joint that coincide where its freedoms are zero."""
+    a, b = joint.frame_a, joint.frame_b
+    if isinstance(joint, Insert) and joint.offset:
+        a = a.body.frame(a.origin + joint.offset * a.axes[:, 2], a.axes[:, 2], a.axes[:, 0])
+    return a, b
 
 
 def write_urdf(
@@ -135,7 +144,8 @@ def _tree(bodies: Sequence[Body], joints: Sequence[Joint]) -> list[_Link]:
         parent = links[place]
         for joint in [item for item in left if any(body is parent.body for body in item.bodies)]:
             left.remove(joint)
-            frame = joint.frame_b if joint.frame_a.body is parent.body else joint.frame_a
+            a, b = _frames(joint)
+            frame = b if a.body is parent.body else a
             if any(link.body is frame.body for link in links):
                 raise UrdfError(f"joint {joint.name!r} closes a loop at {frame.body.name!r}; expected a tree")
             links.append(_Link(frame.body, frame.origin, joint, parent))
@@ -233,7 +243,7 @@ class _Writer:
         between = _OPPOSED if joint.axes == "opposed" else np.eye(3)
         self._place(element, on_parent.origin - parent.origin, on_parent.axes @ between @ on_child.axes.T)
         # Turns and slides are along z of frame a; seen from frame b they go the other way.
-        axis = on_child.axes @ between[:, 2] if joint.frame_a is on_parent else -on_child.axes[:, 2]
+        axis = on_child.axes @ between[:, 2] if joint.frame_a.body is on_parent.body else -on_child.axes[:, 2]
         ElementTree.SubElement(element, "axis", xyz=" ".join(repr(float(x)) for x in axis))
         if kind in ("revolute", "prismatic"):
             limits = {"lower": repr(float(low)), "upper": repr(float(high)), "effort": "0", "velocity": "0"}

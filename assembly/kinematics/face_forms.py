@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
-from assembly.geometry.recognition.elementary import elementary_form
+from assembly.geometry.recognition.elementary import elementary_form, is_plane
 from assembly.geometry.recognition.forms import (
     Cone,
     Cylinder,
@@ -20,7 +20,7 @@ from assembly.geometry.recognition.forms import (
     Torus,
 )
 
-__all__ = ["FaceKind", "axis_of", "center_of", "form_of", "kind_of", "settled"]
+__all__ = ["FaceKind", "axis_of", "center_of", "form_of", "is_flat", "kind_of", "settled"]
 
 Array = NDArray[np.float64]
 FaceKind = Literal["plane", "cylinder", "cone", "sphere", "torus", "extrusion", "revolution", "spline"]
@@ -43,6 +43,12 @@ def form_of(face: Face) -> Form:
     """What the surface of a face is, to 1e-10 of its size."""
     size = face.surface.size
     return elementary_form(face.surface, NEARLY * size if size > 0.0 else None)
+
+
+def is_flat(face: Face) -> bool:
+    """Whether the surface of a face is a plane, without asking what else it is."""
+    size = face.surface.size
+    return size > 0.0 and is_plane(face.surface, NEARLY * size)
 
 
 def kind_of(form: Form) -> FaceKind:

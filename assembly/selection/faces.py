@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.errors import InputError, positive
 from assembly.kinematics.body_face import BodyFace
+from assembly.kinematics.face_forms import is_flat
 from assembly.selection.selection import EQUAL, Selection, are_parallel, checked_place, is_about, shown
 
 __all__ = ["Faces"]
@@ -42,7 +43,7 @@ class Faces(Selection[BodyFace]):
         place = None if at is None else checked_place("at", at)
 
         def fits(face: BodyFace) -> bool:
-            if face.kind != "plane":
+            if not is_flat(face.face):
                 return False
             if along is not None and not are_parallel(face.normal, along, same_sense=True):
                 return False
@@ -114,7 +115,7 @@ class Faces(Selection[BodyFace]):
         return item.kind
 
     def _direction(self, item: BodyFace) -> Array | None:
-        return item.normal if item.kind == "plane" else None
+        return item.normal if is_flat(item.face) else None
 
     def _described(self, item: BodyFace) -> str:
         return f"{item.name!r} ({_said_of(item)})"

@@ -87,9 +87,10 @@ class Selection(tuple[Item, ...]):
             return self._chosen(lambda item: True, f"({selector!r})")
         chosen = rule(
             Seen(
-                np.array([item.centroid for item in self]),
-                [self._direction(item) for item in self],
-                [{*self._kinds[self._kind(item)]} for item in self],
+                len(self),
+                lambda k: self[k].centroid,
+                lambda k: self._direction(self[k]),
+                lambda k: {*self._kinds[self._kind(self[k])]},
                 list(dict.fromkeys(name for names in self._kinds.values() for name in names)),
                 EQUAL * self._size(),
                 self._have_sense,

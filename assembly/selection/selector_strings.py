@@ -45,15 +45,18 @@ _VIEW = re.compile("|".join(_VIEWS))
 
 
 class Seen:
-    """What selectors see of things.
+    """What selectors see of things, asked for where a selector needs it.
 
     Parameters
     ----------
-    centers : (n, 3)
-    directions : sequence of (3,) or None
-        Of planes and straight edges, unit vectors.
-    kinds : sequence of set of str
-        Names of kinds, in capitals.
+    count : int
+        Of the things.
+    center
+        (3,) of the k-th.
+    direction
+        Of the k-th, if it is a plane or a straight edge: a unit vector.
+    kinds
+        Names of the kind of the k-th, in capitals.
     known : sequence of str
         All names of kinds that may be asked for.
     tolerance : float
@@ -64,15 +67,17 @@ class Seen:
 
     def __init__(
         self,
-        centers: Array,
-        directions: Sequence[Array | None],
-        kinds: Sequence[set[str]],
+        count: int,
+        center: Callable[[int], Array],
+        direction: Callable[[int], Array | None],
+        kinds: Callable[[int], set[str]],
         known: Sequence[str],
         tolerance: float,
         have_sense: bool,
     ) -> None:
-        self.centers = centers
-        self.directions = directions
+        self.count = count
+        self.center = center
+        self.direction = direction
         self.kinds = kinds
         self.known = known
         self.tolerance = tolerance
@@ -80,12 +85,13 @@ class Seen:
 
     def all(self) -> Chosen:
         """All of them."""
-        return set(range(len(self.kinds)))
+        return set(range(self.count))
 
     def turned(self, direction: Array, angle: float, either: bool) -> Chosen:
         """Those at an angle to a direction, or to it or its opposite."""
         found = set()
-        for k, own in enumerate(self.directions):
+        for k in range(self.count):
+            own = self.direction(k)
             if own is not None:
                 across, along = float(np.linalg.norm(np.cross(direction, own))), float(direction @ own)
                 off = np.arctan2(across, abs(along) if either else along)
@@ -97,7 +103,7 @@ class Seen:
         """Those at the place of this number along a direction."""
         if not among:
             return set()
-        heights = sorted((float(self.centers[k] @ direction), k) for k in among)
+        heights = sorted((float(self.center(k) @ direction), k) for k in among)
         groups: list[list[int]] = []
         start = -np.inf
         for height, k in heights:
@@ -240,7 +246,7 @@ class _Reader:
                 raise InputError(
                     f"selector is {self._text!r} with kind {name}; expected one of {', '.join(seen.known)}"
                 )
-            return {k for k, names in enumerate(seen.kinds) if name in names}
+            return {k for k in range(seen.count) if name in seen.kinds(k)}
 
         return rule
 

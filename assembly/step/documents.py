@@ -92,7 +92,7 @@ def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
         with settings({"read.stepcaf.subshapes.name": 1, "read.step.product.mode": 1}):
             if reader.ReadFile(file) != o.IFSelect_RetDone:
                 raise StepError(f"path is {path!r}; expected a STEP file, and OCCT cannot parse it")
-            shapes, styles = _broken_entities(reader)
+            shapes, styles, faces = _counted(reader)
             if shapes and not damaged:
                 raise Damaged(f"path is {path!r}; {shapes} of its entities are damaged")
             if styles:
@@ -111,21 +111,27 @@ def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
                 raise StepError(f"path is {path!r}; OCCT finds no shapes in it")
     finally:
         o.XCAFDoc_ShapeTool.SetAutoNaming_s(auto)
-    return document, _face_count(reader)
+    return document, faces
 
 
-def _broken_entities(reader: Any) -> tuple[int, int]:
-    """Numbers of entities that OCCT could not load: those that it makes shapes of, and those that say how these look.
+def _counted(reader: Any) -> tuple[int, int, int]:
+    """Numbers of entities that OCCT could not load, those that shapes are made of and those of style, and of faces.
 
-    OCCT asks nothing of the latter where it is to make no colors.
+    OCCT asks nothing of those of style where it is to make no colors.
     """
     model = reader.Reader().WS().Model()
-    broken = (type(model.Value(k)).__name__ for k in range(1, model.NbEntities() + 1) if model.IsErrorEntity(k))
-    kinds = [kind for kind in broken if not _is_beside(kind)]
-    styles = sum(kind.startswith("StepVisual_") for kind in kinds)
-    values = (model.Value(k) for k in range(1, model.NbEntities() + 1))
-    flat = sum(_is_flat(value) for value in values if type(value).__name__ == "StepGeom_Axis2Placement3d")
-    return len(kinds) - styles + flat, styles
+    everything = range(1, model.NbEntities() + 1)
+    values = list(map(model.Value, everything))
+    kinds = [type(value).__name__ for value in values]
+    broken = [
+        kind for k, kind in zip(everything, kinds, strict=True) if model.IsErrorEntity(k) and not _is_beside(kind)
+    ]
+    styles = sum(kind.startswith("StepVisual_") for kind in broken)
+    flat = sum(
+        _is_flat(value) for value, kind in zip(values, kinds, strict=True) if kind == "StepGeom_Axis2Placement3d"
+    )
+    faces = sum(kind in ("StepShape_AdvancedFace", "StepShape_FaceSurface") for kind in kinds)
+    return len(broken) - styles + flat, styles, faces
 
 
 def _is_flat(placement: Any) -> bool:
@@ -137,10 +143,3 @@ def _is_flat(placement: Any) -> bool:
 def _is_beside(kind: str) -> bool:
     """Whether entities of a kind say nothing of shapes: who made them and when, solid angles, dimensions."""
     return kind.endswith("AndSolidAngleUnit") or kind.startswith(_BESIDE)
-
-
-def _face_count(reader: Any) -> int:
-    """Number of faces in the file."""
-    model = reader.Reader().WS().Model()
-    kinds = ("StepShape_AdvancedFace", "StepShape_FaceSurface")
-    return sum(type(model.Value(k)).__name__ in kinds for k in range(1, model.NbEntities() + 1))

@@ -6,19 +6,22 @@ What is asked of OCCT is asked once an edge, and of faces on other sides only fo
 from __future__ import annotations
 
 from functools import cached_property
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from assembly.errors import InputError
+from assembly.errors import AssemblyError, InputError
 from assembly.step.occt import occt, parts
 from assembly.step.profiles import Unreadable, point
-from assembly.step.projected import Side, is_loose
+from assembly.step.projected import Side, Space, is_loose, space_of
 from assembly.step.surfaces import Patch, patch
-from assembly.step.wires import Traced
+from assembly.step.wires import Traced, Wire, bounds, wires_of
 
-__all__ = ["Edges", "Known"]
+__all__ = ["Edges", "Known", "Laid"]
 
+# OCCT stands for "unbounded" with numbers beyond this one.
+_FAR = 1e50
 # What a file may forgive at most, over the size of the part: a tolerance of a meter makes no faces meet.
 _FORGIVEN = 1e-2
 
@@ -41,6 +44,14 @@ class Known(NamedTuple):
     loose: bool
 
 
+class Laid(NamedTuple):
+    """A face that is taken forward: its surface, its wires, and the patch that it lies in."""
+
+    surface: Any
+    wires: list[Wire]
+    patch: Patch
+
+
 class Edges:
     """The edges of a solid, by their numbers from 1, and the two faces that meet at each."""
 
@@ -50,7 +61,11 @@ class Edges:
         self._map = o.ShapeMap()
         o.TopExp.MapShapes_s(shape, o.TopAbs_EDGE, self._map)
         self._known: dict[int, Known] = {}
-        self._patches: dict[int, Patch | None] = {}
+        self._face_map = o.ShapeMap()
+        o.TopExp.MapShapes_s(shape, o.TopAbs_FACE, self._face_map)
+        self._laid: dict[int, Laid | AssemblyError] = {}
+        self._sides: dict[tuple[int, int], Side] = {}
+        self._spaces: dict[int, Space | None] = {}
 
     def known(self, edge: Any) -> Known:
         """What is known of an edge."""
@@ -81,33 +96,78 @@ class Edges:
         points = [point(o.BRep_Tool.Pnt_s(o.as_vertex(one))) for one in parts(self.shape, o.TopAbs_VERTEX)]
         return float(np.linalg.norm(np.ptp(np.array(points), axis=0))) if points else 0.0
 
+    def laid(self, face: Any) -> Laid:
+        """What a face of the solid lies in; it is taken forward.
+
+        Raises
+        ------
+        Unreadable, InputError
+            Saying why not.
+        """
+        number = self._face_map.FindIndex(face)
+        known = self._laid.get(number) if number else None
+        if known is None:
+            try:
+                known = _laid(face)
+            except (Unreadable, InputError) as reason:
+                known = reason
+            if number:
+                self._laid[number] = known
+        if isinstance(known, AssemblyError):
+            raise known
+        return known
+
     @cached_property
-    def _faces(self) -> dict[int, list[tuple[int, Any]]]:
-        """The faces of each edge with their numbers, made forward."""
+    def _faces(self) -> dict[int, list[Any]]:
+        """The faces of each edge, made forward."""
         o = occt()
-        found: dict[int, list[tuple[int, Any]]] = {}
-        for k, face in enumerate(parts(self.shape, o.TopAbs_FACE)):
+        found: dict[int, list[Any]] = {}
+        for face in parts(self.shape, o.TopAbs_FACE):
             forward = o.as_face(face.Oriented(o.TopAbs_FORWARD))
             for edge in parts(forward, o.TopAbs_EDGE):
-                found.setdefault(self._map.FindIndex(edge), []).append((k, forward))
+                found.setdefault(self._map.FindIndex(edge), []).append(forward)
         return found
+
+    def space(self, edge: Any) -> Space | None:
+        """The edge's curve in space; None where it has none for the parameters of those on surfaces."""
+        number = self._map.FindIndex(edge)
+        if number not in self._spaces:
+            self._spaces[number] = space_of(edge)
+        return self._spaces[number]
+
+    def side(self, traced: Traced, face: Any, where: Patch) -> Side:
+        """The surface of a face, with the curve on it of one of its edges that is no seam."""
+        key = self._map.FindIndex(traced.edge), self._face_map.FindIndex(face)
+        if key not in self._sides:
+            self._sides[key] = Side(traced.curve, where, traced.low, traced.high)
+        return self._sides[key]
 
     def beyond(self, traced: Traced, face: Any) -> Side | None:
         """The surface, with the edge's curve on it, of the face on the other side of an edge; None if not just one."""
-        o = occt()
         around = self._faces.get(self._map.FindIndex(traced.edge), [])
-        others = [(k, one) for k, one in around if not one.IsSame(face)]
+        others = [one for one in around if not one.IsSame(face)]
         if len(around) != 2 or len(others) != 1:
             return None
-        ((k, other),) = others
-        low, high = o.BRep_Tool.Range_s(traced.edge, other)
-        flat = o.BRep_Tool.CurveOnSurface_s(traced.edge, other, low, high)
-        if flat is None or not np.allclose((traced.low, traced.high), (low, high), rtol=1e-9, atol=0.0):
+        try:
+            there = self.laid(others[0])
+        except (Unreadable, InputError):
             return None
-        if k not in self._patches:
-            try:
-                self._patches[k] = patch(o.BRep_Tool.Surface_s(other), o.BRepTools.UVBounds_s(other))
-            except (Unreadable, InputError):
-                self._patches[k] = None
-        there = self._patches[k]
-        return None if there is None else Side(flat, there, low, high)
+        same = (one for wire in there.wires for one in wire.edges if one.edge.IsSame(traced.edge))
+        other = next(same, None)
+        if other is None or other.curve is None:
+            return None
+        if not np.allclose((traced.low, traced.high), (other.low, other.high), rtol=1e-9, atol=0.0):
+            return None
+        return self.side(other, others[0], there.patch)
+
+
+def _laid(face: Any) -> Laid:
+    """What a face lies in."""
+    surface = occt().BRep_Tool.Surface_s(face)
+    if surface is None:
+        raise Unreadable("it has no surface")
+    wires = wires_of(face)
+    box = bounds(wires, surface, face)
+    if not all(isfinite(x) and abs(x) < _FAR for x in box):
+        raise Unreadable("it has no boundary, and its surface no end")
+    return Laid(surface, wires, patch(surface, box))

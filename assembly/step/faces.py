@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -17,15 +16,13 @@ from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.edges import Edges
 from assembly.step.occt import occt
 from assembly.step.profiles import Unreadable
-from assembly.step.surfaces import Patch, patch
+from assembly.step.surfaces import Patch
 from assembly.step.trims import Edge, chained, curves_of, edge_curves, head_to_tail
-from assembly.step.wires import Wire, bounds, outermost, wires_of
+from assembly.step.wires import Wire, outermost
 
 __all__ = ["Read", "read_face"]
 
 Array = NDArray[np.float64]
-# OCCT stands for "unbounded" with numbers beyond this one.
-_FAR = 1e50
 
 
 @dataclass(frozen=True)
@@ -75,15 +72,8 @@ def read_face(face: Any, edges: Edges, name: str | None, scale: float = 1.0) -> 
     """
     o = occt()
     forward = o.as_face(face.Oriented(o.TopAbs_FORWARD))
-    surface = o.BRep_Tool.Surface_s(forward)
-    if surface is None:
-        raise Unreadable("it has no surface")
-    wires = wires_of(forward)
-    box = bounds(wires, surface, forward)
-    if not all(isfinite(x) and abs(x) < _FAR for x in box):
-        raise Unreadable("it has no boundary, and its surface no end")
     try:
-        where = patch(surface, box)
+        surface, wires, where = edges.laid(forward)
         made_surface, factors = _scaled(where, scale)
         around = outermost(wires, surface, forward)
         outer: list[NurbsCurve] | None = None

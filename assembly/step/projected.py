@@ -11,18 +11,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
 from assembly.geometry.splines.curve import NurbsCurve
+from assembly.step.edge_feet import move_between, move_to_feet
 from assembly.step.occt import occt
 from assembly.step.profiles import Spline, Unreadable, approximated, crossings, knot_row, point, profile
 from assembly.step.surfaces import CONFUSION, Patch
 
-__all__ = ["Side", "is_loose", "points_of", "projected"]
+__all__ = ["Side", "Space", "is_loose", "points_of", "projected", "space_of"]
 
 Array = NDArray[np.float64]
 # How far a curve may be off its edge, over the size of the surface: less changes no digit that counts.
@@ -31,21 +32,6 @@ _OFF = 1e-10
 _FOLLOWED = 1e-10
 # Places of a stretch at which a curve is compared with its edge.
 _PLACES = 9
-# Most steps of a projection, of which each gains digits, and the last one over the size, which is rounding's.
-_STEPS, _LAST = 30, 1e-13
-# Sine of the angle between two surfaces at which two thirds of the way to their intersection are gone; from 2.5 times
-# as much on all of it. No edge is moved by more than some 7 times what it is off.
-_CROSSING = 0.1
-# Parts of the way that are none.
-_TANGENT = 1e-9
-# Least eigenvalue, relative, with which an intersection is solved for; the surfaces of smaller ones count as tangent.
-_DAMPED = 1e-6
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Cross products of rows; NumPy's own takes ten times as long for a few."""
-    x, y = a.T, b.T
-    return np.array([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]).T
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -77,6 +63,25 @@ def points_of(curve: Any, low: float, high: float) -> Callable[[Array], Array]:
     return lambda t: np.array([point(curve.Value(x)) for x in t.tolist()])
 
 
+class Space(NamedTuple):
+    """An edge's curve in space, Geom_Curve, its ends, and its points."""
+
+    curve: Any
+    low: float
+    high: float
+    points: Callable[[Array], Array]
+
+
+def space_of(edge: Any) -> Space | None:
+    """The curve of an edge in space, if it has one."""
+    o = occt()
+    curve = o.BRep_Tool.Curve_s(edge, 0.0, 0.0)
+    if curve is None:
+        return None
+    low, high = o.BRep_Tool.Range_s(edge)
+    return Space(curve, low, high, points_of(curve, low, high))
+
+
 class Side:
     """A surface, and the curve on it that is given for an edge.
 
@@ -92,13 +97,14 @@ class Side:
 
     def __init__(self, flat: Any, patch: Patch, low: float, high: float) -> None:
         self.patch = patch
-        self.low, self.high = np.array(patch.surface.domain).T
-        self.side = self.high - self.low
-        self.is_closed = np.array(patch.surface.closed)
-        # Where a coordinate ends; one that comes around does not.
-        self._least, self._most = np.where(self.is_closed, [[-np.inf], [np.inf]], [self.low, self.high])
-        self._is_ring = bool(self.is_closed.any())
+        self.is_closed = patch.surface.closed
         self._flat = flat, low, high
+
+    @cached_property
+    def ground(self) -> tuple[NDArray[np.int64], Array, float]:
+        """The surface as kernels read it."""
+        surface = self.patch.surface
+        return *surface._tables, surface.size
 
     @cached_property
     def _points(self) -> Callable[[Array], Array]:
@@ -107,36 +113,16 @@ class Side:
     def given(self, t: Array) -> Array:
         """Parameters (n, 2) of the surface on the curve."""
         there = self._points(t)
-        return np.array([self.patch.u(there[:, 0]), self.patch.v(there[:, 1])]).T
+        return np.column_stack([self.patch.u(there[:, 0]), self.patch.v(there[:, 1])])
 
-    def _frame(self, uv: Array) -> tuple[Array, Array, Array]:
-        at = np.where(self.is_closed, self.low + np.mod(uv - self.low, self.side), uv) if self._is_ring else uv
-        at = np.minimum(np.maximum(at, self.low), self.high)
-        s, su, sv = self.patch.surface.evaluate(at[:, 0], at[:, 1], 1)
-        return s, su, sv
-
-    def step(self, uv: Array, points: Array) -> tuple[Array, Array, Array]:
-        """Gauss-Newton's step (n, 2) toward the feet of points, how far above the surface they are, and its normals."""
-        s, su, sv = self._frame(uv)
-        off = points - s
-        a, b, c = _dot(su, su), _dot(su, sv), _dot(sv, sv)
-        f, g = _dot(su, off), _dot(sv, off)
-        # Where a parameter has no direction, at poles, it stays.
-        both, product = a * c - b * b, a * c
-        is_whole = both > 1e-12 * product
-        step = np.array([c * f - b * g, a * g - b * f]).T / np.where(is_whole, both, 1.0)[:, None]
-        if not is_whole.all():
-            alone = np.array([f / np.maximum(a, 1e-300), g / np.maximum(c, 1e-300)]).T
-            is_long = np.sqrt(np.array([a, c]).T) * self.side > 1e-9 * self.patch.surface.size
-            step = np.where(is_whole[:, None], step, np.where(is_long, alone, 0.0))
-        normals = _cross(su, sv)
-        normals /= np.maximum(_norm(normals), 1e-300)[:, None]
-        return step, _dot(normals, off), normals
-
-    def moved(self, uv: Array, step: Array) -> Array:
-        """Parameters after a step, within an open domain."""
-        made: Array = np.minimum(np.maximum(uv + step, self._least), self._most)
-        return made
+    def slopes(self, uv: Array) -> tuple[Array, Array]:
+        """Derivatives (n, 3) of the surface at parameters, which count as the end where they are beyond it."""
+        at = uv.copy()
+        for axis, (low, high) in enumerate(self.patch.surface.domain):
+            if not self.is_closed[axis]:
+                np.clip(at[:, axis], low, high, out=at[:, axis])
+        _, su, sv = self.patch.surface.evaluate(at[:, 0], at[:, 1], 1)
+        return su, sv
 
     def feet(self, points: Array, start: Array) -> Array:
         """Parameters (n, 2) of the surface's points that are nearest to others.
@@ -146,26 +132,17 @@ class Side:
         Unreadable
             Steps do not come to an end.
         """
-        uv, far, before = start, np.inf, np.inf
-        for _ in range(_STEPS):
-            there = self.moved(uv, self.step(uv, points)[0])
-            far = float((np.abs(there - uv) / self.side).max())
-            uv = there
-            # The last steps are rounding's, whatever the coordinates.
-            if far <= _LAST or not far <= 0.25 or (far <= 1e3 * _LAST and far >= 0.5 * before):
-                break
-            before = far
-        if not far <= 1e3 * _LAST:
+        places = start.copy()
+        if not move_to_feet(self.ground, points, places):
             raise Unreadable("an edge has no nearest points on its surface")
-        return uv
+        return places
 
 
 class _Edge:
     """An edge in space, the surface that it is projected onto, and the one on its other side if there is one."""
 
-    def __init__(self, space: Any, low: float, high: float, own: Side, other: Side | None) -> None:
+    def __init__(self, space: Space, own: Side, other: Side | None) -> None:
         self.space, self.own, self.other = space, own, other
-        self.points = points_of(space, low, high)
         self.size = own.patch.surface.size
 
     def off(self, t: Array) -> float:
@@ -174,7 +151,7 @@ class _Edge:
         What the curve is ahead or behind on its way does not count.
         """
         given, there = self.own.given(t), self.projection(t)
-        _, su, sv = self.own._frame(given)
+        su, sv = self.own.slopes(given)
         across = su * (there - given)[:, :1] + sv * (there - given)[:, 1:]
         slopes = np.gradient(given, t, axis=0)
         along = su * slopes[:, :1] + sv * slopes[:, 1:]
@@ -184,40 +161,14 @@ class _Edge:
 
     def projection(self, t: Array) -> Array:
         """Parameters (n, 2) on the surface, of the intersection where there is one."""
-        points, start = self.points(t), self.own.given(t)
+        points, start = np.ascontiguousarray(self.space.points(t)), self.own.given(t)
         if self.other is not None:
-            points = self._crossing(points, start, self.other.given(t), self.other)
+            move_between(self.own.ground, self.other.ground, points, np.hstack([start, self.other.given(t)]))
         return self.own.feet(points, start)
-
-    def _crossing(self, points: Array, own: Array, there: Array, other: Side) -> Array:
-        """Points moved to both surfaces, as far as these cross."""
-        found, share = points, np.zeros(len(points))
-        last = _LAST * (self.size + float(np.abs(points).max()))
-        for count in range(_STEPS):
-            step, high, normals = self.own.step(own, found)
-            step_there, high_there, normals_there = other.step(there, found)
-            own, there = self.own.moved(own, step), other.moved(there, step_there)
-            cosine = _dot(normals, normals_there)
-            if count < 2:
-                # Feet of the edge itself, by one step.
-                sine = _norm(_cross(normals, normals_there))
-                share = -np.expm1(-((sine / _CROSSING) ** 4))
-                if count == 0:
-                    continue
-                if share.max() <= _TANGENT:
-                    return points
-            sums, gaps = (high + high_there) / (2.0 + 2.0 * cosine + _DAMPED), high - high_there
-            gaps = gaps / (2.0 - 2.0 * cosine + _DAMPED)
-            back = sums[:, None] * (normals + normals_there) + gaps[:, None] * (normals - normals_there)
-            found = found - back
-            if float((share * _norm(back)).max()) <= last:
-                break
-        moved: Array = points + share[:, None] * (found - points)
-        return moved
 
     def joints(self, low: float, high: float) -> Array:
         """Parameters between which the projection is smooth: between knots of the edge and of the surface."""
-        space, breaks = self.space, np.array([low, high])
+        space, breaks = self.space.curve, np.array([low, high])
         while hasattr(space, "BasisCurve"):
             space = space.BasisCurve()
         if hasattr(space, "Knots"):
@@ -225,20 +176,17 @@ class _Edge:
             breaks = np.unique(np.append(breaks, knots[(knots > low) & (knots < high)]))
         at = np.unique(np.linspace(breaks[:-1], breaks[1:], _PLACES))
         values = self.projection(at)
-        found = [breaks]
+        joints = []
         for axis, knots in enumerate(self.own.patch.surface.breaks()):
             if self.own.is_closed[axis]:
                 knots = np.unique(np.concatenate([knots + k * (knots[-1] - knots[0]) for k in (-1.0, 0.0, 1.0)]))
-            # What is at a knot but for rounding is at it, whichever points are asked for together.
+            # What is at a knot but for rounding is at it.
             near = knots[np.abs(values[:, axis, None] - knots).argmin(axis=1)]
             is_at = np.abs(values[:, axis] - near) <= 1e-11 * (knots[-1] - knots[0])
             values[is_at, axis] = near[is_at]
-            there = crossings(
-                values[:, axis], at, lambda t, axis=axis: float(self.projection(np.array([t]))[0, axis]), knots
-            )
-            found.append(np.array(there))
-        joints = np.unique(np.concatenate(found))
-        kept: Array = joints[np.append(True, np.diff(joints) > 1e-9 * (high - low))]
+            joints.append(knots)
+        cuts = np.unique(np.append(breaks, crossings(values, at, self.projection, joints)))
+        kept: Array = cuts[np.append(True, np.diff(cuts) > 1e-9 * (high - low))]
         kept[-1] = high
         return kept
 
@@ -249,28 +197,26 @@ def is_loose(edge: Any) -> bool:
     return o.BRep_Tool.Tolerance_s(edge) > 2.0 * CONFUSION and not o.BRep_Tool.Degenerated_s(edge)
 
 
-def projected(edge: Any, own: Side, other: Side | None, low: float, high: float) -> tuple[Spline, float] | None:
+def projected(space: Space, own: Side, other: Side | None, low: float, high: float) -> tuple[Spline, float] | None:
     """The curve in our (u, v) of a loose edge that is projected onto a surface; None where the one there is will do.
 
     Parameters
     ----------
-    edge
-        TopoDS_Edge.
+    space
+        The edge.
     own, other
         Its surface, and the one of the face beyond it.
     low, high
-        Ends of its curves.
+        Ends of its curves on surfaces.
 
     Returns
     -------
     spline, deviation
         The deviation is that of the interpolation, in (u, v).
     """
-    o = occt()
-    space = o.BRep_Tool.Curve_s(edge, 0.0, 0.0)
-    if space is None or not np.allclose(o.BRep_Tool.Range_s(edge), (low, high), rtol=1e-9, atol=1e-9 * (high - low)):
+    if not np.allclose((space.low, space.high), (low, high), rtol=1e-9, atol=1e-9 * (high - low)):
         return None
-    made = _Edge(space, low, high, own, other)
+    made = _Edge(space, own, other)
     try:
         if not made.off(np.linspace(low, high, 2 * _PLACES)) > _OFF * made.size:
             return None

@@ -147,14 +147,10 @@ class _FaceBuilder:
     def _joints(self, curve: NurbsCurve) -> Array:
         """Parameters between which a curve on the surface is smooth."""
         low, high = curve.domain
-        breaks = [curve.breaks()]
-        at = sampled(breaks[0], 17)
-        values = curve.evaluate(at)
-        for axis, knots in enumerate(self.surface.breaks()):
-            breaks.append(
-                np.array(crossings(values[:, axis], at, lambda t, axis=axis: float(curve.evaluate(t)[axis]), knots))
-            )
-        joints = np.unique(np.clip(np.concatenate(breaks), low, high))
+        breaks = curve.breaks()
+        at = sampled(breaks, 17)
+        cuts = crossings(curve.evaluate(at), at, curve.evaluate, self.surface.breaks())
+        joints = np.unique(np.clip(np.append(breaks, cuts), low, high))
         return np.append(joints[:-1][np.diff(joints) > 1e-9 * (high - low)], high)
 
     def _in_plane(self, curve: NurbsCurve, plane: Array) -> tuple[Any, Any, float, float, bool]:

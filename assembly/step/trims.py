@@ -19,7 +19,7 @@ from assembly.geometry.splines.curve_parts import sampled
 from assembly.step.edges import Edges
 from assembly.step.occt import occt
 from assembly.step.profiles import Direction, Spline, Unreadable, approximated, crossings, profile, spline
-from assembly.step.projected import Side, projected
+from assembly.step.projected import projected
 from assembly.step.surfaces import Patch
 from assembly.step.wires import Traced, Wire
 
@@ -138,13 +138,8 @@ def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: floa
     breaks = curve.breaks()
     at = sampled(breaks, 17)
     values = curve.evaluate(at)
-    cuts = [breaks]
-    for axis, along in enumerate(maps):
-        joints = along.joints(values[:, axis].min(), values[:, axis].max())
-        cuts.append(
-            np.array(crossings(values[:, axis], at, lambda t, axis=axis: float(curve.evaluate(t)[axis]), joints))
-        )
-    breaks = np.unique(np.concatenate(cuts))
+    joints = [along.joints(column.min(), column.max()) for along, column in zip(maps, values.T, strict=True)]
+    breaks = np.unique(np.append(breaks, crossings(values, at, curve.evaluate, joints)))
     short = 1e-9 * (breaks[-1] - breaks[0])
     keep = np.append(True, np.diff(breaks) > short)
     keep[-1] = True
@@ -223,8 +218,11 @@ def _projected(traced: Traced, wire: Wire, patch: Patch, edges: Edges) -> _Draft
     """The curve of a loose edge projected; None where the one there will do, or none is."""
     if traced.curve is None or traced.seam:
         return None
-    low, high = traced.low, traced.high
-    made = projected(traced.edge, Side(traced.curve, patch, low, high), edges.beyond(traced, wire.face), low, high)
+    space = edges.space(traced.edge)
+    if space is None:
+        return None
+    own = edges.side(traced, wire.face, patch)
+    made = projected(space, own, edges.beyond(traced, wire.face), traced.low, traced.high)
     return None if made is None else _Draft(made[0], (False, False), made[1])
 
 

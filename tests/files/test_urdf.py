@@ -314,11 +314,12 @@ def test_scenes_that_are_no_robots(tmp_path):
     assert not path.exists()
 
 
-def test_mates_are_written_as_the_joints_they_are(tmp_path):
+@pytest.mark.parametrize("offset", [0.0, 1.5])
+def test_mates_are_written_as_the_joints_they_are(tmp_path, offset):
     plate = asm.Body("plate", asm.shapes.plate(20, 20, 8, [(3, 0, 2)]), fixed=True)
     pin = asm.Body("pin", asm.shapes.solid_cylinder(2, 14), position=(1, 2, 15))
     scene = asm.Assembly([plate, pin])
-    scene.constrain(asm.Insert(plate.face("hole 1"), pin.faces.cylinders(), "swivel", limits=(-1, 1)))
+    scene.constrain(asm.Insert(plate.face("hole 1"), pin.faces.cylinders(), "swivel", offset=offset, limits=(-1, 1)))
     asm.write_urdf(tmp_path / "robot.urdf", scene)
     robot = asm.read_urdf(tmp_path / "robot.urdf")
     assert robot.body("plate").picture is not None

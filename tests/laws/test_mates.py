@@ -134,6 +134,43 @@ def test_insert_puts_a_pin_on_the_bottom_of_a_blind_hole(seed):
     assert max(n @ (end - floor) for end in ends) == pytest.approx(4)
 
 
+def test_the_offset_of_an_insert_is_set_between_solves():
+    rng = np.random.default_rng(5)
+    a, b = plate(rng), Part(rng, "pin", asm.shapes.solid_cylinder(0.9, 4))
+    mouth = a.body.edges.circles().near(a.rotation @ [1, -2, 1] + a.offset)
+    end = b.body.edges.circles().near(b.rotation @ [0, 0, 2] + b.offset)
+    mate = asm.Insert(mouth, end, offset=0.5)
+    scene = asm.Assembly([a.body, b.body])
+    scene.constrain(mate)
+    for height in (0.5, -0.75, 0.0):
+        mate.offset = height
+        solution = scene.solve()
+        assert solution.success and mate.removes == 5
+        assert np.linalg.norm(b.point(solution, 0, 0, 2) - a.point(solution, 1, -2, 1.0 + height)) < HELD
+    with pytest.raises(asm.errors.InputError, match="offset is nan"):
+        mate.offset = float("nan")
+
+
+def test_mates_of_one_kind_between_two_bodies_have_names_of_their_own():
+    a, b = (asm.Body(name, asm.shapes.box(1, 1, 1)) for name in "ab")
+    mates = [asm.Flush(a.faces(way), b.faces(way), axes="aligned") for way in (">X", ">Y", ">Z")]
+    mates.append(asm.Flush(a.faces("<X"), b.faces("<X"), "flush a-b 2", axes="aligned"))
+    scene = asm.Assembly([a, b])
+    scene.constrain(mates[0], mates[3], mates[1], mates[2])
+    assert [mate.name for mate in mates] == ["flush a-b", "flush a-b 3", "flush a-b 4", "flush a-b 2"]
+    # A name that an assembly has taken stays: it is what files and results know the mate by.
+    other = asm.Assembly([a, b])
+    other.constrain(mates[2])
+    assert mates[2].name == "flush a-b 4"
+    with pytest.raises(asm.errors.InputError, match="'flush a-b 4' is taken"):
+        other.constrain(mates[2])
+    round_faces = [asm.Body(name, asm.shapes.solid_cylinder(1.0, 2.0)).faces.cylinders() for name in "cd"]
+    tangents = [asm.Tangent(*round_faces, touch=touch) for touch in ("line", "point")]
+    third = asm.Assembly([tangents[0].bodies[0], tangents[0].bodies[1]])
+    third.constrain(*tangents)
+    assert [mate.name for mate in tangents] == ["tangent c-d", "tangent c-d 2"]
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("axes", ["opposed", "aligned"])
 def test_insert_of_edges(seed, axes):

@@ -7,11 +7,13 @@ from math import pi
 import numpy as np
 import pytest
 
+import assembly as asm
 from assembly.step import trims
 from assembly.step.bodies import read_shape
 from assembly.step.carriers import spline_curve
-from assembly.step.profiles import approximated, point
-from assembly.step.projected import Side, is_loose, points_of, projected
+from assembly.step.edge_feet import move_between, move_to_feet
+from assembly.step.profiles import approximated, crossings, point
+from assembly.step.projected import Side, is_loose, points_of, projected, space_of
 from assembly.step.surfaces import patch
 from tests.step.models import MODELS, O, cylinder, edges, faces, parts, without
 
@@ -76,7 +78,7 @@ def test_edges_of_one_surface_alone_end_at_its_nearest_points():
                 continue
             low, high = O.BRep_Tool.Range_s(edge)
             flat = O.BRep_Tool.CurveOnSurface_s(edge, face, low, high)
-            curve, deviation = projected(edge, Side(flat, where, low, high), None, low, high)
+            curve, deviation = projected(space_of(edge), Side(flat, where, low, high), None, low, high)
             assert deviation < 1e-9
             points, _ = curve.cartesian
             assert points.shape[1] == 2
@@ -117,3 +119,75 @@ def test_points_of_curves_are_occt_s(name):
                 np.testing.assert_allclose(
                     points_of(curve, low, high)(at), wanted, rtol=0, atol=3e-14 * (1.0 + abs(wanted).max())
                 )
+
+
+def test_points_are_moved_the_same_whichever_they_are_with():
+    # A cylinder of radius 2 and a plane across it, 5e-3 and 3e-3 beside which points begin.
+    rng = np.random.default_rng(3)
+    turned, flat = asm.shapes.cylinder(2.0, 6.0), asm.shapes.plane(9.0, 9.0)
+    turn = np.array([[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]])
+    tilt = asm.NurbsSurface(flat.control_points @ turn, flat.knots, (1, 1))
+    grounds = [(*surface._tables, surface.size) for surface in (turned, tilt)]
+    angles = rng.uniform(0.0, 2.0 * pi, 40)
+    ring = np.column_stack([2.0 * np.cos(angles), 2.0 * np.sin(angles)])
+    normal = np.cross(*(np.diff(tilt.control_points, axis=k).reshape(2, 3)[0] for k in (0, 1)))
+    normal /= np.linalg.norm(normal)
+    height = -(ring @ normal[:2]) / normal[2]
+    points = np.column_stack([ring, height]) + rng.uniform(-5e-3, 5e-3, (40, 3))
+    places = np.empty((40, 4))
+    for k, x in enumerate(points):
+        for surface, at in ((turned, slice(0, 2)), (tilt, slice(2, 4))):
+            lines = [np.linspace(*ends, 60) for ends in surface.domain]
+            near = np.linalg.norm(surface.evaluate(lines[0][:, None], lines[1]) - x, axis=2)
+            i, j = divmod(int(near.argmin()), 60)
+            places[k, at] = lines[0][i], lines[1][j]
+    moved = points.copy()
+    move_between(*grounds, moved, places)
+    # On both, at the nearest such point to first order: the way there has no part along the intersection.
+    assert np.abs(np.hypot(moved[:, 0], moved[:, 1]) - 2.0).max() < 1e-13
+    assert np.abs(moved @ normal).max() < 1e-13
+    outward = moved * [1.0, 1.0, 0.0] / 2.0
+    along = np.cross(outward, normal)
+    assert np.abs(np.einsum("ij,ij->i", moved - points, along)).max() < 1e-4
+    one = points[7:8].copy()
+    move_between(*grounds, one, places[7:8].copy())
+    assert one.tobytes() == moved[7:8].tobytes()
+    feet = np.ascontiguousarray(places[:, :2])
+    assert move_to_feet(grounds[0], moved, feet)
+    assert np.abs(turned.evaluate(*feet.T) - moved).max() < 1e-12
+
+
+def test_where_surfaces_are_tangent_points_stay():
+    turned, flat = asm.shapes.cylinder(2.0, 6.0), asm.shapes.plane(9.0, 9.0)
+    beside = asm.NurbsSurface(flat.control_points[..., [2, 1, 0]] + [2.0, 0.0, 0.0], flat.knots, (1, 1))
+    points = np.array([[2.0 + 1e-3, 0.0, 0.4], [2.0 - 1e-3, 0.0, -0.3]])
+    before = points.copy()
+    grounds = [(*surface._tables, surface.size) for surface in (turned, beside)]
+    places = np.empty((2, 4))
+    for surface, at in ((turned, slice(0, 2)), (beside, slice(2, 4))):
+        lines = [np.linspace(*ends, 241) for ends in surface.domain]
+        for k, x in enumerate(points):
+            near = np.linalg.norm(surface.evaluate(lines[0][:, None], lines[1]) - x, axis=2)
+            i, j = divmod(int(near.argmin()), 241)
+            places[k, at] = lines[0][i], lines[1][j]
+    move_between(*grounds, points, places)
+    assert np.array_equal(points, before)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_all_crossings_are_found_at_once(scale):
+    at = scale * np.linspace(0.0, 7.0, 40)
+    calls = []
+
+    def wave(t):
+        calls.append(t.size)
+        return np.column_stack([np.sin(t / scale), np.expm1(t / scale - 3.0)])
+
+    found = np.sort(crossings(wave(at), at, wave, [np.array([0.5, 2.0]), np.array([0.0, -1.0])]) / scale)
+    asked = np.sort([pi / 6, 5 * pi / 6, 13 * pi / 6, 3.0])
+    assert np.abs(found - asked).max() < 2e-15 * 7.0 + 1e-15 / scale
+    # The samples, and few places for each of four roots.
+    assert len(calls) < 14 and sum(calls[1:]) < 50
+    # What is a value at a sample is there.
+    level = crossings(at[:, None], at, lambda t: t[:, None], [at[[3, 9]]])
+    assert np.array_equal(np.sort(level), at[[3, 9]])

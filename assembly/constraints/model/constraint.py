@@ -7,7 +7,7 @@ one number that tells how a frame on one body stands to a frame on another (`con
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from math import inf, pi
 from typing import TYPE_CHECKING, Any
@@ -90,6 +90,9 @@ class Constraint(KnownSettings):
 
     # Copies and pickles of before it could be set have none of their own.
     _enabled = True
+    # Whether names by default get a number where an assembly has them; whether this is one, which may get it yet.
+    _is_numbered = False
+    _may_be_renamed = False
 
     def __init__(self, bodies: tuple[Body, ...], name: str | None, kind: str = "") -> None:
         for k, body in enumerate(bodies):
@@ -97,11 +100,20 @@ class Constraint(KnownSettings):
                 raise InputError(f"body {body.name!r} is named twice; expected distinct bodies")
         self._bodies = bodies
         self._name = f"{kind} {'-'.join(body.name for body in bodies)}".lstrip() if name is None else text("name", name)
+        self._may_be_renamed = name is None and self._is_numbered
 
     @property
     def name(self) -> str:
         """Name of the constraint."""
         return self._name
+
+    def _named_beside(self, taken: Container[str]) -> None:
+        """Take a name for good that is none of others, by a number, if it may be."""
+        if self._may_be_renamed:
+            name, count = self._name, 2
+            while self._name in taken:
+                self._name, count = f"{name} {count}", count + 1
+            self._may_be_renamed = False
 
     @property
     def bodies(self) -> tuple[Body, ...]:

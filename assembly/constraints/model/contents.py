@@ -146,6 +146,8 @@ class Contents:
                     "a coupling or an Expression"
                 )
             self._check_bodies(constraint.name, constraint.bodies)
+            if all(constraint is not other for other in self._constraints):
+                constraint._named_beside(self._taken)
             if constraint.name in self._taken:
                 raise InputError(f"constraint name {constraint.name!r} is taken; expected distinct names, say name=...")
             if isinstance(constraint, TrimContact) and constraint.contact not in self._constraints:

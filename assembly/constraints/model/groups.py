@@ -52,6 +52,8 @@ class Group(OwnState, RowConstraint):
         Something that is no body, or no pose.
     """
 
+    _is_numbered = True
+
     def __init__(self, bodies: Iterable[Body], name: str | None = None, *, poses: Sequence[Pose] | None = None) -> None:
         members = items("bodies", bodies, "two bodies or more")
         for k, body in enumerate(members):

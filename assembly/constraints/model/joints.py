@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import pi
+from typing import ClassVar
 
 from assembly.constraints.model.constraint import Coordinate, Equation, FramePair
 from assembly.constraints.model.joint import (
@@ -76,7 +77,7 @@ class Revolute(Joint):
     Origins coincide (3) and z axes lie along each other (2). Free: `angle`, from x_a to x_b about z_a.
     """
 
-    _zero = (*SAME_POINT, *SAME_AXIS)
+    _zero: ClassVar[tuple[tuple[int, int], ...]] = (*SAME_POINT, *SAME_AXIS)
     _free = {"angle": TWIST}
     angle = Driven("angle", "turn of x_b from x_a about z_a [rad]")
     limits = Limits("angle")

@@ -40,8 +40,11 @@ CenterLike = Point | BodyVertex | BodyFace | BodyEdge | Vertices | Faces | Edges
 class Mate(RowConstraint):
     """What mates have: the features that they tie, and how many degrees of freedom they take away.
 
-    Features are faces, edges and vertices, or selections of a single one.
+    Features are faces, edges and vertices, or selections of a single one. Two bodies often have several mates of a
+    kind: where nobody said names the second one is "flush a-b 2" from when an assembly takes it.
     """
+
+    _is_numbered = True
 
     _given: Mapping[str, Any]
 

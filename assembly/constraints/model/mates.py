@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from assembly.constraints.model.constraint import Equation
 from assembly.constraints.model.insert_seats import Seats, found_seats
-from assembly.constraints.model.joint import Axes
-from assembly.constraints.model.joints import Cylindrical, Planar, Revolute, Spherical
+from assembly.constraints.model.joint import ON_AXIS, SAME_AXIS, Axes, Offset
+from assembly.constraints.model.joints import ALONG, Cylindrical, Planar, Revolute, Spherical
 from assembly.constraints.model.mate_features import (
     AxisLike,
     Mate,
@@ -27,7 +28,7 @@ from assembly.constraints.model.mate_features import (
     one_feature,
     plane_frame,
 )
-from assembly.errors import InputError, bounded
+from assembly.errors import InputError
 from assembly.kinematics.body import BodyFace, Frame
 from assembly.selection.edges import BodyEdge, Edges
 from assembly.selection.faces import Faces
@@ -155,6 +156,9 @@ class Insert(Mate, Revolute):
     """
 
     _sides = ("hole", "shank")
+    # The origin on the axis, and at a height above it that is a number.
+    _zero = (*ON_AXIS, *SAME_AXIS)
+    offset = Offset("How far the seat of the shank is above that of the hole.")
 
     def __init__(
         self,
@@ -169,13 +173,10 @@ class Insert(Mate, Revolute):
     ) -> None:
         a, b = one_feature(hole), one_feature(shank)
         self._seats = found_seats(a, b, seats)
-        self._offset = bounded("offset", offset)
-        frame = self._seats.hole.frame()
-        if self._offset:
-            raised = frame.origin + self._offset * frame.axes[:, 2]
-            frame = frame.body.frame(raised, frame.axes[:, 2], frame.axes[:, 0])
         chosen: Axes = self._seats.axes if axes is None else axes
-        super().__init__(frame, self._seats.shank.frame(), name, axes=chosen, **freedoms)
+        super().__init__(self._seats.hole.frame(), self._seats.shank.frame(), name, axes=chosen, **freedoms)
+        self.offset = offset
+        self._own = (*self._own, Equation(((1.0, self._coordinate(*ALONG)),), (self, "offset")))
         self._given = {"hole": a, "shank": b}
 
     @property
@@ -183,13 +184,8 @@ class Insert(Mate, Revolute):
         """The circles at which hole and shank sit."""
         return self._seats
 
-    @property
-    def offset(self) -> float:
-        """How far the seat of the shank is above that of the hole."""
-        return self._offset
-
     def _settings(self) -> str:
-        offset = f", offset={self._offset!r}" if self._offset else ""
+        offset = f", offset={self.offset!r}" if self.offset else ""
         seats = f", seats=({self._seats.hole!r}, {self._seats.shank!r})"
         return f"{super()._settings()}, axes={self.asked_axes!r}{offset}{seats}{_freedoms(self)}"
 

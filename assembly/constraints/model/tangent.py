@@ -175,6 +175,7 @@ class SurfaceTangent(Tangent, Mate, Joint):
         found = touching_rows(one, other, side == "outside")
         assert found is not None, "the faces have rows"
         Joint.__init__(self, found.frame_a, found.frame_b, said, found.axes)
+        self._may_be_renamed = name is None
         self._given = {"a": one, "b": other}
         rows = []
         for k, row in enumerate(found.rows):
@@ -204,6 +205,7 @@ class ContactTangent(Tangent, Contact):
         # Those with creases are cut into smooth ones, which only edges join.
         edges = None if has_creases(one.face) or has_creases(other.face) else False
         Contact.__init__(self, one, other if side == "outside" else _turned(other), said, unilateral, edges=edges)
+        self._may_be_renamed = name is None
 
     def start_at(self, q_a: Array, q_b: Array) -> Array | None:
         """Parameters (4,) of an extremal pair whose outward normals oppose each other, near the ones that nearly do.

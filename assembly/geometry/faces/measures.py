@@ -7,6 +7,7 @@ integrands are integrated by Gauss quadrature, exactly as far as doubles go: `ge
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -46,22 +47,26 @@ def _rows(table: TrimTable, levels: tuple[Array, Array]) -> tuple[Array, NDArray
     """Parts of pieces on which no knot of the surface is passed, and where the coefficients and degree of each are."""
     links, bounds = table.rows()
     rows, which = [], []
-    for k in np.flatnonzero(links.sign_u).tolist():
-        piece, place = bounds[k], links[k]
-        t0, t1 = float(piece.t0), float(piece.t1)
+    # Records are read column by column: of one at a time a field takes as long as a cut.
+    columns = (links[name].tolist() for name in ("sign_u", "coefficients", "degree"))
+    lengths = (bounds[name].tolist() for name in ("t0", "t1", "middle", "shift_u", "shift_v", "box", "start", "end"))
+    for k, piece in enumerate(zip(*columns, *lengths, strict=True)):
+        sign, coefficients, degree, t0, t1, middle, *shifts, box, start, end = piece
+        if sign == 0:
+            continue
         cuts = [t0, t1]
-        for axis, shift in enumerate((piece.shift_u, piece.shift_v)):
-            low, high = piece.box[2 * axis], piece.box[2 * axis + 1]
-            ends = float(piece.start[axis] - shift), float(piece.end[axis] - shift)
-            for level in levels[axis][(levels[axis] > low) & (levels[axis] < high)]:
+        for axis, shift in enumerate(shifts):
+            low, high = box[2 * axis : 2 * axis + 2]
+            inside = levels[axis][(levels[axis] > low) & (levels[axis] < high)].tolist()
+            for level in inside:
+                ends = start[axis] - shift, end[axis] - shift
                 t, _, _ = cut_of_piece(
-                    table.pool, int(place.coefficients), int(place.degree), float(piece.middle),
-                    (t0, t1), axis, float(level - shift), ends,
+                    table.pool, coefficients, degree, middle, (t0, t1), axis, level - shift, ends
                 )  # fmt: skip
                 cuts.append(min(max(t, t0), t1))
         cuts.sort()
-        for a, b in zip(cuts[:-1], cuts[1:], strict=True):
-            rows.append([a, b, piece.middle, piece.shift_u, piece.shift_v])
+        for a, b in pairwise(cuts):
+            rows.append([a, b, middle, *shifts])
             which.append(k)
     places = np.column_stack([links.coefficients, links.degree])[which]
     return np.array(rows).reshape(-1, 5), places.reshape(-1, 2)
@@ -87,7 +92,7 @@ def face_integrals(surface: NurbsSurface, table: TrimTable, center: Array) -> tu
     for u, value in walk:
         w[stretches[:, 0] >= u] = value
     stretches, w = stretches[w != 0.0], w[w != 0.0]
-    record, surface_pool = surface.packed()
+    record, surface_pool = surface._tables
     places[:, 0] += surface_pool.size
     pool = np.concatenate([surface_pool, table.pool])
 

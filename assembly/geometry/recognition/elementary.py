@@ -27,14 +27,18 @@ from assembly.geometry.recognition.turns import turn_of
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["elementary_form"]
+__all__ = ["elementary_form", "is_plane"]
 
 Array = NDArray[np.float64]
 # What a difference of points and a scalar product may be off, in parts of the largest coordinate.
 _DOT = 4.0 * UNIT
 # The least area of a parallelogram, in parts of its size squared, whose normal is known without samples.
 _AREA = 1e-6
+# Where points of a surface are taken, in parts of its domain, to see that it is no plane: at none of its symmetries.
+_PARTS = np.array([0.0, 0.29, 0.61, 1.0])
 _known: WeakKeyDictionary[NurbsSurface, dict[float | None, Form]] = WeakKeyDictionary()
+# Tolerances to which a surface is seen to be no plane.
+_bent: WeakKeyDictionary[NurbsSurface, set[float]] = WeakKeyDictionary()
 
 
 def elementary_form(surface: NurbsSurface, tolerance: float | None = None) -> Form:
@@ -62,6 +66,32 @@ def elementary_form(surface: NurbsSurface, tolerance: float | None = None) -> Fo
     if tolerance not in known:
         known[tolerance] = _recognized(surface, tolerance)
     return known[tolerance]
+
+
+def is_plane(surface: NurbsSurface, tolerance: float) -> bool:
+    """Whether `elementary_form` is a plane, with a tenth of its work of most surfaces that are not.
+
+    Four points within `tolerance` of a plane span a tetrahedron whose edges d from one corner have
+    |det(d_1, d_2, d_3)| <= 2 tolerance (|d_1 x d_2| + |d_2 x d_3| + |d_3 x d_1|), up to the square of that.
+    """
+    known = _known.get(surface, {}).get(tolerance)
+    if known is not None:
+        return isinstance(known, Plane)
+    if tolerance in _bent.get(surface, ()):
+        return False
+    if surface.size > 0.0 and not surface.is_parallelogram:
+        u, v = (low + (high - low) * _PARTS for low, high in surface.domain)
+        points = surface.evaluate(u[:, None], v).reshape(-1, 3)
+        ways = points - points[0]
+        # The longest way, the one farthest beside it, and how far the others are out of the plane of both.
+        first = ways[int(np.argmax(np.einsum("ij,ij->i", ways, ways)))]
+        areas = np.cross(first, ways)
+        normal = areas[int(np.argmax(np.einsum("ij,ij->i", areas, areas)))]
+        # Three areas, each at most the square of the size; half of the bound again for what is left out.
+        if float(np.abs(ways @ normal).max()) > 9.0 * (tolerance + _exactness(surface)) * surface.size**2:
+            _bent.setdefault(surface, set()).add(tolerance)
+            return False
+    return isinstance(elementary_form(surface, tolerance), Plane)
 
 
 def _exactness(surface: NurbsSurface) -> float:

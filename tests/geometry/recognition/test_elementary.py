@@ -12,7 +12,7 @@ import pytest
 import assembly as asm
 from assembly import NurbsSurface
 from assembly.errors import InputError
-from assembly.geometry.recognition.elementary import elementary_form
+from assembly.geometry.recognition.elementary import elementary_form, is_plane
 from assembly.geometry.recognition.forms import (
     Cone,
     Cylinder,
@@ -415,3 +415,28 @@ def test_it_is_kept_with_the_surface():
 def test_bad_tolerances(value):
     with pytest.raises((InputError, TypeError), match="tolerance is"):
         elementary_form(SHAPES.sphere(1.0), value)
+
+
+def test_what_is_a_plane_is_told_without_the_rest(cases):
+    rng = np.random.default_rng(17)
+    told = {True: 0, False: 0}
+    for _ in range(cases(60, 3000)):
+        # A net of any degree that is flat but for some, on both sides of the tolerance.
+        n, m = rng.integers(2, 6, 2)
+        degree = int(rng.integers(1, n)), int(rng.integers(1, m))
+        net = np.stack(np.meshgrid(np.arange(float(n)), np.arange(float(m)), indexing="ij"), axis=-1)
+        net = np.concatenate([net + rng.uniform(-0.2, 0.2, net.shape), np.zeros((n, m, 1))], axis=2)
+        net[..., 2] = 10.0 ** rng.uniform(-14.0, 0.0) * rng.uniform(-1.0, 1.0, (n, m))
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        net = net @ turn + rng.uniform(-5.0, 5.0, 3)
+        knots = [
+            np.concatenate([np.zeros(p), np.linspace(0.0, 1.0, k - p + 1), np.ones(p)])
+            for k, p in zip((n, m), degree, strict=True)
+        ]
+        tolerance = 10.0 ** rng.uniform(-12.0, -2.0)
+        first = NurbsSurface(net, knots, degree, rng.uniform(0.5, 2.0, (n, m)))
+        again = NurbsSurface(net, knots, degree, first.weights)
+        flat = isinstance(elementary_form(first, tolerance), Plane)
+        assert is_plane(first, tolerance) == is_plane(again, tolerance) == is_plane(again, tolerance) == flat
+        told[flat] += 1
+    assert min(told.values()) > 5

@@ -1,0 +1,166 @@
+"""Feet of points of an edge on its surface, and such points moved to where two surfaces cross: for `projected`.
+
+Each point is taken by itself, so that what comes of it does not depend on the points that it is asked for with.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+
+import numpy as np
+
+from assembly._kernel import kernel
+from assembly._record import Store
+from assembly.geometry.splines.evaluate import into_domain, surface_at, surface_lanes, xyz
+from assembly.geometry.vec import add, blend, cross, dot, scale, sub
+
+# Most steps of a projection, of which each gains digits, and the last one over the size, which is rounding's.
+_STEPS, _LAST = 30, 1e-13
+# A step over the side of the domain from which a projection is lost.
+_LOST = 0.25
+# Sine of the angle between two surfaces at which two thirds of the way to their intersection are gone; from 2.5 times
+# as much on all of it. No edge is moved by more than some 7 times what it is off.
+_CROSSING = 0.1
+# Parts of the way that are none.
+_TANGENT = 1e-9
+# Least eigenvalue, relative, with which an intersection is solved for; the surfaces of smaller ones count as tangent.
+_DAMPED = 1e-6
+
+# A surface: as `NurbsSurface` has its tables, and its size [length].
+Ground = namedtuple("Ground", "table pool size")
+# Gauss-Newton's step toward a point's foot, how far above the surface the point is, and the unit normal there.
+_Approach = namedtuple("_Approach", "du dv height normal")
+
+
+@kernel(inline=True)
+def _ends(ground):
+    """Ends of the domain: (u0, u1), (v0, v1)."""
+    patch = surface_at(ground.table, 0)
+    pool = ground.pool
+    return (pool[patch.breaks_u], pool[patch.breaks_u + patch.spans_u]), (
+        pool[patch.breaks_v],
+        pool[patch.breaks_v + patch.spans_v],
+    )
+
+
+@kernel(inner=True)
+def _approach(ground, u, v, point):
+    """The _Approach of a point from parameters, which count as the end where they are beyond an open one."""
+    patch = surface_at(ground.table, 0)
+    (u0, u1), (v0, v1) = _ends(ground)
+    if patch.closed_u == 0:
+        u = min(max(u, u0), u1)
+    if patch.closed_v == 0:
+        v = min(max(v, v0), v1)
+    u, _fits = into_domain(ground.pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
+    v, _fits = into_domain(ground.pool, patch.breaks_v, patch.spans_v, patch.closed_v, v)
+    jet = surface_lanes(Store(ground.table, ground.pool), 0, u, v)
+    su, sv = xyz(jet.u), xyz(jet.v)
+    off = sub(point, xyz(jet.point))
+    a, b, c = dot(su, su), dot(su, sv), dot(sv, sv)
+    f, g = dot(su, off), dot(sv, off)
+    both, product = a * c - b * b, a * c
+    du, dv = 0.0, 0.0
+    if both > 1e-12 * product:
+        du, dv = (c * f - b * g) / both, (a * g - b * f) / both
+    else:
+        # Where a parameter has no direction, at poles, it stays.
+        if np.sqrt(a) * (u1 - u0) > 1e-9 * ground.size:
+            du = f / a
+        if np.sqrt(c) * (v1 - v0) > 1e-9 * ground.size:
+            dv = g / c
+    normal = cross(su, sv)
+    normal = scale(1.0 / max(np.sqrt(dot(normal, normal)), 1e-300), normal)
+    return _Approach(du, dv, dot(normal, off), normal)
+
+
+@kernel(inline=True)
+def _moved(ground, u, v, step):
+    """Parameters after a step, within an open domain."""
+    patch = surface_at(ground.table, 0)
+    (u0, u1), (v0, v1) = _ends(ground)
+    u += step.du
+    v += step.dv
+    if patch.closed_u == 0:
+        u = min(max(u, u0), u1)
+    if patch.closed_v == 0:
+        v = min(max(v, v0), v1)
+    return u, v
+
+
+@kernel(inner=True)
+def _foot(ground, u, v, point):
+    """Parameters of the nearest point on the surface, and whether steps came to an end."""
+    (u0, u1), (v0, v1) = _ends(ground)
+    far, before = np.inf, np.inf
+    for _ in range(_STEPS):
+        new_u, new_v = _moved(ground, u, v, _approach(ground, u, v, point))
+        far = max(abs(new_u - u) / (u1 - u0), abs(new_v - v) / (v1 - v0))
+        u, v = new_u, new_v
+        # The last steps are rounding's, whatever the coordinates.
+        if far <= _LAST or not far <= _LOST or (far <= 1e3 * _LAST and far >= 0.5 * before):
+            break
+        before = far
+    return u, v, far <= 1e3 * _LAST
+
+
+@kernel(inner=True)
+def _between(own, there, point, places):
+    """A point moved to both surfaces from parameters (u, v) on either, as far as these cross."""
+    u, v, s, t = places
+    found = point
+    share = 0.0
+    last = _LAST * (own.size + max(abs(point[0]), abs(point[1]), abs(point[2])))
+    for count in range(_STEPS):
+        here, other = _approach(own, u, v, found), _approach(there, s, t, found)
+        u, v = _moved(own, u, v, here)
+        s, t = _moved(there, s, t, other)
+        cosine = dot(here.normal, other.normal)
+        if count < 2:
+            # Feet of the edge itself, by one step.
+            turn = cross(here.normal, other.normal)
+            share = -np.expm1(-((dot(turn, turn) / _CROSSING**2) ** 2))
+            if count == 0:
+                continue
+            if share <= _TANGENT:
+                return point
+        middle = (here.height + other.height) / (2.0 + 2.0 * cosine + _DAMPED)
+        gap = (here.height - other.height) / (2.0 - 2.0 * cosine + _DAMPED)
+        back = blend(middle, add(here.normal, other.normal), gap, sub(here.normal, other.normal))
+        found = sub(found, back)
+        if share * np.sqrt(dot(back, back)) <= last:
+            break
+    return blend(1.0 - share, point, share, found)
+
+
+@kernel(signatures="(Tuple((i8[::1], f8[::1], f8)), f8[:, ::1], f8[:, ::1])")
+def move_to_feet(surface, points, places):
+    """Move parameters, a row each, to the nearest points of a surface; False where steps do not come to an end."""
+    ground = Ground(surface[0], surface[1], surface[2])
+    for k in range(points.shape[0]):
+        u, v, ends = _foot(ground, places[k, 0], places[k, 1], (points[k, 0], points[k, 1], points[k, 2]))
+        if not ends:
+            return False
+        places[k, 0], places[k, 1] = u, v
+    return True
+
+
+@kernel(signatures="(Tuple((i8[::1], f8[::1], f8)), Tuple((i8[::1], f8[::1], f8)), f8[:, ::1], f8[:, ::1])")
+def move_between(surface, beyond, points, places):
+    """Move points to where two surfaces cross, as far as they do.
+
+    Parameters
+    ----------
+    surface, beyond
+        Each as table, pool and size.
+    points : (n, 3)
+        Changed.
+    places : (n, 4)
+        Parameters of both surfaces near each point.
+    """
+    own = Ground(surface[0], surface[1], surface[2])
+    there = Ground(beyond[0], beyond[1], beyond[2])
+    for k in range(points.shape[0]):
+        at = (places[k, 0], places[k, 1], places[k, 2], places[k, 3])
+        x, y, z = _between(own, there, (points[k, 0], points[k, 1], points[k, 2]), at)
+        points[k, 0], points[k, 1], points[k, 2] = x, y, z
