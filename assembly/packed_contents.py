@@ -174,7 +174,7 @@ class PackedContents(Contents):
             seats: tuple[tuple[int, Seat], ...] = next(known, self._seats)
         else:
             if self._lower_pairs is None:
-                self._lower_pairs = lower_pairs(self._constraints)
+                self._lower_pairs = lower_pairs(self._constraints, self._objectives)
                 self._nearest = {k: item for k, item in enumerate(self._constraints) if _takes_nearest(item)}
             if not self._lower_pairs and not self._nearest:
                 return
