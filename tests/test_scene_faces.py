@@ -190,7 +190,7 @@ def test_files_of_version_1_are_read_and_saved_in_the_newest(tmp_path):
     assert (base.color, base.faces[0].face.color, base.faces[0].face.outer) == (None, None, None)
     assert scene.constraints[0].a is base.faces[0]
     again = reread(scene, path)
-    assert json.loads(path.read_text())["version"] == 4
+    assert json.loads(path.read_text())["version"] == 5
     assert repr(again.constraints) == repr(scene.constraints)
 
 

@@ -149,8 +149,8 @@ NAN, INF = float("nan"), float("inf")
 CASES = {
     "format": (["format"], "step", 'format is "step"; expected a scene of format'),
     "no format": (["format"], MISSING, "format is null"),
-    "newer": (["version"], 5, "version is 5; expected 1 to 4; a newer version of this library wrote the file"),
-    "older": (["version"], 0, "version is 0; expected 1 to 4$"),
+    "newer": (["version"], 6, "version is 6; expected 1 to 5; a newer version of this library wrote the file"),
+    "older": (["version"], 0, "version is 0; expected 1 to 5$"),
     "no version": (["version"], MISSING, "version is null; expected an integer"),
     "version true": (["version"], True, "version is true; expected an integer"),
     "missing table": (["surfaces"], MISSING, "document has no field 'surfaces'; expected the fields format, version"),

@@ -18,7 +18,7 @@ from assembly.scene_file.references import refers_to_others
 __all__ = ["load", "save"]
 
 FORMAT = "assembly-scene"
-VERSION = 4
+VERSION = 5
 _SIGNS = {1: "minimized", -1: "maximized"}
 
 
