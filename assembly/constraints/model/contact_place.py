@@ -196,7 +196,8 @@ def _stretch(surface: NurbsSurface, target: Target) -> Array:
     low, high = surface.domain[1 - k]
     along = np.linspace(low, high, SAMPLES)[1:-1]
     fixed = np.full(along.size, u if k == 0 else v)
-    _, su, sv = surface.evaluate(*((fixed, along) if k == 0 else (along, fixed)), 1)
+    at = (fixed, along) if k == 0 else (along, fixed)
+    _, su, sv = surface.evaluate(at[0], at[1], 1)
     line = sv if k == 0 else su
     lengths = np.linalg.norm(line, axis=1)
     if not (lengths * spans[1 - k] > least).all():

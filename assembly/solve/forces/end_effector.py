@@ -234,7 +234,7 @@ def _touching(packed: Packed, state: Array) -> list[int]:
     """The one-sided rows that are at their bound at a state."""
     rows = rows_of(packed, state)
     touches = rows.one_sided & (np.abs(rows.residual) <= TOUCHING)
-    return np.unique(rows.program_rows[touches]).tolist()
+    return [int(r) for r in np.unique(rows.program_rows[touches])]
 
 
 def _with_term(packed: Packed, objective: Dexterity, active: Collection[int]) -> tuple[NDArray[np.int64], Array, int]:
