@@ -65,8 +65,15 @@ def test_with_its_stop_it_comes_as_near_as_it_can(run):
     ways = []
     for shaft in touching:
         t = nearest(shaft, lever)[1]
-        at = surface.project([2.0 * np.cos(t), 1.2 * np.sin(t), 0.0]).parameters
-        ways.append(place.distance(*at))
+        point, (u, v) = np.array([2.0 * np.cos(t), 1.2 * np.sin(t), 0.0]), np.mean(surface.domain, axis=1)
+        around = np.linspace(*surface.domain[0], 181)
+        u = around[np.argmin(np.linalg.norm(surface.evaluate(around, np.full(181, v)) - point, axis=1))]
+
+        def square(x, point=point, v=v):
+            return float(((surface.evaluate(x, v) - point) ** 2).sum())
+
+        u = minimize_scalar(square, bounds=(u - 0.2, u + 0.2), method="bounded", options={"xatol": 1e-12}).x
+        ways.append(place.distance(u, v))
     # Where t is is known to the root of rounding.
     assert np.isclose(np.sqrt(limited.objective), min(ways), rtol=0, atol=1e-6)
     assert np.isclose(np.sqrt(limited.objective), 0.5761771751755596, rtol=0, atol=1e-8)

@@ -28,7 +28,7 @@ def test_a_contact_comes_to_its_place(target, as_constraint):
     (scene.constrain if as_constraint else scene.minimize)(*places)
     solution = scene.solve()
     assert solution.status is asm.Status.SOLVED
-    x = solution._parameters[0, :4]
+    x = solution.contacts["touch"].parameters
     # A row is a length over the size, 6; an objective is left where its root is the root of rounding.
     least = 1e-9 if as_constraint else 1e-6
     assert places[0].distance(*x[:2]) < least and places[1].distance(*x[2:]) < least
@@ -45,7 +45,9 @@ def test_the_nearest_contact_that_a_hinge_allows():
     scene.minimize(place)
     solution = scene.solve()
     assert solution.status is asm.Status.SOLVED and solution.objective > 1e-4
-    np.testing.assert_allclose(solution.objective, 0.3 * place.distance(*solution._parameters[0, 2:4]) ** 2, rtol=1e-10)
+    np.testing.assert_allclose(
+        solution.objective, 0.3 * place.distance(*solution.contacts["touch"].parameters[2:]) ** 2, rtol=1e-10
+    )
     # In every pose beside it that holds the contact is farther away.
     rng, held = np.random.default_rng(0), asm.Assembly(scene.bodies)
     held.constrain(*scene.constraints)
@@ -55,7 +57,7 @@ def test_the_nearest_contact_that_a_hinge_allows():
         q[1] = retract(q[1], 0.03 * rng.normal(size=6))
         beside = held.solve(q)
         assert beside.success
-        assert 0.3 * place_there.distance(*beside._parameters[0, 2:4]) ** 2 >= solution.objective - 1e-12
+        assert 0.3 * place_there.distance(*beside.contacts["touch"].parameters[2:]) ** 2 >= solution.objective - 1e-12
 
 
 def test_numbers_set_anew_are_those_of_a_scene_built_with_them():
@@ -65,7 +67,7 @@ def test_numbers_set_anew_are_those_of_a_scene_built_with_them():
     first = scene.solve()
     place.target = (5.0, 2.0)
     moved = scene.solve(first)
-    x = moved._parameters[0, :4]
+    x = moved.contacts["touch"].parameters
     assert moved.success and place.distance(*x[:2]) < 1e-9
     np.testing.assert_allclose(x[:2], (5.0, 2.0), rtol=0, atol=1e-8)
     with pytest.raises(InputError, match=r"expected the same coordinates to be None"):
