@@ -453,7 +453,7 @@ def test_what_is_wrong_is_named_by_its_path(key, case, document, load_document, 
 def test_expressions_of_several_values_are_no_terms(document, load_document):
     changed = copy.deepcopy(document)
     changed["objective"].append({"sign": 1, **changed["constraints"][CURVE]})
-    with pytest.raises(InputError, match=r"objective\[9\]: objective '.*' has 2 values; expected one"):
+    with pytest.raises(InputError, match=r"objective\[11\]: objective '.*' has 2 values; expected one"):
         load_document(changed)
 
 

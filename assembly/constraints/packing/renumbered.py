@@ -93,9 +93,9 @@ def renumbered(
     for sign, term in goals:
         terms.add(sign, term)
     pool[packed.terms_at : packed.terms_at + len(writer.pool)] = writer.pool
-    for item, first in packed.placed:
-        numbers = place_numbers(item, 0.0, scale)
-        pool[first : first + len(numbers)] = numbers
+    for spot, start in packed.placed:
+        numbers = place_numbers(spot, 0.0, scale)
+        pool[start : start + len(numbers)] = numbers
     for at in _following_postures(packed):
         # Where the last solve began, until the next one begins.
         pool[at + 1 : at + 1 + REFERENCE] = packed.rows_pool[at + 1 : at + 1 + REFERENCE]
