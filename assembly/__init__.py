@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from assembly.assembly import Assembly as Assembly
     from assembly.constraints.model.clearance import Clearance as Clearance
     from assembly.constraints.model.contact import Contact as Contact
+    from assembly.constraints.model.contact_place import ContactPlace as ContactPlace
     from assembly.constraints.model.couplings import Gear as Gear
     from assembly.constraints.model.couplings import Linear as Linear
     from assembly.constraints.model.couplings import RackPinion as RackPinion
@@ -151,6 +152,7 @@ else:
             "ContactPair": "assembly.proximity.extrema.pairs",
             "Crossings": "assembly.solve.crossings",
             "Cylindrical": "assembly.constraints.model.joints",
+            "ContactPlace": "assembly.constraints.model.contact_place",
             "Dexterity": "assembly.constraints.model.dexterity",
             "Distance": "assembly.constraints.model.placements",
             "Ellipsoid": "assembly.kinematics.ellipsoid",

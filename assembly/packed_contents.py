@@ -214,7 +214,7 @@ class PackedContents(Contents):
     def _seats_at(self, q0: ArrayLike | None, named: Mapping[str, ArrayLike]) -> tuple[tuple[int, Seat], ...]:
         """The seats of a start, but for contacts whose pairs the user names."""
         if self._lower_pairs is None:
-            self._lower_pairs = lower_pairs(self._constraints)
+            self._lower_pairs = lower_pairs(self._constraints, self._objectives)
             self._nearest = {k: item for k, item in enumerate(self._constraints) if _takes_nearest(item)}
         if not self._lower_pairs and not self._nearest:
             return self._seats

@@ -71,6 +71,7 @@ def small_document():
         asm.Symmetric(a.point(1, 0, 0), plate.vertices(">X and >Y and >Z"), c.frame()),
         asm.Tangent(a.face(), ball.face(), side="outside"),
         asm.Group([plate, pin]),
+        kept := asm.ContactPlace(touch, "a", (None, 0.5)),
         asm.Linear(slider, screw.freedom("slide"), 2.0),
         asm.ConstantVelocity(a, b),
         asm.Expression(f, [b]),
@@ -79,6 +80,7 @@ def small_document():
         asm.PointDistance(b.point(0, 0, 0), (1, 2, 3)), asm.FrameDistance(b, asm.Pose()), asm.Expression(f, [c])
     )
     scene.maximize(asm.Weight([pin, ball]), asm.Posture([[0, 0, 0, 1, 0, 0, 0]] * 7), asm.Dexterity(c, [hinge, slider]))
+    scene.minimize(kept)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "scene.json"
         scene.save(path)

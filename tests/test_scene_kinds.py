@@ -107,6 +107,7 @@ def every_constraint():
         touch,
         *joints,
         asm.TrimContact(touch, loop, "inside", "cartesian", side="b", name="kept"),
+        asm.ContactPlace(touch, "a", (THIRD, None), 0.1),
         asm.Clearance([ground, crank], THIRD, merge_radius=0.1, slots=3, exclude=[(crank, ground)]),
         *every_mate(ground, crank, wheel, plate, pin),
         asm.Linear(slider, shaft, -THIRD, "slides", offset=0.1),
@@ -125,7 +126,9 @@ def every_constraint():
         asm.Expression(mixed(1), [wheel], scale=2.0),
         asm.Dexterity(point, [hinge, shaft.freedom("slide")], "isotropy"),
         asm.Dexterity(there, [hinge], "force_transmission", direction=(0, 0, 1, THIRD, 0, 0), length=0.3, weight=0.1),
+        asm.Dexterity(there, [hinge], task="pose", axes=("xy", "z"), ignoring=joints[:2], holding=joints[2:4]),
         asm.Weight([crank, ground], (0.1, -0.2, THIRD), 9.81),
+        asm.ContactPlace(touch, "b", (-0.1, THIRD), THIRD, name="drawn"),
     )
     return scene
 
@@ -450,7 +453,7 @@ def test_what_is_wrong_is_named_by_its_path(key, case, document, load_document, 
 def test_expressions_of_several_values_are_no_terms(document, load_document):
     changed = copy.deepcopy(document)
     changed["objective"].append({"sign": 1, **changed["constraints"][CURVE]})
-    with pytest.raises(InputError, match=r"objective\[9\]: objective '.*' has 2 values; expected one"):
+    with pytest.raises(InputError, match=r"objective\[11\]: objective '.*' has 2 values; expected one"):
         load_document(changed)
 
 
@@ -461,3 +464,31 @@ def test_a_frame_of_any_layout_is_saved(tmp_path):
     scene.constrain(asm.Fixed(ground, Frame(arm, np.zeros(3), axes)))
     again = reread(scene, tmp_path / "scene.json")
     np.testing.assert_array_equal(again.constraints[0].frame_b.axes, axes)
+
+
+def test_dexterities_and_places_come_back_as_they_were(tmp_path):
+    scene = every_constraint()
+    back = reread(scene, tmp_path / "scene.json")
+    (drawn,) = (term for _, term in back.objectives if isinstance(term, asm.ContactPlace))
+    kept = back.constraints[[item.name for item in scene.constraints].index("place touch")]
+    assert (drawn.side, drawn.target, drawn.weight, drawn.name) == (1, (-0.1, THIRD), THIRD, "drawn")
+    assert (kept.side, kept.target, kept.weight) == (0, (THIRD, None), 0.1)
+    assert drawn.contact is kept.contact is back.constraints[2]
+    tasks = [term.tip_task for _, term in back.objectives if isinstance(term, asm.Dexterity)]
+    assert [task.axes for task in tasks] == ["xyz", ("xyz", "xyz"), ("xy", "z")]
+    given = [term.tip_task for _, term in scene.objectives if isinstance(term, asm.Dexterity)][-1]
+    for name in ("ignoring", "holding"):
+        names = [item.name for item in getattr(tasks[-1], name)]
+        assert names == [item.name for item in getattr(given, name)] and len(names) == 2
+
+
+def test_a_dexterity_of_version_4_counts_all_axes(document, load_document):
+    old = copy.deepcopy(document)
+    old["version"] = 4
+    old["constraints"] = [item for item in old["constraints"] if item["type"] != "contact_place"]
+    old["objective"] = [item for item in old["objective"] if item["type"] != "contact_place"]
+    for item in old["objective"]:
+        for name in ("axes", "ignoring", "holding"):
+            item.pop(name, None)
+    tasks = [term.tip_task for _, term in load_document(old).objectives if isinstance(term, asm.Dexterity)]
+    assert [(task.rows, task.ignoring, task.holding) for task in tasks] == [(3, (), ()), (6, (), ()), (6, (), ())]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint, Freedom
 from assembly.constraints.model.contact import Contact
+from assembly.constraints.model.contact_place import ContactPlace
 from assembly.constraints.model.objectives import FrameDistance, PointDistance
 from assembly.errors import InputError, check_coordinates
 from assembly.geometry.faces.face import Face
@@ -28,6 +29,7 @@ __all__ = [
     "FrameTurn",
     "LeastGap",
     "Number",
+    "PlaceNumber",
     "RowNumber",
     "ShapeNumber",
     "TargetNumber",
@@ -192,6 +194,31 @@ class TargetNumber(Number):
         else:
             self.term.target = Pose(place, self.term.target.quaternion)
         count_number(self.term)
+
+
+class PlaceNumber(Number):
+    """A coordinate of the place of a face that a contact comes to, or what it weighs."""
+
+    unit = ""
+
+    def __init__(self, place: ContactPlace, axis: int | None) -> None:
+        self.place, self.axis = place, axis
+        self.name = f"{place.name} {'weight' if axis is None else 'uv'[axis]}"
+        if axis is not None and place.target[axis] is None:
+            raise InputError(f"{self.name} is open, target is {place.target}; expected the coordinate of the line")
+
+    def get(self) -> float:
+        """The number now."""
+        value = self.place.weight if self.axis is None else self.place.target[self.axis]
+        assert value is not None
+        return value
+
+    def set(self, value: float) -> None:
+        """Set it."""
+        if self.axis is None:
+            self.place.weight = value
+        else:
+            self.place.target = [value if k == self.axis else part for k, part in enumerate(self.place.target)]
 
 
 class LeastGap(Number):

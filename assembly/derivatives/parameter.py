@@ -10,6 +10,7 @@ import numpy as np
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint, Freedom
 from assembly.constraints.model.contact import Contact
+from assembly.constraints.model.contact_place import ContactPlace
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.objectives import FrameDistance, PointDistance
 from assembly.derivatives.numbers import (
@@ -20,6 +21,7 @@ from assembly.derivatives.numbers import (
     FrameTurn,
     LeastGap,
     Number,
+    PlaceNumber,
     RowNumber,
     ShapeNumber,
     TargetNumber,
@@ -54,6 +56,7 @@ class Parameter(KnownSettings):
     | a coupling | "offset" |
     | a frame, `joint.frame_a` | "origin" or "turn", "x", "y" or "z": in the axes of its body |
     | `PointDistance`, `FrameDistance` | "target", "x", "y" or "z" |
+    | `ContactPlace` | "target", "u" or "v"; "weight" |
     | `Clearance`, `Contact` | "minimum" |
     | `Parametric`, or a body with such a shape | the name of one of its numbers |
     | a face of a body, `body.face("top")` | "control_points", (i, j, "z"); "weights", (i, j) |
@@ -131,6 +134,12 @@ def _number_of(thing: Thing, field: Any, index: Any) -> Number:
     if isinstance(thing, (PointDistance, FrameDistance)):
         _expect(field, "target")
         return TargetNumber(thing, _axis(index))
+    if isinstance(thing, ContactPlace):
+        if field not in ("target", "weight"):
+            raise InputError(f"field is {field!r}; expected 'target' or 'weight' of a place")
+        if field == "target" and index not in ("u", "v"):
+            raise InputError(f"index is {index!r}; expected 'u' or 'v' of a target")
+        return PlaceNumber(thing, "uv".index(index) if field == "target" else None)
     if isinstance(thing, (Clearance, Contact)):
         _expect(field, "minimum")
         return LeastGap(thing)

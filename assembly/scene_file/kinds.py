@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import Contact
+from assembly.constraints.model.contact_place import ContactPlace
 from assembly.constraints.model.couplings import Gear, Linear, RackPinion
 from assembly.constraints.model.dexterity import Dexterity
 from assembly.constraints.model.expression import Expression
@@ -46,7 +47,7 @@ from assembly.kinematics.pose import Pose
 from assembly.scene_file.features import Feature
 from assembly.scene_file.fields import bad, each, flag, number, or_null, table, text, vector, whole
 from assembly.scene_file.records import Field, Listed, OneOf, OrNull, Parts, Plain, Record
-from assembly.scene_file.references import BODY_NAME, CONTACT_NAME, FREEDOM, SIDE, Index
+from assembly.scene_file.references import BODY_NAME, CONSTRAINT_NAME, CONTACT_NAME, FREEDOM, SIDE, Index
 
 __all__ = ["BODY", "CONSTRAINTS", "FACE", "OBJECTIVES", "SURFACE"]
 
@@ -129,6 +130,10 @@ def _read_side(path: str, value: Any) -> str:
     if side not in ("a", "b"):
         raise bad(path, side, '"a" or "b"')
     return side
+
+
+def _read_axes_of_task(path: str, value: Any) -> str | list[str]:
+    return each(path, value, text, 2) if isinstance(value, list) else text(path, value)
 
 
 def _free(*names: str) -> tuple[Field, ...]:
@@ -255,6 +260,14 @@ EXPRESSION = Record(
     WEIGHT,
     make=Expression.from_document,
 )
+PLACE = Record(
+    ContactPlace,
+    NAME,
+    Field("contact", CONTACT_NAME),
+    Field("side", Plain(_read_side), lambda place: "ab"[place.side]),
+    Field("target", Plain(lambda path, value: each(path, value, or_null(number), 2), list)),
+    WEIGHT,
+)
 
 
 CONSTRAINTS = OneOf(
@@ -314,6 +327,7 @@ CONSTRAINTS = OneOf(
             Field("form", Plain(text)),
             make=_trim,
         ),
+        "contact_place": PLACE,
         "flush": Record(Flush, NAME, *_features("face_a", "face_b"), AXES, OFFSET, *_free("x", "y", "angle")),
         "coaxial": Record(Coaxial, NAME, *_features("a", "b"), AXES, *_free("angle", "slide")),
         "insert": Record(
@@ -397,7 +411,16 @@ OBJECTIVES = OneOf(
             Field("task", Plain(text), "tip_task.task"),
             Field("length", NUMBER, "tip_task.length"),
             Field("direction", Plain(or_null(table(1)), lambda u: None if u is None else u.tolist())),
+            Field(
+                "axes",
+                Plain(_read_axes_of_task, lambda axes: list(axes) if isinstance(axes, tuple) else axes),
+                "tip_task.axes",
+                since=5,
+            ),
+            Field("ignoring", Listed(CONSTRAINT_NAME), "tip_task.ignoring", since=5),
+            Field("holding", Listed(CONSTRAINT_NAME), "tip_task.holding", since=5),
         ),
+        "contact_place": PLACE,
         "expression": EXPRESSION,
     }
 )

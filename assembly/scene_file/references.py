@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from assembly.constraints.model.constraint import Freedom
+from assembly.constraints.model.constraint import Constraint, Freedom
 from assembly.constraints.model.contact import Contact
 from assembly.constraints.model.joint import Joint
 from assembly.errors import InputError
@@ -12,7 +12,7 @@ from assembly.kinematics.body import Body, BodyFace
 from assembly.scene_file.fields import at, bad, members, or_null, text, whole
 from assembly.scene_file.records import Parts, Record
 
-__all__ = ["BODY_NAME", "CONTACT_NAME", "FREEDOM", "SIDE", "Index", "refers_to_others"]
+__all__ = ["BODY_NAME", "CONSTRAINT_NAME", "CONTACT_NAME", "FREEDOM", "SIDE", "Index", "refers_to_others"]
 
 
 class Index:
@@ -84,6 +84,19 @@ class _Freedom:
             return joint.freedom(label)
 
 
+class _ConstraintName:
+    """A constraint of the same file by its name."""
+
+    def write(self, path: str, value: Constraint, parts: Parts) -> str:
+        if parts.constraints.get(value.name) is not value:
+            raise InputError(f"{path} is {value.name!r}, which is not in the assembly; expected scene.constrain of it")
+        return value.name
+
+    def read(self, path: str, value: Any, parts: Parts) -> Constraint:
+        constraint: Constraint = _of_the_file(Constraint, "constraint", path, value, parts)
+        return constraint
+
+
 class _ContactName:
     """A contact of the same file by its name."""
 
@@ -110,6 +123,7 @@ BODY_NAME = _BodyName()
 SIDE = _Side()
 FREEDOM = _Freedom()
 CONTACT_NAME = _ContactName()
+CONSTRAINT_NAME = _ConstraintName()
 
 
 def refers_to_others(record: Record) -> bool:

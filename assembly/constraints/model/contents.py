@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from operator import is_
 from typing import Self
 
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from assembly._html import Table, as_html
 from assembly._read_only import read_only
 from assembly.constraints.model.constraint import Constraint
+from assembly.constraints.model.contact_place import ContactPlace
+from assembly.constraints.model.dexterity import Dexterity
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import Objective
 from assembly.constraints.model.trim_contact import TrimContact
@@ -150,7 +152,7 @@ class Contents:
                 constraint._named_beside(self._taken)
             if constraint.name in self._taken:
                 raise InputError(f"constraint name {constraint.name!r} is taken; expected distinct names, say name=...")
-            if isinstance(constraint, TrimContact) and constraint.contact not in self._constraints:
+            if isinstance(constraint, (TrimContact, ContactPlace)) and constraint.contact not in self._constraints:
                 raise InputError(
                     f"constraint {constraint.name!r} keeps contact {constraint.contact.name!r}, which is not in the "
                     "assembly; expected its contact to be constrained before it"
@@ -172,7 +174,7 @@ class Contents:
         Raises
         ------
         InputError
-            It is not in the assembly, or a `TrimContact` there is of it.
+            It is not in the assembly, or a `TrimContact` or a `ContactPlace` there is of it.
         """
         for item in self._constraints:
             if item is constraint or (isinstance(constraint, str) and item.name == constraint):
@@ -180,8 +182,8 @@ class Contents:
         else:
             known = ", ".join(repr(item.name) for item in self._constraints) or "none"
             raise InputError(f"constraint is {constraint!r}; expected one of the assembly: {known}")
-        for other in self._constraints:
-            if isinstance(other, TrimContact) and other.contact is item:
+        for other in (*self._constraints, *(term for _, term in self._objectives)):
+            if isinstance(other, (TrimContact, ContactPlace)) and other.contact is item:
                 raise InputError(
                     f"constraint is {item.name!r}, whose contact {other.name!r} keeps on a face; "
                     f"expected {other.name!r} to be removed before it"
@@ -206,6 +208,13 @@ class Contents:
             if isinstance(objective, Expression) and objective.count != 1:
                 raise InputError(f"objective {objective.name!r} has {objective.count} values; expected one")
             self._check_bodies(repr(objective), objective.bodies)
+            for what, named in _named_by(objective):
+                for item in named:
+                    if not any(item is other for other in self._constraints):
+                        raise InputError(
+                            f"{what} of objective {objective!r} names {item.name!r}, which is not in the assembly; "
+                            "expected it to be constrained before"
+                        )
             self._objectives.append((sign, objective))
             self._has_changed()
 
@@ -225,3 +234,13 @@ class Contents:
             q = np.array([pose.row for pose in poses]).reshape(-1, 7)
             self._stood = poses, q
         return read_only(q)
+
+
+def _named_by(objective: Objective) -> list[tuple[str, Sequence[Constraint]]]:
+    """The constraints that a term of an objective names, and as what."""
+    if isinstance(objective, ContactPlace):
+        return [("contact", (objective.contact,))]
+    if isinstance(objective, Dexterity):
+        task = objective.tip_task
+        return [("ignoring", task.ignoring), ("holding", task.holding)]
+    return []

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import read_only
-from assembly.constraints.model.constraint import Freedom
+from assembly.constraints.model.constraint import Constraint, Freedom
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.objectives import Objective
-from assembly.errors import InputError, positive, real_array
+from assembly.errors import InputError, items, positive, real_array
 from assembly.kinematics.body import Body, Frame, Point
 
-__all__ = ["MEASURES", "TASKS", "Dexterity", "Measure", "Task", "TipTask"]
+__all__ = ["MEASURES", "TASKS", "Axes", "Dexterity", "Measure", "Task", "TipTask"]
 
 Array = NDArray[np.float64]
 Measure = Literal["manipulability", "inverse_condition", "isotropy", "smallest_singular_value", "force_transmission"]
 Task = Literal["position", "rotation", "pose"]
+Axes = str | tuple[str, str]
 # In the order of the kernel's numbers (`solve/loop/dexterity.py`).
 MEASURES = ("manipulability", "inverse_condition", "isotropy", "smallest_singular_value", "force_transmission")
 TASKS = ("position", "rotation", "pose")
@@ -39,6 +40,18 @@ class TipTask:
     length : float, optional
         In a pose task, angular velocities count as those of points this far off. Half the body's size by default, 1
         for a body without shape.
+    axes : str or (str, str), optional
+        The world axes along which these velocities count, in the order x, y, z: "xy" of a planar arm's position, "z" of
+        its rotation, ("xy", "z") of its pose, linear and then angular ones. All by default.
+    ignoring : sequence of Constraint
+        Constraints that express the task, a tip held at a place say: their rows do not hold the mechanism.
+    holding : sequence of Constraint
+        Constraints whose one-sided rows, a limit or a one-sided contact, hold it as two-sided rows do, touching or not.
+
+    Attributes
+    ----------
+    bits : int
+        The velocities that count, a bit each: three of the linear one, then three of the angular one.
     """
 
     def __init__(
@@ -47,6 +60,10 @@ class TipTask:
         inputs: Sequence[Joint | Freedom],
         task: Task | None = None,
         length: float | None = None,
+        *,
+        axes: Axes | None = None,
+        ignoring: Iterable[Constraint] = (),
+        holding: Iterable[Constraint] = (),
     ) -> None:
         if isinstance(tip, Body):
             tip = tip.frame()
@@ -63,6 +80,12 @@ class TipTask:
             raise InputError(f"inputs is {list(inputs)!r}; expected each freedom once")
         self.task: str = chosen
         self.length = 0.5 * tip.body.size or 1.0 if length is None else positive("length", length)
+        self.bits = _bits(chosen, axes)
+        self.ignoring = _constraints("ignoring", ignoring)
+        self.holding = _constraints("holding", holding)
+        for item in self.ignoring:
+            if any(item is other for other in self.holding):
+                raise InputError(f"holding has {item.name!r}, and so has ignoring; expected it in one of them")
 
     @staticmethod
     def _freedom(k: int, value: object) -> Freedom:
@@ -83,7 +106,13 @@ class TipTask:
     @property
     def rows(self) -> int:
         """Rows of the Jacobian."""
-        return 6 if self.task == "pose" else 3
+        return self.bits.bit_count()
+
+    @property
+    def axes(self) -> str | tuple[str, str]:
+        """The world axes along which velocities count; of a pose linear and angular ones."""
+        linear, angular = ("".join(a for k, a in enumerate("xyz") if self.bits >> (k + s) & 1) for s in (0, 3))
+        return {"position": linear, "rotation": angular}.get(self.task, (linear, angular))
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -92,16 +121,47 @@ class TipTask:
         return tuple(dict.fromkeys(bodies))
 
 
+def _bits(task: str, axes: object) -> int:
+    """The velocities that count."""
+    expected = "letters of 'xyz' in this order"
+    if task == "pose":
+        expected = "two words, linear and angular axes, of letters of 'xyz' in this order"
+    words = axes if task == "pose" else (axes,)
+    if axes is None:
+        words = ("xyz",) * (2 if task == "pose" else 1)
+    if not isinstance(words, (tuple, list)) or len(words) != (2 if task == "pose" else 1):
+        raise InputError(f"axes is {axes!r} of task {task!r}; expected {expected}")
+    bits = 0
+    for word, first in zip(words, (0, 3) if task == "pose" else (3 * (task == "rotation"),), strict=True):
+        if not isinstance(word, str) or "".join(a for a in "xyz" if a in word) != word:
+            raise InputError(f"axes is {axes!r} of task {task!r}; expected {expected}")
+        bits += sum(1 << (first + "xyz".index(letter)) for letter in word)
+    if not bits:
+        raise InputError(f"axes is {axes!r}; expected one axis at least")
+    return bits
+
+
+def _constraints(name: str, value: object) -> tuple[Constraint, ...]:
+    """Distinct constraints."""
+    if isinstance(value, (Constraint, str)):
+        raise InputError(f"{name} is {value!r}; expected constraints, a list of them")
+    found = items(name, value, "a list of constraints")
+    for item in found:
+        if not isinstance(item, Constraint):
+            raise TypeError(f"{name} has {item!r}; expected a constraint")
+    return tuple(dict.fromkeys(found))
+
+
 class Dexterity(Objective):
     """A measure of the Jacobian of an end effector, to be maximized: what unit rates of the inputs do to it.
 
     The Jacobian is taken through closed loops and contacts by the rows of the scene's bilateral constraints; driven
-    values and limits do not count as such. The gradient is exact.
+    values do not count as such, limits and one-sided contacts only where they are `holding`. The gradient is exact.
 
     Parameters
     ----------
-    tip, inputs, task, length
-        As of `TipTask`.
+    tip, inputs, task, length, axes, ignoring, holding
+        As of `TipTask`; constraints are in the scene.
     measure : str
         With singular values s_i of the Jacobian J in the user's units:
         "manipulability": the product of s_i, which is sqrt(det J J^T), or sqrt(det J^T J) where there are fewer inputs
@@ -110,8 +170,8 @@ class Dexterity(Objective):
         "isotropy": (product of s_i^2)^(1/r) / (mean of s_i^2);
         "smallest_singular_value": s_min;
         "force_transmission": 1 / |J^T u|, the force along the unit vector u that inputs of unit norm hold.
-    direction : (3,) or (6,), optional
-        u, world axes, for "force_transmission" and nothing else.
+    direction : (rows of the task,), optional
+        u, along the axes of the task, for "force_transmission" and nothing else.
     weight : float
         Positive.
 
@@ -134,10 +194,13 @@ class Dexterity(Objective):
         *,
         task: Task | None = None,
         length: float | None = None,
+        axes: Axes | None = None,
+        ignoring: Iterable[Constraint] = (),
+        holding: Iterable[Constraint] = (),
         direction: ArrayLike | None = None,
         weight: float = 1.0,
     ) -> None:
-        self._tip_task = TipTask(tip, inputs, task, length)
+        self._tip_task = TipTask(tip, inputs, task, length, axes=axes, ignoring=ignoring, holding=holding)
         if not isinstance(measure, str) or measure not in MEASURES:
             raise InputError(f"measure is {measure!r}; expected one of {', '.join(map(repr, MEASURES))}")
         if (measure == "force_transmission") != (direction is not None):

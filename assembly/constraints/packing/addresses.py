@@ -6,6 +6,7 @@ from assembly._address import address_of
 from assembly.constraints.program.block_factor import factorize_blocks, solve_blocks
 from assembly.constraints.program.contact import contact_rows
 from assembly.constraints.program.lifted_contact import free_row, free_terms
+from assembly.constraints.program.place import place_terms
 from assembly.constraints.program.tapes import run_scene_tape
 from assembly.constraints.program.trim import trim_rows, trim_terms
 from assembly.constraints.program.trim_corners import trim_sides
@@ -17,7 +18,19 @@ from assembly.proximity.manager.contact_place import mark_places
 from assembly.proximity.manager.motion_bounds import measure_parts, went_beyond
 from assembly.proximity.manager.update import update
 
-__all__ = ["blocks", "contacts", "deepest", "places", "sides", "solids", "surfaces", "tapes", "trims", "manager"]
+__all__ = [
+    "blocks",
+    "contacts",
+    "deepest",
+    "place_objectives",
+    "places",
+    "sides",
+    "solids",
+    "surfaces",
+    "tapes",
+    "trims",
+    "manager",
+]
 
 
 def blocks() -> tuple[int, int]:
@@ -58,6 +71,11 @@ def places() -> int:
 def trims() -> tuple[int, int]:
     """Of `trim_rows` and `trim_terms`."""
     return address_of(trim_rows), address_of(trim_terms)
+
+
+def place_objectives() -> int:
+    """Of `place_terms`."""
+    return address_of(place_terms)
 
 
 def sides() -> int:

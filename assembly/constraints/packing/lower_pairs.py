@@ -20,7 +20,8 @@ from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.contact import Contact, side_faces
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.joints import Cylindrical, Spherical
-from assembly.constraints.model.trim_contact import TrimContact
+from assembly.constraints.model.objectives import Objective
+from assembly.constraints.packing.places import names_of_whole
 from assembly.geometry.recognition.forms import Cylinder, Sphere
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
@@ -83,14 +84,17 @@ class LowerPair:
         return self.joints[0 if cosine > 0.0 else 1]
 
 
-def lower_pairs(constraints: Sequence[Constraint]) -> list[LowerPair]:
+def lower_pairs(
+    constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]] = ()
+) -> list[LowerPair]:
     """The contacts that may be lower pairs.
 
-    One with trims is of whole surfaces, and what is one-sided may open. Beside a least gap a contact has a place.
+    One with trims or places is of whole surfaces, and what is one-sided may open. Beside a least gap a contact has
+    a place.
     """
     if any(isinstance(item, Clearance) and item.minimum > 0.0 for item in constraints):
         return []
-    trimmed = {item.contact.name for item in constraints if isinstance(item, TrimContact)}
+    trimmed = names_of_whole(constraints, objectives)
     found = []
     for number, item in enumerate(constraints):
         if isinstance(item, Contact) and not item.unilateral and not item.minimum and item.name not in trimmed:

@@ -61,6 +61,8 @@ class NumberPlaces:
         self._bodies = {id(body) for body in bodies}
         self._clearances = {id(item): k for k, item in enumerate(packed.clearances)}
         self._contacts = {id(item): (item, at) for item, at in zip(packed.contacts, packed.gaps, strict=True)}
+        places = (*packed.drawn, *(place for place, _ in packed.placed))
+        self._placed = {id(place) for place in places}
         self._has_corners = bool(packed.corners)
         self._ends = list(accumulate(map(len, packed.pairs_of_kept)))
         # Of every frame where its origin is in the pool, and whether axes are behind it.
@@ -100,7 +102,7 @@ class NumberPlaces:
         contacts: list[int] = []
         for thing in things:
             key = id(thing)
-            if key in self._bodies or key in self._tips:
+            if key in self._bodies or key in self._tips or key in self._placed:
                 return None
             if key in self._frames:
                 frames.append(key)

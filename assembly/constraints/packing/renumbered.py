@@ -18,6 +18,7 @@ from assembly.constraints.model.dexterity import Dexterity
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import Objective, Posture
 from assembly.constraints.packing.number_places import NumberPlaces
+from assembly.constraints.packing.places import place_numbers
 from assembly.constraints.packing.scene_size import size_and_extent
 from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.packing.terms import TermPacking
@@ -117,10 +118,13 @@ def _compared(
         other._keep_values(values)
         other._standing_units = np.array([1.0 if item.is_angle else scale for item in packed._turned.told])
     writer = _PoolWriter(packed, scale)
-    terms = TermPacking(cast(SceneWriter, writer), bodies, other.reference, other.unit)
+    terms = TermPacking(cast(SceneWriter, writer), packed.row_numbers, bodies, other.reference, other.unit)
     for sign, term in goals:
         terms.add(sign, term)
     pool[packed.terms_at : packed.terms_at + len(writer.pool)] = writer.pool
+    for spot, start in packed.placed:
+        numbers = place_numbers(spot, 0.0, scale)
+        pool[start : start + len(numbers)] = numbers
     for at in _following_postures(packed):
         # Where the last solve began, until the next one begins.
         pool[at + 1 : at + 1 + REFERENCE] = packed.rows_pool[at + 1 : at + 1 + REFERENCE]
@@ -156,7 +160,8 @@ def numbers_told(packed: Packed, bodies: Sequence[Body], constraints: Sequence[C
     asked = [body.fixed for body in bodies], [item._is_asked for item in constraints]
     faces = [side.face for body in bodies for side in body.faces]
     gaps = [item.minimum for item in packed.clearances] + [item.minimum for item in packed.contacts]
-    return [asked, frames, gaps, faces]
+    places = [place.target for place in (*packed.drawn, *(place for place, _ in packed.placed))]
+    return [asked, frames, gaps, faces, places]
 
 
 def _following_postures(packed: Packed) -> list[int]:

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.constraint import Constraint, Equation, RowConstraint
 from assembly.constraints.model.contact import Contact, side_faces
+from assembly.constraints.model.contact_place import ContactPlace
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.trim_contact import FORMS, TrimContact
 from assembly.constraints.packing.numbering import gathering_order
+from assembly.constraints.packing.places import place_numbers
 from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.program import records as layout
 from assembly.geometry.faces.loop_sides import loop_sides
@@ -46,12 +48,15 @@ class RowPacking:
         Where the pool has the least gap of every contact.
     values : list of (Equation, int, float)
         Equations of joints, where the value of each is in the pool, and what one of it counts in the user's units.
+    places : list of (ContactPlace, int)
+        Constraints that are places of contacts, and where the numbers of each are in the pool.
     """
 
     def __init__(self, writer: SceneWriter, constraints: Sequence[Constraint]) -> None:
         self.owners: list[int] = []
         self.values: list[tuple[Equation, int, float]] = []
         self.gaps: list[int] = []
+        self.places: list[tuple[ContactPlace, int]] = []
         self._writer = writer
         self._constraints = constraints
         self._numbers = {id(constraint): k for k, constraint in enumerate(constraints)}
@@ -93,13 +98,22 @@ class RowPacking:
                 self._add(owner, [layout.CONTACT_ROW, -1, -1, 1, 0, 1, -1, -1, -1, -1, layout.ZERO, 0])
 
     def add_trims(self, contacts: Sequence[Contact]) -> None:
-        """Rows of trims, of contacts in the order of their rows."""
+        """Rows of trims and places, of contacts in the order of their rows."""
         pairs = {contact.name: k for k, contact in enumerate(contacts)}
         before = len(self._rows)
         for item in self._constraints:
             if isinstance(item, TrimContact):
                 self._add_trim(item, pairs[item.contact.name])
+            elif isinstance(item, ContactPlace):
+                self._add_place(item, pairs[item.contact.name])
         self._writer.header[layout.TRIMS] = len(self._rows) - before
+
+    def _add_place(self, place: ContactPlace, pair: int) -> None:
+        _, at = self._writer.add(pool=place_numbers(place, 0.0, self._writer.scale))
+        self.places.append((place, at))
+        row = [layout.TRIM_ROW, *self._writer.places_of(place.bodies), 0, 0, 1, pair, place.side, -1, at]
+        for k in range(place.rows):
+            self._add(place, [*row, layout.AT_PLACE, 1, -1, 0, -1, k])
 
     def _add_trim(self, trim: TrimContact, pair: int) -> None:
         writer = self._writer

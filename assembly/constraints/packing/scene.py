@@ -16,7 +16,6 @@ from assembly.constraints.model.constraint import Constraint, Equation, RowConst
 from assembly.constraints.model.contact import Contact, lone_surfaces, side_face
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import Objective, Posture
-from assembly.constraints.model.trim_contact import TrimContact
 from assembly.constraints.packing import addresses
 from assembly.constraints.packing import manager as manager_packing
 from assembly.constraints.packing.asked import Asked
@@ -25,11 +24,12 @@ from assembly.constraints.packing.elimination_order import FEW, block_record
 from assembly.constraints.packing.manager import WatchedPairs
 from assembly.constraints.packing.manager_last import ManagerLast
 from assembly.constraints.packing.numbering import number_bodies
+from assembly.constraints.packing.places import names_of_whole
 from assembly.constraints.packing.revolutions import Turns
 from assembly.constraints.packing.rows import RowPacking
 from assembly.constraints.packing.scene_size import check_reach, size_and_extent
 from assembly.constraints.packing.scene_writer import SceneWriter
-from assembly.constraints.packing.terms import TermPacking, natural_unit
+from assembly.constraints.packing.terms import RowNumbers, TermPacking, natural_unit
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.coordinates_at import coordinates_at
 from assembly.constraints.program.hessian_blocks import FACTORIZE_AT, SOLVE_AT
@@ -149,7 +149,13 @@ class Packed(ManagerLast):
     drives : (m,) bool
         Whether a driven value or a limit asks for the row.
     trims : int
-        Rows of trims.
+        Rows of trims, and of places that contacts are kept at.
+    placed : list of (ContactPlace, int)
+        Constraints that are places of contacts, and where the numbers of each are in the pool.
+    drawn : list of ContactPlace
+        Terms of the objective that are places of contacts.
+    row_numbers : RowNumbers
+        What terms of the objective know of rows.
     chooses_turns : bool
         Whether the turns of angles are told by where bodies stand once they are put together.
     pairs : (m,) int
@@ -178,8 +184,8 @@ class Packed(ManagerLast):
         self.faces = [side.face for body in bodies for side in body.faces]
         self._measure_by(size if self.has_size else 1.0, bodies, objectives or [(1.0, Posture())])
         self.contacts = [constraint for constraint in constraints if isinstance(constraint, Contact)]
-        # Of a contact with trims the surfaces take part without their own boundaries.
-        trimmed = {item.contact.name for item in constraints if isinstance(item, TrimContact)}
+        # Of a contact with trims or places the surfaces take part without their own boundaries.
+        trimmed = names_of_whole(constraints, objectives)
         self.whole = [contact.name in trimmed or not contact.edges for contact in self.contacts]
         self.sides = [
             (side_face(contact.a), side_face(contact.b)) if whole else (contact.a, contact.b)
@@ -257,14 +263,16 @@ class Packed(ManagerLast):
         header[layout.IMPLICIT] = not objectives
         self._write_rows(writer, bodies, constraints, unknown_blocks)
         self.terms_at = writer.pool_at
-        terms = TermPacking(writer, bodies, self.reference, self.unit)
+        terms = TermPacking(writer, self.row_numbers, bodies, self.reference, self.unit)
         for sign, term in goals:
             terms.add(sign, term)
         terms.write()
         self.frames_at = writer.pool_at
         writer.add_shared()
-        # Rows of clearances are of any bodies, those of trims and dexterities are not by blocks.
-        if header[layout.MOVING] > FEW and not (self.clearance_rows or self.trims or header[layout.DEXTERITIES]):
+        self.drawn = terms.drawn
+        # Rows of clearances are of any bodies, those of trims, and dexterities and places, are not by blocks.
+        others = self.clearance_rows or self.trims or header[layout.DEXTERITIES] or self.drawn
+        if header[layout.MOVING] > FEW and not others:
             groups += [writer.places_of(term.bodies) for _, term in goals if isinstance(term, Expression)]
             record = block_record(int(header[layout.MOVING]), [unknown_blocks[group].tolist() for group in groups])
             header[layout.BLOCK_RECORD], header[layout.BLOCK_LENGTH] = writer.add(record)[0], record.size
@@ -308,6 +316,7 @@ class Packed(ManagerLast):
         table = rows.write(bodies)
         self._keep_values(rows.values)
         self.gaps = rows.gaps
+        self.placed = rows.places
         self.rows = len(table)
         self.owners = np.array(rows.owners, dtype=np.int64)
         self.one_sided = table[:, layout.ONE_SIDED] == 1
@@ -318,6 +327,12 @@ class Packed(ManagerLast):
         trims = kinds == layout.TRIM_ROW
         self.pairs[trims] = table[trims, layout.TRIM_PAIR]
         self.trims = int(trims.sum())
+        self.row_numbers = RowNumbers(
+            {contact.name: k for k, contact in enumerate(self.contacts)},
+            [constraints[k].name for k in rows.owners],
+            self.one_sided,
+            self.drives,
+        )
         by_owner = np.argsort(self.owners, kind="stable")
         ends = np.searchsorted(self.owners[by_owner], np.arange(len(constraints) + 1))
         self.spans = [by_owner[first:last] for first, last in pairwise(ends)]
@@ -414,6 +429,8 @@ class Packed(ManagerLast):
             table[[layout.TRACK_AT, layout.SEARCH_AT, layout.NEAREST_AT]] = addresses.solids()
         if self.trims:
             table[[layout.TRIM_ROWS_AT, layout.TRIM_TERMS_AT]] = addresses.trims()
+        if self.drawn:
+            table[layout.PLACE_TERMS_AT] = addresses.place_objectives()
         if table[layout.FIRST_SIDE] < table[layout.TRACKED]:
             table[layout.TRIM_SIDES_AT] = addresses.sides()
         if watched:

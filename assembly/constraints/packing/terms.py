@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from math import inf, prod, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.model.dexterity import MEASURES, TASKS, Dexterity
+from assembly.constraints.model.contact_place import ContactPlace
+from assembly.constraints.model.dexterity import MEASURES, Dexterity, TipTask
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance, Posture, Weight
+from assembly.constraints.packing.places import place_numbers
 from assembly.constraints.packing.scene_size import check_reach
 from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.program import objective_terms as terms
@@ -18,9 +21,41 @@ from assembly.constraints.program import records as layout
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 
-__all__ = ["TermPacking", "natural_unit"]
+__all__ = ["RowNumbers", "TermPacking", "dexterity_numbers", "natural_unit"]
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RowNumbers:
+    """The rows of a scene, by whose they are: what terms of the objective refer to.
+
+    Attributes
+    ----------
+    contacts : mapping of str to int
+        The row of every contact, by its name.
+    owners : sequence of str
+        The constraint of every row, by its name.
+    one_sided, drives : (m,) bool
+    """
+
+    contacts: Mapping[str, int]
+    owners: Sequence[str]
+    one_sided: NDArray[np.bool_]
+    drives: NDArray[np.bool_]
+
+    def that_hold(self, task: TipTask, active: Collection[int] = ()) -> list[int]:
+        """The rows that hold a mechanism while an end effector moves: see `TipTask`; and those that are `active`."""
+        ignored, held = ({item.name for item in items} for items in (task.ignoring, task.holding))
+        kept = []
+        for r, owner in enumerate(self.owners):
+            if self.one_sided[r]:
+                holds = owner in held or (r in active and owner not in ignored)
+            else:
+                holds = not self.drives[r] and owner not in ignored
+            if holds:
+                kept.append(r)
+        return kept
 
 
 class TermPacking:
@@ -29,6 +64,7 @@ class TermPacking:
     Parameters
     ----------
     writer : SceneWriter
+    rows : RowNumbers
     bodies : sequence of Body
     reference : (3,) array
         What positions in the world are relative to.
@@ -41,16 +77,22 @@ class TermPacking:
         Terms with a target, and where its position is in the pool.
     turns : list of (FrameDistance, int)
         Terms with a pose as target, and where its quaternion is in the pool.
+    drawn : list of ContactPlace
+        Terms that are places of contacts.
     """
 
-    def __init__(self, writer: SceneWriter, bodies: Sequence[Body], reference: Array, unit: float) -> None:
+    def __init__(
+        self, writer: SceneWriter, rows: RowNumbers, bodies: Sequence[Body], reference: Array, unit: float
+    ) -> None:
         self.targets: list[tuple[PointDistance | FrameDistance, int]] = []
         self.turns: list[tuple[FrameDistance, int]] = []
         self._writer = writer
+        self._rows = rows
         self._bodies = bodies
         self._reference = reference
         self._unit = unit
         self._records: list[list[int]] = []
+        self.drawn: list[ContactPlace] = []
 
     def add(self, sign: float, term: Objective) -> None:
         """Pack a term: 1 to minimize it, -1 to maximize it."""
@@ -68,6 +110,8 @@ class TermPacking:
             self._add_weight(weight, term)
         elif isinstance(term, Dexterity):
             self._add_dexterity(weight, term)
+        elif isinstance(term, ContactPlace):
+            self._add_place(weight, term)
         elif isinstance(term, Expression):
             _, at = self._writer.add(pool=[weight])
             listed, _ = self._writer.add(self._writer.tape(term, -1))
@@ -112,18 +156,25 @@ class TermPacking:
             _, at = self._writer.add(pool=[*force, *(center / scale), offset])
             self._records.append([terms.POTENTIAL, self._writer.places[body], at])
 
+    def _add_place(self, weight: float, term: ContactPlace) -> None:
+        """Nothing where its contact is disabled."""
+        contact = self._rows.contacts.get(term.contact.name)
+        if contact is not None:
+            _, at = self._writer.add(pool=place_numbers(term, weight, self._writer.scale))
+            self._records.append([terms.PLACE, -1, at, 0, 0, contact, term.side, term.rows])
+            self.drawn.append(term)
+
     def _add_dexterity(self, weight: float, term: Dexterity) -> None:
         """The record is that of `solve/loop/dexterity.py`."""
         writer, task = self._writer, term.tip_task
-        fields = [MEASURES.index(term.measure), TASKS.index(task.task), len(task.inputs)]
+        held = self._rows.that_hold(task)
+        fields = [MEASURES.index(term.measure), task.bits, len(task.inputs), writer.add(held)[0], len(held)]
         factors = []
         for freedom in task.inputs:
             coordinate, bodies = writer.coordinate(freedom.coordinate)
             fields += [*coordinate, *bodies]
             factors.append(1.0 if freedom.coordinate.is_angle else 1.0 / writer.scale)
-        direction = np.zeros(6) if term.direction is None else np.resize(term.direction, 6)
-        turn = task.length if task.task == "pose" else 1.0
-        _, at = writer.add(pool=[weight, *(task.origin / writer.scale), writer.scale, turn, *direction, *factors])
+        _, at = writer.add(pool=dexterity_numbers(term, weight, writer.scale, factors))
         self._records.append([terms.DEXTERITY, writer.places[task.tip.body], at, writer.add(fields)[0]])
         writer.header[layout.DEXTERITIES] += 1
 
@@ -133,6 +184,16 @@ class TermPacking:
         fields = [field for record in self._records for field in record + [0] * (terms.TERM - len(record))]
         header[layout.TERM_TABLE], _ = self._writer.add(fields)
         header[layout.TERMS] = len(self._records)
+
+
+def dexterity_numbers(term: Dexterity, weight: float, scale: float, factors: Sequence[float]) -> list[float]:
+    """A `DEXTERITY_WEIGHTS` of `solve/loop/dexterity.py`, and the factor of every input's unit."""
+    task = term.tip_task
+    direction = np.zeros(6)
+    if term.direction is not None:
+        direction[: task.rows] = term.direction
+    turn = task.length if task.task == "pose" else 1.0
+    return [weight, *(task.origin / scale), scale, turn, *direction, *factors]
 
 
 def natural_unit(term: Objective, scale: float) -> float:

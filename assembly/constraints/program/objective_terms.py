@@ -4,6 +4,8 @@ point distance   weight |p - target|^2
 posture          weight |x - x0|^2 + lever 4 sin^2(angle / 2), from a pose (x0, e0)
 potential        -force . p, p a point of a body
 tape             weight times a user's expression
+
+Dexterities are in `solve/loop/dexterity.py`, places of contacts in `constraints/program/place.py`.
 """
 
 from __future__ import annotations
@@ -28,11 +30,13 @@ TERM_RECORD = record_dtype(
     parameters=1,  # where these are in the pool
     tape=1,  # where the record of its tape is, or of its dexterity
     follows=1,  # 1: a posture whose reference is the start of each solve
-    spare=3,
+    contact=1,  # of a place: the contact that is drawn to it
+    side=1,  # of a place: on the face of f (0) or of g (1)
+    rows=1,  # of a place: 2 of a point, 1 of a line
 )
 term_at = record_view(TERM_RECORD)
 TERM = size_of(TERM_RECORD)
-POINT_DISTANCE, POSTURE, TAPE_TERM, DEXTERITY, POTENTIAL = 0, 1, 2, 3, 4
+POINT_DISTANCE, POSTURE, TAPE_TERM, DEXTERITY, POTENTIAL, PLACE = 0, 1, 2, 3, 4, 5
 # Parameters of a point distance.
 POINT_DISTANCE_FIELDS = record_dtype(
     "f8",

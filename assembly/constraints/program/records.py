@@ -69,6 +69,7 @@ HEADER_RECORD = record_dtype(
     parts_address=1,  # parts of motion bounds that bodies have used
     went_address=1,  # whether bodies went farther than a contact was open
     run_tape_address=1,  # runs a tape
+    place_terms_address=1,  # terms of the objective that are places of contacts; 0: there are none
     kept=1,  # where in a state stands what a solve leaves for the next one (`kept.py`)
 )
 header_at = record_view(HEADER_RECORD)
@@ -114,6 +115,7 @@ STAYED_AT = place_of(HEADER_RECORD, "stayed_address")
 PARTS_AT = place_of(HEADER_RECORD, "parts_address")
 WENT_AT = place_of(HEADER_RECORD, "went_address")
 RUN_TAPE_AT = place_of(HEADER_RECORD, "run_tape_address")
+PLACE_TERMS_AT = place_of(HEADER_RECORD, "place_terms_address")
 KEPT = place_of(HEADER_RECORD, "kept")
 HEADER = size_of(HEADER_RECORD)
 # A row, of any kind. Row k is that of contact k. Fields of its kind stand behind these.
@@ -159,20 +161,21 @@ TRIM_ROW_RECORD = record_dtype(
     **EVERY_ROW,
     contact=1,  # whose coordinates are kept
     side=1,  # 0: on the face of f, 1: of g
-    loop=1,
-    factor=1,  # where the factor of the residual is in the pool
+    loop=1,  # -1: of a place
+    factor=1,  # where the factor of the residual is in the pool; of a place its record there
     form=1,  # SIGNED, ...
     count=1,  # rows that the trim has; its first one says
     edges=1,  # records of the loop's curves as edges
     by_length=1,  # 1: a vector counts by its signed length
     sides=1,  # a `LOOP_SIDES` of a loop with corners; -1: it has none
-    slot=1,  # 0: of the side that the contact is on, 1: of the one that this meets at the corner next to it
+    slot=1,  # 0: of the side that the contact is on, 1: of the one that this meets at the corner next to it;
+    # of a place the number of its row
 )
 trim_row_at = record_view(TRIM_ROW_RECORD)
 TRIM_PAIR = place_of(TRIM_ROW_RECORD, "contact")
 TRIM_LENGTH = place_of(TRIM_ROW_RECORD, "by_length")
-# Forms of trims (`trim.py`).
-SIGNED, PARAMETRIC, CARTESIAN, BETWEEN = 0, 1, 2, 3
+# Forms of trims (`trim.py`), and places (`place.py`), whose rows stand among them.
+SIGNED, PARAMETRIC, CARTESIAN, BETWEEN, AT_PLACE = 0, 1, 2, 3, 4
 # The sides of a loop with corners, which two rows are of: see `trim_sides.py`.
 LOOP_SIDES = record_dtype(
     "i8",

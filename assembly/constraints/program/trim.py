@@ -27,7 +27,15 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.constraints.program.contact import contact_of, surface_of
+from assembly.constraints.program.place import (
+    OwnPlace,
+    add_coordinate_curvature,
+    add_place_rates,
+    place_at,
+    place_error,
+)
 from assembly.constraints.program.records import (
+    AT_PLACE,
     BETWEEN,
     CARTESIAN,
     FREE_COLUMN,
@@ -108,6 +116,16 @@ def signed_row(store, r, lifted, point):
     residual[r] = factor * s
     add_coordinate_rate(lifted, records, k, o, factor * n[0], jacobian, r)
     add_coordinate_rate(lifted, records, k, o + 1, factor * n[1], jacobian, r)
+
+
+@kernel(inner=True)
+def place_row(store, r, lifted, point):
+    """Row r, of a place."""
+    row = trim_of(store.table, r)
+    k, o = row.contact, 2 * row.side
+    clear(point.jacobian, r)
+    point.residual[r] = place_error(store, row.factor, row.slot, point.tracked[k, o], point.tracked[k, o + 1])
+    add_place_rates(store, OwnPlace(row.factor, k, row.side), row.slot, lifted, point, point.jacobian, r)
 
 
 @kernel(inner=True)
@@ -336,7 +354,9 @@ def trim_rows(scene, pairs, at):
     r = header.contacts
     while r < header.contacts + header.trims:
         row = trim_of(table, r)
-        if row.form == SIGNED:
+        if row.form == AT_PLACE:
+            place_row(store, r, lifted, point)
+        elif row.form == SIGNED:
             signed_row(store, r, lifted, point)
         else:
             vector_rows(store, r, lifted, point)
@@ -355,16 +375,23 @@ def trim_rows(scene, pairs, at):
 def trim_terms(scene, r, pairs, bases, point, y, hessian):
     """Upper triangle of hessian += y (second derivative of row r).
 
-    Of a signed row of a free contact that is all; else what the change of u_q adds is left out. A vector's row counts
-    as the signed distance, times what its gradient has of that one's: at a solution all else in it is the gap's.
+    Of a place, exactly. Of a signed row of a free contact that is all; else what the change of u_q adds is left out. A
+    vector's row counts as the signed distance, times what its gradient has of that one's: at a solution all else in it
+    is the gap's.
     """
     table, pool = scene
     free, lengths, vectors, variables, guess, memory = pairs
-    _q, tracked, records, _residual, jacobian = point
+    q, tracked, records, residual, jacobian = point
     lifted = LiftedPairs(free, lengths, vectors, variables, guess, memory)
     row = trim_of(table, r)
     k = row.contact
     o = 2 * row.side
+    if row.form == AT_PLACE:
+        stretch = place_at(pool, row.factor).stretch
+        slopes = (y * stretch[2 * row.slot], y * stretch[2 * row.slot + 1])
+        own, here = OwnPlace(row.factor, k, row.side), Iterate(q, tracked, records, residual, jacobian)
+        add_coordinate_curvature(Store(table, pool), own, slopes, lifted, bases, here, hessian)
+        return 0
     place = trim_place(Store(table, pool), row, tracked)
     if place.loop < 0:
         return 0

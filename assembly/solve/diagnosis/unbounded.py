@@ -98,7 +98,8 @@ class Place:
         state = packed.new_state()
         state[: packed.contacts_at] = self.q.ravel()
         state[packed.contacts_at : packed.angles_at] = np.nan
-        state[packed.angles] = [self.angles[id(angle)] for angle in packed._angles]
+        # An angle that only a dexterity's input has, which no row was put back by, is on any turn.
+        state[packed.angles] = [self.angles.get(id(angle), 0.0) for angle in packed._angles]
         return state
 
 

@@ -6,6 +6,7 @@ of inputs that vanishes on N, or a motion of N that turns no input and moves the
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,12 +31,13 @@ Array = NDArray[np.float64]
 NO_MOTION, NO_PART = 1e-6, 1e-4
 
 
-def complaint(scene: Assembly, packed: Packed, state: Array, task: TipTask) -> str:
-    """What is wrong with the inputs at a state, in words for an error."""
+def complaint(scene: Assembly, packed: Packed, state: Array, task: TipTask, active: Collection[int] = ()) -> str:
+    """What is wrong with the inputs at a state, in words for an error; `active` are one-sided rows that count."""
     moving = [k for k, body in enumerate(scene.bodies) if not body.fixed]
     columns = moving_columns(moving)
     rows = rows_of(packed, state)
-    counted = ~rows.one_sided & ~rows.drives
+    holds = np.isin(np.arange(packed.rows), packed.row_numbers.that_hold(task, active))
+    counted = holds[rows.program_rows]
     worst = float(np.abs(rows.residual[counted]).max(initial=0.0))
     motions = Balanced.of(rows.jacobian[np.ix_(counted, columns)], worst).free().T
     poses = _scaled(packed, rows.state)
@@ -91,9 +93,9 @@ def _gradient(packed: Packed, item: Coordinate, poses: Array) -> Array:
 
 
 def _end_effector_rows(packed: Packed, task: TipTask, poses: Array) -> Array:
-    """The end effector's velocity by the twists of all bodies, lengths over the scene's size, (3 or 6, 6 n)."""
+    """The end effector's velocity by the twists of all bodies, lengths over the scene's size, (rows, 6 n)."""
     body = packed.body_places[task.tip.body]
     arm = rotation_matrix(poses[body, 3:]) @ task.origin / packed.scale
     out = np.zeros((6, 6 * len(poses)))
     out[:, 6 * body : 6 * body + 6] = np.block([[np.eye(3), -skew(arm)], [np.zeros((3, 3)), np.eye(3)]])
-    return {"position": out[:3], "rotation": out[3:], "pose": out}[task.task]
+    return out[[k for k in range(6) if task.bits >> k & 1]]

@@ -1,6 +1,7 @@
 """Dexterity: what an end effector can do with its inputs, as a term of the objective with an exact gradient.
 
-Rows A of joints and contacts (drives and limits left out) and rows B of the inputs: rates V of all unknowns, a column
+Rows A that hold the mechanism, those of joints and contacts (drives and limits left out, see `Dexterity`), and rows B
+of the inputs: rates V of all unknowns, a column
 an input, make B V = 1 and change the rows as little as can be (`solve/loop/rates.py`). J = T V is the Jacobian of the
 end effector, whose velocity T v is. Of J a measure w is taken (`solve/linear_algebra/singular_values.py`), with
 W = dw / dJ. With
@@ -27,9 +28,9 @@ from assembly._record import place_of, record_dtype, record_view, size_of
 from assembly.constraints.program.evaluate import evaluate
 from assembly.constraints.program.objective_terms import DEXTERITY, TERM, term_at, three_at
 from assembly.constraints.program.primitives import add_coordinate_hessian, coordinate
-from assembly.constraints.program.records import BODY_COORDINATE, ROW, Iterate, body_coordinate_at, header_at, row_at
+from assembly.constraints.program.records import BODY_COORDINATE, Iterate, body_coordinate_at, header_at
 from assembly.constraints.program.row_terms import add_row_terms
-from assembly.geometry.vec import add, cross, matvec, scale
+from assembly.geometry.vec import add, cross, matvec
 from assembly.kinematics.motion import rotation
 from assembly.solve.linear_algebra.singular_values import measure_jacobian
 from assembly.solve.loop.parameters import DIFFERENCE, KEPT, UNDETERMINED
@@ -41,12 +42,14 @@ from assembly.solve.loop.residuals import first_unknown, move, times
 DEXTERITY_TERM = record_dtype(
     "i8",
     measure=1,  # `singular_values.py`
-    task=1,  # POSITION, ROTATION or POSE
+    axes=1,  # which velocities count: bits, three of the linear one and then three of the angular one
     inputs=1,  # how many
+    held=1,  # where a list begins of the rows that hold the mechanism
+    held_rows=1,  # how many there are
 )
 dexterity_at = record_view(DEXTERITY_TERM)
 INPUT_LIST, INPUT = size_of(DEXTERITY_TERM), size_of(BODY_COORDINATE)
-POSITION, ROTATION, POSE = 0, 1, 2
+VELOCITIES = 6
 # Its parameters in the pool; behind them the factor of every input's unit.
 DEXTERITY_WEIGHTS = record_dtype(
     "f8",
@@ -67,9 +70,9 @@ DETERMINED, DEPENDENT, OPEN = 0, 1, 2
 EndEffectorMap = namedtuple("EndEffectorMap", "outcome jacobian used inputs adjoint")
 InputRates = namedtuple("InputRates", "v z changes")
 Adjoint = namedtuple("Adjoint", "p y loads")
-# The end effector of a term: its task, the arm from its body's origin, where that body's twist stands among the
-# unknowns (negative: fixed), factors of velocities and angular velocities.
-EndEffector = namedtuple("EndEffector", "task arm place linear angular")
+# The end effector of a term: the axes that count, the arm from its body's origin, where that body's twist stands among
+# the unknowns (negative: fixed), factors of velocities and angular velocities.
+EndEffector = namedtuple("EndEffector", "axes arm place linear angular")
 
 
 @kernel(inner=True)
@@ -91,8 +94,12 @@ def input_row(table, at, records, tracked, b, r):
 
 
 @kernel(inner=True)
-def task_rows(task):
-    return 6 if task == POSE else 3
+def task_rows(axes):
+    """How many velocities count."""
+    count = 0
+    for i in range(VELOCITIES):
+        count += (axes >> i) & 1
+    return count
 
 
 @kernel(inner=True)
@@ -100,45 +107,64 @@ def end_effector(store, term, q):
     """The end effector of a term at poses."""
     weights = dexterity_weights_at(store.pool, term.parameters)
     arm = matvec(rotation(q, term.body), three_at(store.pool, term.parameters + ARM))
-    task = dexterity_at(store.table, term.tape).task
-    return EndEffector(task, arm, first_unknown(store.table, term.body), weights.linear, weights.angular)
+    axes = dexterity_at(store.table, term.tape).axes
+    return EndEffector(axes, arm, first_unknown(store.table, term.body), weights.linear, weights.angular)
 
 
 @kernel(inner=True)
 def end_effector_velocity(effector, v, out, column):
     """Column of out: the end effector's velocity for rates v."""
-    s = effector.place
-    for i in range(task_rows(effector.task)):
-        out[i, column] = 0.0
-    if s < 0:
-        return
-    w = (v[s + 3], v[s + 4], v[s + 5])
+    s, r = effector.place, 0
+    w = (0.0, 0.0, 0.0)
+    if s >= 0:
+        w = (v[s + 3], v[s + 4], v[s + 5])
     swept = cross(w, effector.arm)
-    if effector.task != ROTATION:
-        for i in range(3):
-            out[i, column] = effector.linear * (v[s + i] + swept[i])
-    if effector.task != POSITION:
-        first = 0 if effector.task == ROTATION else 3
-        for i in range(3):
-            out[first + i, column] = effector.angular * w[i]
+    for i in range(VELOCITIES):
+        if (effector.axes >> i) & 1 == 0:
+            continue
+        out[r, column] = 0.0
+        if s >= 0 and i < 3:
+            out[r, column] = effector.linear * (v[s + i] + swept[i])
+        elif s >= 0:
+            out[r, column] = effector.angular * w[i - 3]
+        r += 1
+
+
+@kernel(inner=True)
+def force_along(effector, w, column, i):
+    """Component i of T^T w, of the force or the moment on the end effector; w has a row a velocity that counts."""
+    if (effector.axes >> i) & 1 == 0:
+        return 0.0
+    return (effector.linear if i < 3 else effector.angular) * w[task_rows(effector.axes & ((1 << i) - 1)), column]
+
+
+@kernel(inner=True)
+def force_and_moment(effector, w, column):
+    """Those of T^T w, on the end effector itself, with w a column over the velocities that count."""
+    force = (
+        force_along(effector, w, column, 0),
+        force_along(effector, w, column, 1),
+        force_along(effector, w, column, 2),
+    )
+    moment = (
+        force_along(effector, w, column, 3),
+        force_along(effector, w, column, 4),
+        force_along(effector, w, column, 5),
+    )
+    return force, moment
 
 
 @kernel(inner=True)
 def add_end_effector_force(effector, w, column, out):
-    """out += T^T w, with w a column over the task."""
+    """out += T^T w, with w a column over the velocities that count."""
     s = effector.place
     if s < 0:
         return
-    if effector.task != ROTATION:
-        f = (effector.linear * w[0, column], effector.linear * w[1, column], effector.linear * w[2, column])
-        turn = cross(effector.arm, f)
-        for i in range(3):
-            out[s + i] += f[i]
-            out[s + 3 + i] += turn[i]
-    if effector.task != POSITION:
-        first = 0 if effector.task == ROTATION else 3
-        for i in range(3):
-            out[s + 3 + i] += effector.angular * w[first + i, column]
+    f, moment = force_and_moment(effector, w, column)
+    turn = cross(effector.arm, f)
+    for i in range(3):
+        out[s + i] += f[i]
+        out[s + 3 + i] += turn[i] + moment[i]
 
 
 @kernel(inner=True)
@@ -147,13 +173,7 @@ def add_end_effector_bend(effector, w, column, v, gradient):
     s, p = effector.place, effector.arm
     if s < 0:
         return
-    f = (0.0, 0.0, 0.0)
-    moment = (0.0, 0.0, 0.0)
-    if effector.task != ROTATION:
-        f = scale(effector.linear, (w[0, column], w[1, column], w[2, column]))
-    if effector.task != POSITION:
-        first = 0 if effector.task == ROTATION else 3
-        moment = scale(effector.angular, (w[first, column], w[first + 1, column], w[first + 2, column]))
+    f, moment = force_and_moment(effector, w, column)
     spin = (v[s + 3], v[s + 4], v[s + 5])
     bent = cross(p, cross(f, spin))
     turn = cross(add(moment, cross(p, f)), spin)
@@ -162,17 +182,16 @@ def add_end_effector_bend(effector, w, column, v, gradient):
 
 
 @kernel(inner=True, allocates=True)
-def used_rows(table, rows):
-    """The rows that hold the mechanism together: neither drives nor one-sided; with those of free pairs."""
-    header = header_at(table, 0)
-    used = np.empty(rows, np.int64)
-    count = 0
-    for r in range(rows):
-        row = row_at(table, header.row_table + ROW * r)
-        if r >= header.rows or (row.one_sided == 0 and row.drive == 0):
-            used[count] = r
-            count += 1
-    return used[:count]
+def used_rows(table, record, rows):
+    """The rows that hold the mechanism together: those of a term's list, and those of free pairs."""
+    header, term = header_at(table, 0), dexterity_at(table, record)
+    lifted = max(rows - header.rows, 0)
+    used = np.empty(term.held_rows + lifted, np.int64)
+    for i in range(term.held_rows):
+        used[i] = table[term.held + i]
+    for i in range(lifted):
+        used[term.held_rows + i] = header.rows + i
+    return used
 
 
 @kernel(inner=True, allocates=True)
@@ -206,8 +225,8 @@ def end_effector_map(store, term, bases, rows, n, point, order):
     record = term_record.tape
     factors = term_record.parameters + FACTORS
     effector = end_effector(store, term_record, point.q)
-    k, m = dexterity_at(store.table, record).inputs, task_rows(effector.task)
-    used = used_rows(store.table, rows)
+    k, m = dexterity_at(store.table, record).inputs, task_rows(effector.axes)
+    used = used_rows(store.table, record, rows)
     b = np.zeros((k, n))
     for i in range(k):
         input_row(store.table, record + INPUT_LIST + INPUT * i, point.records, point.tracked, b, i)

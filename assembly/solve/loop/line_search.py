@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 
+from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.constraints.program.contact import MAY_GO, hold_all, is_clearance_row, may_go
 from assembly.constraints.program.evaluate import evaluate
@@ -81,6 +82,11 @@ def goal(program, count, point, order, gradient, hessian):
     """The objective where `count` rows are evaluated; from order 1 on its gradient and the Hessian's upper half."""
     shape = program.structure
     value = objective(program.store, point.q, order, program.tapes, shape.sparsity, gradient, hessian)
+    address = header_at(program.store.table, 0).place_terms_address
+    if address != 0:
+        lifted = program.lifted
+        call_address(address, (program.store, lifted, shape.bases, point, order, gradient, hessian))
+        value += lifted.variables[0, 0]
     return value + dexterities_at(program.end_effectors, program, count, point, order, gradient, hessian)
 
 

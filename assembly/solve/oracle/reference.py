@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import qr
 
+from assembly.constraints.model.constraint import Coordinate
 from assembly.constraints.packing.scene import Packed
 from assembly.errors import InputError
 from assembly.geometry.splines.surface import NurbsSurface
@@ -32,7 +33,8 @@ from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.features.solid_contact import FEATURE_F, TRACK
 from assembly.solve.diagnosis.residual_check import Claim, audit, is_extremal, twist_gradients
 from assembly.solve.loop.settings import COUNT, CULPRIT, DUAL, IMPROPER, OBJECTIVE, VIOLATION
-from assembly.solve.measure import Near
+from assembly.solve.measure import Near, measure, standing
+from assembly.solve.oracle.dexterity import Mechanism
 from assembly.solve.oracle.rows import Poses, Rows
 from assembly.solve.oracle.surfaces import Pair, Patch
 from assembly.solve.oracle.terms import Terms
@@ -117,7 +119,10 @@ class ReferenceSolver:
         symbols = [ca.MX.sym("pose", 7) for _ in scene.bodies]
         poses = Poses(symbols, packed)
         self._rows = Rows(packed, scene.bodies, scene.constraints, poses)
-        self._terms = Terms(packed, scene.bodies, scene.objectives, poses)
+        mechanism = Mechanism(packed, scene.bodies, scene.constraints, poses)
+        self._terms = Terms(packed, scene.bodies, scene.objectives, poses, mechanism)
+        # Of B-splines, and of what is solved for within, there are no scalar instructions.
+        self._expands = not self._pairs and not packed.end_effectors
         self._build(poses)
 
     def _build(self, poses: Poses) -> None:
@@ -143,7 +148,7 @@ class ReferenceSolver:
         options: dict[str, Any] = {
             "print_time": False,
             "show_eval_warnings": False,
-            "expand": not self._pairs,  # of B-splines there are no scalar instructions
+            "expand": self._expands,
             "ipopt": _IPOPT | self.options,
         }
         program: dict[str, Any] = {"x": x, "p": p, "f": terms.value + 0.5 * ca.sumsqr(spare), "g": g}
@@ -297,7 +302,7 @@ class ReferenceSolver:
         state[: packed.contacts_at] = q.ravel()
         tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
         tracked[:, :4], tracked[:, FEATURE_F:] = found.parameters, 0.0
-        state[packed.angles] = [angles[angle] for angle in packed._angles]
+        state[packed.angles] = [angles[a] if a in angles else self._turned(a, q, near) for a in packed._angles]
         state[packed.multipliers_at : packed.residuals_at] = forces[self._places]
         state[packed.residuals_at : packed.results_at] = np.where(packed.lengths, packed.scale, 1.0) * found.residuals
         results = state[packed.results_at :]
@@ -309,6 +314,12 @@ class ReferenceSolver:
         results[IMPROPER] = found.crossing and status is not Status.CONTACT_LOST
         history = figures.get("history", np.empty((0, len(Iteration.COLUMNS))))
         return Solution(scene, packed, state, status, figures.get("seconds", 0.0), history)
+
+    def _turned(self, angle: Coordinate, q: Array, near: Near) -> float:
+        """An angle that no row has, only an input of a dexterity."""
+        pair = angle.frames
+        places = (self._packed.body_places[pair.frame_a.body], self._packed.body_places[pair.frame_b.body])
+        return measure(angle, standing(angle, q, places), near.get(angle, 0.0))
 
 
 def _history(stats: Mapping[str, Any]) -> Array:

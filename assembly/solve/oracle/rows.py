@@ -47,7 +47,7 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import retract
 from assembly.solve.measure import JointRow, Near, measure, standing
 
-__all__ = ["Poses", "Rows"]
+__all__ = ["Poses", "RowFrames", "Rows"]
 
 Array = NDArray[np.float64]
 # A start this near to where a row has no gradient is moved by so much: radians, and lengths over the scene's size.
@@ -87,7 +87,7 @@ def _rotation() -> ca.Function:
     return ca.Function("rotation", [e], [matrix / ca.dot(e, e)])
 
 
-class _Frames(NamedTuple):
+class RowFrames(NamedTuple):
     """p_b - p_a, scaled, and the axes of both frames as columns."""
 
     apart: ca.MX
@@ -95,7 +95,8 @@ class _Frames(NamedTuple):
     b: ca.MX
 
     @classmethod
-    def of(cls, coordinate: Coordinate, places: tuple[int, int], poses: Poses) -> _Frames:
+    def of(cls, coordinate: Coordinate, places: tuple[int, int], poses: Poses) -> RowFrames:
+        """The frames of a coordinate, whose bodies are at these places."""
         pair, (i, j) = coordinate.frames, places
         apart = poses.point(j, pair.frame_b.origin) - poses.point(i, pair.frame_a.origin)
         return cls(apart, poses.turns[i] @ pair.frame_a.axes, poses.turns[j] @ pair.frame_b.axes)
@@ -109,6 +110,15 @@ class _Frames(NamedTuple):
     def across(self) -> ca.MX:
         """p_b - p_a along x_a and y_a."""
         return self.a[:, :2].T @ self.apart
+
+    def parts_of_turn(self, coordinate: Coordinate) -> tuple[ca.MX, ca.MX]:
+        """The sine part and the cosine part of an angle in a plane."""
+        a, b = self.a, self.b
+        if coordinate.kind == TURN:
+            sine = ca.dot(a[:, 1], b[:, 0]) - ca.dot(a[:, 0], b[:, 1])
+            return sine, ca.dot(a[:, 0], b[:, 0]) + ca.dot(a[:, 1], b[:, 1])
+        along = b[:, coordinate.component]
+        return ca.dot(a[:, 1], along), ca.dot(a[:, 0], along)
 
     def linear(self, coordinate: Coordinate) -> ca.MX:
         """A coordinate that is a row as it is."""
@@ -130,18 +140,12 @@ class _Angle:
         self.x = ca.MX.sym("angle")
         self.lower, self.upper = (0.0, pi) if coordinate.kind == ANGLE else (-inf, inf)
 
-    def definition(self, frames: _Frames) -> ca.MX:
+    def definition(self, frames: RowFrames) -> ca.MX:
         """A row, zero where the variable is what the frames say."""
-        a, b = frames.a, frames.b
         c, s = ca.cos(self.x), ca.sin(self.x)
         if self.coordinate.kind == ANGLE:
             return frames.cosine - c
-        if self.coordinate.kind == TURN:
-            sine = ca.dot(a[:, 1], b[:, 0]) - ca.dot(a[:, 0], b[:, 1])
-            cosine = ca.dot(a[:, 0], b[:, 0]) + ca.dot(a[:, 1], b[:, 1])
-        else:
-            along = b[:, self.coordinate.component]
-            sine, cosine = ca.dot(a[:, 1], along), ca.dot(a[:, 0], along)
+        sine, cosine = frames.parts_of_turn(self.coordinate)
         return ca.atan2(sine * c - cosine * s, cosine * c + sine * s)
 
     def start(self, q: Array, near: Near) -> float:
@@ -188,7 +192,7 @@ class Rows:
                 )
         self._joints = [row for _, row in sorted(joints, key=lambda item: item[0])]
         self.p = ca.MX.sym("value", len(self._joints))
-        known: dict[int, _Frames] = {}
+        known: dict[int, RowFrames] = {}
         rows = [self._row(row, self.p[k], known, poses) for k, row in enumerate(self._joints)]
         rows += [poses.value(item, at) / item.scale for item, at in self._expressions]
         self.rows = ca.vertcat(ca.MX(0, 1), *rows)
@@ -199,12 +203,12 @@ class Rows:
         self.lower = np.array([angle.lower for angle in angles])
         self.upper = np.array([angle.upper for angle in angles])
 
-    def _row(self, row: JointRow, value: ca.MX, known: dict[int, _Frames], poses: Poses) -> ca.MX:
+    def _row(self, row: JointRow, value: ca.MX, known: dict[int, RowFrames], poses: Poses) -> ca.MX:
         """The left-hand side less the right-hand side, over the unit; frames of a pair are written once."""
         total = -value
         for (factor, coordinate), places in zip(row.equation.terms, row.places, strict=True):
             if id(coordinate.frames) not in known:
-                known[id(coordinate.frames)] = _Frames.of(coordinate, places, poses)
+                known[id(coordinate.frames)] = RowFrames.of(coordinate, places, poses)
             frames, kind = known[id(coordinate.frames)], coordinate.kind
             if kind == SWING:
                 # No joint drives a swing: the value is zero.

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.model.dexterity import Dexterity
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance, Posture, Weight
 from assembly.constraints.packing.scene import Packed
@@ -17,6 +18,7 @@ from assembly.constraints.packing.terms import natural_unit
 from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
+from assembly.solve.oracle.dexterity import Mechanism
 from assembly.solve.oracle.rows import Poses
 
 __all__ = ["Terms"]
@@ -34,17 +36,24 @@ class Terms:
     """
 
     def __init__(
-        self, packed: Packed, bodies: Sequence[Body], objectives: Sequence[tuple[float, Objective]], poses: Poses
+        self,
+        packed: Packed,
+        bodies: Sequence[Body],
+        objectives: Sequence[tuple[float, Objective]],
+        poses: Poses,
+        mechanism: Mechanism,
     ) -> None:
         self._packed = packed
         self._bodies = bodies
         self._poses = poses
+        self._mechanism = mechanism
         self._places = {id(body): k for k, body in enumerate(bodies)}
         self._given: list[Callable[[Array], Array]] = []
         self._symbols: list[ca.MX] = []
         self.value = ca.MX(0)
         for sign, term in objectives or ((1.0, Posture()),):
-            natural = natural_unit(term, packed.scale)
+            # A dexterity is in the user's units.
+            natural = 1.0 if isinstance(term, Dexterity) else natural_unit(term, packed.scale)
             self.value += sign * term.weight * natural / packed.unit * self._term(term)
         self.p = ca.vertcat(ca.MX(0, 1), *self._symbols)
 
@@ -70,6 +79,8 @@ class Terms:
             return self._frame_distance(term)
         if isinstance(term, Expression):
             return self._poses.value(term, [self._places[id(body)] for body in term.bodies])
+        if isinstance(term, Dexterity):
+            return self._mechanism.value(term)
         if isinstance(term, Posture):
             moving = [k for k, body in enumerate(self._bodies) if not body.fixed]
             return ca.sum1(ca.vertcat(*(self._posture(term, k) for k in moving)))
@@ -84,7 +95,7 @@ class Terms:
             return -ca.sum1(ca.vertcat(*parts))
         raise InputError(
             f"objective is {term!r}; expected what the reference solver takes: PointDistance, FrameDistance, Posture, "
-            "Weight or Expression"
+            "Weight, Dexterity or Expression"
         )
 
     def _target(self, target: Callable[[], Array]) -> ca.MX:
