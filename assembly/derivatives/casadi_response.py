@@ -6,6 +6,7 @@ then, as Ipopt does, or ends.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -29,7 +30,7 @@ def response_function(response: Response, name: str, measures: int, parameters: 
     return _Values(response, name, measures, parameters)
 
 
-class _Values(ca.Callback):  # type: ignore[misc]
+class _Values(ca.Callback):
     """Measures (m, 1) of values (p, 1)."""
 
     def __init__(self, response: Response, name: str, measures: int, parameters: int) -> None:
@@ -57,21 +58,23 @@ class _Values(ca.Callback):  # type: ignore[misc]
     def get_sparsity_out(self, i: int) -> ca.Sparsity:
         return ca.Sparsity.dense(self._shape[0], 1)
 
-    def eval(self, given: list[Any]) -> list[Any]:
+    def eval(self, given: Sequence[Any]) -> Sequence[Any]:
         """Measures."""
         return [ca.DM(np.atleast_1d(self._response(_numbers(given[0]))))]
 
     def has_jacobian(self) -> bool:
         return True
 
-    def get_jacobian(self, name: str, inames: list[str], onames: list[str], opts: dict[str, Any]) -> ca.Function:
+    def get_jacobian(
+        self, name: str, inames: Sequence[str], onames: Sequence[str], opts: Mapping[str, Any]
+    ) -> ca.Function:
         """The function that gives the Jacobian."""
         if name not in self._slopes:
             self._slopes[name] = _Slopes(self._response, name, self._shape, (inames, onames), opts)
         return self._slopes[name]
 
 
-class _Slopes(ca.Callback):  # type: ignore[misc]
+class _Slopes(ca.Callback):
     """Derivatives (m, p) at values (p, 1); CasADi gives the measures (m, 1) as well, which are not needed."""
 
     def __init__(
@@ -79,8 +82,8 @@ class _Slopes(ca.Callback):  # type: ignore[misc]
         response: Response,
         name: str,
         shape: tuple[int, int],
-        names: tuple[list[str], list[str]],
-        options: dict[str, Any],
+        names: tuple[Sequence[str], Sequence[str]],
+        options: Mapping[str, Any],
     ) -> None:
         ca.Callback.__init__(self)
         self._response, self._shape, self._names = response, shape, names
@@ -104,7 +107,7 @@ class _Slopes(ca.Callback):  # type: ignore[misc]
     def get_sparsity_out(self, i: int) -> ca.Sparsity:
         return ca.Sparsity.dense(*self._shape)
 
-    def eval(self, given: list[Any]) -> list[Any]:
+    def eval(self, given: Sequence[Any]) -> Sequence[Any]:
         """Derivatives."""
         rates = self._response.jacobian(_numbers(given[0]))
         return [ca.DM(rates.reshape(self._shape))]
