@@ -99,28 +99,31 @@ def play(scene: Assembly, solution: Solution, of: Measure) -> Play:
             found.append(descents.end(q, sign))
             if found[-1].status is Status.UNBOUNDED:
                 break
-        ends.append(_farthest(found, sign))
+        ends.append(_farthest(scene, found, sign))
         if isfinite(ends[-1].value):
             starts.append(ends[-1].solution.q)
     return Play(of, descents.nominal, *ends)
 
 
-def _farthest(ends: Sequence[End], sign: float) -> End:
+def _farthest(scene: Assembly, ends: Sequence[End], sign: float) -> End:
     """The farthest of the ends at which it is known that bodies are clear; the first one where that is none."""
     left = list(ends)
     while left:
         best = left[0]
         for end in left[1:]:
             best = _better(best, end, sign)
-        if not best.solution.success or _is_clear(best):
+        if not best.solution.success or _is_clear(scene, best):
             return best
         left.remove(best)
     return replace(ends[0], value=nan)
 
 
-def _is_clear(end: End) -> bool:
+def _is_clear(scene: Assembly, end: End) -> bool:
     """Whether the bodies at an end are known to be clear; where they are not, its solution is STALLED."""
-    if end.scene.packed().keeps_apart:
+    packed = end.scene.packed()
+    if packed.keeps_apart:
+        # Bodies and clearances are those of the scene: so is what is kept of them for proofs.
+        packed.proofs = scene.packed().proofs
         judge_end(end.solution, end.scene._settings({}, CTRL_C, warm=True), CTRL_C)
         CTRL_C.is_over()  # What a signal's handler raised is raised here.
     return end.solution.success
