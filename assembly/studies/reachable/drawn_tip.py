@@ -81,6 +81,10 @@ class DrawnTip:
         is_there = solution.success and solution.objective <= self._close**2
         return Stop(solution, solution.q[: self._count], solution.success, is_there)
 
+    def aim_at(self, target: Array) -> None:
+        """Have the objective draw the tip to a place, without a solve."""
+        self._aim.target = target
+
     def place(self, stop: Stop) -> Array:
         """The place (3,) of the tip in the world."""
         return stop.solution.pose(self._tip.body).apply(self._tip.coordinates)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from assembly.errors import InputError
 from assembly.kinematics.pose import multiply
+from assembly.solve.solution import Solution
 from assembly.studies.reachable.drawn_tip import DrawnTip, Stop
 from assembly.studies.reachable.grid import Cell, Grid
 
@@ -58,7 +59,7 @@ class Flood:
     most : int
         Cells that may be reached.
     reached : dict of cell -> list of (poses (n, 7), marks (n, 19))
-    limits : dict of cell -> list of (place, outward normal, poses (n, 7))
+    limits : dict of cell -> list of (place, outward normal, solution)
         Of cells beside reached ones whose middles are not reached: where the tip stopped on the way there.
     undecided : set of cell
         Cells at which a solve has not ended; none of them is reached.
@@ -72,7 +73,7 @@ class Flood:
     flips: int
     most: int
     reached: dict[Cell, list[tuple[Array, Array]]] = field(default_factory=dict)
-    limits: dict[Cell, list[tuple[Array, Array, Array]]] = field(default_factory=dict)
+    limits: dict[Cell, list[tuple[Array, Array, Solution]]] = field(default_factory=dict)
     undecided: set[Cell] = field(default_factory=set)
     solves: int = 0
     _done: set[tuple[int, Cell]] = field(default_factory=set)
@@ -117,7 +118,7 @@ class Flood:
             place = self.tip.place(stop)
             length = float(np.linalg.norm(target - place))
             if length <= _FAR * self.grid.size:
-                self.limits.setdefault(cell, []).append((place, (target - place) / length, stop.poses))
+                self.limits.setdefault(cell, []).append((place, (target - place) / length, stop.solution))
             if start.flips < self.flips and start.cell in self.reached:
                 back = self._drawn(self.grid.center(start.cell), self._mirrored(start.stop, stop))
                 if back.is_there:

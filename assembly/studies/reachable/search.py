@@ -112,7 +112,7 @@ def _found(scene: Assembly, flood: Flood, region: _Region) -> Workspace:
         grid=grid,
         scene=scene,
         _targets=targets,
-        _stops=np.array([limit[3] for limit in limits]).reshape(len(limits), len(scene.bodies), 7),
+        _stops=tuple(limit[3] for limit in limits),
         _drawn=flood.tip,
     )
 
