@@ -19,7 +19,15 @@ from assembly.constraints.packing.earlier import stretch
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.objective_terms import POSTURE, TERM
-from assembly.derivatives.numbers import ControlPoint, ControlWeight, FrameNumber, LeastGap, RowNumber, ShapeNumber, TargetNumber
+from assembly.derivatives.numbers import (
+    ControlPoint,
+    ControlWeight,
+    FrameNumber,
+    LeastGap,
+    RowNumber,
+    ShapeNumber,
+    TargetNumber,
+)
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.probed import Evaluated, ProbedScene
 from assembly.derivatives.size import by_size, size_rate

@@ -71,7 +71,7 @@ class Evaluations:
 
     def at(self, values: Array) -> Evaluated:
         """The same, where failures raise."""
-        found, rates = [], []
+        found, rates = [np.empty(0)], [np.empty((0, len(self._parameters)))]
         # Once for all stations: faces that dimensions make are made, and packed, once.
         with values_set(self._parameters, values):
             for station, response in zip(self.stations, self._each, strict=True):

@@ -99,6 +99,67 @@ def test_steps_to_where_there_is_no_solution_are_shortened_and_told():
     assert bounded.values[0] == pytest.approx(2.05, abs=1e-6)
 
 
+def arm(long, short):
+    """Two links and a tip that is a body; its lengths as parameters."""
+    ground, upper, fore, tip = asm.Body("ground", fixed=True), *(asm.Body(name) for name in ("upper", "fore", "tip"))
+    turn = (np.cos(0.4), 0, 0, np.sin(0.4))
+    fore.pose = asm.Pose((long, 0, 0), turn)
+    tip.pose = asm.Pose((long + short * np.cos(0.8), short * np.sin(0.8), 0), turn)
+    scene = asm.Assembly([ground, upper, fore, tip])
+    shoulder = asm.Revolute(ground, upper, "shoulder")
+    elbow = asm.Revolute(upper.frame(at=(long, 0, 0)), fore, "elbow")
+    wrist = asm.Fixed(fore.frame(at=(short, 0, 0)), tip, "wrist")
+    scene.constrain(shoulder, elbow, wrist)
+    lengths = [asm.Parameter(joint.frame_a, "origin", "x", name=joint.name) for joint in (elbow, wrist)]
+    return scene, (shoulder, elbow), lengths
+
+
+def total(values):
+    return values.sum(), (1.0, 1.0)
+
+
+def test_the_worst_dexterity_over_targets_is_largest_for_links_of_one_length():
+    """The manipulability l1 l2 |sin bend| at a target is twice the area of the triangle of both links and it: of all
+    with one sum of links the isosceles one has the largest, r (l^2 - r^2 / 4)^(1/2).
+    """
+    scene, joints, lengths = arm(1.1, 0.7)
+    ground, tip = scene.bodies[0], scene.bodies[3]
+    held = asm.Planar(ground, tip, "target", x=1.2, y=0.4)
+    scene.constrain(held)
+    scene.maximize(asm.Dexterity(tip.point(0, 0, 0), joints, "manipulability"))
+    x, y = (asm.Parameter(held, name) for name in "xy")
+    targets = [(1.2, 0.4), (0.9, 0.9), (0.3, 1.5), (0.4, 0.7)]
+    found = asm.synthesize(
+        scene,
+        asm.Measure("objective"),
+        {lengths[0]: (0.6, 1.4), lengths[1]: (0.5, 1.3)},
+        stations=[asm.Station({x: a, y: b}) for a, b in targets],
+        subject_to=[(total, 1.8, 1.8)],
+    )
+    assert found.success, found
+    np.testing.assert_allclose(found.values, 0.9, rtol=0, atol=1e-6)
+    radii = np.hypot(*np.transpose(targets))
+    worst = (radii * np.sqrt(0.81 - radii**2 / 4.0)).min()
+    assert found.cost == pytest.approx(-worst, abs=1e-7)
+
+
+def test_the_area_that_an_arm_reaches_is_largest_for_links_of_one_length():
+    """4 pi l1 l2 for one sum of both lengths. The area's derivatives are good to 3e-3 at this cell."""
+    scene, _, lengths = arm(1.0, 0.7)
+
+    def area(values):
+        reach = asm.workspace(scene, scene.bodies[3], cell=0.1, plane="xy")
+        return -reach.estimate, -reach.gradient(lengths)
+
+    found = asm.synthesize(
+        scene, area, {lengths[0]: (0.5, 1.2), lengths[1]: (0.5, 1.2)}, subject_to=[(total, None, 1.7)], level=0.01
+    )
+    assert found.success, found
+    np.testing.assert_allclose(found.values, 0.85, rtol=0, atol=5e-3)
+    assert found.cost == pytest.approx(-4.0 * np.pi * 0.85**2, rel=3e-3)
+    assert lengths[0].value == 1.0
+
+
 def test_same_input_same_output():
     results = []
     for _ in range(2):
