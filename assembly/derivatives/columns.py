@@ -19,6 +19,7 @@ from assembly.constraints.packing.earlier import stretch
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.objective_terms import POSTURE, TERM
+from assembly.derivatives.nets import gap_rates
 from assembly.derivatives.numbers import (
     ControlPoint,
     ControlWeight,
@@ -166,6 +167,8 @@ def columns_of(problem: Problem, parameters: Sequence[Parameter]) -> Columns:
             enters = _of_least_gap(problem, number, rows[:, r])
         elif isinstance(number, TargetNumber):
             values[r], enters = _of_target(problem, number, slopes[:, r])
+        elif isinstance(number, ControlPoint) and (exact := gap_rates(problem, number)) is not None:
+            rows[:, r], enters = exact, bool(exact.any()) or _is_of_a_face(problem, parameter)
         else:
             rows[:, r], slopes[:, r], values[r] = _by_differences(problem, parameter)
             enters = bool(rows[:, r].any() or slopes[:, r].any() or values[r]) or _is_of_a_face(problem, parameter)

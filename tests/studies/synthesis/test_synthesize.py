@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
+from scipy.optimize import minimize_scalar
 
 import assembly as asm
 from assembly.errors import InputError
@@ -158,6 +160,44 @@ def test_the_area_that_an_arm_reaches_is_largest_for_links_of_one_length():
     np.testing.assert_allclose(found.values, 0.85, rtol=0, atol=5e-3)
     assert found.cost == pytest.approx(-4.0 * np.pi * 0.85**2, rel=3e-3)
     assert lengths[0].value == 1.0
+
+
+def test_a_cam_has_the_profile_that_a_lift_is_wanted_of():
+    """A cubic profile y(x) that slides under a roller of radius r: at x the roller's axis is at the largest of
+    y(t) + (r^2 - (t - x)^2)^(1/2). The control points that made the lifts come back.
+    """
+    count, long, radius = 9, 8.0, 0.5
+    knots = np.concatenate([[0.0] * 3, np.linspace(0.0, long, count - 2), [long] * 3])
+    along = np.array([knots[k + 1 : k + 4].mean() for k in range(count)])
+    heights = np.array([0.0, 0.0, 0.05, 0.3, 0.5, 0.35, 0.1, 0.0, 0.0])
+    profile = BSpline(knots, heights, 3)
+
+    def lift(x):
+        def below(t):
+            return -profile(t) - np.sqrt(radius**2 - (t - x) ** 2)
+
+        return -minimize_scalar(below, (x - 0.1, x + 0.1), options={"xtol": 1e-12}).fun
+
+    net = np.array([[[x, 0.0, z] for z in (1.0, -1.0)] for x in along])
+    surface = asm.NurbsSurface(net, (knots, [0.0, 0.0, 1.0, 1.0]), (3, 1))
+    ground, cam = asm.Body("ground", fixed=True), asm.Body("cam", surface)
+    roller = asm.Body("roller", asm.shapes.sphere(radius), position=(4.0, 0.6, 0.0))
+    slide = asm.Prismatic(ground.frame(z=(1, 0, 0)), cam.frame(z=(1, 0, 0)), "slide", slide=0.0)
+    guide = asm.Prismatic(ground.frame(at=(4, 0, 0), z=(0, 1, 0)), roller.frame(z=(0, 1, 0)), "guide")
+    scene = asm.Assembly([ground, cam, roller])
+    scene.constrain(slide, guide, asm.Contact(cam, roller, "touch"))
+    driven, height = asm.Parameter(slide, "slide"), asm.Measure(guide)
+    places = np.linspace(-2.8, 2.8, 12)
+    stations = [asm.Station({driven: -x}, {height: lift(4.0 + x)}) for x in places]
+    points = [
+        asm.Parameter(cam.face(), "control_points", (i, j, "y")) for i in range(1, count - 1) for j in (0, 1)
+    ]  # fmt: skip
+    found = asm.synthesize(scene, stations, {point: (-1.0, 1.0) for point in points}, apply=True)
+    assert found.success, found
+    # A minimum is known to the root of rounding, which leaves 1e-15 of its value.
+    np.testing.assert_allclose(found.residuals, 0.0, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(found.values.reshape(-1, 2), heights[1:-1, None] * [1.0, 1.0], rtol=0, atol=1e-8)
+    assert found.evaluations <= 15
 
 
 def test_same_input_same_output():
