@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
-from assembly.kinematics.pose import multiply
 from assembly.solve.solution import Solution
 from assembly.studies.reachable.drawn_tip import DrawnTip, Stop
 from assembly.studies.reachable.grid import Cell, Grid
@@ -131,8 +130,9 @@ class Flood:
     def _mirrored(self, start: Stop, stop: Stop) -> Array:
         """As far beyond a stop as the start is before it, poses (n, 7)."""
         result = 2.0 * stop.poses - start.poses
-        for row, before, at in zip(result, start.poses, stop.poses, strict=True):
-            row[3:] = multiply(multiply(at[3:], before[3:] * [1.0, -1.0, -1.0, -1.0]), at[3:])
+        # The turn from start to stop once more: of unit quaternions at before* at = 2 (at . before) at - before.
+        at, before = stop.poses[:, 3:], start.poses[:, 3:]
+        result[:, 3:] = 2.0 * (at * before).sum(axis=1)[:, None] * at - before
         return result
 
     def _add(self, cell: Cell, stop: Stop, flips: int) -> None:

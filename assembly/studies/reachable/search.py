@@ -160,7 +160,7 @@ class _Region:
 
     def __call__(self, cell: Cell) -> bool:
         """Whether the middle of a cell is in it."""
-        return bool(self.holds(self._grid.center(cell)))
+        return self._box is None or bool(self.holds(self._grid.center(cell)))
 
     def holds(self, places: Array) -> NDArray[np.bool_]:
         """Whether places (..., 3) are in it."""
