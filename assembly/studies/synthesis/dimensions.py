@@ -68,9 +68,8 @@ def synthesize(
     most : int
         Steps after which the optimizer ends.
     level : float
-        Slopes that count as none, a width of the bounds in parts of what is minimized. SLSQP ends where that is the
-        same to rounding, and dimensions are off by the root of it. A function whose derivatives are no better than a
-        hundredth asks for as much; SLSQP ends where this is the same to a hundredth of it.
+        Slopes that count as none, a width of the bounds in parts of what is minimized. A function whose derivatives are
+        no better than a hundredth asks for as much; SLSQP ends there where it is the same to the square of this.
 
     Returns
     -------
@@ -121,7 +120,7 @@ def _by_slsqp(goal: Goal, start: Array, most: int, level: float) -> Any:
         bounds=sides,
         method="SLSQP",
         constraints=[{"type": "ineq", "fun": goal.rooms, "jac": goal.room_rates}],
-        options={"ftol": 1e-15 if goal.relation is None else 0.01 * level, "maxiter": most},
+        options={"ftol": 1e-15 if goal.relation is None else level**2, "maxiter": most},
     )
 
 

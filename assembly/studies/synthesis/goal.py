@@ -74,7 +74,7 @@ class Goal:
         self.relation: Relation | None = minimize if callable(minimize) else None
         listed = _stations(minimize, stations)
         asked = [bound[0] for bound in map(_three, given) if isinstance(bound[0], Measure)]
-        if self.relation is not None and not asked:
+        if self.relation is not None and not asked and not any(station.wanted for station in listed):
             # Nothing is measured.
             listed = ()
         of = [list(station.wanted or {}) + ([measure] if measure else []) + asked for station in listed]

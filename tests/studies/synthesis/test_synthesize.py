@@ -162,6 +162,29 @@ def test_the_area_that_an_arm_reaches_is_largest_for_links_of_one_length():
     assert lengths[0].value == 1.0
 
 
+def test_functions_of_the_dimensions_that_fail_shorten_steps():
+    """The least of (r - 1.4)^2 + (l - 5)^4 / 8, of which there is none where r is less than 1.3."""
+    scene, slide, _, radius, length = slider_crank()
+
+    def function(values):
+        assert (radius.value, length.value) == tuple(values)  # the scene has them
+        if values[0] < 1.3:
+            raise asm.ResponseError("radius is too small")
+        off = values - [1.4, 5.0]
+        return off[0] ** 2 + off[1] ** 4 / 8.0, (2.0 * off[0], off[1] ** 3 / 2.0)
+
+    length.value = 6.0
+    found = asm.synthesize(scene, function, {radius: (0.5, 3.0), length: (4.0, 8.0)}, level=1e-4)
+    assert found.success, found
+    assert found.values[0] == pytest.approx(1.4, abs=1e-3) and found.cost < 1e-4
+    assert found.failures and found.failures[0] == "radius is too small"
+    assert radius.value == RADIUS
+    with pytest.raises(InputError, match="minimize is a function; expected one of the two"):
+        asm.synthesize(scene, function, {radius: (0.5, 3.0)}, stations=[asm.Station({}, {slide: 1.0})])
+    with pytest.raises(InputError, match="level is 0; expected a positive number"):
+        asm.synthesize(scene, function, {radius: (0.5, 3.0)}, level=0.0)
+
+
 def test_a_cam_has_the_profile_that_a_lift_is_wanted_of():
     """A cubic profile y(x) that slides under a roller of radius r: at x the roller's axis is at the largest of
     y(t) + (r^2 - (t - x)^2)^(1/2). The control points that made the lifts come back.
