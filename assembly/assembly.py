@@ -248,11 +248,13 @@ class Assembly(PackedContents):
         interruption: Interruption,
         reference: Array | None = None,
         turns: Array | None = None,
+        judges: bool = True,
     ) -> Solution:
         """A solve from q0, with as many places for contacts of clearances as it turns out to need.
 
         Postures are measured from q0, or from a reference (n, 7). `turns` are the values that angles are near where
-        these start on a turn of their own.
+        these start on a turn of their own. What is only on the way somewhere needs no proof: then nothing judges the
+        end but the loop.
         """
         spent = 0.0
         if isinstance(q0, Solution):
@@ -296,7 +298,7 @@ class Assembly(PackedContents):
                         continue
                 solution = Solution(self._scene, packed, state, status, spent, history, order, fit)
                 solution._touching = float(settings[ALLOWED_OVERLAP])
-                if packed.keeps_apart:
+                if packed.keeps_apart and judges:
                     from assembly.solve.clearance_proof import judge_end
 
                     judge_end(solution, settings, interruption)

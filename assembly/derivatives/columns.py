@@ -19,7 +19,16 @@ from assembly.constraints.packing.earlier import stretch
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.objective_terms import POSTURE, TERM
-from assembly.derivatives.numbers import FrameNumber, LeastGap, RowNumber, ShapeNumber, TargetNumber
+from assembly.derivatives.nets import gap_rates
+from assembly.derivatives.numbers import (
+    ControlPoint,
+    ControlWeight,
+    FrameNumber,
+    LeastGap,
+    RowNumber,
+    ShapeNumber,
+    TargetNumber,
+)
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.probed import Evaluated, ProbedScene
 from assembly.derivatives.size import by_size, size_rate
@@ -158,9 +167,11 @@ def columns_of(problem: Problem, parameters: Sequence[Parameter]) -> Columns:
             enters = _of_least_gap(problem, number, rows[:, r])
         elif isinstance(number, TargetNumber):
             values[r], enters = _of_target(problem, number, slopes[:, r])
+        elif isinstance(number, ControlPoint) and (exact := gap_rates(problem, number)) is not None:
+            rows[:, r], enters = exact, bool(exact.any()) or _is_of_a_face(problem, parameter)
         else:
             rows[:, r], slopes[:, r], values[r] = _by_differences(problem, parameter)
-            enters = bool(rows[:, r].any() or slopes[:, r].any() or values[r])
+            enters = bool(rows[:, r].any() or slopes[:, r].any() or values[r]) or _is_of_a_face(problem, parameter)
         if not enters:
             raise InputError(f"parameter {parameter.name!r} enters no row and no term; expected one of what is solved")
     _add_size(problem, parameters, slopes, values)
@@ -229,6 +240,14 @@ def _of_target(problem: Problem, number: TargetNumber, slopes: Array) -> tuple[f
             value += factor * float((place - packed.pool[at : at + 3])[number.axis])
             enters = True
     return value, enters
+
+
+def _is_of_a_face(problem: Problem, parameter: Parameter) -> bool:
+    """Whether a parameter is of the net of a face of the scene: where contacts are elsewhere, it does nothing."""
+    number = parameter._number
+    if not isinstance(number, (ControlPoint, ControlWeight)):
+        return False
+    return any(number.face.face is side.face for body in problem.bodies for side in body.faces)
 
 
 def _by_differences(problem: Problem, parameter: Parameter) -> tuple[Array, Array, float]:

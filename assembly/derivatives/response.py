@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.derivatives.implicit import sensitivity, several, the_scene
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
-from assembly.errors import AssemblyError, InputError, number
+from assembly.errors import AssemblyError, InputError, number, text
 from assembly.solve.solution import Solution
 
 if TYPE_CHECKING:
+    import casadi as ca
+
     from assembly.assembly import Assembly
 
 __all__ = ["Response", "ResponseError", "values_set"]
@@ -133,6 +135,21 @@ class Response:
         """Measures and derivatives of one solve."""
         found, rates = self._at(values, with_rates=True)
         return self._shaped(found), self._shaped(rates)
+
+    def casadi(self, name: str = "response") -> ca.Function:
+        """The same as a function of CasADi, of values (p, 1), that gives measures (m, 1), with the exact Jacobian.
+
+        It has no second derivatives: Ipopt takes those of its own (`hessian_approximation` "limited-memory"). Keep it
+        as long as what is made of it. What raises in a solve ends the call, and steps of Ipopt are shortened by it.
+
+        Raises
+        ------
+        InputError
+            A name that CasADi cannot have.
+        """
+        from assembly.derivatives.casadi_response import response_function
+
+        return response_function(self, text("name", name), len(self._of), len(self._wrt))
 
     def _shaped(self, rows: Array) -> Array:
         return rows[0] if self._is_one else rows

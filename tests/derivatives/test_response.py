@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.optimize import least_squares, minimize
@@ -99,6 +100,80 @@ def test_what_optimizers_make_of_it(crank):
     )  # fmt: skip
     # A unit of length lengthens the stroke more than one of radius all the way.
     np.testing.assert_allclose(best.x, [1.0, 6.0], rtol=0, atol=1e-8)
+
+
+def test_a_function_of_casadi_has_the_exact_jacobian(crank):
+    scene, travel, *parameters = crank
+    rod = asm.Measure(scene.bodies[2], "y")
+    function = asm.Response(scene, [travel, rod], parameters).casadi("crank")
+    values = [1.9, 5.2, 0.8]
+    np.testing.assert_allclose(
+        function(values).full().ravel(), [stroke(*values), 1.9 * np.sin(0.8)], rtol=0, atol=1e-11
+    )
+    x = ca.MX.sym("x", 3)
+    rates = ca.Function("rates", [x], [ca.jacobian(function(x), x)])
+    expected = [slopes(*values), [np.sin(0.8), 0.0, 1.9 * np.cos(0.8)]]
+    np.testing.assert_allclose(rates(values).full(), expected, rtol=0, atol=1e-10)
+    # Backward through it, of one measure alone.
+    one = asm.Response(scene, travel, parameters).casadi()
+    gradient = ca.Function("gradient", [x], [ca.gradient(ca.sin(one(x)), x)])
+    expected = np.cos(stroke(*values)) * slopes(*values)
+    np.testing.assert_allclose(gradient(values).full().ravel(), expected, rtol=0, atol=1e-10)
+    with pytest.raises(InputError, match="name is 'a b'; expected letters"):
+        asm.Response(scene, travel, parameters).casadi("a b")
+
+
+def test_ipopt_finds_lengths_by_a_function_of_casadi(crank):
+    """Both lengths from two strokes, with a constraint on one of them; a start whose steps leave what can be solved."""
+    scene, travel, radius, length, _ = crank
+    rod = asm.Measure(scene.bodies[2], "y")
+    function = asm.Response(scene, [travel, rod], [radius, length]).casadi()
+    x = ca.MX.sym("x", 2)
+    off = function(x) - ca.DM([stroke(1.7, 5.6, ANGLE), 1.7 * np.sin(ANGLE)])
+    problem = {"x": x, "f": ca.dot(off, off), "g": x[1] - 2.0 * x[0]}
+    options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-12}}
+    options["ipopt"]["hessian_approximation"] = "limited-memory"
+    solver = ca.nlpsol("solver", "ipopt", problem, options)
+    found = solver(x0=[R, L], lbx=[0.5, 1.0], ubx=[3.0, 9.0], lbg=0.5, ubg=10.0)
+    assert solver.stats()["success"]
+    np.testing.assert_allclose(found["x"].full().ravel(), [1.7, 5.6], rtol=0, atol=1e-6)
+
+
+def test_an_explicit_component_of_openmdao(crank):
+    """The longest stroke for a sum of lengths, as above, with the component's partial derivatives checked."""
+    om = pytest.importorskip("openmdao.api", reason="OpenMDAO is not installed; it is in the extra `test`")
+    scene, travel, radius, length, _ = crank
+    response = asm.Response(scene, travel, [radius, length])
+
+    class Mechanism(om.ExplicitComponent):
+        def setup(self):
+            self.add_input("values", val=response.values)
+            self.add_output("stroke")
+
+        def setup_partials(self):
+            self.declare_partials("stroke", "values")
+
+        def compute(self, inputs, outputs):
+            outputs["stroke"] = response(inputs["values"])
+
+        def compute_partials(self, inputs, partials):
+            partials["stroke", "values"] = response.jacobian(inputs["values"])
+
+    problem = om.Problem(reports=False)
+    problem.model.add_subsystem("mechanism", Mechanism(), promotes=["*"])
+    problem.model.add_subsystem("total", om.ExecComp("total = sum(values)", values=response.values), promotes=["*"])
+    problem.model.add_design_var("values", lower=[0.5, 4.0], upper=[3.0, 6.0])
+    problem.model.add_objective("stroke", scaler=-1.0)
+    problem.model.add_constraint("total", equals=7.0)
+    problem.driver = om.ScipyOptimizeDriver(optimizer="SLSQP", tol=1e-12, disp=False)
+    problem.setup()
+    problem.run_model()
+    told = problem.check_partials(out_stream=None)["mechanism"]["stroke", "values"]
+    # Differences of the first order, in steps of 1e-6.
+    np.testing.assert_allclose(told["J_fwd"], told["J_fd"], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(told["J_fwd"][0], slopes(R, L, ANGLE)[:2], rtol=0, atol=1e-10)
+    problem.run_driver()
+    np.testing.assert_allclose(problem.get_val("values"), [1.0, 6.0], rtol=0, atol=1e-8)
 
 
 def test_what_has_no_solution_raises_or_costs_a_penalty(crank):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from assembly._address import address_of
 from assembly.constraints.program.block_factor import factorize_blocks, solve_blocks
 from assembly.constraints.program.contact import contact_rows
@@ -32,45 +34,48 @@ __all__ = [
     "manager",
 ]
 
+# A kernel stays where it is, and finding out where takes as long as a tenth of what a small scene is packed in.
+_address = cache(address_of)
+
 
 def blocks() -> tuple[int, int]:
     """Of `factorize_blocks` and `solve_blocks`."""
-    return address_of(factorize_blocks), address_of(solve_blocks)
+    return _address(factorize_blocks), _address(solve_blocks)
 
 
 def contacts() -> int:
     """Of `contact_rows`."""
-    return address_of(contact_rows)
+    return _address(contact_rows)
 
 
 def surfaces() -> list[int]:
     """Of `start_surfaces`, `coordinate_lengths`, `free_row`, `free_terms` and `is_extremal`."""
-    return [address_of(entry) for entry in (start_surfaces, coordinate_lengths, free_row, free_terms, is_extremal)]
+    return [_address(entry) for entry in (start_surfaces, coordinate_lengths, free_row, free_terms, is_extremal)]
 
 
 def tapes() -> int:
     """Of `run_scene_tape`."""
-    return address_of(run_scene_tape)
+    return _address(run_scene_tape)
 
 
 def solids() -> tuple[int, int, int]:
     """Of `track_solids`, `search_solids` and `find_nearest`."""
-    return address_of(track_solids), address_of(search_solids), address_of(find_nearest)
+    return _address(track_solids), _address(search_solids), _address(find_nearest)
 
 
 def deepest() -> int:
     """Of `find_deepest`."""
-    return address_of(find_deepest)
+    return _address(find_deepest)
 
 
 def places() -> int:
     """Of `mark_places`."""
-    return address_of(mark_places)
+    return _address(mark_places)
 
 
 def trims() -> tuple[int, int]:
     """Of `trim_rows` and `trim_terms`."""
-    return address_of(trim_rows), address_of(trim_terms)
+    return _address(trim_rows), _address(trim_terms)
 
 
 def place_objectives() -> int:
@@ -80,9 +85,9 @@ def place_objectives() -> int:
 
 def sides() -> int:
     """Of `trim_sides`."""
-    return address_of(trim_sides)
+    return _address(trim_sides)
 
 
 def manager() -> tuple[int, int, int, int]:
     """Of `update`, `has_stayed`, `measure_parts` and `went_beyond`."""
-    return address_of(update), address_of(has_stayed), address_of(measure_parts), address_of(went_beyond)
+    return _address(update), _address(has_stayed), _address(measure_parts), _address(went_beyond)

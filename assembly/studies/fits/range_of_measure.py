@@ -11,9 +11,10 @@ while all bodies are drawn a little aside, to either side, and the other end. Th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from math import inf, isfinite, nan, pi
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,8 @@ from assembly.derivatives.measure import Measure
 from assembly.errors import InputError
 from assembly.kinematics.pose import retract
 from assembly.solve.attempts.starts import moving_rows
+from assembly.solve.clearance_proof import judge_end
+from assembly.solve.interruption import CTRL_C
 from assembly.solve.scene import Status
 from assembly.solve.solution import Solution
 from assembly.studies.fits.result import End, Play
@@ -38,10 +41,10 @@ __all__ = ["play"]
 Array = NDArray[np.float64]
 # Angles that are tracked, past whole turns: poses do not tell these.
 Turns = Mapping[Coordinate, float]
-# In sizes of the scene: the first step, the longest one, and the gain of a step at which it rests, a slope of 0.003.
+# In sizes of the scene: the first step, the longest one, and the gain of a step at which it rests, a slope of 0.03.
 # Twice as long, and thin walls may be stepped through; half as long, and it takes more of them. Where nothing is in the
 # way but limits, steps that nothing shortens grow.
-_FIRST, _LONGEST, _REST = 0.01, 0.32, 1e-7
+_FIRST, _LONGEST, _REST = 0.01, 0.32, 1e-5
 # Steps until the measure is solved for alone, whatever it does: by then it went 2 sizes, or 60 where steps grow.
 _STEPS = 200
 # A step that is not this part of the last one is shortened by something.
@@ -90,22 +93,60 @@ def play(scene: Assembly, solution: Solution, of: Measure) -> Play:
         raise InputError(f"solution ended {solution.status.name}; expected a successful one")
     if solution._scene.bodies != scene.bodies:
         raise InputError("solution is one of another scene, or of this one with other bodies; expected its own")
-    term, nominal = MeasureTerm(of, scene.packed().scale), of.value(solution)
-    turns = _turns_of(solution)
-    starts = [(solution.q, turns, nominal), *((*found, nominal) for found in _aside(scene, solution.q, turns))]
+    nominal = of.value(solution)
+    descents = _Descents(scene, of, MeasureTerm(of, scene.packed().scale))
+    begin = _Start(solution.q, _turns_of(solution), nominal)
+    starts = [begin, *descents.aside(begin)]
     ends: list[End] = []
     for sign in (1.0, -1.0):
-        best: End | None = None
-        for q, turns, value in starts:
-            end = _Descent(scene, of, term, sign).end(q, turns, value)
-            best = end if best is None else _better(best, end, sign)
-            if best.status is Status.UNBOUNDED:
+        found: list[End] = []
+        for start in starts:
+            found.append(descents.end(start, sign))
+            if found[-1].status is Status.UNBOUNDED:
                 break
-        assert best is not None
-        ends.append(best)
-        if isfinite(best.value):
-            starts.append((best.solution.q, _turns_of(best.solution), best.value))
+        ends.append(_farthest(scene, found, sign))
+        if isfinite(ends[-1].value):
+            last = ends[-1].solution
+            starts.append(_Start(last.q, _turns_of(last), ends[-1].value))
     return Play(of, nominal, *ends)
+
+
+class _Start(NamedTuple):
+    """Poses (n, 7), the angles there, and what is measured: an angle there is within half a turn of it."""
+
+    q: Array
+    turns: Turns
+    value: float
+
+
+def _turns_of(solution: Solution) -> Turns:
+    """The angles of a solution, past whole turns."""
+    packed = solution._packed
+    return dict(zip(packed._angles, solution._state[packed.angles].tolist(), strict=True))
+
+
+def _farthest(scene: Assembly, ends: Sequence[End], sign: float) -> End:
+    """The farthest of the ends at which it is known that bodies are clear; the first one where that is none."""
+    left = list(ends)
+    while left:
+        best = left[0]
+        for end in left[1:]:
+            best = _better(best, end, sign)
+        if not best.solution.success or _is_clear(scene, best):
+            return best
+        left.remove(best)
+    return replace(ends[0], value=nan)
+
+
+def _is_clear(scene: Assembly, end: End) -> bool:
+    """Whether the bodies at an end are known to be clear; where they are not, its solution is STALLED."""
+    packed = end.scene.packed()
+    if packed.keeps_apart:
+        # Bodies and clearances are those of the scene: so is what is kept of them for proofs.
+        packed.proofs = scene.packed().proofs
+        judge_end(end.solution, end.scene._settings({}, CTRL_C, warm=True), CTRL_C)
+        CTRL_C.is_over()  # What a signal's handler raised is raised here.
+    return end.solution.success
 
 
 def _better(best: End, end: End, sign: float) -> End:
@@ -118,91 +159,118 @@ def _better(best: End, end: End, sign: float) -> End:
     return end if gain > 1e-12 * max(abs(best.value), end.scene.packed().scale) else best
 
 
-def _turns_of(solution: Solution) -> Turns:
-    """The angles of a solution, past whole turns."""
-    packed = solution._packed
-    return dict(zip(packed._angles, solution._state[packed.angles].tolist(), strict=True))
+class _Descents:
+    """Ways from poses to where a measure is least or most; scenes that are solved for it are packed once."""
 
-
-def _aside(scene: Assembly, q: Array, turns: Turns) -> Iterator[tuple[Array, Turns]]:
-    """Poses that hold, with bodies drawn aside from poses (n, 7): some directions, and each of them mirrored."""
-    rng, moving = np.random.default_rng(0), moving_rows(scene.bodies)
-    sizes = np.repeat([scene.packed().scale, 1.0], 3)
-    for _ in range(_DIRECTIONS):
-        way = _ASIDE / np.sqrt(3.0) * sizes * rng.normal(size=(len(moving), 6))
-        for side in (1.0, -1.0):
-            aim = q.copy()
-            aim[moving] = retract(q[moving], side * way)
-            near = _with(scene, Posture(aim))
-            with near._angles_near(turns):
-                found = near.solve(q)
-            if found.success:
-                yield found.q, _turns_of(found)
-
-
-def _with(scene: Assembly, *objectives: Objective) -> Assembly:
-    """The scene's bodies and constraints with other objectives."""
-    result = Assembly(scene.bodies)
-    result._take_constraints(scene.constraints)
-    result.minimize(*objectives)
-    return result
-
-
-class _Descent:
-    """The way from a pose to where sign times a measure is least."""
-
-    def __init__(self, scene: Assembly, measure: Measure, term: MeasureTerm, sign: float) -> None:
-        self._scene, self._measure, self._term, self._sign = scene, measure, term, sign
+    def __init__(self, scene: Assembly, measure: Measure, term: MeasureTerm) -> None:
+        self._scene, self._measure, self._term = scene, measure, term
+        self._stops = measure.thing.limits if term.turns else None
         packed = scene.packed()
-        # An angle with a stop on this side does not turn for ever.
-        stops = measure.thing.limits if term.turns else None
-        self._turned = _TURNED if stops is None or stops[0 if sign > 0.0 else 1] is None else inf
         self._size, self._may_grow = packed.scale, not (packed.keeps_apart or packed.contacts)
+        self._known: dict[tuple[float, float, float], tuple[Expression, Assembly]] = {}
+        # How many times as many places for contacts scenes have turned out to need.
+        self._crowding = scene._crowding
 
-    def end(self, q: Array, turns: Turns, value: float) -> End:
-        """From poses (n, 7) and the angles there; a measured one is within half a turn of `value`."""
-        term, size, sign = self._term, self._size, self._sign
-        begin = center = value if term.turns else 0.0
-        length, last, failed = _FIRST * size, inf, 0
-        goal, near, rests = term.objective(sign, center), None, False
-        start: Array | Solution = q
+    def _turned(self, sign: float) -> float:
+        """How far an angle turns before it is free to: one with a stop on this side does not turn for ever."""
+        return _TURNED if self._stops is None or self._stops[0 if sign > 0.0 else 1] is None else inf
+
+    def aside(self, begin: _Start) -> Iterator[_Start]:
+        """Poses that hold, with bodies drawn aside from others: some directions, and each of them mirrored."""
+        q = begin.q
+        rng, moving = np.random.default_rng(0), moving_rows(self._scene.bodies)
+        sizes = np.repeat([self._size, 1.0], 3)
+        drawn = self._with(Posture())
+        for _ in range(_DIRECTIONS):
+            way = _ASIDE / np.sqrt(3.0) * sizes * rng.normal(size=(len(moving), 6))
+            for side in (1.0, -1.0):
+                aim = q.copy()
+                aim[moving] = retract(q[moving], side * way)
+                found = self._solved(drawn, q, begin.turns, aim)
+                if found.success:
+                    yield _Start(found.q, _turns_of(found), begin.value)
+
+    def _with(self, *objectives: Objective) -> Assembly:
+        """The scene's bodies and constraints with other objectives."""
+        result = Assembly(self._scene.bodies)
+        result._take_constraints(self._scene.constraints)
+        result.minimize(*objectives)
+        result._crowding = self._crowding
+        return result
+
+    def _solved(
+        self,
+        scene: Assembly,
+        start: Array | Solution,
+        turns: Turns,
+        reference: Array | None = None,
+        **options: float,
+    ) -> Solution:
+        """A solve from a start and no other one, whose end nothing proves; postures are measured from a reference."""
+        scene._take_seats(start, None)
+        settings = scene._settings(options, CTRL_C, isinstance(start, Solution))
+        with scene._angles_near(turns):
+            solution = scene._solved(settings, start, None, CTRL_C, reference, judges=False)
+        CTRL_C.is_over()  # What a signal's handler raised is raised here.
+        self._crowding = max(self._crowding, scene._crowding)
+        return solution
+
+    def _asked(self, sign: float, center: float, length: float = inf) -> tuple[Expression, Assembly]:
+        """The term and the scene of sign times the measure, with steps of a length where it is finite."""
+        key = sign, center, length
+        if key not in self._known:
+            goal = self._term.objective(sign, center)
+            # The term's slope is about one.
+            near = () if length == inf else (Posture(weight=0.5 / length),)
+            self._known[key] = goal, self._with(goal, *near)
+        return self._known[key]
+
+    def end(self, begun: _Start, sign: float) -> End:
+        """Where sign times the measure is least, from a start."""
+        term, size, turns = self._term, self._size, begun.turns
+        begin = center = begun.value if term.turns else 0.0
+        length, last, failed, rests = _FIRST * size, inf, 0, False
+        start: Array | Solution = begun.q
+        goal, near = self._asked(sign, center, length)
         for _ in range(_STEPS):
-            if near is None:
-                # The term's slope is about one.
-                near = _with(self._scene, goal, Posture(weight=0.5 / length))
-            with near._angles_near(turns):
-                found = near.solve(start)
+            found = self._solved(near, start, turns)
             before = start if isinstance(start, np.ndarray) else start.q
             moved = self._moved(before, found.q)
             if not found.success or moved > 4.0 * length:
                 if failed == _SHORTER:
                     break
-                length, near, last, failed, start = 0.25 * length, None, inf, failed + 1, before
+                length, last, failed, start = 0.25 * length, inf, failed + 1, before
+                goal, near = self._asked(sign, center, length)
                 continue
             start, turns = found, _turns_of(found)
             if self._at(goal, before) - self._at(goal, found.q) < _REST * size:
                 rests = True
                 break
             if self._may_grow and moved > _FREE * last and length < _LONGEST * size:
-                length, near, start = 2.0 * length, None, found.q
+                length, start = 2.0 * length, found.q
             last = moved
             if term.turns:
                 beyond = float(self._at(goal, found.q)) * sign / term.unit
                 if abs(beyond) > _NEAR:
-                    center += beyond
-                    goal, near, start = term.objective(sign, center), None, found.q
-                if abs(center - begin) > self._turned:
+                    center, start = center + beyond, found.q
+                if abs(center - begin) > self._turned(sign):
                     break
-        q = start if isinstance(start, np.ndarray) else start.q
-        alone = _with(self._scene, goal)
-        with alone._angles_near(turns):
-            solution = alone.solve(q, radius=_FIRST)
-        if term.turns and abs(center - begin) > self._turned:
+            if start is not found:
+                goal, near = self._asked(sign, center, length)
+        ended = start if isinstance(start, np.ndarray) else start.q
+        return self._alone(_Start(ended, turns, center), sign, begin, rests)
+
+    def _alone(self, start: _Start, sign: float, begin: float, rests: bool) -> End:
+        """The measure solved for alone, which is exact; an angle began at `begin`, and its center is the start's."""
+        q, turns, center = start
+        goal, alone = self._asked(sign, center)
+        solution = self._solved(alone, q, turns, radius=_FIRST)
+        if self._term.turns and abs(center - begin) > self._turned(sign):
             solution.status = Status.UNBOUNDED
         reached = self._measure.value(solution)
-        if term.turns:
-            reached = center + self._at(goal, solution.q) * sign / term.unit
-        if rests and self._moved(q, solution.q) > 4.0 * _FIRST * size:
+        if self._term.turns:
+            reached = center + self._at(goal, solution.q) * sign / self._term.unit
+        if rests and self._moved(q, solution.q) > 4.0 * _FIRST * self._size:
             # It jumped, to where no short steps lead.
             reached = nan
         return End.of(alone, solution, reached, sign)

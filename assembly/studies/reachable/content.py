@@ -11,13 +11,11 @@ from scipy.spatial import cKDTree
 
 from assembly.studies.reachable.grid import Grid
 
-__all__ = ["Content", "boundary_shares", "content"]
+__all__ = ["SIDE", "Content", "cells_beside", "content", "sample_points", "steps_around"]
 
 Array = NDArray[np.float64]
 # Points a side of a cell at which it is asked whether they are in the set.
-_SIDE = {2: 10, 3: 6}
-# [cells] How far from the boundary points count for its length or area, less the farther they are.
-_BAND = 0.5
+SIDE = {2: 10, 3: 6}
 
 
 class Content(NamedTuple):
@@ -41,7 +39,7 @@ def content(
     plane of the boundary at the place nearest to it, which is off by the square of the cell's size, and where it is
     `within` the region, that is told of points (m, 3) of the world.
     """
-    near, cut = _beside(reached)
+    near, cut = cells_beside(reached)
     inner = grid.content * (len(reached) - len(cut))
     outer = grid.content * (len(reached) + len(near))
     if not len(reached):
@@ -50,7 +48,7 @@ def content(
     return Content(inner, outer, inner + grid.content * float(shares.sum()))
 
 
-def _beside(reached: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def cells_beside(reached: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Cells not reached that share a side, an edge or a corner with one that is, and those reached beside one not."""
     if not len(reached):
         return reached, reached
@@ -60,40 +58,21 @@ def _beside(reached: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.i
     counts = reached.max(axis=0) + 2 - low
     weights = np.cumprod(np.concatenate([[1], counts[:-1]]))
     inside = (reached - low) @ weights
-    around = inside[:, None] + _steps(dimension) @ weights
+    around = inside[:, None] + steps_around(dimension) @ weights
     is_in = np.isin(around, inside)
     near = np.unique(around[~is_in])
     cells = near[:, None] // weights % counts + low
     return cells, reached[~is_in.all(axis=1)]
 
 
-def boundary_shares(grid: Grid, reached: NDArray[np.int64], places: Array, normals: Array) -> Array:
-    """The length or area of the boundary that each of its places (m, 3) stands for, (m,); zero for many.
-
-    The estimate counts points behind the tangent plane of the nearest place. Its derivative has a Dirac function of the
-    height over that plane, here a hat of half a cell to either side: what the boundary's curvature adds on one side it
-    takes away on the other. At a corner that goes into the set a place may stand for up to a cell too much, for its
-    plane goes on in the set.
-    """
-    near, cut = _beside(reached)
-    # Cells that are next to those through which the boundary goes, as well.
-    beside = np.concatenate([cut, near])
-    band = np.unique((beside[:, None] + _steps(grid.dimension)).reshape(-1, grid.dimension), axis=0)
-    height, nearest = _heights(grid, _points(grid, band), places, normals)
-    hat = np.maximum(0.0, 1.0 - np.abs(height) / _BAND) / _BAND
-    each = grid.size ** (grid.dimension - 1) / _SIDE[grid.dimension] ** grid.dimension
-    result: Array = each * np.bincount(nearest, hat, len(places))
-    return result
-
-
-def _steps(dimension: int) -> NDArray[np.int64]:
+def steps_around(dimension: int) -> NDArray[np.int64]:
     """From a cell to all that share a side, an edge or a corner with it, and to itself."""
     return np.stack(np.meshgrid(*[(-1, 0, 1)] * dimension, indexing="ij"), axis=-1).reshape(-1, dimension)
 
 
-def _points(grid: Grid, cells: NDArray[np.int64]) -> Array:
+def sample_points(grid: Grid, cells: NDArray[np.int64]) -> Array:
     """Points of cells (k, d) at which it is asked whether they are in the set, cell after cell, in units of cells."""
-    count = _SIDE[grid.dimension]
+    count = SIDE[grid.dimension]
     steps = (np.arange(count) + 0.5) / count
     offsets = np.stack(np.meshgrid(*[steps] * grid.dimension, indexing="ij"), axis=-1).reshape(-1, grid.dimension)
     result: Array = (cells[:, None, :] + offsets).reshape(-1, grid.dimension)
@@ -116,7 +95,7 @@ def _shares(
     within: Callable[[Array], NDArray[np.bool_]],
 ) -> Array:
     """Which part of each cell (k, d) is in the set, (k,)."""
-    points = _points(grid, cells)
+    points = sample_points(grid, cells)
     behind = within(grid.origin + grid.size * points @ grid.axes)
     if len(places):
         behind &= _heights(grid, points, places, normals)[0] <= 0.0

@@ -72,7 +72,7 @@ class DrawnTip:
 
     def to(self, target: Array, start: Solution | Array) -> Stop:
         """The tip drawn to a place from a solution of this scene, or from poses (n, 7) of the bodies."""
-        self._aim.target = target
+        self.aim_at(target)
         if not isinstance(start, Solution):
             extra = [body.pose.q for body in self.scene.bodies[self._count :]]
             start = np.concatenate([start, *(row[None] for row in extra)])
@@ -80,6 +80,11 @@ class DrawnTip:
         # The objective is the square of the distance.
         is_there = solution.success and solution.objective <= self._close**2
         return Stop(solution, solution.q[: self._count], solution.success, is_there)
+
+    def aim_at(self, target: Array) -> None:
+        """Have the objective draw the tip to a place (3,), without a solve."""
+        # A middle of a cell needs no look, which takes as long as a step of a solve.
+        self._aim._target = target
 
     def place(self, stop: Stop) -> Array:
         """The place (3,) of the tip in the world."""

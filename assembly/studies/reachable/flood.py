@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
-from assembly.kinematics.pose import multiply
+from assembly.solve.solution import Solution
 from assembly.studies.reachable.drawn_tip import DrawnTip, Stop
 from assembly.studies.reachable.grid import Cell, Grid
 
@@ -58,7 +58,7 @@ class Flood:
     most : int
         Cells that may be reached.
     reached : dict of cell -> list of (poses (n, 7), marks (n, 19))
-    limits : dict of cell -> list of (place, outward normal, poses (n, 7))
+    limits : dict of cell -> list of (place, outward normal, solution)
         Of cells beside reached ones whose middles are not reached: where the tip stopped on the way there.
     undecided : set of cell
         Cells at which a solve has not ended; none of them is reached.
@@ -74,7 +74,7 @@ class Flood:
     flips: int
     most: int
     reached: dict[Cell, list[tuple[Array, Array]]] = field(default_factory=dict)
-    limits: dict[Cell, list[tuple[Array, Array, Array]]] = field(default_factory=dict)
+    limits: dict[Cell, list[tuple[Array, Array, Solution]]] = field(default_factory=dict)
     undecided: set[Cell] = field(default_factory=set)
     solves: int = 0
     advance: Callable[[int], object] = bool
@@ -120,7 +120,7 @@ class Flood:
             place = self.tip.place(stop)
             length = float(np.linalg.norm(target - place))
             if length <= _FAR * self.grid.size:
-                self.limits.setdefault(cell, []).append((place, (target - place) / length, stop.poses))
+                self.limits.setdefault(cell, []).append((place, (target - place) / length, stop.solution))
             if start.flips < self.flips and start.cell in self.reached:
                 back = self._drawn(self.grid.center(start.cell), self._mirrored(start.stop, stop))
                 if back.is_there:
@@ -134,8 +134,9 @@ class Flood:
     def _mirrored(self, start: Stop, stop: Stop) -> Array:
         """As far beyond a stop as the start is before it, poses (n, 7)."""
         result = 2.0 * stop.poses - start.poses
-        for row, before, at in zip(result, start.poses, stop.poses, strict=True):
-            row[3:] = multiply(multiply(at[3:], before[3:] * [1.0, -1.0, -1.0, -1.0]), at[3:])
+        # The turn from start to stop once more: of unit quaternions at before* at = 2 (at . before) at - before.
+        at, before = stop.poses[:, 3:], start.poses[:, 3:]
+        result[:, 3:] = 2.0 * (at * before).sum(axis=1)[:, None] * at - before
         return result
 
     def _add(self, cell: Cell, stop: Stop, flips: int) -> None:

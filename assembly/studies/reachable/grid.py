@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -49,8 +50,15 @@ class Grid:
 
     def center(self, cell: Cell) -> Array:
         """The middle of a cell, in the world."""
-        result: Array = self.origin + self.size * (np.array(cell) + 0.5) @ self.axes
+        result = self.origin.copy()
+        for k, axis in zip(cell, self._sides, strict=True):
+            result += (k + 0.5) * axis
         return result
+
+    @cached_property
+    def _sides(self) -> tuple[Array, ...]:
+        """From a cell's middle to that of the next one along each axis."""
+        return tuple(self.size * self.axes)
 
     def centers(self, cells: NDArray[np.int64]) -> Array:
         """Middles of cells (k, d), in the world, (k, 3)."""

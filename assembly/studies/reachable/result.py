@@ -19,7 +19,9 @@ from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError
 from assembly.kinematics.picture_mesh import PictureMesh
 from assembly.solve.forces.end_effector import dexterity_value
-from assembly.studies.reachable.content import Content, boundary_shares
+from assembly.solve.solution import Solution
+from assembly.studies.reachable.boundary import Boundary, boundary_shares
+from assembly.studies.reachable.content import Content
 from assembly.studies.reachable.drawn_tip import DrawnTip
 from assembly.studies.reachable.grid import Grid
 from assembly.studies.reachable.moving_boundary import BoundaryStops, boundary_integral
@@ -66,7 +68,7 @@ class Workspace(ReadOnlyArrays):
     grid: Grid = field(repr=False)
     scene: Assembly = field(repr=False)
     _targets: Array = field(repr=False)
-    _stops: Array = field(repr=False)
+    _stops: tuple[Solution, ...] = field(repr=False)
     _drawn: DrawnTip = field(repr=False)
 
     @property
@@ -131,8 +133,8 @@ class Workspace(ReadOnlyArrays):
     def gradient(self, parameters: Parameter | Sequence[Parameter]) -> Array:
         """How the area or volume changes with numbers of the scene, (p,): the boundary integral of its normal velocity.
 
-        Each place of the boundary is solved for again, and its distance from where the tip was drawn to is derived.
-        Those whose distance has no derivative move as the others do on average.
+        Of each place of the boundary the distance from where the tip was drawn to is derived. Those whose distance has
+        no derivative move as the others do on average.
 
         Raises
         ------
@@ -142,8 +144,9 @@ class Workspace(ReadOnlyArrays):
         """
         if not len(self.cells) or not len(self.boundary):
             raise InputError("the workspace has no cells, or no boundary; expected an area or a volume")
-        shares = boundary_shares(self.grid, self.cells, self.boundary, self.normals)
-        stops = BoundaryStops(self._drawn, self.grid.size, self.boundary, self._targets, self._stops)
+        boundary = Boundary.of(self.grid, self.boundary, self.normals, self._targets)
+        shares = boundary_shares(self.grid, self.cells, boundary)
+        stops = BoundaryStops(self._drawn, self.boundary, self._targets, self._stops)
         return boundary_integral(stops, shares, several("parameters", parameters, Parameter))
 
     def dexterity(self, measure: Dexterity) -> Array:

@@ -119,7 +119,7 @@ def _found(scene: Assembly, flood: Flood, region: _Region) -> Workspace:
         grid=grid,
         scene=scene,
         _targets=targets,
-        _stops=np.array([limit[3] for limit in limits]).reshape(len(limits), len(scene.bodies), 7),
+        _stops=tuple(limit[3] for limit in limits),
         _drawn=flood.tip,
     )
 
@@ -167,7 +167,7 @@ class _Region:
 
     def __call__(self, cell: Cell) -> bool:
         """Whether the middle of a cell is in it."""
-        return bool(self.holds(self._grid.center(cell)))
+        return self._box is None or bool(self.holds(self._grid.center(cell)))
 
     def holds(self, places: Array) -> NDArray[np.bool_]:
         """Whether places (..., 3) are in it."""

@@ -21,8 +21,8 @@ from assembly.assembly import Assembly
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.response import ResponseError
-from assembly.errors import InputError, integer
-from assembly.studies.synthesis.goal import Bound, Goal
+from assembly.errors import InputError, integer, positive
+from assembly.studies.synthesis.goal import Bound, Goal, Relation
 from assembly.studies.synthesis.result import Synthesis
 from assembly.studies.synthesis.station import Station
 
@@ -36,23 +36,25 @@ _SAME = 1e-8
 
 def synthesize(
     scene: Assembly,
-    minimize: Measure | Station | Sequence[Station],
+    minimize: Measure | Relation | Station | Sequence[Station],
     parameters: Mapping[Parameter, tuple[float, float]],
     *,
     subject_to: Sequence[Bound] = (),
     stations: Sequence[Station] = (),
     apply: bool = False,
     most: int = 200,
+    level: float = 1e-6,
 ) -> Synthesis:
     """Dimensions of a mechanism for which it does best what is wanted.
 
     Parameters
     ----------
     scene : Assembly
-    minimize : stations with what is wanted there, or a Measure
+    minimize : stations with what is wanted there, a Measure, or a function
         Stations: the sum of squares of all differences, as of a coupler's point from given places. A measure: its
         value, the greatest of all `stations` where they are given; "objective" is what the scene's own objective comes
-        to, a `Dexterity` for instance.
+        to, a `Dexterity` for instance. A function takes the dimensions (p,), which the scene has meanwhile, and gives a
+        number and its derivatives (p,): an area that a tip reaches, say.
     parameters : mapping of Parameter -> (low, high)
         The dimensions and their bounds. They start from the values that they have.
     subject_to : sequence of (what, low, high), optional
@@ -65,6 +67,9 @@ def synthesize(
         were.
     most : int
         Steps after which the optimizer ends.
+    level : float
+        Slopes that count as none, a width of the bounds in parts of what is minimized. A function whose derivatives are
+        no better than a hundredth asks for as much; SLSQP ends there where it is the same to the square of this.
 
     Returns
     -------
@@ -82,9 +87,10 @@ def synthesize(
     if not isinstance(apply, bool):
         raise InputError(f"apply is {apply!r}; expected True or False")
     integer("most", most, 1, 10**6)
+    positive("level", level)
     goal = Goal(scene, minimize, parameters, subject_to, stations)
     start = goal.start_of_search()
-    if goal.worst is None and not goal.bounds:
+    if goal.worst is None and goal.relation is None and not goal.bounds:
         # Coordinates' own trust regions: without active bounds its steps are those of Gauss and Newton.
         found = optimize.least_squares(
             goal.residuals,
@@ -98,14 +104,14 @@ def synthesize(
             max_nfev=most,
         )
     else:
-        found = _by_slsqp(goal, start, most)
-    result = _checked(scene, goal, goal.values(np.clip(found.x, *goal.range)), str(found.message))
+        found = _by_slsqp(goal, start, most, level)
+    result = _checked(scene, goal, goal.values(np.clip(found.x, *goal.range)), level, str(found.message))
     if apply and result.success:
         result.apply()
     return result
 
 
-def _by_slsqp(goal: Goal, start: Array, most: int) -> Any:
+def _by_slsqp(goal: Goal, start: Array, most: int, level: float) -> Any:
     sides = [(0.0, 1.0)] * len(goal.parameters) + [(None, None)] * (goal.worst is not None)
     return optimize.minimize(
         goal.cost,
@@ -114,11 +120,11 @@ def _by_slsqp(goal: Goal, start: Array, most: int) -> Any:
         bounds=sides,
         method="SLSQP",
         constraints=[{"type": "ineq", "fun": goal.rooms, "jac": goal.room_rates}],
-        options={"ftol": 1e-15, "maxiter": most},
+        options={"ftol": 1e-15 if goal.relation is None else level**2, "maxiter": most},
     )
 
 
-def _checked(scene: Assembly, goal: Goal, values: Array, message: str) -> Synthesis:
+def _checked(scene: Assembly, goal: Goal, values: Array, level: float, message: str) -> Synthesis:
     """What was found, with stations solved anew, one from the other, and slopes that are level or held by bounds."""
     known, wrong = goal.evaluations.solved(values), list[str]()
     try:
@@ -132,10 +138,12 @@ def _checked(scene: Assembly, goal: Goal, values: Array, message: str) -> Synthe
     if not passed <= _SAME * (1.0 + np.abs(values).max()):
         wrong.append(f"bounds are passed by {passed:.1e}")
     slope = goal.slope_left(values)
-    if not slope <= 1.0:
-        wrong.append(f"dimensions can be bettered: slopes are {slope:.1e} of what is level")
+    if not slope <= level:
+        wrong.append(f"dimensions can be bettered: slopes are {slope:.1e}, not {level:.1e}")
     residuals = goal.differences(measures)
     cost = 0.5 * float(residuals @ residuals) if goal.worst is None else float(measures[goal.worst].max())
+    if goal.relation is not None:
+        cost = goal.related((values - goal.low) / goal.width)[0]
     evaluations = goal.evaluations
     return Synthesis(
         success=not wrong,

@@ -71,12 +71,14 @@ class Evaluations:
 
     def at(self, values: Array) -> Evaluated:
         """The same, where failures raise."""
-        found, rates = [], []
-        for station, response in zip(self.stations, self._each, strict=True):
-            with values_set(tuple(station.setting), np.array(list(station.setting.values()))):
-                measures, slopes = response.both(values)
-            found.append(measures)
-            rates.append(slopes)
+        found, rates = [np.empty(0)], [np.empty((0, len(self._parameters)))]
+        # Once for all stations: faces that dimensions make are made, and packed, once.
+        with values_set(self._parameters, values):
+            for station, response in zip(self.stations, self._each, strict=True):
+                with values_set(tuple(station.setting), np.array(list(station.setting.values()))):
+                    measures, slopes = response.both(values)
+                found.append(measures)
+                rates.append(slopes)
         return Evaluated(np.concatenate(found), np.concatenate(rates))
 
     def solved_anew(self, scene: Assembly, values: Array) -> Array:

@@ -16,6 +16,7 @@ from scipy.optimize import nnls
 from assembly.assembly import Assembly
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
+from assembly.derivatives.response import ResponseError, values_set
 from assembly.errors import InputError, items, number
 from assembly.studies.synthesis.evaluations import Evaluated, Evaluations
 from assembly.studies.synthesis.station import Station
@@ -27,9 +28,8 @@ Relation = Callable[[Array], tuple[float, Sequence[float]]]
 Bound = tuple[Measure | Relation, float | None, float | None]
 # How much worse than the last ones, in parts of them, cost and rooms of a step without a solution are.
 _WORSE = 1e3
-# [parts of a bound's width] What is this near to a bound is at it; and slopes, in parts of what they may be, that are
-# none. SLSQP ends where the cost is the same to rounding: dimensions are off by the root of it.
-_CLOSE, _LEVEL = 1e-7, 1e-6
+# [parts of a bound's width] What is this near to a bound is at it.
+_CLOSE = 1e-7
 
 
 class _Bounded(NamedTuple):
@@ -53,6 +53,8 @@ class Goal:
         Which of the measures are wanted to be numbers.
     worst : (k,) of int, or None
         Which of the measures are those whose greatest is minimized.
+    relation : function or None
+        The function of the dimensions that is minimized; the scene has them meanwhile.
     bounds : list
     count : int
         Measures of all stations.
@@ -61,7 +63,7 @@ class Goal:
     def __init__(
         self,
         scene: Assembly,
-        minimize: Measure | Station | Sequence[Station],
+        minimize: Measure | Relation | Station | Sequence[Station],
         parameters: Mapping[Parameter, tuple[float, float]],
         subject_to: Sequence[Bound],
         stations: Sequence[Station],
@@ -69,21 +71,29 @@ class Goal:
         self.parameters, self.low, self.width = _dimensions(parameters)
         given = items("subject_to", subject_to, "bounds (what, low, high)")
         measure = minimize if isinstance(minimize, Measure) else None
+        self.relation: Relation | None = minimize if callable(minimize) else None
         listed = _stations(minimize, stations)
         asked = [bound[0] for bound in map(_three, given) if isinstance(bound[0], Measure)]
+        if self.relation is not None and not asked and not any(station.wanted for station in listed):
+            # Nothing is measured.
+            listed = ()
         of = [list(station.wanted or {}) + ([measure] if measure else []) + asked for station in listed]
-        starts = np.cumsum([0, *map(len, of)])[:-1]
+        starts = np.cumsum([0, *map(len, of)])[: len(of)]
         firsts = [at + np.arange(len(station.wanted or {})) for at, station in zip(starts, listed, strict=True)]
         self.count = sum(map(len, of))
-        self.rows = np.concatenate(firsts).astype(np.int64)
+        self.rows = np.concatenate([np.empty(0), *firsts]).astype(np.int64)
         self.worst = np.array([at + len(r) for at, r in zip(starts, firsts, strict=True)]) if measure else None
         if measure is not None and len(self.rows):
             raise InputError("stations want numbers of measures, and minimize is a measure; expected one of the two")
-        if measure is None and not len(self.rows):
+        if self.relation is not None and len(self.rows):
+            raise InputError("stations want numbers of measures, and minimize is a function; expected one of the two")
+        if measure is None and self.relation is None and not len(self.rows):
             raise InputError("minimize is stations at which nothing is wanted; expected a measure with a number")
         self._wanted = np.array([value for station in listed for value in (station.wanted or {}).values()])
-        self._weights = np.concatenate([np.full(len(r), s.weight) for r, s in zip(firsts, listed, strict=True)])
-        ends = starts + np.array(list(map(len, of))) - len(asked)
+        self._weights = np.concatenate(
+            [np.empty(0), *(np.full(len(r), s.weight) for r, s in zip(firsts, listed, strict=True))]
+        )
+        ends = starts + np.array(list(map(len, of)), dtype=np.int64) - len(asked)
         self.bounds, k = list[_Bounded](), 0
         for bound in map(_three, given):
             low, high = _sides(bound)
@@ -96,6 +106,7 @@ class Goal:
         self.start = (np.array([p.value for p in self.parameters]) - self.low) / self.width
         # What was told last of dimensions with a solution; those of the start have one, or raise.
         self._last = self.evaluations.at(self.values(self.start)), self.start
+        self._related: dict[bytes, tuple[float, Array]] = {}
 
     @property
     def range(self) -> tuple[float | Array, float | Array]:
@@ -135,10 +146,29 @@ class Goal:
         """What SLSQP minimizes, and its slopes: half the sum of squares, or s."""
         if self.worst is not None:
             return float(x[-1]), np.append(np.zeros(len(self.low)), 1.0)
+        if self.relation is not None:
+            return self.related(x)
         known = self._last_known(x)
         left = self.differences(known.measures)
         cost, slopes = 0.5 * float(left @ left), left @ self.residual_rates(x)
         return (cost if self._known(x) is not None else cost + _WORSE * (1.0 + cost)), slopes
+
+    def related(self, x: Array) -> tuple[float, Array]:
+        """What the function gives that is minimized, and its slopes; where it has none, worse than all before."""
+        assert self.relation is not None
+        key = x.tobytes()
+        if key not in self._related:
+            try:
+                with values_set(self.parameters, self.values(x)):
+                    value, slopes = _related(self.relation, self.values(x))
+                self._related[key] = value, slopes * self.width
+            except (ResponseError, InputError) as error:
+                if not self._related:
+                    raise
+                self.evaluations.failures.append(str(error))
+                worst = max(cost for cost, _ in self._related.values())
+                self._related[key] = worst + _WORSE * (1.0 + abs(worst)), next(reversed(self._related.values()))[1]
+        return self._related[key]
 
     def rooms(self, x: Array) -> Array:
         """What SLSQP holds at zero or more: how far bounds are, and s above each measure."""
@@ -159,10 +189,7 @@ class Goal:
         return float(np.max(-rooms, initial=0.0)) + 0.0
 
     def slope_left(self, values: Array) -> float:
-        """How far slopes of the cost are from what bounds and rooms at zero balance, in parts of what slopes may be.
-
-        At most one is an optimum, to first order.
-        """
+        """How far slopes of the cost are from what bounds and rooms at zero balance, in parts of what they are of."""
         x = (values - self.low) / self.width
         known = self.evaluations.solved(values)
         if known is None:
@@ -170,6 +197,8 @@ class Goal:
         sizes = np.ones(len(x))
         if self.worst is not None:
             x, sizes = np.append(x, known.measures[self.worst].max()), np.ones(len(x) + 1)
+        elif self.relation is not None:
+            sizes *= 1.0 + abs(self.related(x)[0])
         else:
             # Of a sum of squares r.r / 2 slopes are r.J. Residuals are good to what solves leave.
             missing = float(np.linalg.norm(self.differences(known.measures)))
@@ -181,7 +210,7 @@ class Goal:
         normals = np.concatenate([rates[rooms <= _CLOSE * (1.0 + np.abs(x).max())], walls[at_low], -walls[at_high]])
         slopes = self.cost(x)[1]
         left = slopes - normals.T @ nnls(normals.T, slopes)[0] if len(normals) else slopes
-        return float(np.max(np.abs(left) / np.where(sizes > 0.0, sizes, 1.0)) / _LEVEL)
+        return float(np.max(np.abs(left) / np.where(sizes > 0.0, sizes, 1.0)))
 
     def _rooms(self, x: Array, known: Evaluated) -> tuple[Array, Array]:
         """Rooms (r,) and their derivatives by x and s."""
@@ -233,10 +262,12 @@ def _dimensions(parameters: Mapping[Parameter, tuple[float, float]]) -> tuple[tu
     return tuple(parameters), np.array(low), np.array(high) - np.array(low)
 
 
-def _stations(minimize: Measure | Station | Sequence[Station], stations: Sequence[Station]) -> tuple[Station, ...]:
+def _stations(
+    minimize: Measure | Relation | Station | Sequence[Station], stations: Sequence[Station]
+) -> tuple[Station, ...]:
     """Stations of a goal, in order; of a measure alone one where nothing is set."""
     others = items("stations", stations, "several Station")
-    if isinstance(minimize, Measure):
+    if isinstance(minimize, Measure) or callable(minimize):
         listed = others or (Station({}, {}),)
     elif others:
         raise InputError("stations are given beside stations to minimize; expected them with a measure to minimize")

@@ -32,7 +32,7 @@ class Synthesis(ReadOnlyArrays):
     values : (p,)
         Of the parameters, in this order.
     cost : float
-        Half the sum of squares of the residuals; or the measure, the greatest of all stations.
+        Half the sum of squares of the residuals; the measure, the greatest of all stations; or what the function gives.
     residuals : (m,)
         Measures less what is wanted, times the weight, station after station; empty where nothing is wanted.
     measures : (n,)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
+from scipy.optimize import minimize_scalar
 
 import assembly as asm
 from assembly.errors import InputError
@@ -97,6 +99,128 @@ def test_steps_to_where_there_is_no_solution_are_shortened_and_told():
     )
     assert bounded.success, bounded
     assert bounded.values[0] == pytest.approx(2.05, abs=1e-6)
+
+
+def arm(long, short):
+    """Two links and a tip that is a body; its lengths as parameters."""
+    ground, upper, fore, tip = asm.Body("ground", fixed=True), *(asm.Body(name) for name in ("upper", "fore", "tip"))
+    turn = (np.cos(0.4), 0, 0, np.sin(0.4))
+    fore.pose = asm.Pose((long, 0, 0), turn)
+    tip.pose = asm.Pose((long + short * np.cos(0.8), short * np.sin(0.8), 0), turn)
+    scene = asm.Assembly([ground, upper, fore, tip])
+    shoulder = asm.Revolute(ground, upper, "shoulder")
+    elbow = asm.Revolute(upper.frame(at=(long, 0, 0)), fore, "elbow")
+    wrist = asm.Fixed(fore.frame(at=(short, 0, 0)), tip, "wrist")
+    scene.constrain(shoulder, elbow, wrist)
+    lengths = [asm.Parameter(joint.frame_a, "origin", "x", name=joint.name) for joint in (elbow, wrist)]
+    return scene, (shoulder, elbow), lengths
+
+
+def total(values):
+    return values.sum(), (1.0, 1.0)
+
+
+def test_the_worst_dexterity_over_targets_is_largest_for_links_of_one_length():
+    """The manipulability l1 l2 |sin bend| at a target is twice the area of the triangle of both links and it: of all
+    with one sum of links the isosceles one has the largest, r (l^2 - r^2 / 4)^(1/2).
+    """
+    scene, joints, lengths = arm(1.1, 0.7)
+    ground, tip = scene.bodies[0], scene.bodies[3]
+    held = asm.Planar(ground, tip, "target", x=1.2, y=0.4)
+    scene.constrain(held)
+    scene.maximize(asm.Dexterity(tip.point(0, 0, 0), joints, "manipulability"))
+    x, y = (asm.Parameter(held, name) for name in "xy")
+    targets = [(1.2, 0.4), (0.9, 0.9), (0.3, 1.5), (0.4, 0.7)]
+    found = asm.synthesize(
+        scene,
+        asm.Measure("objective"),
+        {lengths[0]: (0.6, 1.4), lengths[1]: (0.5, 1.3)},
+        stations=[asm.Station({x: a, y: b}) for a, b in targets],
+        subject_to=[(total, 1.8, 1.8)],
+    )
+    assert found.success, found
+    np.testing.assert_allclose(found.values, 0.9, rtol=0, atol=1e-6)
+    radii = np.hypot(*np.transpose(targets))
+    worst = (radii * np.sqrt(0.81 - radii**2 / 4.0)).min()
+    assert found.cost == pytest.approx(-worst, abs=1e-7)
+
+
+def test_the_area_that_an_arm_reaches_is_largest_for_links_of_one_length():
+    """4 pi l1 l2 for one sum of both lengths. The area's derivatives are good to 3e-3 at this cell."""
+    scene, _, lengths = arm(1.0, 0.7)
+
+    def area(values):
+        reach = asm.workspace(scene, scene.bodies[3], cell=0.1, plane="xy")
+        return -reach.estimate, -reach.gradient(lengths)
+
+    found = asm.synthesize(
+        scene, area, {lengths[0]: (0.5, 1.2), lengths[1]: (0.5, 1.2)}, subject_to=[(total, None, 1.7)], level=0.01
+    )
+    assert found.success, found
+    np.testing.assert_allclose(found.values, 0.85, rtol=0, atol=5e-3)
+    assert found.cost == pytest.approx(-4.0 * np.pi * 0.85**2, rel=3e-3)
+    assert lengths[0].value == 1.0
+
+
+def test_functions_of_the_dimensions_that_fail_shorten_steps():
+    """The least of (r - 1.4)^2 + (l - 5)^4 / 8, of which there is none where r is less than 1.3."""
+    scene, slide, _, radius, length = slider_crank()
+
+    def function(values):
+        assert (radius.value, length.value) == tuple(values)  # the scene has them
+        if values[0] < 1.3:
+            raise asm.ResponseError("radius is too small")
+        off = values - [1.4, 5.0]
+        return off[0] ** 2 + off[1] ** 4 / 8.0, (2.0 * off[0], off[1] ** 3 / 2.0)
+
+    length.value = 6.0
+    found = asm.synthesize(scene, function, {radius: (0.5, 3.0), length: (4.0, 8.0)}, level=1e-4)
+    assert found.success, found
+    assert found.values[0] == pytest.approx(1.4, abs=1e-3) and found.cost < 1e-4
+    assert found.failures and found.failures[0] == "radius is too small"
+    assert radius.value == RADIUS
+    with pytest.raises(InputError, match="minimize is a function; expected one of the two"):
+        asm.synthesize(scene, function, {radius: (0.5, 3.0)}, stations=[asm.Station({}, {slide: 1.0})])
+    with pytest.raises(InputError, match="level is 0; expected a positive number"):
+        asm.synthesize(scene, function, {radius: (0.5, 3.0)}, level=0.0)
+
+
+def test_a_cam_has_the_profile_that_a_lift_is_wanted_of():
+    """A cubic profile y(x) that slides under a roller of radius r: at x the roller's axis is at the largest of
+    y(t) + (r^2 - (t - x)^2)^(1/2). The control points that made the lifts come back.
+    """
+    count, long, radius = 9, 8.0, 0.5
+    knots = np.concatenate([[0.0] * 3, np.linspace(0.0, long, count - 2), [long] * 3])
+    along = np.array([knots[k + 1 : k + 4].mean() for k in range(count)])
+    heights = np.array([0.0, 0.0, 0.05, 0.3, 0.5, 0.35, 0.1, 0.0, 0.0])
+    profile = BSpline(knots, heights, 3)
+
+    def lift(x):
+        def below(t):
+            return -profile(t) - np.sqrt(radius**2 - (t - x) ** 2)
+
+        return -minimize_scalar(below, (x - 0.1, x + 0.1), options={"xtol": 1e-12}).fun
+
+    net = np.array([[[x, 0.0, z] for z in (1.0, -1.0)] for x in along])
+    surface = asm.NurbsSurface(net, (knots, [0.0, 0.0, 1.0, 1.0]), (3, 1))
+    ground, cam = asm.Body("ground", fixed=True), asm.Body("cam", surface)
+    roller = asm.Body("roller", asm.shapes.sphere(radius), position=(4.0, 0.6, 0.0))
+    slide = asm.Prismatic(ground.frame(z=(1, 0, 0)), cam.frame(z=(1, 0, 0)), "slide", slide=0.0)
+    guide = asm.Prismatic(ground.frame(at=(4, 0, 0), z=(0, 1, 0)), roller.frame(z=(0, 1, 0)), "guide")
+    scene = asm.Assembly([ground, cam, roller])
+    scene.constrain(slide, guide, asm.Contact(cam, roller, "touch"))
+    driven, height = asm.Parameter(slide, "slide"), asm.Measure(guide)
+    places = np.linspace(-2.8, 2.8, 12)
+    stations = [asm.Station({driven: -x}, {height: lift(4.0 + x)}) for x in places]
+    points = [
+        asm.Parameter(cam.face(), "control_points", (i, j, "y")) for i in range(1, count - 1) for j in (0, 1)
+    ]  # fmt: skip
+    found = asm.synthesize(scene, stations, {point: (-1.0, 1.0) for point in points}, apply=True)
+    assert found.success, found
+    # A minimum is known to the root of rounding, which leaves 1e-15 of its value.
+    np.testing.assert_allclose(found.residuals, 0.0, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(found.values.reshape(-1, 2), heights[1:-1, None] * [1.0, 1.0], rtol=0, atol=1e-8)
+    assert found.evaluations <= 15
 
 
 def test_same_input_same_output():
