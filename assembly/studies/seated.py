@@ -29,12 +29,14 @@ from assembly.studies.parting import is_stuck
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["seated"]
+__all__ = ["fits", "seated"]
 
 Array = NDArray[np.float64]
 # Faces that nearly fit lean by no more than this [rad], and are off by no more than that part of the smaller body's
 # size, or of the radius; a shaft with less than so much of its bore's radius does not fit it.
 LEAN, OFF, FILLS = 0.15, 0.1, 0.8
+# Normals that differ by less are parallel, and heights that differ by less of a reach are one: parts of files are off.
+PARALLEL = 1e-8
 
 
 class _Face:
@@ -70,7 +72,7 @@ def seated(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     others = [item for item in scene.constraints if not isinstance(item, Clearance)]
     taken = {item.name for item in others}
     names = (name for name in map("fit {}".format, count()) if name not in taken)
-    joints = [joint for a, b in stuck for joint in _fits((scene.bodies[a], scene.bodies[b]), q[[a, b]], names)]
+    joints = [joint for a, b in stuck for joint in fits((scene.bodies[a], scene.bodies[b]), q[[a, b]], names)]
     if not joints or interruption.is_over():
         return None
     inner = type(scene)(scene.bodies)
@@ -79,7 +81,7 @@ def seated(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     return poses.copy() if np.isfinite(poses).all() else None
 
 
-def _fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterator[Constraint]:
+def fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterator[Constraint]:
     """Joints by which faces of two bodies would fit that nearly do at poses (2, 7)."""
     reach = OFF * min(body.size for body in bodies)
     ones, others = (
@@ -104,9 +106,32 @@ def _fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Itera
     for off, one, other in flush:
         for face in (one, other):
             nearest[face] = min(off, nearest.get(face, np.inf))
-    for off, one, other in flush:
-        if off <= max(nearest[one], nearest[other]):
-            yield _planar(one, other, next(names))
+    pairs = [(one, other) for off, one, other in flush if off <= max(nearest[one], nearest[other])]
+    for one, other in _first_to_touch(pairs, reach):
+        yield _planar(one, other, next(names))
+
+
+def _first_to_touch(pairs: list[tuple[_Face, _Face]], reach: float) -> list[tuple[_Face, _Face]]:
+    """Pairs of flat faces, without those that cannot touch as others that look the same way come first.
+
+    A boss whose flange lies on the rim does not reach the floor of its recess. With m a normal of the first body, and
+    n = -m of the second, faces at p and q are flush where that body is p.m + q.n along m from the first; where it is
+    farther they are apart.
+    """
+    normals = [(_plane(one)[1], _plane(other)[1]) for one, other in pairs]
+    heights = [
+        float(_plane(one)[0] @ m + _plane(other)[0] @ n) for (one, other), (m, n) in zip(pairs, normals, strict=True)
+    ]
+    kept = []
+    for pair, (m, n), height in zip(pairs, normals, heights, strict=True):
+        alike = [
+            known
+            for (to, fro), known in zip(normals, heights, strict=True)
+            if np.abs(to - m).max() < PARALLEL and np.abs(fro - n).max() < PARALLEL
+        ]
+        if height >= max(alike) - PARALLEL * reach:
+            kept.append(pair)
+    return kept
 
 
 def _plane(face: _Face) -> tuple[Array, Array]:
