@@ -1,11 +1,11 @@
 """Bodies that an objective draws onto what they fit: a plug into its seat, a lid onto its rim.
 
-Faces that lie on each other hold as joints do, as long as contact forces push. So where faces of bodies nearly fit, the
-objective is made least with joints in the place of contacts: a solve of few steps, in which no row comes or goes. At its
-end the objective's slope has to be a sum of slopes of gaps, none of which counts negatively, and the gaps' rows that
-push have to leave no motion that the joints forbid. Then it is a minimum with clearances as well: there the objective
-rises along every motion that opens a contact, and along those that open none the joints' solve says that it does. Faces
-that nothing pushes onto each other are let go, and it is made least again.
+Faces that lie on each other hold as joints do, as long as contact forces push. So where faces of bodies nearly fit,
+the objective is made least with joints in the place of contacts: a solve of few steps, in which no row comes or goes.
+At its end the objective's slope has to be a sum of slopes of gaps, none of which counts negatively, and the gaps' rows
+that push have to leave no motion that the joints forbid. Then it is a minimum with clearances as well: there the
+objective rises along every motion that opens a contact, and along those that open none the joints' solve says that it
+does. Faces that nothing pushes onto each other are let go, and it is made least again.
 """
 
 from __future__ import annotations
@@ -30,13 +30,23 @@ from assembly.proximity.manifolds.closed_gaps import closed_gaps
 from assembly.solve.attempts.attempts import as_it_stands
 from assembly.solve.clearance_proof import PairAnswer, can_prove, lent_proof
 from assembly.solve.interruption import Interruption
-from assembly.solve.loop.settings import ALLOWED_OVERLAP, DUAL, FEASIBILITY, FIT, GATHER, NEVER, SOLVED, STATIONARITY, UNSURE
+from assembly.solve.loop.settings import (
+    ALLOWED_OVERLAP,
+    DUAL,
+    FEASIBILITY,
+    FIT,
+    GATHER,
+    NEVER,
+    SOLVED,
+    STATIONARITY,
+    UNSURE,
+)
 from assembly.solve.scene import Status
 from assembly.solve.second_order.dense import LocalModel, null_space
 from assembly.solve.second_order.leave import Fit
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import is_for_proofs
-from assembly.studies.seated import fits
+from assembly.studies.seated import NearFit, drop_farthest, fits
 from assembly.studies.standing_start import with_contacts
 
 if TYPE_CHECKING:
@@ -52,8 +62,6 @@ Prove = Callable[[Array, float], list[PairAnswer] | None]
 BALANCED = 1e-9
 # A force that is stronger pushes, in parts of the objective's slope.
 PUSHES = 1e-7
-# Rounds in which faces that nothing pushes onto each other are let go: each lets go of a pair at least, and few do.
-ROUNDS = 4
 
 
 def resting(
@@ -87,38 +95,46 @@ def resting(
     begin = perf_counter()
     touching = float(settings[ALLOWED_OVERLAP])
     with lent_proof(packed, scene.bodies) as proof:
-        near = [proof.pairs[k] for k, answer in enumerate(proof.look(poses, touching * packed.scale)) if not is_proven(answer)]
+        near = [
+            proof.pairs[k]
+            for k, answer in enumerate(proof.look(poses, touching * packed.scale))
+            if not is_proven(answer)
+        ]
     others = [item for item in scene.constraints if not isinstance(item, Clearance)]
     taken = {item.name for item in others}
     names = (name for name in map("fit {}".format, count()) if name not in taken)
-    held = {
-        joint: (a, b, isinstance(joint, Planar))
-        for a, b in near
-        for joint in fits((scene.bodies[a], scene.bodies[b]), poses[[a, b]], names)
-    }
-    for _ in range(ROUNDS):
-        joints = list(held)
-        if not joints or interruption.is_over():
-            return None
+    held: list[NearFit] = []
+    sides: dict[Constraint, Side] = {}
+    for a, b in near:
+        for fit in fits((scene.bodies[a], scene.bodies[b]), poses[[a, b]], names):
+            held.append(fit)
+            sides[fit.joint] = (a, b, isinstance(fit.joint, Planar))
+    settings = settings.copy()
+    settings[GATHER] = NEVER
+    while held and not interruption.is_over():
+        joints = [fit.joint for fit in held]
         inner = _with_joints(scene, others, joints)
-        inner_settings = settings.copy()
-        inner_settings[GATHER] = NEVER
-        there = inner._solved(inner_settings, poses, starts, interruption, reference)
-        model = LocalModel.at(there._packed, there._state) if there.success else None
+        there = inner._solved(settings, poses, starts, interruption, reference)
+        if not there.success:
+            if there.status is Status.UNBOUNDED or not drop_farthest(held):
+                return None
+            continue
+        model = LocalModel.at(there._packed, there._state)
         if model is None or len(model.jacobian) != there._packed.rows:
             return None
-        is_joint = np.array([owner >= len(others) for owner in there._packed.owners], dtype=bool)
+        is_joint = there._packed.owners >= len(others)
         with lent_proof(packed, scene.bodies) as proof:
-            rows = [held[joints[owner - len(others)]] for owner in there._packed.owners[is_joint]]
-            pushing = _pushing(_slopes(proof, there, touching * packed.scale), model, is_joint, rows)
+            of_joints = [sides[joints[owner - len(others)]] for owner in there._packed.owners[is_joint]]
+            closed = _slopes(proof, there, touching * packed.scale)
+            pushing = _pushing(closed, model, is_joint, of_joints)
         if pushing is None:
             return None
-        if pushing.issuperset(held.values()):
+        if pushing.issuperset(of_joints):
             solution = _proven(scene, there, prove, settings, starts, interruption)
             if solution is not None:
                 solution.seconds = perf_counter() - begin
             return solution
-        poses, held = there.q.copy(), {joint: side for joint, side in held.items() if side in pushing}
+        poses, held = there.q.copy(), [fit for fit in held if sides[fit.joint] in pushing]
     return None
 
 

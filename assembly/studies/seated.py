@@ -8,6 +8,7 @@ where their axes and planes coincide. A solve begins there as well.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import count
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,7 @@ from assembly.studies.parting import is_stuck
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["fits", "seated"]
+__all__ = ["NearFit", "drop_farthest", "fits", "seated"]
 
 Array = NDArray[np.float64]
 # Faces that nearly fit lean by no more than this [rad], and are off by no more than that part of the smaller body's
@@ -60,8 +61,8 @@ class _Face:
 def seated(scene: Assembly, q: Array, touching: float, interruption: Interruption) -> Array | None:
     """Where bodies that clearances keep apart, and that are stuck in each other at poses (n, 7), fit each other.
 
-    Where they do not all fit at once, as both sides of a key with play, they are off by as little as can be. None where
-    none are stuck, and where none of their faces nearly fit.
+    Where they do not all fit at once, those do that are nearest. None where none are stuck, and where none of their
+    faces nearly fit.
     """
     packed = scene.packed()
     if not can_prove(packed):
@@ -72,16 +73,40 @@ def seated(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     others = [item for item in scene.constraints if not isinstance(item, Clearance)]
     taken = {item.name for item in others}
     names = (name for name in map("fit {}".format, count()) if name not in taken)
-    joints = [joint for a, b in stuck for joint in fits((scene.bodies[a], scene.bodies[b]), q[[a, b]], names)]
-    if not joints or interruption.is_over():
-        return None
-    inner = type(scene)(scene.bodies)
-    inner.constrain(*others, *joints)
-    poses = inner._from_start(q, None, {}, interruption).q
-    return poses.copy() if np.isfinite(poses).all() else None
+    held = [fit for a, b in stuck for fit in fits((scene.bodies[a], scene.bodies[b]), q[[a, b]], names)]
+    poses = None
+    while held and not interruption.is_over():
+        inner = type(scene)(scene.bodies)
+        inner.constrain(*others, *(fit.joint for fit in held))
+        there = inner._from_start(q, None, {}, interruption)
+        poses = there.q.copy() if np.isfinite(there.q).all() else None
+        if there.success or not drop_farthest(held):
+            break
+    return poses
 
 
-def fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterator[Constraint]:
+@dataclass(frozen=True, eq=False)
+class NearFit:
+    """A joint by which two faces would fit, and how far two flat ones are off that; zero of round ones."""
+
+    joint: Constraint
+    off: float
+
+
+def drop_farthest(held: list[NearFit]) -> bool:
+    """Take out, in place, the flat faces that are farthest off each other; whether there were any.
+
+    Where not all fit at once, as both flanks of a key with play, or a slot's far flank beside its gib, those do that
+    are nearest.
+    """
+    farthest = max(held, key=lambda fit: fit.off, default=None)
+    if farthest is None or not farthest.off > 0.0:
+        return False
+    held.remove(farthest)
+    return True
+
+
+def fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterator[NearFit]:
     """Joints by which faces of two bodies would fit that nearly do at poses (2, 7)."""
     reach = OFF * min(body.size for body in bodies)
     ones, others = (
@@ -99,16 +124,16 @@ def fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterat
                 if off <= reach:
                     flush.append((off, one, other))
             elif one.is_outward != other.is_outward:
-                yield from _round(one, other, axes, names)
+                yield from (NearFit(joint, 0.0) for joint in _round(one, other, axes, names))
     # The flank of a key is near both the flank of its slot and the wall beyond: it goes with the nearer one. Feet of
     # a body all go with the one face that they stand on.
     nearest: dict[_Face, float] = {}
     for off, one, other in flush:
         for face in (one, other):
             nearest[face] = min(off, nearest.get(face, np.inf))
-    pairs = [(one, other) for off, one, other in flush if off <= max(nearest[one], nearest[other])]
-    for one, other in _first_to_touch(pairs, reach):
-        yield _planar(one, other, next(names))
+    offs = {(one, other): off for off, one, other in flush if off <= max(nearest[one], nearest[other])}
+    for one, other in _first_to_touch(list(offs), reach):
+        yield NearFit(_planar(one, other, next(names)), offs[one, other])
 
 
 def _first_to_touch(pairs: list[tuple[_Face, _Face]], reach: float) -> list[tuple[_Face, _Face]]:
