@@ -174,9 +174,7 @@ class _FirstSolve:
         touching, ways = self._touching, []
         seat = seated(self.scene, self.q, touching, self.interruption)
         if seat is not None:
-            # Joints that hold there were led to by the least move: where bodies only touch, nothing is left to do.
-            there = None if is_solved or self.scene.objectives else self._unhindered(seat, False)
-            ways.append(there or (self._from(seat) if is_solved else self._where_it_fits(seat)))
+            ways.append(self._from(seat) if is_solved else self._where_it_fits(seat))
         if self._is_done(ways):
             return ways
         apart = parted(self.scene, self.q, touching, self.interruption)
