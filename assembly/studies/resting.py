@@ -116,7 +116,7 @@ def resting(
         inner = _with_joints(scene, others, joints)
         there = inner._solved(settings, poses, starts, interruption, reference)
         if not there.success:
-            if there.status is Status.UNBOUNDED or not drop_farthest(held):
+            if there.status is Status.UNBOUNDED or not drop_farthest(held, there.violations):
                 return None
             continue
         model = LocalModel.at(there._packed, there._state)

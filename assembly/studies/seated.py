@@ -7,7 +7,7 @@ where their axes and planes coincide. A solve begins there as well.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import count
 from typing import TYPE_CHECKING
@@ -38,6 +38,8 @@ Array = NDArray[np.float64]
 LEAN, OFF, FILLS = 0.15, 0.1, 0.8
 # Normals that differ by less are parallel, and heights that differ by less of a reach are one: parts of files are off.
 PARALLEL = 1e-8
+# A joint that is violated by more than this part of the worst one contradicts others.
+CONTRADICTS = 1e-2
 
 
 class _Face:
@@ -80,7 +82,7 @@ def seated(scene: Assembly, q: Array, touching: float, interruption: Interruptio
         inner.constrain(*others, *(fit.joint for fit in held))
         there = inner._from_start(q, None, {}, interruption)
         poses = there.q.copy() if np.isfinite(there.q).all() else None
-        if there.success or not drop_farthest(held):
+        if there.success or not drop_farthest(held, there.violations):
             break
     return poses
 
@@ -93,16 +95,17 @@ class NearFit:
     off: float
 
 
-def drop_farthest(held: list[NearFit]) -> bool:
-    """Take out, in place, the flat faces that are farthest off each other; whether there were any.
+def drop_farthest(held: list[NearFit], violations: Mapping[str, float]) -> bool:
+    """Take out, in place, the flat faces that are farthest off each other of those that contradict; whether there were.
 
     Where not all fit at once, as both flanks of a key with play, or a slot's far flank beside its gib, those do that
-    are nearest.
+    are nearest. A solve that fails says by its violations which ones contradict.
     """
-    farthest = max(held, key=lambda fit: fit.off, default=None)
-    if farthest is None or not farthest.off > 0.0:
+    worst = max((violations[fit.joint.name] for fit in held if fit.off > 0.0), default=0.0)
+    contradict = [fit for fit in held if fit.off > 0.0 and violations[fit.joint.name] >= CONTRADICTS * worst]
+    if not contradict:
         return False
-    held.remove(farthest)
+    held.remove(max(contradict, key=lambda fit: fit.off))
     return True
 
 
