@@ -188,7 +188,7 @@ def test_it_is_the_same_each_time():
 
 
 def test_a_flank_goes_with_the_nearest_one():
-    """A key is near the wall beyond its slot as well, and has two flanks with play: it is flush with those that are nearer."""
+    """A key is near the wall beyond its slot as well, and has play: it is flush with the flanks that are nearer."""
     fit = fits()["a key in its slot"]
     scene = scene_of(fit, np.r_[0.4, -0.3, 0.2, HOME[3:]])
     assert abs(fit.depth(seated(scene, np.array(scene.q), TOUCHING, CTRL_C)[1])) < 1e-12
