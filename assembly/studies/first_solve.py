@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +22,10 @@ from assembly.solve.clearance_proof import can_prove
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import ALLOWED_OVERLAP, GATHER, NEVER
 from assembly.solve.solution import Solution
+from assembly.solve.start_proof import prove_start, prove_way
 from assembly.studies.parting import parted
 from assembly.studies.put_together import PutTogether, put_together
+from assembly.studies.resting import Prove, resting
 from assembly.studies.seated import seated
 from assembly.studies.separation import separated
 from assembly.studies.unhindered import unhindered_at
@@ -68,9 +71,11 @@ class _FirstSolve:
         """The solution."""
         begin = perf_counter()
         together = put_together(self.scene, self.q, self.starts, self.options, self.interruption)
-        ways = []
-        if together is not None and not together.keeps_topology:
+        ways = self._resting(self.q, partial(prove_way, self.scene.packed(), self.scene.bodies, self.q))
+        if not self._is_done(ways) and together is not None and not together.keeps_topology:
             ways += self._put_together(together)
+        if not self._is_done(ways) and together is not None and together.is_asked and self.scene.objectives:
+            ways += self._constraints_first()
         if not self._is_done(ways):
             ways.append(self.scene._solved(self.settings, self.q, self.starts, self.interruption))
             # What holds as it stands is not moved.
@@ -104,6 +109,28 @@ class _FirstSolve:
             return solution
         return self.scene._solved(self.settings, poses, self.starts, self.interruption)
 
+    def _resting(self, poses: Array, prove: Prove) -> list[Solution]:
+        """The solution where an objective draws bodies onto what they fit near poses, if there is one."""
+        scene = self.scene
+        if not scene.objectives or self.interruption.is_over():
+            return []
+        rests = resting(scene, poses, self.q, prove, self.settings, self.starts, self.interruption)
+        return [] if rests is None else [rests]
+
+    def _constraints_first(self) -> list[Solution]:
+        """A solve from where constraints hold and bodies are clear, whatever the objective asks for there.
+
+        Far from there an objective draws bodies into each other before they are where rows can hold them apart.
+        """
+        inner = type(self.scene)(self.scene.bodies)
+        inner._take_constraints(self.scene.constraints)
+        there = inner._from_start(self.q, self.starts, self.options, self.interruption)
+        if not there.success or self.interruption.is_over():
+            return []
+        solution = self._from(there.q.copy())
+        solution.put_together = there.put_together
+        return [solution] if solution.success else []
+
     def _put_together(self, together: PutTogether) -> list[Solution]:
         """The same, from where bodies were put together without clearances; none where these are not found.
 
@@ -115,6 +142,9 @@ class _FirstSolve:
             return []
         poses = there.q.copy()
         solution = self._unhindered(poses, True)
+        if solution is None:
+            rests = self._resting(poses, partial(prove_start, self.scene.packed(), self.scene.bodies))
+            solution = rests[0] if rests else None
         seat = None if solution else seated(self.scene, poses, self._touching, self.interruption)
         if seat is not None:
             solution = None if self.scene.objectives else self._unhindered(seat, False)

@@ -7,7 +7,8 @@ where their axes and planes coincide. A solve begins there as well.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import count
 from typing import TYPE_CHECKING
 
@@ -29,12 +30,16 @@ from assembly.studies.parting import is_stuck
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["seated"]
+__all__ = ["NearFit", "drop_farthest", "fits", "seated"]
 
 Array = NDArray[np.float64]
 # Faces that nearly fit lean by no more than this [rad], and are off by no more than that part of the smaller body's
 # size, or of the radius; a shaft with less than so much of its bore's radius does not fit it.
 LEAN, OFF, FILLS = 0.15, 0.1, 0.8
+# Normals that differ by less are parallel, and heights that differ by less of a reach are one: parts of files are off.
+PARALLEL = 1e-8
+# A joint that is violated by more than this part of the worst one contradicts others.
+CONTRADICTS = 1e-2
 
 
 class _Face:
@@ -58,8 +63,8 @@ class _Face:
 def seated(scene: Assembly, q: Array, touching: float, interruption: Interruption) -> Array | None:
     """Where bodies that clearances keep apart, and that are stuck in each other at poses (n, 7), fit each other.
 
-    Where they do not all fit at once, as both sides of a key with play, they are off by as little as can be. None where
-    none are stuck, and where none of their faces nearly fit.
+    Where they do not all fit at once, those do that are nearest. None where none are stuck, and where none of their
+    faces nearly fit.
     """
     packed = scene.packed()
     if not can_prove(packed):
@@ -70,16 +75,41 @@ def seated(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     others = [item for item in scene.constraints if not isinstance(item, Clearance)]
     taken = {item.name for item in others}
     names = (name for name in map("fit {}".format, count()) if name not in taken)
-    joints = [joint for a, b in stuck for joint in _fits((scene.bodies[a], scene.bodies[b]), q[[a, b]], names)]
-    if not joints or interruption.is_over():
-        return None
-    inner = type(scene)(scene.bodies)
-    inner._take_constraints([*others, *joints])
-    poses = inner._from_start(q, None, {}, interruption).q
-    return poses.copy() if np.isfinite(poses).all() else None
+    held = [fit for a, b in stuck for fit in fits((scene.bodies[a], scene.bodies[b]), q[[a, b]], names)]
+    poses = None
+    while held and not interruption.is_over():
+        inner = type(scene)(scene.bodies)
+        inner._take_constraints([*others, *(fit.joint for fit in held)])
+        there = inner._from_start(q, None, {}, interruption)
+        poses = there.q.copy() if np.isfinite(there.q).all() else None
+        if there.success or not drop_farthest(held, there.violations):
+            break
+    return poses
 
 
-def _fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterator[Constraint]:
+@dataclass(frozen=True, eq=False)
+class NearFit:
+    """A joint by which two faces would fit, and how far two flat ones are off that; zero of round ones."""
+
+    joint: Constraint
+    off: float
+
+
+def drop_farthest(held: list[NearFit], violations: Mapping[str, float]) -> bool:
+    """Take out, in place, the flat faces that are farthest off each other of those that contradict; whether there were.
+
+    Where not all fit at once, as both flanks of a key with play, or a slot's far flank beside its gib, those do that
+    are nearest. A solve that fails says by its violations which ones contradict.
+    """
+    worst = max((violations[fit.joint.name] for fit in held if fit.off > 0.0), default=0.0)
+    contradict = [fit for fit in held if fit.off > 0.0 and violations[fit.joint.name] >= CONTRADICTS * worst]
+    if not contradict:
+        return False
+    held.remove(max(contradict, key=lambda fit: fit.off))
+    return True
+
+
+def fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterator[NearFit]:
     """Joints by which faces of two bodies would fit that nearly do at poses (2, 7)."""
     reach = OFF * min(body.size for body in bodies)
     ones, others = (
@@ -97,16 +127,39 @@ def _fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Itera
                 if off <= reach:
                     flush.append((off, one, other))
             elif one.is_outward != other.is_outward:
-                yield from _round(one, other, axes, names)
+                yield from (NearFit(joint, 0.0) for joint in _round(one, other, axes, names))
     # The flank of a key is near both the flank of its slot and the wall beyond: it goes with the nearer one. Feet of
     # a body all go with the one face that they stand on.
     nearest: dict[_Face, float] = {}
     for off, one, other in flush:
         for face in (one, other):
             nearest[face] = min(off, nearest.get(face, np.inf))
-    for off, one, other in flush:
-        if off <= max(nearest[one], nearest[other]):
-            yield _planar(one, other, next(names))
+    offs = {(one, other): off for off, one, other in flush if off <= max(nearest[one], nearest[other])}
+    for one, other in _first_to_touch(list(offs), reach):
+        yield NearFit(_planar(one, other, next(names)), offs[one, other])
+
+
+def _first_to_touch(pairs: list[tuple[_Face, _Face]], reach: float) -> list[tuple[_Face, _Face]]:
+    """Pairs of flat faces, without those that cannot touch as others that look the same way come first.
+
+    A boss whose flange lies on the rim does not reach the floor of its recess. With m a normal of the first body, and
+    n = -m of the second, faces at p and q are flush where that body is p.m + q.n along m from the first; where it is
+    farther they are apart.
+    """
+    normals = [(_plane(one)[1], _plane(other)[1]) for one, other in pairs]
+    heights = [
+        float(_plane(one)[0] @ m + _plane(other)[0] @ n) for (one, other), (m, n) in zip(pairs, normals, strict=True)
+    ]
+    kept = []
+    for pair, (m, n), height in zip(pairs, normals, heights, strict=True):
+        alike = [
+            known
+            for (to, fro), known in zip(normals, heights, strict=True)
+            if np.abs(to - m).max() < PARALLEL and np.abs(fro - n).max() < PARALLEL
+        ]
+        if height >= max(alike) - PARALLEL * reach:
+            kept.append(pair)
+    return kept
 
 
 def _plane(face: _Face) -> tuple[Array, Array]:

@@ -46,7 +46,7 @@ def manifest_of(scene: Assembly, plan: Plan, columns: tuple[Column, ...]) -> dic
 def _scene_hash(scene: Assembly) -> str:
     """Of the scene as it is, where the study begins."""
     asked = Assembly(scene.bodies)
-    asked.constrain(*(item for item in scene.constraints if item._is_asked))
+    asked._take_constraints(item for item in scene.constraints if item._is_asked)
     for sign, term in scene.objectives:
         (asked.minimize if sign > 0 else asked.maximize)(term)
     left = [item.name for item in scene.constraints if not item._is_asked]

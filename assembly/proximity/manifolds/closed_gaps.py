@@ -1,0 +1,135 @@
+"""Rows of all manifolds of two bodies whose gaps are closed: every way in which the bodies hold each other there.
+
+Beside planes, lines, shafts and cones these are balls in their sockets: a ball of the socket's radius touches it in all
+directions that both faces have. What conforms only in part of a wall, as a shaft in half a bore, has rows of its planes
+and lines, and none all around.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.geometry.faces.face import Face
+from assembly.geometry.recognition.forms import Cone, Cylinder, Sphere
+from assembly.proximity.manifolds.elementary_faces import ElementaryFace, elementary_faces
+from assembly.proximity.manifolds.flat_manifolds import flat_manifolds
+from assembly.proximity.manifolds.line_manifolds import line_manifolds
+from assembly.proximity.manifolds.round_manifolds import round_manifolds
+
+__all__ = ["closed_gaps"]
+
+Array = NDArray[np.float64]
+Faces = tuple[Face, ...]
+# Directions of a ball, along each parameter of its face.
+DIRECTIONS = 9
+# What is as near to a surface, in parts of its radius, is on it; so many steps of Newton's method lead there.
+ON_FACE, STEPS = 1e-8, 6
+# A surface that goes all around does to within so much [rad].
+ALL_AROUND = 1e-9
+
+
+def closed_gaps(
+    shapes: tuple[Faces, Faces], turn: Array, shift: Array, within: tuple[float, float]
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Normals and places (m, 3) of all rows of two bodies whose manifolds are between two gaps, in the first's axes.
+
+    And which of the rows (m,) are of flat faces that lie on each other.
+
+    Parameters
+    ----------
+    shapes : (tuple of Face, tuple of Face)
+        Of both bodies.
+    turn, shift : (3, 3), (3,)
+        The second body is at x -> turn x + shift, seen from the first.
+    within : (float, float)
+    """
+    walls = _walls(shapes[0]), _walls(shapes[1])
+    flat = flat_manifolds(shapes, turn, shift, within)
+    found = [
+        *flat,
+        *line_manifolds(shapes, turn, shift, within),
+        *round_manifolds(walls, turn, shift, within),
+    ]
+    normals, places = _balls(shapes, turn, shift, within)
+    normals = np.concatenate([*(manifold.normals for _, manifold in found), normals])
+    places = np.concatenate([*(manifold.places for _, manifold in found), places])
+    return normals, places, np.arange(len(normals)) < sum(len(manifold.gaps) for _, manifold in flat)
+
+
+@lru_cache(maxsize=256)
+def _walls(faces: Faces) -> tuple[ElementaryFace, ...]:
+    """The cylinders and cones among a body's faces that go all around and are whole."""
+    return tuple(
+        one
+        for face in faces
+        for one in elementary_faces((face,))
+        if isinstance(one.form, Cylinder | Cone)
+        and one.form.turn.angle > 2.0 * np.pi - ALL_AROUND
+        and face.contains(*_grid(face)).all()
+    )
+
+
+@lru_cache(maxsize=256)
+def _spheres(faces: Faces) -> tuple[tuple[Face, Sphere, bool], ...]:
+    """The spheres among a body's faces: face, form, whether it is a ball."""
+    return tuple(
+        (face, one.form, one.is_outward)
+        for face in faces
+        for one in elementary_faces((face,))
+        if isinstance(one.form, Sphere)
+    )
+
+
+def _grid(face: Face) -> tuple[Array, Array]:
+    """Parameters all over a surface, in the middles of parts of it, (k,) each."""
+    parts = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
+    (u0, u1), (v0, v1) = face.surface.domain
+    u, v = np.meshgrid(u0 + (u1 - u0) * parts, v0 + (v1 - v0) * parts, indexing="ij")
+    return u.ravel(), v.ravel()
+
+
+@lru_cache(maxsize=256)
+def _points(face: Face) -> Array:
+    """Points of a face, all over it."""
+    u, v = _grid(face)
+    inside = face.contains(u, v)
+    return np.asarray(face.surface.evaluate(u[inside], v[inside]))
+
+
+def _has(face: Face, points: Array, size: float) -> NDArray[np.bool_]:
+    """Which points near a surface are on its face, to within a part of a size, by steps of Newton's method."""
+    u, v = _grid(face)
+    known = np.asarray(face.surface.evaluate(u, v))
+    nearest = np.linalg.norm(points[:, None] - known[None], axis=2).argmin(axis=1)
+    u, v = u[nearest], v[nearest]
+    (u0, u1), (v0, v1) = face.surface.domain
+    for _ in range(STEPS):
+        at, along_u, along_v = face.surface.evaluate(u, v, 1)
+        slopes = np.stack([along_u, along_v], axis=2)
+        step = np.einsum("kij,kj->ki", np.linalg.pinv(slopes), points - at)
+        u, v = np.clip(u + step[:, 0], u0, u1), np.clip(v + step[:, 1], v0, v1)
+    off = np.linalg.norm(points - face.surface.evaluate(u, v), axis=1)
+    return np.asarray((off <= ON_FACE * size) & face.contains(u, v))
+
+
+def _balls(shapes: tuple[Faces, Faces], turn: Array, shift: Array, within: tuple[float, float]) -> tuple[Array, Array]:
+    """Normals and places (m, 3) of balls in sockets of their radius, or but for gaps."""
+    low, high = within
+    normals, places = [np.empty((0, 3))], [np.empty((0, 3))]
+    for one, form, is_ball in _spheres(shapes[0]):
+        for other, second, is_second_ball in _spheres(shapes[1]):
+            off = turn @ second.center + shift - form.center
+            play = (second.radius - form.radius) if is_ball else (form.radius - second.radius)
+            most, least = play + float(np.linalg.norm(off)), play - float(np.linalg.norm(off))
+            if is_ball == is_second_ball or least < low or most > high:
+                continue
+            points = _points(one)
+            out = (points - form.center) / form.radius
+            on_second = (form.center + off + second.radius * out - shift) @ turn
+            kept = _has(other, on_second, second.radius)
+            normals.append(out[kept] if is_ball else -out[kept])
+            places.append(points[kept])
+    return np.concatenate(normals), np.concatenate(places)

@@ -1,0 +1,237 @@
+"""Bodies that an objective draws onto what they fit: a plug into its seat, a lid onto its rim.
+
+Faces that lie on each other hold as joints do, as long as contact forces push. So where faces of bodies nearly fit,
+the objective is made least with joints in the place of contacts: a solve of few steps, in which no row comes or goes.
+At its end the objective's slope has to be a sum of slopes of gaps, none of which counts negatively, and the gaps' rows
+that push have to leave no motion that the joints forbid. Then it is a minimum with clearances as well: there the
+objective rises along every motion that opens a contact, and along those that open none the joints' solve says that it
+does. Faces that nothing pushes onto each other are let go, and it is made least again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from itertools import count
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import nnls
+
+from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.model.constraint import Constraint
+from assembly.constraints.model.joints import Planar
+from assembly.kinematics.pose import rotation_matrix
+from assembly.proximity.clearance.answers import is_proven
+from assembly.proximity.clearance.proof import ClearanceProof
+from assembly.proximity.manifolds.closed_gaps import closed_gaps
+from assembly.solve.attempts.attempts import as_it_stands
+from assembly.solve.clearance_proof import PairAnswer, can_prove, lent_proof
+from assembly.solve.interruption import Interruption
+from assembly.solve.loop.settings import (
+    ALLOWED_OVERLAP,
+    DUAL,
+    FEASIBILITY,
+    FIT,
+    GATHER,
+    NEVER,
+    SOLVED,
+    STATIONARITY,
+    UNSURE,
+)
+from assembly.solve.scene import Status
+from assembly.solve.second_order.dense import LocalModel, null_space
+from assembly.solve.second_order.leave import Fit
+from assembly.solve.solution import Solution
+from assembly.solve.start_proof import is_for_proofs
+from assembly.studies.seated import NearFit, drop_farthest, fits
+from assembly.studies.standing_start import with_contacts
+
+if TYPE_CHECKING:
+    from assembly.assembly import Assembly
+
+__all__ = ["Prove", "resting"]
+
+Array = NDArray[np.float64]
+# Two bodies, and whether it is their flat faces that lie on each other.
+Side = tuple[int, int, bool]
+Prove = Callable[[Array, float], list[PairAnswer] | None]
+# [of the objective's slope] What contact forces may leave of it: the joints' solve holds 1e-10 of a largest one of 1.
+BALANCED = 1e-9
+# A force that is stronger pushes, in parts of the objective's slope.
+PUSHES = 1e-7
+
+
+def resting(
+    scene: Assembly,
+    poses: Array,
+    reference: Array,
+    prove: Prove,
+    settings: Array,
+    starts: Mapping[str, ArrayLike] | None,
+    interruption: Interruption,
+) -> Solution | None:
+    """The solution of a scene with clearances and an objective at which bodies rest on what they fit near poses (n, 7).
+
+    None where they do not fit, where what they fit would have to pull, and where it is not proven that they are clear.
+
+    Parameters
+    ----------
+    scene : Assembly
+    poses, reference : (n, 7)
+        Where to begin, and what moves are measured from.
+    prove : callable
+        What is proven of the scene's pairs at a state, for what is called touching; None where that is too little.
+    settings : array
+        What the loop is told.
+    starts : mapping of constraint name -> (4,), optional
+    interruption : Interruption
+    """
+    packed = scene.packed()
+    if scene._scene is None or packed.corners or not (can_prove(packed) and is_for_proofs(packed)):
+        return None
+    begin = perf_counter()
+    touching = float(settings[ALLOWED_OVERLAP])
+    with lent_proof(packed, scene.bodies) as proof:
+        near = [
+            proof.pairs[k]
+            for k, answer in enumerate(proof.look(poses, touching * packed.scale))
+            if not is_proven(answer)
+        ]
+    others = [item for item in scene.constraints if not isinstance(item, Clearance)]
+    taken = {item.name for item in others}
+    names = (name for name in map("fit {}".format, count()) if name not in taken)
+    held: list[NearFit] = []
+    sides: dict[Constraint, Side] = {}
+    for a, b in near:
+        for fit in fits((scene.bodies[a], scene.bodies[b]), poses[[a, b]], names):
+            held.append(fit)
+            sides[fit.joint] = (a, b, isinstance(fit.joint, Planar))
+    settings = settings.copy()
+    settings[GATHER] = NEVER
+    while held and not interruption.is_over():
+        joints = [fit.joint for fit in held]
+        inner = _with_joints(scene, others, joints)
+        there = inner._solved(settings, poses, starts, interruption, reference)
+        if not there.success:
+            if there.status is Status.UNBOUNDED or not drop_farthest(held, there.violations):
+                return None
+            continue
+        model = LocalModel.at(there._packed, there._state)
+        if model is None or len(model.jacobian) != there._packed.rows:
+            return None
+        is_joint = there._packed.owners >= len(others)
+        with lent_proof(packed, scene.bodies) as proof:
+            of_joints = [sides[joints[owner - len(others)]] for owner in there._packed.owners[is_joint]]
+            closed = _slopes(proof, there, touching * packed.scale)
+            pushing = _pushing(closed, model, is_joint, of_joints)
+        if pushing is None:
+            return None
+        if pushing.issuperset(of_joints):
+            solution = _proven(scene, there, prove, settings, starts, interruption)
+            if solution is not None:
+                solution.seconds = perf_counter() - begin
+            return solution
+        poses, held = there.q.copy(), [fit for fit in held if sides[fit.joint] in pushing]
+    return None
+
+
+def _with_joints(scene: Assembly, others: Sequence[Constraint], joints: Sequence[Constraint]) -> Assembly:
+    """The bodies and objectives of a scene, with joints in the place of clearances."""
+    inner = type(scene)(scene.bodies)
+    inner._take_constraints([*others, *joints])
+    for sign, objective in scene.objectives:
+        (inner.minimize if sign > 0.0 else inner.maximize)(objective)
+    return inner
+
+
+def _pushing(
+    closed: tuple[Array, list[Side]], model: LocalModel, is_joint: NDArray[np.bool_], of_joints: list[Side]
+) -> set[Side] | None:
+    """The pairs whose contacts push where joints stand for them; None where these hold what contacts would not.
+
+    Slopes of closed gaps and the pair of each are given, and which rows of a model are those of joints, of which pairs.
+    """
+    slopes, owners = closed
+    if not len(slopes):
+        return None
+    kept = null_space(model.jacobian[~is_joint & model.touching], len(model.gradient))
+    goal, slopes = kept.T @ model.gradient, slopes @ kept
+    size = max(float(np.linalg.norm(goal)), PUSHES)
+    forces, left = nnls(slopes.T, goal)
+    if left > BALANCED * max(1.0, size):
+        return None
+    strong = forces * np.linalg.norm(slopes, axis=1) > PUSHES * size
+    pushing = {owners[k] for k in np.flatnonzero(strong)}
+    # Rows against rows that push hold, too: both sides of a bore.
+    loose = null_space(slopes[strong], slopes.shape[1])
+    held = strong | (np.linalg.norm(slopes @ loose, axis=1) < PUSHES) | _opposed(slopes @ loose)
+    free = null_space(slopes[held], slopes.shape[1])
+    own = [side in pushing for side in of_joints]
+    forbidden = model.jacobian[is_joint][own] @ kept @ free
+    return pushing if np.abs(forbidden).max(initial=0.0) < 1e-6 else None
+
+
+def _opposed(slopes: Array) -> NDArray[np.bool_]:
+    """Which rows no motion opens that closes none of the others: less than each is a sum of the others."""
+    found = np.zeros(len(slopes), dtype=bool)
+    for k, slope in enumerate(slopes):
+        size = float(np.linalg.norm(slope))
+        if size >= PUSHES and not found[k]:
+            forces, left = nnls(slopes.T, -slope)
+            if left < PUSHES * size:
+                found[k] = True
+                found |= forces * np.linalg.norm(slopes, axis=1) > PUSHES * size
+    return found
+
+
+def _slopes(proof: ClearanceProof, there: Solution, touching: float) -> tuple[Array, list[Side]]:
+    """Slopes of gaps that are closed, in the unknowns of a solve, and the pair of bodies of each."""
+    q, scale = there.q, there._packed.scale
+    moving = [k for k, body in enumerate(there._scene.bodies) if not body.fixed]
+    column = {k: 6 * i for i, k in enumerate(moving)}
+    blocks: list[Array] = [np.empty((0, 6 * len(moving)))]
+    owners: list[Side] = []
+    for k, (a, b) in enumerate(proof.pairs):
+        least = float(proof.minimum[k])
+        shapes = (proof.faces[a], proof.faces[b])
+        normals, places, is_flat = closed_gaps(shapes, *proof.relative(k, q), (least - touching, least + touching))
+        turn = rotation_matrix(q[a, 3:])
+        normals, places = normals @ turn.T, places @ turn.T + q[a, :3]
+        block = np.zeros((len(normals), 6 * len(moving)))
+        for body, sign in ((a, -1.0), (b, 1.0)):
+            if body in column:
+                arms = (places - q[body, :3]) / scale
+                block[:, column[body] :][:, :6] = sign * np.hstack([normals, np.cross(arms, normals)])
+        blocks.append(block)
+        owners += [(a, b, bool(flat)) for flat in is_flat]
+    return np.concatenate(blocks), owners
+
+
+def _proven(
+    scene: Assembly,
+    there: Solution,
+    prove: Prove,
+    settings: Array,
+    starts: Mapping[str, ArrayLike] | None,
+    interruption: Interruption,
+) -> Solution | None:
+    """The solution of a scene where bodies rest, if its rows hold there and it is proven that bodies are clear."""
+    packed = scene.packed()
+    settings = settings.copy()
+    settings[STATIONARITY] = np.inf
+    code, state, history, *_ = as_it_stands(packed, interruption, settings, scene._start(packed, there.q, starts))
+    touching = float(settings[ALLOWED_OVERLAP])
+    answers = prove(state, touching) if code in (SOLVED, UNSURE) else None
+    if answers is None or interruption.is_over() or scene._scene is None:
+        return None
+    state[packed.results_at + DUAL] = there.stationarity
+    fit = Fit(float(settings[FIT]))
+    solution = Solution(scene._scene, packed, state, Status.SOLVED, 0.0, history, there.second_order, fit)
+    solution._touching, solution._clear = touching, answers
+    solution._lists = partial(with_contacts, scene)
+    # Samples stand for a proof where faces lie on each other: there rows are asked as well.
+    held = solution.proved or solution.feasibility <= float(settings[FEASIBILITY]) * packed.scale
+    return solution if held else None

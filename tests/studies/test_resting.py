@@ -1,0 +1,86 @@
+"""An objective that draws bodies onto what they fit, and what is seated where faces contradict each other."""
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.proximity.manifolds.closed_gaps import closed_gaps
+from assembly.solve.interruption import CTRL_C
+from assembly.studies.seated import seated
+
+
+def bolt_drawn_down(force=-3.0):
+    """A headed bolt 0.5 free in its hole, drawn down by points of its head: the only answer is flush."""
+    plate = asm.Body("plate", asm.shapes.plate(40, 40, 10, [(0, 0, 4.5)]), fixed=True)
+    head = asm.shapes.plate(20, 20, 4, [(0, 0, 4.0)])
+    ring = asm.Body("ring", head, position=(0.3, -0.2, 40.0), quaternion=(0.999, 0.02, -0.03, 0.0))
+    scene = asm.Assembly([plate, ring])
+    scene.constrain(asm.Clearance())
+    corners = ((9.0, 9.0), (-9.0, 9.0), (9.0, -9.0), (-9.0, -9.0))
+    scene.minimize(*(asm.PointDistance(ring.point(x, y, -2.0), (x, y, 5.0 + force)) for x, y in corners))
+    return scene
+
+
+def test_what_is_drawn_into_what_it_fits_rests_on_it():
+    solution = bolt_drawn_down().solve()
+    assert solution.success and solution.proved
+    # Flush, where points are 3 below it: each of the four distances is 3.
+    assert solution.q[1] == pytest.approx([0, 0, 7, 1, 0, 0, 0], abs=1e-9)
+    assert solution.objective == pytest.approx(4 * 9.0, rel=1e-9)
+    assert solution.put_together
+
+
+def test_what_is_drawn_away_is_not_held():
+    solution = bolt_drawn_down(force=2.0).solve()
+    assert solution.success
+    assert solution.q[1, 2] == pytest.approx(9.0, abs=1e-9)
+
+
+def test_rows_of_a_ball_in_its_socket_are_its_slopes():
+    ball = asm.Body("ball", asm.shapes.sphere(2.0))
+    hollow = [asm.Face(face.surface, face.outer, face.holes, reversed=not face.reversed) for face in _faces(ball)]
+    socket = asm.Body("socket", hollow)
+    shapes = (tuple(_faces(socket)), tuple(_faces(ball)))
+    normals, places, is_flat = closed_gaps(shapes, np.eye(3), np.zeros(3), (-1e-9, 1e-9))
+    assert len(normals) > 40 and not is_flat.any()
+    assert places == pytest.approx(-2.0 * normals, abs=1e-12)
+    # A ball that is moved by v is nearer to the wall along u by u.v: the gap's slope is -u.
+    step = 1e-6 * np.array([0.3, -0.5, 0.8])
+    outward = places / 2.0
+    gaps = 2.0 - np.array([np.linalg.norm(step + 2.0 * u) for u in outward])
+    assert gaps == pytest.approx(normals @ step, abs=1e-11)
+    # With play there are none that are closed.
+    assert not len(closed_gaps(shapes, np.eye(3), np.array([1e-3, 0, 0]), (-1e-9, 1e-9))[0])
+
+
+def _faces(body):
+    return [face.face for face in body.faces]
+
+
+def test_flat_faces_that_others_keep_apart_are_not_seated():
+    # A boss 3 high in a recess 3.5 deep: the flange lies on the rim, the boss does not reach the floor.
+    def stepped(step):
+        outline = [(-20, 0), (-20, -8), (20, -8), (20, 0), (8, 0), (8, step), (-8, step), (-8, 0)]
+        return _prism(outline)
+
+    lower = asm.Body("lower", stepped(-3.5), fixed=True)
+    upper = asm.Body(
+        "upper", _prism([(-20, 0), (-7.9, 0), (-7.9, -3), (7.9, -3), (7.9, 0), (20, 0), (20, 6), (-20, 6)])
+    )
+    scene = asm.Assembly([lower, upper])
+    scene.constrain(asm.Clearance())
+    poses = np.array([[0, 0, 0, 1, 0, 0, 0], [0.02, -0.3, 0.2, 0.99999, 0, 0, 0.002]], dtype=float)
+    poses[1, 3:] /= np.linalg.norm(poses[1, 3:])
+    seat = seated(scene, poses, 1e-9, CTRL_C)
+    assert seat is not None
+    assert seat[1, 1] == pytest.approx(0.0, abs=1e-9)
+    assert seat[1, 3] == pytest.approx(1.0, abs=1e-9)
+
+
+def _prism(points):
+    curves = []
+    for k, point in enumerate(points):
+        ends = np.array([point, points[(k + 1) % len(points)]], dtype=float)
+        length = float(np.linalg.norm(ends[1] - ends[0]))
+        curves.append(asm.NurbsCurve(ends, [0.0, 0.0, length, length], 1))
+    return asm.shapes.extrusion(curves, 30.0)
