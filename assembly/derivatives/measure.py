@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import dist
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ from assembly.constraints.model.contact import Contact
 from assembly.constraints.model.joint import Joint
 from assembly.errors import InputError, text
 from assembly.kinematics.body import Body, Frame, Point
-from assembly.kinematics.pose import rotation_of
 from assembly.solve.solution import Solution
 
 __all__ = ["Measure"]
@@ -94,7 +94,7 @@ class Measure:
         sides = self.thing if self.kind == "distance" else (self.thing,)
         rows = [solution.q[solution._scene.index(place_of(side)[0])] for side in sides]
         places = [_place(side, row) for side, row in zip(sides, rows, strict=True)]
-        return float(np.linalg.norm(places[1] - places[0])) if len(places) == 2 else float(places[0][self.axis])
+        return dist(*places) if len(places) == 2 else places[0][self.axis]
 
     def __repr__(self) -> str:
         return f"Measure({self.name!r})"
@@ -107,10 +107,23 @@ def place_of(thing: Point | Frame | Body) -> tuple[Body, Array]:
     return thing.body, thing.coordinates if isinstance(thing, Point) else thing.origin
 
 
-def _place(thing: Point | Frame | Body, row: Array) -> Array:
-    """Where a place is, with its body at the pose row (7,)."""
-    result: Array = row[:3] + rotation_of(row[3:]) @ place_of(thing)[1]
-    return result
+def _place(thing: Point | Frame | Body, row: Array) -> tuple[float, float, float]:
+    """Where a place is, with its body at the pose row (7,).
+
+    In plain floats: arrays this small take five times the time.
+    """
+    p1, p2, p3, w, x, y, z = row.tolist()
+    if isinstance(thing, Body):
+        return p1, p2, p3
+    v1, v2, v3 = place_of(thing)[1].tolist()
+    # v + w t + u x t, where t = 2 u x v / |e|^2.
+    part = 2.0 / (w * w + x * x + y * y + z * z)
+    t1, t2, t3 = part * (y * v3 - z * v2), part * (z * v1 - x * v3), part * (x * v2 - y * v1)
+    return (
+        p1 + (v1 + w * t1 + (y * t3 - z * t2)),
+        p2 + (v2 + w * t2 + (z * t1 - x * t3)),
+        p3 + (v3 + w * t3 + (x * t2 - y * t1)),
+    )
 
 
 def world(thing: Point | Frame | Body, position: Array, rotation: Array) -> tuple[Array, Array]:

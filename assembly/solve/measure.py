@@ -1,4 +1,4 @@
-"""Coordinates of joints by their definitions, in plain numpy: what the rows of a pose are judged by.
+"""Coordinates of joints by their definitions, in plain floats: what the rows of a pose are judged by.
 
 The definitions are those of `constraints/program/primitives.py`; nothing is shared with its code but the names of the
 kinds.
@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import atan2, hypot, pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,73 +27,92 @@ from assembly.constraints.program.primitives import (
     TURN,
 )
 from assembly.kinematics.body import Frame
-from assembly.kinematics.pose import rotation_of
 
 __all__ = ["JointRow", "Near", "Standing", "measure", "standing"]
 
 Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
 # A number near every angle in a plane: it tells its turn.
 Near = Mapping[Coordinate, float]
 # The cosine and the sine part of an angle that has no value; and the sine of a swing whose direction has none.
 _POLE, _UNDEFINED = 1e-12, 1e-12
 
 
-@dataclass(frozen=True, eq=False)
-class Standing:
-    """How two frames stand in the world: p_b - p_a, and the axes of each as columns."""
+class Standing(NamedTuple):
+    """How two frames stand in the world: p_b - p_a, and the x, y and z axis of each."""
 
-    apart: Array
-    a: Array
-    b: Array
+    apart: Vector
+    a: tuple[Vector, Vector, Vector]
+    b: tuple[Vector, Vector, Vector]
 
 
 def standing(coordinate: Coordinate, q: Array, places: tuple[int, int]) -> Standing:
     """The frames of a coordinate whose bodies are rows `places` of q, (n, 7)."""
-
-    def arm_and_axes(frame: Frame, row: Array) -> tuple[Array, Array]:
-        turn = rotation_of(row[3:])
-        return turn @ frame.origin, turn @ frame.axes
-
     pair, (i, j) = coordinate.frames, places
-    (arm_a, a), (arm_b, b) = arm_and_axes(pair.frame_a, q[i]), arm_and_axes(pair.frame_b, q[j])
+    (place_a, arm_a, a), (place_b, arm_b, b) = _in_world(pair.frame_a, q[i]), _in_world(pair.frame_b, q[j])
     # Positions are subtracted first: a common offset cancels.
-    return Standing((q[j, :3] - q[i, :3]) + (arm_b - arm_a), a, b)
+    x, y, z = ((pb - pa) + (qb - qa) for pa, pb, qa, qb in zip(place_a, place_b, arm_a, arm_b, strict=True))
+    return Standing((x, y, z), a, b)
+
+
+def _in_world(frame: Frame, row: Array) -> tuple[Vector, Vector, tuple[Vector, Vector, Vector]]:
+    """Where a frame's body is, from there to the frame's origin, and the frame's axes.
+
+    In plain floats: arrays this small take four times the time.
+    """
+    p1, p2, p3, w, x, y, z = row.tolist()
+    part = 2.0 / (w * w + x * x + y * y + z * z)
+    diagonal = 1.0 - part * (x * x + y * y + z * z)
+    xy, xz, yz = part * x * y, part * x * z, part * y * z
+    wx, wy, wz = part * w * x, part * w * y, part * w * z
+    m11, m22, m33 = diagonal + part * x * x, diagonal + part * y * y, diagonal + part * z * z
+    m12, m13, m21, m23, m31, m32 = xy - wz, xz + wy, xy + wz, yz - wx, xz - wy, yz + wx
+    arm, *axes = [
+        (m11 * v1 + m12 * v2 + m13 * v3, m21 * v1 + m22 * v2 + m23 * v3, m31 * v1 + m32 * v2 + m33 * v3)
+        for v1, v2, v3 in (frame.origin.tolist(), *frame.axes.T.tolist())
+    ]
+    return (p1, p2, p3), arm, (axes[0], axes[1], axes[2])
+
+
+def _dot(u: Vector, v: Vector) -> float:
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
 def _polar(coordinate: Coordinate, frames: Standing) -> tuple[float, float]:
     """Sine and cosine part, of one common length, of a coordinate that is an angle in a plane."""
     a, b = frames.a, frames.b
     if coordinate.kind == TURN:
-        return float(a[:, 1] @ b[:, 0] - a[:, 0] @ b[:, 1]), float(a[:, 0] @ b[:, 0] + a[:, 1] @ b[:, 1])
+        return _dot(a[1], b[0]) - _dot(a[0], b[1]), _dot(a[0], b[0]) + _dot(a[1], b[1])
     if coordinate.kind == AZIMUTH:
-        along = b[:, coordinate.component]
-        return float(a[:, 1] @ along), float(a[:, 0] @ along)
+        along = b[coordinate.component]
+        return _dot(a[1], along), _dot(a[0], along)
     assert coordinate.kind == ANGLE
-    return float(np.linalg.norm(np.cross(a[:, 2], b[:, 2]))), float(a[:, 2] @ b[:, 2])
+    (x, y, z), (u, v, w) = a[2], b[2]
+    return hypot(y * w - z * v, z * u - x * w, x * v - y * u), _dot(a[2], b[2])
 
 
 def _swing(component: int, frames: Standing) -> float:
     """The turn from z_a to z_b as a vector, of which this is the part along an axis of a; opposed, it is along x."""
-    across = frames.a[:, :2].T @ frames.b[:, 2]
-    cosine, sine = float(frames.a[:, 2] @ frames.b[:, 2]), float(np.linalg.norm(across))
+    across = _dot(frames.a[0], frames.b[2]), _dot(frames.a[1], frames.b[2])
+    cosine, sine = _dot(frames.a[2], frames.b[2]), hypot(*across)
     if sine > _UNDEFINED:
-        return atan2(sine, cosine) * float(across[component]) / sine
-    return float(across[component]) if cosine > 0.0 else pi * (component == 0)
+        return atan2(sine, cosine) * across[component] / sine
+    return across[component] if cosine > 0.0 else pi * (component == 0)
 
 
 def measure(coordinate: Coordinate, frames: Standing, near: float = 0.0) -> float:
     """The value of a coordinate; of an angle in a plane the one within pi of `near`."""
     kind, component = coordinate.kind, coordinate.component
     if kind == COINCIDENT:
-        return float(frames.apart[component])
+        return frames.apart[component]
     if kind == SLIDE:
-        return float(frames.a[:, component] @ frames.apart)
+        return _dot(frames.a[component], frames.apart)
     if kind == DISTANCE:
-        return float(np.linalg.norm(frames.apart))
+        return hypot(*frames.apart)
     if kind == RADIUS:
-        return hypot(*(frames.a[:, :2].T @ frames.apart).tolist())
+        return hypot(_dot(frames.a[0], frames.apart), _dot(frames.a[1], frames.apart))
     if kind == DOT:
-        return float(frames.a[:, component // 3] @ frames.b[:, component % 3])
+        return _dot(frames.a[component // 3], frames.b[component % 3])
     if kind == SWING:
         return _swing(component, frames)
     sine, cosine = _polar(coordinate, frames)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from itertools import chain
 from math import frexp, hypot, sqrt
 
@@ -111,8 +112,9 @@ def _longest(boxes: Sequence[tuple[float, float, float]]) -> float:
     return max([_diagonal(box) for box, about in zip(boxes, rough, strict=True) if about >= near])
 
 
+@lru_cache(64)
 def _diagonal(box: tuple[float, float, float]) -> float:
-    """Its diagonal, to the bits of `pose.length`."""
+    """Its diagonal, to the bits of `pose.length`. The longest often is the same as before."""
     unit = 2.0 ** (frexp(max(box))[1] - 1)
     sides = np.array(box) / unit
     return unit * sqrt(sides.dot(sides))

@@ -265,13 +265,14 @@ class Rows:
                 continue
             for (_, coordinate), places in zip(row.equation.terms, row.places, strict=True):
                 frames, kind = standing(coordinate, q, places), coordinate.kind
-                cosine = float(frames.a[:, 2] @ frames.b[:, 2])
+                a, z_b = np.array(frames.a), np.array(frames.b[2])
+                cosine = float(a[2] @ z_b)
                 # The only dot product of joints is that of the z axes.
                 turns = cosine < -_STEEP if kind == SWING else kind in (DOT, ANGLE) and abs(cosine) > _STEEP
                 parts = kind in (DISTANCE, RADIUS) and measure(coordinate, frames) < _FLAT * self._scale
                 if turns or parts:
-                    away = frames.a[:, 0 if kind == RADIUS else 2]
-                    twist = [parts * self._scale * away, turns * frames.a[:, 1]]
+                    away = a[0 if kind == RADIUS else 2]
+                    twist = [parts * self._scale * away, turns * a[1]]
                     self._move(q, places, _NUDGE * np.concatenate(twist))
         return q
 
