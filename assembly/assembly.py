@@ -401,6 +401,22 @@ class Assembly(PackedContents):
 
         return solve_many(self, q0s, parameters, of, threads, retry, options)
 
+    def at(self, values: Mapping[str, float]) -> Array:
+        """Poses (n, 7) at which joints have these values, of freedoms by the names of `Solution.values`: a start `q0`.
+
+        Others have what they are driven to, or what they have where the bodies stand. Loops are closed, where they
+        close from there and joints alone close them; else each body is where the joints between it and the ground
+        with the fewest freedoms carry it.
+
+        Raises
+        ------
+        InputError, TypeError
+            Unknown names, values beyond limits, freedoms that place no body.
+        """
+        from assembly.studies.branches.joint_poses import poses_at
+
+        return poses_at(self, values)
+
     def tracker(self, follow: Point | Frame | Body, **options: Any) -> Tracker:
         """What follows a hand that holds a point or a frame of a body.
 
