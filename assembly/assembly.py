@@ -401,12 +401,12 @@ class Assembly(PackedContents):
 
         return solve_many(self, q0s, parameters, of, threads, retry, options)
 
-    def tracker(self, follow: Point | Frame | Body, **options: Any) -> Tracker:
-        """What follows a hand that holds a point or a frame of a body.
+    def tracker(self, follow: Point | Frame | Body | Sequence[Point | Frame | Body], **options: Any) -> Tracker:
+        """What follows a hand that holds a point or a frame of a body, or several hands.
 
         Parameters
         ----------
-        follow : Point, Frame or Body
+        follow : Point, Frame or Body, or a list of them
         **options
             See `Tracker`.
         """

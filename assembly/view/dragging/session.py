@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._read_only import ReadOnlyArrays
 from assembly.assembly import Assembly
 from assembly.errors import AssemblyError, InputError, positive
-from assembly.kinematics.body import Body
+from assembly.kinematics.body import Frame, Point
 from assembly.kinematics.pose import Pose
 from assembly.solve.solution import Solution
 from assembly.tracking.tick import Step
@@ -115,6 +115,7 @@ class Session(threading.Thread):
         self._start = first.q
         self._calls: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._tracker: Tracker | None = None
+        self._follow: Point | Frame | None = None
         self._pointer: Pointer | None = None
         self._undone: list[Array] = []
         self._records: list[tuple[float, Array, Array]] | None = None
@@ -174,6 +175,7 @@ class Session(threading.Thread):
         follow = body.frame() if at is None else body.point(*pose.inverse().apply(at))
         self._remember()
         self._frames = None
+        self._follow = follow
         self._tracker = self.scene.tracker(follow, q0=q, stiffness=self._stiffness)
         start = row.copy() if at is None else np.array(at, dtype=np.float64)
         self._pointer = Pointer(start, perf_counter())
@@ -200,9 +202,9 @@ class Session(threading.Thread):
         step = self._tracker.step(target)
         if self._records is not None:
             self._records.append((now, target, step.q))
-        follow = self._tracker.follow
-        body = follow if isinstance(follow, Body) else follow.body
-        row = step.q[self.scene.bodies.index(body)]
+        follow = self._follow
+        assert follow is not None
+        row = step.q[self.scene.bodies.index(follow.body)]
         place = Pose(row[:3], row[3:]).apply(getattr(follow, "coordinates", np.zeros(3)))
         contacts = self.shown.contacts
         if now - self._looked > CONTACTS_EVERY:
