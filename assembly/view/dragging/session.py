@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from queue import Empty, SimpleQueue
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -82,6 +83,15 @@ class Shown(ReadOnlyArrays):
     ticks: int = 0
 
 
+class _Record(NamedTuple):
+    """A tick that was recorded: when, toward where, at which poses, and in which drag."""
+
+    time: float
+    target: Array
+    q: Array
+    drag: int
+
+
 class Session(threading.Thread):
     """Runs a scene that is dragged.
 
@@ -116,10 +126,11 @@ class Session(threading.Thread):
         self._calls: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._tracker: Tracker | None = None
         self._follow: Point | Frame | None = None
+        self._drags = 0
         self._pointer: Pointer | None = None
         self._undone: list[Array] = []
-        self._records: list[tuple[float, Array, Array]] | None = None
-        self._recorded: list[tuple[float, Array, Array]] = []
+        self._records: list[_Record] | None = None
+        self._recorded: list[_Record] = []
         # Poses that are being played, or None.
         self._frames: Iterator[Array] | None = None
         self._looked = 0.0
@@ -173,10 +184,12 @@ class Session(threading.Thread):
         row = q[self.scene.bodies.index(body)]
         pose = Pose(row[:3], row[3:])
         follow = body.frame() if at is None else body.point(*pose.inverse().apply(at))
+        # It may raise: nothing is taken then.
+        tracker = self.scene.tracker(follow, q0=q, stiffness=self._stiffness)
         self._remember()
         self._frames = None
-        self._follow = follow
-        self._tracker = self.scene.tracker(follow, q0=q, stiffness=self._stiffness)
+        self._follow, self._tracker = follow, tracker
+        self._drags += 1
         start = row.copy() if at is None else np.array(at, dtype=np.float64)
         self._pointer = Pointer(start, perf_counter())
         place = start[:3]
@@ -201,7 +214,7 @@ class Session(threading.Thread):
         target = self._pointer.at(now)
         step = self._tracker.step(target)
         if self._records is not None:
-            self._records.append((now, target, step.q))
+            self._records.append(_Record(now, target, step.q, self._drags))
         follow = self._follow
         assert follow is not None
         row = step.q[self.scene.bodies.index(follow.body)]
@@ -261,12 +274,11 @@ class Session(threading.Thread):
             self.shown = replace(self.shown, q=self._start, contacts=(), status="back at the start")
 
     def record(self, on: bool) -> None:
-        """Begin to record what the hand does, anew, or end it."""
-        if on:
+        """Begin to record what the hand does, anew, or end it; what is asked for twice, by two browsers say, is one."""
+        if on and self._records is None:
             self._records = []
-        else:
-            self._recorded = self._records or []
-            self._records = None
+        elif not on and self._records is not None:
+            self._recorded, self._records = self._records, None
 
     def play(self, on: bool) -> None:
         """Show what was recorded, tick by tick, from its beginning; or stop there."""
@@ -288,8 +300,8 @@ class Session(threading.Thread):
         rows = self._recorded if self._records is None else self._records
         if not rows:
             return np.empty(0), np.empty((0, len(self.scene.bodies), 7))
-        times, _, poses = zip(*rows, strict=True)
-        return np.array(times) - times[0], np.array(poses)
+        times = np.array([row.time for row in rows])
+        return times - times[0], np.array([row.q for row in rows])
 
     @property
     def trace(self) -> Trace:
@@ -303,9 +315,11 @@ class Session(threading.Thread):
         rows = self._recorded if self._records is None else self._records
         if len(rows) < 2:
             raise InputError(f"{len(rows)} ticks were recorded; expected two at least")
-        last = len(rows[-1][1])
-        kept = [row for row in rows if len(row[1]) == last]
-        return Trace(np.array([row[0] for row in kept]) - kept[0][0], np.array([row[1] for row in kept]))
+        kept = [row for row in rows if row.drag == rows[-1].drag]
+        if len(kept) < 2:
+            raise InputError("1 tick of the last drag was recorded; expected two at least")
+        times = np.array([row.time for row in kept])
+        return Trace(times - times[0], np.array([row.target for row in kept]))
 
 
 def _contacts(solution: Solution) -> tuple[tuple[Array, Array], ...]:
