@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from queue import Empty, SimpleQueue
 from time import perf_counter
@@ -66,6 +66,8 @@ class Shown(ReadOnlyArrays):
         Of the last tick, or of the last solve.
     contacts : tuple of ((3,), (3,))
         Points and normals of contacts.
+    values : dict of str -> float
+        Coordinates of joints by their names, those of some tenths of a second ago at most.
     ticks : int
         Since the beginning.
     """
@@ -80,6 +82,7 @@ class Shown(ReadOnlyArrays):
     violation: float = 0.0
     seconds: float = 0.0
     contacts: tuple[tuple[Array, Array], ...] = ()
+    values: Mapping[str, float] = field(default_factory=dict)
     ticks: int = 0
 
 
@@ -121,7 +124,9 @@ class Session(threading.Thread):
         first = scene.solve(q0)
         if not first.success:
             raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {first.message}")
-        self.shown = Shown(first.q, "SOLVED", contacts=_contacts(first), violation=first.feasibility)
+        self.shown = Shown(
+            first.q, "SOLVED", contacts=_contacts(first), values=first.values, violation=first.feasibility
+        )
         self._start = first.q
         self._calls: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._tracker: Tracker | None = None
@@ -219,9 +224,9 @@ class Session(threading.Thread):
         assert follow is not None
         row = step.q[self.scene.bodies.index(follow.body)]
         place = Pose(row[:3], row[3:]).apply(getattr(follow, "coordinates", np.zeros(3)))
-        contacts = self.shown.contacts
+        contacts, values = self.shown.contacts, self.shown.values
         if now - self._looked > CONTACTS_EVERY:
-            self._looked, contacts = now, _contacts(step.solution)
+            self._looked, contacts, values = now, _contacts(step.solution), step.solution.values
         self.shown = replace(
             self.shown,
             q=step.q,
@@ -232,6 +237,7 @@ class Session(threading.Thread):
             violation=step.feasibility,
             seconds=step.seconds,
             contacts=contacts,
+            values=values,
             ticks=self.shown.ticks + 1,
         )
 
@@ -242,7 +248,7 @@ class Session(threading.Thread):
         """Go to a solution if it is one, else say why not."""
         if solution.success:
             self._remember()
-            self.shown = replace(self.shown, q=solution.q, contacts=_contacts(solution))
+            self.shown = replace(self.shown, q=solution.q, contacts=_contacts(solution), values=solution.values)
         self.shown = replace(
             self.shown, status=solution.message, violation=solution.feasibility, seconds=solution.seconds
         )
@@ -265,13 +271,17 @@ class Session(threading.Thread):
         """Go back to where the bodies were before the last drag, solve or value."""
         if self._tracker is None and self._undone:
             *self._undone, q = self._undone
-            self.shown = replace(self.shown, q=q, contacts=(), status="gone back by one")
+            self._go_back(q, "gone back by one")
 
     def reset(self) -> None:
         """Go to where it all began."""
         if self._tracker is None:
             self._remember()
-            self.shown = replace(self.shown, q=self._start, contacts=(), status="back at the start")
+            self._go_back(self._start, "back at the start")
+
+    def _go_back(self, q: Array, status: str) -> None:
+        at = self.scene.solve(q, max_iterations=0)
+        self.shown = replace(self.shown, q=q, contacts=_contacts(at), values=at.values, status=status)
 
     def record(self, on: bool) -> None:
         """Begin to record what the hand does, anew, or end it; what is asked for twice, by two browsers say, is one."""

@@ -165,8 +165,10 @@ def test_values_and_buttons_wait_until_a_body_is_let_go(crank):
         assert np.array_equal(session.shown.q, turned)
     session.release(1)
     session.reset()
+    assert session.shown.values["hinge.angle"] == pytest.approx(0.0, abs=1e-12)
     session.undo()
     assert np.array_equal(session.shown.q, turned)
+    assert session.shown.values["hinge.angle"] == pytest.approx(0.5, abs=1e-12)
 
 
 def test_the_loop_runs_beside_its_callers_and_ends(ball):
