@@ -417,12 +417,12 @@ class Assembly(PackedContents):
 
         return poses_at(self, values)
 
-    def tracker(self, follow: Point | Frame | Body, **options: Any) -> Tracker:
-        """What follows a hand that holds a point or a frame of a body.
+    def tracker(self, follow: Point | Frame | Body | Sequence[Point | Frame | Body], **options: Any) -> Tracker:
+        """What follows a hand that holds a point or a frame of a body, or several hands.
 
         Parameters
         ----------
-        follow : Point, Frame or Body
+        follow : Point, Frame or Body, or a list of them
         **options
             See `Tracker`.
         """

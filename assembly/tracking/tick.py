@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._read_only import ReadOnlyArrays, read_only
+from assembly.errors import InputError
 from assembly.proximity.manager.events import Event, events_of
 from assembly.proximity.manager.records import EVENT_COUNT
 from assembly.solve.loop.settings import COUNT, CURVED, DUAL, HISTORY, OBJECTIVE, VIOLATION
 from assembly.solve.scene import Status
 from assembly.solve.solution import Solution
 from assembly.tracking.followed import Followed
+from assembly.tracking.hands import Targets
 
 __all__ = ["Step", "TrackStatus"]
 
@@ -53,7 +55,9 @@ class Step(ReadOnlyArrays):
     status : TrackStatus
     force, wrench : (3,), (6,)
         What the assembly exerts on the hand: force, then torque about the followed point, world axes; stiffness times
-        what the hand is ahead.
+        what the hand is ahead. Of several hands they are not one, and `forces` and `wrenches` tell.
+    forces, wrenches : (k, 3), (k, 6)
+        The same for every hand.
     is_minimum : bool or None
         Whether the second derivative along what the constraints leave free is positive definite; None if not asked.
     iterations : int
@@ -75,7 +79,7 @@ class Step(ReadOnlyArrays):
         followed: Followed,
         state: Array,
         status: TrackStatus,
-        target: Array,
+        target: Targets,
         seen: float,
         seconds: float,
         way_depth: float | None = 0.0,
@@ -131,9 +135,22 @@ class Step(ReadOnlyArrays):
         return events_of(self._state[packed.memory_at :], followed.names, packed.scale, int(self._seen))
 
     @cached_property
+    def wrenches(self) -> Array:
+        """Force and torque on every hand, (k, 6)."""
+        return read_only(self._followed.hands.wrenches(self.q, self._target))
+
+    @property
+    def forces(self) -> Array:
+        """Force on every hand, (k, 3)."""
+        return self.wrenches[:, :3]
+
+    @property
     def wrench(self) -> Array:
         """Force and torque on the hand, (6,)."""
-        return read_only(self._followed.wrench(self.q, self._target))
+        if len(self.wrenches) > 1:
+            raise InputError(f"the tracker has {len(self.wrenches)} hands; read forces or wrenches, a row a hand")
+        wrench: Array = self.wrenches[0]
+        return wrench
 
     @property
     def force(self) -> Array:

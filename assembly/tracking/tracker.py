@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from time import perf_counter, sleep
 from typing import TYPE_CHECKING, Any
 
@@ -12,15 +13,13 @@ from assembly._copies import InOneProcess
 from assembly._read_only import read_only
 from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import structure_changes
-from assembly.constraints.model.objectives import FrameDistance, PointDistance
 from assembly.constraints.packing.corners import body_of
 from assembly.constraints.packing.renumbered import numbers_told
 from assembly.constraints.packing.scene import structure_of
 from assembly.constraints.program.records import CLOCK_AT, MANAGER_RECORD
-from assembly.errors import FARTHEST, InputError, integer, number, positive
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.errors import InputError, integer, number, positive
 from assembly.kinematics.changes import changes
-from assembly.kinematics.pose import Pose, axes_quaternion
+from assembly.kinematics.pose import Pose
 from assembly.proximity.features.solid_contact import STAYS, TRACK
 from assembly.proximity.manager.records import (
     CLOCK,
@@ -59,6 +58,7 @@ from assembly.solve.scene import Scene, Status
 from assembly.solve.solution import Solution
 from assembly.tracking.clear_ticks import ClearTicks
 from assembly.tracking.followed import Followed
+from assembly.tracking.hands import Followable, new_hands, springs, with_hands
 from assembly.tracking.log import TrackLog
 from assembly.tracking.tick import Step, TrackStatus
 from assembly.tracking.trace import Trace
@@ -105,28 +105,6 @@ def _begin(scene: Assembly, q0: ArrayLike | Solution | None, touching: float) ->
     return scene.q if q0 is None else scene.solve(q0, max_iterations=0).q
 
 
-def _hand_at(follow: Point | Frame | Body, row: Array, weight: float) -> PointDistance | FrameDistance:
-    """The spring to where what it holds is now, on a body whose pose is a row."""
-    pose = Pose(row[:3], row[3:])
-    if isinstance(follow, Point):
-        return PointDistance(follow, pose.apply(follow.coordinates), weight)
-    hand = FrameDistance(follow, pose, weight=weight)
-    hand.target = pose @ Pose(hand.frame.origin, axes_quaternion(hand.frame.axes))
-    return hand
-
-
-def _with_hand(scene: Assembly, hand: PointDistance | FrameDistance) -> Assembly:
-    """The same scene with one more objective."""
-    inner = Assembly(scene.bodies)
-    inner._take_constraints(scene.constraints)
-    for sign, objective in scene.objectives:
-        (inner.minimize if sign > 0.0 else inner.maximize)(objective)
-    inner.minimize(hand)
-    # Solids that lie on each other go on doing so.
-    inner._corners = scene._corners
-    return inner
-
-
 def _tick_settings(limit: float, iterations: int, second_order: bool) -> Array:
     """What a tick is asked for."""
     settings = Options().settings(warm=True)
@@ -142,7 +120,7 @@ def _tick_settings(limit: float, iterations: int, second_order: bool) -> Array:
 
 
 class Tracker(InOneProcess):
-    """Follows a hand that holds a point or a frame of a body: made by `Assembly.tracker`.
+    """Follows hands that hold points or frames of bodies: made by `Assembly.tracker`.
 
     Every tick is a few steps of the loop that `solve` runs, from the pose and the multipliers of the tick before. The
     hand is a spring: it draws the point by `stiffness` times the distance, and the constraints hold all the time. Other
@@ -154,12 +132,13 @@ class Tracker(InOneProcess):
     scene : Assembly
         Its bodies, constraints and objectives as they are now; driven values and limits may change between ticks, but
         none may come or go.
-    follow : Point, Frame or Body
-        What the hand holds. A target is a point (3,) for a `Point`, a pose (7,) or a `Pose` for the others.
+    follow : Point, Frame or Body, or a list of them
+        What the hand holds, or each of several hands. A target is a point (3,) for a `Point`, a pose (7,) or a `Pose`
+        for the others; of a list it is a sequence of such targets in its order.
     q0 : (n, 7) or Solution, optional
         Where to begin; the bodies' poses by default. The constraints are solved from there, the hand at rest.
-    stiffness : float
-        Force over distance.
+    stiffness : float or sequence of float
+        Force over distance; one for each hand, or one for all.
     budget : float, optional
         Seconds after which the compiled loop of a tick begins nothing more; what is not done then the next tick goes on
         with. Without one it takes what it needs.
@@ -184,33 +163,27 @@ class Tracker(InOneProcess):
     def __init__(
         self,
         scene: Assembly,
-        follow: Point | Frame | Body,
+        follow: Followable | Sequence[Followable],
         *,
         q0: ArrayLike | Solution | None = None,
-        stiffness: float = 1.0,
+        stiffness: float | Sequence[float] = 1.0,
         budget: float | None = None,
         iterations: int = 2,
         tolerance: float = 1e-12,
         second_order: bool = False,
         touching: float = 1e-9,
     ) -> None:
-        weight = 0.5 * positive("stiffness", stiffness)
-        if not isinstance(follow, (Point, Frame, Body)):
-            raise TypeError(f"follow is {follow!r}; expected a Point, a Frame or a Body")
+        weights = springs(follow, stiffness)
         limit = number("tolerance", tolerance)
         if not 1e-14 <= limit <= 1e-3:
             raise InputError(f"tolerance is {limit:g}; expected a part of the scene's size from 1e-14 to 1e-3")
         if not isinstance(second_order, (bool, np.bool_)):
             raise InputError(f"second_order is {second_order!r}; expected True or False")
-        self._scene_given, self._follow = scene, follow
+        self._scene_given = scene
         self._touching = touching
         poses = _begin(scene, q0, touching)
-        held = follow if isinstance(follow, Body) else follow.body
-        if held not in scene.bodies:
-            raise InputError(f"follow is of body {held.name!r}; expected one of {[body.name for body in scene.bodies]}")
-        self._place = scene.bodies.index(held)
-        self._hand = _hand_at(follow, poses[self._place], weight)
-        self._inner = inner = _with_hand(scene, self._hand)
+        self._hands = new_hands(scene.bodies, follow, poses, weights)
+        self._inner = inner = with_hands(scene, self._hands)
         # A solve packs anew where contacts found no place: what it ends with is what ticks go on with.
         first = _held_to(inner.solve(poses, touching=touching))
         if first.disagreeing:
@@ -236,7 +209,7 @@ class Tracker(InOneProcess):
         packed, budget = self._packed, self._budget
         self._history = np.zeros((1, HISTORY))
         names = [(body_of(a).name, body_of(b).name) for a, b in packed.kept_pairs]
-        self._followed = Followed(self._scene, packed, names, self._hand, self._place, first.status)
+        self._followed = Followed(self._scene, packed, names, self._hands, first.status)
         # At its end are the rows of the last tick; steps have no copy of those.
         self._size = packed.kept_at
         self._state = np.zeros(packed.kept_at + packed.kept_size)
@@ -263,21 +236,17 @@ class Tracker(InOneProcess):
         )
         self._radius = float(self._settings[RADIUS])
         self._seen = float(self._state[packed.memory_at + EVENT_COUNT]) if packed.clearance_rows else 0.0
-        self._pool = packed.pool.data
-        self._reference = packed.reference.tolist()
-        self._at = next(at for target, at in packed._targets if target is self._hand)
-        # Whatever else may change between ticks is written by the scene itself.
-        self._others = bool(packed._sources) or len(packed._targets) + len(packed._turns) > 1
+        self._hands.pack(packed)
         # Other values of constraints may ask for another pose than the one that a tick goes on from, or goes back to.
         self._settings[CARRIES] = float(budget is not None and not packed._sources)
 
     def __repr__(self) -> str:
-        return f"Tracker({self._scene_given!r}, follow={self._follow!r}, stiffness={2.0 * self._hand.weight:g})"
+        return f"Tracker({self._scene_given!r}, follow={self.follow!r}, stiffness={self._hands.stiffness})"
 
     @property
-    def follow(self) -> Point | Frame | Body:
-        """What the hand holds."""
-        return self._follow
+    def follow(self) -> Followable | tuple[Followable, ...]:
+        """What the hand holds, or each of several hands."""
+        return self._hands.follow
 
     @property
     def scene(self) -> Assembly:
@@ -289,22 +258,23 @@ class Tracker(InOneProcess):
         """Where the bodies stand now, (n, 7), read-only."""
         return read_only(self._before[: self._packed.contacts_at].reshape(-1, 7).copy())
 
-    def step(self, target: ArrayLike | Pose) -> Step:
-        """Follow the hand for a tick. Never raises: see `Step.status`.
+    def step(self, target: ArrayLike | Pose | Sequence[ArrayLike | Pose]) -> Step:
+        """Follow the hands for a tick. Never raises: see `Step.status`.
 
         Parameters
         ----------
         target : (3,), (7,) or Pose
-            Where the hand is: a point, or the pose of the frame it holds.
+            Where the hand is: a point, or the pose of the frame it holds. Of several hands a sequence of such targets;
+            if one of them is none, no hand moves.
         """
         begin = perf_counter()
         packed = self._packed
         is_new = packed.stamp != structure_changes() or self._edits is not changes()
         changed = is_new and self._has_changed()
-        row = None if changed else self._aimed(target)
+        row = None if changed else self._hands.aimed(target)
         if row is None:
             status = TrackStatus.CHANGED if changed else TrackStatus.BAD_TARGET
-            return Step(self._followed, self._before, status, self._where(), self._seen, perf_counter() - begin)
+            return Step(self._followed, self._before, status, self._hands.where(), self._seen, perf_counter() - begin)
         view, at = self._view, packed.results_at
         carried = view[at + CARRIED] > 0.0
         code = solve_program(*self._arguments)
@@ -366,49 +336,13 @@ class Tracker(InOneProcess):
     def _told(self) -> list[object]:
         return numbers_told(self._packed, self._inner.bodies, self._inner.constraints)
 
-    def _where(self) -> Array:
-        """The target that the loop has."""
-        hand = self._hand
-        return hand._target if isinstance(hand, PointDistance) else hand.target.q
-
-    def _aimed(self, target: ArrayLike | Pose) -> Array | None:
-        """The target as an array, after the loop was told; None for what is none."""
-        hand, packed = self._hand, self._packed
-        try:
-            if type(target) is np.ndarray and target.dtype == np.float64:
-                row = target.copy()
-            else:
-                row = np.array(target.q if isinstance(target, Pose) else target)
-                if row.dtype.kind not in "iuf" or isinstance(target, np.ma.MaskedArray):
-                    return None
-                row = np.asarray(row, dtype=np.float64)
-            if row.shape != ((3,) if isinstance(hand, PointDistance) else (7,)):
-                return None
-            x, y, z = row.tolist()[:3]
-            # Farther ones would overflow, and what is not a number is no nearer.
-            far = FARTHEST * packed.scale
-            if not (-far <= x <= far and -far <= y <= far and -far <= z <= far):
-                return None
-            if isinstance(hand, PointDistance):
-                hand._target = row
-            else:
-                hand.target = Pose(row[:3], row[3:])
-        except Exception:  # whatever a target of the user's own does when it is read
-            return None
-        if self._others or not isinstance(hand, PointDistance):
-            packed.refresh()
-        else:
-            pool, at, size = self._pool, self._at, packed.scale
-            left, front, low = self._reference
-            pool[at], pool[at + 1], pool[at + 2] = (x - left) / size, (y - front) / size, (z - low) / size
-        return row
-
-    def run(self, trace: Trace, *, paced: bool = False, stride: int = 1) -> TrackLog:
-        """Follow a recorded hand, a tick a sample.
+    def run(self, trace: Trace | Sequence[Trace], *, paced: bool = False, stride: int = 1) -> TrackLog:
+        """Follow recorded hands, a tick a sample.
 
         Parameters
         ----------
-        trace : Trace
+        trace : Trace or sequence of Trace
+            For several hands one each, with the same times.
         paced : bool
             Wait for each sample's time by the clock; else as fast as possible.
         stride : int
@@ -417,13 +351,17 @@ class Tracker(InOneProcess):
         Returns
         -------
         TrackLog
+
+        Raises
+        ------
+        InputError, TypeError
+            Not a trace for each hand, or traces of other times than the first one's.
         """
         bodies, budget = len(self._scene.bodies), self._budget
-        if not isinstance(trace, Trace):
-            raise TypeError(f"trace is {trace!r}; expected a Trace")
-        recorder = TrackLog.recorder(trace.times, bodies, TrackStatus, stride=stride, budget=budget)
+        times, targets = self._hands.recorded(trace)
+        recorder = TrackLog.recorder(times, bodies, TrackStatus, stride=stride, budget=budget)
         start = perf_counter()
-        for k, (time, target) in enumerate(trace):
+        for k, (time, target) in enumerate(zip(times.tolist(), targets, strict=True)):
             if paced:
                 wait = start + time - perf_counter()
                 if wait > 0.0:

@@ -146,7 +146,7 @@ def test_forces_of_a_held_frame_are_those_of_its_energy():
 
     def energy(position, rotation):
         target = asm.Pose(position, rotation.as_quat(scalar_first=True))
-        term = asm.FrameDistance(hand.frame(), target, weight=1.0, length=tracker._hand.length)
+        term = asm.FrameDistance(hand.frame(), target, weight=1.0, length=tracker._hands.terms[0].length)
         other = asm.Assembly(scene.bodies)
         other.minimize(term)
         return other.solve(step.q, max_iterations=0).objective
@@ -163,16 +163,16 @@ def test_forces_of_a_held_frame_are_those_of_its_energy():
 def test_the_followed_clip_is_in_balance():
     tracker = clips()
     hold = tracker.q
-    body = tracker._hand.point.body
+    body = tracker.follow.body
     k = [item.name for item in tracker.scene.bodies].index(body.name)
-    point = asm.Pose(hold[k, :3], hold[k, 3:]).apply(tracker._hand.point.coordinates)
+    point = asm.Pose(hold[k, :3], hold[k, 3:]).apply(tracker.follow.coordinates)
     for target in np.linspace(point, point + [2.0, 1.0, -3.0], 50):
         step = tracker.step(target)
     for _ in range(30):
         step = tracker.step(target)
     assert step.status is TrackStatus.FOLLOWED
     pushed = [sides[body.name].at(target) for sides in step.solution.wrenches.values() if body.name in sides]
-    held = asm.Pose(step.q[k, :3], step.q[k, 3:]).apply(tracker._hand.point.coordinates)
+    held = asm.Pose(step.q[k, :3], step.q[k, 3:]).apply(tracker.follow.coordinates)
     spring = np.append(-step.force, np.cross(held - target, -step.force))
     # To the stationarity of a tick, 1e-9, in forces of order one on arms of up to 33.
     assert np.abs(np.sum(pushed, axis=0) + spring).max() < 1e-6

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,8 @@ __all__ = ["Controls"]
 
 # Points of the graph, and seconds between them.
 POINTS, GRAPH_EVERY = 120, 0.2
+# Seconds for which a slider that somebody moved is left to them.
+LEFT_ALONE = 1.0
 
 
 class Controls:
@@ -39,6 +42,8 @@ class Controls:
         self._status = gui.add_markdown("")
         self._figures = gui.add_markdown("")
         self._sliders: dict[str, Any] = {}
+        self._slid_at: dict[str, float] = {}
+        self._values: Mapping[str, float] = {}
         freedoms = freedoms_of(session.scene)
         if freedoms:
             with gui.add_folder("joints"):
@@ -89,12 +94,14 @@ class Controls:
     def _slid(self, name: str, event: Any) -> None:
         # Set by the program a slider tells nobody.
         if event.client is not None:
+            self._slid_at[name] = perf_counter()
             self._session.ask(partial(self._session.set_value, name, float(event.target.value)))
 
     def show(self, shown: Shown, now: float) -> None:
         """Show figures; the graph is sent less often."""
         held = f"**{shown.held}** " if shown.held else ""
         self._status.content = f"{held}{shown.status}"
+        self._follow(shown.values, now)
         force = float(np.linalg.norm(shown.force))
         self._figures.content = (
             f"force {force:.3g}, violation {shown.violation:.1e}, {1e6 * shown.seconds:.0f} us, "
@@ -106,3 +113,18 @@ class Controls:
             self._history[1:, -1] = np.log10(max(shown.violation, 1e-18)), np.log10(max(shown.seconds, 1e-18))
             x = np.arange(POINTS) * GRAPH_EVERY
             self._graph.data = (x, self._history[1].copy(), self._history[2].copy())
+
+    def _follow(self, values: Mapping[str, float], now: float) -> None:
+        """Have sliders where joints are."""
+        if values is self._values:
+            return
+        left = False
+        for name, slider in self._sliders.items():
+            if now - self._slid_at.get(name, -np.inf) < LEFT_ALONE:
+                left = True
+            elif name in values:
+                value = min(max(values[name], slider.min), slider.max)
+                if abs(value - slider.value) > 0.5 * slider.step:
+                    slider.value = value
+        if not left:
+            self._values = values

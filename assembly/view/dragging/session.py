@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from queue import Empty, SimpleQueue
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._read_only import ReadOnlyArrays
 from assembly.assembly import Assembly
 from assembly.errors import AssemblyError, InputError, positive
-from assembly.kinematics.body import Body
+from assembly.kinematics.body import Frame, Point
 from assembly.kinematics.pose import Pose
 from assembly.solve.solution import Solution
 from assembly.tracking.tick import Step
@@ -65,6 +66,8 @@ class Shown(ReadOnlyArrays):
         Of the last tick, or of the last solve.
     contacts : tuple of ((3,), (3,))
         Points and normals of contacts.
+    values : dict of str -> float
+        Coordinates of joints by their names, those of some tenths of a second ago at most.
     ticks : int
         Since the beginning.
     """
@@ -79,7 +82,17 @@ class Shown(ReadOnlyArrays):
     violation: float = 0.0
     seconds: float = 0.0
     contacts: tuple[tuple[Array, Array], ...] = ()
+    values: Mapping[str, float] = field(default_factory=dict)
     ticks: int = 0
+
+
+class _Record(NamedTuple):
+    """A tick that was recorded: when, toward where, at which poses, and in which drag."""
+
+    time: float
+    target: Array
+    q: Array
+    drag: int
 
 
 class Session(threading.Thread):
@@ -111,14 +124,18 @@ class Session(threading.Thread):
         first = scene.solve(q0)
         if not first.success:
             raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {first.message}")
-        self.shown = Shown(first.q, "SOLVED", contacts=_contacts(first), violation=first.feasibility)
+        self.shown = Shown(
+            first.q, "SOLVED", contacts=_contacts(first), values=first.values, violation=first.feasibility
+        )
         self._start = first.q
         self._calls: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._tracker: Tracker | None = None
+        self._follow: Point | Frame | None = None
+        self._drags = 0
         self._pointer: Pointer | None = None
         self._undone: list[Array] = []
-        self._records: list[tuple[float, Array, Array]] | None = None
-        self._recorded: list[tuple[float, Array, Array]] = []
+        self._records: list[_Record] | None = None
+        self._recorded: list[_Record] = []
         # Poses that are being played, or None.
         self._frames: Iterator[Array] | None = None
         self._looked = 0.0
@@ -172,9 +189,12 @@ class Session(threading.Thread):
         row = q[self.scene.bodies.index(body)]
         pose = Pose(row[:3], row[3:])
         follow = body.frame() if at is None else body.point(*pose.inverse().apply(at))
+        # It may raise: nothing is taken then.
+        tracker = self.scene.tracker(follow, q0=q, stiffness=self._stiffness)
         self._remember()
         self._frames = None
-        self._tracker = self.scene.tracker(follow, q0=q, stiffness=self._stiffness)
+        self._follow, self._tracker = follow, tracker
+        self._drags += 1
         start = row.copy() if at is None else np.array(at, dtype=np.float64)
         self._pointer = Pointer(start, perf_counter())
         place = start[:3]
@@ -199,14 +219,14 @@ class Session(threading.Thread):
         target = self._pointer.at(now)
         step = self._tracker.step(target)
         if self._records is not None:
-            self._records.append((now, target, step.q))
-        follow = self._tracker.follow
-        body = follow if isinstance(follow, Body) else follow.body
-        row = step.q[self.scene.bodies.index(body)]
+            self._records.append(_Record(now, target, step.q, self._drags))
+        follow = self._follow
+        assert follow is not None
+        row = step.q[self.scene.bodies.index(follow.body)]
         place = Pose(row[:3], row[3:]).apply(getattr(follow, "coordinates", np.zeros(3)))
-        contacts = self.shown.contacts
+        contacts, values = self.shown.contacts, self.shown.values
         if now - self._looked > CONTACTS_EVERY:
-            self._looked, contacts = now, _contacts(step.solution)
+            self._looked, contacts, values = now, _contacts(step.solution), step.solution.values
         self.shown = replace(
             self.shown,
             q=step.q,
@@ -217,6 +237,7 @@ class Session(threading.Thread):
             violation=step.feasibility,
             seconds=step.seconds,
             contacts=contacts,
+            values=values,
             ticks=self.shown.ticks + 1,
         )
 
@@ -227,7 +248,7 @@ class Session(threading.Thread):
         """Go to a solution if it is one, else say why not."""
         if solution.success:
             self._remember()
-            self.shown = replace(self.shown, q=solution.q, contacts=_contacts(solution))
+            self.shown = replace(self.shown, q=solution.q, contacts=_contacts(solution), values=solution.values)
         self.shown = replace(
             self.shown, status=solution.message, violation=solution.feasibility, seconds=solution.seconds
         )
@@ -250,21 +271,24 @@ class Session(threading.Thread):
         """Go back to where the bodies were before the last drag, solve or value."""
         if self._tracker is None and self._undone:
             *self._undone, q = self._undone
-            self.shown = replace(self.shown, q=q, contacts=(), status="gone back by one")
+            self._go_back(q, "gone back by one")
 
     def reset(self) -> None:
         """Go to where it all began."""
         if self._tracker is None:
             self._remember()
-            self.shown = replace(self.shown, q=self._start, contacts=(), status="back at the start")
+            self._go_back(self._start, "back at the start")
+
+    def _go_back(self, q: Array, status: str) -> None:
+        at = self.scene.solve(q, max_iterations=0)
+        self.shown = replace(self.shown, q=q, contacts=_contacts(at), values=at.values, status=status)
 
     def record(self, on: bool) -> None:
-        """Begin to record what the hand does, anew, or end it."""
-        if on:
+        """Begin to record what the hand does, anew, or end it; what is asked for twice, by two browsers say, is one."""
+        if on and self._records is None:
             self._records = []
-        else:
-            self._recorded = self._records or []
-            self._records = None
+        elif not on and self._records is not None:
+            self._recorded, self._records = self._records, None
 
     def play(self, on: bool) -> None:
         """Show what was recorded, tick by tick, from its beginning; or stop there."""
@@ -286,8 +310,8 @@ class Session(threading.Thread):
         rows = self._recorded if self._records is None else self._records
         if not rows:
             return np.empty(0), np.empty((0, len(self.scene.bodies), 7))
-        times, _, poses = zip(*rows, strict=True)
-        return np.array(times) - times[0], np.array(poses)
+        times = np.array([row.time for row in rows])
+        return times - times[0], np.array([row.q for row in rows])
 
     @property
     def trace(self) -> Trace:
@@ -301,9 +325,11 @@ class Session(threading.Thread):
         rows = self._recorded if self._records is None else self._records
         if len(rows) < 2:
             raise InputError(f"{len(rows)} ticks were recorded; expected two at least")
-        last = len(rows[-1][1])
-        kept = [row for row in rows if len(row[1]) == last]
-        return Trace(np.array([row[0] for row in kept]) - kept[0][0], np.array([row[1] for row in kept]))
+        kept = [row for row in rows if row.drag == rows[-1].drag]
+        if len(kept) < 2:
+            raise InputError("1 tick of the last drag was recorded; expected two at least")
+        times = np.array([row.time for row in kept])
+        return Trace(times - times[0], np.array([row.target for row in kept]))
 
 
 def _contacts(solution: Solution) -> tuple[tuple[Array, Array], ...]:

@@ -3,6 +3,7 @@
 import runpy
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -88,6 +89,64 @@ def test_a_browser_that_leaves_lets_go(browser, clips):
             wait_for(lambda: page.shown.holder == number)
         wait_for(lambda: page.shown.holder is None)
         assert page.shown.status == "nothing is held"
+
+
+@pytest.fixture
+def crank():
+    ground, arm = asm.Body("ground", fixed=True), asm.Body("arm")
+    scene = asm.Assembly([ground, arm])
+    scene.constrain(asm.Revolute(ground.frame(), arm.frame(), name="hinge", limits=(-1.0, 2.0)))
+    return scene
+
+
+def test_sliders_stand_where_joints_are(crank):
+    with asm.view.live(crank, port=0) as page:
+        slider = page._controls._sliders["hinge.angle"]
+        page._session.ask(lambda: page._session.set_value("hinge.angle", 0.75))
+        wait_for(lambda: abs(slider.value - 0.75) < 0.01)
+        page._session.ask(page._session.reset)
+        wait_for(lambda: abs(slider.value) < 0.01)
+
+
+def test_rings_that_another_browser_takes_away_are_let_go(crank):
+    with asm.view.live(crank, port=0) as page:
+        arm, asked = crank["arm"], page._session.ask
+
+        def event(phase):
+            return SimpleNamespace(client_id=1, phase=phase, target=page._gizmo)
+
+        page._clicked(arm, None)
+        page._turn(event("start"))
+        wait_for(lambda: page.shown.holder == 1)
+        page._clicked(arm, None)
+        page._turn(event("update"))
+        page._turn(event("end"))
+        wait_for(lambda: page.shown.holder is None)
+        asked(lambda: page._session.grab("arm", None, 2))
+        wait_for(lambda: page.shown.holder == 2)
+
+
+def test_a_port_that_is_taken_and_closing_twice(crank):
+    with asm.view.live(crank, port=0) as page:
+        port = int(page.url.rsplit(":", 1)[1])
+        with asm.view.live(crank, port=port) as other:
+            assert other.url != page.url
+            other.close()
+        other.close()
+        assert page.shown.status == "SOLVED"
+
+
+def test_a_scene_far_from_the_origin_is_in_the_middle_of_the_page():
+    far = 1e6
+    ball = asm.Body("ball", asm.shapes.sphere(0.5), position=(far, far, far))
+    with asm.view.live(asm.Assembly([ball]), port=0) as page:
+        (node,) = page._nodes.values()
+        # Browsers compute with single precision, which has 0.06 there.
+        assert np.abs(np.array(node.position)).max() < 1e-9
+        page._session.ask(lambda: page._session.grab("ball", np.array([far, far, far + 0.5]), 1))
+        page._session.ask(lambda: page._session.move(np.array([far + 1.0, far, far + 0.5]), 1))
+        wait_for(lambda: page.q[0, 0] > far + 0.5)
+        wait_for(lambda: node.position[0] > 0.4 * page._frame.scale)
 
 
 @pytest.mark.parametrize(

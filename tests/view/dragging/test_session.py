@@ -133,6 +133,44 @@ def test_a_drag_is_recorded_and_played(ball):
     assert session._frames is None
 
 
+def test_what_is_recorded_twice_stays_and_a_trace_is_of_one_drag(ball):
+    session = Session(ball)
+    session.record(True)
+    for place, ticks in (((0.0, 0.0, 1.0), 3), ((0.1, 0.0, 0.9), 5)):
+        session.grab("ball", np.array(place), 1)
+        for _ in range(ticks):
+            session._tick()
+        session.record(True)
+        session.release(1)
+    session.record(False)
+    session.record(False)
+    assert len(session.recorded[0]) == 8
+    assert len(session.trace.times) == 5 and session.trace.targets[0] == pytest.approx((0.1, 0.0, 0.9))
+
+
+def test_what_cannot_be_grabbed_leaves_no_pose_to_go_back_to(ball):
+    session = Session(ball)
+    with pytest.raises(asm.errors.InputError):
+        session.grab("ball", np.full(3, np.nan), 1)
+    assert session.shown.holder is None and not session._undone
+
+
+def test_values_and_buttons_wait_until_a_body_is_let_go(crank):
+    session = Session(crank)
+    session.set_value("hinge.angle", 0.5)
+    turned = session.shown.q
+    session.grab("arm", np.array([1.0, 0.0, 0.0]), 1)
+    for call in (session.solve, session.undo, session.reset, lambda: session.set_value("hinge.angle", 1.0)):
+        call()
+        assert np.array_equal(session.shown.q, turned)
+    session.release(1)
+    session.reset()
+    assert session.shown.values["hinge.angle"] == pytest.approx(0.0, abs=1e-12)
+    session.undo()
+    assert np.array_equal(session.shown.q, turned)
+    assert session.shown.values["hinge.angle"] == pytest.approx(0.5, abs=1e-12)
+
+
 def test_the_loop_runs_beside_its_callers_and_ends(ball):
     session = Session(ball, rate=500.0)
     session.start()
