@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly._copies import FoundAgain
 from assembly.step import StepError, StepWarning, bodies, reader
 from assembly.step.documents import document_of
 from assembly.step.edges import Edges
@@ -310,14 +311,14 @@ def test_damaged_files_are_read_in_another_process_with_this_library(damaged, mo
     assert [str(line.message) for line in warned] == [*lines, said] and lines
     assert [side.name for side in body.faces] == [side.name for side in here.faces]
     assert len(body.faces) == 5
-    # Arrays alike, and no more of them writeable.
+    # Arrays alike, and no more of them writeable, but for those that are found from others when they are asked for.
     for a, b in zip(arrays_of(body), arrays_of(here), strict=True):
         assert np.array_equal(a, b) and a.flags.writeable <= b.flags.writeable
     assert len(arrays_of(body)) > 50 and not body.pose.position.flags.writeable
 
 
 def arrays_of(thing, seen=None):
-    """All arrays in an object, in the order of its attributes."""
+    """All arrays that an object is made of, in the order of its attributes."""
     seen = {} if seen is None else seen
     if id(thing) in seen:
         return []
@@ -330,7 +331,8 @@ def arrays_of(thing, seen=None):
         parts = list(thing.values())
     elif type(thing).__module__.startswith("assembly"):
         slots = [name for kind in type(thing).__mro__ for name in getattr(kind, "__slots__", ())]
-        parts = [getattr(thing, name, None) for name in slots] + list(getattr(thing, "__dict__", {}).values())
+        kept = FoundAgain.__getstate__(thing) if isinstance(thing, FoundAgain) else getattr(thing, "__dict__", {})
+        parts = [getattr(thing, name, None) for name in slots] + list(kept.values())
     else:
         return []
     return [array for part in parts for array in arrays_of(part, seen)]
