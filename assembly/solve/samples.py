@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import rows_of
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import Contact, side_faces
 from assembly.constraints.packing.scene import Packed
@@ -36,8 +37,8 @@ Pair = tuple[Body, Body]
 ROUNDED = 1e-10
 # How deep an update sees, in parts of that size.
 DEPTH = 0.015
-# Contacts of a pair, or of a body in many, that may be near at a time. What is beyond is known where bodies cross by
-# more than updates take for nothing.
+# Contacts of a pair, or of a body in many, that may be near at a time. Of those of a pair the deepest come first; pairs
+# for which none are left, as beside faces that lie on each other, are searched in an update of their own.
 PLACES = 8
 
 
@@ -116,7 +117,17 @@ def sampled(posed: PosedBodies, pairs: Sequence[Pair], interruption: Interruptio
         name += "'"
     if not _known_shapes(pairs, interruption):
         return Sampled(set(), False)
-    return _seen(Packed(posed.bodies, [*posed.contacts, _Watched(pairs, name)], ()), posed, interruption)
+    crossing: set[int] = set()
+    left = list(range(len(pairs)))
+    while left:
+        watched = _Watched([pairs[k] for k in left], name)
+        seen, without = _seen(Packed(posed.bodies, [*posed.contacts, watched], ()), posed, interruption)
+        crossing |= {left[k] for k in seen.crossing}
+        if not seen.is_complete:
+            return Sampled(crossing, False)
+        # The first pair has slots at each update, so that these become fewer.
+        left = [left[k] for k in without if len(without) < len(left)]
+    return Sampled(crossing, True)
 
 
 def _known_shapes(pairs: Iterable[Pair], interruption: Interruption) -> bool:
@@ -133,8 +144,8 @@ def _known_shapes(pairs: Iterable[Pair], interruption: Interruption) -> bool:
     return True
 
 
-def _seen(packed: Packed, posed: PosedBodies, interruption: Interruption) -> Sampled:
-    """What the update finds."""
+def _seen(packed: Packed, posed: PosedBodies, interruption: Interruption) -> tuple[Sampled, list[int]]:
+    """What the update finds, and the pairs for whose contacts no slots were left."""
     q, contacts = posed.q.copy(), len(posed.contacts)
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     count = manager_records.PAIR_MEMORY * len(packed.kept_pairs)
@@ -154,7 +165,10 @@ def _seen(packed: Packed, posed: PosedBodies, interruption: Interruption) -> Sam
         memory[manager_records.DEADLINE] = perf_counter_ns() + SLICE
         manager.update(packed.table, packed.pool, record, memory, q, tracked, manager.EVERYTHING)
         is_cut = memory[manager_records.DEADLINE] < 0.0
-    found = set(np.flatnonzero(pairs[:, manager_records.CROSSED] == 1.0).tolist())
+    known = rows_of(manager_records.PAIR_STATE, pairs)
+    found = set(np.flatnonzero(known.crossed == 1.0).tolist())
     deep, gaps = max(ROUNDED, posed.touching), tracked[contacts:, PAIR_GAP]
-    found |= {pair for gap, (pair, _) in zip(gaps, packed.listed(state), strict=True) if pair >= 0 and gap < -deep}
-    return Sampled(found, not is_cut)
+    listed = [pair for pair, _ in packed.listed(state)]
+    found |= {pair for gap, pair in zip(gaps, listed, strict=True) if pair >= 0 and gap < -deep}
+    wanting: list[int] = np.flatnonzero(known.wanting == 1.0).tolist()
+    return Sampled(found, not is_cut), sorted(set(wanting).difference(listed))

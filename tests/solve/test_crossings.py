@@ -243,6 +243,22 @@ def test_updates_in_slices_find_the_same(monkeypatch):
     assert samples.sampled(posed, pairs, limit) == samples.Sampled({0, 1, 2, 3}, False)
 
 
+def test_contacts_of_one_pair_hide_no_other_pair(monkeypatch):
+    """Where its extrema take all slots that there are, as those of faces that lie on each other, the others' are seen.
+
+    Balls that are in each other by less than their facets are off have an extremum that tells of it, and nothing else.
+    """
+    monkeypatch.setattr(samples, "PLACES", 1)
+    shapes = asm.shapes.box(2.0, 2.0, 2.0), asm.shapes.sphere(1.0)
+    at = ((0.0, 0.0, 0.0), (0.0, 0.0, 2.0)), ((9.0, 0.0, 0.0), (9.0, 0.0, 1.9999))
+    bodies = [asm.Body(f"{k}", shapes[k // 2], at[k // 2][k % 2]) for k in range(4)]
+    posed = samples.PosedBodies(bodies, np.array([body.q for body in bodies]), 1e-9)
+    pairs = [(bodies[0], bodies[1]), (bodies[2], bodies[3])]
+    for order in ((0, 1), (1, 0)):
+        found = samples.sampled(posed, [pairs[k] for k in order], CTRL_C)
+        assert found == samples.Sampled({order.index(1)}, True)
+
+
 def test_bodies_are_where_their_boxes_are(cases):
     # Turned and far from the origin: searched only where hulls meet, and where bodies meet hulls do.
     rng = np.random.default_rng(3)
