@@ -75,6 +75,24 @@ def test_numbers_set_anew_are_those_of_a_scene_built_with_them():
 
 
 @pytest.mark.parametrize("as_constraint", [True, False])
+@pytest.mark.parametrize("often", [1, 600])
+def test_a_gap_and_a_place_set_together_are_those_of_a_scene_built_with_them(as_constraint, often):
+    """Also where more was set meanwhile than is remembered by name."""
+    found = []
+    for is_built in (False, True):
+        scene, contact = eggs()
+        start, place = scene.q, asm.ContactPlace(contact, "a", (4.0, 2.5))
+        (scene.constrain if as_constraint else scene.minimize)(place)
+        if not is_built:
+            assert scene.solve().success
+        for _ in range(1 if is_built else often):
+            contact.minimum, place.target = 0.05, (5.0, 2.0)
+        found.append(scene.solve(start))
+    assert found[0].success and found[0].contacts["touch"].gap == pytest.approx(0.05, rel=0, abs=1e-12)
+    np.testing.assert_array_equal(found[0].q, found[1].q)
+
+
+@pytest.mark.parametrize("as_constraint", [True, False])
 def test_solutions_are_derived_by_targets(as_constraint):
     """Against differences of scenes solved again."""
     scene, contact = eggs()
