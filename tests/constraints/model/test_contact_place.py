@@ -121,6 +121,20 @@ def test_solutions_are_derived_by_targets(as_constraint):
         assert np.abs(expected).max() > 1e-3
 
 
+def test_a_branch_is_followed_along_a_target():
+    """Newton's last steps are of pairs that move by less than is evaluated again, and slopes are made of these."""
+    scene, contact = eggs()
+    egg = scene.bodies[1]
+    place = asm.ContactPlace(contact, "a", (5.0, 2.5))
+    scene.minimize(place, asm.PointDistance(egg.point(0, 0, 0.6), (1.0, 3.0, 2.0)))
+    branch = asm.follow(scene, asm.Parameter(place, "target", "u"), 4.999, 5.001, of=asm.Measure(egg, "x"))
+    assert {event.kind for event in branch.events} == {"end of range"} and np.ptp(branch.values) == pytest.approx(0.002)
+    for value, q in zip(branch.values, branch.poses, strict=True):
+        place.target = (value, 2.5)
+        # Solves leave some 1e-9 along the flattest way of the objective.
+        np.testing.assert_allclose(scene.solve(q).q, q, rtol=0, atol=2e-8)
+
+
 def test_scenes_know_the_contacts_of_their_places():
     scene, contact = eggs()
     alone = asm.Assembly(scene.bodies)
