@@ -103,6 +103,18 @@ def test_a_solution_is_a_start_where_sizes_are_others():
     assert grown.success and abs(grown.q[1, 2] - 1.5) < 1e-12
 
 
+def test_a_number_that_a_function_makes_faces_of_travels_with_its_scene():
+    size = asm.Parameter(asm.shapes.sphere, 1.0, name="radius")
+    plate, ball = asm.Body("plate", asm.shapes.plane(9, 9), fixed=True), asm.Body("ball", size.shape, (0, 0, 2))
+    scene = asm.Assembly([plate, ball])
+    scene.constrain(asm.Contact(plate, ball))
+    there, radius = pickle.loads(pickle.dumps((scene, size)))
+    radius.value = 1.5
+    assert size.value == 1.0 and abs(there.solve().q[1, 2] - 1.5) < 1e-12
+    found = asm.study(scene, asm.grid({size: [1.0, 1.25]}), of=asm.Measure(ball, "z"))
+    assert found.success.all()
+
+
 def test_a_solution_of_other_bodies_or_constraints_is_none():
     solution = linkage().solve()
     renamed, crank = four_bar()

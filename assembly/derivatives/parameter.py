@@ -154,9 +154,18 @@ def _number_of(thing: Thing, field: Any, index: Any) -> Number:
     if isinstance(thing, BodyFace):
         return _of_face(thing, field, index)
     if callable(thing):
-        build = thing
-        return ShapeNumber(Parametric(lambda value: build(value), value=number("value", field)), "value")
+        return ShapeNumber(Parametric(_OfOneNumber(thing), value=number("value", field)), "value")
     raise TypeError(f"thing is {thing!r}; expected a joint, a frame, a term, a clearance, a shape or a function")
+
+
+class _OfOneNumber:
+    """A function of one number as one of `value`; pickle knows it where it knows the function."""
+
+    def __init__(self, build: Callable[..., Any]) -> None:
+        self._of_number = build
+
+    def __call__(self, value: float) -> Any:
+        return self._of_number(value)
 
 
 def _of_constraint(thing: Constraint, field: Any, index: Any) -> Number:

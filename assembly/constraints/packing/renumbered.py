@@ -122,6 +122,8 @@ def _compared(
     for sign, term in goals:
         terms.add(sign, term)
     pool[packed.terms_at : packed.terms_at + len(writer.pool)] = writer.pool
+    for contact, at in zip(packed.contacts, packed.gaps, strict=True):
+        pool[at] = contact.minimum / scale
     for spot, start in packed.placed:
         numbers = place_numbers(spot, 0.0, scale)
         pool[start : start + len(numbers)] = numbers

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.constraint import Freedom
 from assembly.constraints.packing.scene import Packed
-from assembly.derivatives.numbers import FrameNumber, RowNumber, TargetNumber
+from assembly.derivatives.numbers import FrameNumber, LeastGap, PlaceNumber, RowNumber, TargetNumber
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.pool_writes import check_writes, pool_writes
 from assembly.errors import InputError, real_array
@@ -51,6 +51,10 @@ def _check_is_of(scene: Assembly, parameter: Parameter) -> None:
     if isinstance(number, RowNumber):
         owner = number.owner.joint if isinstance(number.owner, Freedom) else number.owner
         known = any(item is owner for item in scene.constraints)
+    elif isinstance(number, LeastGap):
+        known = any(item is number.owner for item in scene.constraints)
+    elif isinstance(number, PlaceNumber):
+        known = any(item is number.place for item in (*scene.constraints, *(term for _, term in scene.objectives)))
     elif isinstance(number, TargetNumber):
         known = any(term is number.term for _, term in scene.objectives)
     elif isinstance(number, FrameNumber):

@@ -51,7 +51,8 @@ def measured(
             out[:, k] = ended[:, packed.results_at + OBJECTIVE] * packed.unit
         elif item.kind == "gap":
             row = next(r for r, contact in enumerate(packed.contacts) if contact is item.thing)
-            out[:, k] = ended[:, packed.residuals_at + row]
+            # The row is the gap less the least one.
+            out[:, k] = ended[:, packed.residuals_at + row] + item.thing.minimum
         elif item.kind == "coordinate":
             out[:, k] = _coordinates(packed, item, ended, q, writes)
         else:

@@ -249,6 +249,10 @@ class Curve:
     def _derived(self, place: Place) -> tuple[Place, Problem, Columns]:
         """Rows, objective and what a unit of the parameter adds to them."""
         place = self._packed_at(place)
+        if place.packed.drawn:
+            # A last short step of a pair leaves its rates as they were before it, and the slopes of a place are made
+            # of rates: with pairs that begin where they end these are those of the place.
+            place = self._tracked(place)
         packed, state, scene = place.packed, place.state, self.scene._scene
         assert scene is not None
         turns = np.array([rotation_matrix(row[3:]) for row in place.q])

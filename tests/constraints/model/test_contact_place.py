@@ -75,6 +75,24 @@ def test_numbers_set_anew_are_those_of_a_scene_built_with_them():
 
 
 @pytest.mark.parametrize("as_constraint", [True, False])
+@pytest.mark.parametrize("often", [1, 600])
+def test_a_gap_and_a_place_set_together_are_those_of_a_scene_built_with_them(as_constraint, often):
+    """Also where more was set meanwhile than is remembered by name."""
+    found = []
+    for is_built in (False, True):
+        scene, contact = eggs()
+        start, place = scene.q, asm.ContactPlace(contact, "a", (4.0, 2.5))
+        (scene.constrain if as_constraint else scene.minimize)(place)
+        if not is_built:
+            assert scene.solve().success
+        for _ in range(1 if is_built else often):
+            contact.minimum, place.target = 0.05, (5.0, 2.0)
+        found.append(scene.solve(start))
+    assert found[0].success and found[0].contacts["touch"].gap == pytest.approx(0.05, rel=0, abs=1e-12)
+    np.testing.assert_array_equal(found[0].q, found[1].q)
+
+
+@pytest.mark.parametrize("as_constraint", [True, False])
 def test_solutions_are_derived_by_targets(as_constraint):
     """Against differences of scenes solved again."""
     scene, contact = eggs()
@@ -101,6 +119,20 @@ def test_solutions_are_derived_by_targets(as_constraint):
         # Order four in steps of 1e-3, and what solves leave, 1e-12, over the step.
         np.testing.assert_allclose(found[:, r], expected, rtol=0, atol=1e-8)
         assert np.abs(expected).max() > 1e-3
+
+
+def test_a_branch_is_followed_along_a_target():
+    """Newton's last steps are of pairs that move by less than is evaluated again, and slopes are made of these."""
+    scene, contact = eggs()
+    egg = scene.bodies[1]
+    place = asm.ContactPlace(contact, "a", (5.0, 2.5))
+    scene.minimize(place, asm.PointDistance(egg.point(0, 0, 0.6), (1.0, 3.0, 2.0)))
+    branch = asm.follow(scene, asm.Parameter(place, "target", "u"), 4.999, 5.001, of=asm.Measure(egg, "x"))
+    assert {event.kind for event in branch.events} == {"end of range"} and np.ptp(branch.values) == pytest.approx(0.002)
+    for value, q in zip(branch.values, branch.poses, strict=True):
+        place.target = (value, 2.5)
+        # Solves leave some 1e-9 along the flattest way of the objective.
+        np.testing.assert_allclose(scene.solve(q).q, q, rtol=0, atol=2e-8)
 
 
 def test_scenes_know_the_contacts_of_their_places():

@@ -15,7 +15,7 @@ from assembly.kinematics.pose import rotation_matrix
 from assembly.studies.batches import solving
 from benchmarks.linkages import boxes
 from benchmarks.linkages import four_bar as spatial_four_bar
-from tests.derivatives.sensitivity_scenes import clips
+from tests.derivatives.sensitivity_scenes import clips, filmed
 
 
 def near(scene, count, spread, seed=0):
@@ -176,6 +176,21 @@ def test_targets_limits_and_contacts_are_numbers_of_rows():
     ends = {asm.Parameter(hinge.freedom(), name): at for name, at in asked.items()}
     angle = limited_scene.solve_many(parameters=ends, of=[asm.Measure(hinge)]).measures[:, 0]
     assert (angle >= asked["lower"] - 1e-12).all() and (angle <= asked["upper"] + 1e-12).all()
+
+
+def test_gaps_of_rows_are_gaps_of_solutions():
+    """Of contacts with a least gap too; to rounding, for a solution finds them again."""
+    case = filmed()
+    q0s = near(case.scene, 3, 1e-3)
+    batch = case.scene.solve_many(q0s, of=case.of, threads=1)
+    assert batch.success.all() and not batch.alone.all()
+    expected = [[item.value(solution) for item in case.of] for solution in map(case.scene.solve, q0s)]
+    # Over bodies of 16.
+    np.testing.assert_allclose(batch.measures, expected, rtol=0, atol=1e-13 * 16.0)
+    assert batch.measure("two.gap")[0] > 0.09
+    elsewhere = filmed().wrt[0]
+    with pytest.raises(InputError, match="of another scene"):
+        case.scene.solve_many(parameters={elsewhere: [0.1]})
 
 
 def test_rows_that_fail_are_rows():
