@@ -208,6 +208,8 @@ class Tracker(InOneProcess):
         held = follow if isinstance(follow, Body) else follow.body
         if held not in scene.bodies:
             raise InputError(f"follow is of body {held.name!r}; expected one of {[body.name for body in scene.bodies]}")
+        if held.fixed:
+            raise InputError(f"follow is of body {held.name!r}, which is fixed; expected a body that moves")
         self._place = scene.bodies.index(held)
         self._hand = _hand_at(follow, poses[self._place], weight)
         self._inner = inner = _with_hand(scene, self._hand)

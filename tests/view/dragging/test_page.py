@@ -97,6 +97,8 @@ def test_a_browser_that_leaves_lets_go(browser, clips):
         ({"port": 70000}, "port"),
         ({"host": ""}, "host is ''"),
         ({"stiffness": 0.0}, "stiffness"),
+        ({"host": "no-such-host.invalid"}, "host is 'no-such-host.invalid'; expected an address of this machine"),
+        ({"host": "192.0.2.1"}, r"host is '192\.0\.2\.1'; expected an address of this machine"),
     ],
 )
 def test_arguments_are_checked(clips, options, message):
