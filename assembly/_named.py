@@ -22,5 +22,5 @@ class Named(dict[str, Value]):
         known = ", ".join(map(repr, near or list(self)[:LISTED]))
         more = len(self) - LISTED
         rest = f" and {more} more" if not near and more > 0 else ""
-        expected = f"{'say' if near else 'one of'} {known}{rest}" if self else "a name, but there is none"
+        expected = f"{'perhaps' if near else 'one of'} {known}{rest}" if self else "a name, but there is none"
         raise UnknownNameError(f"name is {name!r}; expected {expected}")

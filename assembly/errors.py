@@ -186,7 +186,9 @@ def extent(name: str, value: Any) -> float:
 
 
 def items(name: str, value: Any, expected: str) -> tuple[Any, ...]:
-    """The members of what can be gone through."""
+    """The members of what can be gone through, but not the letters of a string."""
+    if isinstance(value, (str, bytes)):
+        raise TypeError(f"{name} is {_shown(value)}; expected {expected}")
     try:
         return tuple(value)
     except TypeError:

@@ -58,7 +58,7 @@ def test_results_by_name_list_the_names_there_are(crank):
     ):
         with pytest.raises(KeyError) as raised:
             table["hinge.angel"]
-        assert str(raised.value) == f"name is 'hinge.angel'; expected say {known}"
+        assert str(raised.value) == f"name is 'hinge.angel'; expected perhaps {known}"
         assert "hinge.angel" not in table and table.get("hinge.angel") is None
     with pytest.raises(asm.errors.InputError, match="expected a name, but there is none"):
         solution.contacts["ball"]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.model.constraint import Freedom
 from assembly.constraints.model.contents import Contents
 from assembly.constraints.packing.renumbered import have_same_numbers
 from assembly.constraints.packing.scene import Packed
@@ -16,6 +17,7 @@ from assembly.derivatives.columns import Columns, Frames, Problem, columns_of
 from assembly.derivatives.kkt import Moves, System, one_sided_moves, solve_system
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.measured import rates_of
+from assembly.derivatives.numbers import FrameNumber, LeastGap, PlaceNumber, RowNumber, TargetNumber
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.plan import layout_of, plan_of
 from assembly.derivatives.probed import Evaluated, ProbedScene
@@ -29,7 +31,7 @@ from assembly.solve.solution import Solution
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["sensitivity", "several", "the_scene"]
+__all__ = ["check_is_of", "sensitivity", "several", "the_scene"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -87,6 +89,25 @@ def the_scene(scene: Assembly) -> Assembly:
     if not isinstance(scene, Contents):
         raise TypeError(f"scene is {scene!r}; expected an Assembly")
     return scene
+
+
+def check_is_of(name: str, scene: Assembly, parameter: Parameter) -> None:
+    """Raise for a parameter of another scene, as far as it tells."""
+    number = parameter._number
+    known = True
+    if isinstance(number, RowNumber):
+        owner = number.owner.joint if isinstance(number.owner, Freedom) else number.owner
+        known = any(item is owner for item in scene.constraints)
+    elif isinstance(number, LeastGap):
+        known = any(item is number.owner for item in scene.constraints)
+    elif isinstance(number, PlaceNumber):
+        known = any(item is number.place for item in (*scene.constraints, *(term for _, term in scene.objectives)))
+    elif isinstance(number, TargetNumber):
+        known = any(term is number.term for _, term in scene.objectives)
+    elif isinstance(number, FrameNumber):
+        known = any(body is number.frame.body for body in scene.bodies)
+    if not known:
+        raise InputError(f"{name} has {parameter.name!r}, which is of another scene; expected ones of this scene")
 
 
 def several(name: str, value: Any, kind: type) -> tuple[Any, ...]:

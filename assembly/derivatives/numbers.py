@@ -81,14 +81,15 @@ class RowNumber(Number):
             self.name = f"{owner.name}.{attribute}"
             (_, first), *_ = getattr(owner, "equations")[-1].terms  # noqa: B009  # of constraints that have rows
             self.unit = "rad" if first.is_angle else "length"
-        value = getattr(owner, attribute)
-        if value is None or abs(value) == inf:
-            what = "a driven value" if attribute == "value" else "a limit on this side"
-            raise InputError(f"{self.name} is {value}; expected {what}")
+        self.get()
 
     def get(self) -> float:
-        """The number now."""
-        return float(getattr(self.owner, self.attribute))
+        """The number now; what is driven or limited no more has none."""
+        value = getattr(self.owner, self.attribute)
+        if value is None or abs(value) == inf:
+            what = "a driven value" if self.attribute == "value" else "a limit on this side"
+            raise InputError(f"{self.name} is {value}; expected {what}")
+        return float(value)
 
     def set(self, value: float) -> None:
         """Set it."""

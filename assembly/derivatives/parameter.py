@@ -120,7 +120,10 @@ class Parameter(KnownSettings):
         self._number.set(number(self.name, value))
 
     def __repr__(self) -> str:
-        return f"Parameter({self.name!r}, value={self.value!r})"
+        try:
+            return f"Parameter({self.name!r}, value={self.value!r})"
+        except InputError:
+            return f"Parameter({self.name!r}, value=None)"
 
 
 def _number_of(thing: Thing, field: Any, index: Any) -> Number:

@@ -252,7 +252,7 @@ def new_hands(
     Raises
     ------
     InputError
-        A body that is not one of these.
+        A body that is not one of these, or does not move.
     """
     several = not isinstance(follow, (Point, Frame, Body))
     held = [follow] if isinstance(follow, (Point, Frame, Body)) else list(follow)
@@ -262,6 +262,9 @@ def new_hands(
         if body not in bodies:
             name = f"follow[{k}]" if several else "follow"
             raise InputError(f"{name} is of body {body.name!r}; expected one of {[body.name for body in bodies]}")
+        if body.fixed:
+            name = f"follow[{k}]" if several else "follow"
+            raise InputError(f"{name} is of body {body.name!r}, which is fixed; expected a body that moves")
         places.append(bodies.index(body))
     if not several:
         return Hand(held[0], places[0], poses[places[0]], weights[0])

@@ -381,3 +381,9 @@ def test_what_is_no_hand_and_no_trace():
         scene.tracker(asm.Body("other"))
     with pytest.raises(TypeError, match="trace"):
         scene.tracker(scene.bodies[2]).run("trace")
+
+
+def test_a_fixed_body_is_not_held():
+    scene, _ = arm()
+    with pytest.raises(InputError, match="follow is of body 'x', which is fixed; expected a body that moves"):
+        scene.tracker(scene.bodies[0].point(0, 0, 0))

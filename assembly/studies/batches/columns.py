@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.constraint import Freedom
 from assembly.constraints.packing.scene import Packed
-from assembly.derivatives.numbers import FrameNumber, LeastGap, PlaceNumber, RowNumber, TargetNumber
+from assembly.derivatives.implicit import check_is_of
+from assembly.derivatives.numbers import RowNumber
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.pool_writes import check_writes, pool_writes
-from assembly.errors import InputError, real_array
+from assembly.errors import real_array
 from assembly.kinematics.changes import count_number, tried_numbers
 from assembly.studies.batches.rows import Writes
 
@@ -37,30 +38,11 @@ def parameter_columns(
     for item, values in parameters.items():
         if not isinstance(item, Parameter):
             raise TypeError(f"parameters has the key {item!r}; expected a Parameter")
-        _check_is_of(scene, item)
+        check_is_of("parameters", scene, item)
         columns.append(real_array(f"parameters[{item.name!r}]", values, (len(columns[0]) if columns else "n",)))
     keys, values = tuple(parameters), np.ascontiguousarray(np.array(columns).T)
     _check_values(keys, values)
     return keys, values
-
-
-def _check_is_of(scene: Assembly, parameter: Parameter) -> None:
-    """Raise for a parameter of another scene, as far as it tells."""
-    number = parameter._number
-    known = True
-    if isinstance(number, RowNumber):
-        owner = number.owner.joint if isinstance(number.owner, Freedom) else number.owner
-        known = any(item is owner for item in scene.constraints)
-    elif isinstance(number, LeastGap):
-        known = any(item is number.owner for item in scene.constraints)
-    elif isinstance(number, PlaceNumber):
-        known = any(item is number.place for item in (*scene.constraints, *(term for _, term in scene.objectives)))
-    elif isinstance(number, TargetNumber):
-        known = any(term is number.term for _, term in scene.objectives)
-    elif isinstance(number, FrameNumber):
-        known = any(body is number.frame.body for body in scene.bodies)
-    if not known:
-        raise InputError(f"parameters has {parameter.name!r}, which is of another scene; expected ones of this scene")
 
 
 def _check_values(parameters: Sequence[Parameter], values: Array) -> None:

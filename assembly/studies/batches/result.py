@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._html import printed
 from assembly._read_only import ReadOnlyArrays
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
@@ -77,6 +78,9 @@ class Batch(ReadOnlyArrays):
 
     def __repr__(self) -> str:
         return f"Batch({len(self)} rows, {int(self.success.sum())} solved)"
+
+    def _repr_html_(self) -> str:
+        return printed(self)
 
     def __str__(self) -> str:
         lines = [f"{len(self)} rows in {self.seconds:.3g} s, {int(self.alone.sum())} of them by themselves"]

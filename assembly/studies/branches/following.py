@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.derivatives.implicit import several, the_scene
+from assembly.derivatives.implicit import check_is_of, several, the_scene
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError, bounded
@@ -97,17 +97,24 @@ def follow(
         raise TypeError(f"parameter is {parameter!r}; expected a Parameter")
     settings = FollowOptions.of(options)
     low, high = bounded("low", low), bounded("high", high)
+    check_is_of("parameter", scene, parameter)
     value = parameter.value
     if not low <= value <= high or not low < high:
-        raise InputError(f"low and high are {low:g} and {high:g}; expected a range with {parameter.name} = {value:g}")
-    measures = several("of", of, Measure) if isinstance(of, Measure) or len(of) else ()
+        raise InputError(
+            f"low and high are {low:g} and {high:g}; expected low below high, and {parameter.name} = {value:g}, from "
+            "where the branch is followed, in between"
+        )
+    measures = () if isinstance(of, (tuple, list)) and not of else several("of", of, Measure)
     if scene.packed().keeps_apart:
         raise InputError("scene has a clearance; expected contacts of pairs, whose rows are the same along a branch")
     solution = scene.solve() if start is None else start
     if not isinstance(solution, Solution):
         raise TypeError(f"start is {start!r}; expected a Solution")
     if not solution.success:
-        raise InputError(f"start is {solution.status.name}; expected a solution that succeeded")
+        raise InputError(
+            f"start is {solution.status.name} at {parameter.name} = {value:g}; expected a solution that succeeded: "
+            f"{solution.message}"
+        )
     try:
         follower = _Follower(scene, parameter, (low, high), settings, solution)
         ways = follower.ways()

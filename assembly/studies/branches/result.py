@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._html import printed
 from assembly._read_only import ReadOnlyArrays
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
@@ -26,6 +27,19 @@ if TYPE_CHECKING:
 __all__ = ["Branch", "BranchEvent", "branch_of"]
 
 Array = NDArray[np.float64]
+# Of events.
+KINDS = (
+    "turning point",
+    "crossing",
+    "limit reached",
+    "limit left",
+    "contact closed",
+    "contact opened",
+    "end of range",
+    "closed loop",
+    "lost",
+    "step limit",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +115,15 @@ class Branch(ReadOnlyArrays):
         return table
 
     def events_of(self, kind: str) -> tuple[BranchEvent, ...]:
-        """The events of a kind."""
+        """The events of a kind.
+
+        Raises
+        ------
+        InputError
+            There is no such kind.
+        """
+        if kind not in KINDS:
+            raise InputError(f"kind is {kind!r}; expected one of {', '.join(map(repr, KINDS))}")
         return tuple(event for event in self.events if event.kind == kind)
 
     def plot(self) -> Figure:
@@ -109,6 +131,9 @@ class Branch(ReadOnlyArrays):
         from assembly.view.branch_plot import plot_branch
 
         return plot_branch(self)
+
+    def _repr_html_(self) -> str:
+        return printed(self)
 
     def __str__(self) -> str:
         end = f"closed to {self.closure:.1e}" if self.closed else "not closed"

@@ -212,7 +212,9 @@ def as_plan(plan: Any) -> Plan:
     """A plan, or the rows of an iterable of dictionaries of parameters and values."""
     if isinstance(plan, Plan):
         return plan
-    if isinstance(plan, (str, bytes, Mapping)) or not isinstance(plan, Iterable):
+    if isinstance(plan, Mapping):
+        raise TypeError(f"plan is {plan!r}; expected asm.grid(...) of it, or a list of dictionaries, one a row")
+    if isinstance(plan, (str, bytes)) or not isinstance(plan, Iterable):
         raise TypeError(
             f"plan is {plan!r}; expected asm.grid, asm.sobol, asm.latin_hypercube, asm.rows, asm.starts, or "
             "dictionaries of parameter -> value"
@@ -252,6 +254,8 @@ def _distinct(name: str, parameters: tuple[Parameter, ...]) -> tuple[Parameter, 
 
 def _column(name: str, values: Any) -> Array:
     """Finite numbers (k,), one at least."""
+    if np.ndim(values) == 1 and not len(values):
+        raise InputError(f"{name} is empty; expected values, one at least")
     return real_array(name, values, ("k",))
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._html import printed
 from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, integer, items
 from assembly.solve.solution import Solution
@@ -36,15 +37,9 @@ class Study(ReadOnlyArrays):
     ----------
     table : (n,) structured array
         A row a design, in the plan's order: "row", the parameters, the measures, "status", "message", "iterations".
-        Measures of a row that has no solution are NaN. `status` is the name of a `Status`, or
-
-        | status | the row |
-        |---|---|
-        | "BRANCH_ENDED" | its branch ends between the row before and this one |
-        | "REFUSED" | the scene cannot have its numbers |
-        | "ERROR" | a measure, or the solve, raised |
-        | "NOT_DONE" | the study was interrupted before |
-
+        Measures of a row that has no solution are NaN. `status` is the name of a `Status`, or "BRANCH_ENDED": its
+        branch ends between the row before and this one; "REFUSED": the scene cannot have its numbers; "ERROR": a
+        measure, or the solve, raised; "NOT_DONE": the study was interrupted before.
     plan : Plan
     measures : tuple of str
         Names of their columns.
@@ -149,7 +144,7 @@ class Study(ReadOnlyArrays):
         try:
             import pandas
         except ImportError:
-            raise ImportError("to_pandas needs pandas, which is not installed; expected it, or table") from None
+            raise ImportError("to_pandas needs pandas, which is not installed; install the extra tables") from None
         return pandas.DataFrame({name: self.table[name] for name in self.table.dtype.names or ()}).set_index("row")
 
     def to_xarray(self) -> Any:
@@ -167,7 +162,7 @@ class Study(ReadOnlyArrays):
         try:
             import xarray
         except ImportError:
-            raise ImportError("to_xarray needs xarray, which is not installed; expected it, or table") from None
+            raise ImportError("to_xarray needs xarray, which is not installed; install the extra tables") from None
         names, shape = self.plan.names, tuple(map(len, self.plan.axes))
         fields = [*self.measures, "status", "iterations"]
         data = {name: (names, self.table[name].reshape(shape)) for name in fields}
@@ -199,6 +194,9 @@ class Study(ReadOnlyArrays):
 
     def __repr__(self) -> str:
         return f"Study({self.plan.kind}, {len(self)} rows, {self._counts()})"
+
+    def _repr_html_(self) -> str:
+        return printed(self)
 
     def __str__(self) -> str:
         lines = [f"{len(self)} designs ({self.plan.kind}): {self._counts()}"]

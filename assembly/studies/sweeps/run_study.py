@@ -11,7 +11,7 @@ import numpy as np
 
 from assembly._progress import Progress, checked_progress, watched
 from assembly.assembly import Assembly
-from assembly.derivatives.implicit import the_scene
+from assembly.derivatives.implicit import check_is_of, the_scene
 from assembly.derivatives.response import values_set
 from assembly.errors import InputError, positive
 from assembly.studies.sweeps.folder import Folder
@@ -75,6 +75,8 @@ def study(
     """
     the_scene(scene)
     designs = as_plan(plan)
+    for parameter in designs.parameters:
+        check_is_of("plan", scene, parameter)
     columns = columns_of(of)
     names = [*OWN, *designs.names]
     for column in columns:

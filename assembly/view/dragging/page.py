@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 from contextlib import redirect_stdout
 from dataclasses import dataclass
@@ -44,6 +45,16 @@ def _server(host: str, port: int) -> ViserServer:
         from viser import ViserServer
     except ImportError as error:
         raise ImportError('viser is not there; pip install "assembly-solver[live]"') from error
+    # It looks for a free port from the first one on, and would do so forever where a host is none of this machine.
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, socket.SOCK_STREAM) as free:
+            free.bind(address)
+    except OSError as error:
+        raise InputError(
+            f"host is {host!r}; expected an address of this machine, '127.0.0.1' for itself alone or '0.0.0.0' for "
+            f"networks as well: {error}"
+        ) from None
     # It announces itself.
     with redirect_stdout(StringIO()):
         return ViserServer(host=host, port=port, label="assembly", verbose=False)

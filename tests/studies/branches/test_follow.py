@@ -10,6 +10,7 @@ import pytest
 import assembly as asm
 from assembly.errors import InputError
 from assembly.kinematics.pose import rotation_matrix
+from assembly.studies.branches.result import KINDS
 from tests.studies.branches.four_bars import FourBar
 
 CRANK_ROCKER, DOUBLE_ROCKER, DRAG_LINK = (1.0, 3.0, 2.5, 3.2), (2.0, 2.2, 2.1, 4.5), (3.0, 1.2, 3.1, 1.0)
@@ -251,7 +252,7 @@ def test_what_cannot_be_followed_raises():
     bar.rocker.angle = bar.swing
     solution, angle = bar.scene.solve(bar.q), asm.Parameter(bar.rocker, "angle")
     cases = [
-        ((angle, 3.0, 4.0), {}, "a range with"),
+        ((angle, 3.0, 4.0), {}, "expected low below high"),
         ((angle, 0.0, 4.0), {"turns": 1.0}, "option 'turns' is unknown"),
         ((angle, 0.0, 4.0), {"turn": 0.0}, "turn is 0"),
         ((angle, 0.0, float("nan")), {}, "high is nan"),
@@ -272,3 +273,29 @@ def test_what_cannot_be_followed_raises():
     scene.constrain(asm.Clearance())
     with pytest.raises(InputError, match="has a clearance"):
         asm.follow(scene, asm.Parameter(goal, "target", "z"), -1.0, 3.0)
+
+
+def test_what_cannot_be_followed_is_told():
+    bar = FourBar(*CRANK_ROCKER)
+    bar.crank.angle = 0.7
+    angle = asm.Parameter(bar.crank, "angle")
+    with pytest.raises(InputError, match=r"are 3 and 0; expected low below high, and crank\.angle = 0\.7"):
+        asm.follow(bar.scene, angle, 3.0, 0.0)
+    with pytest.raises(TypeError, match=r"of is 'crank\.angle'; expected a Measure"):
+        asm.follow(bar.scene, angle, 0.0, 3.0, of="crank.angle")
+    with pytest.raises(InputError, match=r"parameter has 'crank\.angle', which is of another scene"):
+        asm.follow(FourBar(*CRANK_ROCKER).scene, angle, 0.0, 3.0)
+    bar.crank.angle = None
+    assert repr(angle) == "Parameter('crank.angle', value=None)"
+    with pytest.raises(InputError, match=r"crank\.angle is None; expected a driven value"):
+        asm.follow(bar.scene, angle, 0.0, 3.0)
+
+
+def test_a_branch_is_shown_by_notebooks_and_has_known_kinds_of_events():
+    bar = FourBar(*CRANK_ROCKER)
+    branch = followed(bar, bar.rocker, 0.0, pi)
+    assert "turning point at" in branch._repr_html_()
+    assert len(branch.events_of("turning point")) == 2 and branch.events_of("crossing") == ()
+    assert {event.kind for event in branch.events} <= {*KINDS}
+    with pytest.raises(InputError, match="kind is 'turning'; expected one of 'turning point', 'crossing'"):
+        branch.events_of("turning")

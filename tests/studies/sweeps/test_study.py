@@ -227,3 +227,21 @@ def test_what_cannot_be_sent_is_told():
     with ThreadPoolExecutor(1) as threads, pytest.raises((InputError, TypeError), match="pickle"):
         lock = __import__("threading").Lock()
         asm.study(scene, plan, {"locked": lambda solution, lock=lock: 0.0}, executor=threads)
+
+
+def test_plans_and_measures_that_are_none_are_told():
+    scene, plan, _ = wide(3)
+    (first, *_) = plan.parameters
+    with pytest.raises(TypeError, match=r"of is 'swing'; expected a Measure"):
+        asm.study(scene, plan, "swing")
+    with pytest.raises(TypeError, match=r"expected asm\.grid\(\.\.\.\) of it"):
+        asm.study(scene, {first: [1.0, 2.0]}, lambda solution: 0.0)
+    with pytest.raises(InputError, match=r"\] is empty; expected values"):
+        asm.grid({first: []})
+    with pytest.raises(InputError, match=r"plan has .*, which is of another scene"):
+        asm.study(wide(3)[0], plan, lambda solution: 0.0)
+
+
+def test_a_study_is_shown_by_notebooks():
+    scene, plan, of = wide(3)
+    assert "3 designs" in asm.study(scene, plan, of)._repr_html_()

@@ -156,6 +156,8 @@ def test_a_scene_far_from_the_origin_is_in_the_middle_of_the_page():
         ({"port": 70000}, "port"),
         ({"host": ""}, "host is ''"),
         ({"stiffness": 0.0}, "stiffness"),
+        ({"host": "no-such-host.invalid"}, "host is 'no-such-host.invalid'; expected an address of this machine"),
+        ({"host": "192.0.2.1"}, r"host is '192\.0\.2\.1'; expected an address of this machine"),
     ],
 )
 def test_arguments_are_checked(clips, options, message):
