@@ -4,38 +4,22 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from os import PathLike
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._progress import Progress
-from assembly.constraints.packing.corners import corners_of
-from assembly.constraints.packing.scene import MOST_CROWDING
 from assembly.errors import InputError
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.changes import changes
 from assembly.kinematics.pose import pose_rows
-from assembly.packed_contents import PackedContents
-from assembly.solve.attempts.attempts import attempt, load
-from assembly.solve.attempts.postures import postures_from
 from assembly.solve.interruption import CTRL_C, Interruption
-from assembly.solve.loop.settings import (
-    ALLOWED_OVERLAP,
-    GATHER,
-    ITERATIONS,
-    NEVER,
-    PLACES,
-    STRAYS,
-)
 from assembly.solve.options import Options
-from assembly.solve.scene import Status
-from assembly.solve.scene_settings import scene_settings
 from assembly.solve.solution import Solution
 from assembly.solve.straight import straight_from
+from assembly.solving import Solving
 
 if TYPE_CHECKING:
     from assembly.derivatives.measure import Measure
@@ -49,11 +33,9 @@ __all__ = ["Assembly"]
 
 Array = NDArray[np.float64]
 _LOG = logging.getLogger("assembly.solve")
-# How a solve may end where solids come to lie on each other, and corners are not listed.
-AT_KINKS = (Status.STALLED, Status.ITERATION_LIMIT, Status.INFEASIBLE, Status.CONTACT_LOST)
 
 
-class Assembly(PackedContents):
+class Assembly(Solving):
     """A scene: rigid bodies, constraints between them, an objective.
 
     Parameters
@@ -66,9 +48,6 @@ class Assembly(PackedContents):
     The scene is packed once, at the first solve after a change of its bodies, constraints or terms. Targets,
     weights' ratios aside, and starts may change between solves without packing again.
     """
-
-    # Whether solves that fail are left at that: what goes along a branch is to end where the branch does.
-    _stays_near = False
 
     def __repr__(self) -> str:
         return f"Assembly({len(self._bodies)} bodies, {len(self._constraints)} constraints)"
@@ -138,172 +117,6 @@ class Assembly(PackedContents):
         if _LOG.isEnabledFor(logging.DEBUG):
             _LOG.debug("%s, %d iterations, %.6f s", solution.status.name, solution.iterations, solution.seconds)
         return solution
-
-    def _tried_otherwise(
-        self,
-        solution: Solution,
-        q0: ArrayLike | Solution | None,
-        starts: Mapping[str, ArrayLike] | None,
-        swept: bool,
-        options: dict[str, Any],
-        interruption: Interruption,
-    ) -> Solution:
-        """A solve that failed, again with other axes or from elsewhere, where that may help."""
-        if self._stays_near:
-            return solution
-        if solution.axes and not isinstance(q0, Solution) and not swept:
-            from assembly.studies.nearest_axes import with_axes_of_the_rest
-
-            solution = with_axes_of_the_rest(self, solution, self._given(q0), starts, options, interruption)
-            if solution.success:
-                return solution
-        from assembly.studies.restarts import may_hold_elsewhere, restarted
-
-        if may_hold_elsewhere(solution) and not interruption.is_over():
-            given = q0 if isinstance(q0, Solution) else self._given(q0)
-            settings = self._settings(options, interruption, warm=False)
-            solution = restarted(self, solution, settings, given, interruption)
-        return solution
-
-    def _settings(self, options: dict[str, Any], interruption: Interruption, warm: bool) -> Array:
-        """What the loop is told."""
-        settings = scene_settings(options, interruption, bool(self._objectives), warm)
-        if options.get("keep_topology") and self.packed().keeps_apart:
-            settings = settings.copy()
-            settings[GATHER] = NEVER
-        return settings
-
-    def _from_start(
-        self,
-        q0: ArrayLike | Solution | None,
-        starts: Mapping[str, ArrayLike] | None,
-        options: dict[str, Any],
-        interruption: Interruption,
-    ) -> Solution:
-        """A solve from this start and no other one."""
-        self._take_seats(q0, starts)
-        settings = self._settings(options, interruption, isinstance(q0, Solution))
-        solution = self._solved_or_standing(q0, settings, starts, options, interruption)
-        # Asked of every solve: what a callback or a signal's handler raised is raised there.
-        is_over = interruption.is_over()
-        if solution.status in AT_KINKS and not self._corners and settings[ITERATIONS] > 0.0 and not is_over:
-            return self._at_corners(solution, partial(self._from_start, q0, starts, options, interruption))
-        return solution
-
-    def _solved_or_standing(
-        self,
-        q0: ArrayLike | Solution | None,
-        settings: Array,
-        starts: Mapping[str, ArrayLike] | None,
-        options: dict[str, Any],
-        interruption: Interruption,
-    ) -> Solution:
-        """The same, without corners of contacts."""
-        if not self.packed().keeps_apart or settings[ITERATIONS] == 0.0:
-            return self._solved(settings, q0, starts, interruption)
-        if not self._objectives and isinstance(q0, Solution):
-            from assembly.studies.unhindered import unhindered
-
-            # Where no clearance pushes, rows alone say where all of it goes.
-            solution = unhindered(self, q0, settings, starts, interruption)
-            if solution is not None:
-                return solution
-        if not self._objectives and not (isinstance(q0, Solution) and q0._lists is None):
-            from assembly.studies.standing_start import standing_start
-
-            # Nothing asks to move: where all holds at the start, that is the solution.
-            solution = standing_start(self, q0, settings, starts, interruption)
-            if solution is not None:
-                return solution
-        if isinstance(q0, Solution):
-            return self._solved(settings, q0, starts, interruption)
-        from assembly.studies.first_solve import first_solve
-
-        return first_solve(self, self._given(q0), settings, starts, options, interruption)
-
-    def _at_corners(self, ended: Solution, again: Callable[[], Solution]) -> Solution:
-        """A solve that begins again with the corners of contacts of solids listed; where it fails, what ended before.
-
-        Solids that come to lie on each other touch at several corners, and the gap of their contact has a kink there.
-        """
-        packed = self._packed
-        assert packed is not None
-        if not corners_of(packed.contacts, packed.whole, packed.clearances, packed.clearance_pairs):
-            return ended
-        scene, self._corners = self._scene, True
-        self._pack(packed)
-        solution = again()
-        if not solution.success:
-            # The scene is as it was: rows of corners cost time.
-            self._packed, self._scene, self._corners = packed, scene, False
-            return ended
-        solution.seconds += ended.seconds
-        return solution
-
-    def _solved(
-        self,
-        settings: Array,
-        q0: ArrayLike | Solution | None,
-        starts: Mapping[str, ArrayLike] | None,
-        interruption: Interruption,
-        reference: Array | None = None,
-        turns: Array | None = None,
-        judges: bool = True,
-    ) -> Solution:
-        """A solve from q0, with as many places for contacts of clearances as it turns out to need.
-
-        Postures are measured from q0, or from a reference (n, 7). `turns` are the values that angles are near where
-        these start on a turn of their own. What is only on the way somewhere needs no proof: then nothing judges the
-        end but the loop.
-        """
-        spent = 0.0
-        if isinstance(q0, Solution):
-            # It may take more places, and another packed scene.
-            q0._list_contacts()
-        while True:
-            packed = self.packed()
-            if self._turns_near:
-                turns = np.array([self._turns_near.get(angle, 0.0) for angle in packed._angles])
-            apart = None
-            if isinstance(q0, Solution) and q0._fit is not None and q0._packed.rows == packed.rows:
-                apart = q0._fit.apart
-            may_grow = self._crowding < MOST_CROWDING and not isinstance(q0, Solution)
-            if packed.clearance_rows and settings[PLACES] != may_grow:
-                settings = settings.copy()
-                settings[PLACES] = float(may_grow)
-            start = partial(self._start, packed, q0, starts, turns)
-            load(packed, start)
-            begin = perf_counter()
-            if reference is None:
-                outcome = attempt(packed, settings, start, interruption, turns, apart)
-            else:
-                with postures_from(packed, reference):
-                    outcome = attempt(packed, settings, start, interruption, turns, apart)
-            spent += perf_counter() - begin
-            if not (may_grow and packed.is_crowded(outcome.state)) or interruption.is_over():
-                assert self._scene is not None
-                code, state, history, order, fit = outcome
-                status = Status.FITTED if fit is not None and fit.apart is not None else interruption.status(code)
-                if status is not Status.SOLVED and self._objectives:
-                    from assembly.solve.diagnosis.unbounded import Asked, has_strayed, status_of
-
-                    constraints = tuple(item for item in self._constraints if item._is_asked)
-                    asked = Asked(self.bodies, constraints, self._objectives)
-                    status = status_of(status, asked, packed, settings, start, state, interruption)
-                    ended_early = status is Status.ITERATION_LIMIT and has_strayed(packed, settings, state)
-                    if ended_early and not interruption.is_over():
-                        # It comes back, perhaps.
-                        settings = settings.copy()
-                        settings[STRAYS] = 0.0
-                        continue
-                solution = Solution(self._scene, packed, state, status, spent, history, order, fit)
-                solution._touching = float(settings[ALLOWED_OVERLAP])
-                if packed.keeps_apart and judges:
-                    from assembly.solve.clearance_proof import judge_end
-
-                    judge_end(solution, settings, interruption)
-                return solution
-            self._pack_with_more_places()
 
     def solve_all(
         self,
