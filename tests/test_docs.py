@@ -6,6 +6,7 @@ import ast
 import inspect
 import json
 import re
+import tomllib
 from dataclasses import fields
 from pathlib import Path
 
@@ -97,7 +98,7 @@ def test_options_and_their_defaults():
 def test_joints_with_their_rows_and_freedoms():
     settings = {"Screw": {"pitch": 1.0}, "Distance": {"value": 1.0}, "Angle": {"value": 1.0}}
     joints = {cls for module in (joints_of_frames, joints_of_points) for cls in module.__all__}
-    table = rows(MECHANISMS, "joint", "rows", "freedoms")
+    table = rows(MECHANISMS, "joint", "rows", "coordinates")
     assert {row[0] for row in table} == joints and len(table) == len(joints)
     for name, count, freedoms, _ in table:
         joint = getattr(asm, name)(asm.Body("a"), asm.Body("b"), **settings.get(name, {}))
@@ -175,6 +176,12 @@ def test_what_selects():
     for kind, has, _ in rows(PARTS, "kind"):
         for name in re.findall(r"`(\w+)`", f"`{has}`"):
             assert hasattr(BodyFace, name), (kind, name)
+
+
+def test_extras():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    table = rows(README, "extra", "brings")
+    assert sorted(row[0] for row in table) == sorted(project["optional-dependencies"])
 
 
 def test_measures_of_dexterity():

@@ -205,6 +205,7 @@ def test_rows_that_fail_are_rows():
     for batch in (loop, whole):
         assert np.isnan(batch.measures[:, 0]).tolist() == [False, True, False] and batch.feasibility[1] > 0.1
         assert "SOLVED" in str(batch) and repr(batch) == "Batch(3 rows, 2 solved)"
+        assert "3 rows" in batch._repr_html_()
     np.testing.assert_array_equal(whole.q[[0, 2]], loop.q[[0, 2]])
     with pytest.raises(dataclasses.FrozenInstanceError):
         loop.seconds = 0.0
