@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import operator
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -23,6 +23,7 @@ __all__ = [
     "bounded",
     "check_coordinates",
     "check_encodable",
+    "check_options",
     "checked_color",
     "extent",
     "integer",
@@ -69,6 +70,14 @@ class KnownSettings:
             settable = ", ".join(repr(k) for k in known if k[0] != "_")
             raise AttributeError(f"{type(self).__name__} has no {name!r}; expected {settable or 'no change at all'}")
         super().__setattr__(name, value)
+
+
+def check_options(options: Iterable[str], known: Iterable[str]) -> None:
+    """Raise for a name that no option has, and list those that there are."""
+    names = list(known)
+    for name in options:
+        if name not in names:
+            raise InputError(f"option {name!r} is unknown; expected one of {', '.join(names)}")
 
 
 def _shown(value: Any) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.errors import InputError, integer, number
+from assembly.errors import InputError, check_options, integer, number
 from assembly.solve.loop.settings import (
     ALLOWED_OVERLAP,
     FEASIBILITY,
@@ -100,10 +100,7 @@ class Options:
     @classmethod
     def of(cls, options: dict[str, Any]) -> Options:
         """Options from keyword arguments; an unknown name raises and lists the known ones."""
-        known = [field.name for field in fields(cls)]
-        for name in options:
-            if name not in known:
-                raise InputError(f"option {name!r} is unknown; expected one of {', '.join(known)}")
+        check_options(options, [field.name for field in fields(cls)])
         return cls(**options)
 
     def settings(self, warm: bool = False) -> NDArray[np.float64]:

@@ -129,12 +129,15 @@ def test_ctrl_c_ends_a_solve(scene, whole, options, ctrl_c):
     np.testing.assert_array_equal(scene.solve(**LIMIT).q, whole.q)
 
 
-def test_ctrl_c_ends_solves_of_many_starts(scene, whole, ctrl_c):
+def test_ctrl_c_ends_solves_of_many_starts(scene, whole, ctrl_c, caplog):
     timer = threading.Timer(1.5 * whole.seconds, lambda: os.kill(os.getpid(), signal.SIGINT))
     timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        scene.solve_all(starts=1000, **LIMIT)
+    # What was found until then is returned, and that it is not all is said.
+    found = scene.solve_all(starts=1000, **LIMIT)
     timer.join()
+    assert all(solution.success for solution in found)
+    (said,) = [record for record in caplog.records if "was interrupted" in record.message]
+    assert said.args[0] < 1000
 
 
 def test_solves_of_many_starts_have_one_time_limit():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any
 
-from assembly.errors import InputError, integer, number
+from assembly.errors import InputError, check_options, integer, number
 
 __all__ = ["FollowOptions"]
 
@@ -46,8 +46,5 @@ class FollowOptions:
     @classmethod
     def of(cls, options: dict[str, Any]) -> FollowOptions:
         """Options from keyword arguments; an unknown name raises and lists the known ones."""
-        known = [field.name for field in fields(cls)]
-        for name in options:
-            if name not in known:
-                raise InputError(f"option {name!r} is unknown; expected one of {', '.join(known)}")
+        check_options(options, [field.name for field in fields(cls)])
         return cls(**options)

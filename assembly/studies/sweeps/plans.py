@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -112,12 +112,13 @@ def sobol(ranges: Mapping[Parameter, ArrayLike], n: int, seed: int = 0) -> Plan:
     """
     from scipy.stats.qmc import Sobol
 
-    parameters, low, high = _ranges(ranges)
     count = integer("n", n, 1, 2**30)
-    drawn = Sobol(len(parameters), rng=np.random.default_rng(integer("seed", seed, 0, 2**63 - 1)))
-    # Of a power of 2 SciPy has nothing to warn of.
-    parts = drawn.random_base2((count - 1).bit_length())[:count]
-    return Plan(parameters, low + parts * (high - low), curve_order(parts), "sobol", int(seed))
+
+    def points(dimensions: int, rng: np.random.Generator) -> Array:
+        # Of a power of 2 SciPy has nothing to warn of.
+        return np.asarray(Sobol(dimensions, rng=rng).random_base2((count - 1).bit_length())[:count])
+
+    return _drawn("sobol", ranges, points, seed)
 
 
 def latin_hypercube(ranges: Mapping[Parameter, ArrayLike], n: int, seed: int = 0) -> Plan:
@@ -141,11 +142,8 @@ def latin_hypercube(ranges: Mapping[Parameter, ArrayLike], n: int, seed: int = 0
     """
     from scipy.stats.qmc import LatinHypercube
 
-    parameters, low, high = _ranges(ranges)
     count = integer("n", n, 1, MOST_ROWS)
-    drawn = LatinHypercube(len(parameters), rng=np.random.default_rng(integer("seed", seed, 0, 2**63 - 1)))
-    parts = drawn.random(count)
-    return Plan(parameters, low + parts * (high - low), curve_order(parts), "latin hypercube", int(seed))
+    return _drawn("latin hypercube", ranges, lambda d, rng: LatinHypercube(d, rng=rng).random(count), seed)
 
 
 def rows(table: Any, parameters: Parameter | Sequence[Parameter] | None = None) -> Plan:
@@ -232,6 +230,18 @@ def as_plan(plan: Any) -> Plan:
             raise InputError(f"plan[{k}] has {list(row)}; expected the parameters of plan[0], {list(parameters)}")
         values[k] = _column(f"plan[{k}]", [row[p] for p in parameters])
     return Plan(parameters, values, np.arange(len(values), dtype=np.int64), "rows")
+
+
+def _drawn(
+    kind: str,
+    ranges: Mapping[Parameter, ArrayLike],
+    points: Callable[[int, np.random.Generator], Array],
+    seed: int,
+) -> Plan:
+    """A plan of points (n, p) of the unit cube, which a number of dimensions and a seeded generator give."""
+    parameters, low, high = _ranges(ranges)
+    parts = points(len(parameters), np.random.default_rng(integer("seed", seed, 0, 2**63 - 1)))
+    return Plan(parameters, low + parts * (high - low), curve_order(parts), kind, int(seed))
 
 
 def _parameters(name: str, given: Any) -> tuple[Parameter, ...]:

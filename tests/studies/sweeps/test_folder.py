@@ -89,7 +89,7 @@ def test_failures_and_messages_are_kept(tmp_path):
 
 @pytest.mark.skipif(os.name == "nt", reason="processes are killed by a signal")
 def test_killed_at_any_moment(tmp_path, cases):
-    rows, kills = cases(700, 40000), cases(2, 200)
+    rows, kills = cases(700, 40000), cases(1, 200)
     rng = np.random.default_rng(5)
     command = [sys.executable, "-m", "tests.studies.sweeps.sweep_scenes", str(tmp_path), str(rows)]
     done, killed = 0, 0
