@@ -115,13 +115,19 @@ class Frames:
         Of every frame a unit of each parameter, about the origin of its body, lengths over the scene's size.
     """
 
-    def __init__(self, packed: Packed, parameters: Sequence[Parameter], turns: Array, bodies: Sequence[Body]) -> None:
+    def __init__(
+        self,
+        packed: Packed,
+        parameters: Sequence[Parameter],
+        turns: Array,
+        bodies: Sequence[Body],
+        *,
+        of_measures: bool = False,
+    ) -> None:
         known: dict[int, None] = {}
-        if not packed.end_effectors:
-            # A dexterity has frames of its inputs as well.
-            pairs = [*packed._frames, *(term for term, _ in packed._turns)]
-            sides = (side for pair in pairs for side in (getattr(pair, name, None) for name in SIDES))
-            known = {id(getattr(side, "base", side)): None for side in sides if side is not None}
+        if of_measures or not packed.end_effectors:
+            # A dexterity has frames of its inputs as well; what is measured has those of joints.
+            known = _frames_of(packed)
         self.numbers = [_on_probe(parameter, known) for parameter in parameters]
         self.each: list[Frame] = []
         places: dict[int, int] = {}
@@ -139,6 +145,13 @@ class Frames:
 
 # Names of what has frames: of a pair of a joint, of a term of the objective.
 SIDES = ("frame_a", "frame_b", "frame")
+
+
+def _frames_of(packed: Packed) -> dict[int, None]:
+    """The frames of rows and terms, those that others are turned from, by their identities."""
+    pairs = [*packed._frames, *(term for term, _ in packed._turns)]
+    sides = (side for pair in pairs for side in (getattr(pair, name, None) for name in SIDES))
+    return {id(getattr(side, "base", side)): None for side in sides if side is not None}
 
 
 def _on_probe(parameter: Parameter, known: Collection[int]) -> FrameNumber | None:
@@ -172,6 +185,8 @@ def columns_of(problem: Problem, parameters: Sequence[Parameter]) -> Columns:
         else:
             rows[:, r], slopes[:, r], values[r] = _by_differences(problem, parameter)
             enters = bool(rows[:, r].any() or slopes[:, r].any() or values[r]) or _is_of_a_face(problem, parameter)
+            # A hinge may turn about its axis in its frame: rows are as they were, what is measured is not.
+            enters = enters or _on_probe(parameter, _frames_of(problem.packed)) is not None
         if not enters:
             raise InputError(f"parameter {parameter.name!r} enters no row and no term; expected one of what is solved")
     _add_size(problem, parameters, slopes, values)

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.derivatives.columns import Columns, Problem, by_frames, differences
+from assembly.derivatives.columns import Columns, Frames, Problem, by_frames, differences
 from assembly.derivatives.kkt import Moves
 from assembly.derivatives.measure import Measure, place_of, world
 from assembly.derivatives.numbers import ControlPoint, ControlWeight, FrameNumber, FrameOrigin, LeastGap, ShapeNumber
 from assembly.derivatives.parameter import Parameter
+from assembly.derivatives.probed import ProbedScene
 from assembly.errors import InputError
 from assembly.solve.forces.statics import bodies_of
 
@@ -39,6 +40,7 @@ def rates_of(
     steps[moving] = moves.steps
     slopes, own = np.zeros((len(measures), len(here.gradient))), np.zeros((len(measures), len(parameters)))
     units, told = np.ones((len(measures), 1)), {}
+    by_own_frames = _coordinates_by_frames(problem, measures, parameters)
     coordinates = 0
     for i, item in enumerate(measures):
         if item.kind == "wrench":
@@ -48,7 +50,7 @@ def rates_of(
             told[i] = (columns.values + problem.forces @ columns.rows) * problem.packed.unit
         elif item.kind == "coordinate":
             slopes[i], units[i] = here.measured[coordinates], scale if item.unit == "length" else 1.0
-            own[i] = here.measured_by_frames[coordinates] @ problem.frames.twists
+            own[i] = by_own_frames[coordinates]
             coordinates += 1
         elif item.kind == "gap":
             row = _row_of(problem, item)
@@ -58,7 +60,7 @@ def rates_of(
                 if isinstance(parameter._number, LeastGap) and parameter._number.owner is item.thing:
                     own[i, r] += 1.0 / scale
         else:
-            _of_place(problem, item, slopes[i], own[i])
+            _of_place(problem, item, parameters, slopes[i], own[i])
     rates = units * (slopes @ steps + own)
     for i, figures in told.items():
         rates[i] = figures
@@ -89,7 +91,21 @@ def _row_of(problem: Problem, item: Measure) -> int:
     raise InputError(f"measure is the gap of {item.thing.name!r}; expected a contact of the scene that is one of faces")
 
 
-def _of_place(problem: Problem, item: Measure, slopes: Array, own: Array) -> None:
+def _coordinates_by_frames(problem: Problem, measures: Sequence[Measure], parameters: Sequence[Parameter]) -> Array:
+    """What frames that a parameter places change coordinates by at a fixed pose, (coordinates, p)."""
+    frames, here = problem.frames, problem.here
+    coordinates = [item.thing.coordinate for item in measures if item.kind == "coordinate"]
+    if coordinates and problem.packed.end_effectors:
+        # Where a dexterity is no probes are in the rows, and those of what is measured are asked for by themselves.
+        frames = Frames(problem.packed, parameters, problem.turns, problem.bodies, of_measures=True)
+        if frames.each:
+            probed = ProbedScene(problem.packed, problem.state, problem.bodies, frames.each, coordinates)
+            here = probed.evaluate(problem.forces)
+    changes: Array = here.measured_by_frames @ frames.twists
+    return changes
+
+
+def _of_place(problem: Problem, item: Measure, parameters: Sequence[Parameter], slopes: Array, own: Array) -> None:
     """Write slopes of a place in the world or of a distance, in lengths over scaled twists; and what frames add."""
     sides = item.thing if item.kind == "distance" else (item.thing,)
     bodies = [problem.index(place_of(side)[0]) for side in sides]
@@ -107,7 +123,7 @@ def _of_place(problem: Problem, item: Measure, slopes: Array, own: Array) -> Non
     scales = np.repeat([problem.packed.scale, 1.0], 3)
     for side, k, (_, jacobian), direction in zip(sides, bodies, places, directions, strict=True):
         slopes[6 * k : 6 * k + 6] += (direction @ jacobian) * scales
-        for r, number in enumerate(problem.frames.numbers):
+        for r, number in enumerate(parameter._number for parameter in parameters):
             if isinstance(number, FrameOrigin) and number.frame is getattr(side, "base", side):
                 own[r] += direction @ problem.turns[k][:, number.axis]
 

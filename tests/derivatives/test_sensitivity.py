@@ -179,11 +179,15 @@ def test_a_dexterity_is_differenced_by_frames():
     scene.constrain(one, two)
     scene.minimize(goal)
     scene.maximize(asm.Dexterity(tip, [one, two], task="position", weight=0.05))
-    case = Case(scene, [asm.Measure(one), asm.Measure(tip, "x")], [asm.Parameter(two.frame_a, "origin", "x")])
+    # What is measured has the frames as well: a turn of the elbow's turns its angle, and no body.
+    of = [asm.Measure(one), asm.Measure(two), asm.Measure(tip, "x"), asm.Measure(two.frame_a, "x")]
+    case = Case(scene, of, [asm.Parameter(two.frame_a, "origin", "x"), asm.Parameter(two.frame_a, "turn", "z")])
     solution, d = derived(case)
-    found = differences(case, solution, case.wrt[0], 1e-2)
-    # Hessians of dexterities are differences themselves, to 1e-6 or so.
-    assert np.abs(found - d.matrix[:, 0]).max() < 1e-5
+    for r, parameter in enumerate(case.wrt):
+        found = differences(case, solution, parameter, 1e-2)
+        # Hessians of dexterities are differences themselves, to 1e-6 or so.
+        assert np.abs(found - d.matrix[:, r]).max() < 1e-5
+    assert abs(d.matrix[1, 1] + 1.0) < 1e-9 and abs(d.matrix[3, 0]) > 0.1
 
 
 def test_forces_that_rows_share_are_undetermined():
