@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from assembly.assembly import Assembly
-from assembly.errors import InputError, positive
+from assembly.errors import InputError, check_encodable, items, positive
 from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.view.commands import commands, motion
 from assembly.view.item import Picture
-from assembly.view.page import player, write_page
+from assembly.view.page import captions_text, player, write_page
 from assembly.view.picture import DIRECTION, film
 from assembly.view.series import Trajectory
 
@@ -31,6 +31,7 @@ def animate(
     *,
     seconds: float = 5.0,
     loop: bool = True,
+    captions: Iterable[str] = (),
     ellipsoids: Ellipsoid | Iterable[Ellipsoid | Iterable[Ellipsoid]] = (),
     direction: ArrayLike = DIRECTION,
     title: str | None = None,
@@ -57,6 +58,8 @@ def animate(
         From the first frame to the last.
     loop : bool
         Whether it starts again at the end.
+    captions : iterable of str
+        What the play bar of a file says at each frame, a driven value with its unit say; else the frame's number.
     ellipsoids : Ellipsoid, or for each frame one or several
         A single one stays as it is.
     direction : (3,)
@@ -79,7 +82,19 @@ def animate(
     """
     duration = positive("seconds", seconds)
     require_flag("loop", loop)
-    return present(film(scene, trajectory, direction, ellipsoids), path, duration, loop, title, open, visualizer)
+    said = items("captions", captions, "a string for each frame")
+    picture = film(scene, trajectory, direction, ellipsoids)
+    frames = round(float(picture.times[-1])) + 1
+    for k, text in enumerate(said):
+        if not isinstance(text, str):
+            raise TypeError(f"captions[{k}] is {text!r}; expected a string")
+        check_encodable(f"captions[{k}]", text)
+    if isinstance(captions, str) or len(said) not in (0, frames):
+        raise InputError(f"captions has {len(said)} texts; expected one for each of {frames} frames")
+    if said and path is None:
+        raise InputError("captions is given without a path; expected a path: the window's own player has none")
+    beside = captions_text(said) if said else ""
+    return present(picture, path, duration, loop, title, open, visualizer, beside)
 
 
 def require_flag(name: str, value: object) -> None:

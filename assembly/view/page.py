@@ -7,11 +7,12 @@ packed by gzip and written in base64, which browsers unpack. A command stands be
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from gzip import compress
 from html import escape
 from importlib.util import find_spec
+from json import dumps
 from os import PathLike
 from pathlib import Path
 
@@ -25,7 +26,7 @@ from assembly.studies.interference.clash import Interference
 from assembly.view.commands import Command, commands, packed
 from assembly.view.picture import DIRECTION, draw
 
-__all__ = ["page_text", "player", "save_html", "write_page"]
+__all__ = ["captions_text", "page_text", "player", "save_html", "write_page"]
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -89,6 +90,8 @@ _PLAYER = """<div id="player">
 const part = Object.fromEntries(
   ["play", "sign", "slider", "frame", "loop"].map(id => [id, document.getElementById(id)]));
 const animator = viewer.animator;
+// What to say in the place of a frame's number.
+const captions = [];
 function seek(frame) {{
   animator.pause();
   animator.seek(frame / {last} * animator.duration);
@@ -105,7 +108,7 @@ function follow() {{
   requestAnimationFrame(follow);
   const frame = animator.time / animator.duration * {last};
   part.slider.value = frame;
-  part.frame.value = `frame ${{Math.round(frame)}} of {last}`;
+  part.frame.value = captions[Math.round(frame)] ?? `frame ${{Math.round(frame)}} of {last}`;
   part.sign.setAttribute("d", animator.playing ? "M3 2h4v14h-4z M11 2h4v14h-4z" : "M4 2l12 7l-12 7z");
 }}
 follow();
@@ -147,6 +150,13 @@ def write_page(path: str | PathLike[str], title: str | None, drawing: Iterable[C
 def player(frames: int, loop: bool) -> str:
     """Controls of a page's motion: play and pause, a slider over the frames, a loop."""
     return _PLAYER.format(last=frames - 1, checked=" checked" if loop else "")
+
+
+def captions_text(captions: Sequence[str]) -> str:
+    """What the play bar says at each frame, to stand behind the player."""
+    # An end of the script in a caption would be one.
+    listed = dumps(list(captions)).replace("<", "\\u003c")
+    return f'<script type="text/plain" class="with-viewer">captions.push(...{listed});</script>\n'
 
 
 def save_html(

@@ -286,3 +286,23 @@ def test_a_window_plays_until_it_shows_something_else(balls, rolling, stopped, c
     title_after = request.getfixturevalue("browser").title_after
     assert json.loads(title_after(tmp_path / "moving.html", LENGTH)) == [2.5, 4]
     assert json.loads(title_after(tmp_path / "still.html", LENGTH)) == [0, 0]
+
+
+def test_the_play_bar_says_what_it_is_given(balls, rolling, browser, tmp_path):
+    page = tmp_path / "said.html"
+    said = [f"{k} deg </script> <b>" for k in range(len(rolling))]
+    asm.view.animate(balls, rolling, page, captions=said)
+    script = "setTimeout(() => { animator.update(); follow(); document.title = part.frame.value; }, 300);"
+    assert browser.title_after(page, script, fragment="#frame=6") == said[6]
+
+
+@pytest.mark.parametrize(
+    ("captions", "message"),
+    [(["a"], "captions has 1 texts"), ("abc", "captions has 3 texts"), ([1] * 13, r"captions\[0\] is 1")],
+)
+def test_captions_are_one_a_frame(balls, rolling, tmp_path, captions, message):
+    with pytest.raises((InputError, TypeError), match=message):
+        asm.view.animate(balls, rolling, tmp_path / "none.html", captions=captions)
+    with pytest.raises(InputError, match="without a path"):
+        asm.view.animate(balls, rolling, captions=["a"] * 13)
+    assert not any(tmp_path.iterdir())
