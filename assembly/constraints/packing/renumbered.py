@@ -152,7 +152,7 @@ def have_same_numbers(one: Packed, other: Packed) -> bool:
 
 
 def numbers_told(packed: Packed, bodies: Sequence[Body], constraints: Sequence[Constraint]) -> list[object]:
-    """What was set anew where two lists differ: fixed bodies, what is asked for, frames, least gaps, faces.
+    """What was set anew where two lists differ: fixed bodies, what is asked for, frames, least gaps, faces, places.
 
     Driven values, limits, offsets and targets are not among it: they are read in every solve.
     """
@@ -162,8 +162,9 @@ def numbers_told(packed: Packed, bodies: Sequence[Body], constraints: Sequence[C
     asked = [body.fixed for body in bodies], [item._is_asked for item in constraints]
     faces = [side.face for body in bodies for side in body.faces]
     gaps = [item.minimum for item in packed.clearances] + [item.minimum for item in packed.contacts]
-    places = [place.target for place in (*packed.drawn, *(place for place, _ in packed.placed))]
-    return [asked, frames, gaps, faces, places]
+    places = [place.target for place, _ in packed.placed]
+    drawn = [(place.target, place.weight) for place in packed.drawn]
+    return [asked, frames, gaps, faces, places, drawn]
 
 
 def _following_postures(packed: Packed) -> list[int]:

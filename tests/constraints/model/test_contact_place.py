@@ -121,6 +121,20 @@ def test_solutions_are_derived_by_targets(as_constraint):
         assert np.abs(expected).max() > 1e-3
 
 
+def test_a_tracker_tells_that_a_place_is_another_one():
+    scene, contact = eggs()
+    place = asm.ContactPlace(contact, "a", (5.0, 2.5))
+    scene.minimize(place)
+    egg = scene.bodies[1]
+    for number in (asm.Parameter(place, "weight"), asm.Parameter(place, "target", "u")):
+        scene.solve()
+        tracker = asm.Tracker(scene, egg.point(0, 0, 0))
+        there = tracker.q[1, :3]
+        assert tracker.step(there).status is not asm.TrackStatus.CHANGED
+        number.value = 1.1 * number.value
+        assert tracker.step(there).status is asm.TrackStatus.CHANGED
+
+
 def test_a_branch_is_followed_along_a_target():
     """Newton's last steps are of pairs that move by less than is evaluated again, and slopes are made of these."""
     scene, contact = eggs()
