@@ -26,8 +26,8 @@ def _protected(value: Any) -> Any:
     if isinstance(value, tuple) and any(isinstance(item, np.ndarray) for item in value):
         parts = map(_protected, value)
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
-    if type(value) is dict:
-        return {key: _protected(item) for key, item in value.items()}
+    if isinstance(value, dict):
+        return type(value)((key, _protected(item)) for key, item in value.items())
     return value
 
 

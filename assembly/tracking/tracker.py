@@ -241,7 +241,9 @@ class Tracker(InOneProcess):
         self._settings[CARRIES] = float(budget is not None and not packed._sources)
 
     def __repr__(self) -> str:
-        return f"Tracker({self._scene_given!r}, follow={self.follow!r}, stiffness={self._hands.stiffness})"
+        stiffness = self._hands.stiffness
+        told = f"{stiffness:g}" if isinstance(stiffness, float) else repr(stiffness)
+        return f"Tracker({self._scene_given!r}, follow={self.follow!r}, stiffness={told})"
 
     @property
     def follow(self) -> Followable | tuple[Followable, ...]:
