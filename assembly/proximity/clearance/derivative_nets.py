@@ -44,8 +44,12 @@ def surface_bounds(surface: NurbsSurface, low: Array, high: Array) -> tuple[Arra
     boxes[:, ::2], boxes[:, 1::2] = low, high
     at_u, at_v = surface.breaks()
     closed = np.array(surface.closed, dtype=np.int64)
-    # Kernels take arrays that may be written.
-    bound_surface(np.array(surface.bezier_pieces()), np.array(at_u), np.array(at_v), closed, boxes, found)
+    # Seen from the middle: derivatives are the same, and nets of what is beyond a knot by little would be off by the
+    # rounding of far coordinates over the square of that little. Kernels take arrays that may be written.
+    pieces = np.array(surface.bezier_pieces())
+    ends = surface.control_points.reshape(-1, 3)
+    pieces[..., :3] -= pieces[..., 3:] * (0.5 * (ends.min(axis=0) + ends.max(axis=0)))
+    bound_surface(pieces, np.array(at_u), np.array(at_v), closed, boxes, found)
     return found[:, :2], found[:, 2:]
 
 

@@ -27,8 +27,10 @@ Array = NDArray[np.float64]
 FOLLOWED, STEPS, CUT = 8, 60, 0.5
 # The first step, and directions around the subgradient that are tried.
 WIDEST, AROUND = 0.3, np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-# Normals of flat faces that are tried of each body.
-NORMALS = 12
+# Normals of flat faces that are tried of each body, and directions of edges between such faces.
+NORMALS, EDGES = 12, 12
+# Sine of an angle below which two of these have no direction across.
+PARALLEL = 1e-6
 # A translation is this part longer than found to part, and looks for it stop at this part of it.
 FARTHER, CLOSE = 1e-6, 1e-3
 # Other directions are of use where they are shorter by this factor.
@@ -37,10 +39,13 @@ SHORTER = 0.95
 FIRST, LENGTHS = 1e-3, 10
 
 
-def _directions(a: BodyCells, b: BodyCells, turn: Array) -> Array:
-    """Directions (n, 3) that are tried, seen from a: of a grid, of both boxes, of flat faces."""
+def _directions(a: BodyCells, b: BodyCells, turn: Array) -> tuple[Array, Array]:
+    """Directions (n, 3) that are tried, seen from a: of a grid, of both boxes, of flat faces; and across edges of both.
+
+    Polytopes are parted along a normal of one of them, or across an edge of each.
+    """
     grid = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
-    found = [grid]
+    found, edges = [grid], []
     for cells, rotation in ((a, np.eye(3)), (b, turn)):
         links, nodes = rows_of(LINKS, cells.links), rows_of(NODE, cells.nodes)
         flat = nodes.ruling[cells.first][links.form[cells.first] == FLAT]
@@ -49,9 +54,21 @@ def _directions(a: BodyCells, b: BodyCells, turn: Array) -> Array:
         distinct = np.unique(np.round(flat * np.sign(largest), 6), axis=0)[:NORMALS]
         for ways in (nodes.axes[0], distinct):
             found += [ways @ rotation.T, -ways @ rotation.T]
+        edges.append(_across(distinct, distinct)[:EDGES] @ rotation.T)
+    across = _across(*edges)
     ways = np.concatenate(found)
     length = np.linalg.norm(ways, axis=1)
-    return np.asarray(ways[length > 0.0] / length[length > 0.0, None])
+    return ways[length > 0.0] / length[length > 0.0, None], np.concatenate([across, -across])
+
+
+def _across(one: Array, other: Array) -> Array:
+    """Distinct unit vectors (n, 3) across each of two sets of them, of opposite ones one."""
+    ways = np.cross(one[:, None], other[None]).reshape(-1, 3)
+    length = np.linalg.norm(ways, axis=1)
+    ways = ways[length > PARALLEL] / length[length > PARALLEL, None]
+    largest = np.take_along_axis(ways, np.abs(ways).argmax(axis=1)[:, None], axis=1)
+    distinct = np.unique(np.round(ways * np.sign(largest), 6), axis=0)
+    return np.asarray(distinct / np.linalg.norm(distinct, axis=1)[:, None])
 
 
 class _Hulls:
@@ -152,8 +169,8 @@ def least_translation(proof: ClearanceProof, k: int, q: Array) -> Array | None:
     world, turn_b = rotation_matrix(q[a, 3:]), rotation_matrix(q[b, 3:])
     turn, shift = world.T @ turn_b, (q[b, :3] - q[a, :3]) @ world
     first, second = proof.cells_of_both(k)
-    ways = _directions(first, second, turn)
-    way = world @ _Hulls(first, second, turn, shift).least(ways)
+    ways, across = _directions(first, second, turn)
+    way = world @ _Hulls(first, second, turn, shift).least(np.concatenate([ways, across]))
     most = float(np.linalg.norm(way)) * (1.0 + FARTHER) + FARTHER * max(first.size, second.size)
     best = way / np.linalg.norm(way) * most
     translated = _Translated(proof, k, q)

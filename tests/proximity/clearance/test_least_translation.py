@@ -64,6 +64,18 @@ def test_boxes_any_way(cases):
     assert tried > 3
 
 
+def test_boxes_that_are_parted_across_edges():
+    """The least of many local ones: between edges of both. Lower parts of hulls lead to one that is 4 in 100 longer."""
+    # Found among random ones.
+    rng = np.random.default_rng(1)
+    for _ in range(147):
+        one, other = rng.uniform(0.4, 1.5, (2, 3))
+        place, turn = rng.uniform(-0.5, 0.5, 3) * (one + other) * 0.5, quaternion(np.r_[0, 0, 0, rng.normal(size=4)])
+    least = overlaps(one, other, turn.as_matrix(), place)
+    told = length(asm.shapes.box(*one), asm.shapes.box(*other), at(*place, turn))
+    assert least <= told * (1.0 + 1e-12) and told <= (1.0 + 1e-5) * least
+
+
 def test_balls(cases):
     rng = np.random.default_rng(2)
     for _ in range(cases(2, 100)):
