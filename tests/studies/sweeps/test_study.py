@@ -48,6 +48,18 @@ def test_designs_are_on_the_branch_of_the_scene_or_told_to_be_none(found):
     assert np.isnan(found["out"][~held]).all()
 
 
+@pytest.mark.parametrize("design", [(5.95, 2.34, 4.87), (5.1, 2.61, 6.81), (0.06, 2.32, 1.55)])
+def test_far_designs_that_the_branch_reaches_are_reached(design):
+    scene, parameters, out = four_bar()
+    now, there = np.array([item.value for item in parameters]), np.array(design)
+    angle, crank, rod = (now + np.linspace(0.0, 1.0, 101)[:, None] * (there - now)).T
+    across = np.hypot(GROUND - crank * np.cos(angle), crank * np.sin(angle))
+    # All of the way exists, and none of it is near an end; steps of 1/64 of it are too long for Newton's method.
+    assert np.minimum(rod + ROCKER - across, across - np.abs(rod - ROCKER)).min() > 0.05
+    found = asm.study(scene, asm.rows({item: [value] for item, value in zip(parameters, design, strict=True)}), out)
+    assert found.success.all()
+
+
 def test_numbers_and_poses_of_the_scene_are_left_as_they_are():
     scene, plan, of = wide(40)
     before, solution = scene.q.copy(), scene.solve()
