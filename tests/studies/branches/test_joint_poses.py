@@ -123,7 +123,7 @@ def test_what_cannot_close_is_left_open():
 
 def test_values_that_place_nothing_are_refused():
     scene, _ = arm()
-    with pytest.raises(UnknownNameError, match="name is 'shoulder.angel'; expected say 'shoulder.angle'"):
+    with pytest.raises(UnknownNameError, match="name is 'shoulder.angel'; expected perhaps 'shoulder.angle'"):
         scene.at({"shoulder.angel": 0.3})
     with pytest.raises(InputError, match=r"values\['shoulder.angle'\] is 2.1; expected a value within the limits"):
         scene.at({"shoulder.angle": 2.1})
