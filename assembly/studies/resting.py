@@ -60,6 +60,8 @@ Side = tuple[int, int, bool]
 Prove = Callable[[Array, float], list[PairAnswer] | None]
 # [of the objective's slope] What contact forces may leave of it: the joints' solve holds 1e-10 of a largest one of 1.
 BALANCED = 1e-9
+# What rounding alone may change of an objective, in parts of it.
+ROUNDED = 1e-14
 # A force that is stronger pushes, in parts of the objective's slope.
 PUSHES = 1e-7
 
@@ -119,6 +121,8 @@ def resting(
             if there.status is Status.UNBOUNDED or not drop_farthest(held, there.violations):
                 return None
             continue
+        if _rises(there, touching):
+            return None
         model = LocalModel.at(there._packed, there._state)
         if model is None or len(model.jacobian) != there._packed.rows:
             return None
@@ -136,6 +140,14 @@ def resting(
             return solution
         poses, held = there.q.copy(), [fit for fit in held if sides[fit.joint] in pushing]
     return None
+
+
+def _rises(there: Solution, touching: float) -> bool:
+    """Whether bodies fit where a solve began, up to `touching`, and the objective was less there: there they stay."""
+    objective, violation = there.history[:, 0], there.history[:, 1]
+    return len(objective) > 1 and bool(
+        violation[0] <= touching and objective[-1] - objective[0] > ROUNDED * abs(objective[0])
+    )
 
 
 def _with_joints(scene: Assembly, others: Sequence[Constraint], joints: Sequence[Constraint]) -> Assembly:

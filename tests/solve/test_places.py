@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly import assembly as module
+from assembly import solving as module
 
 
 def pair(slots, lift=0.0):

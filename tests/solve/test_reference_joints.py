@@ -12,6 +12,7 @@ from assembly.constraints.model.objectives import Objective
 from assembly.kinematics.pose import retract
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.oracle import reference
+from assembly.solve.oracle.dexterity import Mechanism
 from assembly.solve.oracle.reference import ReferenceSolver
 from assembly.solve.oracle.rows import Poses, Rows
 from assembly.solve.oracle.terms import Terms
@@ -400,6 +401,12 @@ def test_what_the_reference_solver_does_not_take_is_named():
     packed, symbols = scene.packed(), [ca.MX.sym("pose", 7) for _ in scene.bodies]
     poses = Poses(symbols, packed)
     with pytest.raises(ValueError, match=r"objective is Wish\(\); expected .* FrameDistance"):
-        Terms(packed, scene.bodies, [(1.0, Wish((), 1.0))], poses)
+        Terms(
+            packed,
+            scene.bodies,
+            [(1.0, Wish((), 1.0))],
+            poses,
+            Mechanism(packed, scene.bodies, scene.constraints, poses),
+        )
     with pytest.raises(ValueError, match="constraint 'rule' is .*; expected .* an Expression"):
         Rows(packed, scene.bodies, [Constraint(scene.bodies, "rule")], poses)
