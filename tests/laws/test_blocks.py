@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.packing import scene as packing
+from assembly.constraints.packing import written_scene as packing
 from assembly.constraints.packing.elimination_order import block_record
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.block_factor import (
