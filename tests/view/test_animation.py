@@ -298,7 +298,7 @@ def test_the_play_bar_says_what_it_is_given(balls, rolling, browser, tmp_path):
 
 @pytest.mark.parametrize(
     ("captions", "message"),
-    [(["a"], "captions has 1 texts"), ("abc", "captions has 3 texts"), ([1] * 13, r"captions\[0\] is 1")],
+    [(["a"], "captions has 1 texts"), ("abc", "captions is 'abc'"), ([1] * 13, r"captions\[0\] is 1")],
 )
 def test_captions_are_one_a_frame(balls, rolling, tmp_path, captions, message):
     with pytest.raises((InputError, TypeError), match=message):

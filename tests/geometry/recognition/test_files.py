@@ -22,16 +22,16 @@ FILES = sorted(
 @pytest.fixture
 def surfaces(monkeypatch):
     """Surfaces of OCCT, and what was read of them, of all files that are read meanwhile."""
-    from assembly.step import faces
+    from assembly.step import edges
 
-    found, made = [], faces.patch
+    found, made = [], edges.patch
 
     def recorded(surface, box):
         read = made(surface, box)
         found.append((surface, read.surface))
         return read
 
-    monkeypatch.setattr(faces, "patch", recorded)
+    monkeypatch.setattr(edges, "patch", recorded)
     return found
 
 
