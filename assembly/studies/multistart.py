@@ -75,17 +75,17 @@ def solve_all(
     number = integer("seed", seed, 0, 2**63 - 1)
     if executor is not None and not hasattr(executor, "submit"):
         raise TypeError(f"executor is {executor!r}; expected one of concurrent.futures, or another one with submit")
-    given = _given(starts, scene)
+    given, asked = _given(starts, scene)
     checked_progress(progress)
     # Of "all" nobody knows how many there will be: the fewest are told.
-    total = len(given) if given is not None else FEWEST if isinstance(starts, str) else int(starts)  # type: ignore[arg-type]  # a number by now
+    total = len(given) or asked or FEWEST
     with postures_from(scene.packed(), scene.q), watched(progress, "solve_all", total, "start") as advance:
         search = _Search(scene, dict(options), interruption, executor, advance)
         try:
-            if given is not None:
+            if given:
                 search.solve(given)
             else:
-                _from_drawn(search, starts, np.random.default_rng(number))
+                _from_drawn(search, asked, np.random.default_rng(number))
         except KeyboardInterrupt:
             # What is found is found.
             _LOG.warning("solve_all was interrupted after %d starts", search.count)
@@ -93,27 +93,28 @@ def solve_all(
     return sorted(search.found, key=lambda solution: solution.objective)
 
 
-def _given(starts: Starts, scene: Assembly) -> list[Array] | None:
-    """Starts that are poses or solutions; None where a number of them is asked for."""
+def _given(starts: Starts, scene: Assembly) -> tuple[list[Array], int | None]:
+    """Starts that are poses or solutions; else none, and how many are asked for: None of "all"."""
     if isinstance(starts, str):
         if starts != "all":
             raise InputError(f"starts is {starts!r}; expected a number, 'all', or poses and solutions")
-        return None
+        return [], None
     if isinstance(starts, (Sequence, np.ndarray)):
+        if not len(starts):
+            raise InputError("starts is empty; expected a number, 'all', or poses and solutions")
         rows = [item.q if isinstance(item, Solution) else item for item in starts]
-        return [pose_rows(f"starts[{k}]", row, len(scene.bodies)) for k, row in enumerate(rows)]
-    integer("starts", starts, 1, 10**6)
-    return None
+        return [pose_rows(f"starts[{k}]", row, len(scene.bodies)) for k, row in enumerate(rows)], None
+    return [], integer("starts", starts, 1, 10**6)
 
 
-def _from_drawn(search: _Search, starts: Starts, rng: np.random.Generator) -> None:
-    """Solve from the bodies' poses, then from drawn ones, as many as are asked for."""
+def _from_drawn(search: _Search, asked: int | None, rng: np.random.Generator) -> None:
+    """Solve from the bodies' poses, then from drawn ones, as many as are asked for; None: of "all"."""
     scene, tree = search.scene, None
     moving = moving_rows(scene.bodies)
     search.solve([scene.q])
-    most = MOST if isinstance(starts, str) else int(starts)  # type: ignore[arg-type]  # a number by now
+    most = MOST if asked is None else asked
     while search.count < most and not search.is_over():
-        if isinstance(starts, str) and search.count >= max(FEWEST, AGAIN * search.newest):
+        if asked is None and search.count >= max(FEWEST, AGAIN * search.newest):
             return
         if tree is None:
             tree = JointTree(scene)

@@ -170,3 +170,8 @@ def test_solutions_with_something_between_them_are_two():
     assert not are_one(above, below)
     # Nothing asks how far above it is.
     assert are_one(above, higher)
+
+
+def test_no_starts_at_all_are_refused():
+    with pytest.raises(InputError, match="starts is empty; expected a number"):
+        asm.Assembly([asm.Body("a")]).solve_all(starts=[])

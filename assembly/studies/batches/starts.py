@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,8 +36,10 @@ def starts_of(scene: Assembly, q0s: ArrayLike | Solution | list[Solution] | None
                 raise TypeError(f"q0s[{k}] is {item!r}; expected a Solution, as others are")
         return list(q0s)
     bodies = len(scene.bodies)
-    single = np.ndim(q0s) == 2  # type: ignore[arg-type]  # lists of solutions are none
-    given: Array = real_array("q0s", q0s, (bodies, 7) if single else ("n", bodies, 7))  # type: ignore[arg-type]
+    # Lists of solutions are none by now.
+    poses = cast(ArrayLike, q0s)
+    single = np.ndim(poses) == 2
+    given: Array = real_array("q0s", poses, (bodies, 7) if single else ("n", bodies, 7))
     given = given.reshape(-1, bodies, 7)
     check_coordinates("q0s", [float(given[..., :3].min()), float(given[..., :3].max())])
     # Those that are unit to rounding stay as they are, to the bit.

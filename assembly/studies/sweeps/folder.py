@@ -165,7 +165,7 @@ class Folder:
 
 def _locked(path: Path) -> IO[str]:
     """A file of the folder that this process alone has; its lock ends with the process, however that ends."""
-    file = open(path / LOCK, "w", encoding="ascii")  # noqa: SIM115
+    file = open(path / LOCK, "w", encoding="ascii")  # noqa: SIM115  # open as long as it is locked
     with suppress(ImportError):
         import fcntl
 
