@@ -112,13 +112,8 @@ class Hand:
         self._scale, self._far = packed.scale, FARTHEST * packed.scale
 
     def __getstate__(self) -> dict[str, Any]:
-        # Steps are copied and pickled with the hands; a view of memory is none that another process has.
+        # Steps are copied and pickled with the hands, for their forces; only trackers, which are not, write targets.
         return {name: value for name, value in self.__dict__.items() if name != "_pool"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        if "_packed" in state:
-            self._pool = self._packed.pool.data
 
     @property
     def stiffness(self) -> float | list[float]:

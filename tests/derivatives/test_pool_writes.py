@@ -66,3 +66,19 @@ def test_what_takes_more_than_numbers_has_no_places():
     packed = scene.packed()
     for parameter in (asm.Parameter(ball, "radius"), asm.Parameter(hinge.frame_a, "turn", "x")):
         assert pool_writes(packed, parameter) is None
+
+
+def test_targets_are_written_from_where_the_first_body_stands():
+    ground, ball = (
+        asm.Body("ground", position=(10.0, -7.0, 3.0), fixed=True),
+        asm.Body("ball", position=(11.0, -7.0, 3.0)),
+    )
+    scene = asm.Assembly([ground, ball])
+    goal = asm.PointDistance(ball.point(0, 0, 0), target=(11.0, -7.0, 3.0))
+    scene.minimize(goal)
+    along = asm.Parameter(goal, "target", "x")
+    (write,) = pool_writes(scene.packed(), along)
+    along.value = 12.5
+    packed = scene.packed()
+    packed.refresh()
+    assert packed.rows_pool[write.place] == write.numbers(np.array([12.5]))[0] == 2.5 / packed.scale
