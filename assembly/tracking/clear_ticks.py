@@ -104,11 +104,19 @@ class ClearTicks:
             proof = new_proof(first._packed, first._scene.bodies)
             proof.fronts.counts.budget = BUDGET
         proof.forget_poses()
+        # Wires are in each other by the distance of their spines, which no move has to open.
+        proof.make_slimmer(touching if self._limits.depth == np.inf else 0.0)
         self._proof = proof
         self._at = _Standing(first)
-        self._moves = np.array([self._at.opened(self._proof, k, touching) for k in range(len(self._proof.pairs))])
+        self._moves, self._opened = np.zeros((len(proof.pairs), 6)), list[int]()
         self.way_depth = 0.0
-        answers = dict(enumerate(proof.look(first.q, touching, self._moves)))
+        answers = dict(enumerate(proof.look(first.q, touching)))
+        left = [k for k, answer in answers.items() if not is_proven(answer)]
+        for k in left:
+            self._moves[k] = self._at.opened(proof, k, touching)
+        if left:
+            answers.update(zip(left, proof.look(first.q, touching, self._moves, which=left), strict=True))
+            self._opened = self._those_opened()
         self.proved = all(map(is_proven, answers.values()))
         self.doubtful = self._not_known(answers, self._at)
 
@@ -123,7 +131,7 @@ class ClearTicks:
         rolling, last = self._rolling(there), proof.last_poses()
         # Contacts stay for many ticks, and so does what opens them.
         if not rolling and proof.stays_clear(there.q, touching, moves):
-            self._at, self.proved = there, True
+            self._at, self.proved, self.way_depth = there, True, proof.way_depth()
             return True
         answers: dict[int, Answer] = {}
         # Where a long way may not go in by its square, one along flat faces still may do.
@@ -150,7 +158,26 @@ class ClearTicks:
             return False
         self.proved = all(map(is_proven, answers.values()))
         self._at, self._moves = there, moves
+        self._leave_closed([k for k in rolling if moves[k].any() and proof.is_of_wires(k)])
+        self._opened = self._those_opened()
         return True
+
+    def _those_opened(self) -> list[int]:
+        """The pairs that a move opens."""
+        opened: list[int] = np.flatnonzero(self._moves.any(axis=1)).tolist()
+        return opened
+
+    def _leave_closed(self, which: list[int]) -> None:
+        """Go on without moves that open pairs of wires, where these are proven to touch without."""
+        if not which:
+            return
+        closed = self._moves.copy()
+        closed[which] = 0.0
+        for k, answer in zip(which, self._proof.look(self._at.q, self._touching, closed, which=which), strict=True):
+            if is_proven(answer):
+                self._moves[k] = 0.0
+            else:
+                self._proof.look(self._at.q, self._touching, self._moves, which=[k])
 
     def _not_known(self, answers: dict[int, Answer], there: _Standing) -> dict[int, Answer]:
         """The pairs that are not proven to be clear, or to touch, and whose faces do not lie on each other."""
@@ -170,7 +197,7 @@ class ClearTicks:
         """The pairs that touch and go so far that the straight way goes in by what counts beside what is touching."""
         proof, q = self._proof, self._at.q
         found = []
-        for k in np.flatnonzero(self._moves.any(axis=1)).tolist():
+        for k in self._opened:
             way = proof.way_length(k, q, there.q)
             if ROLLED * way * way > SLIGHTLY * self._touching * proof.radius(k):
                 found.append(k)

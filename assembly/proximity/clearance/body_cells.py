@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +83,11 @@ class BodyCells:
     far: float
     radius: float
     walls: tuple[Round, ...]
+
+    @cached_property
+    def is_of_wires(self) -> bool:
+        """Whether all faces are round wires."""
+        return bool((rows_of(LINKS, self.links).form[self.first] == WIRE).all())
 
     @property
     def root(self) -> np.record:

@@ -19,6 +19,7 @@ from assembly.proximity.clearance.halve import put, vector
 from assembly.proximity.clearance.records import (
     BY_BORE_B,
     BY_PLANE,
+    BY_SPINES,
     NODES_SIZE,
     PARTED_SIZE,
     counts_at,
@@ -27,7 +28,8 @@ from assembly.proximity.clearance.records import (
     parted_at,
 )
 from assembly.proximity.clearance.separation import gap_of
-from assembly.proximity.clearance.way import stays_apart
+from assembly.proximity.clearance.spines import loss_on_way, spine_gap
+from assembly.proximity.clearance.way import sag_of, stays_apart
 
 # What is kept of a pair of bodies. pair: a PAIR; counts: COUNTS; parted, nodes: rows of PARTED and NODES, the front;
 # next_parted, next_nodes: the one that follows; waiting, waiting_nodes: the queue of a look, a ring; work: (3, 64) to
@@ -132,6 +134,43 @@ def put_waiting(front, at, nodes, n):
 
 
 @kernel(inner=True)
+def spines_stay_apart(forest, front, nodes, way, needed, gaps):
+    """Whether two pieces of wires are kept apart all the way by their spines, by gaps over what is needed at its ends.
+
+    They may be in each other by what wires may be slimmer, and then on the way by its loss as well; that is written.
+    """
+    pair = pair_proof_at(front.pair, 0)
+    lesser = min(gaps[0], gaps[1])
+    if not lesser > -pair.slimmer:
+        return False
+    if not way.swept:
+        return True
+    loss = loss_on_way(forest, nodes, way, lesser + needed, sag_of(way, forest, nodes.b))
+    if lesser > loss:
+        return True
+    if pair.slimmer == 0.0 or loss == math.inf:
+        return False
+    pair.way_depth = max(pair.way_depth, loss - lesser)
+    return True
+
+
+@kernel(inner=True)
+def ask_spines_again(forest, front, way, needed, i):
+    """Ask pair i of the front, parted by spines, at a new pose; whether it still is."""
+    pair, row, parted = pair_proof_at(front.pair, 0), nodes_at(front.nodes, i), parted_at(front.parted, i)
+    nodes, at = Parted(row.a, row.b, BY_SPINES), vector(parted.normal)
+    gap, place = spine_gap(forest, nodes, way.after, at)
+    before = parted.expiry - pair.travelled - pair.slimmer
+    fine = spines_stay_apart(forest, front, nodes, way, needed, (before, gap - needed))
+    if gap - needed > -pair.slimmer and not fine:
+        before = spine_gap(forest, nodes, way.before, at)[0] - needed
+        fine = spines_stay_apart(forest, front, nodes, way, needed, (before, gap - needed))
+    if fine:
+        keep(front, nodes, place, pair.travelled + way.moved + gap - needed + pair.slimmer)
+    return fine
+
+
+@kernel(inner=True)
 def ask_again(forest, front, way, needed):
     """Ask the front at a new pose along its directions. Pairs that fail go to the queue; returns how many."""
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
@@ -144,6 +183,11 @@ def ask_again(forest, front, way, needed):
         nodes, n, expiry = Parted(row.a, row.b, row.how), vector(parted.normal), parted.expiry
         if expiry <= travelled:
             counts.asked += 1
+            if nodes.how == BY_SPINES:
+                if not ask_spines_again(forest, front, way, needed, i):
+                    put_waiting(front, tail, nodes, (0.0, 0.0, 0.0))
+                    tail += 1
+                continue
             gap = gap_of(forest, nodes, way.after, n) - needed
             # At the last pose the gap was this at least.
             fine = stays_apart(forest, nodes, way, n, (expiry - pair.travelled, gap))

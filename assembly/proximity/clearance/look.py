@@ -23,11 +23,13 @@ from assembly.proximity.clearance.front import (
     put_waiting,
     remember,
     replace_front,
+    spines_stay_apart,
 )
 from assembly.proximity.clearance.halve import halve, put, vector
 from assembly.proximity.clearance.inside import FOREST
 from assembly.proximity.clearance.records import (
     BY_PLANE,
+    BY_SPINES,
     CLEAR,
     CROSSING,
     NO_ROOM,
@@ -42,7 +44,8 @@ from assembly.proximity.clearance.records import (
     pair_proof_at,
     parted_at,
 )
-from assembly.proximity.clearance.separation import best_bore, gap_of, is_cell, is_round, separation
+from assembly.proximity.clearance.separation import best_bore, gap_of, is_cell, is_round, is_wire, separation
+from assembly.proximity.clearance.spines import spine_gap
 from assembly.proximity.clearance.stab import crossing_of
 from assembly.proximity.clearance.way import pose_at, sag_of, stays_apart, way_of
 
@@ -54,6 +57,20 @@ DONE, DIVIDED, ENDED = 0, 1, 2
 
 
 @kernel(inner=True)
+def part_wires(forest, front, way, nodes, needed):
+    """Whether the distance of their spines parts two pieces of wires."""
+    pair, spines = pair_proof_at(front.pair, 0), Parted(nodes.a, nodes.b, BY_SPINES)
+    gap, at = spine_gap(forest, spines, way.after, (0.0, 0.0, 0.0))
+    before = math.inf
+    if way.swept and gap - needed > -pair.slimmer:
+        before = spine_gap(forest, spines, way.before, at)[0] - needed
+    if not spines_stay_apart(forest, front, spines, way, needed, (before, gap - needed)):
+        return False
+    keep(front, spines, at, pair.travelled + way.moved + gap - needed + pair.slimmer)
+    return True
+
+
+@kernel(inner=True)
 def part_nodes(forest, front, way, nodes, hint, needed):
     """Seek what parts two nodes: whether it does, the direction, gaps before and after, and whether hulls overlap."""
     found, overlap = best_direction(forest, front, nodes, way, hint, needed)
@@ -61,6 +78,8 @@ def part_nodes(forest, front, way, nodes, hint, needed):
     travelled = pair_proof_at(front.pair, 0).travelled + way.moved
     if stays_apart(forest, nodes, way, n, gaps):
         keep(front, nodes, n, travelled + gaps[1])
+        return True, n, gaps, overlap
+    if is_wire(forest, nodes.a) and is_wire(forest, nodes.b) and part_wires(forest, front, way, nodes, needed):
         return True, n, gaps, overlap
     how, room = best_bore(forest, nodes.a, nodes.b, way.after)
     if how != BY_PLANE and room > needed:
@@ -84,8 +103,11 @@ def is_halved_first(forest, a, b, short):
     """Of two nodes whose gap is short by so much: whether a is halved, and whether by length or by chord error.
 
     The larger one is. Of two cells that only their radii keep from being parted, the thicker; and what is round, and
-    exact, not as long as what is beside it could be finer.
+    exact, not as long as what is beside it could be finer. Of two wires the longer piece: their spines part them once
+    both are short.
     """
+    if is_wire(forest, a) and is_wire(forest, b):
+        return extent(forest, a) > extent(forest, b), True
     round_a, round_b = is_round(forest, a), is_round(forest, b)
     cell_a, cell_b = is_cell(forest, a), is_cell(forest, b)
     one, other = node_at(forest.nodes, a), node_at(forest.nodes, b)
@@ -251,6 +273,8 @@ def go_to(forest, front, pose, limits):
 # What is to be done with a pair: at a pose, with a new front; on the way there, with one that is
 # made at the last pose.
 PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY, ON_WAY_ANEW = 0, 1, 2, 3, 4
+# A front that has grown by more than this factor and number is begun anew.
+GROWN, MANY = 2, 200
 # What rounding of poses and of sums of coordinates may do to a gap, in parts of these: some thirty roundings.
 ROUNDING = 4e-15
 
@@ -286,6 +310,21 @@ def done_task(forest, front, pose, limits, task):
     return code
 
 
+@kernel(inner=True)
+def look_at_pair(forest, front, q, move, task):
+    """Do what is to be done with a pair of bodies at poses q; how its look ended."""
+    pair, count = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
+    count.asked = 0
+    count.sought = 0
+    count.halved = 0
+    count.stabbed = 0
+    pair.way_depth = 0.0
+    pose = posed_with_move(q, count.body_a, count.body_b, move)
+    far = pair.far + math.sqrt(dot(pose.shift, pose.shift))
+    limits = Limits(pair.needed + ROUNDING * far, pair.touch, pair.resolution, count.budget, count.budget)
+    return done_task(forest, front, pose, limits, task)
+
+
 FRONTS = (
     "Tuple((f8[:, ::1], i8[:, ::1], f8[:, :, ::1], i8[:, :, ::1], "
     "f8[:, ::1], i8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1]))"
@@ -302,15 +341,33 @@ def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes):
         if tasks[k] == PASSED_BY:
             continue
         front = Front(pairs[k], counts[k], parted[k], nodes[k], next_parted, next_nodes, waiting, waiting_nodes, work)
+        codes[k] = look_at_pair(forest, front, q, moves[k], tasks[k])
+
+
+@kernel(signatures=f"({FOREST}, {FRONTS}, f8[:, ::1], f8[:, ::1], f8, i8[::1])", allocates=True)
+def stay_clear(forest_arrays, front_arrays, q, moves, touch, codes):
+    """Look at all pairs on the way to poses q (n, 7): how the first ended that is not known to stay clear, or CLEAR.
+
+    Where one was not clear at its last look, none is looked at: all end OPEN.
+    """
+    table, pool, faces, links, tree_nodes, used = forest_arrays
+    forest = Forest(Store(table, pool), faces, links, tree_nodes, used)
+    pairs, counts, parted, nodes, next_parted, next_nodes, waiting, waiting_nodes, work = front_arrays
+    for k in range(len(pairs)):
+        codes[k] = OPEN
+    for k in range(len(pairs)):
+        if pair_proof_at(pairs[k], 0).known != 1.0:
+            return OPEN
+    worst = CLEAR
+    for k in range(len(pairs)):
+        front = Front(pairs[k], counts[k], parted[k], nodes[k], next_parted, next_nodes, waiting, waiting_nodes, work)
         pair, count = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
-        count.asked = 0
-        count.sought = 0
-        count.halved = 0
-        count.stabbed = 0
-        pose = posed_with_move(q, count.body_a, count.body_b, moves[k])
-        far = pair.far + math.sqrt(dot(pose.shift, pose.shift))
-        limits = Limits(pair.needed + ROUNDING * far, pair.touch, pair.resolution, count.budget, count.budget)
-        codes[k] = done_task(forest, front, pose, limits, tasks[k])
+        pair.touch = touch
+        task = ON_WAY_ANEW if count.count > GROWN * count.fresh + MANY else ON_WAY
+        codes[k] = look_at_pair(forest, front, q, moves[k], task)
+        if worst == CLEAR:
+            worst = codes[k]
+    return worst
 
 
 @kernel(signatures=f"({FOREST}, UniTuple(i8, 2), f8[::1], f8[::1], f8[::1])")

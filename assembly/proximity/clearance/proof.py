@@ -19,10 +19,13 @@ from assembly.proximity.clearance.inside import UNCLEAR, winding_of
 from assembly.proximity.clearance.look import (
     AT_POSE,
     BEGUN_ANEW,
+    GROWN,
+    MANY,
     ON_WAY,
     ON_WAY_ANEW,
     PASSED_BY,
     look_at_pairs,
+    stay_clear,
 )
 from assembly.proximity.clearance.records import (
     BY_BORE_B,
@@ -39,8 +42,6 @@ __all__ = ["LEAST_SIZE", "ClearanceProof"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-# A front that has grown by more than this factor and number is begun anew.
-GROWN, MANY = 2, 200
 # What rounding may add to a length.
 LONGER = 1.0 + 1e-12
 # Of smaller bodies, and of larger ones than one over it, nothing is proven: products of six lengths are no numbers.
@@ -81,9 +82,11 @@ class ClearanceProof:
         self.minimum = np.array(minimum, dtype=float)
         self._codes, self._stack = np.zeros(len(self.pairs), dtype=np.int64), np.zeros(STACK, dtype=np.int64)
         self._begun = np.zeros(len(self.pairs), dtype=bool)
+        # Columns: to ask records for them by name takes longer than a tick.
+        self._turn, self._shift = self.fronts.pair.turn, self.fronts.pair.shift
+        self._way_depth = self.fronts.pair.way_depth
         # What opened contacts at the last look of a solve.
         self.moves = np.zeros((len(self.pairs), 6))
-        self._on_way = np.full(len(self.pairs), ON_WAY)
         # Poses of the last looks, where all pairs had them at the same ones.
         self._at: bytes | None = None
 
@@ -141,26 +144,42 @@ class ClearanceProof:
 
         Where one is not, nothing is known: `look` tells what it is. The budget is as there.
         """
-        self._forget()
-        self._at = None
+        if budget is None:
+            return self._stay_clear(q, touching, moves)
         counts = self.fronts.counts
-        if not (self.fronts.pair.known == 1.0).all():
-            return False
-        grown = counts.count > GROWN * counts.fresh + MANY
-        tasks = np.where(grown, ON_WAY_ANEW, ON_WAY) if grown.any() else self._on_way
-        usual = counts.budget.copy()
-        counts.budget = usual if budget is None else budget
-        self._run(q, touching, moves, tasks)
+        usual, counts.budget = counts.budget.copy(), budget
+        clear = self._stay_clear(q, touching, moves)
         counts.budget = usual
-        if self._codes.any():
+        return clear
+
+    def _stay_clear(self, q: Array, touching: float, moves: Array) -> bool:
+        self._forget()
+        self._at, at = None, np.array(q, dtype=float)
+        code = NO_ROOM
+        while code == NO_ROOM:
+            code = stay_clear(self.forest.arrays, self.fronts.arrays, at, moves, touching, self._codes)
+            if code == NO_ROOM and not self._grow():
+                return False
+        if code != CLEAR:
             return False
-        self._at = q.tobytes()
+        self._at = at.tobytes()
         return True
+
+    def make_slimmer(self, depth: float) -> None:
+        """From now on wires may be in each other by a depth, and on ways by the square of their length as well."""
+        if (self.fronts.pair.slimmer != depth).any():
+            self.fronts.pair.slimmer = depth
+            self._begun[:] = False
+            self.forget_poses()
+
+    def way_depth(self) -> float:
+        """How far wires may be in each other on the ways of the last looks, at most."""
+        return float(self._way_depth.max(initial=0.0))
 
     def clear_answers(self, q: Array, moves: Array) -> list[Answer]:
         """What is proven of all pairs at poses (n, 7) at which they stayed clear, after moves (pairs, 6)."""
         pair = self.fronts.pair
-        bounds = pair.soonest - pair.travelled + pair.needed
+        bounds = pair.soonest - pair.travelled + pair.needed - pair.slimmer
         # Only of pairs with nodes in bores of second bodies: one pair after the other takes longer.
         for k in np.flatnonzero(bounds == -np.inf).tolist():
             bounds[k] = self.bound(k)
@@ -225,6 +244,10 @@ class ClearanceProof:
         normal: Array = rows_of(PARTED, self.fronts.parted[k])[0].normal
         return rotation_matrix(q[self.pairs[k][0], 3:]) @ normal
 
+    def _grow(self) -> bool:
+        """Make more room for cells, or for fronts; False where there may be no more."""
+        return self.forest.grow() if self.forest.is_full else self.fronts.grow()
+
     def _run(self, q: Array, touching: float, moves: Array, tasks: Table) -> None:
         self.fronts.pair.touch = touching
         waiting, at = tasks.copy(), np.array(q, dtype=float)
@@ -233,7 +256,7 @@ class ClearanceProof:
             short = (waiting != PASSED_BY) & (self._codes == NO_ROOM)
             if not short.any():
                 return
-            if not (self.forest.grow() if self.forest.is_full else self.fronts.grow()):
+            if not self._grow():
                 self._codes[short] = OPEN
                 return
             # What is in the front already stays there.
@@ -259,7 +282,7 @@ class ClearanceProof:
     def bound(self, k: int) -> float:
         """A lower bound of the distance of pair k at its last look, where that ended clear."""
         pair, count = self.fronts.pair[k], int(self.fronts.counts.count[k])
-        needed, travelled = float(pair.needed), float(pair.travelled)
+        needed, travelled = float(pair.needed) - float(pair.slimmer), float(pair.travelled)
         if pair.soonest > -np.inf:
             return float(pair.soonest) - travelled + needed
         # Nodes in bores of the second body never keep a gap: they are asked at every pose, and so at this one.
@@ -291,6 +314,8 @@ class ClearanceProof:
             self._begun[k] = False
             return Answer(Verdict.ENCLOSED, bound, bound)
         far = self.move_length(k, q, move)
+        if not bound > pair.needed:
+            far += float(pair.slimmer)
         if far > 0.0:
             return Answer(Verdict.TOUCHING, bound - far, far, swept=swept)
         return Answer(Verdict.CLEAR, bound, swept=swept)
@@ -314,6 +339,10 @@ class ClearanceProof:
     def size(self, k: int) -> float:
         """The size of the larger body of pair k."""
         return max(self.forest.cells[self._number[body]].size for body in self.pairs[k])
+
+    def is_of_wires(self, k: int) -> bool:
+        """Whether both bodies of pair k are round wires."""
+        return all(cells.is_of_wires for cells in self.cells_of_both(k))
 
     def radius(self, k: int) -> float:
         """The least radius of what is round of either body of pair k."""
@@ -345,7 +374,7 @@ class ClearanceProof:
 
     def last_poses(self) -> tuple[Array, Array]:
         """The rotations (pairs, 9) and shifts (pairs, 3) of second bodies at the last looks that ended clear."""
-        return self.fronts.pair.turn.copy(), self.fronts.pair.shift.copy()
+        return self._turn.copy(), self._shift.copy()
 
     def go_back(self, poses: tuple[Array, Array]) -> None:
         """Make earlier poses, from which all ways were clear, the last ones again."""

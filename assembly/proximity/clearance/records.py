@@ -87,6 +87,8 @@ PAIR = record_dtype(
     touch=1,  # cells that cross by no more are no crossing
     resolution=1,  # pairs of cells that are smaller stay open
     far=1,  # the sum of the bodies' largest coordinates
+    slimmer=1,  # by so much wires may be in each other: pieces of them that are parted by the distance of their spines
+    way_depth=1,  # how far these may be in each other on the way of the last look, at most
     guides=(GUIDES, 3),  # normals of contacts, from a to b, seen from a: directions that are tried as well; or zero
 )
 pair_proof_at = record_view(PAIR)
@@ -112,7 +114,7 @@ COUNTS_SIZE = size_of(COUNTS)
 # A pair of nodes in the front, or in the queue of a look.
 PARTED = record_dtype(
     "f8",
-    normal=3,  # the direction, from a to b, that parts them; zero where it is not known
+    normal=3,  # the direction, from a to b, that parts them, zero where it is not known; of spines their nearest places
     expiry=1,  # what `travelled` must stay below for that to hold
 )
 parted_at = record_view(PARTED)
@@ -121,11 +123,11 @@ NODES = record_dtype(
     "i8",
     a=1,
     b=1,
-    how=1,  # BY_PLANE, BY_BORE_A, BY_BORE_B: what parts them
+    how=1,  # BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES: what parts them
 )
 nodes_at = record_view(NODES)
 NODES_SIZE = size_of(NODES)
-# A plane between them; the bore of a wall of a in which b is, or the other way around.
-BY_PLANE, BY_BORE_A, BY_BORE_B = 0, 1, 2
+# A plane between them; the bore of a wall of a in which b is, or the other way around; the distance of two spines.
+BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES = 0, 1, 2, 3
 # How a look ends. UNSWEPT: the way is too long to be proven at once; NO_ROOM: memory is full, and has to be grown.
 CLEAR, CROSSING, OPEN, NO_ROOM, UNSWEPT = 0, 1, 2, 3, 4

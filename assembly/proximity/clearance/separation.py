@@ -92,7 +92,7 @@ def room_in_bore(forest, wall, k, pose):
 
 @kernel(inner=True)
 def gap_of(forest, nodes, pose, n):
-    """The gap of two nodes, kept apart by a plane of direction n, or by a bore."""
+    """The gap of two nodes, kept apart by a plane of direction n, or by a bore; of spines see `spines.py`."""
     if nodes.how == BY_PLANE:
         return separation(forest, nodes.a, nodes.b, pose, n)
     if nodes.how == BY_BORE_A:
