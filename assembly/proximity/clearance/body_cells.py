@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,11 +84,15 @@ class BodyCells:
     radius: float
     walls: tuple[Round, ...]
 
-    @property
-    def root(self) -> np.record:
-        """The root's NODE."""
-        root: np.record = node_at(self.nodes, 0)
-        return root
+    @cached_property
+    def middle(self) -> Array:
+        """The middle (3,) of a ball around the body."""
+        return np.array(node_at(self.nodes, 0).center)
+
+    @cached_property
+    def extent(self) -> float:
+        """The radius of that ball."""
+        return float(node_at(self.nodes, 0).radius)
 
 
 def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:
