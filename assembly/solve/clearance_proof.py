@@ -26,7 +26,7 @@ from assembly.proximity.clearance.deforming import smaller_answer
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
 from assembly.proximity.clearance.touching import filled_bore, left_open, move_apart, off_contacts
 from assembly.proximity.extrema.pairs import ContactPair
-from assembly.solve.contact_pairs import contact_pairs, listed_contacts
+from assembly.solve.contact_pairs import ContactRows, contact_pairs, listed_contacts, rows_of_contacts
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.loop.settings import ANY_POSE, FEASIBILITY
 from assembly.solve.samples import PosedBodies, sampled
@@ -266,14 +266,38 @@ def _contacts(solution: Solution, rows: Sequence[tuple[int, int]]) -> Iterator[t
             yield places[g, f], found[item.name], -1.0
 
 
+def _near_rows(rows: ContactRows, proof: ClearanceProof, reach: float) -> dict[int, Contacts]:
+    """What `near_contacts` says of contacts that are rows."""
+    places = {pair: number for number, pair in enumerate(proof.pairs)}
+    near: dict[int, list[int]] = {}
+    turned = []
+    gaps, minimum = rows.gaps.tolist(), proof.minimum.tolist()
+    for k, (pair, (f, g)) in enumerate(zip(rows.pairs.tolist(), rows.bodies.tolist(), strict=True)):
+        # Behind the pairs of clearances are corners of contacts, of which nothing is proven.
+        number = places.get((f, g), places.get((g, f), -1)) if pair < 0 else pair
+        if 0 <= number < len(minimum) and gaps[k] - minimum[number] < reach:
+            near.setdefault(number, []).append(k)
+            if pair < 0 and (f, g) not in places:
+                turned.append(k)
+    normals, points = rows.normals.copy(), rows.points[:, 1].copy()
+    normals[turned], points[turned] = -normals[turned], rows.points[turned, 0]
+    return {
+        number: Contacts(normals[some], points[some], rows.gaps[some] - minimum[number])
+        for number, some in near.items()
+    }
+
+
 def near_contacts(solution: Solution, proof: ClearanceProof, reach: float) -> dict[int, Contacts]:
     """The contacts of a solution that are open by less than a reach, by the number of their pair of bodies."""
+    rows = rows_of_contacts(solution)
+    if rows is not None:
+        return _near_rows(rows, proof, reach)
     near: dict[int, list[tuple[Array, Array, float]]] = {}
     for number, contact, sign in _contacts(solution, proof.pairs):
         gap = contact.gap - float(proof.minimum[number])
         if gap < reach:
             near.setdefault(number, []).append((sign * contact.normal, contact.points[1 if sign > 0.0 else 0], gap))
-    return {number: Contacts(*(np.array(c) for c in zip(*rows, strict=True))) for number, rows in near.items()}
+    return {number: Contacts(*(np.array(c) for c in zip(*found, strict=True))) for number, found in near.items()}
 
 
 def opening_move(proof: ClearanceProof, k: int, q: Array, contacts: Contacts | None, depth: float) -> Array:

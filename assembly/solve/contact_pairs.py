@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,18 @@ from numpy.typing import NDArray
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import side_face, side_faces
 from assembly.constraints.packing.corners import Kept, body_of
-from assembly.constraints.program.records import DEEPEST_AT, NEAREST_AT, ROW, ROW_TABLE, SHELL_F, SHELL_G
+from assembly.constraints.program.contact import contact_rows
+from assembly.constraints.program.records import (
+    CONTACTS,
+    DEEPEST_AT,
+    EXTRA,
+    FREE_COLUMN,
+    NEAREST_AT,
+    ROW,
+    ROW_TABLE,
+    SHELL_F,
+    SHELL_G,
+)
 from assembly.kinematics.body import Body, BodyFace
 from assembly.proximity.extrema.pairs import STATUSES, ContactPair, PairStatus, extremal_pair
 from assembly.proximity.extrema.rates import ARM_F, GAP, NORMAL
@@ -21,9 +32,32 @@ from assembly.proximity.features.solid_contact import CONTACT_RECORD, FEATURE_F,
 if TYPE_CHECKING:
     from assembly.solve.solution import Solution
 
-__all__ = ["contact_pairs", "listed_contacts"]
+__all__ = ["ContactRows", "contact_pairs", "listed_contacts", "rows_of_contacts"]
 
+Array = NDArray[np.float64]
 Table = NDArray[np.int64]
+
+
+class ContactRows(NamedTuple):
+    """Contacts of a solution as rows.
+
+    Attributes
+    ----------
+    pairs : (m,) of int
+        Of each, the number of its pair of bodies among those that a contact manager keeps apart; of a given one -1.
+    bodies : (m, 2) of int
+    normals : (m, 3)
+        From the first body to the second.
+    points : (m, 2, 3)
+        On both, in the world.
+    gaps : (m,)
+    """
+
+    pairs: Table
+    bodies: Table
+    normals: Array
+    points: Array
+    gaps: Array
 
 
 def contact_pairs(solution: Solution) -> dict[str, ContactPair]:
@@ -71,6 +105,38 @@ def listed_contacts(solution: Solution) -> Iterator[tuple[int, Kept, ContactPair
             face_f, face_g = (side_face(side) for side in sides)
             contact = extremal_pair(face_f, q_f, face_g, q_g, solution._parameters[r, :4])
         yield pair, owners[pair], contact
+
+
+def rows_of_contacts(solution: Solution) -> ContactRows | None:
+    """The contacts of `listed_contacts` and then the given ones, in the same orders, all by one kernel.
+
+    None where the pair of one is lost, or a contact is packed as a joint: `contact_pairs` then searches for it.
+    """
+    packed, scene, state = solution._packed, solution._scene, solution._state
+    given, start = len(packed.contacts), solution._parameters
+    if given != len(scene.contacts) or state.size <= packed.memory_at:
+        return None
+    listed = [(number, k, pair) for k, (pair, number) in enumerate(packed.listed(state)) if pair >= 0]
+    is_lost = np.isnan(start[:, 0]).tolist()
+    places = [(given + k, pair) for _, k, pair in sorted(listed) if not is_lost[given + k]]
+    places += [(k, -1) for k in range(given)]
+    rows, pairs = np.array(places, dtype=np.int64).reshape(-1, 2).T
+    sides = [packed.kept_pairs[pair] if pair >= 0 else scene.contacts[row].bodies for row, pair in places]
+    bodies = np.array([[scene.index(body_of(side)) for side in both] for both in sides], dtype=np.int64).reshape(-1, 2)
+    table = packed.table_at(state)
+    count, q = int(table[CONTACTS]), solution.q.copy()
+    q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
+    free = np.zeros(count, dtype=np.int64)
+    free[rows] = -1
+    records, tracked = np.zeros((count, CONTACT_RECORD)), start.copy()
+    work = q, tracked, records, np.zeros(count), np.zeros((count, FREE_COLUMN + 4 + int(table[EXTRA])))
+    if contact_rows((table, packed.pool), start.copy(), np.inf, free, work) >= 0 or np.isnan(tracked[rows, 0]).any():
+        return None
+    found = records[rows]
+    normals, gaps = found[:, NORMAL : NORMAL + 3], found[:, GAP, None]
+    second = q[bodies[:, 0], :3] + found[:, ARM_F : ARM_F + 3]
+    points = np.stack([second - gaps * normals, second], axis=1) * packed.scale + packed.reference
+    return ContactRows(pairs, bodies, normals, points, gaps[:, 0] * packed.scale)
 
 
 def _listed(solution: Solution) -> dict[str, ContactPair]:

@@ -17,9 +17,9 @@ class SeenPoses:
 
     def __init__(self, proof: ClearanceProof) -> None:
         self._from, self._seen = np.array(proof.pairs, dtype=np.int64).T
-        roots = [proof.cells_of(k).root for k in range(len(proof.pairs))]
-        self._middles = np.array([root.center for root in roots])
-        self._radii = np.array([float(root.radius) for root in roots])
+        seen = [proof.cells_of(k) for k in range(len(proof.pairs))]
+        self._middles = np.array([cells.middle for cells in seen])
+        self._radii = np.array([cells.extent for cells in seen])
 
     def _relative(self, q: Array) -> tuple[Array, Array]:
         """Of all pairs the turn (quaternion) of the second body and the place of its middle, seen from the first."""

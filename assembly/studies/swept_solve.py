@@ -179,7 +179,8 @@ class _Walk:
         """Why the way from one solution to another is not known to be clear; None where it is."""
         if not there.success:
             return _Hindrance(f"a solve beyond is {there.status.name}")
-        turned = there._state[self._angles] - at._state[self._angles]
+        # States that were packed with more places for contacts have their angles elsewhere.
+        turned = there._state[there._packed.angles] - at._state[at._packed.angles]
         if not middle.success or np.abs(turned).max(initial=0.0) > LONGEST:
             return _Hindrance("constraints do not hold all along")
         off = self._seen.bend(at.q, middle.q, there.q)
@@ -193,11 +194,6 @@ class _Walk:
         self._is_proven = self._is_proven and self._ticks.proved
         self._depth = max(self._depth, self._ticks.way_depth, off)
         return None
-
-    @property
-    def _angles(self) -> slice:
-        """Where a state has the angles that are counted on past whole turns."""
-        return self._packed.angles
 
     def _in_the_way(self, at: Solution, done: float) -> dict[int, Answer]:
         """The pairs of bodies that are in the way, and what is proven of them a little beyond."""

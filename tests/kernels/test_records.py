@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
+from assembly._columns import Columns
 from assembly._kernel import kernel
 from assembly._record import place_of, record_dtype, record_view, rows_of, size_of
 
@@ -74,3 +75,17 @@ def test_rows_are_columns_of_fields():
     nodes.radius[1] = -1.0
     assert nodes.center.tolist() == rows[:, 1:4].tolist() and rows[1, 0] == -1.0
     assert (place_of(NODE, "rates"), place_of(HEAD, "first")) == (4, 1)
+
+
+def test_columns_are_the_fields_of_rows():
+    dtype = record_dtype("f8", length=1, place=3)
+    block = np.arange(10.0).reshape(2, 5)
+    columns, rows = Columns(dtype, block), rows_of(dtype, block)
+    assert np.array_equal(columns.length, rows.length) and np.array_equal(columns.place, rows.place)
+    columns.length = 7.0
+    columns.place[1] = (1.0, 2.0, 3.0)
+    assert block[:, 0].tolist() == [7.0, 7.0] and block[1, 1:4].tolist() == [1.0, 2.0, 3.0]
+    with pytest.raises(AttributeError, match="no field 'width'"):
+        columns.width = 1.0
+    with pytest.raises(ValueError, match="broadcast"):
+        columns.place = np.zeros(2)

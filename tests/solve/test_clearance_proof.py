@@ -7,6 +7,7 @@ import pytest
 
 import assembly as asm
 from assembly.proximity.clearance.answers import Verdict
+from assembly.solve import clearance_proof
 from assembly.solve.clearance_proof import lent_proof, near_contacts, new_proof, opening_move, prove_end
 from tests.proximity.clearance.scenes import start_of
 from tests.validation.clearance_scenes import scene_of
@@ -46,6 +47,30 @@ def test_solved_is_proven(place):
     assert solution.success and solution.proved
     assert solution.violations["gap"] < 1e-9
     assert "not clear" not in solution.message
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_contacts_are_the_same_as_rows_and_one_by_one(given, monkeypatch):
+    """What opens them rests on rows that one kernel makes; `contact_pairs` finds each of them again."""
+    base = asm.Body("base", asm.shapes.box(3.0, 3.0, 1.0), fixed=True)
+    ball = asm.Body("ball", BALL, position=(0.1, 0.2, 1.0 + 2e-3))
+    ring = asm.Body("ring", asm.shapes.torus(0.8, 0.2), (-0.3, 0.1, 0.9), (0.9, 0.3, 0.2, 0.2449))
+    found = asm.Assembly([base, ball, ring])
+    found.constrain(asm.Clearance())
+    if given:
+        # The ball is the second body of its pair, and the first side here.
+        found.constrain(asm.Contact(ball, base))
+    for body, goal in ((ball, (0.1, 0.2, 0.9)), (ring, (-0.3, 0.1, 0.4))):
+        found.minimize(asm.PointDistance(body.point(0, 0, 0), goal))
+    solution = found.solve(max_iterations=60)
+    with lent_proof(found.packed(), found.bodies) as proof:
+        rows = near_contacts(solution, proof, 10.0)
+        monkeypatch.setattr(clearance_proof, "rows_of_contacts", lambda _: None)
+        alone = near_contacts(solution, proof, 10.0)
+    assert set(rows) == set(alone) and len(rows) >= 2
+    for number, contacts in alone.items():
+        for told, expected in zip(rows[number], contacts, strict=True):
+            assert told == pytest.approx(expected, abs=1e-10)
 
 
 def test_a_least_gap_is_proven():

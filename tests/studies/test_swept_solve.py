@@ -68,6 +68,39 @@ def test_a_pin_does_not_jump_over_a_thin_plate():
     assert drive.slide == -1.0 and scene.solve(start).q.tobytes() == jumped.q.tobytes()
 
 
+@pytest.mark.parametrize("part", [asm.shapes.sphere(0.3), asm.shapes.solid_cylinder(0.349, 0.6)])
+def test_contacts_that_need_more_places_on_the_way_hinder_nothing(part):
+    """On the axis of a hole all of its rim is as near: solves there are packed anew, with other places in states."""
+    rail = asm.Body("rail", fixed=True)
+    plate = asm.Body("plate", asm.shapes.plate(2.0, 2.0, 0.2, [(0.0, 0.0, 0.35)]), fixed=True)
+    body = asm.Body("part", part, position=(0.0, 0.0, 1.0))
+    drive = asm.Prismatic(rail.frame(), body.frame(), "drive", slide=1.0)
+    scene = asm.Assembly([rail, plate, body])
+    scene.constrain(drive, asm.Clearance())
+    start = scene.solve()
+    drive.slide = -1.0
+    through = scene.solve(start, swept=True)
+    assert through.success and through.proved and through.way.part == 1.0
+    assert through.q[2, 2] == pytest.approx(-1.0, abs=1e-12)
+    assert scene.packed().clearance_rows > start._packed.clearance_rows
+
+
+def test_a_ball_stops_on_the_rim_of_a_hole():
+    """All around: its middle is then sqrt(0.5^2 - 0.3^2) above the rim."""
+    rail = asm.Body("rail", fixed=True)
+    plate = asm.Body("plate", asm.shapes.plate(2.0, 2.0, 0.2, [(0.0, 0.0, 0.3)]), fixed=True)
+    ball = asm.Body("ball", asm.shapes.sphere(0.5), position=(0.0, 0.0, 1.0))
+    drive = asm.Prismatic(rail.frame(), ball.frame(), "drive", slide=1.0)
+    scene = asm.Assembly([rail, plate, ball])
+    scene.constrain(drive, asm.Clearance())
+    start = scene.solve()
+    drive.slide = -1.0
+    blocked = scene.solve(start, swept=True)
+    assert blocked.status is asm.Status.BLOCKED and blocked.way.obstacles == (("plate", "ball"),)
+    assert 0.0 <= blocked.q[2, 2] - (0.1 + 0.4) <= 4.0 * RESOLUTION
+    assert np.hypot(*blocked.way.place[:2]) == pytest.approx(0.3, abs=1e-4)
+
+
 def test_what_cannot_be_reached_either_is_blocked_before():
     scene, drive = through_a_plate()
     start = scene.solve()

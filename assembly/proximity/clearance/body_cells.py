@@ -89,11 +89,15 @@ class BodyCells:
         """Whether all faces are round wires."""
         return bool((rows_of(LINKS, self.links).form[self.first] == WIRE).all())
 
-    @property
-    def root(self) -> np.record:
-        """The root's NODE."""
-        root: np.record = node_at(self.nodes, 0)
-        return root
+    @cached_property
+    def middle(self) -> Array:
+        """The middle (3,) of a ball around the body."""
+        return np.array(node_at(self.nodes, 0).center)
+
+    @cached_property
+    def extent(self) -> float:
+        """The radius of that ball."""
+        return float(node_at(self.nodes, 0).radius)
 
 
 def cells_of_body(faces: tuple[Face, ...]) -> BodyCells:

@@ -134,8 +134,8 @@ def _parted(
             return None
         bound = min(bound, some_proof.bound(0))
     whole = ClearanceProof(shapes, [(0, 1)], [asked.least])
-    record = whole.fronts.pair[0]
-    record.turn[:], record.shift[:] = pose[0].ravel(), pose[1]
+    last = whole.fronts.pair
+    last.turn[0], last.shift[0] = pose[0].ravel(), pose[1]
     return bound if whole.nested(0) is False else None
 
 

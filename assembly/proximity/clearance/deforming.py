@@ -76,16 +76,16 @@ def deformed_answer(proof: ClearanceProof, k: int, q: Array, touching: float) ->
         np.concatenate([getattr(manifold, name) for _, manifold in found]) for name in ("normals", "places", "gaps")
     )
     cells, at = proof.cells_of(k), q[list(proof.pairs[k])]
-    arms = places - (turn @ cells.root.center + shift)
+    arms = places - (turn @ cells.middle + shift)
     for least_map in (least_similar, least_affine):
         # What opens by a part of what a point may be taken, with the first part for which none is taken farther.
         for part in OPENED if touching > 0.0 else ():
-            opening = least_map(normals, arms, part * touching - (gaps - least), float(cells.root.radius))
+            opening = least_map(normals, arms, part * touching - (gaps - least), cells.extent)
             if opening is None:
                 break
             # Of the second body, in its own axes.
             matrix = turn.T @ opening[1:].T @ turn
-            offset = turn.T @ opening[0] - matrix @ cells.root.center
+            offset = turn.T @ opening[0] - matrix @ cells.middle
             far = _farthest(cells, matrix, offset)
             if far <= touching:
                 mapped = _mapped(shapes[1], tuple(matrix.ravel().tolist()), tuple(offset.tolist()))

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly._record import rows_of
+from assembly._columns import Columns
+from assembly._record import place_of, rows_of
 from assembly.geometry.faces.face import Face
-from assembly.geometry.splines.evaluate import spline_curve_at, surface_at
+from assembly.geometry.splines.evaluate import CURVE, SURFACE
 from assembly.proximity.clearance.body_cells import BodyCells, cells_of_body
 from assembly.proximity.clearance.records import (
     CELL_FACE,
@@ -37,6 +38,9 @@ ROOM = 512
 WORK = (3, 64)
 # Points of each connected part of a boundary.
 POINTS = 12
+# Where records of surfaces and of curves have places in the pool.
+_OF_SURFACE = [place_of(SURFACE, name) for name in ("breaks_u", "breaks_v", "coefficients", "cells")]
+_OF_CURVE = [place_of(CURVE, name) for name in ("breaks", "coefficients")]
 # Of the corners of a box.
 _SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
@@ -69,7 +73,7 @@ class PackedForest:
             records = cells.faces.copy()
             rows = rows_of(CELL_FACE, records)
             rows.surface += at
-            moved = _moved(cells, at, used, rows.surface - at)
+            moved = _moved(cells, used, rows.surface - at)
             link = cells.links.copy()
             view = rows_of(LINKS, link)
             for field, by in (("child", row_at), ("face", face_at), ("rim", at)):
@@ -173,17 +177,11 @@ class PackedForest:
         return self._shells[body]
 
 
-def _moved(cells: BodyCells, at: int, used: int, surfaces: Table) -> Table:
+def _moved(cells: BodyCells, used: int, surfaces: Table) -> Table:
     """A body's table with places in the pool as they are behind others."""
     table = cells.table.copy()
-    for place in surfaces.tolist():
-        patch = surface_at(table, place)
-        for field in ("breaks_u", "breaks_v", "coefficients", "cells"):
-            patch[field] += used
-    for place in cells.curves.tolist():
-        curve = spline_curve_at(table, place)
-        curve.breaks += used
-        curve.coefficients += used
+    for places, fields in ((surfaces, _OF_SURFACE), (cells.curves, _OF_CURVE)):
+        table[np.add.outer(places, fields)] += used
     return table
 
 
@@ -213,7 +211,7 @@ class Fronts:
     ) -> None:
         n = len(pairs)
         self._pair, self._counts = np.zeros((n, PAIR_SIZE)), np.zeros((n, COUNTS_SIZE), dtype=np.int64)
-        self.pair, self.counts = rows_of(PAIR, self._pair), rows_of(COUNTS, self._counts)
+        self.pair, self.counts = Columns(PAIR, self._pair), Columns(COUNTS, self._counts)
         both = np.array(pairs, dtype=np.int64).reshape(-1, 2)
         self.counts.body_a, self.counts.body_b = both.T
         roots = np.array(forest.roots)

@@ -35,7 +35,12 @@ def least_move(normals: Array, arms: Array, asked: Array, radius: float) -> Arra
     (6,) or None
         A translation and a rotation vector about the middle of b; None where contacts hold b from all sides.
     """
-    move = least_change(np.column_stack([normals, np.cross(arms, normals) / radius]), asked)
+    rates = np.empty((len(normals), 6))
+    (x, y, z), (u, v, w) = arms.T, normals.T
+    # As np.cross has it, which takes longer than all the rest.
+    rates[:, :3], rates[:, 3], rates[:, 4], rates[:, 5] = normals, y * w - z * v, z * u - x * w, x * v - y * u
+    rates[:, 3:] /= radius
+    move = least_change(rates, asked)
     if move is not None:
         move[3:] /= radius
     return move
@@ -78,6 +83,9 @@ def least_change(rates: Array, asked: Array) -> Array | None:
     if asked.max() <= 0.0:
         return np.zeros(rates.shape[1])
     unit = float(asked.max())
+    if len(asked) == 1:
+        (only,) = rates
+        return np.asarray(only * (unit / float(only @ only)))
     design = np.vstack([rates.T, asked / unit])
     goal = np.zeros(len(design))
     goal[-1] = 1.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot
+from math import asin, hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from assembly._record import rows_of
 from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
-from assembly.kinematics.pose import rotation_matrix
+from assembly.kinematics.pose import rotation_of
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.body_cells import BodyCells
 from assembly.proximity.clearance.forest import Fronts, PackedForest
@@ -127,10 +127,7 @@ class ClearanceProof:
         if swept:
             asked = np.where(pair.known == 1.0, np.where(grown, ON_WAY_ANEW, ON_WAY), asked)
         tasks[rows] = asked[rows]
-        usual = counts.budget.copy()
-        counts.budget = usual if budget is None else budget
-        self._run(q, touching, moved, tasks)
-        counts.budget = usual
+        self._run(q, touching, moved, tasks, budget)
         self._begun[rows] = True
         at = q.tobytes()
         if len(rows) == len(self.pairs):
@@ -242,13 +239,24 @@ class ClearanceProof:
         if not self.is_apart(k, q, 0.0, 1, moves) or rows_of(NODES, self.fronts.nodes[k])[0].how != BY_PLANE:
             return None
         normal: Array = rows_of(PARTED, self.fronts.parted[k])[0].normal
-        return rotation_matrix(q[self.pairs[k][0], 3:]) @ normal
+        return rotation_of(q[self.pairs[k][0], 3:]) @ normal
 
     def _grow(self) -> bool:
         """Make more room for cells, or for fronts; False where there may be no more."""
         return self.forest.grow() if self.forest.is_full else self.fronts.grow()
 
-    def _run(self, q: Array, touching: float, moves: Array, tasks: Table) -> None:
+    def _run(self, q: Array, touching: float, moves: Array, tasks: Table, budget: int | None = None) -> None:
+        counts = self.fronts.counts
+        if budget is None:
+            self._look(q, touching, moves, tasks)
+            return
+        usual = counts.budget.copy()
+        counts.budget = budget
+        self._look(q, touching, moves, tasks)
+        counts.budget = usual
+
+    def _look(self, q: Array, touching: float, moves: Array, tasks: Table) -> None:
+        """Look at pairs, and again with more room at those that had too little."""
         self.fronts.pair.touch = touching
         waiting, at = tasks.copy(), np.array(q, dtype=float)
         while waiting.any():
@@ -266,11 +274,11 @@ class ClearanceProof:
     def near_pairs(self, q: Array, distance: float) -> list[int]:
         """The pairs whose balls around all of a body are no farther apart than a distance over their least gaps."""
         a, b = np.array(self.pairs, dtype=np.int64).reshape(-1, 2).T
-        roots = {body: self.forest.cells[k].root for body, k in self._number.items()}
         middle, radius = np.zeros((len(q), 3)), np.zeros(len(q))
-        for body, root in roots.items():
-            middle[body] = rotation_matrix(q[body, 3:]) @ root.center + q[body, :3]
-            radius[body] = root.radius
+        for body, k in self._number.items():
+            cells = self.forest.cells[k]
+            middle[body] = rotation_of(q[body, 3:]) @ cells.middle + q[body, :3]
+            radius[body] = cells.extent
         apart = np.linalg.norm(middle[b] - middle[a], axis=1) - radius[a] - radius[b]
         found: list[int] = np.flatnonzero(apart <= self.minimum + distance).tolist()
         return found
@@ -281,31 +289,33 @@ class ClearanceProof:
 
     def bound(self, k: int) -> float:
         """A lower bound of the distance of pair k at its last look, where that ended clear."""
-        pair, count = self.fronts.pair[k], int(self.fronts.counts.count[k])
-        needed, travelled = float(pair.needed) - float(pair.slimmer), float(pair.travelled)
-        if pair.soonest > -np.inf:
-            return float(pair.soonest) - travelled + needed
+        pair = self.fronts.pair
+        needed, travelled = float(pair.needed[k] - pair.slimmer[k]), float(pair.travelled[k])
+        soonest = float(pair.soonest[k])
+        if soonest > -np.inf:
+            return soonest - travelled + needed
+        count = int(self.fronts.counts.count[k])
         # Nodes in bores of the second body never keep a gap: they are asked at every pose, and so at this one.
         expiry = self.fronts.parted[k, :count].view(PARTED)[:, 0]["expiry"]
         links = self.fronts.nodes[k, :count].view(NODES)[:, 0]
         in_bore = links["how"] == BY_BORE_B
         kept = float(expiry[~in_bore].min(initial=np.inf)) - travelled + needed
-        turn, shift = pair.turn.reshape(3, 3), pair.shift
+        turn, shift = pair.turn[k].reshape(3, 3), pair.shift[k]
         within = self.forest.room_in_bores(links["b"][in_bore], links["a"][in_bore], turn.T, -shift @ turn)
         # The look that ended clear has found the least gap kept.
-        return max(min(kept, within - ROUNDING * float(pair.far)), needed)
+        return max(min(kept, within - ROUNDING * float(pair.far[k])), needed)
 
     def _answer(self, k: int, q: Array, move: Array, swept: bool) -> Answer:
-        pair, code = self.fronts.pair[k], int(self._codes[k])
-        part = float(pair.part)
+        pair, code = self.fronts.pair, int(self._codes[k])
+        part = float(pair.part[k])
         if code == CROSSING:
-            place = rotation_matrix(q[self.pairs[k][0], 3:]) @ pair.place + q[self.pairs[k][0], :3]
-            return Answer(Verdict.CROSSING, depth=float(pair.depth), place=place, part=part)
+            place = rotation_of(q[self.pairs[k][0], 3:]) @ pair.place[k] + q[self.pairs[k][0], :3]
+            return Answer(Verdict.CROSSING, depth=float(pair.depth[k]), place=place, part=part)
         if code != CLEAR:
             return Answer(Verdict.UNDECIDED, part=part)
         nested = False if swept else self.nested(k)
         # From a pose within another body, or that is not told from one, no way to a clear one is proven.
-        pair.known = float(nested is False)
+        pair.known[k] = float(nested is False)
         if nested is None:
             return Answer(Verdict.UNDECIDED, part=part)
         bound = self.bound(k)
@@ -323,8 +333,8 @@ class ClearanceProof:
     def relative(self, k: int, q: Array) -> tuple[Array, Array]:
         """The rotation and the shift of the second body of pair k, seen from the first."""
         a, b = self.pairs[k]
-        turn = rotation_matrix(q[a, 3:])
-        return turn.T @ rotation_matrix(q[b, 3:]), (q[b, :3] - q[a, :3]) @ turn
+        turn = rotation_of(q[a, 3:])
+        return turn.T @ rotation_of(q[b, 3:]), (q[b, :3] - q[a, :3]) @ turn
 
     def left(self, k: int) -> tuple[np.recarray, np.recarray]:
         """The pairs of nodes that a look at pair k left open: PARTED and NODES of each."""
@@ -354,23 +364,22 @@ class ClearanceProof:
             return 0.0
         if not move[3:].any():
             return float(np.linalg.norm(move[:3]))
-        root = self.cells_of(k).root
+        cells = self.cells_of(k)
         # In plain floats: np.cross takes longer than all the rest.
-        x, y, z = (rotation_matrix(q[self.pairs[k][1], 3:]) @ root.center).tolist()
+        x, y, z = (rotation_of(q[self.pairs[k][1], 3:]) @ cells.middle).tolist()
         dx, dy, dz, u, v, w = move.tolist()
         way = hypot(dx + v * z - w * y, dy + w * x - u * z, dz + u * y - v * x)
-        return way + float(root.radius) * hypot(u, v, w)
+        return way + cells.extent * hypot(u, v, w)
 
     def way_length(self, k: int, before: Array, after: Array) -> float:
         """How far points of the second body of pair k go between two poses, seen from the first, at most."""
         return self._length(k, self.relative(k, before), self.relative(k, after))
 
     def _length(self, k: int, before: tuple[Array, Array], after: tuple[Array, Array]) -> float:
-        root = self.cells_of(k).root
+        cells = self.cells_of(k)
         turn, shift = after[0] - before[0], after[1] - before[1]
-        angle = 2.0 * np.arcsin(min(1.0, float(np.linalg.norm(turn)) / np.sqrt(8.0)))
-        length = float(np.linalg.norm(turn @ root.center + shift)) + float(angle) * float(root.radius)
-        return length * LONGER
+        angle = 2.0 * asin(min(1.0, hypot(*turn.ravel().tolist()) / sqrt(8.0)))
+        return (hypot(*(turn @ cells.middle + shift).tolist()) + angle * cells.extent) * LONGER
 
     def last_poses(self) -> tuple[Array, Array]:
         """The rotations (pairs, 9) and shifts (pairs, 3) of second bodies at the last looks that ended clear."""

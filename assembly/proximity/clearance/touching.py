@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import rows_of
-from assembly.kinematics.pose import rotation_matrix
+from assembly.kinematics.pose import rotation_of
 from assembly.proximity.clearance.answers import Contacts
 from assembly.proximity.clearance.body_cells import BodyCells
 from assembly.proximity.clearance.look import gap_along
@@ -208,14 +209,14 @@ def off_contacts(
     flush, tangent = _flush(proof, k, q, touching), _tangent(proof, k, q, touching)
     normals, gaps = (np.concatenate(both) for both in zip(flush, tangent, strict=True))
     if len(normals):
-        normals = normals @ rotation_matrix(q[proof.pairs[k][0], 3:]).T
+        normals = normals @ rotation_of(q[proof.pairs[k][0], 3:]).T
     else:
         normal = known()
         if normal is None:
             return np.zeros(6)
         normals, gaps = normal[None], np.zeros(1)
-    row, root = q[proof.pairs[k][1]], proof.cells_of(k).root
-    middle = rotation_matrix(row[3:]) @ root.center + row[:3]
+    row = q[proof.pairs[k][1]]
+    middle = rotation_of(row[3:]) @ proof.cells_of(k).middle + row[:3]
     return move_apart(proof, k, q, Contacts(normals, np.tile(middle, (len(normals), 1)), gaps), touching)
 
 
@@ -232,26 +233,27 @@ def move_apart(proof: ClearanceProof, k: int, q: Array, contacts: Contacts, touc
     """
     normals, places, gaps = contacts
     row = q[proof.pairs[k][1]]
-    root = proof.cells_of(k).root
-    arm, radius = rotation_matrix(row[3:]) @ root.center, float(root.radius)
+    cells = proof.cells_of(k)
+    arm, radius = rotation_of(row[3:]) @ cells.middle, cells.extent
     guides = proof.fronts.pair.guides[k]
     guides[:] = 0.0
     few = normals
     if len(normals) > GUIDES:
         few = normals[np.linspace(0, len(normals) - 1, GUIDES).astype(int)]
-    guides[: len(few)] = few @ rotation_matrix(q[proof.pairs[k][0], 3:])
+    guides[: len(few)] = few @ rotation_of(q[proof.pairs[k][0], 3:])
     for part in OPENED if touching > 0.0 else ():
         # Contacts between which a body is wedged open by less than it is moved.
         move = least_move(normals, places - row[:3] - arm, part * touching - gaps, radius)
         if move is None:
             return None
-        if np.linalg.norm(move[:3]) + radius * np.linalg.norm(move[3:]) <= touching:
+        if hypot(*move[:3].tolist()) + radius * hypot(*move[3:].tolist()) <= touching:
             break
     else:
         return None
     # About the origin of the body instead of its middle.
     if move[3:].any():
-        move[:3] -= np.cross(move[3:], arm)
+        (x, y, z), (u, v, w) = arm.tolist(), move[3:].tolist()
+        move[:3] -= (v * z - w * y, w * x - u * z, u * y - v * x)
     return move
 
 
@@ -269,5 +271,5 @@ def left_open(proof: ClearanceProof, k: int, q: Array, touching: float) -> Array
     gaps = np.array([gap_along(proof.forest.arrays, (i, j), turn.ravel(), shift, n) for i, j, n in rows])
     if (np.linalg.norm(normals, axis=1) < 0.5).any() or (gaps < -touching).any():
         return None
-    world = rotation_matrix(a[3:])
+    world = rotation_of(a[3:])
     return move_apart(proof, k, q, Contacts(normals @ world.T, places @ world.T + a[:3], gaps), touching)
