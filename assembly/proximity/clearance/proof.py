@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from assembly._record import rows_of
 from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
-from assembly.kinematics.pose import rotation_matrix
+from assembly.kinematics.pose import rotation_matrix, rotation_of
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.body_cells import BodyCells
 from assembly.proximity.clearance.forest import Fronts, PackedForest
@@ -298,8 +298,8 @@ class ClearanceProof:
     def relative(self, k: int, q: Array) -> tuple[Array, Array]:
         """The rotation and the shift of the second body of pair k, seen from the first."""
         a, b = self.pairs[k]
-        turn = rotation_matrix(q[a, 3:])
-        return turn.T @ rotation_matrix(q[b, 3:]), (q[b, :3] - q[a, :3]) @ turn
+        turn = rotation_of(q[a, 3:])
+        return turn.T @ rotation_of(q[b, 3:]), (q[b, :3] - q[a, :3]) @ turn
 
     def left(self, k: int) -> tuple[np.recarray, np.recarray]:
         """The pairs of nodes that a look at pair k left open: PARTED and NODES of each."""
@@ -334,9 +334,10 @@ class ClearanceProof:
 
     def way_length(self, k: int, before: Array, after: Array) -> float:
         """How far points of the second body of pair k go between two poses, seen from the first, at most."""
-        return self._length(k, self.relative(k, before), self.relative(k, after))
+        return self.length_between(k, self.relative(k, before), self.relative(k, after))
 
-    def _length(self, k: int, before: tuple[Array, Array], after: tuple[Array, Array]) -> float:
+    def length_between(self, k: int, before: tuple[Array, Array], after: tuple[Array, Array]) -> float:
+        """The same of what the second body is turned and shifted by."""
         root = self.cells_of(k).root
         turn, shift = after[0] - before[0], after[1] - before[1]
         angle = 2.0 * np.arcsin(min(1.0, float(np.linalg.norm(turn)) / np.sqrt(8.0)))
@@ -352,7 +353,7 @@ class ClearanceProof:
         pair, self._at = self.fronts.pair, None
         for k, (turn, shift) in enumerate(zip(*poses, strict=True)):
             now = pair.turn[k].reshape(3, 3).copy(), pair.shift[k].copy()
-            pair.travelled[k] += self._length(k, now, (turn.reshape(3, 3), shift))
+            pair.travelled[k] += self.length_between(k, now, (turn.reshape(3, 3), shift))
             pair.turn[k], pair.shift[k] = turn, shift
 
     def nested(self, k: int) -> bool | None:
