@@ -21,8 +21,9 @@ from assembly.solve.solution import Solution
 __all__ = ["ClearTicks", "WayLimits"]
 
 Array = NDArray[np.float64]
-# Pairs of nodes that a tick looks at for a pair of bodies.
-BUDGET = 4000
+# Pairs of nodes that a tick looks at for a pair of bodies: at first, where faces that come to touch have to be opened
+# if it takes more, and then.
+QUICK, BUDGET = 500, 4000
 # How deep the way of a contact that rolls may go in, in parts of the square of its length over the least radius: a
 # chord of a curve of radius r is s^2 / (8 r) off it, there are two, and a contact may go farther than the bodies.
 ROLLED = 1.0
@@ -155,20 +156,19 @@ class ClearTicks:
         there, moves = _Standing(solution), self._moves
         self.way_depth = 0.0
         rolling, last = self._rolling(there), proof.last_poses()
-        # Contacts stay for many ticks, and so does what opens them.
-        if not rolling and proof.stays_clear(there.q, touching, moves):
-            self._at, self.proved = there, True
-            return True
-        answers: dict[int, Answer] = {}
+        others = list(range(len(proof.pairs)))
+        if not rolling:
+            # Contacts stay for many ticks, and so does what opens them.
+            if proof.stays_clear(there.q, touching, moves, QUICK):
+                self._at, self.proved = there, True
+                return True
+            others = proof.not_clear()
         # Where a long way may not go in by its square, one along flat faces still may do.
         rolling = [k for k in rolling if self._may_go_in(k, there, OPENED[0])]
-        others = [k for k in range(len(proof.pairs)) if k not in rolling]
-        for k, answer in zip(others, proof.look(there.q, touching, moves, others, swept=True), strict=True):
-            answers[k] = answer
-            if not is_proven(answer):
-                rolling.append(k)
+        others, moves = [k for k in others if k not in rolling], moves.copy()
+        answers = self._straight(there, moves, others)
+        rolling += [k for k in others if not is_proven(answers[k])]
         if rolling:
-            moves = moves.copy()
             for k in rolling:
                 moves[k] = there.opened(proof, k, touching)
             for part in OPENED:
@@ -185,6 +185,20 @@ class ClearTicks:
         self.proved = all(map(is_proven, answers.values()))
         self._at, self._moves = there, moves
         return True
+
+    def _straight(self, there: _Standing, moves: Array, which: list[int]) -> dict[int, Answer]:
+        """What is proven of straight ways: of pairs that are opened as at the last pose, else as they are at this one.
+
+        What opens them is written into the moves.
+        """
+        proof, touching = self._proof, self._touching
+        found = proof.look(there.q, touching, moves, which, swept=True, budget=QUICK)
+        answers = dict(zip(which, found, strict=True))
+        left = [k for k in which if not is_proven(answers[k])]
+        for k in left:
+            moves[k] = there.opened(proof, k, touching)
+        found = proof.look(there.q, touching, moves, left, swept=True)
+        return answers | dict(zip(left, found, strict=True))
 
     def _not_known(self, answers: dict[int, Answer], there: _Standing) -> dict[int, Answer]:
         """The pairs that are not proven to be clear, or to touch, and whose faces do not lie on each other."""

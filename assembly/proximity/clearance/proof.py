@@ -145,6 +145,7 @@ class ClearanceProof:
         self._at = None
         counts = self.fronts.counts
         if not (self.fronts.pair.known == 1.0).all():
+            self._codes[:] = OPEN
             return False
         grown = counts.count > GROWN * counts.fresh + MANY
         tasks = np.where(grown, ON_WAY_ANEW, ON_WAY) if grown.any() else self._on_way
