@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import place_of
+from assembly.constraints.packing.manager import is_of_surfaces
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.proof import ClearanceProof
+from assembly.proximity.features.solid_contact import TRACK, TRACKED_PAIR
+from assembly.proximity.manager.records import MEMORY_HEADER, PAIR_MEMORY, PLACE_MEMORY, PLACE_NUMBER, PLACE_PAIR
 from assembly.solve.clearance_proof import near_contacts, new_proof, opening_move
 from assembly.solve.solution import Solution
 
 __all__ = ["ClearTicks", "WayLimits"]
 
 Array = NDArray[np.float64]
-# Pairs of nodes that a tick looks at for a pair of bodies.
-BUDGET = 4000
+# Pairs of nodes that a tick looks at for a pair of bodies: at first, where faces that come to touch have to be opened
+# if it takes more, and then.
+QUICK, BUDGET = 500, 4000
 # How deep the way of a contact that rolls may go in, in parts of the square of its length over the least radius: a
 # chord of a curve of radius r is s^2 / (8 r) off it, there are two, and a contact may go farther than the bodies.
 ROLLED = 1.0
@@ -27,8 +33,18 @@ OPENED = (1.0, 0.1, 0.01)
 SLIGHTLY = 0.1
 # It may go in by so much of the size in any case: directions that part bodies are then found at once.
 ROOM = 1e-6
+# Where the normal of a contact is among what is tracked of it.
+NORMAL = slice(place_of(TRACKED_PAIR, "normal"), place_of(TRACKED_PAIR, "normal") + 3)
 # Contacts that are nearer, in parts of the size, are remembered of a pose.
 NEAR = 1e-2
+
+
+class _Listed(NamedTuple):
+    """What slots for contacts have: pairs of bodies, or -1; numbers; normals (k, 3) in the axes of first bodies."""
+
+    pairs: Array
+    numbers: Array
+    normals: Array
 
 
 class _Standing:
@@ -37,6 +53,7 @@ class _Standing:
     def __init__(self, solution: Solution) -> None:
         self.solution = solution
         self.q = solution.q
+        self._relative: dict[int, tuple[Array, Array]] = {}
         self._near: dict[int, Contacts] | None = None
 
     def near(self, proof: ClearanceProof) -> dict[int, Contacts]:
@@ -44,6 +61,22 @@ class _Standing:
         if self._near is None:
             self._near = near_contacts(self.solution, proof, NEAR * max(map(proof.size, range(len(proof.pairs)))))
         return self._near
+
+    def relative(self, proof: ClearanceProof, k: int) -> tuple[Array, Array]:
+        """The rotation and the shift of the second body of pair k, seen from the first."""
+        if k not in self._relative:
+            self._relative[k] = proof.relative(k, self.q)
+        return self._relative[k]
+
+    @cached_property
+    def listed(self) -> _Listed:
+        """The contacts that are listed."""
+        packed, state = self.solution._packed, self.solution._state
+        slots_at = packed.memory_at + MEMORY_HEADER + PAIR_MEMORY * len(packed.kept_pairs)
+        slots = state[slots_at:][: PLACE_MEMORY * packed.clearance_rows].reshape(-1, PLACE_MEMORY)
+        first = packed.contacts_at + TRACK * len(packed.contacts)
+        tracked = state[first:][: TRACK * packed.clearance_rows].reshape(-1, TRACK)
+        return _Listed(slots[:, PLACE_PAIR], slots[:, PLACE_NUMBER], tracked[:, NORMAL])
 
     def opened(self, proof: ClearanceProof, k: int, depth: float) -> Array:
         """The least move (6) of the second body of pair k, by no more than a depth, that opens its contacts."""
@@ -107,6 +140,8 @@ class ClearTicks:
         # Wires are in each other by the distance of their spines, which no move has to open.
         proof.make_slimmer(touching if self._limits.depth == np.inf else 0.0)
         self._proof = proof
+        pairs = first._packed.kept_pairs[: len(proof.pairs)]
+        self._of_features = {k for k, pair in enumerate(pairs) if not is_of_surfaces(pair)}
         self._at = _Standing(first)
         self._moves, self._opened = np.zeros((len(proof.pairs), 6)), list[int]()
         self.way_depth = 0.0
@@ -129,20 +164,19 @@ class ClearTicks:
         there, moves = _Standing(solution), self._moves
         self.way_depth = 0.0
         rolling, last = self._rolling(there), proof.last_poses()
-        # Contacts stay for many ticks, and so does what opens them.
-        if not rolling and proof.stays_clear(there.q, touching, moves):
-            self._at, self.proved, self.way_depth = there, True, proof.way_depth()
-            return True
-        answers: dict[int, Answer] = {}
+        others = list(range(len(proof.pairs)))
+        if not rolling:
+            # Contacts stay for many ticks, and so does what opens them.
+            if proof.stays_clear(there.q, touching, moves, QUICK):
+                self._at, self.proved, self.way_depth = there, True, proof.way_depth()
+                return True
+            others = proof.not_clear()
         # Where a long way may not go in by its square, one along flat faces still may do.
         rolling = [k for k in rolling if self._may_go_in(k, there, OPENED[0])]
-        others = [k for k in range(len(proof.pairs)) if k not in rolling]
-        for k, answer in zip(others, proof.look(there.q, touching, moves, others, swept=True), strict=True):
-            answers[k] = answer
-            if not is_proven(answer):
-                rolling.append(k)
+        others, moves = [k for k in others if k not in rolling], moves.copy()
+        answers = self._straight(there, moves, others)
+        rolling += [k for k in others if not is_proven(answers[k])]
         if rolling:
-            moves = moves.copy()
             for k in rolling:
                 moves[k] = there.opened(proof, k, touching)
             for part in OPENED:
@@ -179,6 +213,20 @@ class ClearTicks:
             else:
                 self._proof.look(self._at.q, self._touching, self._moves, which=[k])
 
+    def _straight(self, there: _Standing, moves: Array, which: list[int]) -> dict[int, Answer]:
+        """What is proven of straight ways: of pairs that are opened as at the last pose, else as they are at this one.
+
+        What opens them is written into the moves.
+        """
+        proof, touching = self._proof, self._touching
+        found = proof.look(there.q, touching, moves, which, swept=True, budget=QUICK)
+        answers = dict(zip(which, found, strict=True))
+        left = [k for k in which if not is_proven(answers[k])]
+        for k in left:
+            moves[k] = there.opened(proof, k, touching)
+        found = proof.look(there.q, touching, moves, left, swept=True)
+        return answers | dict(zip(left, found, strict=True))
+
     def _not_known(self, answers: dict[int, Answer], there: _Standing) -> dict[int, Answer]:
         """The pairs that are not proven to be clear, or to touch, and whose faces do not lie on each other."""
         proof, q = self._proof, there.q
@@ -195,13 +243,34 @@ class ClearTicks:
 
     def _rolling(self, there: _Standing) -> list[int]:
         """The pairs that touch and go so far that the straight way goes in by what counts beside what is touching."""
-        proof, q = self._proof, self._at.q
+        proof, begin = self._proof, self._at
         found = []
         for k in self._opened:
-            way = proof.way_length(k, q, there.q)
-            if ROLLED * way * way > SLIGHTLY * self._touching * proof.radius(k):
+            way = proof.length_between(k, begin.relative(proof, k), there.relative(proof, k))
+            most = SLIGHTLY * self._touching / ROLLED
+            if way * way > most * proof.radius(k) and self._turns(k, there, most / way):
                 found.append(k)
         return found
+
+    def _turns(self, k: int, there: _Standing, angle: float) -> bool:
+        """Whether normals of pair k may turn by more than an angle on the way to a pose, as either body sees them.
+
+        Along flat faces, and on them, they do not turn, and no way goes in. It is not known where contacts come and go,
+        and of surfaces, whose normals are not kept.
+        """
+        before, after = self._at.listed, there.listed
+        if k not in self._of_features or len(before.pairs) != len(after.pairs):
+            return True
+        mine = np.flatnonzero(after.pairs == k)
+        same = (before.pairs[mine] == k) & (before.numbers[mine] == after.numbers[mine])
+        if not len(mine) or not same.all():
+            return True
+        one, other = before.normals[mine], after.normals[mine]
+        turned = np.abs(other - one).max(axis=1)
+        if not (turned > angle).any():
+            return False
+        (first, _), (second, _) = (standing.relative(self._proof, k) for standing in (self._at, there))
+        return bool(((turned > angle) & (np.abs(other @ second - one @ first).max(axis=1) > angle)).any())
 
     def _may_go_in(self, k: int, there: _Standing, part: float) -> bool:
         """Whether pair k may go in by a part of what it may if it touches all along."""

@@ -14,8 +14,9 @@ from assembly._read_only import read_only
 from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import structure_changes
 from assembly.constraints.packing.corners import body_of
+from assembly.constraints.packing.earlier import taken_over
 from assembly.constraints.packing.renumbered import numbers_told
-from assembly.constraints.packing.scene import structure_of
+from assembly.constraints.packing.scene import MOST_CROWDING, structure_of
 from assembly.constraints.program.records import CLOCK_AT, MANAGER_RECORD
 from assembly.errors import InputError, integer, number, positive
 from assembly.kinematics.changes import changes
@@ -199,28 +200,29 @@ class Tracker(InOneProcess):
             self._settings[BUDGET] = 1e9 * positive("budget", budget)
             if self._packed.table[CLOCK_AT] == 0:
                 raise InputError("budget is given, but this interpreter has no clock for compiled code; expected None")
-        self._set_up(first)
+        self._begun = first.status
+        self._set_up(first._state)
+        proves = self._packed.keeps_apart and can_prove(self._packed)
+        self._clear = ClearTicks(first, touching * self._packed.scale) if proves else None
         # The loop holds rows to this, or to what rounding of coordinates alone can violate.
         far = float(np.abs(poses[:, :3]).max()) / self._packed.scale
         self._tolerance = 1.25 * max(limit, ROUNDING * far) * self._packed.scale
 
-    def _set_up(self, first: Solution) -> None:
-        """What ticks work in, and what they read and write directly."""
+    def _set_up(self, begin: Array) -> None:
+        """What ticks work in, and what they read and write directly; they go on from a state of the packed scene."""
         packed, budget = self._packed, self._budget
         self._history = np.zeros((1, HISTORY))
         names = [(body_of(a).name, body_of(b).name) for a, b in packed.kept_pairs]
-        self._followed = Followed(self._scene, packed, names, self._hands, first.status)
+        self._followed = Followed(self._scene, packed, names, self._hands, self._begun)
         # At its end are the rows of the last tick; steps have no copy of those.
         self._size = packed.kept_at
         self._state = np.zeros(packed.kept_at + packed.kept_size)
-        self._state[: first._state.size] = first._state
+        self._state[: begin.size] = begin
         if packed.clearance_rows:
             _follow_extrema(packed, self._state, budget is not None)
         self._pose = self._state[: self._size]
         # Numbers are read from a view in half the time it takes to read them from the array.
         self._view: Any = self._state.data
-        proves = packed.keeps_apart and can_prove(packed)
-        self._clear = ClearTicks(first, self._touching * packed.scale) if proves else None
         self._before = self._pose.copy()
         self._knobs: Any = self._settings.data
         _, doubles, integers = new_workspace(packed)
@@ -239,6 +241,22 @@ class Tracker(InOneProcess):
         self._hands.pack(packed)
         # Other values of constraints may ask for another pose than the one that a tick goes on from, or goes back to.
         self._settings[CARRIES] = float(budget is not None and not packed._sources)
+
+    def _take_more_places(self) -> None:
+        """Have more places for contacts of clearances: from the last pose all of them are found anew.
+
+        What found no place at a tick no row keeps away from there on.
+        """
+        before, radius = self._packed, self._radius
+        self._packed = packed = self._inner._pack_with_more_places()
+        assert self._inner._scene is not None
+        self._scene = self._inner._scene
+        self._numbers = self._told()
+        result = self._before[before.results_at : before.memory_at]
+        self._set_up(taken_over(before, packed, self._before))
+        self._radius = radius
+        self._before[packed.results_at : packed.memory_at] = result
+        self._pose[:] = self._before
 
     def __repr__(self) -> str:
         stiffness = self._hands.stiffness
@@ -309,8 +327,11 @@ class Tracker(InOneProcess):
             self._seen = view[packed.memory_at + EVENT_COUNT]
         # What steps keep nobody writes to.
         self._before = self._pose.copy()
+        ended, followed = self._before, self._followed
+        if packed.is_crowded(self._before) and self._inner._crowding < MOST_CROWDING:
+            self._take_more_places()
         way_depth = 0.0 if self._clear is None else self._clear.way_depth if self._clear.proved else None
-        return Step(self._followed, self._before, status, row, seen, perf_counter() - begin, way_depth)
+        return Step(followed, ended, status, row, seen, perf_counter() - begin, way_depth)
 
     def _proven(self, status: TrackStatus) -> TrackStatus:
         """The status of a tick, whose pose is that of the last one where bodies are not known to be clear at it."""

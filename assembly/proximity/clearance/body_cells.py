@@ -41,6 +41,9 @@ Cells = list[CellTable | WireCells]
 Table = NDArray[np.int64]
 # How near first cells are to faces, in parts of the body's size, and how much a boundary turns along a chord [rad].
 TOLERANCE, ANGLE = 8e-3, 0.5
+# An axis is near the middle of a box around all of a body that is off it by no more than this part of the radius of the
+# ball, by which the ball grows: bodies then seem to go so much farther.
+NEAR_AXIS = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +124,7 @@ def _made_of(faces: tuple[Face, ...]) -> BodyCells:
     radii = [found.radius for found in rounds if found is not None]
     radii += [float(table.first[0, 1]) for table in tables if isinstance(table, WireCells)]
     builder.build()
+    _center_on_axis(rows_of(NODE, builder.nodes)[0], rounds)
     label = _components(topology)
     return BodyCells(
         packed.table,
@@ -312,6 +316,24 @@ class _Builder:
         nodes.bore[rows], nodes.spine[rows] = radius, self.bores.center[bore]
         if turned:
             nodes.ruling[rows] = self.bores.axis[bore]
+
+
+def _center_on_axis(root: np.record, rounds: list[Round | None]) -> None:
+    """Have the middle of a body's root on the nearest axis of what is round of it, if one is near.
+
+    A way is straight for that point (`way.py`): a shaft that turns in its bore turns about it.
+    """
+    found = []
+    for each in rounds:
+        if each is not None:
+            off = each.center - root.center
+            found.append(off - (off @ each.axis) * each.axis)
+    move = min(found, key=np.linalg.norm, default=np.zeros(3))
+    far = float(np.linalg.norm(move))
+    if 0.0 < far <= NEAR_AXIS * root.radius:
+        root.center += move
+        root.half += np.abs(root.axes @ move)
+        root.radius += far
 
 
 def _write_round(node: np.record, found: Round) -> None:

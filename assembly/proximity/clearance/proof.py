@@ -373,9 +373,10 @@ class ClearanceProof:
 
     def way_length(self, k: int, before: Array, after: Array) -> float:
         """How far points of the second body of pair k go between two poses, seen from the first, at most."""
-        return self._length(k, self.relative(k, before), self.relative(k, after))
+        return self.length_between(k, self.relative(k, before), self.relative(k, after))
 
-    def _length(self, k: int, before: tuple[Array, Array], after: tuple[Array, Array]) -> float:
+    def length_between(self, k: int, before: tuple[Array, Array], after: tuple[Array, Array]) -> float:
+        """The same of what the second body is turned and shifted by."""
         cells = self.cells_of(k)
         turn, shift = after[0] - before[0], after[1] - before[1]
         angle = 2.0 * asin(min(1.0, hypot(*turn.ravel().tolist()) / sqrt(8.0)))
@@ -390,7 +391,7 @@ class ClearanceProof:
         pair, self._at = self.fronts.pair, None
         for k, (turn, shift) in enumerate(zip(*poses, strict=True)):
             now = pair.turn[k].reshape(3, 3).copy(), pair.shift[k].copy()
-            pair.travelled[k] += self._length(k, now, (turn.reshape(3, 3), shift))
+            pair.travelled[k] += self.length_between(k, now, (turn.reshape(3, 3), shift))
             pair.turn[k], pair.shift[k] = turn, shift
 
     def nested(self, k: int) -> bool | None:
