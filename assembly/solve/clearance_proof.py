@@ -42,6 +42,7 @@ __all__ = [
     "can_prove",
     "judge_end",
     "lent_proof",
+    "named_answers",
     "near_contacts",
     "new_proof",
     "nothing_known",
@@ -56,7 +57,7 @@ Array = NDArray[np.float64]
 NEAR = 2.0
 # Moves that are tried for contacts that no row tells of.
 TRIES = 3
-# Pairs of nodes that a look may take where bodies conform.
+# Pairs of nodes that a look may take where bodies conform, or on the way from the last poses.
 FEW = 500
 
 
@@ -87,12 +88,14 @@ def owned_pairs(packed: Packed) -> list[tuple[Clearance, tuple[Body, Body], bool
 
     What is in the place of a contact is asked for no gap, but it may not cross.
     """
-    touched = {frozenset(id(body) for body in contact.bodies) for contact in packed.contacts}
-    return [
-        (item, pair, frozenset(map(id, pair)) in touched)
-        for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True)
-        for pair in own
-    ]
+    if packed.owned_pairs is None:
+        touched = {frozenset(id(body) for body in contact.bodies) for contact in packed.contacts}
+        packed.owned_pairs = [
+            (item, pair, frozenset(map(id, pair)) in touched)
+            for item, own in zip(packed.clearances, packed.clearance_pairs, strict=True)
+            for pair in own
+        ]
+    return packed.owned_pairs
 
 
 def proven_pairs(
@@ -157,6 +160,10 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
         ]
     touching = solution._touching * packed.scale
     with lent_proof(packed, scene.bodies) as proof:
+        proof.make_slimmer(touching)
+        stayed = _stayed_clear(proof, solution.q, touching)
+        if stayed is not None:
+            return named_answers(packed, stayed)
         wedged = _open_recognized(proof, solution.q, touching)
         answers = _first_looks(proof, solution.q, touching, wedged)
         _make_smaller(proof, solution.q, touching, answers, wedged)
@@ -180,6 +187,26 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
         proven = is_proven(answer)
         proved = proven and not (touched and item.minimum > 0.0)
         found.append(PairAnswer(item.name, (a.name, b.name), answer, proven or k in clear, proved))
+    return found
+
+
+def _stayed_clear(proof: ClearanceProof, q: Array, touching: float) -> list[Answer] | None:
+    """What is proven at poses to which bodies come straight from the last ones and stay clear; None where it is not known.
+
+    That is asked first, as most solves go on from the one before: it is one call for all pairs.
+    """
+    if not proof.has_looked or not proof.stays_clear(q, touching, proof.moves, FEW, at_once=True):
+        return None
+    answers = proof.clear_answers(q, proof.moves)
+    return answers if all(answer.depth <= touching for answer in answers) else None
+
+
+def named_answers(packed: Packed, answers: Sequence[Answer]) -> list[PairAnswer]:
+    """Answers that hold, with the names of what they are of."""
+    found = []
+    for (item, (a, b), touched), answer in zip(owned_pairs(packed), answers, strict=True):
+        proved = is_proven(answer) and not (touched and item.minimum > 0.0)
+        found.append(PairAnswer(item.name, (a.name, b.name), answer, True, proved))
     return found
 
 

@@ -20,7 +20,15 @@ from assembly.proximity.clearance.hulls.scene import answers_by_hulls
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
 from assembly.proximity.features.solid_contact import TRACK
-from assembly.solve.clearance_proof import TRIES, PairAnswer, lent_proof, nothing_known, owned_pairs, proven_pairs
+from assembly.solve.clearance_proof import (
+    TRIES,
+    PairAnswer,
+    lent_proof,
+    named_answers,
+    nothing_known,
+    owned_pairs,
+    proven_pairs,
+)
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.samples import PosedBodies, sampled
 
@@ -59,9 +67,10 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
     # Hulls of faces tell most of it before there are any cells; with these it takes some 10 us a pair to look again.
     hulled = None if packed.proofs else answers_by_hulls(*proven_pairs(packed, bodies), q, touching * packed.scale)
     if hulled is not None:
-        packed.stood = asked, touching, _named(packed, hulled)
+        packed.stood = asked, touching, named_answers(packed, hulled)
         return packed.stood[2]
     with lent_proof(packed, bodies) as proof:
+        proof.make_slimmer(touching * packed.scale)
         answers, conforming = _answers(proof, q, touching * packed.scale)
     if answers is None:
         return None
@@ -71,7 +80,7 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
         posed = PosedBodies(bodies, q, touching, packed.contacts, given)
         if sampled(posed, [owned[k][1] for k in conforming], CTRL_C).crossing:
             return None
-    found = _named(packed, answers)
+    found = named_answers(packed, answers)
     packed.stood = asked, touching, found
     return found
 
@@ -79,14 +88,6 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
 def _asked(packed: Packed, state: Array) -> bytes:
     """Poses, and pairs of the given contacts, by which a proof is found again."""
     return state[: packed.contacts_at + TRACK * len(packed.contacts)].tobytes()
-
-
-def _named(packed: Packed, answers: Sequence[Answer]) -> list[PairAnswer]:
-    """Answers that hold, with the names of what they are of."""
-    return [
-        PairAnswer(item.name, (a.name, b.name), answer, True, is_proven(answer))
-        for (item, (a, b), _), answer in zip(owned_pairs(packed), answers, strict=True)
-    ]
 
 
 def prove_way(
@@ -110,13 +111,14 @@ def prove_way(
     """
     q, length = state[: packed.contacts_at].reshape(-1, 7), touching * packed.scale
     with lent_proof(packed, bodies) as proof:
+        proof.make_slimmer(length)
         if not proof.has_looked:
             # Hulls told of the last poses.
             _answers(proof, last, length)
         elif not proof.is_at(last):
             proof.look(last, length, proof.moves)
         if proof.stays_clear(q, length, proof.moves, QUICK):
-            found = _named(packed, proof.clear_answers(q, proof.moves))
+            found = named_answers(packed, proof.clear_answers(q, proof.moves))
             packed.stood = _asked(packed, state), touching, found
             return found
         if any(proof.way_length(k, last, q) > proof.radius(k) for k in _unproven_ways(proof, q, length)):

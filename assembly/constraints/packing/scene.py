@@ -40,6 +40,7 @@ OUTGROWN = 1e4
 
 # Bytes of a state, what touching is, and what was proven there.
 Stood = tuple[bytes, float, list[Any]]
+OwnedPairs = list[Any]
 # How many times as many places as they ask for a solve gives to clearances.
 MORE_PLACES, MOST_CROWDING = 4, 16
 # Numbers of pools that are not as they were packed (0).
@@ -75,6 +76,8 @@ class Packed(WrittenScene):
         Of the pairs that clearances keep apart, of solves that have ended.
     stood : (bytes, float, list) or None
         Poses, with pairs of contacts, that were proven to hold as they stand; what touching was; what was proven.
+    owned_pairs : list or None
+        Clearances and the pairs of bodies that they keep apart (`solve/clearance_proof.py`), once asked.
     asked : Asked
         What the last solve was asked for.
     number_places : NumberPlaces or None
@@ -135,6 +138,7 @@ class Packed(WrittenScene):
         self.workspaces: list[tuple[Array, Array, Table]] = []
         self.proofs: list[ClearanceProof] = []
         self.stood: Stood | None = None
+        self.owned_pairs: OwnedPairs | None = None
         self.number_places: NumberPlaces | None = None
         self.derivative_plans: dict[Any, Any] = {}
         self.kept_at = self.memory_at + self._memory.size
@@ -206,6 +210,7 @@ class Packed(WrittenScene):
             "workspaces": [],
             "proofs": [],
             "stood": None,
+            "owned_pairs": None,
             "number_places": None,
             "derivative_plans": {},
         }

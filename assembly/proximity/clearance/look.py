@@ -272,7 +272,7 @@ def go_to(forest, front, pose, limits):
 
 # What is to be done with a pair: at a pose, with a new front; on the way there, with one that is
 # made at the last pose.
-PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY, ON_WAY_ANEW = 0, 1, 2, 3, 4
+PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY, ON_WAY_ANEW, ON_WAY_AT_ONCE = 0, 1, 2, 3, 4, 5
 # A front that has grown by more than this factor and number is begun anew.
 GROWN, MANY = 2, 200
 # What rounding of poses and of sums of coordinates may do to a gap, in parts of these: some thirty roundings.
@@ -303,7 +303,7 @@ def done_task(forest, front, pose, limits, task):
         return go_to(forest, front, pose, limits)
     if task == BEGUN_ANEW:
         begin_front(front)
-    code = look(forest, front, pose, limits, False)
+    code = look(forest, front, pose, limits, task == ON_WAY_AT_ONCE)
     if task == BEGUN_ANEW:
         counts.fresh = counts.count
     pair.part = 1.0 if code == CLEAR else 0.0
@@ -344,11 +344,12 @@ def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes):
         codes[k] = look_at_pair(forest, front, q, moves[k], tasks[k])
 
 
-@kernel(signatures=f"({FOREST}, {FRONTS}, f8[:, ::1], f8[:, ::1], f8, i8[::1])", allocates=True)
-def stay_clear(forest_arrays, front_arrays, q, moves, touch, codes):
+@kernel(signatures=f"({FOREST}, {FRONTS}, f8[:, ::1], f8[:, ::1], f8, b1, i8[::1])", allocates=True)
+def stay_clear(forest_arrays, front_arrays, q, moves, touch, at_once, codes):
     """Look at all pairs on the way to poses q (n, 7): how the first ended that is not known to stay clear, or CLEAR.
 
-    Where one was not clear at its last look, none is looked at: all end OPEN.
+    Where one was not clear at its last look, none is looked at: all end OPEN. Ways that are to be proven at once are
+    not taken in parts.
     """
     table, pool, faces, links, tree_nodes, used = forest_arrays
     forest = Forest(Store(table, pool), faces, links, tree_nodes, used)
@@ -363,7 +364,9 @@ def stay_clear(forest_arrays, front_arrays, q, moves, touch, codes):
         front = Front(pairs[k], counts[k], parted[k], nodes[k], next_parted, next_nodes, waiting, waiting_nodes, work)
         pair, count = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
         pair.touch = touch
-        task = ON_WAY_ANEW if count.count > GROWN * count.fresh + MANY else ON_WAY
+        task = ON_WAY_AT_ONCE if at_once else ON_WAY
+        if count.count > GROWN * count.fresh + MANY:
+            task = ON_WAY_ANEW
         codes[k] = look_at_pair(forest, front, q, moves[k], task)
         if worst == CLEAR:
             worst = codes[k]

@@ -136,25 +136,28 @@ class ClearanceProof:
             self._at = None
         return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
 
-    def stays_clear(self, q: Array, touching: float, moves: Array, budget: int | None = None) -> bool:
+    def stays_clear(
+        self, q: Array, touching: float, moves: Array, budget: int | None = None, at_once: bool = False
+    ) -> bool:
         """Whether all pairs, all of which were clear at the last look, are so at poses and on the way there.
 
-        Where one is not, nothing is known: `look` tells what it is. The budget is as there.
+        Where one is not, nothing is known: `look` tells what it is. The budget is as there. A way that is to be proven
+        at once is not taken in parts.
         """
         if budget is None:
-            return self._stay_clear(q, touching, moves)
+            return self._stay_clear(q, touching, moves, at_once)
         counts = self.fronts.counts
         usual, counts.budget = counts.budget.copy(), budget
-        clear = self._stay_clear(q, touching, moves)
+        clear = self._stay_clear(q, touching, moves, at_once)
         counts.budget = usual
         return clear
 
-    def _stay_clear(self, q: Array, touching: float, moves: Array) -> bool:
+    def _stay_clear(self, q: Array, touching: float, moves: Array, at_once: bool) -> bool:
         self._forget()
         self._at, at = None, np.array(q, dtype=float)
         code = NO_ROOM
         while code == NO_ROOM:
-            code = stay_clear(self.forest.arrays, self.fronts.arrays, at, moves, touching, self._codes)
+            code = stay_clear(self.forest.arrays, self.fronts.arrays, at, moves, touching, at_once, self._codes)
             if code == NO_ROOM and not self._grow():
                 return False
         if code != CLEAR:
@@ -181,8 +184,9 @@ class ClearanceProof:
         for k in np.flatnonzero(bounds == -np.inf).tolist():
             bounds[k] = self.bound(k)
         answers = [Answer(Verdict.CLEAR, bound, swept=True) for bound in bounds.tolist()]
-        for k in np.flatnonzero(moves.any(axis=1)).tolist():
-            far = self.move_length(k, q, moves[k])
+        closed = ~(bounds > pair.needed)
+        for k in np.flatnonzero(moves.any(axis=1) | closed).tolist():
+            far = self.move_length(k, q, moves[k]) + (float(pair.slimmer[k]) if closed[k] else 0.0)
             answers[k] = Answer(Verdict.TOUCHING, float(bounds[k]) - far, far, swept=True)
         return answers
 
@@ -218,15 +222,16 @@ class ClearanceProof:
 
         After the pair's move of `moves` (pairs, 6) if they are given; the distance is not below zero.
         """
-        needed, budgets = self.fronts.pair.needed, self.fronts.counts.budget
+        needed, budgets, slimmer = self.fronts.pair.needed, self.fronts.counts.budget, self.fronts.pair.slimmer
         before, needed[k] = float(needed[k]), distance
+        depth, slimmer[k] = float(slimmer[k]), 0.0
         usual, budgets[k] = int(budgets[k]), budget
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         tasks[k] = BEGUN_ANEW
         self._run(q, 0.0, np.zeros((len(self.pairs), 6)) if moves is None else moves, tasks)
         found = self._codes[k] == CLEAR and self.nested(k) is False
         # Gaps of this front are those over another length.
-        needed[k], budgets[k], self._begun[k] = before, usual, False
+        needed[k], budgets[k], self._begun[k], slimmer[k] = before, usual, False, depth
         self.fronts.pair.known[k] = 0.0
         return bool(found)
 
@@ -324,8 +329,8 @@ class ClearanceProof:
             self._begun[k] = False
             return Answer(Verdict.ENCLOSED, bound, bound)
         far = self.move_length(k, q, move)
-        if not bound > pair.needed:
-            far += float(pair.slimmer)
+        if not bound > pair.needed[k]:
+            far += float(pair.slimmer[k])
         if far > 0.0:
             return Answer(Verdict.TOUCHING, bound - far, far, swept=swept)
         return Answer(Verdict.CLEAR, bound, swept=swept)
