@@ -121,7 +121,7 @@ class Bodies:
         if read.missing:
             told = f"body {name!r}; not read: {'; '.join(read.missing[:10])}"
             if self._strict:
-                raise InputError(f"{told}; pass strict=False to go without")
+                raise InputError(f"{told}; pass strict=False to read the rest")
             warnings.warn(told, StepWarning, stacklevel=4)
         said: dict[int, Label] = {}
         for label in labels:

@@ -148,7 +148,7 @@ def _number_of(thing: Thing, field: Any, index: Any) -> Number:
         return LeastGap(thing)
     if isinstance(thing, Freedom):
         if field not in ("value", "lower", "upper"):
-            raise InputError(f"field is {field!r}; expected 'value', 'lower' or 'upper' of a freedom")
+            raise InputError(f"field is {field!r}; expected 'value', 'lower' or 'upper' of a joint coordinate")
         return RowNumber(thing, field)
     if isinstance(thing, Constraint):
         return _of_constraint(thing, field, index)

@@ -96,7 +96,7 @@ class _Reader:
         """Links as bodies, joints, what mimics others."""
         links = {_name("link", link.name): link for link in self._robot.links}
         if len(links) < len(self._robot.links):
-            raise UrdfError("two links have one name; expected distinct names")
+            raise UrdfError("two links have the same name; expected distinct names")
         order = self._tree(list(links))
         poses: dict[str, Pose] = {}
         for name, joint in order:
@@ -136,7 +136,7 @@ class _Reader:
             order += [(joint.child, joint) for joint in children]
             below += [joint.child for joint in children]
         if len(order) < len(links):
-            raise UrdfError(f"links {sorted(set(links) - {name for name, _ in order})} hang on each other in a ring")
+            raise UrdfError(f"links {sorted(set(links) - {name for name, _ in order})} form a ring of joints")
         return order
 
     def _body(self, link: Any, pose: Pose, fixed: bool) -> Body:

@@ -152,7 +152,7 @@ def _tree(bodies: Sequence[Body], joints: Sequence[Joint]) -> list[_Link]:
         place += 1
     lost = [body.name for body in bodies if not any(link.body is body for link in links)]
     if lost:
-        raise UrdfError(f"bodies {lost} hang on nothing; expected joints to all")
+        raise UrdfError(f"bodies {lost} are connected to the root by no joints; expected joints to all")
     return links
 
 
@@ -235,7 +235,7 @@ class _Writer:
         elif kind in ("revolute", "prismatic") and not np.isfinite([low, high]).all():
             raise UrdfError(f"joint {joint.name!r} has limits from {low:g} to {high:g}; expected finite ones")
         if isinstance(joint, Planar) and any(freedom.limits for freedom in joint.freedoms.values()):
-            raise UrdfError(f"joint {joint.name!r} is planar with limits, which a file has not; expected none")
+            raise UrdfError(f"joint {joint.name!r} is planar with limits, which a file cannot have; expected none")
         element = ElementTree.Element("joint", name=joint.name, type=kind)
         ElementTree.SubElement(element, "parent", link=parent.body.name)
         ElementTree.SubElement(element, "child", link=link.body.name)

@@ -53,7 +53,7 @@ def _given_pose(position: ArrayLike, quaternion: ArrayLike, pose: Pose | None) -
         # Pose takes what is like an array, which its fields do not say: they are tuples once it is made.
         return Pose(position, quaternion)  # type: ignore[arg-type]  # Pose converts them
     if not np.array_equal(position, (0, 0, 0)) or not np.array_equal(quaternion, (1, 0, 0, 0)):
-        raise InputError("pose is given beside position or quaternion; expected one of both")
+        raise InputError("pose is given beside position or quaternion; expected either")
     return pose
 
 

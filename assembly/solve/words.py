@@ -29,7 +29,7 @@ def message(solution: Solution) -> str:
     if solution.status is Status.CONTACT_LOST and culprit >= 0:
         return f"{solution._packed.pair_name(culprit)!r}: {text}"
     if solution.restarted:
-        text += "; found from another start: near the one given constraints did not hold"
+        text += "; found from another start: near the given one the constraints did not hold"
     if solution.put_together:
         text += "; bodies were put together without clearances first, and may have passed through each other"
     scale = solution._scene.scale
@@ -50,7 +50,7 @@ def message(solution: Solution) -> str:
         text += "; disagreeing: " + ", ".join(f"{name!r} ({off:.3g})" for name, off in solution.disagreeing.items())
     if solution.status is Status.INFEASIBLE:
         named = " and ".join(", ".join(map(repr, names)) for names in solution.conflicting_sets)
-        text += f"; conflicting: {named or 'none was shown to be'}"
+        text += f"; conflicting: {named or 'no set was found'}"
     if solution._result(IMPROPER) > 0.0:
         text += "; at a contact the surfaces cross beside the point (indefinite relative curvature)"
     return text
@@ -73,7 +73,7 @@ def _crossing_lines(solution: Solution) -> list[str]:
     except InputError as error:
         return [f"  crossings are not known: {error}"]
     lines = [f"  {a} and {b} cross; asm.Clearance() keeps them apart" for a, b in apart]
-    return lines + [f"  {a} and {b} cross, which a joint or a coupling ties" for a, b in joined]
+    return lines + [f"  {a} and {b} cross, which are connected by a joint or a coupling" for a, b in joined]
 
 
 def _first_lines(solution: Solution) -> list[str]:

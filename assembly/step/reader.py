@@ -156,7 +156,7 @@ def read_step(
     except Damaged as reason:
         damage = str(reason)
         if strict and isinstance(reason, Malformed):
-            raise StepError(f"{damage}; pass strict=False for what is whole of it") from None
+            raise StepError(f"{damage}; pass strict=False to read the undamaged part") from None
     if damage:
         bodies, left = _read_apart(str(file), unit, bool(strict), damage)
         left.append(f"{damage}, and what OCCT makes of the rest was read")

@@ -29,8 +29,8 @@ class TrackStatus(Enum):
     Under a clearance a pose holds only where it is proven that bodies are clear or touch, at it and on the way there.
     """
 
-    FOLLOWED = "the constraints hold and the pose is as near to the hand as they allow"
-    APPROACHING = "the constraints hold; the next tick goes on toward the hand"
+    FOLLOWED = "the constraints hold and the pose is as near to the target as they allow"
+    APPROACHING = "the constraints hold; the next tick continues toward the target"
     LATE = "the time was spent; the constraints hold at the pose returned"
     HELD = "no further pose was found that holds; the last one that does is returned"
     BAD_TARGET = "the target is no finite point or pose; nothing moved"
@@ -148,7 +148,9 @@ class Step(ReadOnlyArrays):
     def wrench(self) -> Array:
         """Force and torque on the hand, (6,)."""
         if len(self.wrenches) > 1:
-            raise InputError(f"the tracker has {len(self.wrenches)} hands; read forces or wrenches, a row a hand")
+            raise InputError(
+                f"the tracker has {len(self.wrenches)} hands; read forces or wrenches, with a row for each hand"
+            )
         wrench: Array = self.wrenches[0]
         return wrench
 

@@ -94,7 +94,7 @@ def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
 def _held_to(begin: Solution) -> Solution:
     """A solve that a tracker begins with, which has to hold."""
     if not begin.success:
-        raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {begin.message}")
+        raise InputError(f"q0 leads to no pose at which the constraints hold; expected one that does: {begin.message}")
     return begin
 
 

@@ -100,7 +100,7 @@ class Clearance(Constraint):
         self._merge_radius = number("merge_radius", merge_radius)
         if not 0.0 < self._merge_radius <= 1.0:
             raise InputError(
-                f"merge_radius is {self._merge_radius:g}; expected a part of the scene's size, from above 0 to 1"
+                f"merge_radius is {self._merge_radius:g}; expected a positive part of the scene's size, 1 at most"
             )
         slots = renamed("slots", slots, "places", places)
         if slots is not None and (not isinstance(slots, int) or isinstance(slots, bool) or slots < 1):

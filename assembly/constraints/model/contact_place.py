@@ -190,7 +190,9 @@ def _stretch(surface: NurbsSurface, target: Target) -> Array:
         a, b = float(np.linalg.norm(su)), float(np.linalg.norm(sv))
         area = float(np.linalg.norm(np.cross(su, sv)))
         if not (a * spans[0] > least and b * spans[1] > least and area > DEGENERATE * a * b):
-            raise InputError(f"target is ({u:g}, {v:g}), a pole of the face; expected a place where both have lengths")
+            raise InputError(
+                f"target is ({u:g}, {v:g}), a pole of the face; expected a place where u and v have lengths"
+            )
         return np.array([[a, su @ sv / a], [0.0, area / a]])
     k = 0 if u is not None else 1
     low, high = surface.domain[1 - k]

@@ -27,14 +27,14 @@ def _freedom(name: str, value: Any, slides: bool) -> Freedom:
     fits, word = (_slides, "slides") if slides else (_turns, "is an angle")
     if isinstance(value, Freedom):
         if not fits(value.coordinate):
-            raise InputError(f"{name} is {value!r}; expected a freedom that {word}")
+            raise InputError(f"{name} is {value!r}; expected a joint coordinate that {word}")
         return value
     if not isinstance(value, Joint):
-        raise TypeError(f"{name} is {value!r}; expected a joint or one of its freedoms, joint.freedom(name)")
+        raise TypeError(f"{name} is {value!r}; expected a joint or one of its coordinates, joint.freedom(name)")
     fitting = [freedom for freedom in value.freedoms.values() if fits(freedom.coordinate)]
     if len(fitting) != 1:
         known = ", ".join(repr(freedom.name) for freedom in fitting) or "none"
-        raise InputError(f"{name} is {value.name!r}; expected a joint with one freedom that {word}, it has {known}")
+        raise InputError(f"{name} is {value.name!r}; expected a joint with one coordinate that {word}; it has {known}")
     return fitting[0]
 
 
@@ -48,7 +48,7 @@ class Coupling(RowConstraint):
 
     def __init__(self, leader: Freedom, follower: Freedom, factor: float, name: str | None, offset: float) -> None:
         if leader.coordinate is follower.coordinate:
-            raise InputError(f"both sides are {leader!r}; expected two freedoms")
+            raise InputError(f"both sides are {leader!r}; expected two coordinates")
         bodies = dict.fromkeys((*leader.joint.bodies, *follower.joint.bodies))
         super().__init__(tuple(bodies), name, words(type(self)))
         self._leader = leader
@@ -120,7 +120,7 @@ class Gear(Coupling):
     ) -> None:
         factor = number("ratio", ratio)
         if factor == 0.0:
-            raise InputError("ratio is 0; expected the turns of b a turn of a, not zero")
+            raise InputError("ratio is 0; expected the turns of b per turn of a, not zero")
         super().__init__(_freedom("a", a, slides=False), _freedom("b", b, slides=False), factor, name, offset)
 
     @property
@@ -156,7 +156,7 @@ class Linear(Coupling):
     ) -> None:
         factor = number("ratio", ratio)
         if factor == 0.0:
-            raise InputError("ratio is 0; expected the travel of b for a travel of a of one, not zero")
+            raise InputError("ratio is 0; expected the travel of b per travel of a, not zero")
         super().__init__(_freedom("a", a, slides=True), _freedom("b", b, slides=True), factor, name, offset)
 
     @property
@@ -197,7 +197,7 @@ class RackPinion(Coupling):
     ) -> None:
         factor = bounded("radius", radius)
         if factor == 0.0:
-            raise InputError("radius is 0; expected the travel of the rack a radian of the pinion, not zero")
+            raise InputError("radius is 0; expected the travel of the rack per radian of the pinion, not zero")
         super().__init__(
             _freedom("pinion", pinion, slides=False), _freedom("rack", rack, slides=True), factor, name, offset
         )

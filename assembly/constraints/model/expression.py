@@ -210,7 +210,7 @@ def _checked_function(function: Any) -> int:
         raise InputError("function is casadi.Function() without content; expected one of poses")
     inputs, outputs = int(function.n_in()), int(function.n_out())
     if inputs == 0:
-        raise InputError(f"function is {function}, without inputs; expected one a body, its pose (7,)")
+        raise InputError(f"function is {function}, without inputs; expected one for each body, its pose (7,)")
     for k in range(inputs):
         if function.size_in(k) != (7, 1) or function.nnz_in(k) != 7:
             raise InputError(
@@ -228,14 +228,14 @@ def _checked_function(function: Any) -> int:
 
 def _checked_bodies(bodies: Any, inputs: int) -> tuple[Body, ...]:
     if isinstance(bodies, str) or not isinstance(bodies, Iterable):
-        raise TypeError(f"bodies is {bodies!r}; expected a sequence of bodies, one an input of the function")
+        raise TypeError(f"bodies is {bodies!r}; expected a sequence of bodies, one for each input of the function")
     given = tuple(bodies)
     for k, body in enumerate(given):
         if not isinstance(body, Body):
             raise TypeError(f"bodies[{k}] is {body!r}; expected a Body")
     if len(given) != inputs:
         names = [body.name for body in given]
-        raise InputError(f"bodies are {names}; expected {inputs}, one an input of the function")
+        raise InputError(f"bodies are {names}; expected {inputs}, one for each input of the function")
     return given
 
 

@@ -66,7 +66,7 @@ class Group(OwnState, RowConstraint):
             if not isinstance(pose, Pose):
                 raise TypeError(f"poses[{k}] is {pose!r}; expected a Pose")
         if len(given) != len(members):
-            raise InputError(f"poses is {len(given)} poses; expected {len(members)}, one a body")
+            raise InputError(f"poses is {len(given)} poses; expected {len(members)}, one for each body")
         super().__init__(members, name, "group")
         self._poses: tuple[Pose, ...] = given
         base = next((k for k, body in enumerate(members) if body.fixed), 0)

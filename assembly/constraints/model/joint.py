@@ -176,8 +176,8 @@ class Joint(OwnState, RowConstraint):
             return next(iter(self._freedoms.values()))
         if isinstance(name, str) and name in self._freedoms:
             return self._freedoms[name]
-        known = ", ".join(map(repr, self._freedoms)) or "none, the joint leaves nothing free"
-        raise InputError(f"name is {name!r}; expected a freedom of {self.name!r}: {known}")
+        known = ", ".join(map(repr, self._freedoms)) or "none, the joint leaves no coordinate free"
+        raise InputError(f"name is {name!r}; expected a coordinate of {self.name!r}: {known}")
 
     @property
     def equations(self) -> tuple[Equation, ...]:

@@ -175,7 +175,9 @@ class Screw(Cylindrical):
     ) -> None:
         self._pitch = bounded("pitch", pitch)
         if self._pitch == 0.0:
-            raise InputError("pitch is 0; expected the travel a turn, not zero; a nut that cannot slide is Revolute")
+            raise InputError(
+                "pitch is 0; expected the travel per turn, not zero; a nut that cannot slide is a Revolute"
+            )
         super().__init__(
             frame_a,
             frame_b,

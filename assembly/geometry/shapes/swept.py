@@ -75,7 +75,7 @@ def revolution(profile: Profile, angle: float = 2.0 * pi, *, name: str | None = 
     """
     turn = number("angle", angle)
     if not 1e-9 <= turn <= 2.0 * pi * (1.0 + 1e-15):
-        raise InputError(f"angle is {turn:g}; expected one above zero, a whole turn (2 pi) at most")
+        raise InputError(f"angle is {turn:g}; expected a positive angle, a whole turn (2 pi) at most")
     turn = min(turn, 2.0 * pi)
     if isinstance(profile, NurbsCurve) and not profile.closed:
         _check_radii([profile])
@@ -151,7 +151,7 @@ def loft(curves: Iterable[NurbsCurve], *, name: str | None = None) -> NurbsSurfa
     steps = np.linalg.norm(np.diff(rows[..., :3] / rows[..., 3:], axis=0), axis=-1).mean(axis=-1)
     if not (steps > 0.0).all():
         k = int(np.argmin(steps))
-        raise InputError(f"curves[{k}] and curves[{k + 1}] are one; expected curves that are apart")
+        raise InputError(f"curves[{k}] and curves[{k + 1}] are equal; expected different curves")
     at = np.concatenate([[0.0], np.cumsum(steps)])
     across = min(_MOST, len(given) - 1)
     # Knots by averaging parameters (The NURBS Book, 9.8), so that the equations can be solved.
@@ -159,7 +159,9 @@ def loft(curves: Iterable[NurbsCurve], *, name: str | None = None) -> NurbsSurfa
     across_knots = np.concatenate([np.repeat(at[0], across + 1), inner, np.repeat(at[-1], across + 1)])
     points = np.linalg.solve(_collocation(at, across_knots, across), rows.reshape(len(given), -1)).reshape(rows.shape)
     if not (points[..., 3] > 0.0).all():
-        raise InputError("curves has weights so unlike each other that those between are not positive; expected others")
+        raise InputError(
+            "curves has weights so different that weights between them are not positive; expected more similar ones"
+        )
     net = points.swapaxes(0, 1)
     return NurbsSurface(net[..., :3] / net[..., 3:], (knots, across_knots), (degree, across), net[..., 3], name=name)
 

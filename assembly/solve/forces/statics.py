@@ -249,7 +249,7 @@ def _chain(
     if id(body) not in rows:
         raise InputError(f"tip is on body {body.name!r}; expected a body of this assembly")
     if isinstance(inputs, (Joint, Freedom)) or not isinstance(inputs, Sequence):
-        raise TypeError(f"inputs is {inputs!r}; expected a sequence of joints or freedoms")
+        raise TypeError(f"inputs is {inputs!r}; expected a sequence of joints or joint coordinates")
     point = _world(rows[id(body)], coordinates)
     columns = []
     for k, given in enumerate(inputs):
@@ -283,13 +283,13 @@ def _world(row: Array, coordinates: Array) -> Array:
 def _input(name: str, given: Joint | Freedom) -> Freedom:
     """The freedom that is meant; one that turns about the joint's axis or slides along it."""
     if not isinstance(given, (Joint, Freedom)):
-        raise TypeError(f"{name} is {given!r}; expected a joint or one of its freedoms, joint.freedom(name)")
+        raise TypeError(f"{name} is {given!r}; expected a joint or one of its coordinates, joint.freedom(name)")
     if isinstance(given, Joint) and len(given.freedoms) != 1:
         known = ", ".join(map(repr, given.freedoms)) or "none"
-        raise InputError(f"{name} is {given.name!r}; expected a joint with one freedom, it has {known}")
+        raise InputError(f"{name} is {given.name!r}; expected a joint with one coordinate; it has {known}")
     freedom = given.freedom() if isinstance(given, Joint) else given
     if not isinstance(freedom.joint, (Revolute, Prismatic, Cylindrical)) or isinstance(freedom.joint, Screw):
-        raise InputError(f"{name} is {freedom!r}; expected a freedom of a Revolute, Prismatic or Cylindrical joint")
+        raise InputError(f"{name} is {freedom!r}; expected a coordinate of a Revolute, Prismatic or Cylindrical joint")
     return freedom
 
 

@@ -145,7 +145,7 @@ class _Follower:
         try:
             self.first, self.start = _begun(curve, place)
         except LostError:
-            raise InputError("start is at a fold of a contact; expected a pose beside it") from None
+            raise InputError("start is at a fold of a contact; expected a pose near it") from None
 
     def ways(self) -> list[Way]:
         """What is found as the parameter grows at first, and, if that is no loop, as it shrinks."""
@@ -237,7 +237,7 @@ def _begun(curve: Curve, place: Place) -> tuple[Curve, Point]:
     point = curve.point(place)
     rank = point.basis.shape[1]
     if rank > n:
-        raise InputError(f"{curve.parameter.name} cannot change: rows have no solution beside the start")
+        raise InputError(f"{curve.parameter.name} cannot change: rows have no solution near the start")
     wishes = not packed.is_implicit
     if rank == n and not wishes:
         return curve, _settled(curve, point)
@@ -260,7 +260,7 @@ def _begun(curve: Curve, place: Place) -> tuple[Curve, Point]:
     values = np.linalg.svd(point.matrix, compute_uv=False)
     flat = int(np.count_nonzero(values <= FLAT * values[0]))
     if flat:
-        raise InputError(f"objective does not tell {flat} of the motions that rows leave free; {EXPECTED}")
+        raise InputError(f"objective does not determine {flat} of the motions that rows leave free; {EXPECTED}")
     return pushing, _settled(pushing, point)
 
 
@@ -268,7 +268,7 @@ def _settled(curve: Curve, point: Point) -> Point:
     """The start itself, to the last digit."""
     found = curve.corrected(point, np.zeros(len(point.tangent)))
     if found is None:
-        raise InputError("start is where branches cross, or a contact is at a fold; expected a pose beside it")
+        raise InputError("start is where branches cross, or a contact is at a fold; expected a pose near it")
     return found
 
 

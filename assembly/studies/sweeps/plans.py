@@ -211,7 +211,7 @@ def as_plan(plan: Any) -> Plan:
     if isinstance(plan, Plan):
         return plan
     if isinstance(plan, Mapping):
-        raise TypeError(f"plan is {plan!r}; expected asm.grid(...) of it, or a list of dictionaries, one a row")
+        raise TypeError(f"plan is {plan!r}; expected asm.grid(...) of it, or a list of dictionaries, one for each row")
     if isinstance(plan, (str, bytes)) or not isinstance(plan, Iterable):
         raise TypeError(
             f"plan is {plan!r}; expected asm.grid, asm.sobol, asm.latin_hypercube, asm.rows, asm.starts, or "

@@ -44,7 +44,9 @@ def _server(host: str, port: int) -> ViserServer:
     try:
         from viser import ViserServer
     except ImportError as error:
-        raise ImportError('viser is not there; pip install "assembly-solver[live]"') from error
+        raise ImportError(
+            'the page needs viser, which is not installed; pip install "assembly-solver[live]"'
+        ) from error
     # It looks for a free port from the first one on, and would do so forever where a host is none of this machine.
     try:
         family, _, _, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
