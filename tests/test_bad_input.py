@@ -279,7 +279,10 @@ CASES = {
         lambda: clearance(merge_radius=0.0),
         "merge_radius is 0; expected a positive part of the scene's size, 1 at most",
     ),
-    "neglect large": (lambda: clearance(merge_radius=2.0), "merge_radius is 2; expected a positive part of the scene's size"),
+    "neglect large": (
+        lambda: clearance(merge_radius=2.0),
+        "merge_radius is 2; expected a positive part of the scene's size",
+    ),
     "places": (lambda: clearance(slots=0), "slots is 0; expected an integer of 1 or more"),
     "places half": (lambda: clearance(slots=1.5), "slots is 1.5; expected an integer of 1 or more"),
     "exclude": (lambda: clearance(exclude=[pair()[0]]), r"exclude\[0\] is .*; expected a pair of bodies"),

@@ -93,11 +93,11 @@ class Coaxial(Mate, Cylindrical):
     Parameters
     ----------
     a, b : cylinder, cone, torus or revolution; circle or line; or Frame
-        Faces, edges, or selections of a single one. Of a frame its z axis.
+        Faces, edges, or selections of a single one. For a frame, its z axis.
     name : str, optional
     axes : "nearest", "aligned" or "opposed"
-        Axes of faces have no sense of their own, but those of cones; so it is the one that is nearer where a solve
-        starts, which `solution.axes` tells.
+        Axes of faces other than cones have no sense; by default the nearer one at the start of a solve is taken, which
+        `solution.axes` tells.
     **freedoms
         Driven values and limits of `angle` and `slide`; see `Cylindrical`.
 

@@ -357,7 +357,7 @@ def solve(
         Where to start: a row a body, or an earlier solution, whose contacts are taken up as well. The bodies' own
         poses by default.
     starts : mapping of constraint name -> (4,), optional
-        Parameters near the pair each contact is to track; a global start finds the others.
+        Surface parameters near the pair that a contact is to track; for other contacts a global search finds the pair.
     ipopt : mapping, optional
         IPOPT's options by name, each a number or a string, such as {"max_iter": 100}.
 
@@ -372,7 +372,7 @@ def solve(
     Raises
     ------
     TypeError, InputError
-        Naming the argument, what came and what was expected.
+        The message names the argument, its value and what was expected.
 
     Notes
     -----

@@ -49,7 +49,7 @@ def study(
     plan : Plan, or iterable of dictionaries Parameter -> value
         ``asm.grid``, ``asm.sobol``, ``asm.latin_hypercube``, ``asm.rows``, ``asm.starts``.
     of : Measure or function of a solution, several, or a mapping of names to them
-        What is told of every row. Functions give finite numbers; for workers they have names in a module.
+        Measures to compute for every row. Functions give finite numbers; for workers they have names in a module.
     executor : Executor, optional
         Where it is computed: of `concurrent.futures`, `mpi4py.futures` or executorlib, or a client of Dask. By default
         here. The bits of the results are the same.
