@@ -200,7 +200,7 @@ class Assembly(Solving):
         Returns
         -------
         Batch
-            A row a solve; rows that fail are rows.
+            One row per solve; rows that fail are rows.
 
         Raises
         ------

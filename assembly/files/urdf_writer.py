@@ -51,7 +51,7 @@ class _Link:
 
 
 def _frames(joint: Joint) -> tuple[Frame, Frame]:
-    """The frames of a joint that coincide where its freedoms are zero."""
+    """The frames of a joint that coincide where its coordinates are zero."""
     a, b = joint.frame_a, joint.frame_b
     if isinstance(joint, Insert) and joint.offset:
         a = a.body.frame(a.origin + joint.offset * a.axes[:, 2], a.axes[:, 2], a.axes[:, 0])

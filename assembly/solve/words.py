@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["iteration_table", "message", "table"]
 
-# Moving bodies whose freedoms are printed: counting takes a second for some 300, and grows with the cube.
+# Moving bodies whose degrees of freedom are printed: counting takes a second for some 300, and grows with the cube.
 MOST_COUNTED = 200
 # Bodies with shapes all pairs of which are searched for crossings when a solution is printed; their number grows with
 # the square.
@@ -57,7 +57,7 @@ def message(solution: Solution) -> str:
 
 
 def iteration_table(solution: Solution) -> str:
-    """The history as text, a line an iteration."""
+    """The history as text, one line per iteration."""
     lines = ["   " + "".join(f"{name:>15}" for name in Iteration.COLUMNS)]
     lines += [f"{k:>3}" + "".join(f"{value:>15.6e}" for value in row) for k, row in enumerate(solution.history)]
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""Couplings: one freedom of a joint follows one of another."""
+"""Couplings: one coordinate of a joint follows one of another."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _slides(coordinate: Coordinate) -> bool:
 
 
 def _freedom(name: str, value: Any, slides: bool) -> Freedom:
-    """The freedom itself, or the only one of a joint that turns, or slides."""
+    """The coordinate itself, or the only one of a joint that turns, or slides."""
     fits, word = (_slides, "slides") if slides else (_turns, "is an angle")
     if isinstance(value, Freedom):
         if not fits(value.coordinate):
@@ -39,7 +39,7 @@ def _freedom(name: str, value: Any, slides: bool) -> Freedom:
 
 
 class Coupling(RowConstraint):
-    """follower = ratio * leader + offset, between freedoms of joints; see its subclasses.
+    """follower = ratio * leader + offset, between coordinates of joints; see its subclasses.
 
     A joint of the coupling need not be in the scene, its bodies must.
     """
@@ -58,12 +58,12 @@ class Coupling(RowConstraint):
 
     @property
     def leader(self) -> Freedom:
-        """The freedom that is multiplied."""
+        """The coordinate that is multiplied."""
         return self._leader
 
     @property
     def follower(self) -> Freedom:
-        """The freedom that follows."""
+        """The coordinate that follows."""
         return self._follower
 
     @property
@@ -99,9 +99,9 @@ class Gear(Coupling):
     Parameters
     ----------
     a, b : Joint or Freedom
-        Joints with one freedom that is an angle, or such freedoms, `joint.freedom(name)`.
+        Joints with one coordinate that is an angle, or such coordinates, `joint.freedom(name)`.
     ratio : float
-        Turns of b a turn of a, not zero: -teeth_a / teeth_b of two wheels that mesh outside.
+        Turns of b per turn of a, not zero: -teeth_a / teeth_b for two wheels that mesh on the outside.
     name : str, optional
         "gear" and the bodies' names by default.
     offset : float
@@ -110,7 +110,7 @@ class Gear(Coupling):
     Raises
     ------
     InputError, TypeError
-        A joint with no such freedom or with several, the same freedom twice, ratio 0.
+        A joint with no such coordinate or with several, the same coordinate twice, ratio 0.
     """
 
     offset = Offset("angle_b where angle_a is zero [rad].")
@@ -125,7 +125,7 @@ class Gear(Coupling):
 
     @property
     def ratio(self) -> float:
-        """Turns of b a turn of a."""
+        """Turns of b per turn of a."""
         return self._factor
 
 
@@ -135,9 +135,9 @@ class Linear(Coupling):
     Parameters
     ----------
     a, b : Joint or Freedom
-        Joints with one freedom that slides, or such freedoms, `joint.freedom(name)`.
+        Joints with one coordinate that slides, or such coordinates, `joint.freedom(name)`.
     ratio : float
-        Travel of b for a travel of a of one, not zero; negative where they go against each other.
+        Travel of b per travel of a, not zero; negative if they move in opposite directions.
     name : str, optional
         "linear" and the bodies' names by default.
     offset : float
@@ -146,7 +146,7 @@ class Linear(Coupling):
     Raises
     ------
     InputError, TypeError
-        A joint with no such freedom or with several, the same freedom twice, ratio 0.
+        A joint with no such coordinate or with several, the same coordinate twice, ratio 0.
     """
 
     offset = Offset("slide_b where slide_a is zero.")
@@ -161,7 +161,7 @@ class Linear(Coupling):
 
     @property
     def ratio(self) -> float:
-        """Travel of b for a travel of a of one."""
+        """Travel of b per travel of a."""
         return self._factor
 
 
@@ -171,9 +171,9 @@ class RackPinion(Coupling):
     Parameters
     ----------
     pinion, rack : Joint or Freedom
-        Joints with one freedom that is an angle, and one that slides; or such freedoms, `joint.freedom(name)`.
+        Joints with one coordinate that is an angle, and one that slides; or such coordinates, `joint.freedom(name)`.
     radius : float
-        Travel of the rack a radian of the pinion, not zero; negative where the rack lies on the other side.
+        Travel of the rack per radian of the pinion, not zero; negative if the rack is on the other side.
     name : str, optional
         "rack-pinion" and the bodies' names by default.
     offset : float
@@ -182,7 +182,7 @@ class RackPinion(Coupling):
     Raises
     ------
     InputError, TypeError
-        A joint with no such freedom or with several, radius 0.
+        A joint with no such coordinate or with several, radius 0.
     """
 
     offset = Offset("The slide where the angle is zero.")
@@ -204,5 +204,5 @@ class RackPinion(Coupling):
 
     @property
     def radius(self) -> float:
-        """Travel of the rack a radian of the pinion."""
+        """Travel of the rack per radian of the pinion."""
         return self._factor

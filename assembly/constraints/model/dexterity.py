@@ -33,7 +33,7 @@ class TipTask:
     ----------
     tip : Point, Frame or Body
     inputs : sequence of Joint or Freedom
-        Joints with one freedom, or freedoms, `joint.freedom(name)`; rates of angles [rad] and of slides.
+        Joints with one coordinate, or coordinates, `joint.freedom(name)`; rates of angles [rad] and of slides.
     task : "position", "rotation" or "pose", optional
         Its linear velocity, angular velocity, or both (linear first), world axes. Position for a point, pose for a
         frame or a body by default.
@@ -180,7 +180,8 @@ class Dexterity(Objective):
     Raises
     ------
     InputError, TypeError
-        Unknown words, no inputs, a joint with several freedoms, a direction where none belongs or none where one does.
+        Unknown words, no inputs, a joint with several coordinates, a direction where none belongs or none where one
+        does.
 
     Notes
     -----

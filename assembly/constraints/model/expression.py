@@ -131,7 +131,7 @@ class Expression(Constraint, Objective):
         return f"Expression({self.function.name()}, [{bodies}], name={self.name!r}{settings})"
 
     def values(self, q: ArrayLike) -> Array:
-        """The values (m,) at poses q (b, 7), a row a body of the expression, by CasADi itself.
+        """The values (m,) at poses q (b, 7), one row per body of the expression, by CasADi itself.
 
         Neither divided by the scale nor multiplied by the weight.
         """
@@ -161,7 +161,7 @@ class Expression(Constraint, Objective):
         )
 
     def document(self) -> str:
-        """The function as text, a line an instruction, for files; `from_document` reads it.
+        """The function as text, one line per instruction, for files; `from_document` reads it.
 
         The first line says how many bodies and values there are and the function's name. Then stand the instructions
         of `geometry/expression/tape.py` by name, with the place of the result and those of the arguments (the

@@ -67,9 +67,9 @@ def tip_jacobian(
     tip : Point, Frame or Body
         Of a body, its origin and its axes.
     inputs : sequence of Joint or Freedom
-        Joints with one freedom, or freedoms, `joint.freedom(name)`.
+        Joints with one coordinate, or coordinates, `joint.freedom(name)`.
     q : (n, 7) or Solution, optional
-        A row a body, or a solution for these bodies; the bodies' own poses by default.
+        One row per body, or a solution for these bodies; the bodies' own poses by default.
     task : "position", "rotation" or "pose", optional
         Which rows: its linear velocity, its body's angular velocity, or both, linear first. Position for a point,
         pose for a frame or a body by default.
@@ -84,13 +84,14 @@ def tip_jacobian(
     Returns
     -------
     (r, k)
-        A row a velocity that counts, a column an input, world axes. Lengths in the user's unit, angles in radians.
+        One row per velocity that counts, one column per input, world axes. Lengths in the user's unit, angles in
+        radians.
 
     Raises
     ------
     InputError
         The inputs depend on each other at this pose or leave the end effector's motion open (the message
-        names those that do, and freedoms to add), or q does not fit.
+        names those that do, and coordinates to add), or q does not fit.
 
     Notes
     -----

@@ -196,14 +196,14 @@ def geometric_jacobian(at: Solution | Assembly, inputs: Sequence[Joint | Freedom
     """Velocity of an end effector for unit rates of the joints of an open chain, (6, k): paper 001, eq. 7.
 
     A column is [z x b, z] for a joint that turns about the axis z, b the vector from the axis to it, and [z, 0]
-    for one that slides along z. Freedoms of the chain that are no inputs are held still.
+    for one that slides along z. Coordinates of the chain that are no inputs are held still.
 
     Parameters
     ----------
     at : Solution or Assembly
         Where the bodies are.
     inputs : sequence of Joint or Freedom
-        Freedoms of `Revolute`, `Prismatic` and `Cylindrical` joints; of a joint its only one.
+        Coordinates of `Revolute`, `Prismatic` and `Cylindrical` joints; of a joint its only one.
     tip : Point, Frame or Body
         Of a frame or a body its origin. World axes.
 
@@ -281,7 +281,7 @@ def _world(row: Array, coordinates: Array) -> Array:
 
 
 def _input(name: str, given: Joint | Freedom) -> Freedom:
-    """The freedom that is meant; one that turns about the joint's axis or slides along it."""
+    """The coordinate that is meant; one that turns about the joint's axis or slides along it."""
     if not isinstance(given, (Joint, Freedom)):
         raise TypeError(f"{name} is {given!r}; expected a joint or one of its coordinates, joint.freedom(name)")
     if isinstance(given, Joint) and len(given.freedoms) != 1:

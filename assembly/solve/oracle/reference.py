@@ -354,7 +354,7 @@ def solve(
     ----------
     scene : Assembly
     q0 : (n, 7) or Solution, optional
-        Where to start: a row a body, or an earlier solution, whose contacts are taken up as well. The bodies' own
+        Where to start: one row per body, or an earlier solution, whose contacts are taken up as well. The bodies' own
         poses by default.
     starts : mapping of constraint name -> (4,), optional
         Surface parameters near the pair that a contact is to track; for other contacts a global search finds the pair.

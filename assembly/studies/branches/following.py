@@ -68,8 +68,8 @@ def follow(
 ) -> Branch:
     """Follow the branch of a solution while a parameter goes from one end of a range to the other.
 
-    It goes both ways from the start, through turning points of the parameter, until it leaves the range, closes, or
-    ends; docs/branches.md has what is an event. The scene has its own number afterwards.
+    The branch is followed both ways from the start, through turning points of the parameter, until it leaves the range,
+    closes, or ends; docs/branches.md lists the events. The scene's own number is restored afterwards.
 
     Parameters
     ----------
@@ -89,8 +89,8 @@ def follow(
     Raises
     ------
     InputError, TypeError
-        A range without the parameter's value, a start that failed, a scene whose rows leave motions free and nobody
-        asks for anything, clearances.
+        A range without the parameter's value, a start that failed, a scene with free motions and no objective,
+        clearances.
     """
     the_scene(scene)
     if not isinstance(parameter, Parameter):

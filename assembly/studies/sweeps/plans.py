@@ -1,4 +1,4 @@
-"""Plans of studies: which numbers of a scene take which values, a row a design."""
+"""Plans of studies: which numbers of a scene take which values, one row per design."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_ROWS = 10**9
 
 @dataclass(frozen=True, eq=False)
 class Plan(ReadOnlyArrays):
-    """Values of parameters, a row a design.
+    """Values of parameters, one row per design.
 
     Attributes
     ----------

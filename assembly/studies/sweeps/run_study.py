@@ -64,7 +64,7 @@ def study(
     Returns
     -------
     Study
-        A row a design, those that failed as well. After Ctrl-C the rows that are done.
+        One row per design, those that failed as well. After Ctrl-C the rows that are done.
 
     Raises
     ------
