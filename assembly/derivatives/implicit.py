@@ -44,8 +44,8 @@ def sensitivity(
 ) -> Sensitivity:
     """How measures of a solution change with parameters of its scene.
 
-    With an objective the solution is followed along its rows and the stationary point; without one it moves as little
-    as rows ask for, from its own pose. See docs/sensitivity.md.
+    With an objective the derivative is that of the stationary point on the rows; without one it is that of the least
+    move from the solution's own pose. See docs/sensitivity.md.
 
     Parameters
     ----------

@@ -38,11 +38,11 @@ def read_urdf(path: str | PathLike[str], *, unit: str = "mm") -> Robot:
     Returns
     -------
     Robot
-        Boxes, cylinders and spheres of `<collision>` are exact shapes of the bodies. What `<visual>` shows is the
-        body's `picture` where meshes are in it, or where there are no exact shapes; a mesh of `<collision>` is one
-        where nothing else is to be seen. A mesh is no exact shape: nothing touches it. Revolute, continuous, prismatic,
-        planar and fixed joints become `Revolute`, `Prismatic`, `Planar` and `Fixed` with their limits; a floating joint
-        constrains nothing; a joint that mimics another one is coupled to it.
+        Boxes, cylinders and spheres of `<collision>` are exact shapes of the bodies. `<visual>` becomes the body's
+        `picture` if it contains meshes or if there are no exact shapes; a mesh of `<collision>` does if there is
+        nothing else to show. A mesh is no exact shape and has no contacts. Revolute, continuous, prismatic, planar and
+        fixed joints become `Revolute`, `Prismatic`, `Planar` and `Fixed` with their limits; a floating joint constrains
+        nothing; a joint that mimics another one is coupled to it.
 
     Raises
     ------

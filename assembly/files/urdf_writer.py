@@ -71,25 +71,25 @@ def write_urdf(
     Parameters
     ----------
     path : str or path
-        Where the file goes; a body that is neither a box, a cylinder nor a ball goes as a mesh into an STL file beside
-        it, named after the file and the link, and so does `body.picture`, as what is seen of the link. Existing files
-        are replaced.
+        Where to write. A body that is neither a box, a cylinder nor a ball is written as a mesh to an STL file beside
+        it, named after the file and the link, and so is `body.picture`, as the link's visual. Existing files are
+        replaced.
     what : Robot or Assembly
-        Joints are `Revolute`, `Prismatic`, `Planar` or `Fixed`, or mates that are such, and make a tree; of several
-        bodies that nothing carries none is the root. Every joint is written free, with its limits; couplings of turns,
-        or of a slide and a turn, as joints that mimic others. Other constraints, and objectives, raise.
+        Joints are `Revolute`, `Prismatic`, `Planar` or `Fixed`, or such mates, and form a tree with one root. Every
+        joint is written without its driven value, with its limits; couplings of angles, or of a slide and an angle, are
+        written as joints that mimic others. Other constraints, and objectives, raise.
     unit : str
         Of the bodies: "um", "mm", "cm", "m", "in" or "ft"; the file has meters.
     name : str, optional
         Of the robot; by default its own, or the file's.
     density : float, optional
-        Kilograms a cubic meter where `body.density` is one, positive: closed bodies weigh that. Without it a Robot has
-        the masses that it was read with, and an Assembly none.
+        Kilograms per cubic meter for a `body.density` of one, positive; used for closed bodies. Without it a Robot has
+        the masses it was read with, and an Assembly none.
 
     Notes
     -----
     A link's origin is that of the joint's frame on it, with the axes of its body; the root's is its body's. Efforts and
-    velocities, of which nothing is known here, are zero.
+    velocities are written as zero.
 
     Raises
     ------

@@ -58,14 +58,14 @@ def tip_jacobian(
 ) -> Array:
     """Velocities of an end effector for unit rates of the inputs, through closed loops and contacts.
 
-    Two-sided constraints hold; driven values do not count, limits and one-sided contacts where they are asked for.
-    Where the pose violates constraints, it is the Jacobian of rates that do not change the violations.
+    Two-sided constraints hold; driven values do not count, limits and one-sided contacts only if requested. If the pose
+    violates constraints, it is the Jacobian of rates that do not change the violations.
 
     Parameters
     ----------
     scene : Assembly
     tip : Point, Frame or Body
-        Of a body, its origin and its axes.
+        A body stands for its origin and axes.
     inputs : sequence of Joint or Freedom
         Joints with one coordinate, or coordinates, `joint.freedom(name)`.
     q : (n, 7) or Solution, optional
@@ -79,7 +79,8 @@ def tip_jacobian(
         As of `Dexterity`: which world axes count, constraints that do not hold the mechanism, and constraints whose
         one-sided rows do.
     active : bool
-        One-sided rows that are at their bound at q, contacts that touch and limits that are reached, hold it as well.
+        Whether one-sided rows that are at their bound at q, contacts that touch and limits that are reached, hold it as
+        well.
 
     Returns
     -------

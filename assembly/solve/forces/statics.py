@@ -205,7 +205,7 @@ def geometric_jacobian(at: Solution | Assembly, inputs: Sequence[Joint | Freedom
     inputs : sequence of Joint or Freedom
         Coordinates of `Revolute`, `Prismatic` and `Cylindrical` joints; of a joint its only one.
     tip : Point, Frame or Body
-        Of a frame or a body its origin. World axes.
+        A frame or body stands for its origin. World axes.
 
     Raises
     ------

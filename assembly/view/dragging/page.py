@@ -115,7 +115,7 @@ class Live:
 
     @property
     def trace(self) -> Trace:
-        """The hand's motion that was recorded last; raises `InputError` where none was."""
+        """The last recorded motion of the target; raises `InputError` if there is none."""
         return self._session.trace
 
     def wait(self) -> None:
@@ -264,10 +264,10 @@ def live(
     host: str = "127.0.0.1",
     port: int = 8080,
 ) -> Live:
-    """Open a page in which bodies are taken with the mouse and dragged, contacts and clearances held.
+    """Open a page in which bodies are dragged with the mouse while contacts and clearances hold.
 
-    The server runs beside the script until `close`, or its end; `live(scene).wait()` keeps a script from ending. With
-    another host than this machine's own, 127.0.0.1, everybody who reaches it can drag.
+    The server runs beside the script until `close`, or until the script ends; `live(scene).wait()` keeps a script from
+    ending. With a host other than 127.0.0.1 everybody who can reach it can drag.
 
     Parameters
     ----------
