@@ -113,8 +113,8 @@ class Wrench(ReadOnlyArrays):
 def wrenches(solution: Solution) -> dict[str, dict[str, Wrench]]:
     """What every constraint exerts on each of its bodies, by their names; `Solution.wrenches` keeps it.
 
-    In the objective's units over lengths and radians. On a flat face that lies on another the pressure has a center:
-    torques there are those that balance the objective.
+    In the objective's units over lengths and radians. For flat faces that lie on each other, force and torque are those
+    that balance the objective.
 
     Raises
     ------
@@ -220,8 +220,8 @@ def joint_torques(
 ) -> Array:
     """J^T W: torques and forces of the joints of an open chain that do the work of a wrench at its end effector, (k,).
 
-    An arm that holds still pushes with the wrench W; against a load it takes the negative of the load's. Paper 001,
-    eqs. 6 to 8.
+    An arm at rest with these torques pushes with the wrench W; to carry a load use the negative of the load's wrench.
+    Paper 001, eqs. 6 to 8.
 
     Parameters
     ----------

@@ -376,11 +376,11 @@ def solve(
 
     Notes
     -----
-    Of rows that follow from others, as in a planar four-bar in space, some are left to the final check: their
-    multipliers are zero, and others carry what `Assembly.solve` spreads over all.
+    Of redundant rows, as in a planar four-bar in space, some are left to the final check: their multipliers are zero,
+    and others carry what `Assembly.solve` distributes over all.
 
-    Without an objective bodies stay close to where the solve starts. `Assembly.solve` gathers scattered bodies first
-    and stays close to where these then are; to compare, say `Posture()`.
+    Without an objective bodies stay close to where the solve starts. `Assembly.solve` first assembles scattered bodies
+    and stays close to the poses found so; to compare, minimize a `Posture()`.
 
     At a pole of a surface one parameter moves nothing and rows lose their meaning: a contact there is reached to about
     1e-7 at best, or ends STALLED.
