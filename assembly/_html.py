@@ -10,7 +10,7 @@ __all__ = ["Table", "as_html", "printed"]
 
 
 class Table(NamedTuple):
-    """Cells under headings, a row a line. Cells that are numbers stand to the right."""
+    """Cells under headings, one row per line. Cells that are numbers stand to the right."""
 
     headings: tuple[str, ...]
     rows: list[tuple[object, ...]]

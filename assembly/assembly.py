@@ -64,36 +64,37 @@ class Assembly(Solving):
     ) -> Solution:
         """Find the pose where every constraint holds and the objective has a local minimum.
 
-        Without an objective the least move is sought; where that is not found, any pose does at which all holds. What
-        holds as it stands is not moved. Where constraints do not hold near the start, others are tried, the same in
-        every run, and the solution with the least objective is returned; its `restarted` says so.
+        Without an objective the least move is sought; if it is not found, any pose at which all constraints hold is
+        returned. A start at which they hold is not moved. If constraints do not hold near the start, other starts are
+        tried, the same in every run; the solution with the least objective is returned, and its `restarted` is True.
 
         Parameters
         ----------
         q0 : (n, 7) or Solution, optional
-            Where to start: a row a body (rows of fixed bodies too), or an earlier solution of this assembly, whose
-            contacts and multipliers are taken up as well. The bodies' own poses by default.
+            Where to start: one row for each body (fixed bodies too), or an earlier solution of this assembly, whose
+            contacts and multipliers are used as well. By default the bodies' own poses.
         starts : mapping of constraint name -> (4,), optional
-            Parameters near the pair each contact is to track; a global start finds the others.
+            Surface parameters near the pair that a contact is to track; for other contacts a global search finds the
+            pair.
         time_limit : float, optional
             Seconds after which the solve ends with `Status.TIME_LIMIT`, at the last pose that held if there was one.
         callback : callable, optional
             Called with the iteration, the objective and the feasibility (in the scene's unit; nan and inf before they
-            are known) every 50 ms, or after a step that takes longer; where it returns True the solve ends with
-            `Status.STOPPED`. What it raises is raised here. Ctrl-C is answered as often, with or without a callback;
-            the scene stays usable.
+            are known) every 50 ms, or after a step that takes longer. If it returns True the solve ends with
+            `Status.STOPPED`; an exception in it is raised here. Ctrl-C is answered equally often, with or without a
+            callback, and the scene stays usable.
         swept : bool
-            Whether the way from q0, a solution, is asked for as well. Driven values, offsets, limits and targets go
-            from what q0 was solved with to what they are now, along a line, and the scene is solved in many steps.
-            Where bodies that a clearance keeps apart are in the way, the solve ends at the last pose before, as
-            `Status.BLOCKED`; `way` and the message say what is in the way, and where.
+            Whether to prove the way from q0, which must be a solution. Driven values, offsets, limits and targets go
+            along a line from the values that q0 was solved with to the present ones, and the scene is solved in many
+            steps. If bodies that a clearance keeps apart are in the way, the solve ends at the last pose before them
+            with `Status.BLOCKED`; `way` and the message say what is in the way, and where.
         **options
             See `Options`.
 
         Returns
         -------
         Solution
-            Check `success`; the status and the message say what happened otherwise.
+            Check `success`; if it is False, the status and the message say what happened.
         """
         is_plain = starts is None and time_limit is None and callback is None and swept is False and not options
         # Where a body or a constraint was set since, it may be one of this scene: `packed` looks.
@@ -130,35 +131,36 @@ class Assembly(Solving):
     ) -> list[Solution]:
         """The distinct solutions found from several starts: the bodies' poses, then random ones.
 
-        Random starts are where joints let bodies be: values of freedoms within limits, angles any where there are none,
-        along a tree of joints from fixed bodies on, and loops are closed from there in the joints' coordinates. A body
-        that no joint carries is shifted by up to the scene's size along each axis, and turned any way.
+        Random starts are drawn in joint coordinates, within their limits or over all angles, along a tree of joints
+        from fixed bodies; loops are closed from there in joint coordinates. A body without a joint is shifted by up to
+        the scene's size along each axis, and turned in any way.
 
         Parameters
         ----------
         starts : int, "all", or sequence of (n, 7) and Solution
-            How many; the first is the bodies' poses. "all": 128 at least, and four times as many as led to the last
-            solution that is new, up to 4,096. Or the starts themselves; solutions may be of any scene of these bodies.
+            Their number; the first is the bodies' poses. "all": at least 128, and four times as many as led to the last
+            new solution, up to 4,096. Or the starts themselves; solutions may be of any scene with these bodies.
         seed : int
-            Of the random starts: the same seed, the same starts.
+            Of the random starts: equal seeds give equal starts.
         time_limit : float, optional
-            Seconds after which no start is begun any more, and the last one ends.
+            Seconds after which no further start is tried and the present one ends.
         executor : Executor, optional
             One of `concurrent.futures`, or one like it: solves are submitted to it, the scene pickled. What is found
             is the same.
         progress : bool or callable
-            True shows a bar of the starts; a function is called with how many are done, and of how many, and ends the
-            search where it returns True. After Ctrl-C the solutions that were found are returned.
+            True shows a progress bar; a function is called with the numbers of finished and of all starts, and ends the
+            search by returning True. After Ctrl-C the solutions found so far are returned.
         **options
             See `Options`.
 
         Returns
         -------
         list of Solution
-            The successful ones, the smallest objective first. Solutions in another configuration (`configuration`) are
-            two. Else poses within 1e-6 of each other (lengths over the scene's size, radians) are one, and so are two
-            between which all poses on the straight way are as good. A `Posture` without a reference, and the objective
-            of a scene that has none, are measured from the bodies' poses in all of them.
+            The successful ones, the smallest objective first. Solutions with different signs of their `configuration`
+            are distinct. Otherwise poses within 1e-6 of each other (lengths over the scene's size, radians) are one
+            solution, and so are two poses if all poses on the straight way between them are as good. A `Posture`
+            without a reference, and the least move of a scene without an objective, are measured from the bodies' poses
+            for all of them.
         """
         from assembly.studies.multistart import solve_all
 
@@ -176,8 +178,8 @@ class Assembly(Solving):
     ) -> Batch:
         """Solve from many starts, or with many values of parameters, in compiled calls over threads.
 
-        Rows are independent of each other: they do not depend on the number of threads. A start has the same bits as
-        `solve` has from it; with parameters lengths are counted in the size that the scene has now.
+        Rows are independent of each other and of the number of threads. A row has the bits of `solve` from its start;
+        with parameters lengths are divided by the scene's present size.
 
         Parameters
         ----------
@@ -186,19 +188,19 @@ class Assembly(Solving):
         parameters : mapping of Parameter -> (n,), optional
             Values for every row. Those of the scene are the same afterwards.
         of : iterable of Measure
-            What is told of every row.
+            Measures to compute for every row.
         threads : int, optional
-            By default as many as there are processors for this process.
+            By default the number of processors available to this process.
         retry : bool
-            Whether rows at which the loop does not arrive are solved again by all that `solve` tries, one after the
-            other: False leaves them as the loop did.
+            Whether rows at which the compiled loop does not arrive are solved again, one after the other, with
+            everything that `solve` tries; False leaves them as they are.
         **options
             See `Options`.
 
         Returns
         -------
         Batch
-            A row a solve; rows that fail are rows.
+            One row per solve; rows that fail are rows.
 
         Raises
         ------
@@ -215,23 +217,23 @@ class Assembly(Solving):
         return solve_many(self, q0s, parameters, of, threads, retry, options)
 
     def at(self, values: Mapping[str, float]) -> Array:
-        """Poses (n, 7) at which joints have these values, of freedoms by the names of `Solution.values`: a start `q0`.
+        """Poses (n, 7) at which joint coordinates have given values, by the names in `Solution.values`: a start `q0`.
 
-        Others have what they are driven to, or what they have where the bodies stand. Loops are closed, where they
-        close from there and joints alone close them; else each body is where the joints between it and the ground
-        with the fewest freedoms carry it.
+        Other coordinates have their driven values, or their values at the bodies' poses. Loops of joints are closed if
+        Newton's method closes them from there; otherwise each body is where the joints with the fewest coordinates
+        between it and the ground put it.
 
         Raises
         ------
         InputError, TypeError
-            Unknown names, values beyond limits, freedoms that place no body.
+            Unknown names, values beyond limits, coordinates that determine the pose of no body.
         """
         from assembly.studies.branches.joint_poses import poses_at
 
         return poses_at(self, values)
 
     def tracker(self, follow: Point | Frame | Body | Sequence[Point | Frame | Body], **options: Any) -> Tracker:
-        """What follows a hand that holds a point or a frame of a body, or several hands.
+        """A tracker that makes a point or a frame of a body, or several of them, follow targets.
 
         Parameters
         ----------
@@ -256,7 +258,7 @@ class Assembly(Solving):
         Parameters
         ----------
         q : (n, 7) or Solution, optional
-            A row a body, or a solution of this assembly; the bodies' own poses by default. Where they violate
+            One row for each body, or a solution of this assembly; by default the bodies' own poses. If they violate
             constraints the counts are those of that pose, and `feasibility` says by how much.
         drives : bool
             Whether driven values count as constraints.
@@ -276,7 +278,7 @@ class Assembly(Solving):
         InputError
             Wrong shapes, a contact without a pair at the pose, a solution of another assembly.
         TimeoutError
-            The time limit was over before: half of a rank says nothing.
+            The time limit was reached first; part of a rank has no meaning.
         """
         from assembly.solve.diagnosis.mobility import Mobility
 

@@ -48,7 +48,7 @@ class AssemblyError(Exception):
 
 
 class InputError(AssemblyError, ValueError):
-    """An argument that cannot be used; the text says which, what came and what was expected."""
+    """An argument that cannot be used; the message says which, its value and what was expected."""
 
 
 class UnknownNameError(InputError, KeyError):

@@ -1,8 +1,7 @@
-"""An egg is led over a curved plate with a hole, and its contact goes around the hole, not over it.
+"""An egg is led over a curved plate with a hole, and its contact goes around the hole, not across it.
 
-The egg touches the plate all the time; a hand draws it, as a frame, straight across the hole. Where on the two
-surfaces the contact is, is free, as long as it stays out of the hole: it halts at the rim, slides along it and leaves
-it on the other side.
+The egg touches the plate all the time, and a target frame draws it straight across the hole. The contact may be
+anywhere on the two surfaces except in the hole: it stops at the rim, slides along it and leaves it on the other side.
 Prints where the contact is, and writes avoid_the_hole.html, which plays the motion: open it in any browser.
 """
 

@@ -1,10 +1,9 @@
 """A ball in a bowl follows a hand that draws it over the bottom, up to the rim, out over it and back.
 
 The bowl is a curved surface cut off by a round rim: a face and an edge. Nothing says where the ball touches, or whether
-it does: a clearance keeps the two apart, and the hand, a spring, presses the ball against whatever is in the way. The
-ball's contact goes from the face to the edge and around it as the hand goes.
-Prints where the ball was and how well it held, and writes ball_in_bowl.html, which plays the motion: open it in any
-browser.
+it does: a clearance keeps the two from crossing, and the hand, a spring, presses the ball against whatever is in the
+way. The contact moves from the face to the edge and around it as the hand moves. Prints where the ball was and how well
+it held, and writes ball_in_bowl.html, which plays the motion: open it in any browser.
 """
 
 from __future__ import annotations

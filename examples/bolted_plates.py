@@ -1,11 +1,11 @@
 """Two plates, two bolts and two nuts lie about, and are bolted together.
 
 Joints say what belongs where: the plates are flush, a bolt stands in a hole of both with its head on the upper plate, a
-nut is on its bolt, below the lower plate. A clearance says that nothing is in anything else. The bolts have half a
-millimeter of play in their holes, the nuts a tenth on their bolts; heads, plates and nuts lie flush on each other.
-Where the parts lie now, the bolts are on the wrong side of both plates, and their heads do not fit through the holes.
-So the parts are put together without the clearance first, and then it is proven that nothing crosses.
-Prints where they end, beside where they are known to belong; writes bolted_plates.html, to be opened in any browser.
+nut is on its bolt, below the lower plate. A clearance keeps all bodies from crossing. The bolts have half a millimeter
+of play in their holes, the nuts a tenth on their bolts; heads, plates and nuts lie flush on each other. Where the parts
+lie now, the bolts are on the wrong side of both plates, and their heads do not fit through the holes. So the parts are
+put together without the clearance first, and then it is proven that nothing crosses. Prints where they end, beside
+where they are known to belong; writes bolted_plates.html, to be opened in any browser.
 """
 
 from __future__ import annotations

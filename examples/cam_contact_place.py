@@ -1,7 +1,7 @@
-"""A cam turns until it touches its roller where it is to: a contact drawn to a line of a face, and held off by a stop.
+"""A cam turns until it touches its roller at a given line: a contact drawn to a line of a face, and held off by a stop.
 
-The roller hangs on a lever. Drawn to a line of the cam's face, the contact ends on it, wherever around the cam that is;
-where a stop of the lever does not let it, it comes as near as it can, a distance along the face.
+The roller hangs on a lever. The contact is drawn to a line of the cam's face, and ends on it, wherever around the cam
+that is. If a stop of the lever prevents that, it comes as near as it can, measured along the face.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """A cam turns once, and a roller that touches it rises and falls: found by contact, and by the cam's offset curve.
 
-The cam is on a driven hinge, the roller on a stem in a guide; a contact of the cam's face with the roller's wall ties
-them. The roller's axis runs on the curve that is one roller radius outside of the profile: where this crosses the guide
-is computed from the profile's points alone, with another library's spline.
-Prints both, and writes cam_follower.html, which plays the turn: open it in any browser.
+The cam is on a driven hinge, the roller on a stem in a guide, and the cam's face is in contact with the roller's wall.
+The roller's axis follows the curve that is one roller radius outside of the profile; where that curve crosses the guide
+is computed from the profile's points alone, with another library's spline. Prints both, and writes cam_follower.html,
+which plays the turn: open it in any browser.
 """
 
 from __future__ import annotations

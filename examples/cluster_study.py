@@ -1,7 +1,8 @@
 """A study on a cluster: the six-bar of dexterity_study.py on the workers of Dask, with the bits of one process.
 
-`LocalCluster` starts workers on this machine; on others it is `Client("tcp://scheduler:8786")` and nothing else that
-changes. Prints how long one process and the workers take, and that all numbers are the same. Takes the extra `cluster`.
+`LocalCluster` starts workers on this machine; for other machines use `Client("tcp://scheduler:8786")`, without any
+other change. Prints how long one process and the workers take, and that all numbers are the same. Takes the extra
+`cluster`.
 """
 
 from __future__ import annotations

@@ -1,11 +1,10 @@
 """A crank turns once and swings a rocker, in links that are 6 mm thick and lie side by side on pins.
 
 The links are plates of 20 by 6 mm with two bores each, the pins are cylinders with a play of 0.05 mm in these. Crank
-and rocker lie on the ground, the coupler lies on both of them, so that it goes over the pins in the ground, flush
-with their ends. Joints say how they hang together, and a clearance that nothing is in anything else, of all pairs of
-bodies. None of their many contacts pushes where all slide along each other: a step is solved by its joints and then
-proven to be clear.
-Prints where the rocker is, beside where two circles meet; writes crank_with_thick_links.html, which plays the turn.
+and rocker lie on the ground, the coupler lies on both of them, so that it goes over the pins in the ground, flush with
+their ends. Joints connect them, and a clearance keeps all pairs of bodies from crossing. None of their many contacts
+pushes while all slide along each other: a step is solved by its joints and then proven to be clear. Prints the rocker's
+angle beside that of the closed form; writes crank_with_thick_links.html, which plays the turn.
 """
 
 from __future__ import annotations

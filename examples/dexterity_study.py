@@ -1,11 +1,11 @@
 """A six-bar's dexterity over 10,000 designs: which lengths move the tip fast, and which do not press sideways.
 
-A four-bar's rocker drives a second loop, whose floating link has the tip. The lengths of crank and coupler go over a
-grid. Of each design the manipulability of the tip is measured, how fast it moves for a crank that turns at a rate of
-one, and the transmission, the sine of the angle between coupler and rocker. The study is computed in another process
-first, which is killed on its way; what that has finished lies in the folder "dexterity_study", and the study goes on
-from there. Prints what was found, writes maps of both measures, dexterity_map.png, the designs that are best in one way
-or the other, dexterity_front.png, where matplotlib is installed, and dexterity_study.html, one of these.
+A four-bar's rocker drives a second loop, whose floating link has the tip. The lengths of crank and coupler vary over a
+grid. For each design two measures are computed: the manipulability of the tip (its speed for a crank that turns at a
+rate of one) and the transmission (the sine of the angle between coupler and rocker). The study is first run in another
+process, which is killed; what that has finished is in the folder "dexterity_study", and the study continues from there.
+Prints the results and writes dexterity_study.html, one of the best designs, and, if matplotlib is installed, maps of
+both measures, dexterity_map.png, and the designs on their Pareto front, dexterity_front.png.
 """
 
 from __future__ import annotations

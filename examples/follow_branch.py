@@ -1,9 +1,9 @@
 """A rocker's angle, followed around the whole loop of a four-bar, though it cannot turn around.
 
-A crank that turns around drives a rocker that swings. Seen from the rocker, its two ends are dead centers: at each the
-branch of solutions turns back, and the crank goes on. Prints the branch's events beside what cosines say, and how
-well the loop closes; writes follow_branch.html, where the mechanism runs along its branch, and follow_branch.png where
-matplotlib is installed.
+A crank that turns around drives a rocker that swings. The two ends of the rocker's swing are dead centers: there the
+branch of solutions turns back in the rocker's angle, and the crank goes on. Prints the branch's events beside the
+closed form, and how well the loop closes; writes follow_branch.html, where the mechanism runs along its branch, and
+follow_branch.png if matplotlib is installed.
 """
 
 from __future__ import annotations

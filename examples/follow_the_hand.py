@@ -1,10 +1,10 @@
 """A chain of three paper clips follows a hand at a thousand ticks a second, and no wire enters another.
 
-Each clip is threaded through both others and touches them. The red one is held, the hand has the lower end of the blue
-one: it goes slowly and fast, up to 0.09 m/s, and farther than the chain reaches. Wires slide along each other and meet
-in new places on the way. Where a pull wedges them, a tick may find no further pose that holds: it is HELD then.
-Prints how long ticks took and how well the constraints held, and writes follow_the_hand.html, which plays the motion:
-open it in any browser.
+Each clip is threaded through both others and touches them. The red one is fixed, and the hand holds the lower end of
+the blue one. It moves slowly and fast, up to 0.09 m/s, and farther than the chain reaches. Wires slide along each other
+and meet in new places on the way. If they wedge, a tick may find no further pose at which the constraints hold; then it
+is HELD. Prints how long ticks took and how well the constraints held, and writes follow_the_hand.html, which plays the
+motion: open it in any browser.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """A spatial four-bar in a hand, which holds the middle of its upper link in three ways.
 
-A universal joint, a ball and two hinges leave one freedom. The hand draws a point of the link (point grasp) or a frame
-on it (rigid grasp), or it is a ring around the link, drawn to its own pose, and the two touch (surface grasp).
-Prints the crank's angle, how far what is held stays from the hand, and the iterations of each; writes the surface grasp
-as four_bar.html into the working directory: open it in any browser and turn it around.
+A universal joint, a ball and two hinges leave one degree of freedom. The hand draws a point of the link (point grasp)
+or a frame on it (rigid grasp), or it is a ring around the link that is drawn to its own pose while the two touch
+(surface grasp). Prints the crank's angle, how far what is held stays from the hand, and the iterations of each; writes
+the surface grasp as four_bar.html into the working directory: open it in any browser and turn it around.
 """
 
 from __future__ import annotations

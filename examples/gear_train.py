@@ -1,7 +1,8 @@
 """A compound gear train with a rack: ten turns of the crank are one turn of the pinion.
 
 12 teeth drive 48, on whose shaft 16 drive 40, on whose shaft 14 drive the rack; at the end the rack is pushed back.
-Prints turns, which count on past whole ones, and writes gear_train.html, which plays them: open it in any browser.
+Prints angles, which continue past whole turns, and writes gear_train.html, which plays the motion: open it in any
+browser.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """A cover is screwed onto a housing, and somebody drew one of its holes 1.2 mm beside the housing's.
 
-Which parts cross, touch, or nearly do, where, and is it proved: the first question about any assembly. One screw goes
-through the cover's material, the other one has 0.4 mm around it; a weight was left inside the handle, and between the
-cover and the board there are 0.3 mm.
-Prints the report; writes interference_report.csv, and interference_report.html for a browser: parts that cross are red.
+The report says which parts cross, touch, or nearly touch, where, and whether that is proved. One screw goes through the
+cover's material, the other one has 0.4 mm of play; a weight was left inside the handle, and between the cover and the
+board there is a gap of 0.3 mm. Prints the report; writes interference_report.csv, and interference_report.html for a
+browser: parts that cross are red.
 """
 
 from __future__ import annotations

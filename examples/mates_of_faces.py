@@ -1,8 +1,8 @@
 """A bracket is bolted onto a plate, and a lever hangs in it: faces are picked by what they are, and mated.
 
-Nobody has to know where a hole is. The top of the plate is its face farthest up, a hole is a hollow cylinder, a bolt's
-shank is its thinner cylinder. A mate says what belongs together, and how much that takes away.
-Prints the mates, what they leave free, and where parts end; writes mates_of_faces.html, to be opened in any browser.
+No coordinates of holes are needed: the top of the plate is its highest face, a hole is a hollow cylinder, a bolt's
+shank is its thinner cylinder. A mate says what belongs together, and how many degrees of freedom it takes away. Prints
+the mates, what they leave free, and where parts end; writes mates_of_faces.html, to be opened in any browser.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """A four-bar whose coupler passes through given places, one at each of eight angles of the crank.
 
-The places are those of a mechanism that is known, so that it can be found again: the synthesis starts with its lengths
-off by a tenth, and moves them until the pen is at the places, by exact derivatives of solutions. Prints the lengths
-found beside those known, and how often the eight stations were solved. Writes path_synthesis.html: the mechanism found.
+The places are those of a known mechanism, so that the result can be checked: the synthesis starts with lengths that are
+off by a tenth, and changes them, with exact derivatives of solutions, until the pen is at the places. Prints the
+lengths found beside the known ones, and how often the eight stations were solved. Writes path_synthesis.html: the
+mechanism found.
 """
 
 from __future__ import annotations

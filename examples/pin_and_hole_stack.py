@@ -1,9 +1,9 @@
-"""How far a pin's end is off when it stands loose in its hole, and what of that is play and what are tolerances.
+"""How far the end of a loose pin in its hole may be off, and how much of that is due to play and to tolerances.
 
-A pin of diameter 8 stands in a hole of 8.4 in a plate 12 thick, and leans as far as the hole lets it; its end is in the
-plane 20 above the plate. The place of the hole, its height and the height at which the end is looked at scatter. Prints
-the range of the end by play alone, and then the stack with play as a contribution of its own. Without it the stack
-would be wrong by the play. Writes pin_and_hole_stack.html, the pin as far as it goes to one side.
+A pin of diameter 8 stands in a hole of 8.4 in a plate 12 thick, and tilts as far as the hole allows; its end is in the
+plane 20 above the plate. The position of the hole, its height and the height of the end scatter. Prints the range of
+the end due to play alone, and then the stack with play as a contribution of its own, without which the stack would be
+wrong. Writes pin_and_hole_stack.html, with the pin tilted to one side.
 """
 
 from __future__ import annotations

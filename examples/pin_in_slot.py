@@ -1,10 +1,10 @@
 """A pin is lowered into a slot and led along it; at the round end it stops, wherever the hand goes.
 
-The pin stays upright. Its wall may touch each of the four walls of the slot and run through none: one-sided contacts of
-faces that end at edges. The pin's axis is kept in a slot that is narrower by the pin: the place there that is nearest
-to the hand is known, and printed beside the one that was found. The fit is close, so that the hand goes in small steps:
-where the pin moves by some, the point at which it touches the round end moves by eight times as much.
-Prints both and what touches, and writes pin_in_slot.html, which plays the motion: open it in any browser.
+The pin stays upright. Its wall may touch each of the four walls of the slot but may cross none: one-sided contacts of
+faces that end at edges. So the pin's axis stays in a slot that is narrower by the pin; the point there that is nearest
+to the hand is known in closed form, and printed beside the one that was found. The fit is close, so the hand moves in
+small steps: when the pin moves, the point at which it touches the round end moves eight times as far. Prints both and
+what touches, and writes pin_in_slot.html, which plays the motion: open it in any browser.
 """
 
 from __future__ import annotations

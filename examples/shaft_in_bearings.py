@@ -1,8 +1,8 @@
 """A shaft with a collar is put into two bearings, and turned and slid there as far as its collar lets it go.
 
 The bearings are blocks on a base, with bores that are wider than the shaft by a play of 0.02 mm; between them the
-collar has 2 mm to go. All parts lie about. Joints say where the blocks stand, and that the shaft is in the bores of
-both, and a clearance that nothing is in anything else. At the ends of its way the collar lies flush on a block.
+collar can move by 2 mm. All parts start scattered. Joints say where the blocks stand, and that the shaft is in the
+bores of both; a clearance keeps all bodies from crossing. At the ends of its travel the collar lies flush on a block.
 Prints where the shaft is, and what is left on both sides of its collar; writes shaft_in_bearings.html, which plays it.
 """
 

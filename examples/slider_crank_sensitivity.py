@@ -1,8 +1,8 @@
 """How far a piston moves when a dimension of its crank mechanism changes a little.
 
-The crank is driven to an angle; its hinges are frames on the bodies, whose places are the lengths of crank and rod.
-Prints where the piston is, its derivatives beside those of the closed form, and what a longer crank would do: by the
-derivative, and solved with the number set anew. Writes slider_crank_sensitivity.html: open it in any browser.
+The crank is driven to an angle; the positions of the hinges' frames on the bodies are the lengths of crank and rod.
+Prints the piston's position, its derivatives beside those of the closed form, and the effect of a longer crank: by the
+derivative, and solved with the new length. Writes slider_crank_sensitivity.html: open it in any browser.
 """
 
 from __future__ import annotations

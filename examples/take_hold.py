@@ -1,6 +1,6 @@
 """Two paper clips to take hold of: drag the green one with the mouse, and it slides along the red one, which is fixed.
 
-Serves a page until Ctrl-C. A click on a clip shows axes and rings by which it is turned; what is dragged keeps
+Serves a page until Ctrl-C. A click on a clip shows axes and rings by which it is moved and turned; the clips keep
 touching, and nothing crosses.
 """
 

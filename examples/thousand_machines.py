@@ -1,9 +1,10 @@
 """A study on a thousand machines, simulated: how long it takes, and what machines that fail cost.
 
-A discrete simulation of what `asm.study` does: one process cuts the plan into runs, gives chunks of them to machines as
-they come back, and writes what is finished. A machine that fails takes its chunk with it; that is found out some time
-later, and another one is given the chunk. How much rows differ, and what a run costs the process that hands it out and
-writes it, are measured first, on a four-bar; the mean of a row is set, to that of scenes with contacts. Prints a table.
+A discrete-event simulation of `asm.study`: one process cuts the plan into runs, gives chunks of them to machines as
+these become free, and writes what is finished. A machine that fails loses its chunk; that is noticed some time later,
+and the chunk is given to another one. How much the times of rows differ, and what a run costs the process that hands it
+out and writes it, are measured first on a four-bar; the mean time of a row is set to that of scenes with contacts.
+Prints a table.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """How exactly a piston stops when the parts of its crank mechanism scatter, and which part to make better.
 
-The lengths of crank and rod and the angle of the crank are normal about their values. Prints the scatter of the piston
-by root sum square, its worst case, how far the mean is off, and the shares of the three; then the same by 2,000 sets of
-values that are drawn and solved in full, and how many stop within the limits. Writes tolerance_stack.html, the
-mechanism, and tolerance_stack.png where matplotlib is installed.
+The lengths of crank and rod and the angle of the crank are normally distributed. Prints the scatter of the piston by
+root sum square, its worst case, the shift of the mean, and the shares of the three; then the same from 2,000 samples
+that are solved, and how many of them stop within the limits. Writes tolerance_stack.html, the mechanism, and
+tolerance_stack.png where matplotlib is installed.
 """
 
 from __future__ import annotations

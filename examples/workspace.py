@@ -1,8 +1,8 @@
 """What an arm of two links reaches on its table: its elbow has stops, and a post stands in the way of its tip.
 
-Cells of the table are flooded by solves that draw the tip from one to the next, with all that holds; where the tip
-stops on the way is the boundary. Prints the area with neither, where it is 4 pi l1 l2, with stops alone, and with both.
-Writes workspace.html: cells are bright where the joints move the tip well.
+Solves draw the tip from cell to cell of the table, with all constraints; where the tip stops on the way is the
+boundary. Prints the area without stops and post, where it is 4 pi l1 l2, with stops alone, and with both. Writes
+workspace.html: cells are bright where the joints move the tip well.
 """
 
 from __future__ import annotations

@@ -277,9 +277,12 @@ CASES = {
     "minimum text": (lambda: clearance(minimum="1"), "minimum is '1'; expected a finite real number"),
     "neglect": (
         lambda: clearance(merge_radius=0.0),
-        "merge_radius is 0; expected a part of the scene's size, from above 0 to 1",
+        "merge_radius is 0; expected a positive part of the scene's size, 1 at most",
     ),
-    "neglect large": (lambda: clearance(merge_radius=2.0), "merge_radius is 2; expected a part of the scene's size"),
+    "neglect large": (
+        lambda: clearance(merge_radius=2.0),
+        "merge_radius is 2; expected a positive part of the scene's size",
+    ),
     "places": (lambda: clearance(slots=0), "slots is 0; expected an integer of 1 or more"),
     "places half": (lambda: clearance(slots=1.5), "slots is 1.5; expected an integer of 1 or more"),
     "exclude": (lambda: clearance(exclude=[pair()[0]]), r"exclude\[0\] is .*; expected a pair of bodies"),
@@ -306,7 +309,7 @@ CASES = {
     "reach nan": (lambda: asm.Manager(pair(), reach=NAN), "reach is nan; expected a finite real number"),
     "manager neglect": (
         lambda: asm.Manager(pair(), merge_radius=0.0),
-        "merge_radius is 0; expected a part of the scene's size",
+        "merge_radius is 0; expected a positive part of the scene's size",
     ),
     "manager places": (lambda: asm.Manager(pair(), slots=-1), "slots is -1; expected an integer of 1 or more"),
     "stiffness": (lambda: tracker(stiffness=0.0), "stiffness is 0; expected a positive number"),
@@ -317,7 +320,7 @@ CASES = {
     "tracker q0": (lambda: tracker(q0=np.zeros(7)), r"q0 has shape \(7,\); expected \(2, 7\)"),
     "no start": (
         track_what_cannot_hold,
-        "q0 is a start that leads to no pose to begin at; expected one: .*conflicting",
+        "q0 leads to no pose at which the constraints hold; expected one that does: .*conflicting",
     ),
     "solution body an array": (
         lambda: solve().pose(np.array([1, 2])),

@@ -8,6 +8,8 @@ import json
 import re
 import tomllib
 from dataclasses import fields
+from itertools import takewhile
+from math import pi
 from pathlib import Path
 
 import pytest
@@ -29,6 +31,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 CONCEPTS = (ROOT / "docs" / "concepts.md").read_text()
 MECHANISMS = (ROOT / "docs" / "mechanisms.md").read_text()
 PARTS = (ROOT / "docs" / "parts.md").read_text()
+SHAPES = (ROOT / "docs" / "shapes.md").read_text()
 README = (ROOT / "README.md").read_text()
 
 
@@ -39,21 +42,21 @@ def blocks(path):
     return ["\n" * text.count("\n", 0, match.start(1)) + match[1] for match in found]
 
 
-def rows(text, *heads):
-    """The rows of the table whose first cells are these, as lists of cells without backquotes."""
+def tables(text, *heads):
+    """The tables whose first cells are these, each as rows of cells without backquotes."""
     lines = iter(text.splitlines())
     for line in lines:
         if line.startswith("|") and [c.strip(" `") for c in line.strip("|").split("|")][: len(heads)] == list(heads):
-            break
-    else:
-        raise AssertionError(f"no table {heads}")
-    next(lines)
-    found = []
-    for line in lines:
-        if not line.startswith("|"):
-            break
-        found.append([cell.strip(" `") for cell in line.strip("|").split("|")])
-    return found
+            next(lines)
+            found = takewhile(lambda row: row.startswith("|"), lines)
+            yield [[cell.strip(" `") for cell in row.strip("|").split("|")] for row in found]
+
+
+def rows(text, *heads):
+    """The rows of the first of these tables."""
+    for found in tables(text, *heads):
+        return found
+    raise AssertionError(f"no table {heads}")
 
 
 def test_there_is_code_to_run():
@@ -143,10 +146,38 @@ def made_shapes():
 
 
 def test_makers_and_their_face_names():
-    table = {maker: names for maker, names in rows(PARTS, "maker in `asm.shapes", "faces")}
+    table = {maker: names for maker, names in rows(SHAPES, "maker in `asm.shapes", "faces")}
     made = made_shapes()
     assert table == {maker: ", ".join(f.name for f in asm.Body("part", shape).faces) for maker, shape in made.items()}
     assert {maker.partition("(")[0] for maker in table} == {*asm.shapes.__all__} - {"Path"}
+
+
+def described(maker):
+    """A function or method as tables have it: its signature without types, and the first sentence of its docstring."""
+    signature = inspect.signature(maker)
+    known = [p.replace(annotation=p.empty) for p in signature.parameters.values() if p.name != "self"]
+    text = str(signature.replace(parameters=known, return_annotation=signature.empty))
+    return [
+        maker.__name__ + text.replace(str(2 * pi), "2 * pi"),
+        inspect.getdoc(maker).split("\n")[0].removesuffix("."),
+    ]
+
+
+def test_makers_of_shapes():
+    """Signatures and descriptions are those of the code, and no maker is missing."""
+    makers = [getattr(asm.shapes, name) for name in asm.shapes.__all__ if name != "Path"]
+    of_several = [maker for maker in makers if inspect.signature(maker).return_annotation.startswith("tuple")]
+    surfaces, solids = [list(found) for found in tables(SHAPES, "asm.shapes", "makes")]
+    assert surfaces == [described(maker) for maker in makers if maker not in of_several]
+    assert solids == [described(maker) for maker in of_several]
+    methods = [method for name, method in vars(asm.shapes.Path).items() if name in ("line", "arc")]
+    assert rows(SHAPES, "asm.shapes.Path", "does") == [described(method) for method in methods]
+
+
+def test_makers_of_curves():
+    makers = [getattr(asm.curves, name) for name in asm.curves.__all__]
+    made = [[*described(maker), inspect.signature(maker).return_annotation] for maker in makers]
+    assert rows(SHAPES, "asm.curves", "makes", "type") == made
 
 
 def test_mates_and_what_they_take_away():

@@ -43,7 +43,7 @@ def test_a_scene_is_not_gone_through_by_numbers(crank):
 
 
 def test_a_list_of_constraints_is_told_the_star(crank):
-    with pytest.raises(TypeError, match=r"expected each for itself: constrain\(\*constraints\)"):
+    with pytest.raises(TypeError, match=r"expected separate arguments: constrain\(\*constraints\)"):
         crank.constrain([asm.Fixed(crank["ground"].frame(), crank["arm"].frame())])
 
 

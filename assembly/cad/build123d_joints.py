@@ -88,7 +88,8 @@ class Tie:
         found = makers[kinds]()
         if self._driven:
             raise InputError(
-                f"driven has {', '.join(map(repr, self._driven))} of {self._name!r}, which it does not leave"
+                f"driven has {', '.join(map(repr, self._driven))} of {self._name!r}, which the joint "
+                "does not leave free"
             )
         return found
 

@@ -106,25 +106,24 @@ def from_build123d(
 ) -> list[Body]:
     """The parts of build123d as bodies.
 
-    Of a `Compound` with children every part below it is a body that stands where the tree has it. Its name is its
-    label, with those of the compounds between it and the root before it ("gripper/jaw"), so that names tell the tree
-    and `asm.cad.place` finds what they are of. A part is one body, whatever solids it has, in its own coordinates:
-    its `location` becomes the pose. Parts that were made by `copy.copy` share their faces.
+    Every part below a `Compound` with children becomes a body at its place in the tree. Its name is its label, preceded
+    by those of the compounds between it and the root ("gripper/jaw"), so that `asm.cad.place` finds the part again. A
+    part is one body, however many solids it has, in its own coordinates: its `location` becomes the pose. Parts that
+    were made by `copy.copy` share their faces.
 
     Parameters
     ----------
     thing : build123d part, Compound, BuildPart, or several
-        Lengths stay what they are, millimeters say.
+        Lengths are not converted; they are usually millimeters.
     name : str
         Of a part without a label.
     faces : mapping of name -> Face, or iterable of faces with labels
-        Faces that are to have a name; others are "face 1", "face 2" in build123d's order. (A face that is selected has
-        a label of its own, which the part does not know.) A face is found wherever it is in, also in a copy of the
-        part.
+        Faces that are to have a name; others are "face 1", "face 2" in build123d's order. (The label of a selected face
+        is not known to its part, hence this argument.) A face is found in every part that contains it, also in a copy.
     fixed : iterable of str
         Names of bodies that do not move.
     strict : bool
-        Raise where a face cannot be read. Otherwise it is left out, and a warning says which and why.
+        Whether to raise if a face cannot be read. Otherwise it is left out, and a warning says which and why.
 
     Returns
     -------

@@ -84,26 +84,25 @@ def _is_face(shape: Any) -> bool:
 def from_cadquery(thing: Any, name: str = "part", *, fixed: Iterable[str] = (), strict: bool = True) -> list[Body]:
     """The parts of a CadQuery workplane, shape or assembly as bodies.
 
-    Of an assembly every object is a body that stands where the assembly has it; its name is the one that CadQuery's
-    queries have, with the names of subassemblies before it ("gripper/jaw"), and the assembly itself has its own. So
-    names tell the tree, and `asm.cad.place` finds what they are of. Bodies have their assembly's color, or that
-    of the assembly around it.
+    Every object of an assembly becomes a body at its location. Its name is the one used in CadQuery's queries, preceded
+    by the names of subassemblies ("gripper/jaw"), so that `asm.cad.place` finds the object again. Bodies have their
+    assembly's color, or that of the assembly around it.
 
-    Faces are called "face 1", "face 2" in CadQuery's order, or by the tags of the workplane that are of faces, and by
-    the names of `Assembly.addSubshape`, which come first. A tag is of the same face wherever it is in, also in a copy
-    of the part or in one that was moved, and of what later operations have left of it: several faces are "top" and
-    "top 2". Objects that are used several times share their faces.
+    Faces are called "face 1", "face 2" in CadQuery's order, or have the names of `Assembly.addSubshape`, or else of the
+    workplane's tags for faces. A tag follows its face into copies of the part, after moves, and to what later
+    operations leave of it; several faces are then "top" and "top 2". Objects that are used several times share their
+    faces.
 
     Parameters
     ----------
     thing : cadquery.Workplane, cadquery.Shape or cadquery.Assembly
-        Lengths stay what they are, millimeters say.
+        Lengths are not converted; they are usually millimeters.
     name : str
         Of the one body that a workplane or a shape becomes, whatever solids it has.
     fixed : iterable of str
         Names of bodies that do not move.
     strict : bool
-        Raise where a face cannot be read. Otherwise it is left out, and a warning says which and why.
+        Whether to raise if a face cannot be read. Otherwise it is left out, and a warning says which and why.
 
     Returns
     -------

@@ -17,14 +17,14 @@ Thing = TypeVar("Thing")
 
 
 def place(assembly: Thing, solution: Solution) -> Thing:
-    """Put the parts of an assembly to where a solution has the bodies that were made of them.
+    """Move the parts of an assembly to the poses of their bodies in a solution.
 
     Parameters
     ----------
     assembly : cadquery.Assembly, build123d Compound with children, or several build123d parts
         What `from_cadquery` or `from_build123d` was called with. Bodies and parts are matched by their names.
     solution : Solution
-        It may have bodies besides; parts that it has no bodies of stay as they are to what they are in.
+        It may have other bodies as well; parts without a body in it keep their location in their parent.
 
     Returns
     -------

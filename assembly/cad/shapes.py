@@ -121,7 +121,7 @@ class Bodies:
         if read.missing:
             told = f"body {name!r}; not read: {'; '.join(read.missing[:10])}"
             if self._strict:
-                raise InputError(f"{told}; pass strict=False to go without")
+                raise InputError(f"{told}; pass strict=False to read the rest")
             warnings.warn(told, StepWarning, stacklevel=4)
         said: dict[int, Label] = {}
         for label in labels:
@@ -253,19 +253,19 @@ def color_of(color: Any) -> Color | None:
 
 
 def from_occt(shape: Any, name: str = "part", *, fixed: Iterable[str] = (), strict: bool = True) -> list[Body]:
-    """The solids of a shape of OCCT, a body each; shells and faces outside of any solid are bodies, too.
+    """The solids of an OCCT shape, one body each; shells and faces outside of any solid are bodies, too.
 
     Parameters
     ----------
     shape : OCP.TopoDS.TopoDS_Shape
-        Lengths stay what they are. Solids that are one, at several locations, share their faces: geometry is in
-        the solid's own coordinates, and the body's pose is its location.
+        Lengths are not converted. Equal solids at several locations share their faces: geometry is in the solid's own
+        coordinates, and the body's pose is its location.
     name : str
         Of the body; of several "part", "part 2" and so on. Faces are "face 1", "face 2" in OCCT's order.
     fixed : iterable of str
         Names of bodies that do not move.
     strict : bool
-        Raise where a face cannot be read. Otherwise it is left out, and a warning says which and why.
+        Whether to raise if a face cannot be read. Otherwise it is left out, and a warning says which and why.
 
     Returns
     -------

@@ -15,24 +15,26 @@ __all__ = ["solve"]
 
 
 def solve(assembly: Any, *, fixed: Any = (), driven: Mapping[Any, Any] | None = None, **options: Any) -> Solution:
-    """Solve what holds between the parts of an assembly, and move them; nothing is moved where that fails.
+    """Solve the constraints or joints between the parts of an assembly, and move the parts; if that fails nothing is
+    moved.
 
-    Of a `cadquery.Assembly` these are the constraints that its `constrain` was called with, and locations are set as
-    its own `solve` sets them. Parts that are Fixed stay, and the assembly's own object does; where there is neither,
-    the first part does that others are constrained to. Constraints hold to 1e-12 of the size, and not in the sense of
-    least squares: where some contradict others by more than `fit`, the solution is INFEASIBLE and names them.
-    Constraints that repeat each other do no harm. Shapes are not read, but for CadQuery's own markers on them.
+    For a `cadquery.Assembly` these are the constraints given to its `constrain`, and locations are set as its own
+    `solve` sets them. Fixed parts stay, and so does the assembly's own object; if there is neither, the first part that
+    others are constrained to stays. Constraints hold to 1e-12 of the size, not in the sense of least squares: if some
+    contradict others by more than `fit`, the solution is INFEASIBLE and names them. Redundant constraints do no harm.
+    Of shapes only CadQuery's own markers are computed.
 
-    Of build123d's parts these are the joints that `connect_to` tied, also in loops, within their ranges. What they
-    leave free stays as near as it can to where it is: to the values that `connect_to` was called with.
+    For build123d's parts these are the joints connected by `connect_to`, also in loops, within their ranges. What they
+    leave free stays as near as possible to where it is: to the values given to `connect_to`.
 
     Parameters
     ----------
     assembly : cadquery.Assembly, or build123d parts: a Compound with children, or several of them
     fixed : parts or their labels
-        Of build123d: what does not move; the first part by default. Of CadQuery, say so by `constrain(name, "Fixed")`.
+        For build123d: parts that do not move; by default the first part. For CadQuery use `constrain(name, "Fixed")`
+        instead.
     driven : mapping of joint -> value
-        Of build123d: values that joints are held at, an angle in degrees or a position; of a joint that has both
+        For build123d: values at which joints are held, an angle in degrees or a position; for a joint that has both
         {"angle": degrees, "position": length}.
     **options
         Of `Assembly.solve`: `tolerance`, `fit`, `time_limit` and so on.
@@ -41,7 +43,7 @@ def solve(assembly: Any, *, fixed: Any = (), driven: Mapping[Any, Any] | None = 
     -------
     Solution
         Constraints are named by their kinds and parts, "Plane base-lid", joints by parts and labels,
-        "base.hinge-lid.pin"; bodies are those of the parts, and a world where constraints need it.
+        "base.hinge-lid.pin"; bodies are those of the parts, and a world body if constraints need it.
 
     Raises
     ------

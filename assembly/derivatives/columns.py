@@ -188,7 +188,9 @@ def columns_of(problem: Problem, parameters: Sequence[Parameter]) -> Columns:
             # A hinge may turn about its axis in its frame: rows are as they were, what is measured is not.
             enters = enters or _on_probe(parameter, _frames_of(problem.packed)) is not None
         if not enters:
-            raise InputError(f"parameter {parameter.name!r} enters no row and no term; expected one of what is solved")
+            raise InputError(
+                f"parameter {parameter.name!r} enters no row and no term; expected one on which the solve depends"
+            )
     _add_size(problem, parameters, slopes, values)
     return Columns(rows, slopes, values)
 

@@ -44,8 +44,8 @@ def sensitivity(
 ) -> Sensitivity:
     """How measures of a solution change with parameters of its scene.
 
-    With an objective the solution is followed along its rows and the stationary point; without one it moves as little
-    as rows ask for, from its own pose. See docs/sensitivity.md.
+    With an objective the derivative is that of the stationary point on the rows; without one it is that of the least
+    move from the solution's own pose. See docs/sensitivity.md.
 
     Parameters
     ----------
@@ -129,10 +129,15 @@ def _checked(scene: Assembly, solution: Solution) -> tuple[Packed, Array]:
         raise InputError(f"solution is {solution.status.name}; expected one that succeeded")
     packed, state = solution._packed, solution._state
     if not have_same_numbers(packed, scene.packed()):
-        raise InputError("solution is of another scene, or of this one with other numbers; expected one of it as it is")
+        raise InputError(
+            "solution is of another scene, or of this one with other numbers; expected one "
+            "solved with the present numbers"
+        )
     packed.refresh()
     if not _are_same(packed.asked, solution._asked):
-        raise InputError("solution is of other values or targets than the scene has now; expected one solved with them")
+        raise InputError(
+            "solution was solved with other values or targets than the scene has now; expected one solved with these"
+        )
     return packed, state
 
 

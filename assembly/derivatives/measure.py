@@ -28,7 +28,7 @@ class Measure:
     | thing | component |
     |---|---|
     | a point, a frame, a body | "x", "y" or "z" of it, or of its origin, in the world |
-    | a joint or a freedom | the name of the freedom; none where there is one |
+    | a joint or a coordinate | the name of the coordinate; none where there is one |
     | two points (or frames, bodies) | none: their distance |
     | a contact of the scene | none: its gap |
     | a constraint, `on=body` | "fx" to "tz" of what it exerts on the body, about the body's origin, in world axes |
@@ -41,7 +41,7 @@ class Measure:
     on : Body, optional
         Of a wrench: the body that it acts on.
     name : str, optional
-        How tables call it.
+        Its name in tables.
 
     Raises
     ------
@@ -81,7 +81,7 @@ class Measure:
         self.name = label if name is None else text("name", name)
 
     def value(self, solution: Solution) -> float:
-        """What it is at a solution, in the user's units; angles go on past whole turns."""
+        """The value at a solution, in the user's units; angles continue past whole turns."""
         if self.kind == "objective":
             return solution.objective
         if self.kind == "coordinate":

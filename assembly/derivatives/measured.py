@@ -88,7 +88,7 @@ def _row_of(problem: Problem, item: Measure) -> int:
     for k, contact in enumerate(problem.packed.contacts):
         if contact is item.thing:
             return k
-    raise InputError(f"measure is the gap of {item.thing.name!r}; expected a contact of the scene that is one of faces")
+    raise InputError(f"measure is the gap of {item.thing.name!r}; expected a contact of faces in the scene")
 
 
 def _coordinates_by_frames(problem: Problem, measures: Sequence[Measure], parameters: Sequence[Parameter]) -> Array:

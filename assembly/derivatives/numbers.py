@@ -47,7 +47,7 @@ class Number(ABC):
     Attributes
     ----------
     name : str
-        How tables call it.
+        Its name in tables.
     unit : str
         "length", "rad", or "" of a number that has none, or one that nobody knows.
     """
@@ -69,7 +69,7 @@ class Number(ABC):
 
 
 class RowNumber(Number):
-    """The driven value or a limit of a freedom, or the offset of a constraint: what a row equals, or is bounded by."""
+    """The driven value or a limit of a coordinate, or the offset of a constraint: what bounds a row or equals it."""
 
     def __init__(self, owner: Freedom | Constraint, attribute: str) -> None:
         self.owner, self.attribute = owner, attribute

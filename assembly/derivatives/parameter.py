@@ -47,12 +47,12 @@ Thing = (
 
 
 class Parameter(KnownSettings):
-    """A number of a scene that may be set anew, and that solutions may be derived with respect to.
+    """A number of a scene that can be set, and with respect to which solutions can be differentiated.
 
     | thing | field, index |
     |---|---|
-    | a joint | the name of a driven freedom; "limits" or "angle_limits", 0 or 1; "offset"; "value" |
-    | a freedom, `joint.freedom("angle")` | "value", "lower", "upper" |
+    | a joint | the name of a driven coordinate; "limits" or "angle_limits", 0 or 1; "offset"; "value" |
+    | a coordinate, `joint.freedom("angle")` | "value", "lower", "upper" |
     | a coupling | "offset" |
     | a frame, `joint.frame_a` | "origin" or "turn", "x", "y" or "z": in the axes of its body |
     | `PointDistance`, `FrameDistance` | "target", "x", "y" or "z" |
@@ -62,18 +62,17 @@ class Parameter(KnownSettings):
     | a face of a body, `body.face("top")` | "control_points", (i, j, "z"); "weights", (i, j) |
     | a function that makes faces of a number | the number: `asm.Body("ball", parameter.shape)` |
 
-    A turn of a frame is a vector, its length an angle, by which the axes are turned about the frame's origin from where
-    they were given.
+    A turn of a frame is a rotation vector by which the axes are turned about the frame's origin from their original
+    direction.
 
     Parameters
     ----------
     thing, field, index
         As in the table.
     name : str, optional
-        How tables call it.
+        Its name in tables.
     step : float, optional
-        Of numbers that make faces: by how much they are changed for differences; by default five thousandths of the
-        value, or of the body.
+        For numbers that make faces: the step of differences; by default five thousandths of the value, or of the body.
 
     Raises
     ------
@@ -90,29 +89,29 @@ class Parameter(KnownSettings):
 
     @property
     def name(self) -> str:
-        """How tables call it."""
+        """Its name in tables."""
         return self._name
 
     @property
     def unit(self) -> str:
-        """Its unit: "length", "rad", or "" where nobody knows, or it has none."""
+        """Its unit: "length", "rad", or "" if it is unknown or there is none."""
         return self._number.unit
 
     @property
     def step(self) -> float | None:
-        """By how much it is changed for differences, if that was said."""
+        """The step of differences, if given."""
         return self._step
 
     @property
     def shape(self) -> Parametric:
-        """Of a number that a function turns into faces: the shape for a `Body`."""
+        """For a number from which a function makes faces: the shape for a `Body`."""
         if not isinstance(self._number, ShapeNumber):
             raise InputError(f"parameter {self.name!r} makes no faces; expected one of a function, or of a Parametric")
         return self._number.shape
 
     @property
     def value(self) -> float:
-        """The number now. Settable; the scene that has it is solved with it from then on, and is not packed again."""
+        """The present number. Settable; the scene is solved with it from then on, and is not packed again."""
         return self._number.get()
 
     @value.setter
@@ -148,7 +147,7 @@ def _number_of(thing: Thing, field: Any, index: Any) -> Number:
         return LeastGap(thing)
     if isinstance(thing, Freedom):
         if field not in ("value", "lower", "upper"):
-            raise InputError(f"field is {field!r}; expected 'value', 'lower' or 'upper' of a freedom")
+            raise InputError(f"field is {field!r}; expected 'value', 'lower' or 'upper' of a joint coordinate")
         return RowNumber(thing, field)
     if isinstance(thing, Constraint):
         return _of_constraint(thing, field, index)

@@ -178,7 +178,8 @@ class Response:
             if derived.undetermined.any():
                 loose = [m.name for m, is_loose in zip(self._of, derived.undetermined, strict=True) if is_loose]
                 raise ResponseError(
-                    f"measures {loose} change with a motion that the scene leaves free, or are forces that rows share"
+                    f"measures {loose} change with a motion that the scene leaves free, or are forces that "
+                    "redundant rows share"
                 )
             if not np.isfinite(rates).all():
                 told = "; ".join(f"{name}: {reason}" for name, reason in derived.reasons.items())

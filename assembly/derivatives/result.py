@@ -63,7 +63,7 @@ class Sensitivity(ReadOnlyArrays):
     of : tuple of Measure
     wrt : tuple of Parameter
     matrix : (m, p)
-        A row a measure, a column a parameter; NaN where there is no derivative, and `reasons` has why.
+        One row per measure, one column per parameter; NaN where there is no derivative, and `reasons` has why.
     shrinking, growing : (m, p)
         The derivatives from below and from above. They differ where a one-sided row is at its bound without a force.
     undetermined : (m,) bool

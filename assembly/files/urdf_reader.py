@@ -38,11 +38,11 @@ def read_urdf(path: str | PathLike[str], *, unit: str = "mm") -> Robot:
     Returns
     -------
     Robot
-        Boxes, cylinders and spheres of `<collision>` are exact shapes of the bodies. What `<visual>` shows is the
-        body's `picture` where meshes are in it, or where there are no exact shapes; a mesh of `<collision>` is one
-        where nothing else is to be seen. A mesh is no exact shape: nothing touches it. Revolute, continuous, prismatic,
-        planar and fixed joints become `Revolute`, `Prismatic`, `Planar` and `Fixed` with their limits; a floating joint
-        constrains nothing; a joint that mimics another one is coupled to it.
+        Boxes, cylinders and spheres of `<collision>` are exact shapes of the bodies. `<visual>` becomes the body's
+        `picture` if it contains meshes or if there are no exact shapes; a mesh of `<collision>` does if there is
+        nothing else to show. A mesh is no exact shape and has no contacts. Revolute, continuous, prismatic, planar and
+        fixed joints become `Revolute`, `Prismatic`, `Planar` and `Fixed` with their limits; a floating joint constrains
+        nothing; a joint that mimics another one is coupled to it.
 
     Raises
     ------
@@ -96,7 +96,7 @@ class _Reader:
         """Links as bodies, joints, what mimics others."""
         links = {_name("link", link.name): link for link in self._robot.links}
         if len(links) < len(self._robot.links):
-            raise UrdfError("two links have one name; expected distinct names")
+            raise UrdfError("two links have the same name; expected distinct names")
         order = self._tree(list(links))
         poses: dict[str, Pose] = {}
         for name, joint in order:
@@ -136,7 +136,7 @@ class _Reader:
             order += [(joint.child, joint) for joint in children]
             below += [joint.child for joint in children]
         if len(order) < len(links):
-            raise UrdfError(f"links {sorted(set(links) - {name for name, _ in order})} hang on each other in a ring")
+            raise UrdfError(f"links {sorted(set(links) - {name for name, _ in order})} form a ring of joints")
         return order
 
     def _body(self, link: Any, pose: Pose, fixed: bool) -> Body:

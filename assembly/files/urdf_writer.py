@@ -51,7 +51,7 @@ class _Link:
 
 
 def _frames(joint: Joint) -> tuple[Frame, Frame]:
-    """The frames of a joint that coincide where its freedoms are zero."""
+    """The frames of a joint that coincide where its coordinates are zero."""
     a, b = joint.frame_a, joint.frame_b
     if isinstance(joint, Insert) and joint.offset:
         a = a.body.frame(a.origin + joint.offset * a.axes[:, 2], a.axes[:, 2], a.axes[:, 0])
@@ -71,25 +71,25 @@ def write_urdf(
     Parameters
     ----------
     path : str or path
-        Where the file goes; a body that is neither a box, a cylinder nor a ball goes as a mesh into an STL file beside
-        it, named after the file and the link, and so does `body.picture`, as what is seen of the link. Existing files
-        are replaced.
+        Where to write. A body that is neither a box, a cylinder nor a ball is written as a mesh to an STL file beside
+        it, named after the file and the link, and so is `body.picture`, as the link's visual. Existing files are
+        replaced.
     what : Robot or Assembly
-        Joints are `Revolute`, `Prismatic`, `Planar` or `Fixed`, or mates that are such, and make a tree; of several
-        bodies that nothing carries none is the root. Every joint is written free, with its limits; couplings of turns,
-        or of a slide and a turn, as joints that mimic others. Other constraints, and objectives, raise.
+        Joints are `Revolute`, `Prismatic`, `Planar` or `Fixed`, or such mates, and form a tree with one root. Every
+        joint is written without its driven value, with its limits; couplings of angles, or of a slide and an angle, are
+        written as joints that mimic others. Other constraints, and objectives, raise.
     unit : str
         Of the bodies: "um", "mm", "cm", "m", "in" or "ft"; the file has meters.
     name : str, optional
         Of the robot; by default its own, or the file's.
     density : float, optional
-        Kilograms a cubic meter where `body.density` is one, positive: closed bodies weigh that. Without it a Robot has
-        the masses that it was read with, and an Assembly none.
+        Kilograms per cubic meter for a `body.density` of one, positive; used for closed bodies. Without it a Robot has
+        the masses it was read with, and an Assembly none.
 
     Notes
     -----
     A link's origin is that of the joint's frame on it, with the axes of its body; the root's is its body's. Efforts and
-    velocities, of which nothing is known here, are zero.
+    velocities are written as zero.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def _tree(bodies: Sequence[Body], joints: Sequence[Joint]) -> list[_Link]:
         place += 1
     lost = [body.name for body in bodies if not any(link.body is body for link in links)]
     if lost:
-        raise UrdfError(f"bodies {lost} hang on nothing; expected joints to all")
+        raise UrdfError(f"bodies {lost} are connected to the root by no joints; expected joints to all")
     return links
 
 
@@ -235,7 +235,7 @@ class _Writer:
         elif kind in ("revolute", "prismatic") and not np.isfinite([low, high]).all():
             raise UrdfError(f"joint {joint.name!r} has limits from {low:g} to {high:g}; expected finite ones")
         if isinstance(joint, Planar) and any(freedom.limits for freedom in joint.freedoms.values()):
-            raise UrdfError(f"joint {joint.name!r} is planar with limits, which a file has not; expected none")
+            raise UrdfError(f"joint {joint.name!r} is planar with limits, which a file cannot have; expected none")
         element = ElementTree.Element("joint", name=joint.name, type=kind)
         ElementTree.SubElement(element, "parent", link=parent.body.name)
         ElementTree.SubElement(element, "child", link=link.body.name)

@@ -32,7 +32,7 @@ def _folders() -> str:
 
 
 def _show(items: list[Item]) -> None:
-    """Print a line a kernel, and the sum."""
+    """Print one line per kernel, and the sum."""
     width = max(len(item.name) for item in items)
     total, count = 0, 0
     for item in items:

@@ -53,7 +53,7 @@ def _given_pose(position: ArrayLike, quaternion: ArrayLike, pose: Pose | None) -
         # Pose takes what is like an array, which its fields do not say: they are tuples once it is made.
         return Pose(position, quaternion)  # type: ignore[arg-type]  # Pose converts them
     if not np.array_equal(position, (0, 0, 0)) or not np.array_equal(quaternion, (1, 0, 0, 0)):
-        raise InputError("pose is given beside position or quaternion; expected one of both")
+        raise InputError("pose is given beside position or quaternion; expected either")
     return pose
 
 
@@ -140,14 +140,14 @@ class OpposedFrame(Frame):
 
 
 class Body(Weighed):
-    """A rigid body. Its pose may be set anew, and whether it is fixed; its name and its shape are for life.
+    """A rigid body. Its pose and whether it is fixed may be set; its name and its shape cannot be changed.
 
     Parameters
     ----------
     name : str
         Not empty; unique in an assembly.
     shape : NurbsSurface, Face, or several of them, or Parametric, optional
-        In body coordinates. A surface's outward normal is Su x Sv. Numbers of a `Parametric` may be set anew.
+        In body coordinates. A surface's outward normal is Su x Sv. Numbers of a `Parametric` can be set.
     position, quaternion
         Where the body stands, body to world; the quaternion is (w, x, y, z), unit to within a percent.
     fixed : bool
@@ -155,16 +155,16 @@ class Body(Weighed):
     color : (red, green, blue), optional
         0 to 1 each, for pictures and files; settable.
     density : float
-        Mass a volume, positive; for life, as faces are.
+        Mass per volume, positive; cannot be changed.
     picture : PictureMesh, optional
-        Triangles that the body is drawn with in the place of its faces; settable.
+        Triangles that are drawn instead of the body's faces; settable.
     pose : Pose, optional
-        Where the body stands, in the place of position and quaternion.
+        Pose of the body, instead of position and quaternion.
 
     Raises
     ------
     InputError, TypeError
-        Naming the argument, what came and what was expected.
+        The message names the argument, its value and what was expected.
     """
 
     def __init__(
@@ -211,7 +211,7 @@ class Body(Weighed):
 
     @property
     def fixed(self) -> bool:
-        """Whether the body stays where it is; settable. Constraints of fixed bodies alone ask for nothing."""
+        """Whether the body stays where it is; settable. Constraints between fixed bodies have no effect."""
         return self._fixed
 
     @fixed.setter
@@ -267,7 +267,7 @@ class Body(Weighed):
 
     @property
     def color(self) -> tuple[float, float, float] | None:
-        """Red, green and blue, or None for one that is chosen by whoever draws the body."""
+        """Red, green and blue, or None for a color chosen when the body is drawn."""
         return self._color
 
     @color.setter

@@ -33,7 +33,7 @@ def numbers_set() -> int:
 
 
 def count_number(thing: object) -> None:
-    """Say that such a number is another one now, and of what: a frame, a joint, a freedom, a term, a body."""
+    """Say that such a number is another one now, and of what: a frame, a joint, a coordinate, a term, a body."""
     numbers, edited = _counts[0]
     _things.append(ref(thing))
     if len(_things) > 2 * REMEMBERED:

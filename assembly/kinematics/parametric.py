@@ -15,7 +15,7 @@ __all__ = ["Parametric"]
 
 
 class Parametric:
-    """A shape for bodies, made by a maker in `shapes`, or a function of yours, of numbers that may be set anew.
+    """A shape for bodies with numbers that can be set, made by a maker in `shapes` or a function of yours.
 
         wheel = asm.Body("wheel", asm.Parametric(asm.shapes.cylinder, radius=4.0, height=1.0))
         radius = asm.Parameter(wheel.shape, "radius")
@@ -23,8 +23,8 @@ class Parametric:
     Parameters
     ----------
     build : callable
-        Called with the numbers by name; returns what `Body` takes for a shape. For all values the same number of
-        faces, in the same order.
+        Called with the numbers by name; returns what `Body` takes as a shape, with the same number of faces in the same
+        order for all values.
     **numbers : float
         In any unit that `build` has.
 
@@ -59,7 +59,7 @@ class Parametric:
         return tuple(self._bodies)
 
     def made(self) -> Any:
-        """What `build` makes of the numbers now."""
+        """The shape for the present numbers."""
         return self._build(**self._numbers)
 
     def _belongs_to(self, body: Body) -> None:
@@ -67,14 +67,14 @@ class Parametric:
         self._bodies.append(body)
 
     def set(self, name: str, value: float) -> None:
-        """Set a number; the bodies have other faces then, and what refers to a face means the one in its place.
+        """Set a number; the bodies get new faces, and whatever refers to a face refers to the new one.
 
         Frames and points that were taken from faces stay where they are.
 
         Raises
         ------
         InputError
-            No such number, one of which `build` makes no faces, or other ones in number or name.
+            No such number, or one for which `build` makes no faces, or other faces by number or name.
         """
         if name not in self._numbers:
             raise InputError(f"name is {name!r}; expected one of {', '.join(map(repr, self._numbers))}")

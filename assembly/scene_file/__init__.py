@@ -65,12 +65,12 @@ a loop of its own. Frames, and the points of joints, are {body, origin [3], axes
 axes unit vectors at right angles. The `axes` of a joint are "aligned", "opposed" or "nearest". What a mate ties
 (`seats`, `slot` and `tab`: two each) is {body, face}, {body, edge}, {body, vertex} or {body, point [3]}, or a frame:
 faces by name, edges and vertices by their number in `body.edges` and `body.vertices`. A driven value is a number, or
-null where the freedom is free; limits are [lower, upper], null for a side without limit, or null without limits; angles
-are in radians. A coupling refers to joints of the same file, which may stand after it. The `function` of an expression
-is the text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers are the shortest decimals
-that give back the same doubles. A dexterity's tip is a frame, its inputs are [{joint, freedom}], its direction numbers
-or null; its `axes` are letters of "xyz", of a pose two words, of linear and angular axes; what it ignores and what is
-holding are constraints of the file.
+null where the coordinate is free; limits are [lower, upper], null for a side without limit, or null without limits;
+angles are in radians. A coupling refers to joints of the same file, which may stand after it. The `function` of an
+expression is the text of `Expression.document()`. A sign is 1 (minimized) or -1 (maximized). Numbers are the shortest
+decimals that give back the same doubles. A dexterity's tip is a frame, its inputs are [{joint, freedom}], its
+direction numbers or null; its `axes` are letters of "xyz", of a pose two words, of linear and angular axes; what it
+ignores and what is holding are constraints of the file.
 
 Older versions are read, too. Version 4 had no places of contacts and no least gaps of contacts, and dexterities had no
 `axes`, `ignoring` and `holding`; version 3 had no pictures, no distances from lines and no `touch`; version 2 had no

@@ -137,7 +137,7 @@ def _read_axes_of_task(path: str, value: Any) -> str | list[str]:
 
 
 def _free(*names: str) -> tuple[Field, ...]:
-    """Driven values and limits of freedoms; with one freedom its limits have no name of their own."""
+    """Driven values and limits of coordinates; with one coordinate its limits have no name of their own."""
     limits = ["limits"] if len(names) == 1 else [f"{name}_limits" for name in names]
     return tuple(
         made for name, its in zip(names, limits, strict=True) for made in (Field(name, DRIVEN), Field(its, LIMITS))

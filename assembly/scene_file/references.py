@@ -65,7 +65,7 @@ class _Side:
 
 
 class _Freedom:
-    """A freedom of a joint of the same file."""
+    """A coordinate of a joint of the same file."""
 
     def write(self, path: str, value: Freedom, parts: Parts) -> dict[str, Any]:
         joint = value.joint

@@ -92,7 +92,7 @@ class Crossings:
     found : tuple of Crossing
         Bodies that cross elsewhere than at their contacts.
     unseen : tuple of (name, name)
-        Bodies of which nobody knows, because the time limit was over: they may cross.
+        Bodies that were not searched before the time limit: they may cross.
     """
 
     found: tuple[Crossing, ...]

@@ -103,7 +103,7 @@ class Interruption:
         For what has no part that means anything by itself, as a rank has none.
         """
         if self.is_over():
-            raise TimeoutError(f"{what} is not known yet where time_limit is over; raise time_limit or leave it out")
+            raise TimeoutError(f"{what} is not known yet when time_limit is over; raise time_limit or leave it out")
 
     def wait_for(self, what: str, compute: Callable[[], Answer]) -> Answer:
         """The answer of a call that is long and without the interpreter's lock, as decompositions are; see `check`.

@@ -144,7 +144,7 @@ class Result(ReadOnlyArrays):
 
     @property
     def history(self) -> Array:
-        """A row an iteration, columns `Iteration.COLUMNS`; none where a contact was lost at the start."""
+        """One row per iteration, columns `Iteration.COLUMNS`; none where a contact was lost at the start."""
         return read_only(self._rows[: 0 if self._is_lost and self.iterations == 0 else self.iterations + 1])
 
     @property
@@ -204,7 +204,7 @@ class Result(ReadOnlyArrays):
 
     @cached_property
     def values(self) -> dict[str, float]:
-        """Every freedom of every joint, "joint.freedom": lengths in the user's unit, angles in radians."""
+        """Every coordinate of every joint, "joint.freedom": lengths in the user's unit, angles in radians."""
         return Named(
             (f"{joint.name}.{name}", self._value(joint, name))
             for joint in self._scene.constraints
@@ -213,7 +213,7 @@ class Result(ReadOnlyArrays):
         )
 
     def _value(self, joint: Joint, name: str) -> float:
-        """One freedom of one joint."""
+        """One coordinate of one joint."""
         packed, state = self._ended
         coordinate = joint._coordinate_in(name, self._scene.axes.get(joint.name))
         near = next((k for k, other in enumerate(packed._angles) if other is coordinate), None)

@@ -31,11 +31,15 @@ class Status(Enum):
     STALLED = "no further progress; look at the worst violation, start elsewhere or loosen the tolerance"
     ITERATION_LIMIT = "out of iterations; raise max_iterations or start nearer"
     CONTACT_LOST = "a contact has no extremal pair at the start; move the bodies or name the faces"
-    TIME_LIMIT = "the time limit ended it; the pose is the last that held, if one did: raise time_limit or start nearer"
-    STOPPED = "the callback ended it; the pose is the last that held, if one did"
-    UNBOUNDED = "the objective is unbounded, it falls on and on along poses that hold; bound it by a limit or a term"
-    FITTED = "constraints that repeat each other disagree by a little and hold as well as they can; all others hold"
-    BLOCKED = "something is in the way to what is asked for; the pose is the last one before: look at the message"
+    TIME_LIMIT = (
+        "the time limit was reached; the pose is the last that held, if one did: raise time_limit or start nearer"
+    )
+    STOPPED = "the callback stopped the solve; the pose is the last that held, if one did"
+    UNBOUNDED = (
+        "the objective is unbounded: it decreases without end along poses that hold; bound it by a limit or a term"
+    )
+    FITTED = "redundant constraints disagree slightly and hold as well as they can; all others hold"
+    BLOCKED = "something is in the way to the given values; the pose is the last one before it: look at the message"
 
 
 class Scene:

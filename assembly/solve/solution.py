@@ -33,61 +33,62 @@ class Solution(Result):
     Attributes
     ----------
     q : (n, 7)
-        A row a body: x y z qw qx qy qz.
+        One row per body: x y z qw qx qy qz.
     status : Status
     success : bool
-        True only where the constraints, evaluated afresh at `q`, hold to the tolerance, and the objective, if there is
-        one, is stationary and no pose beside `q` was found to be lower: SOLVED. FITTED, too, where constraints that
-        repeat each other disagree by no more than `fit`. Without an objective it says that constraints hold near the
-        start: the least move is a preference.
+        True only if the constraints, evaluated afresh at `q`, hold to the tolerance and the objective, if there is one,
+        is stationary without a lower pose found nearby: SOLVED. Also True for FITTED, where redundant constraints
+        disagree by no more than `fit`. Without an objective it says that constraints hold near the start: the least
+        move is a soft objective.
     objective : float
         In the user's units.
     proved : bool
-        Whether it is proven that all pairs of bodies which clearances keep apart are clear, or only touch. False where
-        faces lie on each other and samples stand for the proof, and where a clearance asks for a gap beside a contact.
+        Whether all pairs of bodies that clearances keep apart are proven to be clear or to touch only. False if faces
+        lie on each other and samples had to be used, and if a clearance asks for a gap beside a contact.
     restarted : bool
         Whether the constraints did not hold near the start, and the solution was found from another one.
     put_together : bool
-        Whether, where joints or contacts did not hold at the start, or an objective alone drew bodies together, they
-        were put together without clearances first: to there they may have passed through each other. The option
-        `keep_topology` forbids it.
+        Whether bodies were put together without clearances first, because joints or contacts did not hold at the start,
+        or because an objective draws them together; they may have passed through each other. The option `keep_topology`
+        forbids it.
     way : Way or None
-        Of a solve with `swept=True`: how far its way is clear, and of a BLOCKED one what is in the way.
+        For a solve with `swept=True`: how far its way is clear, and if BLOCKED what is in the way.
     feasibility : float
-        Largest violation of a constraint, in the user's units, evaluated at `q`. Of a contact that has no extremal pair
-        there it is the distance of the points in `contacts`. Infinite only where an `Expression` or a derivative of it
-        has no finite value, and so is the objective of one.
+        Largest violation of a constraint, in the user's units, evaluated at `q`. For a contact without an extremal pair
+        it is the distance of the points in `contacts`. Infinite only if an `Expression` or a derivative of it has no
+        finite value; then its objective is infinite as well.
     second_order : SecondOrder
         What the end is: `minimum`, `not isolated` (along some motions the objective does not change to second order),
-        `undecided`, `saddle` (not SOLVED: lower poses are beside it, which no step was left for), `no objective`. None
-        of a solve that failed otherwise.
+        `undecided`, `saddle` (not SOLVED: lower poses are nearby, but no step was left to go there), `no objective`.
+        None if the solve failed otherwise.
     stationarity : float
-        Largest component of the Lagrangian's gradient, scaled; of the objective's where a contact was lost.
+        Largest component of the Lagrangian's gradient, scaled; of the objective's gradient if a contact was lost.
     violations : dict of name -> float
     multipliers : dict of name -> array
-        Of L = objective + sum multiplier . residual, in the user's units; not positive for residual >= 0.
+        For L = objective + sum multiplier . residual, in the user's units; not positive for residual >= 0.
     wrenches : dict of name -> dict of body's name -> Wrench
         What each constraint exerts on its bodies: multipliers as forces and torques.
     values : dict of "joint.freedom" -> float
-        Every freedom of every joint, in the user's units and radians; driven and limited angles go on past whole turns.
+        Every coordinate of every joint, in the user's units and radians; driven and limited angles continue past whole
+        turns.
     disagreeing : dict of name -> float
-        Of a FITTED solve: the constraints that repeat each other, and by how much each is off, the worst first.
+        For a FITTED solve: the redundant constraints, and by how much each is off, the worst first.
     conflicting : list of name
-        Of an INFEASIBLE solve: constraints that cannot hold together; `conflicting_sets` has the minimal sets.
+        For an INFEASIBLE solve: constraints that cannot hold together; `conflicting_sets` has the minimal sets.
     mobility : Mobility
         Degrees of freedom at `q`, free motions, redundant constraints.
     pose_error : float
         About how far `q` is from where all rows hold exactly, in sizes of the scene and radians.
     contacts : dict of name -> ContactPair
-        Of a clearance every contact that is near, "clearance: a-b", "clearance: a-b 2" and so on.
+        For a clearance, every contact that is near: "clearance: a-b", "clearance: a-b 2" and so on.
     crossings : tuple of (name, name)
-        Bodies that cross elsewhere than at their contacts, but pairs that a clearance excludes and those that a joint
-        ties directly, or a gear or a rack, whose teeth are in each other.
+        Bodies that cross elsewhere than at their contacts, except pairs that a clearance excludes and pairs that a
+        joint, gear or rack connects directly.
     crossings_of_joined : tuple of (name, name)
-        Of the pairs that a joint or a coupling ties directly those that cross.
+        The pairs that cross among those that a joint or a coupling connects directly.
     iterations : int
     seconds : float
-        Time in the compiled loop; of a solve with `swept=True` all of its time.
+        Time in the compiled loop; with `swept=True` the whole time.
     history : (iterations + 1, 7)
         Columns `Iteration.COLUMNS`; lengths over the scene's size.
     message : str
@@ -120,7 +121,7 @@ class Solution(Result):
 
     @property
     def second_order(self) -> SecondOrder | None:
-        """What the end of a solve is; judged when it is read, unless the solve had to."""
+        """What the end of a solve is; judged when it is read, unless the solve had to judge it."""
         if self._order is None and self.success:
             from assembly.solve.second_order.classification import SecondOrder, judge
 
@@ -134,7 +135,7 @@ class Solution(Result):
 
     @cached_property
     def violations(self) -> dict[str, float]:
-        """Violation of every constraint, by name: its largest; lengths in the user's unit, angles in radians."""
+        """The largest violation of every constraint, by name; lengths in the user's unit, angles in radians."""
         if self._is_lost:
             from assembly.solve.diagnosis.lost import violations
 
@@ -183,25 +184,26 @@ class Solution(Result):
     def crossings(self) -> tuple[tuple[str, str], ...]:
         """Names of bodies that cross at `q` elsewhere than at their contacts; all pairs are searched when it is read.
 
-        Pairs that a joint or a coupling ties directly, one in the other as a rule, are in `crossings_of_joined`; those
-        which a clearance excludes may overlap. A body in the material of another one crosses it, too.
+        Pairs that a joint or a coupling connects directly, which usually overlap, are in `crossings_of_joined`; those
+        that a clearance excludes may overlap. A body inside the material of another one crosses it, too.
         """
         return self.find_crossings().pairs
 
     @cached_property
     def crossings_of_joined(self) -> tuple[tuple[str, str], ...]:
-        """The same of bodies that a joint or a coupling ties directly: a pin in its bore, teeth, links too thick."""
+        """The same for bodies that a joint or a coupling connects directly: a pin in its bore, gears, thick links."""
         return self.find_crossings(joined=True).pairs
 
     def find_crossings(self, *, joined: bool = False, time_limit: float | None = None) -> Crossings:
-        """Bodies that cross at `q`, as far as a search of limited time tells: `crossings` has no limit.
+        """Bodies that cross at `q`, searched for a limited time; `crossings` has no limit.
 
         Parameters
         ----------
         joined : bool
-            Whether it is the pairs that a joint or a coupling ties directly, as in `crossings_of_joined`, or others.
+            Whether to search the pairs that a joint or a coupling connects directly, as in `crossings_of_joined`, or
+            the others.
         time_limit : float, optional
-            Seconds after which the pairs that were not searched to the end are `unseen`.
+            Seconds after which the remaining pairs are `unseen`.
 
         Returns
         -------
@@ -221,9 +223,9 @@ class Solution(Result):
     def pose_error(self) -> float:
         """About how far `q` is from where all rows hold exactly, by their residuals: in sizes of the scene and radians.
 
-        Residual over the smallest singular value of the active rows, and at a dead center, where that is zero, the
-        root of twice the residual over the rows' curvature: 1e-13 there is 4e-7. Free motions do not count, nor does
-        how far an objective is from its best; infinite where rows do not hold to 1e-6.
+        Residual over the smallest singular value of the active rows; at a dead center, where that is zero, the square
+        root of twice the residual over the rows' curvature: a residual of 1e-13 there gives 4e-7. Free motions do not
+        count, nor does the distance from an objective's minimum; infinite if rows do not hold to 1e-6.
         """
         from assembly.solve.diagnosis.pose_error import pose_error
 
@@ -238,7 +240,7 @@ class Solution(Result):
         return message(self)
 
     def iteration_table(self) -> str:
-        """The history as text, a line an iteration."""
+        """The history as text, one line per iteration."""
         from assembly.solve.words import iteration_table
 
         return iteration_table(self)

@@ -19,15 +19,15 @@ class Way(ReadOnlyArrays):
     Attributes
     ----------
     part : float
-        Of the way from what the start was solved with to what is asked for: 1 at its end.
+        The proven part of the way from the values of the start to the present ones: 1 at its end.
     depth : float
-        How deep bodies may be in each other on it, at most, in the user's unit.
+        The largest possible overlap of bodies on the way, in the user's unit.
     obstacles : tuple of (str, str)
-        The pairs of bodies that are in the way; none where it goes to its end, or something else ended it.
+        The pairs of bodies that are in the way; none if the way goes to its end, or if something else ended it.
     place : (3,)
-        Where the first of these pairs meets, or nearly does, in the world; NaN where that is not known.
+        Where the first of these pairs meets, or nearly does, in the world; NaN if that is not known.
     reason : str
-        What ended the way; empty where it goes to its end.
+        What ended the way; empty if it goes to its end.
     """
 
     part: float

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["iteration_table", "message", "table"]
 
-# Moving bodies whose freedoms are printed: counting takes a second for some 300, and grows with the cube.
+# Moving bodies whose degrees of freedom are printed: counting takes a second for some 300, and grows with the cube.
 MOST_COUNTED = 200
 # Bodies with shapes all pairs of which are searched for crossings when a solution is printed; their number grows with
 # the square.
@@ -29,7 +29,7 @@ def message(solution: Solution) -> str:
     if solution.status is Status.CONTACT_LOST and culprit >= 0:
         return f"{solution._packed.pair_name(culprit)!r}: {text}"
     if solution.restarted:
-        text += "; found from another start: near the one given constraints did not hold"
+        text += "; found from another start: near the given one the constraints did not hold"
     if solution.put_together:
         text += "; bodies were put together without clearances first, and may have passed through each other"
     scale = solution._scene.scale
@@ -50,14 +50,14 @@ def message(solution: Solution) -> str:
         text += "; disagreeing: " + ", ".join(f"{name!r} ({off:.3g})" for name, off in solution.disagreeing.items())
     if solution.status is Status.INFEASIBLE:
         named = " and ".join(", ".join(map(repr, names)) for names in solution.conflicting_sets)
-        text += f"; conflicting: {named or 'none was shown to be'}"
+        text += f"; conflicting: {named or 'no set was found'}"
     if solution._result(IMPROPER) > 0.0:
         text += "; at a contact the surfaces cross beside the point (indefinite relative curvature)"
     return text
 
 
 def iteration_table(solution: Solution) -> str:
-    """The history as text, a line an iteration."""
+    """The history as text, one line per iteration."""
     lines = ["   " + "".join(f"{name:>15}" for name in Iteration.COLUMNS)]
     lines += [f"{k:>3}" + "".join(f"{value:>15.6e}" for value in row) for k, row in enumerate(solution.history)]
     return "\n".join(lines)
@@ -73,7 +73,7 @@ def _crossing_lines(solution: Solution) -> list[str]:
     except InputError as error:
         return [f"  crossings are not known: {error}"]
     lines = [f"  {a} and {b} cross; asm.Clearance() keeps them apart" for a, b in apart]
-    return lines + [f"  {a} and {b} cross, which a joint or a coupling ties" for a, b in joined]
+    return lines + [f"  {a} and {b} cross, which are connected by a joint or a coupling" for a, b in joined]
 
 
 def _first_lines(solution: Solution) -> list[str]:

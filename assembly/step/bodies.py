@@ -167,7 +167,7 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
     # Those of a file that is not damaged are of no shape.
     if strict and (missing or (lost and source.damaged)):
         raise StepError(
-            f"path is {str(file)!r}; {_listed('not read', missing + lost)}; pass strict=False to go without"
+            f"path is {str(file)!r}; {_listed('not read', missing + lost)}; pass strict=False to read the rest"
         )
     away = [f"{name!r}, which it refers to and which is not there" for name in source.absent]
     if not bodies:

@@ -169,5 +169,5 @@ def _laid(face: Any) -> Laid:
     wires = wires_of(face)
     box = bounds(wires, surface, face)
     if not all(isfinite(x) and abs(x) < _FAR for x in box):
-        raise Unreadable("it has no boundary, and its surface no end")
+        raise Unreadable("it has no boundary, and its surface is unbounded")
     return Laid(surface, wires, patch(surface, box))

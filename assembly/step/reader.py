@@ -94,20 +94,19 @@ def read_step(
 ) -> list[Body]:
     """The solids of a STEP file, a body each.
 
-    A part that the file's assembly uses several times becomes as many bodies, which share their faces. Geometry stays
-    in the part's own coordinates; the body's pose is the placement that the assembly gives it. Names are those of
-    the parts, and "nut" is followed by "nut 2"; faces have the names that the file gives them, or "face 1", "face 2"
-    in its order (around voids always: OCCT does not read those names). `body.color` and `face.color` are the file's, or
-    None.
+    A part that the file's assembly uses several times becomes several bodies that share their faces. Geometry stays in
+    the part's own coordinates; the body's pose is its placement in the assembly. Names are those of the parts, with
+    "nut" followed by "nut 2"; faces have their names in the file, or "face 1", "face 2" in its order (always around
+    voids, whose names OCCT does not read). `body.color` and `face.color` are the file's, or None.
 
     Planes, cylinders, cones, spheres, tori, swept surfaces and splines are exact rational surfaces, and so are their
-    trims, up to curves around an axis that have no rational form (helices, intersections): those are followed to
-    1e-10 of the face's extent in (u, v). Ends of edges that the file leaves apart within its tolerance are joined.
-    What a file's tolerance forgives, trims that leave their surface and ends that are apart, is at most a hundredth of
-    the part's size. Faces end where their surfaces cross, where a file has edges beside these.
-    Faces are a little smaller than the patches of their surfaces. Shells and faces outside of any solid become bodies
-    too. What bounds no face, as wires, points and annotations, is not read. Files of parts that the file refers to are
-    looked for beside it.
+    trims, up to curves around an axis that have no rational form (helices, intersections): those are followed to 1e-10
+    of the face's extent in (u, v). Ends of edges that the file leaves apart within its tolerance are joined. Trims that
+    leave their surface and ends that do not meet are accepted within the file's tolerance, up to a hundredth of the
+    part's size. Where a file has edges beside its surfaces, faces end where the surfaces cross. Faces are a little
+    smaller than the patches of their surfaces. Shells and faces outside of any solid become bodies too. Wires, points
+    and annotations that bound no face are not read. Files of parts that the file refers to are looked for in its
+    folder.
 
     Parameters
     ----------
@@ -116,10 +115,10 @@ def read_step(
     unit : {"mm", "um", "cm", "m", "in", "ft"}
         Lengths are converted to it, whatever the file's own unit.
     strict : bool
-        Raise where a face cannot be read, or the text is damaged. Otherwise faces are left out, statements too, and
-        warnings say which and why.
+        Whether to raise if a face cannot be read or the text is damaged. Otherwise these faces and statements are left
+        out, and warnings say which and why.
     progress : bool or callable
-        True shows a bar of faces; a function is called with how many faces are read, and of how many.
+        True shows a progress bar; a function is called with the numbers of faces read and of all faces.
 
     Returns
     -------
@@ -139,8 +138,8 @@ def read_step(
     Warns
     -----
     StepWarning
-        Faces that are left out, or were approximated by more than 1e-7 mm (offset surfaces); damage to the file; files
-        that it refers to and that are not there.
+        Faces that are left out, or approximated with an error of more than 1e-7 mm (offset surfaces); damage to the
+        file; missing files that it refers to.
     """
     checked_unit(unit)
     if not isinstance(strict, (bool, np.bool_)):
@@ -156,7 +155,7 @@ def read_step(
     except Damaged as reason:
         damage = str(reason)
         if strict and isinstance(reason, Malformed):
-            raise StepError(f"{damage}; pass strict=False for what is whole of it") from None
+            raise StepError(f"{damage}; pass strict=False to read the undamaged part") from None
     if damage:
         bodies, left = _read_apart(str(file), unit, bool(strict), damage)
         left.append(f"{damage}, and what OCCT makes of the rest was read")

@@ -97,22 +97,22 @@ def write_step(
 ) -> None:
     """Write bodies to a STEP file (AP214, in millimeters), each where it stands.
 
-    The file has one assembly. Bodies that share their faces are instances of one part where their names follow from
-    its name ("nut", "nut 2"), so that `read_step` gives the same bodies again: names, poses, colors, names and colors
-    of faces. Faces that close are written as a solid, others as shells; a body in several pieces is read as several.
+    The file has one assembly. Bodies that share their faces are instances of one part if their names follow from its
+    name ("nut", "nut 2"), so that `read_step` gives the same bodies again: names, poses, colors, names and colors of
+    faces. Closed faces are written as a solid, others as shells; a body in several pieces is read as several bodies.
     Planes, cylinders, cones, spheres, tori, extrusions and revolutions are written as such, whatever their parameters,
     and all others as B-splines, exactly; of the edges, lines in (u, v) and curves in planes are exact and others are
-    followed to 1e-10 of the surface's size. A face that winds more than once around a surface that is written as
-    a B-spline is written in parts of half a turn.
+    followed to 1e-10 of the surface's size. A face that winds more than once around a surface that is written as a
+    B-spline is written in parts of half a turn.
 
     Parameters
     ----------
     path
         Where to write.
     what : Assembly, Solution, Body or several bodies
-        Bodies of a solution stand where it puts them. Bodies without faces are left out, and a warning says so.
+        Bodies of a solution have its poses. Bodies without faces are left out with a warning.
     unit : {"mm", "um", "cm", "m", "in", "ft"}
-        What the bodies' lengths are; they are converted to millimeters.
+        Unit of the bodies' lengths; they are converted to millimeters.
 
     Raises
     ------

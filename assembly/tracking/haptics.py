@@ -7,7 +7,7 @@
 
 Each does the same work on both sides. W is a force in world axes and a torque t about the body's origin in body axes;
 G (`kinematics/pose.py`, in body axes) has the factor two, and e any length, since its rotation is the normalized one:
-along e nothing works. Eq. 7 has a column a joint, b_i from the origin of joint i to the wrist; the printed indices,
+along e nothing works. Eq. 7 has one column per joint, b_i from the origin of joint i to the wrist; the printed indices,
 0 to 7, make eight of seven. `assembly.statics` reads the same off a scene; here are devices, known by arrays, and
 many ticks at once: leading axes broadcast.
 """

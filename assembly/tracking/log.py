@@ -66,16 +66,16 @@ class TrackLog(ReadOnlyArrays):
     Parameters
     ----------
     times : (k,)
-        When each target was to be reached, in the hand's seconds; increasing.
+        Times of the targets, in the trace's seconds; increasing.
     seconds : (k,)
         What each tick took.
     feasibility : (k,)
         Worst violation after each, in the user's units.
     status : (k,) of int
-        How each ended: places in `statuses`.
+        How each ended: indices into `statuses`.
     iterations : (k,) of int
     q : (m, n, 7)
-        Poses after ticks 0, stride, 2 stride ...: a row a body, x y z qw qx qy qz.
+        Poses after ticks 0, stride, 2 stride ...: one row per body, x y z qw qx qy qz.
     statuses : sequence of str
         Names of the statuses.
     events : sequence of (tick, event)
@@ -131,14 +131,14 @@ class TrackLog(ReadOnlyArrays):
     def recorder(
         times: ArrayLike, bodies: int, statuses: type[Enum], *, stride: int = 1, budget: float | None = None
     ) -> Recorder:
-        """A recorder for ticks at times (k,) of a number of bodies; a status is its place in an Enum."""
+        """A recorder for ticks at times (k,) of a number of bodies; a status is its index in an Enum."""
         return Recorder(times, bodies, statuses, stride=stride, budget=budget)
 
     def __len__(self) -> int:
         return len(self.times)
 
     def percentile(self, p: float) -> float:
-        """Seconds that p percent of the ticks took at most: of one of the ticks, not between two."""
+        """Seconds that p percent of the ticks took at most: the duration of one of the ticks, not interpolated."""
         part = number("p", p)
         if not 0.0 <= part <= 100.0:
             raise InputError(f"p is {part:g}; expected percents from 0 to 100")

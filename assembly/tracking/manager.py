@@ -84,10 +84,10 @@ class _Everything(Clearance):
 class Manager(OwnState):
     """The global stage without a solve: pairs of bodies from far to near to tracked contacts (paper 001, section 5).
 
-    Every `update` says where bodies stand. A contact that is listed is carried along by the contact velocity
-    formulation and corrected by Newton's method; one that loses its extremum, or is corrected by so much that it may
-    have come to another one, is handed back to an update of its pair of bodies. Other pairs are updated when the
-    bodies have moved by what the last update left them.
+    Every `update` gives the poses of the bodies. A listed contact is predicted by the contact velocity formulation and
+    corrected by Newton's method; if it loses its extremum, or is corrected so much that it may have moved to another
+    one, its pair of bodies is searched again. Other pairs are searched when the bodies have moved as far as the last
+    search allows.
 
     Parameters
     ----------
@@ -95,18 +95,19 @@ class Manager(OwnState):
         Two or more, with shapes and distinct names; each may move, fixed ones too.
     reach : float, optional
         Contacts with a gap up to this are all listed, in the unit of the bodies; at most a fifth of the largest body's
-        size. By default zero: what touches or crosses is listed, and what is near as far as the bodies' pace asks for.
+        size. By default zero: contacts that touch or cross are listed, and near ones depending on how fast the bodies
+        move.
     merge_radius : float
         Two contacts of the same two bodies whose points are nearer than this on both, and near along the surfaces as
         well, are one: the radius of the spheres of neglect, in parts of the scene's size. Contacts farther apart are
         all kept, also across a wire thinner than the radius.
     slots : int, optional
-        How many contacts may be near at a time, to begin with; twice as many when they do not do.
+        How many contacts may be near at a time, initially; doubled when that is not enough.
     neglect, places
         Former names of `merge_radius` and `slots`; they warn.
     touching : float
-        What bodies may be in each other and still touch, in parts of the scene's size: only what is deeper crosses. For
-        parts of files 1e-6 is right, say.
+        How much bodies may overlap and still count as touching, in parts of the scene's size; only deeper overlaps are
+        crossings. For parts of files use 1e-6, for example.
 
     Raises
     ------
@@ -231,9 +232,10 @@ class Manager(OwnState):
 
     @property
     def crossings(self) -> tuple[tuple[str, str], ...]:
-        """Names of the pairs of bodies that are in each other by more than `touching`, or wholly; () before an update.
+        """Names of the pairs of bodies that overlap by more than `touching`, or enclose each other; () before an
+        update.
 
-        Where the last update put them. All pairs are searched anew when this is read, which takes longer than an
+        At the poses of the last update. All pairs are searched anew when this is read, which takes longer than an
         update.
         """
         if np.isnan(self._poses).any():
@@ -244,18 +246,18 @@ class Manager(OwnState):
         return find_crossings(posed, list(combinations(shaped, 2)), CTRL_C).pairs
 
     def update(self, q: ArrayLike) -> tuple[Event, ...]:
-        """Bodies stand here now.
+        """Set the poses of the bodies.
 
         Parameters
         ----------
         q : (n, 7)
-            A row a body: x y z qw qx qy qz.
+            One row per body: x y z qw qx qy qz.
 
         Returns
         -------
         tuple of Event
-            Contacts that came near, went away, were handed back to the global stage or merged, in that order of
-            happening; the last 64 of them.
+            Contacts that came near, went away, were handed back to the global search or merged, in the order in which
+            this happened; the last 64 of them.
 
         Raises
         ------
@@ -309,7 +311,7 @@ class Manager(OwnState):
 
     @property
     def states(self) -> dict[tuple[str, str], PairState]:
-        """How every pair of bodies is watched; far before the first update."""
+        """How every pair of bodies is tracked; "far" before the first update."""
         pairs = self._parts(self._packed, self._memory)[0]
         return {
             names: _STATES[int(state)]
@@ -320,9 +322,9 @@ class Manager(OwnState):
     def gaps(self) -> dict[tuple[str, str], float]:
         """A lower bound of the gap of every pair of bodies, proven anew where it is read.
 
-        The gap of the nearest contact that is listed, or how far what is not listed is away at least, less a part of
-        1e-9; a smaller one where that is not proven. Not positive, and no bound, where bodies cross or touch; minus
-        infinity before the first update, and where nothing is proven.
+        The gap of the nearest listed contact, or the least distance of all that is not listed, less a part of 1e-9; a
+        smaller one if that is not proven. Not positive, and no bound, where bodies cross or touch; minus infinity
+        before the first update, and where nothing is proven.
         """
         pairs = self._parts(self._packed, self._memory)[0]
         if np.isnan(pairs[:, manager_records.PAIR_TURN]).any():

@@ -29,8 +29,8 @@ class TrackStatus(Enum):
     Under a clearance a pose holds only where it is proven that bodies are clear or touch, at it and on the way there.
     """
 
-    FOLLOWED = "the constraints hold and the pose is as near to the hand as they allow"
-    APPROACHING = "the constraints hold; the next tick goes on toward the hand"
+    FOLLOWED = "the constraints hold and the pose is as near to the target as they allow"
+    APPROACHING = "the constraints hold; the next tick continues toward the target"
     LATE = "the time was spent; the constraints hold at the pose returned"
     HELD = "no further pose was found that holds; the last one that does is returned"
     BAD_TARGET = "the target is no finite point or pose; nothing moved"
@@ -42,36 +42,36 @@ class TrackStatus(Enum):
 
 
 class Step(ReadOnlyArrays):
-    """What a tick did. Tables are computed when they are read; arrays are read-only.
+    """The result of a tick. Tables are computed when they are read; arrays are read-only.
 
-    One that is LATE at the pose of the step before has that one's figures as well: violation, iterations, objective.
+    A step that is LATE at the pose of the step before also has that step's violation, iterations and objective.
 
     Attributes
     ----------
     q : (n, 7)
-        A row a body: x y z qw qx qy qz.
+        One row per body: x y z qw qx qy qz.
     feasibility : float
         Largest violation of a constraint at `q`, in the user's units.
     status : TrackStatus
     force, wrench : (3,), (6,)
         What the assembly exerts on the hand: force, then torque about the followed point, world axes; stiffness times
-        what the hand is ahead. Of several hands they are not one, and `forces` and `wrenches` tell.
+        the distance from the target. For several targets read `forces` and `wrenches`.
     forces, wrenches : (k, 3), (k, 6)
-        The same for every hand.
+        The same for every target.
     is_minimum : bool or None
         Whether the second derivative along what the constraints leave free is positive definite; None if not asked.
     iterations : int
     seconds : float
         From the call of `step` to its end.
     events : tuple of Event
-        Contacts of clearances that came, went, were handed off or merged in this tick.
+        Contacts of clearances that appeared, disappeared, were handed off or merged in this tick.
     proved : bool
-        Whether it is proven that bodies which clearances keep apart are clear, or only touch, at the pose and on the
-        way to it. False where the constraints do not hold, and where faces lie on each other and rows stand for it.
+        Whether bodies that clearances keep apart are proven to be clear or to touch only, at the pose and on the way to
+        it. False if the constraints do not hold, and if faces lie on each other so that only rows keep them apart.
     way_depth : float
-        How deep bodies that touch may be in each other on the way to the pose, at most.
+        The largest overlap that bodies which touch may have on the way to the pose.
     solution : Solution
-        The same pose with all that a solution tells: contacts, multipliers, wrenches of every constraint.
+        The same pose as a solution: contacts, multipliers, wrenches of every constraint.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ class Step(ReadOnlyArrays):
 
     @property
     def objective(self) -> float:
-        """The objective, the energy of the hand's spring among it."""
+        """The objective, including the energy of the spring to the target."""
         return self._result(OBJECTIVE) * self._followed.packed.unit
 
     @property
@@ -128,7 +128,7 @@ class Step(ReadOnlyArrays):
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
-        """What became of contacts since the step before, in the memory of its state."""
+        """Events of contacts since the step before."""
         followed, packed = self._followed, self._followed.packed
         if not packed.clearance_rows or self._state[packed.memory_at + EVENT_COUNT] == self._seen:
             return ()
@@ -136,19 +136,21 @@ class Step(ReadOnlyArrays):
 
     @cached_property
     def wrenches(self) -> Array:
-        """Force and torque on every hand, (k, 6)."""
+        """Force and torque on the hand at every target, (k, 6)."""
         return read_only(self._followed.hands.wrenches(self.q, self._target))
 
     @property
     def forces(self) -> Array:
-        """Force on every hand, (k, 3)."""
+        """Force on the hand at every target, (k, 3)."""
         return self.wrenches[:, :3]
 
     @property
     def wrench(self) -> Array:
         """Force and torque on the hand, (6,)."""
         if len(self.wrenches) > 1:
-            raise InputError(f"the tracker has {len(self.wrenches)} hands; read forces or wrenches, a row a hand")
+            raise InputError(
+                f"the tracker has {len(self.wrenches)} hands; read forces or wrenches, with a row for each hand"
+            )
         wrench: Array = self.wrenches[0]
         return wrench
 

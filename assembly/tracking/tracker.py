@@ -95,7 +95,7 @@ def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
 def _held_to(begin: Solution) -> Solution:
     """A solve that a tracker begins with, which has to hold."""
     if not begin.success:
-        raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {begin.message}")
+        raise InputError(f"q0 leads to no pose at which the constraints hold; expected one that does: {begin.message}")
     return begin
 
 
@@ -121,37 +121,38 @@ def _tick_settings(limit: float, iterations: int, second_order: bool) -> Array:
 
 
 class Tracker(InOneProcess):
-    """Follows hands that hold points or frames of bodies: made by `Assembly.tracker`.
+    """Makes points or frames of bodies follow targets; made by `Assembly.tracker`.
 
-    Every tick is a few steps of the loop that `solve` runs, from the pose and the multipliers of the tick before. The
-    hand is a spring: it draws the point by `stiffness` times the distance, and the constraints hold all the time. Other
-    objectives of the scene count beside it. Under a clearance a pose is taken only where bodies are proven clear, or to
-    touch, at it and on the way from the last one; else the tick is HELD there.
+    Every tick is a few steps of the loop that `solve` runs, from the pose and the multipliers of the tick before. A
+    spring draws the point to its target with `stiffness` times the distance, and the constraints hold all the time.
+    Other objectives of the scene are added. Under a clearance a pose is accepted only if bodies are proven to be clear
+    or to touch only, at it and on the way from the last pose; otherwise the tick is HELD at the last pose.
 
     Parameters
     ----------
     scene : Assembly
-        Its bodies, constraints and objectives as they are now; driven values and limits may change between ticks, but
-        none may come or go.
+        Its present bodies, constraints and objectives; driven values and limits may change between ticks, but none may
+        be added or removed.
     follow : Point, Frame or Body, or a list of them
-        What the hand holds, or each of several hands. A target is a point (3,) for a `Point`, a pose (7,) or a `Pose`
-        for the others; of a list it is a sequence of such targets in its order.
+        What follows the target, or a list of several. The target of a `Point` is a point (3,), that of the others a
+        pose (7,) or a `Pose`; for a list it is a sequence of targets in its order.
     q0 : (n, 7) or Solution, optional
-        Where to begin; the bodies' poses by default. The constraints are solved from there, the hand at rest.
+        Where to begin; by default the bodies' poses. The constraints are solved from there, with the target at rest.
     stiffness : float or sequence of float
-        Force over distance; one for each hand, or one for all.
+        Force over distance; one for each target, or one for all.
     budget : float, optional
-        Seconds after which the compiled loop of a tick begins nothing more; what is not done then the next tick goes on
-        with. Without one it takes what it needs.
+        Seconds after which the compiled loop of a tick begins no further step or update; the next tick continues with
+        what is not done. Without a budget a tick takes as long as it needs.
     iterations : int
-        Steps of a tick after which it ends, if the constraints hold; it takes up to four times as many until they do.
+        Number of steps after which a tick ends if the constraints hold; otherwise up to four times as many.
     tolerance : float
-        Largest violation that counts as held, in parts of the scene's size; far from the origin, what rounding of
-        coordinates alone violates. Where the start is FITTED it is 1e-6 at least.
+        Largest violation at which constraints count as held, in parts of the scene's size; far from the origin at least
+        the rounding of coordinates, and at least 1e-6 if the start is FITTED.
     second_order : bool
         Whether every tick is tested for a minimum.
     touching : float
-        What bodies of a clearance may be in each other where it begins and still touch, in parts of the scene's size.
+        How much bodies of a clearance may overlap at the start and still count as touching, in parts of the scene's
+        size.
 
     Raises
     ------
@@ -265,7 +266,7 @@ class Tracker(InOneProcess):
 
     @property
     def follow(self) -> Followable | tuple[Followable, ...]:
-        """What the hand holds, or each of several hands."""
+        """What follows the target, or a list of several."""
         return self._hands.follow
 
     @property
@@ -279,13 +280,12 @@ class Tracker(InOneProcess):
         return read_only(self._before[: self._packed.contacts_at].reshape(-1, 7).copy())
 
     def step(self, target: ArrayLike | Pose | Sequence[ArrayLike | Pose]) -> Step:
-        """Follow the hands for a tick. Never raises: see `Step.status`.
+        """Follow the target for one tick. Never raises: see `Step.status`.
 
         Parameters
         ----------
         target : (3,), (7,) or Pose
-            Where the hand is: a point, or the pose of the frame it holds. Of several hands a sequence of such targets;
-            if one of them is none, no hand moves.
+            A point, or a pose for a frame. For several a sequence of targets; if one of them is invalid, nothing moves.
         """
         begin = perf_counter()
         packed = self._packed
@@ -360,14 +360,14 @@ class Tracker(InOneProcess):
         return numbers_told(self._packed, self._inner.bodies, self._inner.constraints)
 
     def run(self, trace: Trace | Sequence[Trace], *, paced: bool = False, stride: int = 1) -> TrackLog:
-        """Follow recorded hands, a tick a sample.
+        """Follow recorded motions, one tick per sample.
 
         Parameters
         ----------
         trace : Trace or sequence of Trace
-            For several hands one each, with the same times.
+            For several targets one trace each, with the same times.
         paced : bool
-            Wait for each sample's time by the clock; else as fast as possible.
+            Whether to wait for each sample's time by the clock, instead of going as fast as possible.
         stride : int
             Poses are kept of every so many ticks.
 
@@ -378,7 +378,7 @@ class Tracker(InOneProcess):
         Raises
         ------
         InputError, TypeError
-            Not a trace for each hand, or traces of other times than the first one's.
+            Not a trace for each target, or traces with times other than the first one's.
         """
         bodies, budget = len(self._scene.bodies), self._budget
         times, targets = self._hands.recorded(trace)

@@ -59,7 +59,8 @@ def animate(
     loop : bool
         Whether it starts again at the end.
     captions : iterable of str
-        What the play bar of a file says at each frame, a driven value with its unit say; else the frame's number.
+        Text in the play bar of a file at each frame, for example a driven value with its unit; by default the frame's
+        number.
     ellipsoids : Ellipsoid, or for each frame one or several
         A single one stays as it is.
     direction : (3,)

@@ -82,13 +82,13 @@ def show(
     direction: ArrayLike = DIRECTION,
     visualizer: Visualizer | None = None,
 ) -> Visualizer:
-    """Draw a scene in a meshcat visualizer, in the place of what was shown before.
+    """Draw a scene in a meshcat visualizer, replacing what was shown before.
 
     Parameters
     ----------
     scene : Assembly
     solution : Solution, optional
-        Bodies stand where it says, and its contacts are shown; else they stand where they were made.
+        Bodies are shown at its poses, with its contacts; by default at their own poses.
     open : bool
         Whether to open a browser window. Without it nothing is opened; `visualizer.url()` is the address.
     ellipsoids : Ellipsoid or several

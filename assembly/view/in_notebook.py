@@ -45,13 +45,13 @@ def notebook(
     height: int = 360,
     direction: ArrayLike = DIRECTION,
 ) -> NotebookView:
-    """A scene, or one body, to turn around in a notebook: let it be the last line of a cell.
+    """Show a scene, or one body, in a notebook, to be turned with the mouse: make it the last line of a cell.
 
     Parameters
     ----------
     scene : Assembly or Body
     solution : Solution, optional
-        Bodies stand where it says, and its contacts are shown.
+        Bodies are shown at its poses, with its contacts.
     height : int
         Of the picture, in pixels, 50 to 5000.
     direction : (3,)

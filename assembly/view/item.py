@@ -100,7 +100,7 @@ class Stations:
     ----------
     bodies : sequence of Body
     q : (k, n, 7)
-        A row a body, at each time.
+        One row per body, at each time.
     """
 
     def __init__(self, bodies: Sequence[Body], q: Array) -> None:

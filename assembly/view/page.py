@@ -181,7 +181,7 @@ def save_html(
     path : str or path
     scene : Assembly
     solution : Solution, optional
-        Bodies stand where it says, and its contacts are shown; else they stand where they were made.
+        Bodies are shown at its poses, with its contacts; by default at their own poses.
     ellipsoids : Ellipsoid or several
         Drawn beside the bodies, half transparent, with their axes.
     interference : Interference, optional

@@ -177,7 +177,7 @@ def test_what_is_fixed_and_what_is_not_tied():
     for arguments, error, text in (
         ({"fixed": "c"}, asm.errors.InputError, "expected parts of the assembly: 'a', 'b'"),
         ({"driven": {a: 1}}, TypeError, "expected joints of build123d"),
-        ({"driven": {a.joints["r"]: {"position": 1}}}, asm.errors.InputError, "which it does not leave"),
+        ({"driven": {a.joints["r"]: {"position": 1}}}, asm.errors.InputError, "which the joint does not leave free"),
         ({"driven": {a.joints["r"]: {"turn": 1}}}, asm.errors.InputError, "expected 'angle' or 'position'"),
         ({"driven": 3}, TypeError, "expected a mapping"),
     ):

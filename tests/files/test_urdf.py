@@ -182,7 +182,7 @@ def test_what_primitives_are():
 BAD = {
     "no xml": ("nonsense", "expected a URDF file"),
     "no links": ('<robot name="r"/>', "it has no links; expected a robot"),
-    "two of a name": ('<robot name="r"><link name="a"/><link name="a"/></robot>', "two links have one name"),
+    "two of a name": ('<robot name="r"><link name="a"/><link name="a"/></robot>', "two links have the same name"),
     "no name": ('<robot name="r"><link name=" "/></robot>', "a link has the name ' '; expected a nonempty string"),
     "two roots": (
         '<robot name="r"><link name="a"/><link name="b"/></robot>',
@@ -203,7 +203,7 @@ BAD = {
         '<robot name="r"><link name="a"/><link name="b"/><link name="c"/>'
         '<joint name="j" type="fixed"><parent link="b"/><child link="c"/></joint>'
         '<joint name="k" type="fixed"><parent link="c"/><child link="b"/></joint></robot>',
-        r"links \['b', 'c'\] hang on each other in a ring",
+        r"links \['b', 'c'\] form a ring of joints",
     ),
     "type": (
         '<robot name="r"><link name="a"/><link name="b"/>'
@@ -284,7 +284,7 @@ def test_scenes_that_are_no_robots(tmp_path):
     a, b, c = (asm.Body(name, asm.shapes.sphere(1.0), fixed=name == "a") for name in "abc")
     scene = asm.Assembly([a, b, c])
     scene.constrain(asm.Fixed(a, b))
-    with pytest.raises(UrdfError, match=r"bodies \['c'\] hang on nothing"):
+    with pytest.raises(UrdfError, match=r"bodies \['c'\] are connected to the root by no joints"):
         asm.write_urdf(path, scene)
     scene.constrain(asm.Fixed(b, c), asm.Fixed(a, c))
     with pytest.raises(UrdfError, match="joint .* closes a loop at '[bc]'; expected a tree"):

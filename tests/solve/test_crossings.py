@@ -34,7 +34,7 @@ def test_joints_alone_have_crossings():
     assert solution.crossings_of_joined == (("ground", "a"), ("a", "b"))
     lines = str(solution).splitlines()
     assert "  ground and c cross; asm.Clearance() keeps them apart" in lines
-    assert "  a and b cross, which a joint or a coupling ties" in lines
+    assert "  a and b cross, which are connected by a joint or a coupling" in lines
 
 
 def test_a_scene_without_constraints_has_crossings_and_apart_there_are_none():

@@ -269,7 +269,7 @@ def test_what_is_waited_for():
     with pytest.raises(ZeroDivisionError):
         limited.wait_for("a quotient", lambda: 1 // 0)
     done = threading.Event()
-    with pytest.raises(TimeoutError, match="a rest is not known yet where time_limit is over"):
+    with pytest.raises(TimeoutError, match="a rest is not known yet when time_limit is over"):
         interruption.Interruption(time_limit=1e-3).wait_for("a rest", lambda: done.wait(60.0))
     assert not done.is_set()
     done.set()

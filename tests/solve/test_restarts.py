@@ -260,7 +260,7 @@ def test_what_is_stuck_at_a_pole_is_called_no_contradiction():
     case = linkage(1273)
     solution = case.scene.solve()
     assert case.scene.solve(case.held).success and solution.status is asm.Status.INFEASIBLE
-    assert solution.conflicting == [] and "conflicting: none was shown to be" in solution.message
+    assert solution.conflicting == [] and "conflicting: no set was found" in solution.message
 
 
 def test_linkages_that_are_drawn_somewhere_are_closed():

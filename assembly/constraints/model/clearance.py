@@ -17,28 +17,26 @@ __all__ = ["Clearance"]
 class Clearance(Constraint):
     """The gap between any two of the bodies is at least `minimum`, everywhere.
 
-    Contacts come and go as the bodies move: a contact manager lists every extremal pair of points that comes near
-    (`Manager`), each is a row gap >= minimum as long as it is near, and a step is never longer than to where something
-    that is not listed could touch. A solve ends SOLVED only where every pair of bodies is proven clear, or clear after
-    a move of one of them by what is called touching; a tick is held to the same, and so is the way to it
-    (`docs/certified.md`). Of some faces that lie on each other without play neither can be proven: there samples
-    stand in, and `Solution.proved` is False. A solve that knows neither of a pair is STALLED and names it.
+    Contacts come and go as the bodies move: a contact manager (`Manager`) lists every extremal pair of points that
+    comes near, each is a row gap >= minimum while it is near, and steps are limited so that nothing can touch that is
+    not listed. A solve is SOLVED only if every pair of bodies is proven to be clear, or to be clear after a move of one
+    body by the option `touching`; for a tick the same is proven, also of the way to it (`docs/certified.md`). For some
+    faces that lie on each other without play neither can be proven: then samples are tested, and `Solution.proved` is
+    False. If nothing is known of a pair, the solve is STALLED and names it.
 
-    Pairs of points that a `Contact` of the same two bodies has are that contact's: its gap of zero is no violation. A
-    `minimum` above zero does not ask for the place of the contact: what is reached from its points, between the two
-    bodies, without their gap rising to `minimum`. Nothing crosses there, and elsewhere the bodies keep it. The place of
-    a contact that is still open is the one it will have once it is closed; a one-sided one that is open by `minimum` or
-    more leaves nothing out that is nearer. Of the two bodies it is proven that they do not cross; the gap around the
-    contact is that of the rows, and `Solution.proved` is False where `minimum` is above zero.
+    A `Contact` of the same two bodies is no violation. A `minimum` above zero does not apply around it: in the part
+    between the two bodies that can be reached from its points without the gap rising to `minimum` they only may not
+    cross. For a contact that is still open this is the part around where it will close; a one-sided contact that is
+    open by `minimum` or more has no such part. For these two bodies it is proven that they do not cross; the gap around
+    the contact is kept by rows, and `Solution.proved` is False if `minimum` is above zero.
 
-    Bodies that cross at the start are pushed apart by their contacts. From a start in which they are stuck through each
-    other, or within each other, they are also parted by the least translation that is found; of the ways that hold the
-    one with the least objective is the answer, the least move where nothing else is asked for. Where there is none the
-    solve is STALLED.
+    Bodies that cross at the start are pushed apart by their contacts. If they are stuck through each other or within
+    each other, parting them by the shortest translation found is tried as well; of the results that hold, the one with
+    the least objective (by default the least move) is the answer. If none holds the solve is STALLED.
 
-    Of solids with edges corners are contacts too: vertices and points of edges over a face, and edges that cross, whose
-    normal misses their cones by less than 0.3 rad, and points of a curve along which two faces all but touch, as a ring
-    and the plate below it. Where faces come to lie on each other, several of them carry.
+    For solids with edges, corners are contacts too: vertices and points of edges over a face, edges that cross, if the
+    normal misses their normal cones by less than 0.3 rad, and points of a curve along which two faces almost touch,
+    such as a ring and the plate below it. Faces that lie on each other have several contacts that carry.
 
     Parameters
     ----------
@@ -51,21 +49,21 @@ class Clearance(Constraint):
     exclude : iterable of (Body, Body)
         Pairs that may overlap: a pin in its hole, links that a joint holds together.
     merge_radius : float
-        Two contacts of the same two bodies whose points are nearer than this on both, and near along the surfaces as
-        well, are one: the radius of the spheres of neglect (paper 001, section 5), in parts of the scene's size.
+        Two contacts of the same two bodies count as one if their points are nearer than this on both bodies, also along
+        the surfaces: the radius of the spheres of neglect (paper 001, section 5), in parts of the scene's size.
         Contacts farther apart are all kept, also across a wire thinner than the radius.
     slots : int, optional
         How many contacts may be near at a time; by default six for one pair and two more for each further one, at most
-        eight and four a body. A solve that needs more begins again with four times as many.
+        eight plus four for each body. A solve that needs more begins again with four times as many.
     neglect, places
         Former names of `merge_radius` and `slots`; they warn.
 
     Raises
     ------
     InputError, TypeError
-        Fewer than two bodies, bodies without shape, a pair that is not of the bodies, numbers out of range; bodies of
-        sizes or of surfaces whose parameters have spans that doubles do not carry (1e-75 to 1e75, 1e-60 to 1e60): of
-        all bodies of an assembly it is looked at when the assembly is solved.
+        Fewer than two bodies, bodies without shape, a pair that is not of the bodies, numbers out of range; sizes of
+        bodies outside of 1e-75 to 1e75, or spans of surface parameters outside of 1e-60 to 1e60. With `bodies=None`
+        this is checked when the assembly is solved.
     """
 
     # Whether corners over faces are listed besides extrema, for steps to see.
@@ -100,7 +98,7 @@ class Clearance(Constraint):
         self._merge_radius = number("merge_radius", merge_radius)
         if not 0.0 < self._merge_radius <= 1.0:
             raise InputError(
-                f"merge_radius is {self._merge_radius:g}; expected a part of the scene's size, from above 0 to 1"
+                f"merge_radius is {self._merge_radius:g}; expected a positive part of the scene's size, 1 at most"
             )
         slots = renamed("slots", slots, "places", places)
         if slots is not None and (not isinstance(slots, int) or isinstance(slots, bool) or slots < 1):

@@ -205,7 +205,7 @@ class Equation:
         return sign * float(getattr(owner, name))
 
     def ask_for(self, value: float) -> None:
-        """Set what `current` reads. The value is taken as it is, limits of a driven freedom or not."""
+        """Set what `current` reads. The value is taken as it is, limits of a driven coordinate or not."""
         if self.source is not None:
             owner, name, sign = self.place()
             setattr(owner, name, sign * value)
@@ -249,7 +249,7 @@ class Freedom:
         self._joint = joint
         self._name = name
         self._coordinate = coordinate
-        # What messages call the value. A freedom under another name is what its joint holds, not a drive of it.
+        # What messages call the value. A coordinate under another name is what its joint holds, not a drive of it.
         self._argument = argument or name
         self._limits_argument = limits_argument
         self._is_own = argument is not None
@@ -258,12 +258,12 @@ class Freedom:
 
     @property
     def joint(self) -> Joint:
-        """The joint that has the freedom."""
+        """The joint that has the coordinate."""
         return self._joint
 
     @property
     def name(self) -> str:
-        """Name of the freedom in its joint: "angle", "slide" ..."""
+        """Name of the coordinate in its joint: "angle", "slide" ..."""
         return self._name
 
     @property
@@ -309,7 +309,7 @@ class Freedom:
 
     @property
     def equations(self) -> tuple[Equation, ...]:
-        """The driving row, or else a one-sided row for each limit; a driven freedom is within its limits anyway."""
+        """The driving row, or else a one-sided row for each limit; a driven coordinate is within its limits anyway."""
         driven, below, above = self._rows
         rows = []
         if driven:

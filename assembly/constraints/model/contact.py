@@ -19,11 +19,11 @@ __all__ = ["Contact", "lone_surfaces", "side_face", "side_faces"]
 class Contact(Constraint):
     """The extremal gap of two faces is zero (or, one-sided, not negative), or another least gap.
 
-    The gap is that of the pair of points the solve tracks from its start; where it lies on the faces is free. With
-    edges the pair is one of features, faces, edges or vertices, and switches between them as the bodies move; without,
-    it is one of two surfaces, flush where both are flat. A bore and a pin of its radius, or a socket and a ball, that
-    are in each other at the start touch all over or nowhere: a contact of these two faces that is not one-sided is the
-    joint that puts axis on axis, or center on center.
+    The gap is that of the pair of points that the solve tracks from its start; its place on the faces is free. With
+    edges, the pair is one of features (faces, edges, vertices) and switches between them as the bodies move; without,
+    it is a pair of two whole surfaces, flush if both are flat. A bore and a pin of its radius, or a socket and a ball,
+    that are in each other at the start touch everywhere or nowhere: a two-sided contact of these two faces is then the
+    joint that aligns their axes, or centers.
 
     Parameters
     ----------
@@ -37,8 +37,8 @@ class Contact(Constraint):
         Whether the faces' edges and vertices take part. By default where a side has several faces, or one with loops
         or creases; without them a contact that would have to leave a surface is lost.
     minimum : float
-        The gap instead of zero, or the least one: a film, a shim, a grinding allowance. Settable between solves. Not
-        beside a `Clearance` of the same two bodies.
+        The gap instead of zero, or the least gap: a film, a shim, a grinding allowance. Settable between solves. Not
+        together with a `Clearance` of the same two bodies.
 
     Raises
     ------

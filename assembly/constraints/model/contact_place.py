@@ -30,12 +30,12 @@ SAMPLES = 17
 
 
 class ContactPlace(Constraint, Objective):
-    """A contact comes to a place of one of its faces: as near as it can as an objective, there as a constraint.
+    """A contact is drawn to a place on one of its faces as an objective, or is kept there as a constraint.
 
-    With d the differences of the contact's (u, v) on the face from the target's, over closed directions the shorter
-    way, and E = [Su Sv] at the target, the distance is |E d|, in lengths. To a line of one coordinate it is that
-    difference times the mean stretch of the surface across the line. As an objective it counts weight |E d|^2; as a
-    constraint it has two rows, or one of a line. Derivatives are exact, the second ones as well.
+    With d the difference between the contact's (u, v) on the face and the target's, in closed directions the shorter
+    way, and E = [Su Sv] at the target, the distance is |E d|, a length. The distance to a line of one coordinate is the
+    difference in that coordinate times the mean stretch of the surface across the line. As an objective the term is
+    weight |E d|^2; as a constraint it has two rows, or one for a line. First and second derivatives are exact.
 
     The contact is then one of the two surfaces, without their boundaries.
 
@@ -61,8 +61,8 @@ class ContactPlace(Constraint, Objective):
 
     Notes
     -----
-    Half a period from the target of a closed direction the objective has a kink, a ridge; beyond a pole coordinates
-    jump by half a turn, and so does what is measured by them.
+    In a closed direction the objective has a kink (a ridge) half a period from the target; beyond a pole the
+    coordinates, and with them the distance, jump by half a turn.
     """
 
     def __init__(
@@ -190,7 +190,9 @@ def _stretch(surface: NurbsSurface, target: Target) -> Array:
         a, b = float(np.linalg.norm(su)), float(np.linalg.norm(sv))
         area = float(np.linalg.norm(np.cross(su, sv)))
         if not (a * spans[0] > least and b * spans[1] > least and area > DEGENERATE * a * b):
-            raise InputError(f"target is ({u:g}, {v:g}), a pole of the face; expected a place where both have lengths")
+            raise InputError(
+                f"target is ({u:g}, {v:g}), a pole of the face; expected a place where u and v have lengths"
+            )
         return np.array([[a, su @ sv / a], [0.0, area / a]])
     k = 0 if u is not None else 1
     low, high = surface.domain[1 - k]

@@ -141,7 +141,7 @@ class Contents:
         """Add constraints; their names must be distinct and their bodies in the assembly."""
         for constraint in constraints:
             if isinstance(constraint, (list, tuple)):
-                raise TypeError("constraint is a sequence; expected each for itself: constrain(*constraints)")
+                raise TypeError("constraint is a sequence; expected separate arguments: constrain(*constraints)")
             if not isinstance(constraint, Constraint):
                 raise TypeError(
                     f"constraint is {constraint!r}; expected a Contact or a trim of one, a Clearance, a joint, "
@@ -185,8 +185,8 @@ class Contents:
         for other in (*self._constraints, *(term for _, term in self._objectives)):
             if isinstance(other, (TrimContact, ContactPlace)) and other.contact is item:
                 raise InputError(
-                    f"constraint is {item.name!r}, whose contact {other.name!r} keeps on a face; "
-                    f"expected {other.name!r} to be removed before it"
+                    f"constraint is {item.name!r}, whose contact {other.name!r} constrains to a place; "
+                    f"expected {other.name!r} to be removed first"
                 )
         self._constraints.remove(item)
         self._taken.discard(item.name)

@@ -1,4 +1,4 @@
-"""Couplings: one freedom of a joint follows one of another."""
+"""Couplings: one coordinate of a joint follows one of another."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ def _slides(coordinate: Coordinate) -> bool:
 
 
 def _freedom(name: str, value: Any, slides: bool) -> Freedom:
-    """The freedom itself, or the only one of a joint that turns, or slides."""
+    """The coordinate itself, or the only one of a joint that turns, or slides."""
     fits, word = (_slides, "slides") if slides else (_turns, "is an angle")
     if isinstance(value, Freedom):
         if not fits(value.coordinate):
-            raise InputError(f"{name} is {value!r}; expected a freedom that {word}")
+            raise InputError(f"{name} is {value!r}; expected a joint coordinate that {word}")
         return value
     if not isinstance(value, Joint):
-        raise TypeError(f"{name} is {value!r}; expected a joint or one of its freedoms, joint.freedom(name)")
+        raise TypeError(f"{name} is {value!r}; expected a joint or one of its coordinates, joint.freedom(name)")
     fitting = [freedom for freedom in value.freedoms.values() if fits(freedom.coordinate)]
     if len(fitting) != 1:
         known = ", ".join(repr(freedom.name) for freedom in fitting) or "none"
-        raise InputError(f"{name} is {value.name!r}; expected a joint with one freedom that {word}, it has {known}")
+        raise InputError(f"{name} is {value.name!r}; expected a joint with one coordinate that {word}; it has {known}")
     return fitting[0]
 
 
 class Coupling(RowConstraint):
-    """follower = ratio * leader + offset, between freedoms of joints; see its subclasses.
+    """follower = ratio * leader + offset, between coordinates of joints; see its subclasses.
 
     A joint of the coupling need not be in the scene, its bodies must.
     """
@@ -48,7 +48,7 @@ class Coupling(RowConstraint):
 
     def __init__(self, leader: Freedom, follower: Freedom, factor: float, name: str | None, offset: float) -> None:
         if leader.coordinate is follower.coordinate:
-            raise InputError(f"both sides are {leader!r}; expected two freedoms")
+            raise InputError(f"both sides are {leader!r}; expected two coordinates")
         bodies = dict.fromkeys((*leader.joint.bodies, *follower.joint.bodies))
         super().__init__(tuple(bodies), name, words(type(self)))
         self._leader = leader
@@ -58,12 +58,12 @@ class Coupling(RowConstraint):
 
     @property
     def leader(self) -> Freedom:
-        """The freedom that is multiplied."""
+        """The coordinate that is multiplied."""
         return self._leader
 
     @property
     def follower(self) -> Freedom:
-        """The freedom that follows."""
+        """The coordinate that follows."""
         return self._follower
 
     @property
@@ -99,9 +99,9 @@ class Gear(Coupling):
     Parameters
     ----------
     a, b : Joint or Freedom
-        Joints with one freedom that is an angle, or such freedoms, `joint.freedom(name)`.
+        Joints with one coordinate that is an angle, or such coordinates, `joint.freedom(name)`.
     ratio : float
-        Turns of b a turn of a, not zero: -teeth_a / teeth_b of two wheels that mesh outside.
+        Turns of b per turn of a, not zero: -teeth_a / teeth_b for two wheels that mesh on the outside.
     name : str, optional
         "gear" and the bodies' names by default.
     offset : float
@@ -110,7 +110,7 @@ class Gear(Coupling):
     Raises
     ------
     InputError, TypeError
-        A joint with no such freedom or with several, the same freedom twice, ratio 0.
+        A joint with no such coordinate or with several, the same coordinate twice, ratio 0.
     """
 
     offset = Offset("angle_b where angle_a is zero [rad].")
@@ -120,12 +120,12 @@ class Gear(Coupling):
     ) -> None:
         factor = number("ratio", ratio)
         if factor == 0.0:
-            raise InputError("ratio is 0; expected the turns of b a turn of a, not zero")
+            raise InputError("ratio is 0; expected the turns of b per turn of a, not zero")
         super().__init__(_freedom("a", a, slides=False), _freedom("b", b, slides=False), factor, name, offset)
 
     @property
     def ratio(self) -> float:
-        """Turns of b a turn of a."""
+        """Turns of b per turn of a."""
         return self._factor
 
 
@@ -135,9 +135,9 @@ class Linear(Coupling):
     Parameters
     ----------
     a, b : Joint or Freedom
-        Joints with one freedom that slides, or such freedoms, `joint.freedom(name)`.
+        Joints with one coordinate that slides, or such coordinates, `joint.freedom(name)`.
     ratio : float
-        Travel of b for a travel of a of one, not zero; negative where they go against each other.
+        Travel of b per travel of a, not zero; negative if they move in opposite directions.
     name : str, optional
         "linear" and the bodies' names by default.
     offset : float
@@ -146,7 +146,7 @@ class Linear(Coupling):
     Raises
     ------
     InputError, TypeError
-        A joint with no such freedom or with several, the same freedom twice, ratio 0.
+        A joint with no such coordinate or with several, the same coordinate twice, ratio 0.
     """
 
     offset = Offset("slide_b where slide_a is zero.")
@@ -156,12 +156,12 @@ class Linear(Coupling):
     ) -> None:
         factor = number("ratio", ratio)
         if factor == 0.0:
-            raise InputError("ratio is 0; expected the travel of b for a travel of a of one, not zero")
+            raise InputError("ratio is 0; expected the travel of b per travel of a, not zero")
         super().__init__(_freedom("a", a, slides=True), _freedom("b", b, slides=True), factor, name, offset)
 
     @property
     def ratio(self) -> float:
-        """Travel of b for a travel of a of one."""
+        """Travel of b per travel of a."""
         return self._factor
 
 
@@ -171,9 +171,9 @@ class RackPinion(Coupling):
     Parameters
     ----------
     pinion, rack : Joint or Freedom
-        Joints with one freedom that is an angle, and one that slides; or such freedoms, `joint.freedom(name)`.
+        Joints with one coordinate that is an angle, and one that slides; or such coordinates, `joint.freedom(name)`.
     radius : float
-        Travel of the rack a radian of the pinion, not zero; negative where the rack lies on the other side.
+        Travel of the rack per radian of the pinion, not zero; negative if the rack is on the other side.
     name : str, optional
         "rack-pinion" and the bodies' names by default.
     offset : float
@@ -182,7 +182,7 @@ class RackPinion(Coupling):
     Raises
     ------
     InputError, TypeError
-        A joint with no such freedom or with several, radius 0.
+        A joint with no such coordinate or with several, radius 0.
     """
 
     offset = Offset("The slide where the angle is zero.")
@@ -197,12 +197,12 @@ class RackPinion(Coupling):
     ) -> None:
         factor = bounded("radius", radius)
         if factor == 0.0:
-            raise InputError("radius is 0; expected the travel of the rack a radian of the pinion, not zero")
+            raise InputError("radius is 0; expected the travel of the rack per radian of the pinion, not zero")
         super().__init__(
             _freedom("pinion", pinion, slides=False), _freedom("rack", rack, slides=True), factor, name, offset
         )
 
     @property
     def radius(self) -> float:
-        """Travel of the rack a radian of the pinion."""
+        """Travel of the rack per radian of the pinion."""
         return self._factor

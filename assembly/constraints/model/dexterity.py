@@ -33,7 +33,7 @@ class TipTask:
     ----------
     tip : Point, Frame or Body
     inputs : sequence of Joint or Freedom
-        Joints with one freedom, or freedoms, `joint.freedom(name)`; rates of angles [rad] and of slides.
+        Joints with one coordinate, or coordinates, `joint.freedom(name)`; rates of angles [rad] and of slides.
     task : "position", "rotation" or "pose", optional
         Its linear velocity, angular velocity, or both (linear first), world axes. Position for a point, pose for a
         frame or a body by default.
@@ -73,11 +73,11 @@ class TipTask:
         if not isinstance(chosen, str) or chosen not in TASKS:
             raise InputError(f"task is {task!r}; expected one of {', '.join(map(repr, TASKS))}")
         if isinstance(inputs, (Joint, Freedom)) or not isinstance(inputs, Sequence) or not inputs:
-            raise InputError(f"inputs is {inputs!r}; expected joints or freedoms, at least one")
+            raise InputError(f"inputs is {inputs!r}; expected joints or their coordinates, at least one")
         self.tip = tip
         self.inputs = tuple(self._freedom(k, value) for k, value in enumerate(inputs))
         if len({id(freedom.coordinate) for freedom in self.inputs}) < len(self.inputs):
-            raise InputError(f"inputs is {list(inputs)!r}; expected each freedom once")
+            raise InputError(f"inputs is {list(inputs)!r}; expected each coordinate once")
         self.task: str = chosen
         self.length = 0.5 * tip.body.size or 1.0 if length is None else positive("length", length)
         self.bits = _bits(chosen, axes)
@@ -92,10 +92,12 @@ class TipTask:
         if isinstance(value, Freedom):
             return value
         if not isinstance(value, Joint):
-            raise TypeError(f"inputs[{k}] is {value!r}; expected a joint or one of its freedoms, joint.freedom(name)")
+            raise TypeError(
+                f"inputs[{k}] is {value!r}; expected a joint or one of its coordinates, joint.freedom(name)"
+            )
         if len(value.freedoms) != 1:
             known = ", ".join(map(repr, value.freedoms)) or "none"
-            raise InputError(f"inputs[{k}] is {value.name!r}; expected a joint with one freedom, it has {known}")
+            raise InputError(f"inputs[{k}] is {value.name!r}; expected a joint with one coordinate; it has {known}")
         return value.freedom()
 
     @property
@@ -178,7 +180,8 @@ class Dexterity(Objective):
     Raises
     ------
     InputError, TypeError
-        Unknown words, no inputs, a joint with several freedoms, a direction where none belongs or none where one does.
+        Unknown words, no inputs, a joint with several coordinates, a direction where none belongs or none where one
+        does.
 
     Notes
     -----

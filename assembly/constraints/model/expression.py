@@ -131,7 +131,7 @@ class Expression(Constraint, Objective):
         return f"Expression({self.function.name()}, [{bodies}], name={self.name!r}{settings})"
 
     def values(self, q: ArrayLike) -> Array:
-        """The values (m,) at poses q (b, 7), a row a body of the expression, by CasADi itself.
+        """The values (m,) at poses q (b, 7), one row per body of the expression, by CasADi itself.
 
         Neither divided by the scale nor multiplied by the weight.
         """
@@ -161,7 +161,7 @@ class Expression(Constraint, Objective):
         )
 
     def document(self) -> str:
-        """The function as text, a line an instruction, for files; `from_document` reads it.
+        """The function as text, one line per instruction, for files; `from_document` reads it.
 
         The first line says how many bodies and values there are and the function's name. Then stand the instructions
         of `geometry/expression/tape.py` by name, with the place of the result and those of the arguments (the
@@ -210,7 +210,7 @@ def _checked_function(function: Any) -> int:
         raise InputError("function is casadi.Function() without content; expected one of poses")
     inputs, outputs = int(function.n_in()), int(function.n_out())
     if inputs == 0:
-        raise InputError(f"function is {function}, without inputs; expected one a body, its pose (7,)")
+        raise InputError(f"function is {function}, without inputs; expected one for each body, its pose (7,)")
     for k in range(inputs):
         if function.size_in(k) != (7, 1) or function.nnz_in(k) != 7:
             raise InputError(
@@ -228,14 +228,14 @@ def _checked_function(function: Any) -> int:
 
 def _checked_bodies(bodies: Any, inputs: int) -> tuple[Body, ...]:
     if isinstance(bodies, str) or not isinstance(bodies, Iterable):
-        raise TypeError(f"bodies is {bodies!r}; expected a sequence of bodies, one an input of the function")
+        raise TypeError(f"bodies is {bodies!r}; expected a sequence of bodies, one for each input of the function")
     given = tuple(bodies)
     for k, body in enumerate(given):
         if not isinstance(body, Body):
             raise TypeError(f"bodies[{k}] is {body!r}; expected a Body")
     if len(given) != inputs:
         names = [body.name for body in given]
-        raise InputError(f"bodies are {names}; expected {inputs}, one an input of the function")
+        raise InputError(f"bodies are {names}; expected {inputs}, one for each input of the function")
     return given
 
 

@@ -31,18 +31,18 @@ Array = NDArray[np.float64]
 
 
 class Group(OwnState, RowConstraint):
-    """Bodies that move as one: takes away 6 degrees of freedom of every body but one.
+    """Bodies that move as one: takes away 6 degrees of freedom for every body but one.
 
-    They keep how they stand to each other where they stand when the group is made, or at given poses.
+    They keep their relative poses, either those when the group is made or given ones.
 
     Parameters
     ----------
     bodies : sequence of Body
-        Two or more, distinct. What is fixed stays where it is, and so do all of them then.
+        Two or more, distinct. If one is fixed, none of them moves.
     name : str, optional
         "group" and the bodies' names by default.
     poses : sequence of Pose, optional
-        How they stand to each other, a pose a body; the bodies' own by default.
+        Their relative poses, one pose per body; the bodies' own by default.
 
     Raises
     ------
@@ -66,7 +66,7 @@ class Group(OwnState, RowConstraint):
             if not isinstance(pose, Pose):
                 raise TypeError(f"poses[{k}] is {pose!r}; expected a Pose")
         if len(given) != len(members):
-            raise InputError(f"poses is {len(given)} poses; expected {len(members)}, one a body")
+            raise InputError(f"poses is {len(given)} poses; expected {len(members)}, one for each body")
         super().__init__(members, name, "group")
         self._poses: tuple[Pose, ...] = given
         base = next((k for k, body in enumerate(members) if body.fixed), 0)
@@ -89,7 +89,7 @@ class Group(OwnState, RowConstraint):
 
     @property
     def poses(self) -> tuple[Pose, ...]:
-        """How the bodies stand to each other."""
+        """The relative poses of the bodies."""
         return self._poses
 
     @property

@@ -107,7 +107,9 @@ def _nearest(holes: list[BodyEdge], shanks: list[BodyEdge], axes: Sense) -> Seat
     """The two circles that need no turning around where the bodies stand, of several the nearest."""
     if not holes or not shanks:
         side = "hole" if not holes else "shank"
-        raise InputError(f"{side} has no circle to sit at beside those of the other; expected seats=(circle, circle)")
+        raise InputError(
+            f"{side} has no circle to sit at other than those of the other side; expected seats=(circle, circle)"
+        )
     pairs, hole_size = list(product(holes, shanks)), holes[0].body.size
     sense = 1.0 if axes == "aligned" else -1.0
     upright = [pair for pair in pairs if sense * _cosine(*pair) > 0.0] or pairs

@@ -1,4 +1,4 @@
-"""What all joints have: two frames, rows between them, and freedoms by name.
+"""What all joints have: two frames, rows between them, and coordinates by name.
 
 The z axes of the frames are the joint's axes. "aligned" lets them point the same way, "opposed" against each other,
 as the outward normals of two faces do that lie on each other; "nearest" is the one of the two that they are nearer to
@@ -68,7 +68,7 @@ def _frame(name: str, side: Any, takes_point: bool) -> Frame:
 class Joint(OwnState, RowConstraint):
     """A joint between two bodies; see its subclasses.
 
-    What it asks for is in `equations`, what it leaves free in `freedoms`. A freedom is driven where it has a value,
+    What it asks for is in `equations`, what it leaves free in `freedoms`. A coordinate is driven where it has a value,
     and kept within limits where it has limits; both may be set between solves.
 
     Parameters
@@ -81,7 +81,7 @@ class Joint(OwnState, RowConstraint):
     axes : "aligned", "opposed" or "nearest"
         Whether the z axes point the same way or against each other, of joints that ask for either; or whichever is
         nearer where a solve starts, which `Solution.axes` tells.
-    settings : (value, limits) by freedom
+    settings : (value, limits) by coordinate
         Driven value or None; limits (lower, upper) or None.
 
     Raises
@@ -161,27 +161,27 @@ class Joint(OwnState, RowConstraint):
 
     @property
     def freedoms(self) -> Mapping[str, Freedom]:
-        """Freedoms by name."""
+        """Coordinates by name."""
         return MappingProxyType(self._freedoms)
 
     def freedom(self, name: str | None = None) -> Freedom:
-        """A freedom by name; the only one when no name is given.
+        """A coordinate by name; the only one when no name is given.
 
         Raises
         ------
         InputError
-            No such freedom, or no name where there are several; the message lists the names.
+            No such coordinate, or no name where there are several; the message lists the names.
         """
         if name is None and len(self._freedoms) == 1:
             return next(iter(self._freedoms.values()))
         if isinstance(name, str) and name in self._freedoms:
             return self._freedoms[name]
-        known = ", ".join(map(repr, self._freedoms)) or "none, the joint leaves nothing free"
-        raise InputError(f"name is {name!r}; expected a freedom of {self.name!r}: {known}")
+        known = ", ".join(map(repr, self._freedoms)) or "none, the joint leaves no coordinate free"
+        raise InputError(f"name is {name!r}; expected a coordinate of {self.name!r}: {known}")
 
     @property
     def equations(self) -> tuple[Equation, ...]:
-        """Rows now: the joint's own, then driven values, then limits, both in the order of the freedoms."""
+        """Rows now: the joint's own, then driven values, then limits, both in the order of the coordinates."""
         asked = [row for freedom in self._freedoms.values() for row in freedom.equations]
         return (*self._own, *(row for row in asked if not row.one_sided), *(row for row in asked if row.one_sided))
 
@@ -194,7 +194,7 @@ class Joint(OwnState, RowConstraint):
         return "opposed" if cosine < 0.0 else "aligned"
 
     def _take_axes(self, axes: Sense) -> None:
-        """Have the axes aligned or opposed from now on: rows and freedoms are of other frames."""
+        """Have the axes aligned or opposed from now on: rows and coordinates are of other frames."""
         if axes == self._axes:
             return
         self._axes, self._frames = axes, self._senses[axes]
@@ -213,7 +213,7 @@ class Joint(OwnState, RowConstraint):
         return self._twins[coordinate]
 
     def _coordinate_in(self, name: str, axes: Sense | None) -> Coordinate:
-        """The coordinate of a freedom where the axes are aligned or opposed."""
+        """What a joint coordinate measures where the axes are aligned or opposed."""
         coordinate = self._freedoms[name].coordinate
         return coordinate if axes is None or axes == self._axes else self._twins[coordinate]
 
@@ -231,7 +231,7 @@ class Joint(OwnState, RowConstraint):
 
 
 class Driven:
-    """Attribute of a joint: the driven value of a freedom, None where it is free. Settable."""
+    """Attribute of a joint: the driven value of a coordinate, None where it is free. Settable."""
 
     def __init__(self, freedom: str, meaning: str) -> None:
         self._freedom = freedom
@@ -251,7 +251,7 @@ class Driven:
 
 
 class Limits:
-    """Attribute of a joint: the limits of a freedom, None without. Settable."""
+    """Attribute of a joint: the limits of a coordinate, None without. Settable."""
 
     def __init__(self, freedom: str) -> None:
         self._freedom = freedom

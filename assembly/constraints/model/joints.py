@@ -1,8 +1,8 @@
 """Joints: what each asks of two frames, and what it leaves free.
 
-Rows and freedoms are coordinates of frame b as seen from frame a (kinds as in `constraints/program/primitives.py`);
+Rows and joint coordinates describe frame b as seen from frame a (kinds as in `constraints/program/primitives.py`);
 both z
-axes are the joint's axes. Lengths are in the user's unit, angles in radians. Every freedom takes a driven value and
+axes are the joint's axes. Lengths are in the user's unit, angles in radians. Every coordinate takes a driven value and
 limits (lower, upper), in the call and between solves:
 
     crank = asm.Revolute(ground.frame(), arm.frame(), angle=0.2)
@@ -151,13 +151,13 @@ class Cylindrical(Joint):
 class Screw(Cylindrical):
     """A nut on a screw: 5 rows, free to turn, sliding as it turns.
 
-    The rows of `Cylindrical` (4) and slide - pitch angle / (2 pi) = 0. Freedoms: `angle` and `slide`, of which one
+    The rows of `Cylindrical` (4) and slide - pitch angle / (2 pi) = 0. Coordinates: `angle` and `slide`, of which one
     follows from the other; drive one of them.
 
     Parameters
     ----------
     pitch : float
-        Travel along z_a a turn; not zero, negative for a left-handed screw.
+        Travel along z_a per turn; not zero, negative for a left-handed screw.
     """
 
     def __init__(
@@ -175,7 +175,9 @@ class Screw(Cylindrical):
     ) -> None:
         self._pitch = bounded("pitch", pitch)
         if self._pitch == 0.0:
-            raise InputError("pitch is 0; expected the travel a turn, not zero; a nut that cannot slide is Revolute")
+            raise InputError(
+                "pitch is 0; expected the travel per turn, not zero; a nut that cannot slide is a Revolute"
+            )
         super().__init__(
             frame_a,
             frame_b,
@@ -191,7 +193,7 @@ class Screw(Cylindrical):
 
     @property
     def pitch(self) -> float:
-        """Travel along z_a a turn."""
+        """Travel along z_a per turn."""
         return self._pitch
 
 
@@ -235,7 +237,7 @@ class Planar(Joint):
 class Spherical(Joint):
     """A ball in a socket: 3 rows, free to turn every way.
 
-    Origins coincide; of a point or a body the axes are the body's. Freedoms: `swing`, the angle between the z axes,
+    Origins coincide; of a point or a body the axes are the body's. Coordinates: `swing`, the angle between the z axes,
     `azimuth`, the direction of z_b about z_a from x_a, and `twist`, the turn of x_b from x_a about z_a. The azimuth
     has no value where the swing is 0, the twist none where it is pi. A cone is `swing_limits=(None, half_angle)`.
     """
@@ -360,7 +362,7 @@ class Parallel(Joint):
 
 
 class Perpendicular(Joint):
-    """z axes are perpendicular: 1 row, z_a . z_b = 0; no freedom with a name."""
+    """z axes are perpendicular: 1 row, z_a . z_b = 0; no coordinate with a name."""
 
     _zero = (Z_DOT_Z,)
 

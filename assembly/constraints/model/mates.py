@@ -4,8 +4,8 @@
     asm.Flush(top, foot)                                             # face on face: 3
     asm.Insert(plate.faces.cylinders(hole=True).near(p), bolt.faces.cylinders(radius=3))     # hole and shank: 5
 
-They are joints of frames that faces and edges have (`face.frame()`), so freedoms, driven values and limits are those of
-the joints they are.
+They are joints of frames that faces and edges have (`face.frame()`), so coordinates, driven values and limits are those
+of the joints they are.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ class Flush(Mate, Planar):
     Parameters
     ----------
     face_a, face_b : flat face, or Frame
-        Selections of a single face will do. Of a frame its x-y plane, with z outward.
+        Or selections of a single face. For a frame, its x-y plane, with z outward.
     name : str, optional
     offset : float
         Height of face b above face a.
     axes : "opposed", "aligned" or "nearest"
-        Outward normals against each other, as faces lie on each other, or the same way, as faces of two parts that
-        end at one level.
+        Outward normals opposed, as for faces that lie on each other, or aligned, as for faces of two parts that end at
+        one level.
     **freedoms
         Driven values and limits of `x`, `y` and `angle`; see `Planar`.
 
@@ -93,11 +93,11 @@ class Coaxial(Mate, Cylindrical):
     Parameters
     ----------
     a, b : cylinder, cone, torus or revolution; circle or line; or Frame
-        Faces, edges, or selections of a single one. Of a frame its z axis.
+        Faces, edges, or selections of a single one. For a frame, its z axis.
     name : str, optional
     axes : "nearest", "aligned" or "opposed"
-        Axes of faces have no sense of their own, but those of cones; so it is the one that is nearer where a solve
-        starts, which `solution.axes` tells.
+        Axes of faces other than cones have no sense; by default the nearer one at the start of a solve is taken, which
+        `solution.axes` tells.
     **freedoms
         Driven values and limits of `angle` and `slide`; see `Cylindrical`.
 
@@ -125,11 +125,11 @@ class Coaxial(Mate, Cylindrical):
 class Insert(Mate, Revolute):
     """A shank in a hole, to where it sits: coaxial and flush, 5 rows, takes away 5 degrees of freedom.
 
-    The circles at which both end, their seats, come to lie in one plane about one axis. Of edges they are the edges. Of
-    a shank with a shoulder, as a bolt has under its head, it is the shoulder that comes to lie on the face at a mouth
-    of the hole. A shank without a shoulder sits on the bottom of a blind hole; in one that goes through its end is
-    level with a mouth. Of several mouths and ends those are taken that look the right way where bodies stand when the
-    mate is made, and of these the nearest; `seats` tells them, and may say them. Free: `angle`.
+    The circles at which both end, their seats, come to lie in one plane about one axis. A given edge is a seat itself.
+    A shank with a shoulder, such as a bolt's under its head, has the shoulder on the face at a mouth of the hole. A
+    shank without a shoulder sits on the bottom of a blind hole; in a through hole its end is level with a mouth. Among
+    several mouths and ends the nearest pair is taken that faces the right way at the poses when the mate is made;
+    `seats` tells which, and can be given. Free: `angle`.
 
     Parameters
     ----------
@@ -139,8 +139,8 @@ class Insert(Mate, Revolute):
     offset : float
         How far the seat of the shank is above that of the hole, along the outward normal there.
     axes : "opposed", "aligned" or "nearest", optional
-        Of the outward normals of the flat faces at the seats: "opposed" where one comes to lie on the other, "aligned"
-        where they end at one level. By default as above, and "opposed" of edges.
+        Of the outward normals of the flat faces at the seats: "opposed" if one comes to lie on the other, "aligned" if
+        they end at one level. By default as above, and "opposed" for edges.
     seats : (circle, circle), optional
         The edges at which hole and shank sit.
     **freedoms
@@ -149,8 +149,8 @@ class Insert(Mate, Revolute):
     Raises
     ------
     InputError
-        A hole that is not hollow, a shank that is not full (they may be in the wrong order), radii of which that of the
-        shank is larger, a face without a circle at which it ends on a flat face, both on one body.
+        A hole that is not hollow, a shank that is not full (they may be in the wrong order), a shank with the larger
+        radius, a face without a circle at which it ends on a flat face, both on one body.
     TypeError
         Something else than a face or an edge.
     """
@@ -193,7 +193,7 @@ class Insert(Mate, Revolute):
 class Concentric(Mate, Spherical):
     """Two spheres about one center, or a sphere in a cone: 3 rows, takes away 3 degrees of freedom.
 
-    A sphere and a cone touch along a circle, from within the cone or, of a hollow sphere, from around it: then its
+    A sphere touches a cone along a circle, from within the cone or, if the sphere is hollow, from around it: then its
     center is on the axis, at radius / sin(half angle) from the apex. Free: what `Spherical` leaves free.
 
     Parameters
@@ -237,7 +237,8 @@ class Width(Mate, Planar):
     offset : float
         Height of the middle of the tab above that of the slot, along the outward normal of the slot's first face.
     axes : "nearest", "aligned" or "opposed"
-        Of the normals of the two first faces; a tab fits both ways, so it is what is nearer where a solve starts.
+        Of the normals of the two first faces; a tab fits both ways, so by default the nearer one at the start of a
+        solve.
     **freedoms
         Driven values and limits of `x`, `y` and `angle`; see `Planar`.
 

@@ -83,8 +83,8 @@ class PointDistance(Objective):
 class Posture(Objective):
     """weight sum_b |x - x0|^2 + s^2 4 sin^2(angle / 2): bodies stay close to where they were.
 
-    x0 and the angle are taken from the reference; s is half the body's size, so that a turn counts about as much
-    as it moves the body's points. This is the objective of a solve that is given none.
+    x0 and the angle are relative to the reference; s is half the body's size, so that a rotation counts about as much
+    as it moves the body's points. A solve without an objective minimizes this.
 
     Parameters
     ----------
@@ -120,8 +120,8 @@ class FrameDistance(Objective):
     target : Pose
         Where the frame is drawn to. Settable between solves.
     length : float
-        How much a turn counts: a turn by an angle counts as a point this far from the origin. Half the body's size by
-        default, 1 for a body without shape.
+        The lever of rotations: a rotation counts as the motion of a point this far from the origin. By default half the
+        body's size, 1 for a body without shape.
     weight : float
         Positive.
     """
@@ -144,7 +144,7 @@ class FrameDistance(Objective):
 
     @property
     def length(self) -> float:
-        """How much a turn counts."""
+        """The lever of rotations."""
         return self._length
 
     @property

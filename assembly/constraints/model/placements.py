@@ -27,12 +27,12 @@ class PointOnLine(Joint):
     """A point stays on the z axis of a frame: 2 rows. Or at a distance from it: 1 row, or one for each limit.
 
     Frame a is the line's. Free with a name: `slide` along z_a; the bodies turn freely against each other. Of a point
-    at a distance, or within limits, `distance` is a freedom as well, whose value the joint holds.
+    at a distance, or within limits, `distance` is a coordinate as well, whose value the joint holds.
 
     Parameters
     ----------
     point : Point, vertex, sphere or circle; Frame or Body
-        Of a sphere or a circle its center, of a frame or a body its origin.
+        A sphere or circle stands for its center, a frame or body for its origin.
     frame : Frame or Body; or a face or an edge with an axis
         Its z axis is the line.
     distance : float or None
@@ -88,7 +88,7 @@ class PointOnLine(Joint):
         self._away().limits = value
 
     def _away(self) -> Freedom:
-        """The distance as a freedom."""
+        """The distance as a coordinate."""
         if "distance" not in self._freedoms:
             raise InputError(f"{self.name!r} was made for a point on the line; expected one made with a distance")
         return self._freedoms["distance"]
@@ -102,7 +102,7 @@ class PointOnPlane(Joint):
     Parameters
     ----------
     point : Point, vertex, sphere or circle; Frame or Body
-        Of a sphere or a circle its center, of a frame or a body its origin.
+        A sphere or circle stands for its center, a frame or body for its origin.
     frame : Frame or Body, or a flat face
         Its z axis is the plane's normal, of a face the outward one.
     offset : float
@@ -141,11 +141,11 @@ class Distance(Joint):
     Parameters
     ----------
     point_a, point_b : Point, vertex, sphere or circle; Frame or Body
-        Of a sphere or a circle its center, of a frame or a body its origin.
+        A sphere or circle stands for its center, a frame or body for its origin.
     value : float, optional
         Above zero; points that coincide are `Spherical`.
     limits : (lower, upper), optional
-        Of value and limits at least one is needed.
+        At least one of value and limits is needed.
     """
 
     _free = {"distance": (DISTANCE, 0)}
@@ -176,7 +176,7 @@ class Angle(Joint):
     value : float, optional
         Between 0 and pi [rad], both excluded; axes along each other are `Parallel`, aligned or opposed.
     limits : (lower, upper), optional
-        Of value and limits at least one is needed.
+        At least one of value and limits is needed.
     """
 
     _free = {"angle": (ANGLE, 0)}

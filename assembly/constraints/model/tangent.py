@@ -36,11 +36,11 @@ _GRID, _TRIED = 16, 8
 class Tangent(Constraint):
     """Two faces touch, and have one tangent plane there: takes away 1 degree of freedom, more along lines and circles.
 
-    Planes, cylinders, cones and spheres count whole, to where their surfaces go on: they are held by the distances of
-    planes, axes and centers. A cylinder on a plane, or a cone, lies on it along a line, and takes away 2; on a parallel
-    cylinder 3. Other faces, those that touch in a point, and `unilateral` ones are a `Contact`, with the side on which
-    they touch: it means the pair that it tracks, from where the solve starts, and is held on the surfaces, not within
-    their trims. To hold it there add a `TrimContact`, or ask for a `Contact` with edges.
+    Planes, cylinders, cones and spheres are treated as unbounded surfaces, held by distances between planes, axes and
+    centers. A cylinder or cone lies on a plane along a line, which takes away 2; a cylinder on a parallel cylinder 3.
+    Other faces, those that touch in a point, and `unilateral` ones are a `Contact` with the given side: it holds the
+    one pair of points that it tracks from the start of the solve, on the whole surfaces, not within their trims. To
+    stay within the trims add a `TrimContact`, or use a `Contact` with edges.
 
     Parameters
     ----------
@@ -49,8 +49,9 @@ class Tangent(Constraint):
     name : str, optional
         "tangent" and the bodies' names by default.
     side : "outside" or "inside"
-        Outside: outward normals oppose each other, the bodies are on different sides, as a ball on a floor, and as a
-        pin in a wider bore. Inside: the normals are one, the bodies are on the same side, as two drums in one band.
+        Outside: outward normals are opposed and the bodies are on different sides, such as a ball on a floor or a pin
+        in a wider bore. Inside: the normals are equal and the bodies are on the same side, such as two drums in one
+        band.
     unilateral : bool
         gap >= 0 instead of gap = 0.
     touch : "line" or "point", optional
@@ -103,7 +104,7 @@ class Tangent(Constraint):
 
     @property
     def side(self) -> Side:
-        """Whether the outward normals oppose each other where they touch, or are one."""
+        """Whether the outward normals are opposed or equal where the faces touch."""
         return self._side
 
     @property

@@ -25,9 +25,9 @@ FORMS: tuple[Form, ...] = get_args(Form)
 
 
 class TrimContact(Constraint):
-    """A contact stays on a loop, or on one side of it.
+    """A contact is kept on a loop, or on one side of it.
 
-    The contact is then one of the two surfaces, without their boundaries: where it may be is said here.
+    The contact is then one of the two whole surfaces, without their boundaries; the trim says where it may be.
 
     Parameters
     ----------
@@ -39,14 +39,14 @@ class TrimContact(Constraint):
         On the loop, or on the side that it encloses or does not; the loop itself belongs to both sides.
     form : "signed", "parametric", "cartesian" or "between"
         The rows. "signed": the signed distance of the contact from the loop in (u, v), times the mean stretch of the
-        surface over the loop, one row. The others are those of paper 001, section 3.4, with c the point of the
-        loop's own extremum against the other surface: u_f - c, f(u_f) - f(c) and g(u_g) - f(c). The first two count
-        by their length, negative on the wrong side: the first row; their others are zero. "between" contains the gap
-        and is for "on" alone; its three rows depend on one another at a solution, which slows a solve.
-        Of a loop with corners these are rows of the smooth side that the contact is on; one more, the last, is that of
-        the side which this meets at the corner next to the contact: its signed distance, one-sided.
+        surface over the loop, one row. The others are those of paper 001, section 3.4, with c the point of the loop's
+        own extremum against the other surface: u_f - c, f(u_f) - f(c) and g(u_g) - f(c). The first two are replaced by
+        their signed length, negative on the wrong side, in the first row; their other rows are zero. "between" contains
+        the gap and is for "on" alone; its three rows are dependent at a solution, which slows a solve. On a loop with
+        corners these are the rows of the smooth side that the contact is on; an additional last row is the signed
+        distance, one-sided, of the neighboring side at the corner next to the contact.
     side : "a" or "b", optional
-        Which of the contact's faces the loop is on; by default the one that has it, else "a".
+        Which of the contact's faces the loop is on; by default the face that has the loop, otherwise "a".
     name : str, optional
         "trim" and the contact's name by default.
 

@@ -45,7 +45,7 @@ def _half_angle(here: Pose, there: Pose) -> float:
 
 
 def _pose_between(here: Pose, there: Pose, part: float) -> Pose:
-    """A pose a part of the way: its origin goes along a line, and it turns the shorter way at constant speed."""
+    """One pose per part of the way: its origin goes along a line, and it turns the shorter way at constant speed."""
     half = _half_angle(here, there)
     end = there.quaternion if here.quaternion @ there.quaternion >= 0.0 else -there.quaternion
     parts = np.array([1.0 - part, part])

@@ -1,6 +1,6 @@
 """Which turn an angle is on when a solve starts: angles go on past a whole turn, poses do not tell how often.
 
-A driven angle starts on the turn of its value, one that is coupled to a driven freedom on the turn that the coupling
+A driven angle starts on the turn of its value, one that is coupled to a driven coordinate on the turn that the coupling
 asks for. Other coupled angles keep, in a warm start, the turn they have; otherwise they too are on the turn of their
 coupling, where the other side is known. What is left takes, with all that couplings move with it, the turn whose
 angles are least beyond their limits, and of several the one next to where the angle was, zero at first. An angle that

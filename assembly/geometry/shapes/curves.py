@@ -126,7 +126,7 @@ def _squared_speed(size: float, slopes: tuple[dict[int, float], dict[int, float]
 def epicycloid(
     size: float = 1.0, cusps: int = 5, *, angle: float = 0.0, center: ArrayLike = (0.0, 0.0)
 ) -> FormulaCurve:
-    """The path of a point of a circle of radius `size` that rolls around one of radius cusps * size.
+    """The path of a point on a circle of radius `size` that rolls around a circle of radius cusps * size.
 
     size ((k + 1) cos t - cos (k + 1) t, (k + 1) sin t - sin (k + 1) t), t in [0, 2 pi], k = cusps.
     """
@@ -146,12 +146,12 @@ def epicycloid(
 
 
 def ranunculoid(size: float = 1.0, *, angle: float = 0.0, center: ArrayLike = (0.0, 0.0)) -> FormulaCurve:
-    """The epicycloid of five cusps."""
+    """The epicycloid with five cusps."""
     return epicycloid(size, 5, angle=angle, center=center)
 
 
 def ellipse(half_axes: ArrayLike = (2.0, 1.0), *, angle: float = 0.0, center: ArrayLike = (0.0, 0.0)) -> FormulaCurve:
-    """(a cos t, b sin t), t in [0, 2 pi]; a circle where the half axes are equal."""
+    """The ellipse (a cos t, b sin t), t in [0, 2 pi]."""
     import casadi as ca
 
     a, b = (extent(f"half_axes[{k}]", x) for k, x in enumerate(vector("half_axes", half_axes, 2).tolist()))
@@ -203,7 +203,7 @@ def lissajous(
     angle: float = 0.0,
     center: ArrayLike = (0.0, 0.0),
 ) -> FormulaCurve:
-    """(a sin(p t + phase), b sin(q t)), t in [0, 2 pi]; the phase in degrees."""
+    """The Lissajous curve (a sin(p t + phase), b sin(q t)), t in [0, 2 pi]; the phase is in degrees."""
     import casadi as ca
 
     a, b = vector("half_axes", half_axes, 2).tolist()
@@ -226,7 +226,7 @@ def lissajous(
 def helix(
     radius: float = 1.0, pitch: float = 1.0, turns: float = 3.0, *, center: ArrayLike = (0.0, 0.0, 0.0)
 ) -> FormulaCurve:
-    """(radius cos t, radius sin t, pitch t / 2 pi) about the z axis through the center, t in [0, 2 pi turns]."""
+    """A helix about the z axis: (radius cos t, radius sin t, pitch t / 2 pi), t in [0, 2 pi turns]."""
     import casadi as ca
 
     r, rise = extent("radius", radius), number("pitch", pitch) / (2 * pi)

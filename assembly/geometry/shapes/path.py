@@ -99,7 +99,7 @@ class Piece:
 
 
 class Path:
-    """Lines and arcs in space, tangent to each other; every call returns a longer path.
+    """A smooth path of lines and arcs in space, for `pipe`; every call returns a longer path.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class Path:
         return longer
 
     def line(self, length: float) -> Path:
-        """Go on straight.
+        """Add a straight line.
 
         Raises
         ------
@@ -172,7 +172,7 @@ class Path:
         return self._extended(Piece(self.end, self.end_direction, extent("length", length)))
 
     def arc(self, radius: float, angle: float, toward: ArrayLike) -> Path:
-        """Turn along a circle.
+        """Add an arc of a circle.
 
         Parameters
         ----------

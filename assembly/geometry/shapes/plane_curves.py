@@ -40,7 +40,7 @@ def arc_through(center: ArrayLike, radius: float, start: float, sweep: float) ->
 
 
 def circle(radius: float, center: ArrayLike = (0.0, 0.0)) -> NurbsCurve:
-    """A circle in the plane, counterclockwise from its point at +x; its parameter runs over the length.
+    """A circle in the plane, counterclockwise from its point at +x; its parameter is the arc length.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def circle(radius: float, center: ArrayLike = (0.0, 0.0)) -> NurbsCurve:
 
 
 def arc(radius: float, start: float, end: float, center: ArrayLike = (0.0, 0.0)) -> NurbsCurve:
-    """An arc of a circle in the plane, clockwise where `end` is less than `start`; its parameter is the length.
+    """An arc of a circle in the plane, clockwise if `end` is less than `start`; its parameter is the arc length.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def arc(radius: float, start: float, end: float, center: ArrayLike = (0.0, 0.0))
     Raises
     ------
     InputError
-        Angles that are one, or apart by a whole turn or more.
+        Equal angles, or angles that differ by a whole turn or more.
     """
     first, last = number("start", start), number("end", end)
     sweep = last - first
@@ -73,7 +73,7 @@ def arc(radius: float, start: float, end: float, center: ArrayLike = (0.0, 0.0))
 
 
 def polygon(points: ArrayLike) -> NurbsCurve:
-    """Straight sides from point to point and back to the first one; its parameter runs over the length.
+    """A closed polygon in the plane; its parameter is the arc length.
 
     Parameters
     ----------

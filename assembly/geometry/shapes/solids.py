@@ -78,7 +78,7 @@ def plane_around(curves: Iterable[NurbsCurve], z: float) -> NurbsSurface:
 def trimmed_plane(outer: Profile, holes: Iterable[Profile] = (), *, name: str | None = None) -> Face:
     """The part of the xy-plane inside a closed profile and outside others, with the normal +z; S(u, v) = (u, v, 0).
 
-    The plane itself goes on a little around the outer profile.
+    The surface itself extends slightly beyond the outer profile.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def _revolution(
 
 
 def plane(width: float, height: float, *, name: str | None = None) -> NurbsSurface:
-    """A rectangle in the xy-plane, centered, with the normal +z; S(u, v) = (u, v, 0).
+    """A rectangle in the xy-plane about the origin, with the normal +z; S(u, v) = (u, v, 0).
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def sphere(radius: float, *, name: str | None = None) -> NurbsSurface:
 
 
 def ellipsoid(a: float, b: float, c: float, *, name: str | None = None) -> NurbsSurface:
-    """The ellipsoid (x/a)^2 + (y/b)^2 + (z/c)^2 = 1, laid out as `sphere`.
+    """The ellipsoid (x/a)^2 + (y/b)^2 + (z/c)^2 = 1, with u and v as on a sphere.
 
     The domain is [0, 2 pi m] x [0, pi n] with the mean squares m^2 = (a^2 + b^2)/2 and n^2 = (m^2 + c^2)/2.
     """
@@ -142,7 +142,7 @@ def torus(major_radius: float, minor_radius: float, *, name: str | None = None) 
 
 
 def box(x: float, y: float, z: float) -> tuple[Face, ...]:
-    """Six faces of a box about the origin.
+    """A box about the origin, of six faces.
 
     Their names are left (-x), right (+x), front (-y), back (+y), bottom (-z) and top (+z).
 
@@ -176,7 +176,7 @@ def _across(path: Path) -> Array:
 
 
 def pipe(path: Path, radius: float, caps: bool = True, *, name: str | None = None) -> NurbsSurface:
-    """A round wire along a path of lines and arcs, with its caps one surface.
+    """A round wire along a path of lines and arcs; with its caps it is one surface.
 
     u runs along the path with speed one at the joints of the center line (over the chords of its pieces), v
     around the wire over [0, 2 pi radius], closed. Half balls close the ends, each one more span of u with a

@@ -47,12 +47,12 @@ def _on_axis(curve: NurbsCurve, size: float) -> bool:
 
 
 def revolution(profile: Profile, angle: float = 2.0 * pi, *, name: str | None = None) -> Any:
-    """What a plane profile of (radius, z) sweeps when it turns about the z axis, from the x axis on.
+    """The surface or solid that a plane profile of (radius, z) sweeps about the z axis, starting at the x axis.
 
-    Of one open curve it is a surface, outward on the right of the curve: of one that goes up, away from the axis. Of a
-    profile that closes it is a solid: one wall for every curve ("wall", or "wall 1", "wall 2" ..., in the order of the
-    curves; those on the axis sweep none), and where it does not go all around, "start" and "end". On walls u runs
-    around, and v is the curve's parameter.
+    One open curve makes a surface, whose outward normal is on the right of the curve: away from the axis for a curve
+    that goes up. A closed profile makes a solid: one wall for every curve ("wall", or "wall 1", "wall 2" ..., in the
+    order of the curves; curves on the axis make none), and, if the angle is less than a whole turn, the flat faces
+    "start" and "end". On walls u runs around the axis, and v is the curve's parameter.
 
     Parameters
     ----------
@@ -70,12 +70,12 @@ def revolution(profile: Profile, angle: float = 2.0 * pi, *, name: str | None = 
     Raises
     ------
     InputError
-        An angle that is not above zero or beyond a whole turn, a radius below zero, a profile that neither is one curve
-        nor closes, or that lies on the axis.
+        An angle that is not positive or is larger than a whole turn, a negative radius, a profile of several curves
+        that does not close, or a profile on the axis.
     """
     turn = number("angle", angle)
     if not 1e-9 <= turn <= 2.0 * pi * (1.0 + 1e-15):
-        raise InputError(f"angle is {turn:g}; expected one above zero, a whole turn (2 pi) at most")
+        raise InputError(f"angle is {turn:g}; expected a positive angle, a whole turn (2 pi) at most")
     turn = min(turn, 2.0 * pi)
     if isinstance(profile, NurbsCurve) and not profile.closed:
         _check_radii([profile])
@@ -120,7 +120,7 @@ def _end(curves: Sequence[NurbsCurve], angle: float, name: str) -> Face:
 
 
 def loft(curves: Iterable[NurbsCurve], *, name: str | None = None) -> NurbsSurface:
-    """The surface through curves, one after the other: u runs along them, v from the first to the last.
+    """The surface through several curves: u runs along the curves, v from the first to the last.
 
     Between two curves it is ruled; through more of them it is a spline of degree 3 at most, with parameters by the mean
     distance of the curves' control points. Curves of other degrees and knots are raised to common ones, exactly.
@@ -134,8 +134,8 @@ def loft(curves: Iterable[NurbsCurve], *, name: str | None = None) -> NurbsSurfa
     Raises
     ------
     InputError
-        Fewer than two, plane ones, curves that are one, closed and open ones together, or weights so unlike each other
-        that those between curves are not positive.
+        Fewer than two curves, curves in the plane, two equal neighbors, closed and open curves together, or weights so
+        different that weights between the curves are not positive.
     """
     given = items("curves", curves, "two curves or more")
     for k, curve in enumerate(given):
@@ -151,7 +151,7 @@ def loft(curves: Iterable[NurbsCurve], *, name: str | None = None) -> NurbsSurfa
     steps = np.linalg.norm(np.diff(rows[..., :3] / rows[..., 3:], axis=0), axis=-1).mean(axis=-1)
     if not (steps > 0.0).all():
         k = int(np.argmin(steps))
-        raise InputError(f"curves[{k}] and curves[{k + 1}] are one; expected curves that are apart")
+        raise InputError(f"curves[{k}] and curves[{k + 1}] are equal; expected different curves")
     at = np.concatenate([[0.0], np.cumsum(steps)])
     across = min(_MOST, len(given) - 1)
     # Knots by averaging parameters (The NURBS Book, 9.8), so that the equations can be solved.
@@ -159,7 +159,9 @@ def loft(curves: Iterable[NurbsCurve], *, name: str | None = None) -> NurbsSurfa
     across_knots = np.concatenate([np.repeat(at[0], across + 1), inner, np.repeat(at[-1], across + 1)])
     points = np.linalg.solve(_collocation(at, across_knots, across), rows.reshape(len(given), -1)).reshape(rows.shape)
     if not (points[..., 3] > 0.0).all():
-        raise InputError("curves has weights so unlike each other that those between are not positive; expected others")
+        raise InputError(
+            "curves has weights so different that weights between them are not positive; expected more similar ones"
+        )
     net = points.swapaxes(0, 1)
     return NurbsSurface(net[..., :3] / net[..., 3:], (knots, across_knots), (degree, across), net[..., 3], name=name)
 
@@ -205,10 +207,11 @@ def _collocation(at: Array, knots: Array, degree: int) -> Array:
 
 
 def joined(*shapes: Any, **named: Any) -> tuple[Face, ...]:
-    """The faces of several shapes as those of one, with names that do not collide.
+    """The faces of several shapes as one shape, with distinct names.
 
-    `joined(base=plate, boss=cylinder)` puts the words before the names: "base top", "boss wall". Of shapes without a
-    word, names that are taken get a number: "top", "top 2". Faces that have no name get one, "face" and a number.
+    Shapes given by keyword have the keyword before their faces' names: `joined(base=plate, boss=cylinder)` has "base
+    top" and "boss wall". Among shapes given without keywords, a name that is taken gets a number: "top", "top 2". A
+    face without a name is called "face" with a number.
 
     Parameters
     ----------

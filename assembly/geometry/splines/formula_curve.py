@@ -167,7 +167,9 @@ class FormulaCurve:
         values = out.reshape((*at.shape, 3, 3))[..., : order + 1, : self.dimension]
         finite = np.isfinite(values).all(axis=(-2, -1)).ravel()
         if not finite.all():
-            raise InputError(f"t is {row[~finite][0]}; expected one where the expression and what is asked is finite")
+            raise InputError(
+                f"t is {row[~finite][0]}; expected one where the expression and its derivatives are finite"
+            )
         return values[..., 0, :] if order == 0 else tuple(values[..., k, :] for k in range(order + 1))
 
     def bounds(self, t0: ArrayLike, t1: ArrayLike) -> Array:

@@ -104,7 +104,7 @@ class ClearanceProof:
         Parameters
         ----------
         q : (n, 7)
-            A row a body.
+            One row per body.
         touching : float
             Cells that cross by no more are not said to.
         moves : (pairs, 6), optional

@@ -124,7 +124,7 @@ def _strip(surface: NurbsSurface, direction: int, k: int) -> NurbsSurface:
 
 
 def round_parts(face: Face) -> tuple[int, list[Round | None]]:
-    """What the spans of a face without a boundary lie on: the direction of the spans, and one entry a span.
+    """What the spans of a face without a boundary lie on: the direction of the spans, and one entry per span.
 
     A wire with half balls on its ends is one face; its spans along it are exact. One entry where the whole face is.
     """

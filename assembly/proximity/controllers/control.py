@@ -130,14 +130,15 @@ class Controller:
     form : "unit", "covariant" or "contravariant"
         What the projections psi are of: f - h on unit tangents, on f_u and f_v, or its components along them.
     gain : float, optional
-        K of u' = -K psi [1/s]. By default, and at most with a `rate`, half of what a step may have (`gain_limit`), and
-        where nothing moves a step that would lead farther apart is halved.
+        K of u' = -K psi [1/s]. By default, and at most with a `rate`, half of the `gain_limit` of a step; if nothing
+        moves, a step that would increase the distance is halved.
     rate : float, optional
         K is chosen so that |f - h| - nearest decays by this rate [1/s]: bounded where `nearest` is the least distance.
     nearest : float
         For `rate`: the least distance.
     feedforward : bool
-        Add the rate of the closest point that the motion alone gives it; what is left to the gain is the initial error.
+        Whether to add the velocity of the closest point due to the motion, so that the gain only has to reduce the
+        initial error.
     start : (2,) or (4,), optional
         Parameters; the middles of the domains by default.
     tolerance : float
@@ -150,8 +151,8 @@ class Controller:
 
     Notes
     -----
-    Paper 000, eqs. 1, 13 and 14, with the sign, the gains and the saturation of `docs/controllers.md`. That it is the
-    closest point that is reached holds where `is_globally_convergent` says so. A pole counts as an edge of the patch.
+    Paper 000, eqs. 1, 13 and 14, with the sign, the gains and the saturation of `docs/controllers.md`. The closest
+    point is reached if `is_globally_convergent` says so. A pole counts as an edge of the patch.
     """
 
     def __init__(

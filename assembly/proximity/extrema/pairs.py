@@ -172,8 +172,8 @@ def descend(
 ) -> ContactPair:
     """The nearest pair of two patches that a descent from any start leads to: points that never move apart.
 
-    Where Newton's method alone may go to any extremum, or nowhere, this one follows the distance down and lets Newton's
-    method finish at the minimum it has come to.
+    Newton's method alone may go to any extremum, or nowhere; this follows the distance down, and Newton's method
+    finishes at the minimum.
 
     Parameters
     ----------

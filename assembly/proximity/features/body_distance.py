@@ -51,7 +51,7 @@ class BodyDistance(ReadOnlyArrays):
         coordinates.
     status : DistanceStatus
     evaluations : int
-        Pairs of parts of the bodies that were looked at.
+        Number of pairs of parts that were processed.
     """
 
     lower: float
@@ -70,8 +70,8 @@ class BodyDistance(ReadOnlyArrays):
     def translation(self) -> Array | None:
         """The shortest translation (3,) of b found that parts the bodies, one of which is inside; None elsewhere.
 
-        Computed when it is asked for, in some tenths of a second. As long as is needed along its direction; of convex
-        bodies none is shorter but for digits, and of others there may be one.
+        Computed when it is read, in some tenths of a second. It is as long as needed along its direction; for convex
+        bodies none is shorter up to rounding, for others one may be.
         """
         if self.status is not DistanceStatus.ENCLOSED:
             return None
@@ -85,9 +85,9 @@ class BodyDistance(ReadOnlyArrays):
 
     @property
     def proved(self) -> bool:
-        """Whether the bounds are within the tolerance, and of bodies inside each other no translation is shorter.
+        """Whether the bounds are within the tolerance, and for bodies inside each other no translation is shorter.
 
-        The latter is known of balls alone.
+        The latter is known for balls only.
         """
         if self.status is DistanceStatus.ENCLOSED:
             return are_balls(self._where[0])
@@ -149,7 +149,7 @@ def distance(
 
     Notes
     -----
-    What is known of a shape's parts is kept with its faces: a later query about them at other poses goes on from there.
+    Trees of a shape's parts are kept with its faces and reused by later queries at other poses.
     """
     faces = faces_of("a", a), faces_of("b", b)
     if not isinstance(poses, (tuple, list, np.ndarray)) or len(poses) != 2:

@@ -227,16 +227,16 @@ def closest_features(
     q_a, q_b : (7,), optional
         Poses; a body's own by default, else the identity.
     touching : float
-        What the bodies may be in each other and still touch, in parts of the larger one's size. So do those whose flat
-        faces lie on each other, where as small a move off these faces parts them, and those with conforming faces, a
-        peg in a bore of its own radius, that are no deeper.
+        How much the bodies may overlap and still count as touching, in parts of the larger one's size. The same holds
+        for flat faces that lie on each other if an equally small move off them parts the bodies, and for conforming
+        faces, such as a peg in a bore of its own radius, that overlap by no more.
 
     Returns
     -------
     FeaturePair
-        Where the bodies are apart or touch, their nearest points. Where they cross, a pair with normals that oppose
-        each other and a negative gap: one that closes as the bodies come apart along the normal of a face that crosses,
-        of these the one that leads out first.
+        If the bodies are apart or touch, their nearest points. If they cross, a pair with opposed normals and a
+        negative gap: one that closes as the bodies come apart along the normal of a face that crosses, the shortest
+        such way out.
 
     Raises
     ------

@@ -27,7 +27,7 @@ Side = PlaneRegion | ElementaryFace
 
 @dataclass(frozen=True, eq=False)
 class ContactManifold(ReadOnlyArrays):
-    """The few places at which the contact of two conforming faces is decided, in the world.
+    """The few points that determine the contact of two conforming faces, in the world.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class ContactManifold(ReadOnlyArrays):
     gaps : (m,)
         Along the normals; negative where b is within a.
     bound : float
-        No gap of the whole pair is less; rounding and what the faces are off their forms are taken from it.
+        No gap of the whole pair is less; rounding and the deviations of the faces from their kinds are subtracted.
     """
 
     places: Array
@@ -48,7 +48,7 @@ class ContactManifold(ReadOnlyArrays):
     _origins: Array = field(repr=False)
 
     def rates(self) -> tuple[Array, Array]:
-        """How the gaps change by twists of the bodies of a and of b, (m, 6) each.
+        """Derivatives of the gaps by the twists of the bodies of a and of b, (m, 6) each.
 
         A twist is a velocity of the body's origin and an angular velocity, in world axes.
         """

@@ -5,7 +5,7 @@ With J the Jacobian of the rows in the twists of the moving bodies, the degrees 
     dof = 6 moving - rank J,
 
 and the free motions span the null space of J. Grubler's count, 6 moving - rows, is right only where rows are
-independent. One-sided rows do not count: they take away no freedom until they bind.
+independent. One-sided rows do not count: they take away no degree of freedom until they bind.
 """
 
 from __future__ import annotations
@@ -202,7 +202,7 @@ class Mobility(ReadOnlyArrays):
 
     @property
     def singular(self) -> bool:
-        """Whether the pose has more freedoms than poses nearby: `finite_dof < dof`."""
+        """Whether the pose has more degrees of freedom than poses nearby: `finite_dof < dof`."""
         return self.finite_dof < self.dof
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Poses near a pose along its free motions: how many freedoms they have, and a path through them.
+"""Poses near a pose along its free motions: how many degrees of freedom they have, and a path through them.
 
 Bodies are moved along a motion and put back onto the constraints by a solve, which takes the nearest pose.
 """
@@ -20,7 +20,7 @@ from assembly.solve.result import Result
 __all__ = ["finite_dof", "path"]
 
 Array = NDArray[np.float64]
-# How far bodies are moved to count freedoms there, in sizes of the scene and radians.
+# How far bodies are moved to count degrees of freedom there, in sizes of the scene and radians.
 REACH = 0.02
 # Mixtures of free motions that are tried, and how far from one bodies may go, in parts of the way.
 MIXTURES, ASTRAY = 2, 0.3
@@ -65,8 +65,8 @@ def finite_dof(problem: Problem, groups: Sequence[Group], q: Array, size: float,
     """The least degrees of freedom found near a pose, group by group.
 
     Where rows are independent the poses that hold them are a smooth surface of that dimension. Else bodies are moved
-    along mixtures of their free motions: if these can go there, and have as many freedoms where they arrive, so can all
-    the others, for a mixture is like any. If not, along every free motion and back.
+    along mixtures of their free motions: if these are possible and end with as many degrees of freedom, so can all the
+    others, for a mixture is like any. If not, along every free motion and back.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class Walks:
         self._size = size
         self._interruption = interruption
         self._free = [group.balanced.free(interruption) for group in groups]
-        # For each group: the way that was meant, the way that bodies went, freedoms there.
+        # For each group: the way that was meant, the way that bodies went, degrees of freedom there.
         self._ends: list[list[tuple[Array, Array, int]]] = [[] for _ in groups]
 
     def go(self, parts: Sequence[Array]) -> None:
@@ -136,13 +136,13 @@ class Walks:
                 self._ends[g].append((part, way, there.get(group.places, group.dof)))
 
     def regular(self, g: int) -> bool:
-        """Whether a group went everywhere it was meant to go, and has as many freedoms there."""
+        """Whether a group went everywhere it was meant to go, and has as many degrees of freedom there."""
         return len(self._ends[g]) > 0 and all(
             np.linalg.norm(way - part) <= ASTRAY and dof == self.groups[g].dof for part, way, dof in self._ends[g]
         )
 
     def least(self, g: int) -> int:
-        """The least freedoms of a group at the end of a way, and no more than directions in which it went."""
+        """The least degrees of freedom of a group at the end of a way, and no more than directions in which it went."""
         least = self.groups[g].dof
         if self._ends[g] and not self.regular(g):
             least = min([least, *(dof for _, way, dof in self._ends[g] if np.linalg.norm(way) >= ARRIVED)])

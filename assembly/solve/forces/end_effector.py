@@ -58,18 +58,18 @@ def tip_jacobian(
 ) -> Array:
     """Velocities of an end effector for unit rates of the inputs, through closed loops and contacts.
 
-    Two-sided constraints hold; driven values do not count, limits and one-sided contacts where they are asked for.
-    Where the pose violates constraints, it is the Jacobian of rates that do not change the violations.
+    Two-sided constraints hold; driven values do not count, limits and one-sided contacts only if requested. If the pose
+    violates constraints, it is the Jacobian of rates that do not change the violations.
 
     Parameters
     ----------
     scene : Assembly
     tip : Point, Frame or Body
-        Of a body, its origin and its axes.
+        A body stands for its origin and axes.
     inputs : sequence of Joint or Freedom
-        Joints with one freedom, or freedoms, `joint.freedom(name)`.
+        Joints with one coordinate, or coordinates, `joint.freedom(name)`.
     q : (n, 7) or Solution, optional
-        A row a body, or a solution for these bodies; the bodies' own poses by default.
+        One row per body, or a solution for these bodies; the bodies' own poses by default.
     task : "position", "rotation" or "pose", optional
         Which rows: its linear velocity, its body's angular velocity, or both, linear first. Position for a point,
         pose for a frame or a body by default.
@@ -79,18 +79,20 @@ def tip_jacobian(
         As of `Dexterity`: which world axes count, constraints that do not hold the mechanism, and constraints whose
         one-sided rows do.
     active : bool
-        One-sided rows that are at their bound at q, contacts that touch and limits that are reached, hold it as well.
+        Whether one-sided rows that are at their bound at q, contacts that touch and limits that are reached, hold it as
+        well.
 
     Returns
     -------
     (r, k)
-        A row a velocity that counts, a column an input, world axes. Lengths in the user's unit, angles in radians.
+        One row per velocity that counts, one column per input, world axes. Lengths in the user's unit, angles in
+        radians.
 
     Raises
     ------
     InputError
         The inputs depend on each other at this pose or leave the end effector's motion open (the message
-        names those that do, and freedoms to add), or q does not fit.
+        names those that do, and coordinates to add), or q does not fit.
 
     Notes
     -----

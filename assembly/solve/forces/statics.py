@@ -113,8 +113,8 @@ class Wrench(ReadOnlyArrays):
 def wrenches(solution: Solution) -> dict[str, dict[str, Wrench]]:
     """What every constraint exerts on each of its bodies, by their names; `Solution.wrenches` keeps it.
 
-    In the objective's units over lengths and radians. On a flat face that lies on another the pressure has a center:
-    torques there are those that balance the objective.
+    In the objective's units over lengths and radians. For flat faces that lie on each other, force and torque are those
+    that balance the objective.
 
     Raises
     ------
@@ -196,16 +196,16 @@ def geometric_jacobian(at: Solution | Assembly, inputs: Sequence[Joint | Freedom
     """Velocity of an end effector for unit rates of the joints of an open chain, (6, k): paper 001, eq. 7.
 
     A column is [z x b, z] for a joint that turns about the axis z, b the vector from the axis to it, and [z, 0]
-    for one that slides along z. Freedoms of the chain that are no inputs are held still.
+    for one that slides along z. Coordinates of the chain that are no inputs are held still.
 
     Parameters
     ----------
     at : Solution or Assembly
         Where the bodies are.
     inputs : sequence of Joint or Freedom
-        Freedoms of `Revolute`, `Prismatic` and `Cylindrical` joints; of a joint its only one.
+        Coordinates of `Revolute`, `Prismatic` and `Cylindrical` joints; of a joint its only one.
     tip : Point, Frame or Body
-        Of a frame or a body its origin. World axes.
+        A frame or body stands for its origin. World axes.
 
     Raises
     ------
@@ -220,8 +220,8 @@ def joint_torques(
 ) -> Array:
     """J^T W: torques and forces of the joints of an open chain that do the work of a wrench at its end effector, (k,).
 
-    An arm that holds still pushes with the wrench W; against a load it takes the negative of the load's. Paper 001,
-    eqs. 6 to 8.
+    An arm at rest with these torques pushes with the wrench W; to carry a load use the negative of the load's wrench.
+    Paper 001, eqs. 6 to 8.
 
     Parameters
     ----------
@@ -249,7 +249,7 @@ def _chain(
     if id(body) not in rows:
         raise InputError(f"tip is on body {body.name!r}; expected a body of this assembly")
     if isinstance(inputs, (Joint, Freedom)) or not isinstance(inputs, Sequence):
-        raise TypeError(f"inputs is {inputs!r}; expected a sequence of joints or freedoms")
+        raise TypeError(f"inputs is {inputs!r}; expected a sequence of joints or joint coordinates")
     point = _world(rows[id(body)], coordinates)
     columns = []
     for k, given in enumerate(inputs):
@@ -281,15 +281,15 @@ def _world(row: Array, coordinates: Array) -> Array:
 
 
 def _input(name: str, given: Joint | Freedom) -> Freedom:
-    """The freedom that is meant; one that turns about the joint's axis or slides along it."""
+    """The coordinate that is meant; one that turns about the joint's axis or slides along it."""
     if not isinstance(given, (Joint, Freedom)):
-        raise TypeError(f"{name} is {given!r}; expected a joint or one of its freedoms, joint.freedom(name)")
+        raise TypeError(f"{name} is {given!r}; expected a joint or one of its coordinates, joint.freedom(name)")
     if isinstance(given, Joint) and len(given.freedoms) != 1:
         known = ", ".join(map(repr, given.freedoms)) or "none"
-        raise InputError(f"{name} is {given.name!r}; expected a joint with one freedom, it has {known}")
+        raise InputError(f"{name} is {given.name!r}; expected a joint with one coordinate; it has {known}")
     freedom = given.freedom() if isinstance(given, Joint) else given
     if not isinstance(freedom.joint, (Revolute, Prismatic, Cylindrical)) or isinstance(freedom.joint, Screw):
-        raise InputError(f"{name} is {freedom!r}; expected a freedom of a Revolute, Prismatic or Cylindrical joint")
+        raise InputError(f"{name} is {freedom!r}; expected a coordinate of a Revolute, Prismatic or Cylindrical joint")
     return freedom
 
 

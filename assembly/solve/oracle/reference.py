@@ -354,10 +354,10 @@ def solve(
     ----------
     scene : Assembly
     q0 : (n, 7) or Solution, optional
-        Where to start: a row a body, or an earlier solution, whose contacts are taken up as well. The bodies' own
+        Where to start: one row per body, or an earlier solution, whose contacts are taken up as well. The bodies' own
         poses by default.
     starts : mapping of constraint name -> (4,), optional
-        Parameters near the pair each contact is to track; a global start finds the others.
+        Surface parameters near the pair that a contact is to track; for other contacts a global search finds the pair.
     ipopt : mapping, optional
         IPOPT's options by name, each a number or a string, such as {"max_iter": 100}.
 
@@ -372,15 +372,15 @@ def solve(
     Raises
     ------
     TypeError, InputError
-        Naming the argument, what came and what was expected.
+        The message names the argument, its value and what was expected.
 
     Notes
     -----
-    Of rows that follow from others, as in a planar four-bar in space, some are left to the final check: their
-    multipliers are zero, and others carry what `Assembly.solve` spreads over all.
+    Of redundant rows, as in a planar four-bar in space, some are left to the final check: their multipliers are zero,
+    and others carry what `Assembly.solve` distributes over all.
 
-    Without an objective bodies stay close to where the solve starts. `Assembly.solve` gathers scattered bodies first
-    and stays close to where these then are; to compare, say `Posture()`.
+    Without an objective bodies stay close to where the solve starts. `Assembly.solve` first assembles scattered bodies
+    and stays close to the poses found so; to compare, minimize a `Posture()`.
 
     At a pole of a surface one parameter moves nothing and rows lose their meaning: a contact there is reached to about
     1e-7 at best, or ends STALLED.

@@ -65,7 +65,7 @@ def _check_values(parameters: Sequence[Parameter], values: Array) -> None:
 
 
 def _check_freedom(numbers: Sequence[Any], values: Array) -> None:
-    """The same of the value and the limits of one freedom, which have to go together in every row."""
+    """The same of the value and the limits of one coordinate, which have to go together in every row."""
     owner = numbers[0].owner
     names = [item.attribute for item in numbers]
     ends = (values.min(axis=0), values.max(axis=0))
@@ -76,7 +76,7 @@ def _check_freedom(numbers: Sequence[Any], values: Array) -> None:
 
 
 def set_all(parameters: Sequence[Parameter], values: Sequence[float]) -> None:
-    """Set parameters to values that were checked, those of one freedom at once."""
+    """Set parameters to values that were checked, those of one coordinate at once."""
     for item, value in zip(parameters, values, strict=True):
         if isinstance(item._number, RowNumber):
             item._number.put(float(value))

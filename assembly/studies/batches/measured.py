@@ -83,7 +83,7 @@ def _in_world(
 
 
 def _coordinates(packed: Packed, measure: Measure, ended: Array, q: Array, writes: Writes) -> Array:
-    """A freedom of a joint in every row, (n,): in the user's unit, angles on the turns where rows ended."""
+    """A coordinate of a joint in every row, (n,): in the user's unit, angles on the turns where rows ended."""
     coordinate = measure.thing.coordinate
     asked = np.array([[packed._frames[coordinate.frames], coordinate.kind, coordinate.component]], dtype=np.int64)
     scaled = q.copy()

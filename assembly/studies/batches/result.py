@@ -21,12 +21,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Batch(ReadOnlyArrays):
-    """n solves of a scene, a row each, in the order in which they were asked for; print it for a summary.
+    """n solves of a scene, one row each, in the given order; print it for a summary.
 
     Attributes
     ----------
     q : (n, bodies, 7)
-        Poses; of a row that failed those that its solve ended with.
+        Poses; for a row that failed, those at which its solve ended.
     status : (n,) of Status
     objective : (n,)
         In the user's units.
@@ -35,7 +35,7 @@ class Batch(ReadOnlyArrays):
     iterations : (n,)
         Steps of the loop.
     alone : (n,) of bool
-        Whether the row was a solve by itself, because it took more than the loop.
+        Whether the row was solved on its own, because the compiled loop was not enough.
     parameters : tuple of Parameter
     values : (n, p)
         Of the parameters.

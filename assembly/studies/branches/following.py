@@ -68,8 +68,8 @@ def follow(
 ) -> Branch:
     """Follow the branch of a solution while a parameter goes from one end of a range to the other.
 
-    It goes both ways from the start, through turning points of the parameter, until it leaves the range, closes, or
-    ends; docs/branches.md has what is an event. The scene has its own number afterwards.
+    The branch is followed both ways from the start, through turning points of the parameter, until it leaves the range,
+    closes, or ends; docs/branches.md lists the events. The scene's own number is restored afterwards.
 
     Parameters
     ----------
@@ -89,8 +89,8 @@ def follow(
     Raises
     ------
     InputError, TypeError
-        A range without the parameter's value, a start that failed, a scene whose rows leave motions free and nobody
-        asks for anything, clearances.
+        A range without the parameter's value, a start that failed, a scene with free motions and no objective,
+        clearances.
     """
     the_scene(scene)
     if not isinstance(parameter, Parameter):
@@ -145,7 +145,7 @@ class _Follower:
         try:
             self.first, self.start = _begun(curve, place)
         except LostError:
-            raise InputError("start is at a fold of a contact; expected a pose beside it") from None
+            raise InputError("start is at a fold of a contact; expected a pose near it") from None
 
     def ways(self) -> list[Way]:
         """What is found as the parameter grows at first, and, if that is no loop, as it shrinks."""
@@ -237,7 +237,7 @@ def _begun(curve: Curve, place: Place) -> tuple[Curve, Point]:
     point = curve.point(place)
     rank = point.basis.shape[1]
     if rank > n:
-        raise InputError(f"{curve.parameter.name} cannot change: rows have no solution beside the start")
+        raise InputError(f"{curve.parameter.name} cannot change: rows have no solution near the start")
     wishes = not packed.is_implicit
     if rank == n and not wishes:
         return curve, _settled(curve, point)
@@ -260,7 +260,7 @@ def _begun(curve: Curve, place: Place) -> tuple[Curve, Point]:
     values = np.linalg.svd(point.matrix, compute_uv=False)
     flat = int(np.count_nonzero(values <= FLAT * values[0]))
     if flat:
-        raise InputError(f"objective does not tell {flat} of the motions that rows leave free; {EXPECTED}")
+        raise InputError(f"objective does not determine {flat} of the motions that rows leave free; {EXPECTED}")
     return pushing, _settled(pushing, point)
 
 
@@ -268,7 +268,7 @@ def _settled(curve: Curve, point: Point) -> Point:
     """The start itself, to the last digit."""
     found = curve.corrected(point, np.zeros(len(point.tangent)))
     if found is None:
-        raise InputError("start is where branches cross, or a contact is at a fold; expected a pose beside it")
+        raise InputError("start is where branches cross, or a contact is at a fold; expected a pose near it")
     return found
 
 

@@ -49,7 +49,7 @@ def poses_at(scene: Assembly, values: Mapping[str, float]) -> Array:
 
 
 def _checked(name: str, freedom: Freedom, value: float) -> float:
-    """A value within the limits of its freedom, whatever it is driven to."""
+    """A value within the limits of its coordinate, whatever it is driven to."""
     told = number(f"values[{name!r}]", value)
     if not freedom.lower <= told <= freedom.upper:
         raise InputError(
@@ -59,7 +59,7 @@ def _checked(name: str, freedom: Freedom, value: float) -> float:
 
 
 def _check_holds(tree: JointTree, known: Mapping[str, Freedom], given: Mapping[Freedom, float]) -> None:
-    """Raise for freedoms that are not to be set, or twice."""
+    """Raise for coordinates that are not to be set, or twice."""
     for name, freedom in known.items():
         if freedom not in given:
             continue

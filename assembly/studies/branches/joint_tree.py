@@ -1,6 +1,6 @@
 """What joints let bodies reach: a tree of joints that carries bodies, and the rows that close loops.
 
-Of the joints between bodies those with the fewest freedoms are taken first, from fixed bodies on. What the tree does
+Of the joints between bodies those with the fewest coordinates are taken first, from fixed bodies on. What the tree does
 not hold are rows: of joints that close loops, and of all other constraints that are rows.
 """
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["JointTree"]
 
 Array = NDArray[np.float64]
-# Twists in the moving frame, shift and turn, of what kinds of joints leave free, and the freedoms of these.
+# Twists in the moving frame, shift and turn, of what kinds of joints leave free, and the coordinates of these.
 _SHIFTS, _TURNS = np.eye(6)[:3], np.eye(6)[3:]
 _CARRIES: dict[type[Joint], tuple[tuple[str, ...], Array]] = {
     Fixed: ((), np.empty((0, 6))),
@@ -74,7 +74,7 @@ class JointTree:
     ----------
     scene : Assembly
     given : mapping of Freedom -> float, optional
-        Values that freedoms are held at, in the user's unit, whatever they are driven to.
+        Values that coordinates are held at, in the user's unit, whatever they are driven to.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class JointTree:
         self._write_rows(constraints)
 
     def _grown(self, constraints: tuple[Constraint, ...]) -> list[_Carried]:
-        """Joints from fixed bodies on, those with few freedoms first."""
+        """Joints from fixed bodies on, those with few coordinates first."""
         joints = [item for item in constraints if type(item) in _CARRIES and isinstance(item, Joint)]
         joints.sort(key=lambda joint: len(_CARRIES[type(joint)][1]))
         known = {k for k, body in enumerate(self.bodies) if body.fixed}
@@ -145,7 +145,7 @@ class JointTree:
         self.coordinates = first
 
     def _held(self, joint: Joint, name: str) -> float | None:
-        """What a freedom is held at, None where it is free."""
+        """What a coordinate is held at, None where it is free."""
         freedom = joint.freedom(name)
         return self._given.get(freedom, freedom.value)
 
@@ -182,7 +182,7 @@ class JointTree:
         return self._places[id(coordinate.frames.frame_a.body)], self._places[id(coordinate.frames.frame_b.body)]
 
     def holds(self, freedom: Freedom) -> bool:
-        """Whether the tree, or a row that closes a loop, can hold a freedom at a value."""
+        """Whether the tree, or a row that closes a loop, can hold a coordinate at a value."""
         if any(item.joint is freedom.joint for item in self._tree):
             return freedom.name in _CARRIES[type(freedom.joint)][0] or isinstance(freedom.joint, Screw)
         return self.loops_close and freedom.coordinate.kind in _KINDS
@@ -193,7 +193,7 @@ class JointTree:
         return not isinstance(joint, Spherical) or coordinate.kind == COINCIDENT
 
     def drawn(self, rng: np.random.Generator, count: int) -> Array:
-        """Motions (count, e, 12) of the tree's joints, freedoms within their limits; any angle where there are none."""
+        """Motions (count, e, 12) of the tree's joints, coordinates within limits; any angle where there are none."""
         motions = np.zeros((count, len(self._tree), 12))
         motions[:, :, [0, 4, 8]] = 1.0
         for k, item in enumerate(self._tree):
@@ -208,8 +208,8 @@ class JointTree:
         return motions
 
     def standing(self, q: Array) -> Array:
-        """Motions (1, e, 12) of the tree's joints: freedoms that are held at their values, others as bodies stand at q
-        (n, 7).
+        """Motions (1, e, 12) of the tree's joints: coordinates that are held at their values, others as bodies stand at
+        q (n, 7).
         """
         motions = np.zeros((1, len(self._tree), 12))
         motions[:, :, [0, 4, 8]] = 1.0
@@ -238,7 +238,7 @@ class JointTree:
         return joint.pitch / (2.0 * pi * self.scale)
 
     def _move(self, item: _Carried, told: dict[str, Array], motion: Array) -> None:
-        """Write motions (s, 12) of a joint, a rotation and a shift, whose freedoms are told, (s,), over the size."""
+        """Write motions (s, 12) of a joint, a rotation and a shift, whose coordinates are told, (s,), over the size."""
         joint = item.joint
         if isinstance(joint, Screw):
             told["slide"] = told["angle"] * self._lead(joint)
@@ -254,7 +254,7 @@ class JointTree:
             motion[:, :9] = turns.reshape(-1, 9)
 
     def _values(self, rng: np.random.Generator, freedom: Freedom, count: int) -> Array:
-        """Values of a freedom, lengths over the size."""
+        """Values of a coordinate, lengths over the size."""
         is_angle = freedom.coordinate.is_angle
         unit, reach = (1.0, pi) if is_angle else (self.scale, 1.0)
         held = self._held(freedom.joint, freedom.name)

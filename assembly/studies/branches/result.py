@@ -69,7 +69,7 @@ class BranchEvent(ReadOnlyArrays):
 
 @dataclass(frozen=True, eq=False)
 class Branch(ReadOnlyArrays):
-    """A branch of solutions along a parameter: a row a point, in order along the branch; print it for its events.
+    """A branch of solutions along a parameter: one row per point, in order along the branch; print it for its events.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Branch(ReadOnlyArrays):
 
     @property
     def table(self) -> NDArray[np.void]:
-        """A row a point: the parameter, the length along the branch, and measures, by their names."""
+        """One row per point: the parameter, the length along the branch, and measures, by their names."""
         names = [self.parameter.name, "length", *(item.name for item in self.of)]
         for k, name in enumerate(names):
             if name in names[:k]:

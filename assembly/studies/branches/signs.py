@@ -7,7 +7,7 @@ other: elbow up or down, a wrist flipped or not. The sign is that of
     ((p_2 - p_1) x (p_3 - p_2)) . z      parallel axes z through p_i,
     z_1 . (z_2 x z_3)                    others,
 
-over the lengths. A loop that six freedoms close is singular where their screws are dependent: the sign of the
+over the lengths. A loop that six coordinates close is singular where their screws are dependent: the sign of the
 determinant of these. Two solutions of a scene with another sign are two branches, however near they are.
 """
 
@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 PARALLEL, ZERO = 1e-9, 1e-6
 # Singular values of screws that are always dependent.
 DEPENDENT = 1e-8
-# Freedoms of joints that are one screw each: about the axis, along it.
+# Coordinates of joints that are one screw each: about the axis, along it.
 SCREWS = {Revolute: ("angle",), Prismatic: ("slide",), Cylindrical: ("angle", "slide"), Fixed: ()}
 
 
@@ -60,8 +60,8 @@ def configuration(solution: Solution) -> Mapping[str, int]:
     Returns
     -------
     dict of str to int
-        "a-b-c" for hinges that follow each other, in the order of the scene's constraints, the bend at b; "loop of c"
-        for a loop that six freedoms close, c the last of its joints. Of joints that are always dependent there is none.
+        "a-b-c" for consecutive hinges, in the order of the scene's constraints, with the bend at b; "loop of c" for a
+        loop that six coordinates close, c the last of its joints. Of joints that are always dependent there is none.
     """
     if not isinstance(solution, Solution):
         raise TypeError(f"solution is {solution!r}; expected a Solution")
@@ -125,7 +125,7 @@ def _bend(first: _Axis, middle: _Axis, last: _Axis) -> float | None:
 
 
 def _loops(bodies: Sequence[Body], axes: Sequence[_Axis]) -> dict[str, float]:
-    """The determinants of loops that six freedoms close."""
+    """The determinants of loops that six coordinates close."""
     above: dict[int, tuple[int, _Axis] | None] = {k: None for k, body in enumerate(bodies) if body.fixed}
     rest, told = list(axes), {}
     while True:
@@ -156,7 +156,7 @@ def _way(body: int, above: Mapping[int, tuple[int, _Axis] | None]) -> list[_Axis
 
 
 def _determinant(loop: Sequence[_Axis]) -> float | None:
-    """Of the screws of six freedoms, lengths over the loop's own. None of more or fewer, or where it is always zero."""
+    """Of the screws of six coordinates, lengths over the loop's. None for more or fewer, or where it is always zero."""
     middle = np.mean([axis.place for axis in loop], axis=0)
     size = max(float(np.linalg.norm(axis.place - middle)) for axis in loop)
     if size == 0.0:
@@ -171,5 +171,5 @@ def _determinant(loop: Sequence[_Axis]) -> float | None:
     if len(screws) != 6:
         return None
     values = np.linalg.svd(np.array(screws), compute_uv=False)
-    # Of a planar loop with six freedoms several are zero.
+    # Of a planar loop with six coordinates several are zero.
     return float(np.linalg.det(np.array(screws))) if values[-2] > DEPENDENT else None

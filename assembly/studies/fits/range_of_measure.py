@@ -61,8 +61,8 @@ _NEAR, _TURNED = 2.0, 4.0 * pi
 def play(scene: Assembly, solution: Solution, of: Measure) -> Play:
     """The range of a measure over all poses that one-sided contacts, clearances and limits allow.
 
-    Joints, driven values and two-sided contacts are held; objectives of the scene do not count. Poses are reached from
-    the solution, in short steps, so that a pin stays in its hole.
+    Joints, driven values and two-sided contacts hold; objectives of the scene do not count. Poses are reached from the
+    solution in short steps, so that a pin stays in its hole.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def play(scene: Assembly, solution: Solution, of: Measure) -> Play:
     solution : Solution
         A successful one of the scene.
     of : Measure
-        A place, a distance, or a coordinate of a joint.
+        A position, a distance, or a coordinate of a joint.
 
     Returns
     -------

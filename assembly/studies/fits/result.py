@@ -47,13 +47,13 @@ class End:
 
 @dataclass(frozen=True, eq=False)
 class Play:
-    """The range of a measure over poses that hold; print it.
+    """The range of a measure over poses at which constraints hold; print it.
 
     Attributes
     ----------
     measure : Measure
     nominal : float
-        At the solution that was given.
+        At the given solution.
     least, most : End
     """
 
@@ -69,7 +69,7 @@ class Play:
 
     @property
     def width(self) -> float:
-        """From the least value to the most; infinite or NaN where an end is."""
+        """The greatest value minus the least one; infinite or NaN if an end is."""
         return self.most.value - self.least.value
 
     def _repr_html_(self) -> str:

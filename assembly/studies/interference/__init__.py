@@ -1,1 +1,1 @@
-"""Which bodies of a scene are near each other or cross: a row a pair, with what is proven of it."""
+"""Which bodies of a scene are near each other or cross: one row per pair, with what is proven of it."""

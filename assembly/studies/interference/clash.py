@@ -37,14 +37,14 @@ class Clash(ReadOnlyArrays):
     bodies : (str, str)
         Names, in the order of the scene.
     kind : str
-        ``"clear"``: apart by more than is called touching. ``"touching"``: they have points in common, or nearly, and
-        are no deeper in each other than is called touching. ``"crossing"``: their surfaces cross. ``"enclosed"``: one
-        is wholly inside the other one's material. ``"undecided"``: the time was over before they were searched.
+        ``"clear"``: apart by more than `touching`. ``"touching"``: they have points in common, or nearly, and overlap
+        by no more than `touching`. ``"crossing"``: their surfaces cross. ``"enclosed"``: one is entirely inside the
+        other one's material. ``"undecided"``: the time limit was reached before they were searched.
     gap : float or None
-        The distance of the nearest points found. Of bodies that cross, minus how deep: of the places where their
-        surfaces face each other from inside that are known the deepest, or, if that is less, how far the bodies are to
-        be moved apart along the normal at `points`; 0 where it is not known. Of an enclosed one, minus its distance
-        from the walls. None where it is undecided.
+        The distance of the nearest points found. For bodies that cross, minus the depth: the deepest known place at
+        which their surfaces face each other from inside, or, if less, how far the bodies have to be moved apart along
+        the normal at `points`; 0 if it is not known. For an enclosed body, minus its distance from the walls. None if
+        undecided.
     bound : float
         No points of the two surfaces are nearer than this; 0 where none is proven apart.
     points : (2, 3) or None
@@ -52,14 +52,14 @@ class Clash(ReadOnlyArrays):
     faces : (str, str) or None
         The face, edge or vertex of either body that the point is on.
     proved : bool
-        Whether `kind` is certified. Clear: `bound` is the gap but for 1e-9 of the bodies' size. Touching: the bodies
-        are clear where they are, or once one of them is moved or made slimmer, by no more than what is called
-        touching. Crossing: the surfaces cross, and no translation by less than that undoes it, or there is a ball that
-        is inside of both bodies. Enclosed: the surfaces are apart, and the one is inside of the other one.
+        Whether `kind` is certified. Clear: `bound` is the gap to within 1e-9 of the bodies' size. Touching: the bodies
+        are clear as they are, or once one of them is moved or made slimmer by no more than `touching`. Crossing: the
+        surfaces cross and no shorter translation undoes it, or a ball is inside of both bodies. Enclosed: the surfaces
+        are apart, and one body is inside of the other one.
     relation : str
         ``"joined"`` by a joint, a gear or a rack, ``"excluded"`` by a clearance, in ``"contact"``, or ``"free"``.
     witness : (3,) or None
-        Of a crossing the middle of that ball, where one was found.
+        For a crossing, the center of that ball, if one was found.
     """
 
     bodies: tuple[str, str]
@@ -148,7 +148,7 @@ class Interference(ReadOnlyArrays):
         return "\n".join([self._counts(), *(text if self.rows else [])])
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write a file of comma-separated values, a line a row; what is not known is empty."""
+        """Write a file of comma-separated values, one line per row; what is not known is empty."""
         with open(path, "w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(_COLUMNS)

@@ -45,13 +45,13 @@ def interference(
     Parameters
     ----------
     scene : Assembly or iterable of Body
-        Bodies as a STEP file has them are a scene without constraints.
+        A list of bodies, for example of a STEP file, is a scene without constraints.
     poses : Solution or (n, 7), optional
-        Where the bodies stand; by default where they were made.
+        Poses of the bodies; by default their own.
     margin : float
-        Not negative, in the unit of the scene. Every pair has a row that is not proven to be farther apart.
+        Not negative, in the unit of the scene. Every pair that is not proven to be farther apart has a row.
     touching : float
-        What bodies may be in each other and still touch, from 0 to 0.001 parts of the scene's size.
+        How much bodies may overlap and still count as touching, from 0 to 0.001 parts of the scene's size.
     time_limit : float, optional
         Seconds after which pairs that were not searched are rows of the kind "undecided".
 
@@ -67,10 +67,9 @@ def interference(
 
     Notes
     -----
-    Boxes tell which pairs may be near; of those the nearest points are searched for by branch and bound
-    (`assembly.proximity.distance`). Of bodies that have points in common a look proves that they touch, or cross, as in
-    `Solution.crossings`. Where it does not tell, as of blocks in slots of their width, samples do, and the row is not
-    proved.
+    Boxes tell which pairs may be near; for these the nearest points are found by branch and bound
+    (`assembly.proximity.distance`). For bodies that have points in common it is proven that they touch or cross, as in
+    `Solution.crossings`. If that fails, samples decide, and the row is not proved.
     """
     interruption = CTRL_C if time_limit is None else Interruption(time_limit)
     margin = bounded("margin", margin)

@@ -41,18 +41,18 @@ _FLAT = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Workspace(ReadOnlyArrays):
-    """The places that a tip can reach: cells whose middles it reaches, and places of the boundary.
+    """The positions that a tip can reach: cells whose centers it reaches, and points of the boundary.
 
     Attributes
     ----------
     cells : (k, d) of int
         Those reached, in order; two numbers in a plane, three in space.
     poses : (k, n, 7)
-        Of all bodies, with the tip in the middle of each.
+        Poses of all bodies, with the tip at the center of each cell.
     boundary, normals : (m, 3)
-        Places of the tip at which it stopped, and the outward unit normals of the set there, in the world.
+        Points at which the tip stopped, and the outward unit normals of the set there, in the world.
     undecided : int
-        Cells at which a solve has not ended; they count as not reached.
+        Cells for which a solve did not succeed; they count as not reached.
     solves : int
         How many there were.
     scene : Assembly
@@ -73,22 +73,22 @@ class Workspace(ReadOnlyArrays):
 
     @property
     def estimate(self) -> float:
-        """Area or volume, with cells that the boundary cuts counted by their part in the set."""
+        """Area or volume; cells that the boundary cuts count by their part in the set."""
         return self.content.estimate
 
     @property
     def inner(self) -> float:
-        """Area or volume of the cells that were reached like all cells around them."""
+        """Area or volume of the reached cells whose neighbors are all reached."""
         return self.content.inner
 
     @property
     def outer(self) -> float:
-        """Area or volume of the cells reached and of those next to them."""
+        """Area or volume of the reached cells and their neighbors."""
         return self.content.outer
 
     @property
     def centers(self) -> Array:
-        """Middles of the cells reached, in the world, (k, 3)."""
+        """Centers of the reached cells, in the world, (k, 3)."""
         return self.grid.centers(self.cells)
 
     def _repr_html_(self) -> str:
@@ -100,9 +100,9 @@ class Workspace(ReadOnlyArrays):
         return text + (f", {self.undecided} undecided" if self.undecided else "")
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether the tip can reach points (..., 3) of the world, from poses at which it is near; (...).
+        """Whether the tip can reach points (..., 3) of the world, from poses at which it is near; shape (...).
 
-        Each is asked of a solve. Points off the plane of an area are not in it.
+        Each takes a solve. Points off the plane of an area are not in it.
         """
         try:
             places = np.asarray(points, dtype=np.float64)
@@ -133,8 +133,8 @@ class Workspace(ReadOnlyArrays):
     def gradient(self, parameters: Parameter | Sequence[Parameter]) -> Array:
         """How the area or volume changes with numbers of the scene, (p,): the boundary integral of its normal velocity.
 
-        Of each place of the boundary the distance from where the tip was drawn to is derived. Those whose distance has
-        no derivative move as the others do on average.
+        For each point of the boundary the distance from the tip's target is differentiated. Points whose distance has
+        no derivative are taken to move as the others do on average.
 
         Raises
         ------
@@ -174,7 +174,7 @@ class Workspace(ReadOnlyArrays):
         Parameters
         ----------
         values : (k,), optional
-            One number a cell, as of `dexterity`: dark for the least, bright for the greatest, gray for NaN.
+            One number per cell, as of `dexterity`: dark for the least, bright for the greatest, gray for NaN.
         """
         if not len(self.cells):
             raise InputError("the workspace has no cells; expected some to draw")
@@ -187,7 +187,7 @@ class Workspace(ReadOnlyArrays):
         Parameters
         ----------
         values : (k,), optional
-            One number a cell, as of `dexterity`; NaN is left out.
+            One number per cell, as of `dexterity`; NaN is left out.
         axes : matplotlib.axes.Axes, optional
             Where to draw; new ones by default.
 

@@ -36,33 +36,34 @@ def workspace(
     most: int = 200_000,
     progress: Progress = False,
 ) -> Workspace:
-    """The set of places that a tip can reach with all constraints, limits and clearances (paper 001, section 3.1).
+    """Find the positions that a tip can reach with all constraints, limits and clearances (paper 001, section 3.1).
 
-    Space, or a plane, is divided into cells. From the start the tip is drawn to the middles of neighboring cells by
-    warm solves, until no neighbor is left that it comes to. Where it stops on the way to a middle is the boundary.
+    Space, or a plane, is divided into cells. From the start the tip is drawn to the centers of neighboring cells by
+    warm solves, until it reaches no further cell. Where it stops on the way to a center is the boundary.
 
     Parameters
     ----------
     scene : Assembly
         Driven values hold; its objective is not used.
     tip : Point, Frame or Body
-        Of a frame or a body its origin.
+        A frame or body stands for its origin.
     cell : float
         Length of a cell's sides.
     plane : Frame of a fixed body, "xy", "yz" or "zx", optional
-        The area in the x-y plane of a frame, or in a plane of the world through the tip's start. Without it the volume.
+        Compute the area in the x-y plane of a frame, or in a plane of the world through the tip's start; by default the
+        volume.
     starts : several (n, 7) or Solution, optional
-        Poses from which it is looked as well: places that the tip comes to only by another assembly of the mechanism.
+        Further poses to start from, for positions that the tip reaches only with another assembly of the mechanism.
     within : ((3,), (3,)), optional
-        Lower and upper corner of the box of the world in which it is looked, for tips that go on without end. The tip
-        starts in it; area and volume are those of what is in it.
+        Lower and upper corner of a box in the world to which the search is limited, for tips that can move without end.
+        The tip starts in it; area and volume are those inside of it.
     flips : int
         How often the search may go on in another configuration where the mechanism is straight or folded; see Notes.
     most : int
         Cells after which the search ends with an error.
     progress : bool or callable
-        True shows a bar of the solves; a function is called with how many there were, twice: nobody knows how many
-        there will be.
+        True shows a progress bar; a function is called with the number of solves so far, twice, as the total is
+        unknown.
 
     Returns
     -------
@@ -75,10 +76,10 @@ def workspace(
 
     Notes
     -----
-    The estimate is off by the square of the cell's size, in parts of the boundary's radius of curvature. A part of the
-    set that is thinner than a cell may be missed, and so may one that is reached only by a configuration that more
-    flips, or other starts, lead to: an arm has two for its elbow, and one flip more for each joint like it. A tip that
-    moves along a curve, or on a surface, has no area or volume: no cell is reached.
+    The error of the estimate is proportional to the square of the cell's size, in parts of the boundary's radius of
+    curvature. A part of the set that is thinner than a cell may be missed, as may one that is reached only by a
+    configuration that needs more flips or other starts: an arm has two for its elbow, and each joint like it takes one
+    flip more. A tip that moves along a curve, or on a surface, reaches no cell and has no area or volume.
     """
     if not isinstance(scene, Assembly):
         raise TypeError(f"scene is {scene!r}; expected an Assembly")

@@ -1,4 +1,4 @@
-"""Plans of studies: which numbers of a scene take which values, a row a design."""
+"""Plans of studies: which numbers of a scene take which values, one row per design."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_ROWS = 10**9
 
 @dataclass(frozen=True, eq=False)
 class Plan(ReadOnlyArrays):
-    """Values of parameters, a row a design.
+    """Values of parameters, one row per design.
 
     Attributes
     ----------
@@ -211,7 +211,7 @@ def as_plan(plan: Any) -> Plan:
     if isinstance(plan, Plan):
         return plan
     if isinstance(plan, Mapping):
-        raise TypeError(f"plan is {plan!r}; expected asm.grid(...) of it, or a list of dictionaries, one a row")
+        raise TypeError(f"plan is {plan!r}; expected asm.grid(...) of it, or a list of dictionaries, one for each row")
     if isinstance(plan, (str, bytes)) or not isinstance(plan, Iterable):
         raise TypeError(
             f"plan is {plan!r}; expected asm.grid, asm.sobol, asm.latin_hypercube, asm.rows, asm.starts, or "

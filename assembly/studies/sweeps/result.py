@@ -1,4 +1,4 @@
-"""What a study found: a row a design, as a table, pictures, and the best of them."""
+"""What a study found: one row per design, as a table, pictures, and the best of them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Study(ReadOnlyArrays):
     Attributes
     ----------
     table : (n,) structured array
-        A row a design, in the plan's order: "row", the parameters, the measures, "status", "message", "iterations".
+        One row per design, in the plan's order: "row", the parameters, the measures, "status", "message", "iterations".
         Measures of a row that has no solution are NaN. `status` is the name of a `Status`, or "BRANCH_ENDED": its
         branch ends between the row before and this one; "REFUSED": the scene cannot have its numbers; "ERROR": a
         measure, or the solve, raised; "NOT_DONE": the study was interrupted before.

@@ -45,26 +45,26 @@ def study(
     Parameters
     ----------
     scene : Assembly
-        Its numbers are what they were afterwards.
+        Its numbers are restored afterwards.
     plan : Plan, or iterable of dictionaries Parameter -> value
         ``asm.grid``, ``asm.sobol``, ``asm.latin_hypercube``, ``asm.rows``, ``asm.starts``.
     of : Measure or function of a solution, several, or a mapping of names to them
-        What is told of every row. Functions give finite numbers; for workers they have names in a module.
+        Measures to compute for every row. Functions return finite numbers; for workers they must be importable.
     executor : Executor, optional
-        Where it is computed: of `concurrent.futures`, `mpi4py.futures` or executorlib, or a client of Dask. By default
-        here. The bits of the results are the same.
+        Where to compute: an executor of `concurrent.futures`, `mpi4py.futures` or executorlib, or a client of Dask; by
+        default in this process. The results have the same bits.
     folder : str or path, optional
-        Where what is finished is kept. A call with the folder of an earlier one goes on from there.
+        Where finished parts are kept. A call with the folder of an earlier one continues it.
     progress : bool or callable
-        True shows a bar; a function is called with how many rows are done, and of how many, and stops the study where
-        it returns True.
+        True shows a progress bar; a function is called with the numbers of finished and of all rows, and stops the
+        study by returning True.
     chunk_seconds : float
-        How long what a worker is given at a time takes, about; it does not change the results.
+        About how long a chunk for a worker takes; it does not change the results.
 
     Returns
     -------
     Study
-        A row a design, those that failed as well. After Ctrl-C the rows that are done.
+        One row per design, those that failed as well. After Ctrl-C the rows that are done.
 
     Raises
     ------

@@ -44,7 +44,7 @@ class Task(NamedTuple):
 
 
 class RunDone(NamedTuple):
-    """What came of a run, a row a place in the lists; `starts` are where others may begin, None without one."""
+    """What came of a run, one row per place in the lists; `starts` are where others may begin, None without one."""
 
     number: int
     rows: list[int]

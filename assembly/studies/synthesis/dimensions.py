@@ -45,31 +45,31 @@ def synthesize(
     most: int = 200,
     level: float = 1e-6,
 ) -> Synthesis:
-    """Dimensions of a mechanism for which it does best what is wanted.
+    """Find dimensions with which a mechanism does best what is wanted.
 
     Parameters
     ----------
     scene : Assembly
     minimize : stations with what is wanted there, a Measure, or a function
-        Stations: the sum of squares of all differences, as of a coupler's point from given places. A measure: its
-        value, the greatest of all `stations` where they are given; "objective" is what the scene's own objective comes
-        to, a `Dexterity` for instance. A function takes the dimensions (p,), which the scene has meanwhile, and gives a
-        number and its derivatives (p,): an area that a tip reaches, say.
+        Stations: the sum of squares of all differences, for example of a coupler's point from given positions. A
+        measure: its value, or its greatest value over `stations`; "objective" is the value of the scene's own
+        objective, for instance a `Dexterity`. A function: it takes the dimensions (p,), which the scene has meanwhile,
+        and returns a number and its derivatives (p,), for example the area that a tip reaches.
     parameters : mapping of Parameter -> (low, high)
-        The dimensions and their bounds. They start from the values that they have.
+        The dimensions and their bounds. They start from their present values.
     subject_to : sequence of (what, low, high), optional
         Bounds that hold at the end, None for a side without one: of a measure, at every station; or of a function that
         takes the dimensions (p,) and gives a number and its derivatives (p,).
     stations : sequence of Station, optional
-        Where a measure is minimized: the states that count.
+        If a measure is minimized: the states to consider.
     apply : bool
-        Whether the scene's parameters are given the values found, if there is success; by default they are what they
-        were.
+        Whether the scene's parameters are set to the values found in case of success; by default they are restored.
     most : int
         Steps after which the optimizer ends.
     level : float
-        Slopes that count as none, a width of the bounds in parts of what is minimized. A function whose derivatives are
-        no better than a hundredth asks for as much; SLSQP ends there where it is the same to the square of this.
+        Slopes that count as zero: the change over the width of the bounds, in parts of what is minimized. Use 0.01 for
+        a function whose derivatives are only good to a hundredth; SLSQP then ends when the value changes by less than
+        the square of this.
 
     Returns
     -------

@@ -84,11 +84,15 @@ class Goal:
         self.rows = np.concatenate([np.empty(0), *firsts]).astype(np.int64)
         self.worst = np.array([at + len(r) for at, r in zip(starts, firsts, strict=True)]) if measure else None
         if measure is not None and len(self.rows):
-            raise InputError("stations want numbers of measures, and minimize is a measure; expected one of the two")
+            raise InputError(
+                "stations have wanted values of measures, and minimize is a measure; expected one of the two"
+            )
         if self.relation is not None and len(self.rows):
-            raise InputError("stations want numbers of measures, and minimize is a function; expected one of the two")
+            raise InputError(
+                "stations have wanted values of measures, and minimize is a function; expected one of the two"
+            )
         if measure is None and self.relation is None and not len(self.rows):
-            raise InputError("minimize is stations at which nothing is wanted; expected a measure with a number")
+            raise InputError("minimize is stations without wanted values; expected a measure with a value")
         self._wanted = np.array([value for station in listed for value in (station.wanted or {}).values()])
         self._weights = np.concatenate(
             [np.empty(0), *(np.full(len(r), s.weight) for r, s in zip(firsts, listed, strict=True))]

@@ -60,7 +60,8 @@ class FirstOrder(NamedTuple):
         loose = [measure.name for measure, is_loose in zip(measures, rates.undetermined, strict=True) if is_loose]
         if loose:
             raise InputError(
-                f"measures {loose} change with a motion that the scene leaves free, or are forces that rows share; "
+                f"measures {loose} change with a motion that the scene leaves free, or are forces that "
+                "redundant rows share; "
                 "expected determined ones"
             )
         low, high = rates.shrinking, rates.growing

@@ -171,7 +171,7 @@ class Tolerances(ReadOnlyArrays):
         return printed(self)
 
     def plot(self) -> Figure:
-        """Histograms of the samples, and bars of the contributions, a row a measure, by matplotlib.
+        """Histograms of the samples, and bars of the contributions, one row per measure, by matplotlib.
 
         Raises
         ------

@@ -49,7 +49,7 @@ def tolerances(
     play: bool = False,
     progress: Progress = False,
 ) -> Tolerances:
-    """What scatter of parameters does to measures of a solution.
+    """Compute what scatter of parameters does to measures of a solution.
 
     Parameters
     ----------
@@ -60,16 +60,16 @@ def tolerances(
     parameters : mapping of Parameter -> Normal or Uniform
         How each scatters about its value, independent of the others.
     samples : int
-        Sets of values that are drawn and solved in full, each from `solution`.
+        Number of sets of values that are drawn and solved, each from `solution`.
     seed : int
         Of the draws; the same seed gives the same bits.
     limits : mapping of Measure -> (lower, upper), optional
-        What is accepted, None for a side without limit: `yields` says how many samples are within all of them.
+        Accepted ranges, None for a side without limit: `yields` is the share of samples within all of them.
     play : bool
-        Whether parts are loose in their fits as well (`asm.play`): a measure is anywhere between the ends of its range,
-        with the same chance, and dimensions move both ends. Objectives of the scene do not count then.
+        Whether parts are loose in their fits as well (`asm.play`): a measure is uniformly distributed over its range,
+        and dimensions move both ends of the range. Objectives of the scene do not count then.
     progress : bool or callable
-        True shows a bar of the samples' solves; a function is called with how many are done, and of how many.
+        True shows a progress bar; a function is called with the numbers of finished and of all samples.
 
     Returns
     -------

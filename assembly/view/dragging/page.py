@@ -44,7 +44,9 @@ def _server(host: str, port: int) -> ViserServer:
     try:
         from viser import ViserServer
     except ImportError as error:
-        raise ImportError('viser is not there; pip install "assembly-solver[live]"') from error
+        raise ImportError(
+            'the page needs viser, which is not installed; pip install "assembly-solver[live]"'
+        ) from error
     # It looks for a free port from the first one on, and would do so forever where a host is none of this machine.
     try:
         family, _, _, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
@@ -113,7 +115,7 @@ class Live:
 
     @property
     def trace(self) -> Trace:
-        """The hand's motion that was recorded last; raises `InputError` where none was."""
+        """The last recorded motion of the target; raises `InputError` if there is none."""
         return self._session.trace
 
     def wait(self) -> None:
@@ -262,10 +264,10 @@ def live(
     host: str = "127.0.0.1",
     port: int = 8080,
 ) -> Live:
-    """Open a page in which bodies are taken with the mouse and dragged, contacts and clearances held.
+    """Open a page in which bodies are dragged with the mouse while contacts and clearances hold.
 
-    The server runs beside the script until `close`, or its end; `live(scene).wait()` keeps a script from ending. With
-    another host than this machine's own, 127.0.0.1, everybody who reaches it can drag.
+    The server runs beside the script until `close`, or until the script ends; `live(scene).wait()` keeps a script from
+    ending. With a host other than 127.0.0.1 everybody who can reach it can drag.
 
     Parameters
     ----------

@@ -123,7 +123,9 @@ class Session(threading.Thread):
         self._stiffness, self._period = positive("stiffness", stiffness), 1.0 / positive("rate", rate)
         first = scene.solve(q0)
         if not first.success:
-            raise InputError(f"q0 is a start that leads to no pose to begin at; expected one: {first.message}")
+            raise InputError(
+                f"q0 leads to no pose at which the constraints hold; expected one that does: {first.message}"
+            )
         self.shown = Shown(
             first.q, "SOLVED", contacts=_contacts(first), values=first.values, violation=first.feasibility
         )

@@ -158,7 +158,7 @@ def test_scenes_know_the_contacts_of_their_places():
     with pytest.raises(InputError, match="names 'touch', which is not in the assembly"):
         alone.minimize(place)
     scene.minimize(place)
-    with pytest.raises(InputError, match="whose contact 'place touch' keeps on a face"):
+    with pytest.raises(InputError, match="whose contact 'place touch' constrains to a place"):
         scene.remove(contact)
     contact.enabled = False
     assert scene.solve().objective == 0.0  # nothing is drawn without its contact

@@ -52,14 +52,14 @@ def test_a_gear_takes_one_of_several_angles():
     first, *_ = wheels()
     cross = make(asm.Universal)
     assert asm.Gear(cross.freedom("angle_a"), cross.freedom("angle_b"), 1.0).bodies == cross.bodies
-    with pytest.raises(InputError, match="^b is 'universal ground-crank'; .* is an angle, it has 'angle_a', 'angle_b'"):
+    with pytest.raises(InputError, match="^b is 'universal ground-crank'; .* is an angle; it has 'angle_a', 'angle_b'"):
         asm.Gear(first, cross, 1.0)
 
 
 @pytest.mark.parametrize(
     ("call", "error", "text"),
     [
-        (lambda a, b, rack: asm.Gear(a, b, 0), InputError, "ratio is 0; expected the turns of b a turn of a, not zero"),
+        (lambda a, b, rack: asm.Gear(a, b, 0), InputError, "ratio is 0; expected the turns of b per turn of a"),
         (lambda a, b, rack: asm.Gear(a, b, NAN), InputError, "ratio is nan; expected a finite real number"),
         (
             lambda a, b, rack: asm.Gear(a, b, 1.0, offset=INF),
@@ -67,25 +67,25 @@ def test_a_gear_takes_one_of_several_angles():
             "offset is inf; expected a finite real number",
         ),
         (lambda a, b, rack: asm.Gear(a, b, 1.0, name=""), InputError, "name is ''; expected a nonempty string"),
-        (lambda a, b, rack: asm.Gear(a, a, 1.0), InputError, "both sides are Freedom.*; expected two freedoms"),
-        (lambda a, b, rack: asm.Gear(a, rack, 1.0), InputError, "b is 'rack'; .* is an angle, it has none"),
+        (lambda a, b, rack: asm.Gear(a, a, 1.0), InputError, "both sides are Freedom.*; expected two coordinates"),
+        (lambda a, b, rack: asm.Gear(a, rack, 1.0), InputError, "b is 'rack'; .* is an angle; it has none"),
         (
             lambda a, b, rack: asm.Gear(rack.freedom(), a, 1.0),
             InputError,
-            "a is Freedom.*; expected a freedom that is an",
+            "a is Freedom.*; expected a joint coordinate that is an",
         ),
-        (lambda a, b, rack: asm.Gear(a, "b", 1.0), TypeError, "b is 'b'; expected a joint or one of its freedoms"),
+        (lambda a, b, rack: asm.Gear(a, "b", 1.0), TypeError, "b is 'b'; expected a joint or one of its coordinates"),
         (lambda a, b, rack: asm.RackPinion(a, rack, 0.0), InputError, "radius is 0; expected the travel of the rack"),
         (lambda a, b, rack: asm.RackPinion(a, rack, "1"), InputError, "radius is '1'; expected a finite real number"),
         (
             lambda a, b, rack: asm.RackPinion(a, b, 1.0),
             InputError,
-            "rack is 'revolute ground-b'; .* slides, it has none",
+            "rack is 'revolute ground-b'; .* slides; it has none",
         ),
         (
             lambda a, b, rack: asm.RackPinion(rack, rack, 1.0),
             InputError,
-            "pinion is 'rack'; .* is an angle, it has none",
+            "pinion is 'rack'; .* is an angle; it has none",
         ),
         (lambda a, b, rack: asm.RackPinion(a, make(asm.Planar), 1.0), InputError, "rack is .* it has 'x', 'y'"),
         (lambda a, b, rack: asm.RackPinion(a, None, 1.0), TypeError, "rack is None; expected a joint"),

@@ -376,7 +376,7 @@ def calling():
             r"function height:.* does not expand to SX \(.*FindE\); expected one that does",
         ),
         (ca.Function, r"function is casadi.Function\(\) without content; expected"),
-        (lambda: shaped([], [(1, 1)]), "function is f:.* without inputs; expected one a body"),
+        (lambda: shaped([], [(1, 1)]), "function is f:.* without inputs; expected one for each body"),
         (lambda: shaped([(7, 1), (6, 1)], [(1, 1)]), "function has input 'i1' of shape 6x1.*; expected a pose"),
         (lambda: shaped([(1, 7)], [(1, 1)]), "function has input 'i0' of shape 1x7.*; expected a pose"),
         (lambda: shaped([(7, 1)], []), "function has 0 outputs; expected one"),
@@ -401,7 +401,7 @@ def test_what_is_no_function_is_refused(value):
 @pytest.mark.parametrize(
     ("bodies", "error", "text"),
     [
-        ([], InputError, r"bodies are \[\]; expected 2, one an input"),
+        ([], InputError, r"bodies are \[\]; expected 2, one for each input"),
         ([RED], InputError, r"bodies are \['red'\]; expected 2"),
         (BODIES, InputError, "bodies are .*'blue'.*; expected 2"),
         ([RED, RED], InputError, "body 'red' is named twice; expected distinct"),

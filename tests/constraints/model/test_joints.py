@@ -205,14 +205,14 @@ def test_freedom_by_name():
     hinge, shaft = make(asm.Revolute), make(asm.Cylindrical)
     assert hinge.freedom() is hinge.freedom("angle") is hinge.freedoms["angle"]
     with pytest.raises(
-        InputError, match="name is None; expected a freedom of 'cylindrical ground-crank': 'angle', 'sl"
+        InputError, match="name is None; expected a coordinate of 'cylindrical ground-crank': 'angle', 'sl"
     ):
         shaft.freedom()
-    with pytest.raises(InputError, match="name is 'slide'; expected a freedom of 'revolute ground-crank': 'angle'$"):
+    with pytest.raises(InputError, match="name is 'slide'; expected a coordinate of 'revolute ground-crank': 'angle'$"):
         hinge.freedom("slide")
-    with pytest.raises(InputError, match=r"name is \[\]; expected a freedom"):
+    with pytest.raises(InputError, match=r"name is \[\]; expected a coordinate"):
         hinge.freedom([])
-    with pytest.raises(InputError, match="none, the joint leaves nothing free"):
+    with pytest.raises(InputError, match="none, the joint leaves no coordinate free"):
         make(asm.Fixed).freedom()
     with pytest.raises(TypeError):
         hinge.freedoms["slide"] = hinge.freedom()

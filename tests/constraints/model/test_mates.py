@@ -148,7 +148,7 @@ REFUSED = {
     "mirror": (lambda: asm.Symmetric(BALL.face(), BOLT.point(0, 0, 0), BOLT.faces("<Z")), "on body 'bolt' of a or b"),
     "group of one": (lambda: asm.Group([PLATE]), "bodies is ['plate']; expected two or more"),
     "group twice": (lambda: asm.Group([PLATE, PLATE]), "body 'plate' is named twice"),
-    "poses": (lambda: asm.Group([PLATE, BOLT], poses=[asm.Pose()]), "poses is 1 poses; expected 2, one a body"),
+    "poses": (lambda: asm.Group([PLATE, BOLT], poses=[asm.Pose()]), "poses is 1 poses; expected 2, one for each body"),
 }
 WRONG_KIND = {
     "a point for a plane": (

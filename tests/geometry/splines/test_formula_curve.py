@@ -236,7 +236,7 @@ def test_bad_input_to_methods():
         made.bounds(1.0, 0.5)
     steep = asm.FormulaCurve(ca.vertcat(ca.sqrt(T), T), T, (0.0, 1.0))
     assert steep.evaluate(0.0).tolist() == [0.0, 0.0]
-    with pytest.raises(InputError, match="t is 0.0; expected one where the expression and what is asked is finite"):
+    with pytest.raises(InputError, match="t is 0.0; expected one where the expression and its derivatives are finite"):
         steep.evaluate(0.0, 1)
 
 

@@ -426,7 +426,7 @@ def lazy(mobility):
 
 def test_a_time_limit_gives_no_halves():
     scene = planar_four_bar()
-    with pytest.raises(TimeoutError, match="rank is not known yet where time_limit is over"):
+    with pytest.raises(TimeoutError, match="rank is not known yet when time_limit is over"):
         scene.mobility(time_limit=1e-9)
     with pytest.raises(InputError, match="time_limit is 0; expected a number of seconds above 0"):
         scene.mobility(time_limit=0.0)

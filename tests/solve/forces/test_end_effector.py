@@ -299,7 +299,7 @@ BAD = [
     ({"scene": "arm"}, TypeError, "scene is 'arm'; expected an Assembly"),
     ({"tip": "hand"}, TypeError, "tip is 'hand'; expected a point, a frame or a body"),
     ({"tip": asm.Body("stranger").point(0, 0, 0)}, InputError, "tip is on body 'stranger'; expected bodies of this"),
-    ({"inputs": []}, InputError, r"inputs is \[\]; expected joints or freedoms"),
+    ({"inputs": []}, InputError, r"inputs is \[\]; expected joints or their coordinates"),
     ({"inputs": "joint 1"}, TypeError, r"inputs\[0\] is 'j'; expected a joint"),
     (
         {"inputs": [asm.Revolute(asm.Body("a"), asm.Body("b"), "far")]},

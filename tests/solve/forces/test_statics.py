@@ -274,12 +274,12 @@ def test_joints_that_do_not_carry_the_tip_hold_nothing():
         (
             lambda s, j: statics.geometric_jacobian(s, [asm.Universal(*s.bodies[:2])], s.bodies[1]),
             InputError,
-            "expected a joint with one freedom, it has 'angle_a', 'angle_b'",
+            "expected a joint with one coordinate; it has 'angle_a', 'angle_b'",
         ),
         (
             lambda s, j: statics.geometric_jacobian(s, [asm.Parallel(*s.bodies[:2])], s.bodies[1]),
             InputError,
-            "expected a freedom of a Revolute, Prismatic or Cylindrical joint",
+            "expected a coordinate of a Revolute, Prismatic or Cylindrical joint",
         ),
         (lambda s, j: statics.joint_torques(s, [], s.bodies[1], (1, 2)), InputError, "wrench"),
         (lambda s, j: statics.tool_wrench((1, 2), (0, 0, 0)), InputError, "force"),

@@ -268,7 +268,7 @@ def test_what_cannot_be_followed_raises():
         asm.follow(bar.scene, length, 0.1, 4.0, start=bar.scene.solve(bar.q))
     scene, ball, goal = table_and_ball()
     scene.remove("guide")
-    with pytest.raises(InputError, match="does not tell 3 of the motions"):
+    with pytest.raises(InputError, match="does not determine 3 of the motions"):
         asm.follow(scene, asm.Parameter(goal, "target", "z"), -1.0, 3.0)
     scene.constrain(asm.Clearance())
     with pytest.raises(InputError, match="has a clearance"):

@@ -237,7 +237,7 @@ def test_what_cannot_be_used_is_told():
     station = asm.Station({angle: 0.7}, {slide: 6.0})
     with pytest.raises(InputError, match="either side"):
         asm.synthesize(scene, [station], {radius: (2.5, 3.0)})
-    with pytest.raises(InputError, match="nothing is wanted"):
+    with pytest.raises(InputError, match="without wanted values"):
         asm.synthesize(scene, [asm.Station({angle: 0.7})], {radius: (1.5, 3.0)})
     with pytest.raises(InputError, match="one of the two"):
         asm.synthesize(scene, slide, {radius: (1.5, 3.0)}, stations=[station])

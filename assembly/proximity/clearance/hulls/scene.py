@@ -36,7 +36,7 @@ def answers_by_hulls(
     minimum : sequence of float
         Of every pair, what its gap is to be at least.
     q : (n, 7)
-        A row a body.
+        One row per body.
     touching : float
         How far a point of a body may be taken to have the gap so large.
     """
