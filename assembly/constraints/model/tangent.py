@@ -29,6 +29,8 @@ __all__ = ["ContactTangent", "SurfaceTangent", "Tangent"]
 Array = NDArray[np.float64]
 Side = Literal["outside", "inside"]
 Touch = Literal["line", "point"]
+# Faces that touch along a line or in a point, as is asked.
+_EITHER = (["cylinder", "cylinder"], ["cone", "cylinder"])
 # Samples of each surface along either parameter, and pairs of them from which an extremal pair is looked for.
 _GRID, _TRIED = 16, 8
 
@@ -38,7 +40,7 @@ class Tangent(Constraint):
 
     Planes, cylinders, cones and spheres count whole, to where their surfaces go on: they are held by the distances of
     planes, axes and centers. A cylinder on a plane, or a cone, lies on it along a line, and takes away 2; on a parallel
-    cylinder 3. Other faces, those that touch in a point, and `unilateral` ones are a `Contact`, with the side on which
+    cylinder 3, and so on a cone, along a line of that. Other faces, those that touch in a point, and `unilateral` ones are a `Contact`, with the side on which
     they touch: it means the pair that it tracks, from where the solve starts, and is held on the surfaces, not within
     their trims. To hold it there add a `TrimContact`, or ask for a `Contact` with edges.
 
@@ -54,7 +56,8 @@ class Tangent(Constraint):
     unilateral : bool
         gap >= 0 instead of gap = 0.
     touch : "line" or "point", optional
-        How two cylinders touch: along a line, with parallel axes, by default; or in a point, as crossed ones do.
+        How two cylinders, or a cylinder and a cone, touch: along a line, with parallel axes or an axis parallel to a
+        line of the cone, by default; or in a point, as crossed ones do.
 
     Raises
     ------
@@ -113,8 +116,8 @@ class Tangent(Constraint):
 
     @property
     def touch(self) -> Touch | None:
-        """Whether two cylinders touch along a line or in a point; None of other faces, which leave no choice."""
-        if {face.kind for face in self._faces} != {"cylinder"} or self._is_one_sided:
+        """Whether faces that may touch along a line do so, or in a point; None of others, which leave no choice."""
+        if _kinds(*self._faces) not in _EITHER or self._is_one_sided:
             return None
         return "line" if isinstance(self, SurfaceTangent) else "point"
 
@@ -138,9 +141,11 @@ class Tangent(Constraint):
         if set(kinds) == {"plane"}:
             raise InputError(f"a and b are {one!r} and {other!r}, two planes; expected Flush for them")
         if touch is not None:
-            if unilateral or set(kinds) != {"cylinder"}:
+            if unilateral or _kinds(one, other) not in _EITHER:
                 what = "a one-sided tangent" if unilateral else f"a {kinds[0]} and a {kinds[1]}"
-                raise InputError(f"touch is {touch!r} of {what}; expected it of two cylinders alone")
+                raise InputError(
+                    f"touch is {touch!r} of {what}; expected it of two cylinders, or a cylinder and a cone, alone"
+                )
             if not isinstance(touch, str) or touch not in ("line", "point"):
                 raise InputError(f"touch is {touch!r}; expected 'line' or 'point'")
         self._side = side
@@ -244,6 +249,10 @@ def _sampled(face: Face, q: Array) -> tuple[Array, Array, Array]:
     u, v = (a.ravel() for a in np.meshgrid(u0 + part * (u1 - u0), v0 + part * (v1 - v0), indexing="ij"))
     turn = rotation_matrix(q[3:])
     return np.column_stack([u, v]), face.surface.evaluate(u, v) @ turn.T + q[:3], face.normal(u, v) @ turn.T
+
+
+def _kinds(a: BodyFace, b: BodyFace) -> list[str]:
+    return sorted((a.kind, b.kind))
 
 
 def _face(name: str, value: Any) -> BodyFace:
