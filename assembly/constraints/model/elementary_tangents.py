@@ -11,8 +11,8 @@ the center, and + where they oppose each other (outside), - where they are one (
     cone and sphere         the center is +-r from the lines of the cone, cos(angle) rho - sin(angle) z from the apex,
                             and beside these lines, sin(angle) rho + cos(angle) z >= 0
     cylinder and cylinder   axes are parallel, r + R apart, or |r - R|; or lie on each other
-    cylinder and cone       along a line of the cone: the axis lies on a line of the cone that is +-r outside of it, goes
-                            through its apex, which is +-r / sin(angle) before the other one, and leans by its angle
+    cylinder and cone       along a line of the cone: the axis leans by the half angle, and goes through the apex of the
+                            cone that is +-r outside of it, +-r / sin(angle) before its own
 """
 
 from __future__ import annotations

@@ -39,10 +39,11 @@ class Tangent(Constraint):
     """Two faces touch, and have one tangent plane there: takes away 1 degree of freedom, more along lines and circles.
 
     Planes, cylinders, cones and spheres count whole, to where their surfaces go on: they are held by the distances of
-    planes, axes and centers. A cylinder on a plane, or a cone, lies on it along a line, and takes away 2; on a parallel
-    cylinder 3, and so on a cone, along a line of that. Other faces, those that touch in a point, and `unilateral` ones are a `Contact`, with the side on which
-    they touch: it means the pair that it tracks, from where the solve starts, and is held on the surfaces, not within
-    their trims. To hold it there add a `TrimContact`, or ask for a `Contact` with edges.
+    planes, axes and centers. A cylinder on a plane, or a cone, lies on it along a line, and takes away 2; a cylinder on
+    a parallel one, or along a line of a cone, 3. Other faces, those that touch in a point, and `unilateral` ones are a
+    `Contact`, with the side on which they touch: it means the pair that it tracks, from where the solve starts, and is
+    held on the surfaces, not within their trims. To hold it there add a `TrimContact`, or ask for a `Contact` with
+    edges.
 
     Parameters
     ----------

@@ -201,7 +201,7 @@ def _gap(solid: Topology, edge: Edge) -> float:
 
 
 def _within(curve: NurbsCurve, t: Array, is_ring: bool) -> Array:
-    """Parameters in the domain of a curve; of a ring they go on at its other end where they leave it beyond rounding."""
+    """Parameters in the domain of a curve; of a ring they go on at its other end beyond rounding."""
     low, high = curve.domain
     slack = 1e-6 * (high - low)
     inside = np.clip(t, low, high)
