@@ -130,14 +130,21 @@ def _counted(reader: Any) -> tuple[int, int, int]:
     flat = sum(
         _is_flat(value) for value, kind in zip(values, kinds, strict=True) if kind == "StepGeom_Axis2Placement3d"
     )
+    bare = sum(_is_bare(value) for value, kind in zip(values, kinds, strict=True) if kind == "StepGeom_Pcurve")
     faces = sum(kind in ("StepShape_AdvancedFace", "StepShape_FaceSurface") for kind in kinds)
-    return len(broken) - styles + flat, styles, faces
+    return len(broken) - styles + flat + bare, styles, faces
 
 
 def _is_flat(placement: Any) -> bool:
     """Whether the location of a placement in space is a point of the plane: OCCT would read a third coordinate."""
     location = placement.Location()
     return location is not None and location.NbCoordinates() < 3
+
+
+def _is_bare(on_surface: Any) -> bool:
+    """Whether a curve on a surface has something else in place of its curve: OCCT would take it for one."""
+    there = on_surface.ReferenceToCurve()
+    return there is not None and (there.NbItems() < 1 or not isinstance(there.ItemsValue(1), occt().StepGeom_Curve))
 
 
 def _is_beside(kind: str) -> bool:

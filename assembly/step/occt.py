@@ -29,6 +29,7 @@ _MODULES = (
     "Quantity",
     "STEPCAFControl",
     "STEPControl",
+    "StepGeom",
     "TCollection",
     "TDF",
     "TDataStd",

@@ -31,6 +31,8 @@ Pair = tuple[float, float]
 FOLLOWED = 1e-10
 # Curves that leave a coordinate line by less, over the side of the domain, run along it.
 LEVEL = 1e-9
+# Legs of a control polygon, over a move of its end, along which the move is spread where the first leg is shorter.
+GENTLE = 10.0
 # Ends that are nearer to each other, over the side of the domain, are apart by rounding alone.
 ROUNDING = 1e-12
 
@@ -98,7 +100,8 @@ class Edge(NamedTuple):
         for axis in (0, 1):
             if self.level[axis]:
                 made[:, axis] = start[axis] * made[:, 2]
-        made[[0, -1], :2] = np.array((start, end)) * made[[0, -1], 2:]
+        for points, to in ((made, start), (made[::-1], end)):
+            _move_end(points, np.array(to))
         return self._replace(curve=Spline(made, self.curve.knots, self.curve.degree))
 
     def shifted(self, by: Pair) -> Edge:
@@ -113,6 +116,22 @@ class Edge(NamedTuple):
     def nurbs(self, scales: Array) -> NurbsCurve:
         """As the loops of a face take it, its u and v multiplied."""
         return curves_of([self], scales)[0]
+
+
+def _move_end(points: Array, to: Array) -> None:
+    """Move the first control point, homogeneous in (u, v), and as many after it as a move by a share of a leg takes.
+
+    A move that is longer than the first leg would turn the curve back: what it leaves to the others falls evenly along
+    their legs, as those add up to `GENTLE` moves.
+    """
+    plane = points[:, :2] / points[:, 2:]
+    move = to - plane[0]
+    far = float(np.hypot(*move)) * GENTLE
+    legs = np.hypot(*np.diff(plane, axis=0).T)
+    if legs[0] < far:
+        share = np.maximum(0.0, 1.0 - np.cumsum(legs) / far)
+        points[1:-1, :2] += share[:-1, None] * move * points[1:-1, 2:]
+    points[0, :2] = to * points[0, 2]
 
 
 def curves_of(edges: Sequence[Edge], scales: Array) -> list[NurbsCurve]:

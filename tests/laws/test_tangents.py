@@ -66,13 +66,26 @@ def gap_of_cylinder_and_ball(a, b, solution, side):
 
 
 def gap_of_cone_and_ball(a, b, solution, side):
-    out, up = away(a, solution, center(b, solution))
     # Along the outward normal of the line through (3, -2) and (0, 2).
-    return [cos(ANGLE) * out + sin(ANGLE) * (up - 2) - side * 0.7]
+    return _cone_gaps(a, solution, center(b, solution), side)
 
 
 def gap_of_cylinders(a, b, solution, side):
     return [away(a, solution, b.point(solution, 0, 0, z))[0] - (2.7 if side > 0 else 1.3) for z in (-3, 3)]
+
+
+def gap_of_cone_and_cylinder(a, b, solution, side):
+    """Points of the axis, from far beside the apex on, are all at the radius from the lines of the cone."""
+    along = b.direction(solution, 0, 0, 1)
+    # The cone opens against its z.
+    along = -along if along @ a.direction(solution, 0, 0, 1) > 0.0 else along
+    foot = center(b, solution) + along * (along @ (a.point(solution, 0, 0, 2) - center(b, solution)))
+    return [gap for t in (2, 5, 9) for gap in _cone_gaps(a, solution, foot + t * along, side)]
+
+
+def _cone_gaps(a, solution, point, side):
+    out, up = away(a, solution, point)
+    return [cos(ANGLE) * out + sin(ANGLE) * (up - 2) - side * 0.7]
 
 
 SHAPES = asm.shapes
@@ -84,6 +97,7 @@ PAIRS = {
     "cylinder, ball": (SHAPES.cylinder(2, 6), SHAPES.sphere(0.7), 1, gap_of_cylinder_and_ball),
     "cone, ball": (SHAPES.cone(3, 4), SHAPES.sphere(0.7), 1, gap_of_cone_and_ball),
     "cylinder, cylinder": (SHAPES.cylinder(2, 6), SHAPES.cylinder(0.7, 6), 3, gap_of_cylinders),
+    "cone, cylinder": (SHAPES.cone(3, 4), SHAPES.cylinder(0.7, 6), 3, gap_of_cone_and_cylinder),
 }
 
 
@@ -167,6 +181,11 @@ def test_which_tangents_are_contacts():
     for a, b, tracked in (*pairs, (top, ball.face(), False)):
         mate = asm.Tangent(a, b)
         assert isinstance(mate, Contact) == tracked and mate.faces == (a, b)
+    pin, tip = asm.Body("pin", SHAPES.cylinder(1, 6)), asm.Body("tip", SHAPES.cone(3, 4))
+    for touch, count in (("line", 3), ("point", 1), (None, 3)):
+        mate = asm.Tangent(tip.face(), pin.face(), touch=touch)
+        assert isinstance(mate, Contact) == (touch == "point") and mate.removes == count
+        assert mate.touch == (touch or "line") and f"touch={mate.touch!r}" in repr(mate)
     one_sided = asm.Tangent(top, ball.face(), unilateral=True)
     assert isinstance(one_sided, Contact) and one_sided.unilateral and "unilateral=True" in repr(one_sided)
 

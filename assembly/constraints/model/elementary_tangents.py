@@ -11,6 +11,8 @@ the center, and + where they oppose each other (outside), - where they are one (
     cone and sphere         the center is +-r from the lines of the cone, cos(angle) rho - sin(angle) z from the apex,
                             and beside these lines, sin(angle) rho + cos(angle) z >= 0
     cylinder and cylinder   axes are parallel, r + R apart, or |r - R|; or lie on each other
+    cylinder and cone       along a line of the cone: the axis leans by the half angle, and goes through the apex of the
+                            cone that is +-r outside of it, +-r / sin(angle) before its own
 """
 
 from __future__ import annotations
@@ -83,6 +85,11 @@ def touching_rows(a: BodyFace, b: BodyFace, outside: bool) -> TangentRows | None
             # The foot on a line of the cone is not beyond the apex; from inside it never is.
             rows += (TangentRow(((sin(angle), (RADIUS, 0)), (cos(angle), ALONG)), 0.0, one_sided=True),)
         return TangentRows(frame_a, frame_b, "aligned", rows)
+    if kinds == ("cylinder", "cone"):
+        angle = second.half_angle
+        apex = _frame(second, sense * _sign(first) * _sign(second) * first.radius / sin(angle))
+        leans = TangentRow(((1.0, Z_DOT_Z),), cos(angle))
+        return TangentRows(frame_a, apex, "nearest", (*(_zero(*which) for which in ON_AXIS), leans))
     if "cone" in kinds:
         return None
     # Radii add up where what is around axes or centers is on different sides.
@@ -117,9 +124,9 @@ def _sign(face: BodyFace) -> float:
     return -1.0 if face.is_hole else 1.0
 
 
-def _frame(face: BodyFace) -> Frame:
-    """The plane with z outward, the axis, or the center; of a cone at its apex."""
+def _frame(face: BodyFace, before: float = 0.0) -> Frame:
+    """The plane with z outward, the axis, or the center; of a cone at its apex, or so far before it."""
     form = face.form
     if isinstance(form, Cone):
-        return face.body.frame(np.asarray(form.apex), form.axis)
+        return face.body.frame(np.asarray(form.apex) - before * np.asarray(form.axis), form.axis)
     return face.frame()

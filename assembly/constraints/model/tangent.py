@@ -29,6 +29,8 @@ __all__ = ["ContactTangent", "SurfaceTangent", "Tangent"]
 Array = NDArray[np.float64]
 Side = Literal["outside", "inside"]
 Touch = Literal["line", "point"]
+# Faces that touch along a line or in a point, as is asked.
+_EITHER = (["cylinder", "cylinder"], ["cone", "cylinder"])
 # Samples of each surface along either parameter, and pairs of them from which an extremal pair is looked for.
 _GRID, _TRIED = 16, 8
 
@@ -37,10 +39,10 @@ class Tangent(Constraint):
     """Two faces touch, and have one tangent plane there: takes away 1 degree of freedom, more along lines and circles.
 
     Planes, cylinders, cones and spheres are treated as unbounded surfaces, held by distances between planes, axes and
-    centers. A cylinder or cone lies on a plane along a line, which takes away 2; a cylinder on a parallel cylinder 3.
-    Other faces, those that touch in a point, and `unilateral` ones are a `Contact` with the given side: it holds the
-    one pair of points that it tracks from the start of the solve, on the whole surfaces, not within their trims. To
-    stay within the trims add a `TrimContact`, or use a `Contact` with edges.
+    centers. A cylinder or cone lies on a plane along a line, which takes away 2; a cylinder on a parallel one, or along
+    a line of a cone, 3. Other faces, those that touch in a point, and `unilateral` ones are a `Contact` with the given
+    side: it holds the one pair of points that it tracks from the start of the solve, on the whole surfaces, not within
+    their trims. To stay within the trims add a `TrimContact`, or use a `Contact` with edges.
 
     Parameters
     ----------
@@ -55,7 +57,8 @@ class Tangent(Constraint):
     unilateral : bool
         gap >= 0 instead of gap = 0.
     touch : "line" or "point", optional
-        How two cylinders touch: along a line, with parallel axes, by default; or in a point, as crossed ones do.
+        How two cylinders, or a cylinder and a cone, touch: along a line, with parallel axes or an axis parallel to a
+        line of the cone, by default; or in a point, as crossed ones do.
 
     Raises
     ------
@@ -114,8 +117,8 @@ class Tangent(Constraint):
 
     @property
     def touch(self) -> Touch | None:
-        """Whether two cylinders touch along a line or in a point; None of other faces, which leave no choice."""
-        if {face.kind for face in self._faces} != {"cylinder"} or self._is_one_sided:
+        """Whether faces that may touch along a line do so, or in a point; None of others, which leave no choice."""
+        if _kinds(*self._faces) not in _EITHER or self._is_one_sided:
             return None
         return "line" if isinstance(self, SurfaceTangent) else "point"
 
@@ -139,9 +142,11 @@ class Tangent(Constraint):
         if set(kinds) == {"plane"}:
             raise InputError(f"a and b are {one!r} and {other!r}, two planes; expected Flush for them")
         if touch is not None:
-            if unilateral or set(kinds) != {"cylinder"}:
+            if unilateral or _kinds(one, other) not in _EITHER:
                 what = "a one-sided tangent" if unilateral else f"a {kinds[0]} and a {kinds[1]}"
-                raise InputError(f"touch is {touch!r} of {what}; expected it of two cylinders alone")
+                raise InputError(
+                    f"touch is {touch!r} of {what}; expected it of two cylinders, or a cylinder and a cone, alone"
+                )
             if not isinstance(touch, str) or touch not in ("line", "point"):
                 raise InputError(f"touch is {touch!r}; expected 'line' or 'point'")
         self._side = side
@@ -245,6 +250,10 @@ def _sampled(face: Face, q: Array) -> tuple[Array, Array, Array]:
     u, v = (a.ravel() for a in np.meshgrid(u0 + part * (u1 - u0), v0 + part * (v1 - v0), indexing="ij"))
     turn = rotation_matrix(q[3:])
     return np.column_stack([u, v]), face.surface.evaluate(u, v) @ turn.T + q[:3], face.normal(u, v) @ turn.T
+
+
+def _kinds(a: BodyFace, b: BodyFace) -> list[str]:
+    return sorted((a.kind, b.kind))
 
 
 def _face(name: str, value: Any) -> BodyFace:

@@ -19,15 +19,19 @@ from assembly.errors import InputError
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.proximity.brep.solid import solid_of
-from assembly.proximity.brep.topology import Edge, Topology
+from assembly.proximity.brep.topology import Edge, Topology, topology_of
 from assembly.proximity.features.body_distance import DistanceStatus, distance
-from assembly.proximity.features.places import shells_of
+from assembly.proximity.features.places import pieces_of
 
 __all__ = ["MassProperties", "mass_properties"]
 
 Array = NDArray[np.float64]
-# How near the distance of two pieces has to be known, in parts of the body's size.
-_APART = 1e-9
+# How near the distance of two pieces has to be known, in parts of the body's size: whether it is zero, and pieces that
+# are apart by much, as most are, tell so at once.
+_APART = (1e-2, 1e-5, 1e-9)
+# Gaps of files, in parts of the body's size: what is open is looked at with these one after the other, up to what the
+# writer of STEP files sews. How much the volume may be wrong by gaps is told.
+_GAPS = (1e-5, 1e-4)
 # Places of an edge at which the curves of its two faces are compared.
 _PLACES = 17
 # Steps of Gauss and Newton to the nearest point of a curve.
@@ -78,7 +82,7 @@ def mass_properties(name: str, faces: tuple[Face, ...], density: float) -> MassP
     """
     if not faces:
         raise InputError(f"body {name!r} has no shape; expected faces that enclose a volume")
-    solid = solid_of(faces)
+    solid = _closed(faces)
     if not solid.is_closed:
         open_edge = next(edge for edge in solid.edges if edge.face_b is None)
         face = solid.faces[open_edge.face_a].name or f"face {open_edge.face_a + 1}"
@@ -99,12 +103,15 @@ def _fault(faces: tuple[Face, ...]) -> str:
     A piece that lies in an even number of others is material, with normals that look outward; one in an odd number is
     a void, whose normals look into it.
     """
-    shells = shells_of(faces)
+    shells = pieces_of(_closed(faces))
     volumes = [_of_density_one(shell).volume for shell in shells]
     inside = [0] * len(shells)
     for i, k in combinations(range(len(shells)), 2):
         first, second = _outward(shells[i], volumes[i]), _outward(shells[k], volumes[k])
-        found = distance(first, second, tolerance=_APART * _size(faces))
+        for apart in _APART:
+            found = distance(first, second, tolerance=apart * _size(faces))
+            if found.lower > 0.0 and found.converged:
+                break
         if not found.lower > 0.0:
             return (
                 f"has pieces that meet, with {_name(shells[i])} and {_name(shells[k])}; expected pieces that are apart"
@@ -119,6 +126,17 @@ def _fault(faces: tuple[Face, ...]) -> str:
             text = f"has a piece with a volume of {volume:g}, with {_name(shell)}"
             return f"{text}; expected a positive one, by normals that look outward"
     return ""
+
+
+@lru_cache(maxsize=256)
+def _closed(faces: tuple[Face, ...]) -> Topology:
+    """The topology of a body, with the least of gaps between edges that are one with which it is closed, if it is."""
+    solid = solid_of(faces)
+    if solid.is_closed:
+        return solid
+    size = _size(faces)
+    wider = (topology_of(faces, gap * size) for gap in _GAPS)
+    return next((found for found in wider if found.is_closed), solid)
 
 
 def _outward(shell: tuple[Face, ...], volume: float) -> list[Face]:
@@ -153,13 +171,13 @@ def _of_density_one(faces: tuple[Face, ...]) -> MassProperties:
     offset = first / volume if volume else np.zeros(3)
     about = second - volume * np.outer(offset, offset)
     doubt = sum(float(doubt.flux.sum()) for _, _, doubt in found) / 3.0
-    doubt += _gaps(solid_of(faces)) * float(np.linalg.norm(high - center)) / 3.0
+    doubt += _gaps(_closed(faces)) * float(np.linalg.norm(high - center)) / 3.0
     return MassProperties(1.0, volume, area, center + offset, np.trace(about) * np.eye(3) - about, doubt)
 
 
 def _gaps(solid: Topology) -> float:
     """Area of the gaps between faces, at most: lengths of edges times how far their curves are apart."""
-    return sum(edge.length * _gap(solid, edge) for edge in solid.edges)
+    return sum(edge.length * _gap(solid, edge) for edge in solid.edges if edge.face_b is not None)
 
 
 def _gap(solid: Topology, edge: Edge) -> float:
@@ -171,9 +189,10 @@ def _gap(solid: Topology, edge: Edge) -> float:
     at, _ = _in_space(face, curve, t)
     # Parameters of the other curve are known to first order; its nearest points are found from there.
     guess = edge.map_b[0] + edge.map_b[1] * t
+    is_ring = edge.start == edge.end
     nearest = np.full(len(at), np.inf)
     for _ in range(_STEPS):
-        guess = _within(others, guess)
+        guess = _within(others, guess, is_ring)
         place, slope = _in_space(other, others, guess)
         nearest = np.minimum(nearest, np.linalg.norm(at - place, axis=1))
         speed = np.maximum(np.einsum("ij,ij->i", slope, slope), 1e-300)
@@ -181,12 +200,12 @@ def _gap(solid: Topology, edge: Edge) -> float:
     return float(nearest.max())
 
 
-def _within(curve: NurbsCurve, t: Array) -> Array:
-    """Parameters in the domain of a curve, going on at its other end where they leave it by more than rounding."""
+def _within(curve: NurbsCurve, t: Array, is_ring: bool) -> Array:
+    """Parameters in the domain of a curve; of a ring they go on at its other end beyond rounding."""
     low, high = curve.domain
     slack = 1e-6 * (high - low)
-    turned = low + np.mod(t - low, high - low)
-    return np.where((t < low - slack) | (t > high + slack), turned, np.clip(t, low, high))
+    inside = np.clip(t, low, high)
+    return np.where(np.abs(t - inside) > slack, low + np.mod(t - low, high - low), inside) if is_ring else inside
 
 
 def _in_space(face: Face, curve: NurbsCurve, t: Array) -> tuple[Array, Array]:

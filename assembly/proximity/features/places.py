@@ -15,7 +15,7 @@ from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.topology import Edge, Topology
 from assembly.proximity.features.features import Feature, features_of
 
-__all__ = ["body_faces", "body_tree", "feature_at", "is_behind", "is_closed", "normals_at", "shells_of"]
+__all__ = ["body_faces", "body_tree", "feature_at", "is_behind", "is_closed", "normals_at", "pieces_of", "shells_of"]
 
 Array = NDArray[np.float64]
 Faces = tuple[Face, ...]
@@ -41,7 +41,11 @@ def is_closed(faces: Faces) -> bool:
 @lru_cache(maxsize=256)
 def shells_of(faces: Faces) -> tuple[Faces, ...]:
     """The faces of a body by parts that no edge joins."""
-    topology = solid_of(faces)
+    return pieces_of(solid_of(faces))
+
+
+def pieces_of(topology: Topology) -> tuple[Faces, ...]:
+    """The faces of a topology by parts that no edge joins."""
     part = list(range(len(topology.faces)))
     for edge in topology.edges:
         if edge.face_b is not None:
