@@ -91,6 +91,8 @@ class _Desk(NamedTuple):
     evaluated: Array
     out: Array
     parts: tuple[Array, ...]
+    free: Array
+    shared: Array
 
 
 class Plan:
@@ -277,7 +279,8 @@ class Plan:
         evaluated = np.empty(1 + rows + columns + rows * columns + columns * columns)
         out = np.empty(self._parts[-1][1])
         parts = tuple(out[first:end].reshape(shape) for first, end, shape in self._parts)
-        return _Desk(pool, np.zeros(rows), evaluated, out, parts)
+        n, m = self._unknowns, self._rows
+        return _Desk(pool, np.zeros(rows), evaluated, out, parts, np.empty((n, n)), np.empty((m, m)))
 
     def _derived(self, packed: Packed, state: Array, desk: _Desk) -> Sensitivity | None:
         rows, pool = self._rows, packed.rows_pool
@@ -324,18 +327,18 @@ class Plan:
         jacobian, hessian, rows_by, _, slopes_by, values, slopes, own, _ = desk.parts
         rows_held, asked = jacobian[: self._rows][held], rows_by[held]
         (r, n), p = rows_held.shape, asked.shape[1]
-        steps, forces, free, shared = np.empty((n, p)), np.empty((r, p)), np.empty((n, n)), np.empty((r, r))
+        steps, forces, free = np.empty((n, p)), np.empty((r, p)), desk.free
+        shared = desk.shared if r == self._rows else np.empty((r, r))
         rank, contradicting = least_steps(rows_held, hessian, asked, slopes_by, steps, forces, free, shared)
         if rank < 0 or contradicting:
             return None
-        # The sum has no negative zeros.
-        rates = slopes @ steps
+        # The sums have no negative zeros.
+        rates = slopes.dot(steps)
         rates += own
         for i in self._lengths:
             rates[i] *= packed.scale
         for i in self._objectives:
-            rates[i] = (values + desk.forces[: self._rows] @ rows_by) * packed.unit
-        rates += 0.0
+            rates[i] = (values + desk.forces[: self._rows] @ rows_by) * packed.unit + 0.0
         loose = np.zeros(len(self._measures), dtype=bool)
         if self._is_implicit and rank < n:
             changed = np.abs(slopes @ free[:, : n - rank]).max(axis=1)
