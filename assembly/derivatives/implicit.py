@@ -171,10 +171,15 @@ def _problem(
 
 
 def _are_same(asked: Sequence[Any], others: Sequence[Any]) -> bool:
-    return len(asked) == len(others) and all(
-        np.array_equal(a, b) if isinstance(a, np.ndarray) else a is b or a == b
-        for a, b in zip(asked, others, strict=True)
-    )
+    """Whether values and targets are; a loop of its own, because every call of `sensitivity` goes through it."""
+    if len(asked) != len(others):
+        return False
+    for a, b in zip(asked, others, strict=True):
+        if a is b:
+            continue
+        if not (np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b):
+            return False
+    return True
 
 
 def _moving(bodies: Sequence[Body], n: int) -> NDArray[np.int64]:

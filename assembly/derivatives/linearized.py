@@ -16,6 +16,7 @@ from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.constraints.program.records import pool_header_at
 from assembly.geometry.vec import quaternion_matrix
+from assembly.solve.second_order.dense import UNBALANCED
 
 # What is known of a scene before it is evaluated, in a table; offsets are in that table.
 PLAN = record_dtype(
@@ -284,7 +285,7 @@ def add_measures(plan, table, given, out):
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])", allocates=True)
 def linearize(table, pool, state, figures, forces, evaluated, out):
-    """Write the equations of a solution; whether they are finite, and every distance has a way.
+    """Write the equations of a solution; whether they are finite and in balance, and every distance has a way.
 
     Parameters
     ----------
@@ -341,6 +342,9 @@ def linearize(table, pool, state, figures, forces, evaluated, out):
         for r in range(m):
             for i in range(n):
                 left[0, i] += forces[r] * rows[r, i]
+        for i in range(n):
+            if abs(left[0, i]) > UNBALANCED:
+                return False
     turns = np.empty((plan.bodies, 3, 3))
     write_turns(plan, state, turns)
     given = (pool, state, figures, turns)

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.constraint import Constraint, Freedom
 from assembly.constraints.model.contact import Contact
+from assembly.constraints.model.contact_place import ContactPlace
 from assembly.constraints.model.joint import Joint
+from assembly.derivatives.touching_place import COMPONENTS, place_value
 from assembly.errors import InputError, text
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.solve.solution import Solution
@@ -31,6 +33,7 @@ class Measure:
     | a joint or a coordinate | the name of the coordinate; none where there is one |
     | two points (or frames, bodies) | none: their distance |
     | a contact of the scene | none: its gap |
+    | a place of a contact (`ContactPlace`) | "u", "v" of the contact on its face, or "x", "y", "z" of its point there |
     | a constraint, `on=body` | "fx" to "tz" of what it exerts on the body, about the body's origin, in world axes |
     | "objective" | none |
 
@@ -66,6 +69,11 @@ class Measure:
             freedom = thing.freedom(component) if isinstance(thing, Joint) else thing
             self.kind, self.thing, label = "coordinate", freedom, f"{freedom.joint.name}.{freedom.name}"
             self.unit = "rad" if freedom.coordinate.is_angle else "length"
+        elif isinstance(thing, ContactPlace):
+            if component not in COMPONENTS:
+                raise InputError(f"component is {component!r}; expected one of {', '.join(map(repr, COMPONENTS))}")
+            self.kind, self.axis, label = "touching", COMPONENTS.index(component), f"{thing.contact.name}.{component}"
+            self.unit = "parameter" if self.axis < 2 else "length"
         elif isinstance(thing, Contact):
             self.kind, label = "gap", f"{thing.name}.gap"
         elif isinstance(thing, str) and thing == "objective":
@@ -74,8 +82,8 @@ class Measure:
             self.kind, label = "distance", "-".join(place_of(side)[0].name for side in thing)
         else:
             raise TypeError(
-                f"thing is {thing!r}; expected a point, a frame, a body, a joint, a contact, a pair of points, a "
-                "constraint with on=body, or 'objective'"
+                f"thing is {thing!r}; expected a point, a frame, a body, a joint, a contact, a place of one, a "
+                "pair of points, a constraint with on=body, or 'objective'"
             )
         self.on = on
         self.name = label if name is None else text("name", name)
@@ -91,6 +99,8 @@ class Measure:
         if self.kind == "wrench":
             assert self.on is not None
             return float(solution.wrenches[self.thing.name][self.on.name].vector[self.axis])
+        if self.kind == "touching":
+            return place_value(self.axis, self.thing, solution)
         sides = self.thing if self.kind == "distance" else (self.thing,)
         rows = [solution.q[solution._scene.index(place_of(side)[0])] for side in sides]
         places = [_place(side, row) for side, row in zip(sides, rows, strict=True)]

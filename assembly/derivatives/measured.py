@@ -13,6 +13,7 @@ from assembly.derivatives.measure import Measure, place_of, world
 from assembly.derivatives.numbers import ControlPoint, ControlWeight, FrameNumber, FrameOrigin, LeastGap, ShapeNumber
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.probed import ProbedScene
+from assembly.derivatives.touching_place import place_slopes
 from assembly.errors import InputError
 from assembly.solve.forces.statics import bodies_of
 
@@ -59,6 +60,8 @@ def rates_of(
                 # The row is the gap less the least one.
                 if isinstance(parameter._number, LeastGap) and parameter._number.owner is item.thing:
                     own[i, r] += 1.0 / scale
+        elif item.kind == "touching":
+            _of_touching(problem, item, parameters, slopes[i])
         else:
             _of_place(problem, item, parameters, slopes[i], own[i])
     rates = units * (slopes @ steps + own)
@@ -126,6 +129,20 @@ def _of_place(problem: Problem, item: Measure, parameters: Sequence[Parameter], 
         for r, number in enumerate(parameter._number for parameter in parameters):
             if isinstance(number, FrameOrigin) and number.frame is getattr(side, "base", side):
                 own[r] += direction @ problem.turns[k][:, number.axis]
+
+
+def _of_touching(problem: Problem, item: Measure, parameters: Sequence[Parameter], slopes: Array) -> None:
+    """Write slopes of where a contact is on a face, over scaled twists."""
+    for parameter in parameters:
+        if isinstance(parameter._number, DIFFERENCED):
+            raise InputError(
+                f"parameter {parameter.name!r} makes faces, on which {item.name!r} is measured; expected other numbers"
+            )
+    scales = np.repeat([problem.packed.scale, 1.0], 3)
+    sides = place_slopes(item.axis, item.thing, problem.packed, problem.state)
+    for body, found in zip(item.thing.contact.bodies, sides, strict=True):
+        at = 6 * problem.index(body)
+        slopes[at : at + 6] += found * scales
 
 
 def _of_wrench(problem: Problem, item: Measure, parameters: Sequence[Parameter], steps: Array, forces: Array) -> Array:

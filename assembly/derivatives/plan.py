@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import accumulate
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ from assembly.derivatives.probed import ProbedScene
 from assembly.derivatives.result import Layout, Moved, Sensitivity
 from assembly.kinematics.body import Body, Frame
 from assembly.solve.second_order.curvature import curvature_at
-from assembly.solve.second_order.dense import PUSHING, UNBALANCED
+from assembly.solve.second_order.dense import PUSHING
 from assembly.solve.solution import Solution
 
 __all__ = ["Plan", "layout_of", "plan_of"]
@@ -82,6 +83,18 @@ def layout_of(
     return Layout(*names, tuple(blocks), packed.spans, packed.lengths)
 
 
+class _Desk(NamedTuple):
+    """Where a thread derives: the pool with probes behind it, multipliers, and what calls write, whole and in parts."""
+
+    pool: Array
+    forces: Array
+    evaluated: Array
+    out: Array
+    parts: tuple[Array, ...]
+    free: Array
+    shared: Array
+
+
 class Plan:
     """What measures of solutions change by, in three calls.
 
@@ -126,12 +139,18 @@ class Plan:
         entries = self._entries(packed, places)
         measured = self._measured(packed, places)
         self._numbers = np.array(self._figures)
+        # Figures as they are unless frames were turned or placed anew, with the scale that they are for.
+        self._scaled = (0.0, self._numbers)
+        # Of every number of a state with probes its place in that without.
+        self._gathered = np.empty(0, dtype=np.int64)
+        self._desks: list[_Desk] = []
         self._plan = self._written(packed, entries, measured)
         m, e, n, p = packed.rows, len(coordinates), self._unknowns, len(self._parameters)
         k = len(self._measures)
         shapes = [(m + e, n), (n, n), (m, p), (e, p), (n, p), (p,), (k, n), (k, p), (n,)]
         ends = np.cumsum([int(np.prod(shape)) for shape in shapes]).tolist()
         self._parts = list(zip([0, *ends], ends, shapes, strict=False))
+        self._is_implicit, self._rows = packed.is_implicit, m
         self._one_sided = packed.one_sided if packed.one_sided.any() else None
         self._lengths = [k for k, item in enumerate(self._measures) if item.kind == "gap" or _is_slide(item)]
         self._objectives = [k for k, item in enumerate(self._measures) if item.kind == "objective"]
@@ -229,50 +248,68 @@ class Plan:
         return table
 
     def _figures_of_now(self, packed: Packed) -> Array:
-        figures = self._numbers.copy()
-        count = len(self._layout.blocks)
-        levers = figures[:count]
-        levers /= packed.scale
-        levers[levers == 0.0] = 0.5
-        for at, number in self._turned:
-            if "_turned" in number.frame.__dict__:
+        scale, figures = self._scaled
+        if scale != packed.scale:
+            figures = self._numbers.copy()
+            levers = figures[: len(self._layout.blocks)]
+            levers /= packed.scale
+            levers[levers == 0.0] = 0.5
+            self._scaled = packed.scale, figures
+        turned = [item for item in self._turned if "_turned" in item[1].frame.__dict__]
+        if turned or self._placed:
+            figures = figures.copy()
+            for at, number in turned:
                 figures[at : at + 9] = turn_rates(number._turned()[1]).ravel()
-        for at, frame in self._placed:
-            figures[at : at + 3] = frame.origin
+            for at, frame in self._placed:
+                figures[at : at + 3] = frame.origin
         return figures
 
     def derived(self, packed: Packed, state: Array) -> Sensitivity | None:
         """The derivatives at a solution; None where it is one of those that go the general way."""
-        bodies, rows = packed.contacts_at, packed.rows
-        if self._hosts.size:
-            probes = state[:bodies].reshape(-1, 7)[self._hosts].ravel()
-            probed = np.concatenate((state[:bodies], probes, state[bodies:]))
-        else:
-            probed = state.copy()
-        pool = packed.rows_pool
+        # Threads have desks of their own.
+        desk = self._desks.pop() if self._desks else self._new_desk(packed)
+        try:
+            return self._derived(packed, state, desk)
+        finally:
+            self._desks.append(desk)
+
+    def _new_desk(self, packed: Packed) -> _Desk:
+        pool = np.concatenate((packed.rows_pool, np.zeros(FRAMES * len(self._pairs)), self._behind))
+        rows, columns = self._most
+        evaluated = np.empty(1 + rows + columns + rows * columns + columns * columns)
+        out = np.empty(self._parts[-1][1])
+        parts = tuple(out[first:end].reshape(shape) for first, end, shape in self._parts)
+        n, m = self._unknowns, self._rows
+        return _Desk(pool, np.zeros(rows), evaluated, out, parts, np.empty((n, n)), np.empty((m, m)))
+
+    def _derived(self, packed: Packed, state: Array, desk: _Desk) -> Sensitivity | None:
+        rows, pool = self._rows, packed.rows_pool
         if self._behind.size:
-            more = [frame_numbers(pair.frame_a, pair.frame_b, packed.scale) for pair in self._pairs]
-            pool = np.concatenate((pool, *more, self._behind))
-        most, columns = self._most
-        forces = np.zeros(most)
-        if not packed.is_implicit:
-            forces[:rows] = state[packed.multipliers_at : packed.residuals_at]
-        evaluated = np.empty(1 + most + columns + most * columns + columns * columns)
-        if curvature_at(self._table, pool, probed, forces, evaluated, None) != 0:
+            desk.pool[: pool.size] = pool
+            for k, pair in enumerate(self._pairs):
+                at = pool.size + FRAMES * k
+                desk.pool[at : at + FRAMES] = frame_numbers(pair.frame_a, pair.frame_b, packed.scale)
+            pool = desk.pool
+        if not self._is_implicit:
+            desk.forces[:rows] = state[packed.multipliers_at : packed.residuals_at]
+        if curvature_at(self._table, pool, self._probed(packed, state), desk.forces, desk.evaluated, None) != 0:
             return None
-        out = np.zeros(self._parts[-1][1])
-        if not linearize(self._plan, pool, state, self._figures_of_now(packed), forces, evaluated, out):
+        desk.out.fill(0.0)
+        if not linearize(self._plan, pool, state, self._figures_of_now(packed), desk.forces, desk.evaluated, desk.out):
             return None
-        parts = [out[first:end].reshape(shape) for first, end, shape in self._parts]
-        jacobian, hessian, rows_by, _, slopes_by, values, slopes, own, left = parts
-        if not packed.is_implicit and max(left.max(), -left.min()) > UNBALANCED:
-            return None
-        held = self._held(packed, evaluated[1 : 1 + rows], forces[:rows])
-        if held is None:
-            return None
-        return self._stepped(
-            packed, held, (jacobian[:rows], hessian, rows_by, slopes_by), (values, slopes, own, forces)
-        )
+        held = self._held(packed, desk.evaluated[1 : 1 + rows], desk.forces[:rows])
+        return None if held is None else self._stepped(packed, held, desk)
+
+    def _probed(self, packed: Packed, state: Array) -> Array:
+        """The state of the scene with probes, which stand where their bodies do behind these."""
+        if not self._hosts.size:
+            return state.copy()
+        gathered = self._gathered
+        if gathered.size != state.size + 7 * self._hosts.size:
+            places, bodies = np.arange(state.size), packed.contacts_at
+            probes = places[:bodies].reshape(-1, 7)[self._hosts].ravel()
+            gathered = self._gathered = np.concatenate((places[:bodies], probes, places[bodies:]))
+        return state.take(gathered)
 
     def _held(self, packed: Packed, residual: Array, forces: Array) -> Table | slice | None:
         """The rows that hold; None where one of them is at its bound without a force."""
@@ -285,39 +322,33 @@ class Plan:
             return None
         return np.flatnonzero(~one_sided | pushing)
 
-    def _stepped(
-        self,
-        packed: Packed,
-        held: Table | slice,
-        system: tuple[Array, Array, Array, Array],
-        measured: tuple[Array, Array, Array, Array],
-    ) -> Sensitivity | None:
+    def _stepped(self, packed: Packed, held: Table | slice, desk: _Desk) -> Sensitivity | None:
         """The step, and what measures change by; None where ranks are in doubt, or rows contradict each other."""
-        jacobian, hessian, rows_by, slopes_by = system
-        values, slopes, rates, multipliers = measured
-        rows_held, asked = jacobian[held], rows_by[held]
+        jacobian, hessian, rows_by, _, slopes_by, values, slopes, own, _ = desk.parts
+        rows_held, asked = jacobian[: self._rows][held], rows_by[held]
         (r, n), p = rows_held.shape, asked.shape[1]
-        steps, forces, free, shared = np.empty((n, p)), np.empty((r, p)), np.empty((n, n)), np.empty((r, r))
+        steps, forces, free = np.empty((n, p)), np.empty((r, p)), desk.free
+        shared = desk.shared if r == self._rows else np.empty((r, r))
         rank, contradicting = least_steps(rows_held, hessian, asked, slopes_by, steps, forces, free, shared)
         if rank < 0 or contradicting:
             return None
-        rates += slopes @ steps
+        # The sums have no negative zeros.
+        rates = slopes.dot(steps)
+        rates += own
         for i in self._lengths:
             rates[i] *= packed.scale
         for i in self._objectives:
-            rates[i] = (values + multipliers[: packed.rows] @ rows_by) * packed.unit
-        # No negative zeros.
-        rates += 0.0
+            rates[i] = (values + desk.forces[: self._rows] @ rows_by) * packed.unit + 0.0
         loose = np.zeros(len(self._measures), dtype=bool)
-        if packed.is_implicit and rank < n:
+        if self._is_implicit and rank < n:
             changed = np.abs(slopes @ free[:, : n - rank]).max(axis=1)
             loose = changed > FREE * np.maximum(1.0, np.abs(slopes).max(axis=1))
         everywhere = forces
         if not isinstance(held, slice):
-            everywhere = np.zeros((packed.rows, p))
+            everywhere = np.zeros((self._rows, p))
             everywhere[held] = forces
         moved = Moved(self._layout, steps, everywhere, packed.scale, packed.unit)
-        return Sensitivity(self._measures, self._parameters, rates, rates, rates, loose, rank, {}, moved)
+        return Sensitivity.smooth(self._measures, self._parameters, rates, loose, rank, moved)
 
 
 def _record(dtype: np.dtype[np.void], fields: dict[str, int]) -> Table:

@@ -191,7 +191,7 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
 
 
 def _stayed_clear(proof: ClearanceProof, q: Array, touching: float) -> list[Answer] | None:
-    """What is proven at poses to which bodies go straight from the last ones, staying clear; None where that is unknown.
+    """What is proven at poses that bodies reach straight from the last ones, staying clear; None where that is unknown.
 
     That is asked first, as most solves go on from the one before: it is one call for all pairs.
     """

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 from assembly._address import address_of
 from assembly._kernel.decorator import ENTRIES
 from assembly.solve.loop.augmented_lagrangian import solve_program
@@ -9,6 +11,7 @@ from assembly.solve.loop.augmented_lagrangian import solve_program
 __all__ = ["loop_address"]
 
 
+@functools.cache
 def loop_address(end_effectors: int | None) -> int:
     """The address of `solve_program` in this process, for scenes with a dexterity (1) or without (None)."""
     entry = ENTRIES.get(getattr(solve_program, "py_func", solve_program))

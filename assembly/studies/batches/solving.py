@@ -31,7 +31,7 @@ from assembly.studies.batches.starts import begun_states, starts_of
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["solve_many"]
+__all__ = ["solve_many", "solve_slices"]
 
 Array = NDArray[np.float64]
 # Rows of a slice: what a thread solves before anybody can stop it. A slice begins in some 10 us. Chosen.
@@ -124,7 +124,7 @@ def _by_the_loop(asked: _Asked, out: dict[str, Any], threads: int, retry: bool) 
     warm = isinstance(asked.starts, list)
     settings = scene._settings(dict(asked.options), CTRL_C, warm)
     ended = np.empty((asked.count, packed.memory_at))
-    _solve_slices(packed, settings, writes, begun, ended, threads)
+    solve_slices(packed, settings, writes, begun, ended, threads)
     codes = ended[:, packed.results_at].astype(np.int64)
     left = codes != SOLVED if retry else codes == UNSURE
     if not warm and packed.chooses_turns:
@@ -136,8 +136,11 @@ def _by_the_loop(asked: _Asked, out: dict[str, Any], threads: int, retry: bool) 
     return np.flatnonzero(left).tolist()
 
 
-def _solve_slices(packed: Packed, settings: Array, writes: Writes, begun: Array, ended: Array, threads: int) -> None:
-    """Solve all rows in place, on so many threads; an exception of a signal's handler is raised between slices."""
+def solve_slices(packed: Packed, settings: Array, writes: Writes, begun: Array, ended: Array, threads: int) -> None:
+    """Solve all rows in place, on so many threads; an exception of a signal's handler is raised between slices.
+
+    Rows begin with the states in `begun`, and end with those in `ended`, as `solve_rows` has them.
+    """
     loop = loop_address(packed.end_effectors)
     slices = iter(range(0, len(ended), SLICE))
 

@@ -1,7 +1,13 @@
-"""A scene whose tip is drawn to places, one after the other, with nothing else that it is to do."""
+"""A scene whose tip is drawn to places, with nothing else that it is to do: many places in one compiled call.
+
+Nearly all of these solves are the loop alone, which goes on from a solution (`solve/straight.py`). Places that do not
+wait for each other are rows of one call (`studies/batches`), and give the same bits as one after the other. What the
+loop does not arrive at, and scenes with more than it in a solve, begin again with all there is.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +16,19 @@ from numpy.typing import NDArray
 from assembly.assembly import Assembly
 from assembly.constraints.model.objectives import PointDistance
 from assembly.constraints.model.placements import PointOnPlane
+from assembly.constraints.packing.scene import Packed
+from assembly.derivatives.parameter import Parameter
 from assembly.kinematics.body import Body, Point
-from assembly.kinematics.pose import axes_quaternion
+from assembly.kinematics.pose import Pose, axes_quaternion
+from assembly.solve.interruption import CTRL_C
+from assembly.solve.loop.settings import OBJECTIVE, SCATTER, SOLVED
+from assembly.solve.result import Ended
+from assembly.solve.scene import Status
+from assembly.solve.scene_settings import scene_settings
 from assembly.solve.solution import Solution
+from assembly.studies.batches.columns import writes_of
+from assembly.studies.batches.solving import solve_slices
+from assembly.studies.batches.starts import begun_states
 from assembly.studies.reachable.grid import Grid
 
 __all__ = ["DrawnTip", "Stop"]
@@ -28,19 +44,22 @@ class Stop(NamedTuple):
 
     Attributes
     ----------
-    solution : Solution
-        Of the scene that draws it.
+    ended : Ended
+        How the scene that draws it was packed, and the state at the end.
     poses : (n, 7)
         Of the bodies of the scene.
     has_ended : bool
         Whether no pose beside it brings the tip nearer.
     is_there : bool
+    solution : Solution or None
+        What came of a solve of its own; rows of a call have none.
     """
 
-    solution: Solution
+    ended: Ended
     poses: Array
     has_ended: bool
     is_there: bool
+    solution: Solution | None = None
 
 
 class DrawnTip:
@@ -69,17 +88,60 @@ class DrawnTip:
         if plane is not None:
             self.scene.constrain(PointOnPlane(tip, plane, f"tip in the {plane.name}"))
         self.scene.minimize(self._aim)
+        self._place = tuple(Parameter(self._aim, "target", axis) for axis in "xyz")
+        self._body = next(k for k, body in enumerate(bodies) if body is tip.body)
 
     def to(self, target: Array, start: Solution | Array) -> Stop:
         """The tip drawn to a place from a solution of this scene, or from poses (n, 7) of the bodies."""
         self.aim_at(target)
-        if not isinstance(start, Solution):
-            extra = [body.pose.q for body in self.scene.bodies[self._count :]]
-            start = np.concatenate([start, *(row[None] for row in extra)])
-        solution = self.scene.solve(start)
+        solution = self.scene.solve(start if isinstance(start, Solution) else self._with_plane(start[None])[0])
         # The objective is the square of the distance.
         is_there = solution.success and solution.objective <= self._close**2
-        return Stop(solution, solution.q[: self._count], solution.success, is_there)
+        return Stop(solution._ended, solution.q[: self._count], solution.success, is_there, solution)
+
+    def all_to(self, targets: Array, starts: Sequence[Stop]) -> list[Stop]:
+        """The tip drawn to places (k, 3), each from a stop of its own."""
+        packed = self.scene.packed()
+        rows = [k for k, start in enumerate(starts) if self._is_row(packed, start)]
+        found: list[Stop | None] = [None] * len(starts)
+        if rows:
+            begun = np.array([starts[k].ended.state for k in rows])
+            for k, stop in zip(rows, self._in_one_call(packed, targets[rows], begun, True), strict=True):
+                found[k] = stop
+        return [
+            self.to(target, self.solution(start)) if stop is None else stop
+            for target, start, stop in zip(targets, starts, found, strict=True)
+        ]
+
+    def all_from(self, targets: Array, poses: Array) -> list[Stop]:
+        """The same from poses (k, n, 7) of the bodies."""
+        packed = self.scene.packed()
+        found: list[Stop | None] = [None] * len(poses)
+        if packed.is_loop_alone and len(poses):
+            packed.refresh()
+            # Where the tip is drawn to has no part in the turn that an angle begins on.
+            begun = begun_states(self.scene, packed, self._with_plane(poses), False, False)
+            if begun is not None:
+                found = self._in_one_call(packed, targets, begun, False)
+        return [
+            self.to(target, row) if stop is None else stop
+            for target, row, stop in zip(targets, poses, found, strict=True)
+        ]
+
+    def solution(self, stop: Stop) -> Solution:
+        """A stop as a solution: of a row of a call it is made here, with the numbers that its scene was aimed with."""
+        if stop.solution is not None:
+            return stop.solution
+        scene = self.scene._scene
+        assert scene is not None
+        return Solution(scene, *stop.ended, Status.SOLVED, 0.0, np.empty((0, 0)))
+
+    def limit(self, target: Array, stop: Stop) -> Solution:
+        """The solution of a stop on the way to a place, with what it was asked for."""
+        if stop.solution is None:
+            self.aim_at(target)
+            stop.ended.packed.refresh()
+        return self.solution(stop)
 
     def aim_at(self, target: Array) -> None:
         """Have the objective draw the tip to a place (3,), without a solve."""
@@ -88,4 +150,38 @@ class DrawnTip:
 
     def place(self, stop: Stop) -> Array:
         """The place (3,) of the tip in the world."""
-        return stop.solution.pose(self._tip.body).apply(self._tip.coordinates)
+        row = stop.poses[self._body]
+        return Pose(row[:3], row[3:]).apply(self._tip.coordinates)
+
+    def _is_row(self, packed: Packed, start: Stop) -> bool:
+        """Whether a solve from a stop is a run of the loop and nothing else, if that arrives."""
+        if not packed.is_loop_alone or packed._turned.coupled or start.ended.packed is not packed:
+            return False
+        return start.solution is None or start.solution._fit is None
+
+    def _with_plane(self, poses: Array) -> Array:
+        """Poses (k, n, 7) of the bodies, and that of the plane, which is a body of this scene alone."""
+        extra = [np.broadcast_to(body.pose.q, (len(poses), 1, 7)) for body in self.scene.bodies[self._count :]]
+        return np.concatenate([poses, *extra], axis=1)
+
+    def _in_one_call(self, packed: Packed, targets: Array, begun: Array, warm: bool) -> list[Stop | None]:
+        """The same for rows of the loop, from states; None where it did not arrive.
+
+        Rows that go on from a solution are `warm`; others may be on other turns where bodies were gathered.
+        """
+        packed.refresh()
+        writes = writes_of(packed, self._place, targets, len(targets))
+        assert writes is not None, "targets are numbers of the pool"
+        ended = np.empty((len(begun), packed._state_size))
+        solve_slices(packed, scene_settings({}, CTRL_C, True, warm), writes, begun, ended, 1)
+        CTRL_C.is_over()
+        poses = ended[:, : packed.contacts_at].reshape(len(ended), -1, 7)[:, : self._count].copy()
+        results = ended[:, packed.results_at :]
+        is_there = results[:, OBJECTIVE] * packed.unit <= self._close**2
+        arrived = results[:, 0] == SOLVED
+        if not warm and packed.chooses_turns:
+            arrived &= results[:, SCATTER] == 0.0
+        return [
+            Stop(Ended(packed, state), rows, True, there) if holds else None
+            for state, rows, there, holds in zip(ended, poses, is_there.tolist(), arrived.tolist(), strict=True)
+        ]

@@ -1,9 +1,12 @@
-"""Cells that a tip can reach, one after the other: each is tried from the poses at which its neighbors are reached.
+"""Cells that a tip can reach, front after front: each is tried from the poses at which its neighbors are reached.
 
 A solve draws the tip to the middle of a cell, with all constraints. Where the tip comes there, the cell is reached, and
 its neighbors are tried from the new pose. Where it does not, the tip stops at the place of the set that is nearest to
 the middle: a place of the set's boundary, whose outward normal is the direction in which the rest of the way lies,
 because at the least distance all that can still move moves at right angles to it.
+
+The neighbors of all cells that were reached in one turn are the front of the next one, and are drawn to in one call.
+One that several cells are beside is tried from the first of these, and from the next one where that does not reach it.
 
 A mechanism may reach a place in several configurations (an elbow to the left or to the right), and a boundary of the
 one need not be one of the other. They meet where the tip stops with the mechanism straight or folded: what has moved
@@ -13,7 +16,6 @@ mirror image, and the cell that it came from is solved for from there; a pose th
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -58,7 +60,7 @@ class Flood:
     most : int
         Cells that may be reached.
     reached : dict of cell -> list of (poses (n, 7), marks (n, 19))
-    limits : dict of cell -> list of (place, outward normal, solution)
+    limits : dict of cell -> list of (middle, place, outward normal, solution)
         Of cells beside reached ones whose middles are not reached: where the tip stopped on the way there.
     undecided : set of cell
         Cells at which a solve has not ended; none of them is reached.
@@ -74,62 +76,101 @@ class Flood:
     flips: int
     most: int
     reached: dict[Cell, list[tuple[Array, Array]]] = field(default_factory=dict)
-    limits: dict[Cell, list[tuple[Array, Array, Solution]]] = field(default_factory=dict)
+    limits: dict[Cell, list[tuple[Array, Array, Array, Solution]]] = field(default_factory=dict)
     undecided: set[Cell] = field(default_factory=set)
     solves: int = 0
     advance: Callable[[int], object] = bool
     _done: set[tuple[int, Cell]] = field(default_factory=set)
-    _waiting: deque[_Reached] = field(default_factory=deque)
+    _waiting: list[_Reached] = field(default_factory=list)
 
-    def run(self, first: Cell, stop: Stop, within: Callable[[Cell], bool]) -> None:
-        """All cells that can be reached from a pose at which the tip is in the first cell."""
+    def run(self, first: Cell, stop: Stop, within: Callable[[Array], NDArray[np.bool_]]) -> None:
+        """All cells that can be reached from a pose at which the tip is in the first cell.
+
+        `within` tells of places (..., 3) of the world whether they are in the region where it is looked.
+        """
         start = _Reached(first, stop, 0)
-        cells = [cell for cell in (first, *self.grid.around(first)) if within(cell)]
-        if not cells:
+        around = (first, *self.grid.around(first))
+        inside = within(self.grid.centers(np.array(around))).tolist()
+        if not any(inside):
             place = self.tip.place(stop).tolist()
             raise InputError(f"within has no cell beside the tip, which starts at {place}; expected a box around it")
-        for cell in cells:
-            self._try(cell, start)
+        self._try_all([(cell, start) for cell, holds in zip(around, inside, strict=True) if holds])
         while self._waiting:
-            start = self._waiting.popleft()
-            for beside in self.grid.beside(start.cell):
-                if within(beside) and (start.flips, beside) not in self._done:
-                    self._try(beside, start)
+            front, self._waiting = self._waiting, []
+            beside = self.grid.beside(np.array([start.cell for start in front]))
+            inside = within(self.grid.centers(beside)).tolist()
+            self._try_all(
+                [
+                    (cell, start)
+                    for start, cells, holds in zip(front, beside.tolist(), inside, strict=True)
+                    for cell, is_in in zip(map(tuple, cells), holds, strict=True)
+                    if is_in and (start.flips, cell) not in self._done
+                ]
+            )
         for cell in self.reached:
             self.limits.pop(cell, None)
         self.undecided -= set(self.reached)
 
     def _marks(self, poses: Array) -> Array:
-        """Numbers that differ by about as much as poses do: origins, and 2 arm e e^T of quaternions e, (n, 19).
+        """Numbers that differ by about as much as poses (k, n, 7) do, (k, n, 19): origins, and 2 arm e e^T of turns e.
 
         A quaternion and its negative have the same; of a turn by a small angle they change by about arm times it.
         """
-        e = poses[:, 3:]
-        turns = 2.0 * self.arm * e[:, :, None] * e[:, None, :]
-        return np.concatenate([poses[:, :3], turns.reshape(len(e), 16)], axis=1)
+        e = poses[..., 3:]
+        turns = 2.0 * self.arm * e[..., :, None] * e[..., None, :]
+        return np.concatenate([poses[..., :3], turns.reshape(*e.shape[:2], 16)], axis=2)
 
-    def _try(self, cell: Cell, start: _Reached) -> None:
-        """Draw the tip from where it is to the middle of a cell."""
-        target = self.grid.center(cell)
-        stop = self._drawn(target, start.stop)
-        if stop.is_there:
-            self._add(cell, stop, start.flips)
-        elif not stop.has_ended:
-            self.undecided.add(cell)
-        else:
-            place = self.tip.place(stop)
-            length = float(np.linalg.norm(target - place))
-            if length <= _FAR * self.grid.size:
-                self.limits.setdefault(cell, []).append((place, (target - place) / length, stop.solution))
-            if start.flips < self.flips and start.cell in self.reached:
-                back = self._drawn(self.grid.center(start.cell), self._mirrored(start.stop, stop))
-                if back.is_there:
-                    self._add(start.cell, back, start.flips + 1)
+    def _try_all(self, asked: list[tuple[Cell, _Reached]]) -> None:
+        """Draw the tip to the middles of cells from where it is, to each once where that reaches it."""
+        while asked:
+            now: dict[tuple[int, Cell], _Reached] = {}
+            later = []
+            for cell, start in asked:
+                key = start.flips, cell
+                if key in now:
+                    later.append((cell, start))
+                else:
+                    now[key] = start
+            cells = [cell for _, cell in now]
+            targets = self.grid.centers(np.array(cells))
+            stops = self.tip.all_to(targets, [start.stop for start in now.values()])
+            self._count(len(stops))
+            self._tell(cells, targets, list(now.values()), stops)
+            asked = [(cell, start) for cell, start in later if (start.flips, cell) not in self._done]
 
-    def _drawn(self, target: Array, start: Stop | Array) -> Stop:
-        self.solves += 1
-        self.advance(1)
-        return self.tip.to(target, start.solution if isinstance(start, Stop) else start)
+    def _tell(self, cells: list[Cell], targets: Array, starts: list[_Reached], stops: list[Stop]) -> None:
+        """Add what was reached, and look for other configurations where the tip stopped before."""
+        marks = self._marks(np.array([stop.poses for stop in stops]))
+        stopped = []
+        for cell, target, start, stop, mark in zip(cells, targets, starts, stops, marks, strict=True):
+            if stop.is_there:
+                self._add(cell, stop, start.flips, mark)
+            elif not stop.has_ended:
+                self.undecided.add(cell)
+            else:
+                place = self.tip.place(stop)
+                length = float(np.linalg.norm(target - place))
+                if length <= _FAR * self.grid.size:
+                    limit = target, place, (target - place) / length, self.tip.limit(target, stop)
+                    self.limits.setdefault(cell, []).append(limit)
+                if start.flips < self.flips and start.cell in self.reached:
+                    stopped.append((start, stop))
+        if stopped:
+            self._turn_back(stopped)
+
+    def _turn_back(self, stopped: list[tuple[_Reached, Stop]]) -> None:
+        """Draw the tip back from beyond stops to the cells where it came from; in other configurations it goes on."""
+        poses = np.array([self._mirrored(start.stop, stop) for start, stop in stopped])
+        backs = self.tip.all_from(self.grid.centers(np.array([start.cell for start, _ in stopped])), poses)
+        self._count(len(backs))
+        marks = self._marks(np.array([back.poses for back in backs]))
+        for (start, _), back, mark in zip(stopped, backs, marks, strict=True):
+            if back.is_there:
+                self._add(start.cell, back, start.flips + 1, mark)
+
+    def _count(self, solves: int) -> None:
+        self.solves += solves
+        self.advance(solves)
 
     def _mirrored(self, start: Stop, stop: Stop) -> Array:
         """As far beyond a stop as the start is before it, poses (n, 7)."""
@@ -139,9 +180,8 @@ class Flood:
         result[:, 3:] = 2.0 * (at * before).sum(axis=1)[:, None] * at - before
         return result
 
-    def _add(self, cell: Cell, stop: Stop, flips: int) -> None:
-        """A pose with the tip in the middle of a cell: one that is new goes on."""
-        marks = self._marks(stop.poses)
+    def _add(self, cell: Cell, stop: Stop, flips: int, marks: Array) -> None:
+        """A pose with the tip in the middle of a cell, and its marks (n, 19): one that is new goes on."""
         known = self.reached.setdefault(cell, [])
         self._done.add((flips, cell))
         if any(np.abs(marks - other).max() < _ONE * self.grid.size for _, other in known):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -48,18 +47,6 @@ class Grid:
         """Area or volume of a cell."""
         return float(self.size**self.dimension)
 
-    def center(self, cell: Cell) -> Array:
-        """The middle of a cell, in the world."""
-        result = self.origin.copy()
-        for k, axis in zip(cell, self._sides, strict=True):
-            result += (k + 0.5) * axis
-        return result
-
-    @cached_property
-    def _sides(self) -> tuple[Array, ...]:
-        """From a cell's middle to that of the next one along each axis."""
-        return tuple(self.size * self.axes)
-
     def centers(self, cells: NDArray[np.int64]) -> Array:
         """Middles of cells (k, d), in the world, (k, 3)."""
         result: Array = self.origin + self.size * (cells + 0.5) @ self.axes
@@ -74,11 +61,11 @@ class Grid:
         """The cell that a point is in."""
         return tuple(np.floor(self.flat(point)).astype(np.int64).tolist())
 
-    def beside(self, cell: Cell) -> Iterator[Cell]:
-        """Cells that share a side with one."""
-        for axis in range(self.dimension):
-            for step in (-1, 1):
-                yield (*cell[:axis], cell[axis] + step, *cell[axis + 1 :])
+    def beside(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Of each of some cells (k, d) those that share a side with it, (k, 2 d, d)."""
+        forward = np.eye(self.dimension, dtype=np.int64)
+        steps = np.stack([-forward, forward], axis=1).reshape(-1, self.dimension)
+        return cells[:, None] + steps
 
     def around(self, cell: Cell) -> Iterator[Cell]:
         """Cells that share a side, an edge or a corner with one."""

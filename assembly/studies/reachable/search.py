@@ -16,7 +16,7 @@ from assembly.solve.solution import Solution
 from assembly.studies.reachable.content import content
 from assembly.studies.reachable.drawn_tip import DrawnTip
 from assembly.studies.reachable.flood import Flood
-from assembly.studies.reachable.grid import Cell, Grid, grid_of
+from assembly.studies.reachable.grid import Grid, grid_of
 from assembly.studies.reachable.result import Workspace
 
 __all__ = ["workspace"]
@@ -98,7 +98,7 @@ def workspace(
         for start in (first, *(_solved(scene, each, f"starts[{k}]") for k, each in enumerate(others))):
             place = start.pose(point.body).apply(point.coordinates)
             stop = drawn.to(grid.origin + (place - grid.origin) @ grid.axes.T @ grid.axes, start.q)
-            flood.run(grid.cell(drawn.place(stop)), stop, region)
+            flood.run(grid.cell(drawn.place(stop)), stop, region.holds)
     return _found(scene, flood, region)
 
 
@@ -107,7 +107,7 @@ def _found(scene: Assembly, flood: Flood, region: _Region) -> Workspace:
     grid = flood.grid
     order = sorted(flood.reached)
     cells = np.array(order, dtype=np.int64).reshape(-1, grid.dimension)
-    limits = [(grid.center(at), *limit) for at in sorted(flood.limits) for limit in flood.limits[at]]
+    limits = [limit for at in sorted(flood.limits) for limit in flood.limits[at]]
     targets, places, normals = (np.array([limit[k] for limit in limits]).reshape(-1, 3) for k in range(3))
     return Workspace(
         cells=cells,
@@ -165,10 +165,6 @@ class _Region:
             if not (low < high).all():
                 raise InputError(f"within is {box!r}; expected a lower and an upper corner")
             self._box = low, high
-
-    def __call__(self, cell: Cell) -> bool:
-        """Whether the middle of a cell is in it."""
-        return self._box is None or bool(self.holds(self._grid.center(cell)))
 
     def holds(self, places: Array) -> NDArray[np.bool_]:
         """Whether places (..., 3) are in it."""
