@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -98,6 +99,9 @@ class Hand:
         self.follow: Followable | tuple[Followable, ...] = follow
         self.terms = (term,)
         self._term, self._place = term, place
+        # What is held now, or None, and by which spring; only one of several hands changes these.
+        self._held: Followable | None = follow
+        self._spring = 2.0 * weight
         self._size = 3 if isinstance(term, PointDistance) else 7
 
     def pack(self, packed: Packed) -> None:
@@ -165,12 +169,14 @@ class Hand:
 
     def wrench(self, q: Array, target: Array) -> Array:
         """Force and torque of the spring on the hand, (6,), bodies at q (n, 7), the hand at a target."""
-        term = self._term
+        term, held, stiffness = self._term, self._held, self._spring
+        if held is None:
+            return np.zeros(6)
         pose = Pose(q[self._place, :3], q[self._place, 3:])
-        stiffness = 2.0 * term.weight
-        if isinstance(term, PointDistance):
-            return np.append(stiffness * (pose.apply(term.point.coordinates) - target), np.zeros(3))
-        frame = term.frame
+        if isinstance(held, Point):
+            return np.append(stiffness * (pose.apply(held.coordinates) - target), np.zeros(3))
+        assert isinstance(term, FrameDistance)
+        frame = held.frame() if isinstance(held, Body) else held
         force = stiffness * (pose.apply(frame.origin) - target[:3])
         turn = rotation_matrix(pose.quaternion) @ frame.axes @ rotation_matrix(target[3:]).T
         # Twice the skew part of a rotation is its sine along its axis.
@@ -180,6 +186,8 @@ class Hand:
 
 class SeveralHands:
     """Hands that hold a scene at once; parameters are those of `Hand`, one for each.
+
+    Each may hold something else of its body later on, or nothing: `Tracker.hold`.
 
     Attributes
     ----------
@@ -191,43 +199,101 @@ class SeveralHands:
         self, follow: Sequence[Followable], places: Sequence[int], rows: Sequence[Array], weights: Sequence[float]
     ) -> None:
         self._hands = [Hand(*each) for each in zip(follow, places, rows, weights, strict=True)]
-        self.follow: Followable | tuple[Followable, ...] = tuple(follow)
         self.terms = tuple(hand._term for hand in self._hands)
+        self._packed: Packed | None = None
+        self._springs: list[SpringNumbers] = []
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Steps are copied and pickled with the hands, for their forces; only trackers, which are not, write springs.
+        return {name: value for name, value in self.__dict__.items() if name != "_springs"}
+
+    @property
+    def follow(self) -> Followable | tuple[Followable | None, ...]:
+        """What each holds; None for one that holds nothing."""
+        return tuple(hand._held for hand in self._hands)
 
     def pack(self, packed: Packed) -> None:
-        """Take how far targets may be; the scene itself writes them."""
+        """Take how far targets may be, which the scene itself writes, and where the numbers of the springs are."""
+        if packed is not self._packed:
+            self._springs = [SpringNumbers(packed, term) for term in self.terms]
         self._packed, self._far = packed, FARTHEST * packed.scale
+        for hand, numbers in zip(self._hands, self._springs, strict=True):
+            numbers.write(hand._held, hand._spring)
+
+    def holding(self, k: int, held: Followable | None, stiffness: float, row: Array) -> SeveralHands:
+        """The same hands, one of which holds something else from now on, at rest; its body is at (7,)."""
+        hands, hand = copy(self), copy(self._hands[k])
+        hands._springs = self._springs
+        hands._hands = [*self._hands[:k], hand, *self._hands[k + 1 :]]
+        hand._held, hand._spring, term = held, stiffness, hand._term
+        hand._size = 3 if isinstance(held, Point) else 7
+        pose = Pose(row[:3], row[3:])
+        if isinstance(term, PointDistance):
+            term._target = term._target if held is None else pose.apply(held.coordinates)
+        elif isinstance(held, Point):
+            term.target = Pose(pose.apply(held.coordinates), term.target.quaternion)
+        elif held is not None:
+            term._frame = held.frame() if isinstance(held, Body) else held
+            term.target = pose @ Pose(term.frame.origin, axes_quaternion(term.frame.axes))
+        self._springs[k].write(held, stiffness)
+        return hands
+
+    def at_rest(self, q: Array) -> None:
+        """Have every hand hold what its tracker was made with, at rest, bodies at q (n, 7); until `pack`."""
+        for hand, numbers in zip(self._hands, self._springs, strict=True):
+            term, pose = hand._term, Pose(q[hand._place, :3], q[hand._place, 3:])
+            if isinstance(term, PointDistance):
+                term._target = pose.apply(term.point.coordinates)
+                numbers.write(term.point, 2.0 * term.weight)
+            else:
+                term.target = pose @ Pose(term.frame.origin, axes_quaternion(term.frame.axes))
+                numbers.write(term.frame, 2.0 * term.weight)
+
+    def take_targets(self, q: Array) -> None:
+        """Have every hand at rest where it holds, bodies at q (n, 7)."""
+        for hand in self._hands:
+            term, held = hand._term, hand._held
+            if isinstance(term, FrameDistance) and isinstance(held, Point):
+                pose = Pose(q[hand._place, :3], q[hand._place, 3:])
+                term.target = Pose(pose.apply(held.coordinates), term.target.quaternion)
+            elif isinstance(held, Point):
+                assert isinstance(term, PointDistance)
+                term._target = Pose(q[hand._place, :3], q[hand._place, 3:]).apply(held.coordinates)
 
     @property
     def stiffness(self) -> float | list[float]:
         """Forces over distances."""
-        return [2.0 * term.weight for term in self.terms]
+        return [hand._spring for hand in self._hands]
 
     def where(self) -> Targets:
         """The targets that the loop has."""
-        return tuple(np.asarray(hand.where()) for hand in self._hands)
+        return tuple(
+            np.asarray(hand._term._target if isinstance(hand._held, Point) else hand.where()) for hand in self._hands
+        )
 
     def aimed(self, targets: Any) -> Targets | None:
         """The targets as arrays, after the loop was told all of them; None, and none told, where one is none."""
         try:
             if len(targets) != len(self._hands):
                 return None
-            pairs = zip(targets, self._hands, strict=True)
-            rows = [_row_of(target, hand._size, self._far) for target, hand in pairs]
-            found = [row for row in rows if row is not None]
-            if len(found) < len(rows):
+            pairs = list(zip(targets, self._hands, strict=True))
+            # Whatever is said to a hand that holds nothing, nothing is drawn there.
+            rows = [None if hand._held is None else _row_of(target, hand._size, self._far) for target, hand in pairs]
+            if any(row is None and hand._held is not None for row, hand in zip(rows, self._hands, strict=True)):
                 return None
-            poses = [Pose(row[:3], row[3:]) if len(row) == 7 else None for row in found]
+            poses = [None if row is None or len(row) != 7 else Pose(row[:3], row[3:]) for row in rows]
         except Exception:  # whatever targets of the user's own do when they are read
             return None
-        for term, row, pose in zip(self.terms, found, poses, strict=True):
+        for term, row, pose in zip(self.terms, rows, poses, strict=True):
+            if row is None:
+                continue
             if isinstance(term, PointDistance):
                 term._target = row
             else:
-                assert pose is not None
-                term.target = pose
+                term.target = Pose(row, term.target.quaternion) if pose is None else pose
+        assert self._packed is not None
         self._packed.refresh()
-        return tuple(found)
+        return self.where()
 
     def recorded(self, trace: Any) -> tuple[Array, Sequence[Any]]:
         """Times (k,) and targets of recorded hands."""
@@ -243,6 +309,32 @@ class SeveralHands:
     def wrenches(self, q: Array, targets: Targets) -> Array:
         """Forces and torques of the springs on their hands, (k, 6), bodies at q (n, 7)."""
         return np.array([hand.wrench(q, target) for hand, target in zip(self._hands, targets, strict=True)])
+
+
+class SpringNumbers:
+    """Where the loop has the numbers of a spring: its weights, and the point of the body that it draws."""
+
+    def __init__(self, packed: Packed, term: PointDistance | FrameDistance) -> None:
+        self._pool, self._scale, self._weight = packed.pool, packed.scale, term.weight
+        # Before the target are the weight and the point.
+        self._at = next(at for target, at in packed._targets if target is term) - 4
+        turns = [at for target, at in packed._turns if target is term]
+        self._turn_at = turns[0] + 4 if turns else None
+        # As they were packed, for the stiffness that the term has.
+        self._drawn = float(self._pool[self._at])
+        self._turned = 0.0 if self._turn_at is None else float(self._pool[self._turn_at])
+
+    def write(self, held: Followable | None, stiffness: float) -> None:
+        """Have the spring draw what is held; nothing for None."""
+        factor = 0.0 if held is None else 0.5 * stiffness / self._weight
+        self._pool[self._at] = factor * self._drawn
+        if isinstance(held, (Point, Frame)):
+            place = held.coordinates if isinstance(held, Point) else held.origin
+            self._pool[self._at + 1 : self._at + 4] = place / self._scale
+        elif held is not None:
+            self._pool[self._at + 1 : self._at + 4] = 0.0
+        if self._turn_at is not None:
+            self._pool[self._turn_at] = 0.0 if isinstance(held, Point) else factor * self._turned
 
 
 Hands: TypeAlias = Hand | SeveralHands

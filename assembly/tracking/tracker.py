@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from time import perf_counter, sleep
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +14,14 @@ from assembly._copies import InOneProcess
 from assembly._read_only import read_only
 from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import structure_changes
+from assembly.constraints.model.objectives import PointDistance
 from assembly.constraints.packing.corners import body_of
 from assembly.constraints.packing.earlier import taken_over
 from assembly.constraints.packing.renumbered import numbers_told
 from assembly.constraints.packing.scene import MOST_CROWDING, structure_of
 from assembly.constraints.program.records import CLOCK_AT, MANAGER_RECORD
 from assembly.errors import InputError, integer, number, positive
+from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.changes import changes
 from assembly.kinematics.pose import Pose
 from assembly.proximity.features.solid_contact import STAYS, TRACK
@@ -59,7 +62,7 @@ from assembly.solve.scene import Scene, Status
 from assembly.solve.solution import Solution
 from assembly.tracking.clear_ticks import ClearTicks
 from assembly.tracking.followed import Followed
-from assembly.tracking.hands import Followable, new_hands, springs, with_hands
+from assembly.tracking.hands import Followable, SeveralHands, new_hands, springs, with_hands
 from assembly.tracking.log import TrackLog
 from assembly.tracking.tick import Step, TrackStatus
 from assembly.tracking.trace import Trace
@@ -265,9 +268,75 @@ class Tracker(InOneProcess):
         return f"Tracker({self._scene_given!r}, follow={self.follow!r}, stiffness={told})"
 
     @property
-    def follow(self) -> Followable | tuple[Followable, ...]:
-        """What follows the target, or a list of several."""
+    def follow(self) -> Followable | tuple[Followable | None, ...]:
+        """What follows the target, or a tuple for several hands, None for one that holds nothing."""
         return self._hands.follow
+
+    def hold(self, hand: int, follow: Followable | None, stiffness: float = 1.0) -> None:
+        """Have one of several hands hold something else of its body from the next tick on, or nothing.
+
+        It is at rest there. This takes some microseconds, where another tracker takes a tenth of a second and more.
+
+        Parameters
+        ----------
+        hand : int
+            Which one, in the order of what the tracker was made with.
+        follow : Point, Frame, Body or None
+            Of the same body. A hand that was made with a point holds points, other ones hold anything.
+        stiffness : float
+
+        Raises
+        ------
+        InputError, TypeError
+            A tracker of a single hand, a hand or a body that it has not, a stiffness that is not positive.
+        """
+        if not isinstance(self._hands, SeveralHands):
+            raise InputError("the tracker has a single hand; expected one that was made with a list")
+        k = integer("hand", hand, 0, len(self._hands.terms) - 1)
+        term, spring = self._hands.terms[k], positive("stiffness", stiffness)
+        if follow is not None and not isinstance(follow, (Point, Frame, Body)):
+            raise TypeError(f"follow is {follow!r}; expected a Point, a Frame, a Body or None")
+        body = term.bodies[0]
+        if follow is not None and (follow if isinstance(follow, Body) else follow.body) is not body:
+            raise InputError(f"follow is {follow!r}; expected something of body {body.name!r}, which hand {k} holds")
+        if isinstance(term, PointDistance) and follow is not None and not isinstance(follow, Point):
+            raise InputError(f"follow is {follow!r}; expected a Point, which is what hand {k} was made with")
+        place = self._scene_given.bodies.index(body)
+        self._hands = self._hands.holding(k, follow, spring, self.q[place])
+        self._followed = replace(self._followed, hands=self._hands)
+
+    def restart(self, q0: ArrayLike | Solution) -> None:
+        """Go on from other poses, hands at rest there; where these do not hold, the tracker stays as it is.
+
+        Parameters
+        ----------
+        q0 : (n, 7) or Solution
+            The constraints are solved from there.
+
+        Raises
+        ------
+        InputError, TypeError
+            A tracker of a single hand, or a start from which the constraints cannot be solved.
+        """
+        if not isinstance(self._hands, SeveralHands):
+            raise InputError("the tracker has a single hand; expected one that was made with a list")
+        poses = self._scene_given._given(q0.q if isinstance(q0, Solution) else q0)
+        before = self.q
+        self._hands.at_rest(poses)
+        try:
+            first = _held_to(self._inner.solve(poses, touching=self._touching))
+        except InputError:
+            self._hands.at_rest(before)
+            self._hands.pack(self._packed)
+            self._hands.take_targets(before)
+            raise
+        self._packed = self._inner.packed()
+        assert self._inner._scene is not None
+        self._scene = self._inner._scene
+        self._edits, self._numbers = changes(), self._told()
+        self._settings[RADIUS] = self._radius
+        self._set_up(first)
+        self._hands.take_targets(first.q)
 
     @property
     def scene(self) -> Assembly:

@@ -14,12 +14,14 @@ if TYPE_CHECKING:
     from assembly.view.in_notebook import notebook as notebook
     from assembly.view.page import save_html as save_html
     from assembly.view.playback import replay as replay
+    from assembly.view.style import Style as Style
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
         {
             "animate": "assembly.view.animation",
             "Live": "assembly.view.dragging.page",
+            "Style": "assembly.view.style",
             "live": "assembly.view.dragging.page",
             "notebook": "assembly.view.in_notebook",
             "replay": "assembly.view.playback",

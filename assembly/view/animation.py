@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from os import PathLike
 from typing import TYPE_CHECKING
 
@@ -12,11 +12,14 @@ from numpy.typing import ArrayLike
 from assembly.assembly import Assembly
 from assembly.errors import InputError, check_encodable, items, positive
 from assembly.kinematics.ellipsoid import Ellipsoid
+from assembly.view.captions import captions_text, driven_captions
 from assembly.view.commands import commands, motion
 from assembly.view.item import Picture
-from assembly.view.page import captions_text, player, write_page
+from assembly.view.overlay import overlay
+from assembly.view.page import player, write_page
 from assembly.view.picture import DIRECTION, film
 from assembly.view.series import Trajectory
+from assembly.view.style import Style
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -37,6 +40,7 @@ def animate(
     title: str | None = None,
     open: bool = False,
     visualizer: Visualizer | None = None,
+    style: Style | None = None,
 ) -> Visualizer | None:
     """Play a trajectory, in a meshcat visualizer or, with a path, in one HTML file without server or network.
 
@@ -59,8 +63,8 @@ def animate(
     loop : bool
         Whether it starts again at the end.
     captions : iterable of str
-        Text in the play bar of a file at each frame, for example a driven value with its unit; by default the frame's
-        number.
+        Text in the play bar of a file at each frame; by default the coordinates of joints that are driven through
+        solutions, or the time.
     ellipsoids : Ellipsoid, or for each frame one or several
         A single one stays as it is.
     direction : (3,)
@@ -71,6 +75,8 @@ def animate(
         Whether to open a browser window on the visualizer; not with a path.
     visualizer : meshcat.Visualizer, optional
         As in `show`; not with a path.
+    style : Style, optional
+        As in `save_html`, or in `show` without a path.
 
     Returns
     -------
@@ -84,7 +90,9 @@ def animate(
     duration = positive("seconds", seconds)
     require_flag("loop", loop)
     said = items("captions", captions, "a string for each frame")
-    picture = film(scene, trajectory, direction, ellipsoids)
+    # An iterator is gone through once.
+    shown = [*trajectory] if isinstance(trajectory, Iterator) else trajectory
+    picture = film(scene, shown, direction, ellipsoids, style)
     frames = round(float(picture.times[-1])) + 1
     for k, text in enumerate(said):
         if not isinstance(text, str):
@@ -94,6 +102,8 @@ def animate(
         raise InputError(f"captions has {len(said)} texts; expected one for each of {frames} frames")
     if said and path is None:
         raise InputError("captions is given without a path; expected a path: the window's own player has none")
+    if not said and path is not None:
+        said = driven_captions(scene, shown, picture.style)
     beside = captions_text(said) if said else ""
     return present(picture, path, duration, loop, title, open, visualizer, beside)
 
@@ -125,6 +135,6 @@ def present(
     if open or visualizer is not None:
         raise InputError("open or visualizer is given with a path; expected either a file or a window")
     frames = round(float(picture.times[-1])) + 1
-    controls = player(frames, loop) + beside
+    controls = player(frames, loop) + overlay(picture) + beside
     write_page(path, title, [*commands(picture), motion(picture, duration, loop)], controls)
     return None

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterable, Mapping
 from contextlib import redirect_stdout
 from io import StringIO
+from itertools import chain
 from typing import Any
 from weakref import WeakSet
 
@@ -18,6 +19,8 @@ from assembly.studies.interference.clash import Interference
 from assembly.view.commands import commands, motion, stillness
 from assembly.view.item import Picture
 from assembly.view.picture import DIRECTION, draw
+from assembly.view.said_in_window import said_in_window
+from assembly.view.style import Style
 
 with warnings.catch_warnings():
     # Of its own imports: a module of pyzmq that calls itself deprecated.
@@ -58,7 +61,7 @@ def display(
     if visualizer is not None and not isinstance(visualizer, Visualizer):
         raise TypeError(f"visualizer is {visualizer!r}; expected a meshcat.Visualizer")
     target = _visualizer() if visualizer is None else visualizer
-    for command in commands(picture):
+    for command in chain(commands(picture), said_in_window(picture)):
         target.window.send(_Sent(command))
     if seconds > 0.0:
         target.window.send(_Sent(motion(picture, seconds, loop)))
@@ -81,6 +84,7 @@ def show(
     interference: Interference | None = None,
     direction: ArrayLike = DIRECTION,
     visualizer: Visualizer | None = None,
+    style: Style | None = None,
 ) -> Visualizer:
     """Draw a scene in a meshcat visualizer, replacing what was shown before.
 
@@ -101,6 +105,9 @@ def show(
     visualizer : meshcat.Visualizer, optional
         Where to draw. By default one that is started at the first call (a server process, which ends with
         this one) and used again.
+    style : Style, optional
+        What hides what, opacities, edges, names, axes with their length; meshcat's window has no legend, and names
+        nothing under the mouse.
 
     Returns
     -------
@@ -111,4 +118,4 @@ def show(
     InputError, TypeError
         See the message; nothing is started then.
     """
-    return display(draw(scene, solution, direction, ellipsoids, interference), open, visualizer)
+    return display(draw(scene, solution, direction, ellipsoids, interference, style), open, visualizer)

@@ -49,9 +49,10 @@ def clash_items(report: Interference, place: Place) -> Iterator[Item]:
 def _clash(row: Clash, place: Place) -> Iterator[Item]:
     assert row.points is not None
     name, color = " / ".join(row.bodies), _MARKS[row.kind]
+    said = f"{' and '.join(row.bodies)}: {row.kind}"
     a, b = place(row.points)
     size = np.full(3, 1.4 * MARK)
-    yield Item(("places", name, "point"), ball(), color, a, scale=size, in_front=True)
-    yield Item(("places", name, "other point"), ball(), color, b, scale=size, in_front=True)
+    yield Item(("places", name, "point"), ball(), color, a, scale=size, in_front=True, said=said)
+    yield Item(("places", name, "other point"), ball(), color, b, scale=size, in_front=True, said=said)
     if np.linalg.norm(b - a) > 2.0 * MARK:
         yield line(("places", name, "between"), a[None], b[None], 0.4 * MARK, color, in_front=True)

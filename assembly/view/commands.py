@@ -16,7 +16,7 @@ from assembly.view.item import FIELD_OF_VIEW, Item, Picture
 from assembly.view.motion import quaternions
 from assembly.view.outline import Lines
 
-__all__ = ["ROOT", "Command", "commands", "motion", "packed", "stillness"]
+__all__ = ["ROOT", "Command", "commands", "mesh_commands", "motion", "packed", "path_of", "stillness"]
 
 Array = NDArray[np.float64]
 Command = dict[str, Any]
@@ -101,7 +101,8 @@ def _object(path: str, kind: str, geometry: Command, material: Command) -> Comma
     return {"type": "set_object", "path": path, "object": described}
 
 
-def _path(item: Item) -> str:
+def path_of(item: Item) -> str:
+    """Where the viewer has an item; also the identifier of its mesh."""
     # The viewer splits at slashes, which a name may hold.
     return "/".join([ROOT, *(part.replace("/", "\N{DIVISION SLASH}") for part in item.path)])
 
@@ -110,18 +111,23 @@ def _property(path: str, name: str, value: Any) -> Command:
     return {"type": "set_property", "path": path, "property": name, "value": value}
 
 
+def mesh_commands(item: Item) -> Iterator[Command]:
+    """Commands that put one thing where it is, with its edges."""
+    path = path_of(item)
+    yield _object(path, "Mesh", _geometry(item, f"{path}:geometry"), _material(item, f"{path}:material"))
+    yield {"type": "set_transform", "path": path, "matrix": item.matrix.T.ravel().tolist()}
+    if item.lines is not None:
+        # Below the item's path, so that it moves with it.
+        below = f"{path}/edges"
+        material = {"uuid": f"{below}:material", "type": "LineBasicMaterial", "color": _EDGE}
+        yield _object(below, "LineSegments", _line_geometry(item.lines, f"{below}:geometry"), material)
+
+
 def commands(picture: Picture) -> Iterator[Command]:
     """Commands that draw a picture over whatever was drawn before."""
     yield {"type": "delete", "path": ROOT}
     for item in picture.items:
-        path = _path(item)
-        yield _object(path, "Mesh", _geometry(item, f"{path}:geometry"), _material(item, f"{path}:material"))
-        yield {"type": "set_transform", "path": path, "matrix": item.matrix.T.ravel().tolist()}
-        if item.lines is not None:
-            # Below the item's path, so that it moves with it.
-            below = f"{path}/edges"
-            material = {"uuid": f"{below}:material", "type": "LineBasicMaterial", "color": _EDGE}
-            yield _object(below, "LineSegments", _line_geometry(item.lines, f"{below}:geometry"), material)
+        yield from mesh_commands(item)
     for path in ("/Grid", "/Axes"):
         yield _property(path, "visible", False)
     for name, color in zip(("top_color", "bottom_color"), _BACKGROUND, strict=True):
@@ -160,7 +166,7 @@ def motion(picture: Picture, seconds: float, loop: bool) -> Command:
         # The motion lasts as long where nothing moves.
         tracks = _tracks(item, times, always=item is picture.items[0])
         if tracks:
-            animations.append({"path": _path(item), "clip": {"fps": 1.0, "name": "motion", "tracks": tracks}})
+            animations.append({"path": path_of(item), "clip": {"fps": 1.0, "name": "motion", "tracks": tracks}})
     options = {"play": True, "repetitions": float("inf") if loop else 1}
     return {"type": "set_animation", "path": ROOT, "animations": animations, "options": options}
 

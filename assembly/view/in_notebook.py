@@ -12,8 +12,10 @@ from assembly.errors import integer
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
 from assembly.view.commands import commands
+from assembly.view.overlay import overlay
 from assembly.view.page import page_text
 from assembly.view.picture import DIRECTION, draw
+from assembly.view.style import Style
 
 __all__ = ["NotebookView", "notebook"]
 
@@ -44,6 +46,7 @@ def notebook(
     *,
     height: int = 360,
     direction: ArrayLike = DIRECTION,
+    style: Style | None = None,
 ) -> NotebookView:
     """Show a scene, or one body, in a notebook, to be turned with the mouse: make it the last line of a cell.
 
@@ -56,6 +59,8 @@ def notebook(
         Of the picture, in pixels, 50 to 5000.
     direction : (3,)
         From the scene to the eye; z is upward.
+    style : Style, optional
+        As in `save_html`.
 
     Raises
     ------
@@ -64,4 +69,5 @@ def notebook(
     """
     pixels = integer("height", height, 50, 5000)
     shown = Assembly([scene]) if isinstance(scene, Body) else scene
-    return NotebookView(page_text("assembly", commands(draw(shown, solution, direction))), pixels)
+    picture = draw(shown, solution, direction, style=style)
+    return NotebookView(page_text("assembly", commands(picture), overlay(picture)), pixels)

@@ -12,6 +12,7 @@ from assembly.kinematics.body import Body
 from assembly.view.mesh import Mesh
 from assembly.view.motion import rotations
 from assembly.view.outline import Lines
+from assembly.view.style import Style
 
 __all__ = ["FIELD_OF_VIEW", "Color", "Item", "Picture", "Place", "Stations", "framed"]
 
@@ -47,6 +48,12 @@ class Item:
         From 0 to 1.
     lines : Lines, optional
         Edges to be drawn over the mesh, in the same coordinates.
+    hides : bool
+        Whether it is a glyph that solids may hide, and that pages show through them where that is asked for.
+    said : str
+        What it is, in words, for whoever points at it.
+    label : str
+        Its name, where it can have one written beside it.
     """
 
     path: tuple[str, ...]
@@ -58,6 +65,14 @@ class Item:
     in_front: bool = False
     opacity: float = 1.0
     lines: Lines | None = None
+    hides: bool = False
+    said: str = ""
+    label: str = ""
+
+    @property
+    def kind(self) -> str:
+        """What it is one of: "bodies", "joints", "contacts", "targets", "ellipsoids" or "places"."""
+        return self.path[0]
 
     @property
     def matrix(self) -> Array:
@@ -86,11 +101,16 @@ class Picture:
         It looks at the origin, z upward.
     times : (k,)
         Increasing from zero, in frames of a trajectory; a single zero where nothing moves.
+    scale : float
+        From lengths of the scene to those of the picture.
+    style : Style
     """
 
     items: tuple[Item, ...]
     eye: Array
     times: Array
+    scale: float = 1.0
+    style: Style = field(default_factory=Style)
 
 
 class Stations:

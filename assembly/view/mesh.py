@@ -8,7 +8,7 @@ its normals. A trimmed face is made of facets (`geometry/meshing/polygon.py`) th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -19,15 +19,19 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.meshing.polygon import facets
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body
-from assembly.view.outline import extent, turning
+from assembly.view.outline import ANGLE, extent, turning
 
 __all__ = ["Mesh", "body_mesh", "face_mesh", "joined"]
 
 Array = NDArray[np.float64]
-# Degrees that tangents and normals may turn in a cell: shading hides 7.5, and outlines show 48 sides to a circle.
-_ANGLE = 7.5
+# By so much larger cells are tried until a body's vertices are few enough.
+_COARSER = 1.2
 # Normals that differ by more on the two sides of a knot make an edge.
 _CREASE = np.cos(np.deg2rad(1.0))
+# Normals that differ by more on the two sides of an edge of a mesh make one that is drawn.
+_FEATURE = np.cos(np.deg2rad(10.0))
+# Vertices nearer to each other than this part of a mesh's size are at one place.
+_WELDED = 1e-6
 # How far inside a span, in parts of it, normals at its end are taken: the knot itself belongs to the next span.
 _INSIDE = 1e-9
 # Points nearer than this part of the surface's size are one point.
@@ -47,12 +51,15 @@ class Mesh:
         Corners, counterclockwise seen from outside.
     colors : (n, 3), optional
         Red, green, blue from 0 to 1; NaN for vertices that have no color of their own.
+    creases : (k, 2) of int
+        Vertices at the ends of edges along which a surface has two normals, as the teeth of a gear do.
     """
 
     vertices: Array
     normals: Array
     triangles: NDArray[np.int64]
     colors: Array | None = None
+    creases: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
 
     def about(self, point: Array) -> Mesh:
         """The mesh moved so that a point comes to the origin."""
@@ -79,6 +86,7 @@ def joined(meshes: list[Mesh]) -> Mesh:
         np.concatenate([mesh.normals for mesh in meshes]),
         np.concatenate(triangles),
         colors,
+        np.concatenate([mesh.creases + start for mesh, start in zip(meshes, starts[:-1], strict=True)]),
     )
 
 
@@ -117,10 +125,10 @@ def _turning(surface: NurbsSurface, direction: int) -> tuple[Array, NDArray[np.b
     tangents = _unit(surface.evaluate(u.ravel()[:, None], v[None, :], 1)[1]).reshape(*u.shape, v.size, 3)
     normals = _normals(Face(surface), u.ravel(), v).reshape(tangents.shape)
     degrees = np.zeros((len(u), _ALONG - 1))
-    for field in (tangents, normals):
-        turned = np.linalg.norm(np.diff(field, axis=1), axis=-1)
+    for rows in (tangents, normals):
+        turned = np.linalg.norm(np.diff(rows, axis=1), axis=-1)
         # The chord of an angle; a tangent that vanishes (at a pole) has no angle to the next.
-        turned[(np.linalg.norm(field[:, 1:], axis=-1) == 0.0) | (np.linalg.norm(field[:, :-1], axis=-1) == 0.0)] = 0.0
+        turned[(np.linalg.norm(rows[:, 1:], axis=-1) == 0.0) | (np.linalg.norm(rows[:, :-1], axis=-1) == 0.0)] = 0.0
         angle = np.rad2deg(2.0 * np.arcsin(np.minimum(0.5 * turned, 1.0)))
         degrees = np.maximum(degrees, angle.max(axis=-1))
     creased = np.zeros(len(u), dtype=bool)
@@ -151,8 +159,9 @@ def _rows(
     return np.array(points), np.array(normals), begins
 
 
-# Meshes of faces that were drawn before, which bodies may share, by what else they depend on.
+# Meshes of faces that were drawn before, which bodies may share, by what else they depend on; and how surfaces turn.
 _known: WeakKeyDictionary[Face, dict[tuple[float, ...], Mesh]] = WeakKeyDictionary()
+_turns: WeakKeyDictionary[Face, list[tuple[Array, NDArray[np.bool_]]]] = WeakKeyDictionary()
 # Distance of a trimmed face's facets, in parts of its body's extent: that alone would show in an outline.
 _TOLERANCE = 1e-3
 
@@ -183,29 +192,57 @@ def face_mesh(face: Face, budget: int = 20_000) -> Mesh:
     InputError
         A surface that has no normals.
     """
-    return _face_mesh(face, budget, extent([face]), turning(1))
+    if _is_whole(face):
+        return _grid_mesh(face, _fitting([face], budget, ANGLE))
+    return _facets_mesh(face, _TOLERANCE * extent([face]), turning(1))
 
 
-def _face_mesh(face: Face, budget: int, size: float, angle: float) -> Mesh:
-    if face.outer is None and not face.holes:
-        return _kept(face, (budget,), lambda: _grid_mesh(face, budget))
-    return _kept(face, (size, angle), lambda: _facets_mesh(face, _TOLERANCE * size, angle))
+def _is_whole(face: Face) -> bool:
+    """Whether a face is all of its surface."""
+    return face.outer is None and not face.holes
 
 
 def _facets_mesh(face: Face, tolerance: float, angle: float) -> Mesh:
-    found = facets(face, tolerance, angle=angle)
-    return Mesh(found.points, found.normals, found.triangles)
+    def make() -> Mesh:
+        found = facets(face, tolerance, angle=angle)
+        return Mesh(found.points, found.normals, found.triangles)
+
+    return _kept(face, (tolerance, angle), make)
 
 
-def _grid_mesh(face: Face, budget: int) -> Mesh:
-    surface = face.surface
-    turns = [_turning(surface, direction) for direction in (0, 1)]
-    angle = _ANGLE
+def _turns_of(face: Face) -> list[tuple[Array, NDArray[np.bool_]]]:
+    if face not in _turns:
+        _turns[face] = [_turning(face.surface, direction) for direction in (0, 1)]
+    return _turns[face]
+
+
+def _cells(face: Face, angle: float) -> list[NDArray[np.int64]]:
+    """How many cells each span has, in either direction, that turn by an angle [deg] at most."""
+    return [
+        np.maximum(np.ceil(degrees.sum(axis=1) / angle - 1e-9), 1.0).astype(np.int64) for degrees, _ in _turns_of(face)
+    ]
+
+
+def _fitting(faces: list[Face], budget: int, angle: float) -> float:
+    """The angle [deg], or a larger one, by which the grids of all these faces together stay below a budget of vertices.
+
+    A flat face needs four vertices wherever it is, so that a dome among them has nearly all.
+    """
     while True:
-        cells = [np.maximum(np.ceil(degrees.sum(axis=1) / angle), 1.0).astype(np.int64) for degrees, _ in turns]
-        if (cells[0].sum() + 1) * (cells[1].sum() + 1) <= budget or max(c.max() for c in cells) == 1:
-            break
-        angle *= 1.2
+        cells = [_cells(face, angle) for face in faces]
+        if sum(int((u.sum() + 1) * (v.sum() + 1)) for u, v in cells) <= budget:
+            return angle
+        if all(each.max() == 1 for pair in cells for each in pair):
+            return angle
+        angle *= _COARSER
+
+
+def _grid_mesh(face: Face, angle: float) -> Mesh:
+    return _kept(face, (angle,), lambda: _new_grid(face, angle))
+
+
+def _new_grid(face: Face, angle: float) -> Mesh:
+    surface, turns, cells = face.surface, _turns_of(face), _cells(face, angle)
     (u, normal_u, i), (v, normal_v, j) = (
         _rows(breaks, degrees, count, creased)
         for breaks, count, (degrees, creased) in zip(surface.breaks(), cells, turns, strict=True)
@@ -226,17 +263,38 @@ def _grid_mesh(face: Face, budget: int) -> Mesh:
     sides = vertices[triangles] - vertices[np.roll(triangles, 1, axis=1)]
     triangles = triangles[(np.abs(sides).max(axis=2) > 0.0).all(axis=1)]
     normals = _normals(face, normal_u, normal_v).reshape(-1, 3)
-    return Mesh(vertices, normals, triangles[:, :: face.sign])
+    edges = _creases(vertices, normals, triangles) if any(creased.any() for _, creased in turns) else None
+    made = Mesh(vertices, normals, triangles[:, :: face.sign])
+    return made if edges is None else replace(made, creases=edges)
 
 
-def body_mesh(body: Body, budget: int = 20_000) -> Mesh | None:
-    """Triangles of a body, its picture's or those of all its faces, in body coordinates; None without either."""
+def _creases(vertices: Array, normals: Array, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Edges (k, 2) that two triangles share with other normals, at both ends, of the one than of the other."""
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    place = np.unique(np.round(vertices / (_WELDED * size)), axis=0, return_inverse=True)[1].reshape(-1)
+    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    sides = np.where((place[sides[:, 0]] > place[sides[:, 1]])[:, None], sides[:, ::-1], sides)
+    sides = sides[np.lexsort(place[sides].T)]
+    same = (place[sides[1:]] == place[sides[:-1]]).all(axis=1)
+    alike = (normals[sides[1:]] * normals[sides[:-1]]).sum(axis=2)
+    found: NDArray[np.int64] = sides[1:][same & (alike < _FEATURE).all(axis=1)]
+    return found
+
+
+def body_mesh(body: Body, budget: int = 20_000, angle: float = ANGLE) -> Mesh | None:
+    """Triangles of a body, its picture's or those of all its faces, in body coordinates; None without either.
+
+    Tangents and normals turn by the angle [deg] in a cell at most, or by more in all of them alike where the vertices
+    were more than the budget; trimmed faces do not count.
+    """
     picture = body.picture
     if picture is not None:
         return Mesh(picture.vertices, picture.normals, picture.triangles, picture.colors)
     if not body.faces:
         return None
-    share = max(budget // len(body.faces), 100)
     faces = [side.face for side in body.faces]
-    size, angle = extent(faces), turning(len(faces))
-    return joined([_colored(_face_mesh(face, share, size, angle), face.color) for face in faces])
+    whole = [face for face in faces if _is_whole(face)]
+    coarse = _fitting(whole, budget, angle) if whole else angle
+    tolerance, facet = _TOLERANCE * extent(faces), turning(len(faces), angle)
+    made = (_grid_mesh(face, coarse) if _is_whole(face) else _facets_mesh(face, tolerance, facet) for face in faces)
+    return joined([_colored(mesh, face.color) for mesh, face in zip(made, faces, strict=True)])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -16,11 +17,14 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.meshing.border import border
 from assembly.kinematics.body import Body
 
-__all__ = ["Lines", "body_lines", "extent", "turning"]
+if TYPE_CHECKING:
+    from assembly.view.mesh import Mesh
+
+__all__ = ["ANGLE", "Lines", "body_lines", "extent", "turning"]
 
 Array = NDArray[np.float64]
 # Degrees that boundaries turn from corner to corner, as meshes do; where there are many faces each is small.
-_ANGLE = 7.5
+ANGLE = 7.5
 _MANY, _COARSEST = 100, 2.0
 # In parts of the extent: distance of a chord from its arc, and points that are one.
 _TOLERANCE, _SAME = 1e-3, 1e-6
@@ -52,9 +56,9 @@ def _chords(face: Face, tolerance: float, angle: float) -> Array:
     return found[tolerance, angle]
 
 
-def turning(count: int) -> float:
-    """Angle [rad] that meshes and boundaries of so many faces of a body may turn from corner to corner."""
-    return float(np.deg2rad(_ANGLE * np.clip(np.sqrt(count / _MANY), 1.0, _COARSEST)))
+def turning(count: int, angle: float = ANGLE) -> float:
+    """Angle [rad] that meshes and boundaries of so many faces may turn from corner to corner; for few of them [deg]."""
+    return float(np.deg2rad(angle * np.clip(np.sqrt(count / _MANY), 1.0, _COARSEST)))
 
 
 def extent(faces: Sequence[Face]) -> float:
@@ -71,16 +75,21 @@ def extent(faces: Sequence[Face]) -> float:
     return float(np.linalg.norm(np.ptp(corners, axis=0)))
 
 
-def body_lines(body: Body) -> Lines | None:
-    """Edges of a body, in body coordinates; None for a body without edges, or drawn by a picture."""
+def body_lines(body: Body, mesh: Mesh | None = None, angle: float = ANGLE) -> Lines | None:
+    """Edges of a body, in body coordinates, and those within its faces that its mesh tells of.
+
+    None for a body without edges, or drawn by a picture. Boundaries turn by the angle [deg] from corner to corner.
+    """
     faces = [side.face for side in body.faces]
     if not faces or body.picture is not None:
         return None
     size = extent(faces)
-    chords = np.concatenate([_chords(face, _TOLERANCE * size, turning(len(faces))) for face in faces])
-    if not len(chords):
+    chords = [_chords(face, _TOLERANCE * size, turning(len(faces), angle)) for face in faces]
+    if mesh is not None:
+        chords.append(mesh.vertices[mesh.creases])
+    points = np.concatenate(chords).reshape(-1, 3)
+    if not len(points):
         return None
-    points = chords.reshape(-1, 3)
     _, first, place = np.unique(np.round(points / (_SAME * size)), axis=0, return_index=True, return_inverse=True)
     segments = np.unique(np.sort(place.reshape(-1, 2), axis=1), axis=0)
     return Lines(points[first], segments[segments[:, 0] != segments[:, 1]])

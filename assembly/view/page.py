@@ -7,12 +7,11 @@ packed by gzip and written in base64, which browsers unpack. A command stands be
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import cache
 from gzip import compress
 from html import escape
 from importlib.util import find_spec
-from json import dumps
 from os import PathLike
 from pathlib import Path
 
@@ -24,9 +23,11 @@ from assembly.kinematics.ellipsoid import Ellipsoid
 from assembly.solve.solution import Solution
 from assembly.studies.interference.clash import Interference
 from assembly.view.commands import Command, commands, packed
+from assembly.view.overlay import overlay
 from assembly.view.picture import DIRECTION, draw
+from assembly.view.style import Style
 
-__all__ = ["captions_text", "page_text", "player", "save_html", "write_page"]
+__all__ = ["page_text", "player", "save_html", "write_page"]
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -90,8 +91,9 @@ _PLAYER = """<div id="player">
 const part = Object.fromEntries(
   ["play", "sign", "slider", "frame", "loop"].map(id => [id, document.getElementById(id)]));
 const animator = viewer.animator;
-// What to say in the place of a frame's number.
+// What to say in the place of the time.
 const captions = [];
+let clock = part => `${{(part * animator.duration).toFixed(2)}} of ${{animator.duration.toFixed(2)}} s`;
 function seek(frame) {{
   animator.pause();
   animator.seek(frame / {last} * animator.duration);
@@ -108,7 +110,7 @@ function follow() {{
   requestAnimationFrame(follow);
   const frame = animator.time / animator.duration * {last};
   part.slider.value = frame;
-  part.frame.value = captions[Math.round(frame)] ?? `frame ${{Math.round(frame)}} of {last}`;
+  part.frame.value = captions[Math.round(frame)] ?? clock(animator.time / animator.duration);
   part.sign.setAttribute("d", animator.playing ? "M3 2h4v14h-4z M11 2h4v14h-4z" : "M4 2l12 7l-12 7z");
 }}
 follow();
@@ -152,13 +154,6 @@ def player(frames: int, loop: bool) -> str:
     return _PLAYER.format(last=frames - 1, checked=" checked" if loop else "")
 
 
-def captions_text(captions: Sequence[str]) -> str:
-    """What the play bar says at each frame, to stand behind the player."""
-    # An end of the script in a caption would be one.
-    listed = dumps(list(captions)).replace("<", "\\u003c")
-    return f'<script type="text/plain" class="with-viewer">captions.push(...{listed});</script>\n'
-
-
 def save_html(
     path: str | PathLike[str],
     scene: Assembly,
@@ -168,13 +163,14 @@ def save_html(
     interference: Interference | None = None,
     direction: ArrayLike = DIRECTION,
     title: str | None = None,
+    style: Style | None = None,
 ) -> None:
     """Write a scene as one HTML file to turn around in any browser, without server or network.
 
     Bodies are colored by their names ("red") or in turn, fixed ones grayer. A body without a shape is drawn as rods
     between its joints, a joint as a ball with an arrow along its z axis. Contacts are balls with the normal as an
-    arrow, amber, or magenta where the surfaces interpenetrate. A point that is drawn to a target is joined with a
-    cross at the target.
+    arrow, amber, or magenta where the surfaces interpenetrate; solids hide them unless a style asks for them. A point
+    that is drawn to a target is joined with a cross at the target. The mouse shows names of what it is on.
 
     Parameters
     ----------
@@ -191,10 +187,13 @@ def save_html(
         From the scene to the eye; z is upward.
     title : str, optional
         Of the page; the file's name by default.
+    style : Style, optional
+        What hides what, opacities, edges; which names, axes, scale and legend the page begins with.
 
     Raises
     ------
     InputError, TypeError
         See the message; also a scene without bodies, or a solution of other bodies.
     """
-    write_page(path, title, commands(draw(scene, solution, direction, ellipsoids, interference)))
+    picture = draw(scene, solution, direction, ellipsoids, interference, style)
+    write_page(path, title, commands(picture), overlay(picture))

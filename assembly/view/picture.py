@@ -6,7 +6,8 @@ in micrometres, looks the same in a browser that computes with single precision.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle
 
@@ -38,8 +39,9 @@ from assembly.view.series import (
     trajectory_rows,
 )
 from assembly.view.skeleton import JOINT, MARK, fineness, held_points, joint_items, joint_tips, line, link_mesh
+from assembly.view.style import Style, checked_style
 
-__all__ = ["DIRECTION", "draw", "film"]
+__all__ = ["DIRECTION", "PENETRATING", "TOUCHING", "draw", "film"]
 
 Array = NDArray[np.float64]
 
@@ -64,10 +66,14 @@ _NAMED: dict[str, Color] = {
 _PALETTE = tuple(_NAMED.values())[:9]
 _GROUND: Color = (0.60, 0.62, 0.66)
 _GRAY = np.array(_GROUND)
-_TOUCHING: Color = (1.00, 0.72, 0.10)
-_PENETRATING: Color = (0.95, 0.05, 0.65)
+TOUCHING: Color = (1.00, 0.72, 0.10)
+PENETRATING: Color = (0.95, 0.05, 0.65)
 _WISH: Color = (0.16, 0.17, 0.20)
 _ELLIPSOID: Color = (0.35, 0.20, 0.80)
+# Names of contacts that a clearance finds: those of the bodies, and a number.
+_FOUND = re.compile(r"^clearance: (.*?)( \d+)?$")
+# How far a target may make the picture larger than its parts, in their radius: parts are what is to be seen.
+_FARTHEST = 1.5
 # Half the width of the cross at a target, in parts of the scene's radius.
 _ARM = 3.0 * MARK
 # The gap, in parts of the scene's radius, below which surfaces interpenetrate.
@@ -109,13 +115,18 @@ def _bodies(
     place: Place,
     size: float,
     interference: Interference | None,
+    style: Style,
 ) -> Iterator[Item]:
-    styles = {} if interference is None else shown_as(interference)
+    faint = {} if interference is None else shown_as(interference)
     for (body, mesh), own in zip(meshes.items(), body_colors(scene.bodies), strict=True):
         path, rotation = ("bodies", body.name), stations.rotation(body)
-        color, opacity = styles.get(body.name, (own, 1.0))
+        color, opacity = faint.get(body.name, (own, 1.0))
+        opacity *= style.opacity_of(body)
+        said = f"{body.name}, fixed" if body.fixed else body.name
         if mesh is None and not len(held[body]):
-            yield Item(path, ball(), color, place(stations.points(body, np.zeros(3))), rotation, np.full(3, MARK))
+            at = place(stations.points(body, np.zeros(3)))
+            dot = np.full(3, MARK)
+            yield Item(path, ball(), color, at, rotation, dot, opacity=opacity, said=said, label=body.name)
             continue
         scale = np.full(3, place.scale)
         if mesh is None:
@@ -123,35 +134,43 @@ def _bodies(
         # About its own middle, for a shape that was drawn far from the origin of its body.
         middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
         position = place(stations.points(body, scale * middle / place.scale))
-        lines = body_lines(body)
+        lines = body_lines(body, mesh, style.angle) if style.edges else None
         if lines is not None:
             lines = lines.about(middle)
         shown = mesh.about(middle)
-        if styles:
+        if faint:
             # Colors that faces have of their own would hide which bodies cross.
             shown = replace(shown, colors=None)
-        yield Item(path, shown, color, position, rotation, scale, opacity=opacity, lines=lines)
+        item = Item(path, shown, color, position, rotation, scale, opacity=opacity, lines=lines)
+        yield replace(item, said=said, label=body.name)
 
 
-def _contact(pair: Pairs, place: Place) -> Iterator[Item]:
+def _contact(pair: Pairs, place: Place, style: Style, name: str) -> Iterator[Item]:
     """A ball at each point, and the normal of the first surface as an arrow; nothing while there is no pair."""
-    color = _PENETRATING if pair.gaps.min() * place.scale < _PENETRATION else _TOUCHING
-    shown = pair.shown[:, None]
+    if style.glyphs == "none":
+        return
+    color = PENETRATING if pair.gaps.min() * place.scale < _PENETRATION else TOUCHING
+    shown, in_front = pair.shown[:, None], style.glyphs == "in front"
+    said = f"contact {pair.name}"
+    if len(pair.gaps) == 1:
+        said += f", gap {style.length(float(pair.gaps[0]), 2)}"
     f, g = place(pair.points[:, 0]), place(pair.points[:, 1])
-    for label, point in (("point", f), ("other point", g)):
-        path = ("contacts", pair.name, label)
-        yield Item(path, ball(), color, point, scale=shown * np.full(3, MARK), in_front=True)
+    for what, point, label in (("point", f, name), ("other point", g, "")):
+        path, scale = ("contacts", pair.name, what), shown * np.full(3, MARK)
+        yield Item(path, ball(), color, point, scale=scale, in_front=in_front, hides=True, said=said, label=label)
     mesh, path = arrow(0.0, 7.0 * MARK, 0.22 * MARK, 0.7 * MARK), ("contacts", pair.name, "normal")
-    yield Item(path, mesh, color, f, aligned(pair.normals), shown * np.ones(3), in_front=True)
+    turned = aligned(pair.normals)
+    yield Item(path, mesh, color, f, turned, shown * np.ones(3), in_front, hides=True, said=said)
 
 
-def _wish(name: str, target: Array, point: Array, radius: float) -> Iterator[Item]:
+def _wish(name: str, body: str, target: Array, point: Array, radius: float) -> Iterator[Item]:
     """A cross at the target, a ball at the point (k, 3) that is drawn to it, and a line between them."""
-    yield Item(("targets", name, "target"), cross(_ARM, 0.3 * MARK), _WISH, target)
-    yield Item(("targets", name, "point"), ball(), _WISH, point, scale=np.full(3, radius))
+    said = f"{name}, of a point of {body}"
+    yield Item(("targets", name, "target"), cross(_ARM, 0.3 * MARK), _WISH, target, said=said, label=name)
+    yield Item(("targets", name, "point"), ball(), _WISH, point, scale=np.full(3, radius), said=said)
     if np.linalg.norm(target - point, axis=1).max() > 2.0 * MARK:
         ends = np.broadcast_to(target, point.shape)
-        yield line(("targets", name, "line"), point, ends, 0.25 * MARK, _WISH)
+        yield replace(line(("targets", name, "line"), point, ends, 0.25 * MARK, _WISH), said=said)
 
 
 def _ellipsoid(name: str, shape: Ellipsoids, place: Place) -> Iterator[Item]:
@@ -159,7 +178,7 @@ def _ellipsoid(name: str, shape: Ellipsoids, place: Place) -> Iterator[Item]:
     color = _ELLIPSOID if shape.color is None else shape.color
     center, lengths = place(shape.centers), place.scale * shape.lengths
     path = ("ellipsoids", name, "solid")
-    yield Item(path, ball(_SMOOTH), color, center, shape.axes, np.maximum(lengths, _THIN), opacity=_VEIL)
+    yield Item(path, ball(_SMOOTH), color, center, shape.axes, np.maximum(lengths, _THIN), opacity=_VEIL, said=name)
     for k in range(3):
         if lengths[:, k].max() > 0.0:
             half = lengths[:, k, None] * shape.axes[:, :, k]
@@ -190,6 +209,18 @@ def _outline(
         yield solid @ np.swapaxes(shape.axes, 1, 2) + shape.centers[:, None]
 
 
+def _nearer(points: Array, parts: Array) -> Array:
+    """Points (m, 3), those far from the parts at (n, 3) drawn toward their middle: parts stay as large as they are."""
+    low, high = parts.min(axis=0), parts.max(axis=0)
+    middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    away = points - middle
+    distance = np.linalg.norm(away, axis=1, keepdims=True)
+    if radius == 0.0:
+        return points
+    result: Array = middle + away * np.minimum(1.0, _FARTHEST * radius / np.maximum(distance, radius))
+    return result
+
+
 def _picture(
     scene: Assembly,
     stations: Stations,
@@ -197,34 +228,42 @@ def _picture(
     pairs: Sequence[Pairs],
     ellipsoids: Sequence[Ellipsoids],
     toward: Array,
+    style: Style,
+    *,
     interference: Interference | None = None,
+    values: Mapping[str, float] | None = None,
 ) -> Picture:
-    meshes = {body: body_mesh(body) for body in scene.bodies}
+    meshes = {body: body_mesh(body, angle=style.angle) for body in scene.bodies}
     held = held_points(scene)
     wishes = [objective for _, objective in scene.objectives if isinstance(objective, PointDistance)]
     drawn = [stations.points(wish.point.body, wish.point.coordinates) for wish in wishes]
-    seen = [*_outline(meshes, held, stations, ellipsoids), *drawn, *(wish.target for wish in wishes)]
-    outline = np.concatenate([points.reshape(-1, 3) for points in seen])
+    parts = np.concatenate([points.reshape(-1, 3) for points in _outline(meshes, held, stations, ellipsoids)])
+    targets = _nearer(np.array([wish.target for wish in wishes]).reshape(-1, 3), parts)
+    outline = np.concatenate([parts, *(points.reshape(-1, 3) for points in drawn), targets])
     radius = 0.5 * float(np.linalg.norm(np.ptp(outline, axis=0)))
     arms = _ARM * radius * np.concatenate([np.eye(3), -np.eye(3)])
-    tips = [wish.target + arms for wish in wishes]
+    tips = [target + arms for target in targets]
     size = fineness(scene, held, radius)
     place, distance = framed(np.concatenate([outline, *tips, joint_tips(scene, stations, size * radius)]), toward)
 
-    items = list(_bodies(scene, meshes, held, stations, place, size, interference))
-    items.extend(joint_items(scene, stations, place, size))
+    items = list(_bodies(scene, meshes, held, stations, place, size, interference, style))
+    items.extend(joint_items(scene, stations, place, size, style, values or {}))
+    named = set()
     for pair in pairs:
-        items.extend(_contact(pair, place))
+        # Of contacts that a clearance finds between two bodies, one has their name.
+        label = _FOUND.sub(r"\1", pair.name)
+        items.extend(_contact(pair, place, style, "" if label in named else label))
+        named.add(label)
     for k, (wish, point) in enumerate(zip(wishes, drawn, strict=True)):
         thick = 0.8 * MARK if wish.point.body.faces else size * JOINT
-        items.extend(_wish(f"target {k + 1}", place(wish.target), place(point), thick))
+        items.extend(_wish(f"target {k + 1}", wish.point.body.name, place(wish.target), place(point), thick))
     for k, shape in enumerate(ellipsoids):
         items.extend(_ellipsoid(f"ellipsoid {k + 1}", shape, place))
     if interference is not None:
         items.extend(clash_items(interference, place))
     if stations.count > 1:
         distance *= _ROOM
-    return Picture(tuple(items), distance * toward / np.linalg.norm(toward), times)
+    return Picture(tuple(items), distance * toward / np.linalg.norm(toward), times, place.scale, style)
 
 
 def _checked(scene: Assembly, direction: ArrayLike) -> Array:
@@ -245,6 +284,7 @@ def draw(
     direction: ArrayLike = DIRECTION,
     ellipsoids: Ellipsoid | Iterable[Ellipsoid] = (),
     interference: Interference | None = None,
+    style: Style | None = None,
 ) -> Picture:
     """Place everything there is to see.
 
@@ -259,6 +299,7 @@ def draw(
     ellipsoids : Ellipsoid or several
     interference : Interference, optional
         One of this scene, instead of a solution: bodies stand where it was made, and its places are shown.
+    style : Style, optional
 
     Raises
     ------
@@ -266,6 +307,7 @@ def draw(
         A scene without bodies, a solution or a report of other bodies, or something that is neither.
     """
     toward = _checked(scene, direction)
+    look = checked_style(style, (body.name for body in scene.bodies))
     if interference is not None:
         _check_report(scene, solution, interference)
     if solution is not None and not isinstance(solution, Solution):
@@ -275,7 +317,9 @@ def draw(
         q = interference.q
     times = np.zeros(1)
     pairs = [] if solution is None else contact_series([solution], times)
-    return _picture(scene, Stations(scene.bodies, q[None]), times, pairs, stills(ellipsoids), toward, interference)
+    stations, values = Stations(scene.bodies, q[None]), None if solution is None else solution.values
+    shapes = stills(ellipsoids)
+    return _picture(scene, stations, times, pairs, shapes, toward, look, interference=interference, values=values)
 
 
 def _check_report(scene: Assembly, solution: Solution | None, report: Interference) -> None:
@@ -293,6 +337,7 @@ def film(
     trajectory: Trajectory,
     direction: ArrayLike = DIRECTION,
     ellipsoids: Ellipsoid | Iterable[Ellipsoid | Iterable[Ellipsoid]] = (),
+    style: Style | None = None,
 ) -> Picture:
     """Place everything there is to see at the frames of a trajectory, and between them.
 
@@ -305,6 +350,7 @@ def film(
         From the scene to the eye.
     ellipsoids : Ellipsoid, or for each frame one or several
         A single one stays as it is.
+    style : Style, optional
 
     Raises
     ------
@@ -312,8 +358,9 @@ def film(
         A scene without bodies, a trajectory of another shape or of other bodies.
     """
     toward = _checked(scene, direction)
+    look = checked_style(style, (body.name for body in scene.bodies))
     q, solutions = trajectory_rows(scene, trajectory)
     times = sample_times(q)
     shapes = ellipsoid_series(ellipsoids, len(q), times)
     stations = Stations(scene.bodies, poses_at(q, times))
-    return _picture(scene, stations, times, contact_series(solutions, times), shapes, toward)
+    return _picture(scene, stations, times, contact_series(solutions, times), shapes, toward, look)

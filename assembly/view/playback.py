@@ -18,6 +18,7 @@ from assembly.tracking.trace import Trace
 from assembly.view.animation import present, require_flag
 from assembly.view.picture import DIRECTION, film
 from assembly.view.series import poses_at
+from assembly.view.style import Style
 
 if TYPE_CHECKING:
     from meshcat import Visualizer
@@ -33,7 +34,7 @@ _LISTED = 500
 
 _PANEL = """<div id="happened">
 <style>
-#happened {{ position: fixed; left: 12px; top: 12px; max-height: calc(100vh - 120px); max-width: 40vw; overflow: auto;
+#happened {{ position: fixed; left: 12px; top: 36px; max-height: calc(100vh - 240px); max-width: 40vw; overflow: auto;
   padding: 8px 12px; border-radius: 12px; background: rgba(255, 255, 255, 0.8); font: 13px sans-serif; color: #333; }}
 #happened button {{ display: block; border: 0; background: none; padding: 2px 0; font: inherit; color: inherit;
   text-align: left; cursor: pointer; font-variant-numeric: tabular-nums; }}
@@ -44,11 +45,12 @@ _PANEL = """<div id="happened">
 </div>
 <script type="text/plain" class="with-viewer">
 const happened = [...document.querySelectorAll("#happened button")];
+clock = part => `${{({begin} + part * {span}).toFixed(3)}} s`;
 happened.forEach(entry => entry.onclick = () => seek(Number(entry.dataset.frame)));
 function tell() {{
   requestAnimationFrame(tell);
   const part = animator.time / animator.duration;
-  document.getElementById("clock").value = `${{({begin} + part * {span}).toFixed(3)}} s`;
+  document.getElementById("clock").value = clock(part);
   happened.forEach(entry => entry.className = Number(entry.dataset.frame) > part * {last} + 1e-6 ? "ahead" : "");
 }}
 tell();
@@ -69,6 +71,7 @@ def replay(
     title: str | None = None,
     open: bool = False,
     visualizer: Visualizer | None = None,
+    style: Style | None = None,
 ) -> Visualizer | None:
     """Play what a tracker did, in the time it had, in a meshcat visualizer or, with a path, in one HTML file.
 
@@ -89,7 +92,7 @@ def replay(
         At most; not more than the log has poses.
     hand : Trace, optional
         What was followed: drawn as a dark, transparent ball with its axes.
-    loop, direction, title, open, visualizer
+    loop, direction, title, open, visualizer, style
         As in `animate`.
 
     Returns
@@ -118,7 +121,7 @@ def replay(
     times = np.linspace(recorded[0], recorded[-1], min(most, len(recorded)))
     rows = poses_at(log.q, np.interp(times, recorded, np.arange(float(len(recorded)))))
     balls = [] if hand is None else _balls(scene, hand.at(times))
-    picture = film(scene, rows, direction, balls)
+    picture = film(scene, rows, direction, balls, style)
     span = float(times[-1] - times[0])
     return present(picture, path, span / pace, loop, title, open, visualizer, _panel(log, times))
 

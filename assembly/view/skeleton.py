@@ -7,7 +7,8 @@ none for Spherical and Distance, one for Revolute, two for Universal.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -23,8 +24,20 @@ from assembly.view.item import Color, Item, Place, Stations
 from assembly.view.marks import arrow, ball, rods, stick
 from assembly.view.mesh import Mesh
 from assembly.view.motion import aligned
+from assembly.view.style import Style
 
-__all__ = ["JOINT", "MARK", "fineness", "held_points", "joint_items", "joint_tips", "line", "link_mesh"]
+__all__ = [
+    "COLOR",
+    "JOINT",
+    "MARK",
+    "fineness",
+    "held_points",
+    "joint_items",
+    "joint_tips",
+    "line",
+    "link_mesh",
+    "said_value",
+]
 
 Array = NDArray[np.float64]
 # Sizes in parts of the scene's radius: radii of marks, rods and joints, reach of arrows behind and before their origin.
@@ -34,7 +47,7 @@ JOINT = 0.022
 _BACK, _FORTH = -0.07, 0.14
 # Links shorter than this part of the scene's radius have smaller rods and joints, but not smaller than that.
 _SHORT, _LEAST = 0.12, 0.15
-_COLOR: Color = (0.20, 0.22, 0.27)
+COLOR: Color = (0.20, 0.22, 0.27)
 # Points of a body that differ by less, in parts of their distance from its origin, are one.
 _COINCIDENT = 1e-9
 # Directions that differ by less [rad] look the same.
@@ -121,28 +134,65 @@ def joint_tips(scene: Assembly, stations: Stations, radius: float) -> Array:
     return np.concatenate([np.empty((0, 3)), *tips])
 
 
-def joint_items(scene: Assembly, stations: Stations, place: Place, size: float) -> Iterator[Item]:
-    """What there is to see of each joint."""
+def joint_items(
+    scene: Assembly, stations: Stations, place: Place, size: float, style: Style, values: Mapping[str, float]
+) -> Iterator[Item]:
+    """What there is to see of each joint; values are of coordinates by their names, as in `Solution.values`."""
+    if style.glyphs == "none":
+        return
     thick = np.full(3, size * JOINT)
     axis = arrow(size * _BACK, size * _FORTH, 0.35 * size * _ROD, 1.1 * size * _ROD)
     for joint in _joints(scene):
         kinds = {coordinate.kind for row in joint.equations for _, coordinate in row.terms}
         a, b = (place(stations.points(frame.body, frame.origin)) for frame in (joint.frame_a, joint.frame_b))
         turn_a, turn_b = (stations.rotation(f.body) @ f.axes for f in (joint.frame_a, joint.frame_b))
-        in_front = any(body.faces for body in joint.bodies)
-        meets = bool(kinds & {COINCIDENT, SLIDE, DISTANCE, RADIUS})
+        hides = any(body.faces for body in joint.bodies)
+        in_front = hides and style.glyphs == "in front"
         gap = float(np.linalg.norm(b - a, axis=1).max())
         sine = np.linalg.norm(np.cross(turn_a[:, :, 2], turn_b[:, :, 2]), axis=1).max()
+        # Frames that are anywhere in one plane are not apart: there is nothing between their origins.
+        in_plane = _is_in_plane(joint) and float(np.abs(((b - a) * turn_a[:, :, 2]).sum(axis=1)).max()) <= size * MARK
+        meets = bool(kinds & {COINCIDENT, SLIDE, DISTANCE, RADIUS})
+        said = _said(joint, values, style)
 
         parts: list[tuple[str, Mesh, Array, Array, Array]] = [("ball", ball(), a, np.eye(3), thick)]
         if kinds - {COINCIDENT, DISTANCE}:
             parts.append(("axis", axis, a, turn_a, np.ones(3)))
-        if gap > size * MARK:
+        if gap > size * MARK and not in_plane:
             parts.append(("other ball", ball(), b, np.eye(3), thick))
         # The second arrow of a hinge lies on the first.
         if kinds - {COINCIDENT, DISTANCE, RADIUS, SLIDE} and not (meets and sine < _PARALLEL):
             parts.append(("other axis", axis, b, turn_b, np.ones(3)))
         for what, mesh, position, rotation, scale in parts:
-            yield Item(("joints", joint.name, what), mesh, _COLOR, position, rotation, scale, in_front)
-        if meets and gap > 2.0 * size * MARK:
-            yield line(("joints", joint.name, "line"), a, b, 0.35 * size * _ROD, _COLOR, in_front)
+            label = joint.name if what == "ball" else ""
+            path = ("joints", joint.name, what)
+            yield Item(path, mesh, COLOR, position, rotation, scale, in_front, hides=hides, said=said, label=label)
+        if meets and gap > 2.0 * size * MARK and not in_plane:
+            between = line(("joints", joint.name, "line"), a, b, 0.35 * size * _ROD, COLOR, in_front)
+            yield replace(between, hides=hides, said=said)
+
+
+def _is_in_plane(joint: Joint) -> bool:
+    """Whether a joint holds nothing of where its frames are but that they are in one plane, as mates of faces do."""
+    held = {
+        (coordinate.kind, coordinate.component)
+        for row in joint.equations
+        for _, coordinate in row.terms
+        if coordinate.kind in (COINCIDENT, SLIDE, DISTANCE, RADIUS)
+    }
+    return held == {(SLIDE, 2)}
+
+
+def _said(joint: Joint, values: Mapping[str, float], style: Style) -> str:
+    """A joint in words, with its coordinates."""
+    told = [f"{joint.name}: {type(joint).__name__} of {' and '.join(body.name for body in joint.bodies)}"]
+    for name, freedom in joint.freedoms.items():
+        value = values.get(f"{joint.name}.{name}")
+        if value is not None:
+            told.append(f"{name} {said_value(value, freedom.coordinate.is_angle, style)}")
+    return ", ".join(told)
+
+
+def said_value(value: float, is_angle: bool, style: Style) -> str:
+    """A coordinate of a joint in words: degrees, or a length."""
+    return f"{np.rad2deg(value):.1f} deg" if is_angle else style.length(value)

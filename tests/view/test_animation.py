@@ -208,7 +208,7 @@ def test_play_pause_slider_and_loop(balls, rolling, browser, tmp_path):
     assert playing == [True, False, False, False, True, True, True, True]
     # It plays, stands still when paused, goes where the slider is, and on from there.
     assert 0.0 < time[0] <= time[1] == time[2] < time[3] == 50.0 <= time[4] < time[5] < time[6] < 60.0
-    assert frame == ["frame 0 of 12"] * 3 + ["frame 6 of 12"] * 5
+    assert frame == [f"{t:.2f} of 100.00 s" for t in time]
     # three.js: LoopRepeat is 2201, LoopOnce 2200.
     assert loop == [2201] * 6 + [2200, 2201]
 

@@ -65,11 +65,17 @@ def test_a_page_refers_to_nothing_outside(balls, tmp_path):
     assert "http" not in page
     markup = re.sub(r"<script>.*?</script>", "", page, flags=re.S)
     assert not re.search(r"\b(src|href|srcset|@import|url)\b", markup)
-    # What is packed is run by the one script that is ours.
+    # What is packed is run by a script that is ours, and what is said is data for another one.
     assert set(re.findall(r"<script([^>]*)>", page)) == {
-        "", ' type="text/plain" id="packed-viewer"', ' type="text/plain" id="packed-drawing"'
-    }  # fmt: skip
-    (ours,) = re.findall(r"<script>(.*?)</script>", page, flags=re.S)
+        "",
+        ' type="text/plain" id="packed-viewer"',
+        ' type="text/plain" id="packed-drawing"',
+        ' type="application/json" id="said"',
+        ' type="text/plain" class="with-viewer"',
+    }
+    ours = "".join(
+        re.findall(r"<script(?: type=\"text/plain\" class=\"with-viewer\")?>(.*?)</script>", page, flags=re.S)
+    )
     assert "handle_command_bytearray" in ours and not re.search(r"connect|fetch|import", ours)
 
 

@@ -57,7 +57,7 @@ def test_contacts_are_balls_and_arrows(balls):
         ball = item(picture, "contacts", "red-green", label)
         # The solver's tolerance, in parts of the scene, is 1e-12 or so.
         assert center(ball) == pytest.approx(middle, abs=1e-10)
-        assert ball.color == TOUCHING and ball.in_front
+        assert ball.color == TOUCHING and ball.hides and not ball.in_front
     points = item(picture, "contacts", "red-green", "normal").points
     away = (points - center(item(picture, "bodies", "red"))) @ (solution.contacts["red-green"].normal)
     tip = points[away.argmax()] - middle

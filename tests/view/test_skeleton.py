@@ -82,13 +82,13 @@ def test_arrows_of_the_four_bar(four_bar):
         assert points[:, k].min() == pytest.approx(-0.07, abs=1e-12)
 
 
-def joined(joint, apart=(0.0, 0.0, 0.0), a=None, b=None, shape=None):
+def joined(joint, apart=(0.0, 0.0, 0.0), a=None, b=None, shape=None, style=None):
     """Names of what is drawn of a joint between two bodies whose frames are apart, and the picture."""
     one = asm.Body("one", shape, (-3, 0, 0), fixed=True)
     two = asm.Body("two", shape, np.array([3.0, 0, 0]) + apart)
     scene = asm.Assembly([one, two])
     scene.constrain(joint(one.frame(at=(3, 0, 0), **(a or {})), two.frame(at=(-3, 0, 0), **(b or {}))))
-    picture = draw(scene)
+    picture = draw(scene, style=style)
     return parts(picture, scene.constraints[0].name), picture
 
 
@@ -102,7 +102,9 @@ def joined(joint, apart=(0.0, 0.0, 0.0), a=None, b=None, shape=None):
         (Revolute, {"apart": (0, 0, 1), "b": SIDEWAYS}, {"ball", "axis", "other ball", "other axis", "line"}),
         (Prismatic, {"apart": (0, 0, 1)}, {"ball", "axis", "other ball", "line"}),
         (Cylindrical, {}, {"ball", "axis"}),
-        (Planar, {"apart": (1, 1, 0)}, {"ball", "axis", "other ball", "line"}),
+        # Anywhere in one plane is together; off it is not.
+        (Planar, {"apart": (1, 1, 0)}, {"ball", "axis"}),
+        (Planar, {"apart": (1, 1, 1)}, {"ball", "axis", "other ball", "line"}),
         (Spherical, {"b": SIDEWAYS}, {"ball"}),
         (lambda a, b: Spherical(a, b, swing=0.5), {"b": SIDEWAYS}, {"ball", "axis", "other axis"}),
         (Universal, {"b": SIDEWAYS}, {"ball", "axis", "other axis"}),
@@ -134,13 +136,18 @@ def test_a_line_joins_what_is_apart():
     assert np.abs(points[:, :2] - a[:2]).max() < ROD
 
 
-def test_joints_of_shapes_are_seen_through_them():
+def test_joints_hide_in_shapes_unless_asked_for():
     # A shape is no rod, and hides its joints.
     shape = asm.shapes.box(6.0, 1.0, 1.0)
+    in_front = asm.view.Style(glyphs="in front")
     _, picture = joined(Revolute, shape=shape)
-    assert all(i.in_front == (i.path[0] == "joints") for i in picture.items)
+    assert not any(i.in_front for i in picture.items)
+    assert all(i.hides == (i.kind == "joints") for i in picture.items)
     assert len(item(picture, "bodies", "one").mesh.vertices) == 24
-    assert not any(i.in_front for i in joined(Revolute)[1].items)
+    _, picture = joined(Revolute, shape=shape, style=in_front)
+    assert all(i.in_front == (i.kind == "joints") for i in picture.items)
+    assert not any(i.in_front for i in joined(Revolute, style=in_front)[1].items)
+    assert not [i for i in joined(Revolute, style=asm.view.Style(glyphs="none"))[1].items if i.kind == "joints"]
 
 
 def test_places_of_a_body():

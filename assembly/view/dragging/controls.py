@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assembly.view.dragging.joint_values import freedoms_of, reach_of
-from assembly.view.dragging.session import Session, Shown
+from assembly.view.dragging.session import Session
+from assembly.view.dragging.shown import Shown
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -95,16 +96,17 @@ class Controls:
         # Set by the program a slider tells nobody.
         if event.client is not None:
             self._slid_at[name] = perf_counter()
-            self._session.ask(partial(self._session.set_value, name, float(event.target.value)))
+            self._session.ask(partial(self._session.slide, name, float(event.target.value), event.client.client_id))
 
     def show(self, shown: Shown, now: float) -> None:
         """Show figures; the graph is sent less often."""
-        held = f"**{shown.held}** " if shown.held else ""
-        self._status.content = f"{held}{shown.status}"
+        lines = [f"**{shown.who}**"] if shown.hands else []
+        lines += [shown.status] if shown.notice in ("", shown.status) else [shown.status, f"*{shown.notice}*"]
+        self._status.content = "\n\n".join(lines)
         self._follow(shown.values, now)
-        force = float(np.linalg.norm(shown.force))
+        forces = " + ".join(f"{np.linalg.norm(hand.force):.3g}" for hand in shown.hands) or "0"
         self._figures.content = (
-            f"force {force:.3g}, violation {shown.violation:.1e}, {1e6 * shown.seconds:.0f} us, "
+            f"force {forces}, violation {shown.violation:.1e}, {1e6 * shown.seconds:.0f} us, "
             f"{len(shown.contacts)} contacts"
         )
         if now - self._graphed >= GRAPH_EVERY:

@@ -20,7 +20,8 @@ from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
 from assembly.tracking.trace import Trace
 from assembly.view.dragging.controls import Controls
-from assembly.view.dragging.session import Session, Shown
+from assembly.view.dragging.session import Session
+from assembly.view.dragging.shown import Shown
 from assembly.view.item import FIELD_OF_VIEW, Stations
 from assembly.view.mesh import body_mesh
 from assembly.view.picture import DIRECTION, body_colors
@@ -36,6 +37,8 @@ Array = NDArray[np.float64]
 RATE = 60.0
 # Most balls that stand for contacts.
 MOST_CONTACTS = 40
+# Most hands whose force is said.
+MOST_HANDS = 8
 # The radius of the scene in the page: browsers compute with single precision.
 RADIUS = 1.0
 
@@ -166,8 +169,8 @@ class Live:
         self._turned: Body | None = None
         self._gizmo = scene.add_transform_controls("/gizmo", 0.25 * RADIUS, depth_test=False, visible=False)
         self._gizmo.on_update(self._turn)
-        self._arrow = scene.add_arrows("/hand", np.zeros((1, 2, 3)), (40, 43, 51), visible=False)
-        self._figure = scene.add_label("/force", "", visible=False)
+        self._arrow = scene.add_arrows("/hands", np.zeros((1, 2, 3)), (40, 43, 51), visible=False)
+        self._forces = [scene.add_label(f"/forces/{k}", "", visible=False) for k in range(MOST_HANDS)]
         server.on_client_disconnect(lambda client: self._session.ask(partial(self._session.release, client.client_id)))
 
     def _dragged(self, body: Body, event: SceneNodeDragEvent[Any]) -> None:
@@ -221,14 +224,18 @@ class Live:
                 ball.visible = k < len(shown.contacts)
                 if ball.visible:
                     ball.position = self._frame.there(shown.contacts[k][0])
-            if self._turned is not None and shown.holder is None:
+            if self._turned is not None and self._turned.name not in [hand.body for hand in shown.hands]:
                 row = shown.q[list(self._nodes).index(self._turned)]
                 self._gizmo.position, self._gizmo.wxyz = self._frame.there(row[:3]), row[3:]
-            self._arrow.visible = self._figure.visible = shown.holder is not None
-            if shown.holder is not None:
-                ends = self._frame.there([shown.point, shown.target])
-                self._arrow.points = ends[None].astype(np.float32)
-                self._figure.position, self._figure.text = ends[1], f"{np.linalg.norm(shown.force):.3g}"
+            self._arrow.visible = bool(shown.hands)
+            if shown.hands:
+                ends = self._frame.there([[hand.point, hand.target] for hand in shown.hands])
+                self._arrow.points = ends.astype(np.float32)
+            for k, label in enumerate(self._forces):
+                label.visible = k < len(shown.hands)
+                if label.visible:
+                    hand = shown.hands[k]
+                    label.position, label.text = self._frame.there(hand.target), f"{np.linalg.norm(hand.force):.3g}"
 
 
 def _meshes(scene: Assembly, q: Array) -> tuple[_Frame, list[tuple[Array, NDArray[np.int64]]]]:

@@ -46,6 +46,11 @@ class Pointer:
         """Where the last message has it."""
         return self._to
 
+    @property
+    def since(self) -> float:
+        """When the last message came."""
+        return self._since
+
     def move(self, target: Array | Pose, now: float) -> bool:
         """Take a message; False, and nothing taken, where its target is not of finite numbers."""
         row = np.asarray(target.q if isinstance(target, Pose) else target, dtype=np.float64)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from queue import Empty, SimpleQueue
 from time import perf_counter
 from typing import NamedTuple
@@ -17,17 +17,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly._read_only import ReadOnlyArrays
 from assembly.assembly import Assembly
-from assembly.errors import AssemblyError, InputError, positive
-from assembly.kinematics.body import Frame, Point
+from assembly.errors import AssemblyError, InputError, number, positive
+from assembly.kinematics.body import Body, Point
 from assembly.kinematics.pose import Pose
 from assembly.solve.solution import Solution
-from assembly.tracking.tick import Step
+from assembly.tracking.tick import Step, TrackStatus
 from assembly.tracking.trace import Trace
 from assembly.tracking.tracker import Tracker
-from assembly.view.dragging.joint_values import set_value
+from assembly.view.dragging.grips import Coordinate, Grip, coordinate_of
+from assembly.view.dragging.joint_values import freedoms_of, set_value
 from assembly.view.dragging.pointer import Pointer
+from assembly.view.dragging.shown import Held, Shown
 
 __all__ = ["Session", "Shown"]
 
@@ -37,66 +38,23 @@ log = logging.getLogger("assembly.view")
 MOST_UNDONE = 100
 # Seconds between looks at contacts, which take longer than a tick.
 CONTACTS_EVERY = 0.05
-
-
-def _origin() -> Array:
-    return np.zeros(3)
-
-
-@dataclass(frozen=True, eq=False)
-class Shown(ReadOnlyArrays):
-    """What there is to show.
-
-    Attributes
-    ----------
-    q : (n, 7)
-    status : str
-        In words.
-    holder : int or None
-        The browser that drags; None while nobody does.
-    held : str
-        Name of the body that is dragged, or "".
-    point, target : (3,)
-        Of the hand: where it holds the body, and where the mouse is.
-    force : (3,)
-        On the hand, by the tracker's stiffness.
-    violation : float
-        In the scene's unit.
-    seconds : float
-        Of the last tick, or of the last solve.
-    contacts : tuple of ((3,), (3,))
-        Points and normals of contacts.
-    values : dict of str -> float
-        Coordinates of joints by their names, those of some tenths of a second ago at most.
-    ticks : int
-        Since the beginning.
-    """
-
-    q: Array
-    status: str = "nothing is held"
-    holder: int | None = None
-    held: str = ""
-    point: Array = field(default_factory=_origin)
-    target: Array = field(default_factory=_origin)
-    force: Array = field(default_factory=_origin)
-    violation: float = 0.0
-    seconds: float = 0.0
-    contacts: tuple[tuple[Array, Array], ...] = ()
-    values: Mapping[str, float] = field(default_factory=dict)
-    ticks: int = 0
+# Seconds for which somebody reads what was refused, and after which a slider that says nothing more lets go.
+NOTICED, SLIDER_LEFT = 3.0, 0.6
 
 
 class _Record(NamedTuple):
-    """A tick that was recorded: when, toward where, at which poses, and in which drag."""
+    """A tick that was recorded: when, toward where each drag drew, and at which poses."""
 
     time: float
-    target: Array
+    targets: Mapping[int, Array]
     q: Array
-    drag: int
 
 
 class Session(threading.Thread):
     """Runs a scene that is dragged.
+
+    One tracker has a hand on every body, and those of bodies that nobody holds draw nothing: so to take hold is to
+    write some numbers, and several people drag at once.
 
     Parameters
     ----------
@@ -132,9 +90,12 @@ class Session(threading.Thread):
         self._start = first.q
         self._calls: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._tracker: Tracker | None = None
-        self._follow: Point | Frame | None = None
+        # Bodies that move, in the order of the tracker's hands.
+        self._movable = [body for body in scene.bodies if not body.fixed]
+        self._grips: list[Grip] = []
         self._drags = 0
-        self._pointer: Pointer | None = None
+        # Until when what somebody was refused is said.
+        self._noticed = 0.0
         self._undone: list[Array] = []
         self._records: list[_Record] | None = None
         self._recorded: list[_Record] = []
@@ -154,78 +115,142 @@ class Session(threading.Thread):
 
     def run(self) -> None:
         """Take calls and ticks until `stop`; sleep while nothing is held or played and nothing is asked for."""
+        if self._movable:
+            # Whoever takes hold first need not wait for it.
+            self._attempt(self._ready)
         due = perf_counter()
         while True:
-            idle = self._tracker is None and self._frames is None
+            idle = not self._grips and self._frames is None
             wait = None if idle else max(0.0, due - perf_counter())
             try:
                 call = self._calls.get(timeout=wait) if wait is None or wait > 0.0 else self._calls.get_nowait()
             except Empty:
                 # Late ticks are not made up for: the hand is where it is now.
                 due = max(due + self._period, perf_counter())
-                if self._tracker is not None:
+                if self._grips:
                     self._tick()
                 else:
                     self._show_frame()
                 continue
             if call is None:
                 return
-            try:
-                call()
-            except AssemblyError as error:
-                self.shown = replace(self.shown, status=str(error))
-            except Exception:
-                # A fault of one call must not end the picture for everybody.
-                log.exception("a call of the page failed")
-                self.shown = replace(self.shown, status="this failed; the log says how")
+            self._attempt(call)
+
+    def _attempt(self, call: Callable[[], object]) -> None:
+        """Make a call; what it raises is said."""
+        try:
+            call()
+        except AssemblyError as error:
+            self._say(str(error))
+        except Exception:
+            # A fault of one call must not end the picture for everybody.
+            log.exception("a call of the page failed")
+            self._say("this failed; the log says how")
+
+    def _say(self, text: str) -> None:
+        """Have something read for a while, though ticks have their own words."""
+        self._noticed = perf_counter() + NOTICED
+        self.shown = replace(self.shown, status=text, notice=text)
+
+    def _ready(self) -> Tracker:
+        """The tracker, at the poses that are shown."""
+        q = self.shown.q
+        if self._tracker is None:
+            self._tracker = self.scene.tracker(self._movable, q0=q, stiffness=self._stiffness)
+            for hand in range(len(self._movable)):
+                self._tracker.hold(hand, None)
+        elif not np.array_equal(self._tracker.q, q):
+            self._tracker.restart(q)
+        return self._tracker
 
     def grab(self, name: str, at: Array | None, client: int) -> None:
         """Begin to drag a body, at a point (3,) of the world or, without one, by its frame."""
-        if self.shown.holder not in (None, client):
-            self.shown = replace(self.shown, status=f"{self.shown.held} is held in another window")
-            return
         body, q = self.scene.body(name), self.shown.q
-        if body.fixed:
-            self.shown = replace(self.shown, status=f"{name} is fixed")
-            return
         row = q[self.scene.bodies.index(body)]
         pose = Pose(row[:3], row[3:])
-        follow = body.frame() if at is None else body.point(*pose.inverse().apply(at))
+        follow = body if at is None else body.point(*pose.inverse().apply(at))
+        start = row.copy() if at is None else np.array(at, dtype=np.float64)
+        self._hold(body, follow, start, client)
+
+    def slide(self, name: str, value: float, client: int) -> None:
+        """Drag a joint's coordinate ("hinge.angle") to a value; one that no hand can drag is driven for one solve."""
+        wanted = np.array([number("value", value)])
+        grip = next((each for each in self._grips if each.client == client), None)
+        if grip is not None and grip.coordinate is not None and grip.coordinate.name == name:
+            grip.pointer.move(wanted, perf_counter())
+            return
+        freedom = freedoms_of(self.scene).get(name)
+        coordinate = None if freedom is None else coordinate_of(self.scene, name, freedom)
+        if coordinate is None:
+            self.set_value(name, value)
+            return
+        coordinate.begin_at(self.shown.values.get(name, 0.0))
+        start = np.array([coordinate.value(self.shown.q)])
+        held = self._hold(coordinate.body, coordinate.body, start, client, coordinate)
+        if held is not None:
+            held.pointer.move(wanted, perf_counter())
+
+    def _hold(
+        self, body: Body, follow: Point | Body, start: Array, client: int, coordinate: Coordinate | None = None
+    ) -> Grip | None:
+        """Begin a drag; None where it cannot be, and why is said."""
+        if body.fixed:
+            self._say(f"{body.name} is fixed")
+            return None
+        other = next((each for each in self._grips if each.body is body and each.client != client), None)
+        if other is not None:
+            self._say(f"{body.name} is held in another window, that of browser {other.client}")
+            return None
+        self.release(client)
         # It may raise: nothing is taken then.
-        tracker = self.scene.tracker(follow, q0=q, stiffness=self._stiffness)
+        tracker = self._ready()
+        hand = self._movable.index(body)
+        tracker.hold(hand, follow, self._stiffness)
         self._remember()
         self._frames = None
-        self._follow, self._tracker = follow, tracker
         self._drags += 1
-        start = row.copy() if at is None else np.array(at, dtype=np.float64)
-        self._pointer = Pointer(start, perf_counter())
-        place = start[:3]
-        self.shown = replace(self.shown, holder=client, held=name, point=place, target=place)
+        grip = Grip(client, hand, follow, Pointer(start, perf_counter()), self._drags, coordinate)
+        self._grips.append(grip)
+        place = grip.point(self.shown.q[self.scene.bodies.index(body)])
+        held = Held(client, body.name, place, place, by="" if coordinate is None else coordinate.name)
+        self.shown = replace(self.shown, hands=(*self.shown.hands, held))
+        return grip
 
     def move(self, target: Array, client: int) -> None:
         """Where the mouse is: a point (3,), or a pose (7,) of a body that is held by its frame."""
-        if self._pointer is None or client != self.shown.holder:
-            return
-        if not self._pointer.move(target, perf_counter()):
-            self.shown = replace(self.shown, status="the target is not of finite numbers; it was left out")
+        grip = next((each for each in self._grips if each.client == client and each.coordinate is None), None)
+        if grip is not None and not grip.pointer.move(target, perf_counter()):
+            self._say("the target is not of finite numbers; it was left out")
 
     def release(self, client: int) -> None:
-        """Let go, if it is this browser that holds; one that is gone lets go as well."""
-        if client == self.shown.holder:
-            self._tracker = self._pointer = None
-            self.shown = replace(self.shown, holder=None, held="", force=np.zeros(3), status="nothing is held")
+        """Let go of what this browser holds; one that is gone lets go as well."""
+        gone = [grip for grip in self._grips if grip.client == client]
+        if not gone:
+            return
+        assert self._tracker is not None
+        for grip in gone:
+            self._tracker.hold(grip.hand, None)
+        self._grips = [grip for grip in self._grips if grip.client != client]
+        hands = tuple(hand for hand in self.shown.hands if hand.client != client)
+        self.shown = replace(self.shown, hands=hands, status=self.shown.status if hands else "nothing is held")
 
     def _tick(self) -> None:
-        assert self._tracker is not None and self._pointer is not None
-        now = perf_counter()
-        target = self._pointer.at(now)
-        step = self._tracker.step(target)
+        assert self._tracker is not None
+        now, q = perf_counter(), self.shown.q
+        targets: list[Array | None] = [None] * len(self._movable)
+        for grip in self._grips:
+            targets[grip.hand] = grip.target(now, q)
+        step = self._tracker.step(targets)
+        if step.status is TrackStatus.CHANGED:
+            # The next grab makes another one.
+            for client in {grip.client for grip in self._grips}:
+                self.release(client)
+            self._tracker = None
+            self._say(step.status.value)
+            return
+        drawn = {grip.drag: targets[grip.hand] for grip in self._grips}
         if self._records is not None:
-            self._records.append(_Record(now, target, step.q, self._drags))
-        follow = self._follow
-        assert follow is not None
-        row = step.q[self.scene.bodies.index(follow.body)]
-        place = Pose(row[:3], row[3:]).apply(getattr(follow, "coordinates", np.zeros(3)))
+            self._records.append(_Record(now, {k: row for k, row in drawn.items() if row is not None}, step.q))
         contacts, values = self.shown.contacts, self.shown.values
         if now - self._looked > CONTACTS_EVERY:
             self._looked, contacts, values = now, _contacts(step.solution), step.solution.values
@@ -233,15 +258,24 @@ class Session(threading.Thread):
             self.shown,
             q=step.q,
             status=_words(step),
-            point=place,
-            target=target[:3],
-            force=step.force,
+            hands=tuple(self._held(grip, targets[grip.hand], step) for grip in self._grips),
+            notice=self.shown.notice if now < self._noticed else "",
             violation=step.feasibility,
             seconds=step.seconds,
             contacts=contacts,
             values=values,
             ticks=self.shown.ticks + 1,
         )
+        # Sliders do not say when they are let go.
+        for grip in [each for each in self._grips if each.coordinate is not None]:
+            if now - grip.pointer.since > SLIDER_LEFT:
+                self.release(grip.client)
+
+    def _held(self, grip: Grip, target: Array | None, step: Step) -> Held:
+        assert target is not None
+        place = grip.point(step.q[self.scene.bodies.index(grip.body)])
+        by = "" if grip.coordinate is None else grip.coordinate.name
+        return Held(grip.client, grip.body.name, place, target[:3], step.forces[grip.hand], by)
 
     def _remember(self) -> None:
         self._undone = [*self._undone, self.shown.q][-MOST_UNDONE:]
@@ -257,12 +291,12 @@ class Session(threading.Thread):
 
     def solve(self) -> None:
         """Solve the scene, its objectives among it, from where the bodies are."""
-        if self._tracker is None:
+        if not self._grips:
             self._stand(self.scene.solve(self.shown.q))
 
     def set_value(self, name: str, value: float) -> None:
         """Have a joint's coordinate ("hinge.angle") at a value, from where the bodies are."""
-        if self._tracker is None:
+        if not self._grips:
             self._stand(set_value(self.scene, name, value, self.shown.q))
 
     def say_mobility(self) -> None:
@@ -271,13 +305,13 @@ class Session(threading.Thread):
 
     def undo(self) -> None:
         """Go back to where the bodies were before the last drag, solve or value."""
-        if self._tracker is None and self._undone:
+        if not self._grips and self._undone:
             *self._undone, q = self._undone
             self._go_back(q, "gone back by one")
 
     def reset(self) -> None:
         """Go to where it all began."""
-        if self._tracker is None:
+        if not self._grips:
             self._remember()
             self._go_back(self._start, "back at the start")
 
@@ -294,7 +328,7 @@ class Session(threading.Thread):
 
     def play(self, on: bool) -> None:
         """Show what was recorded, tick by tick, from its beginning; or stop there."""
-        if self._tracker is None:
+        if not self._grips:
             _, poses = self.recorded
             self._frames = iter(poses) if on and len(poses) else None
 
@@ -317,7 +351,7 @@ class Session(threading.Thread):
 
     @property
     def trace(self) -> Trace:
-        """The hand's motion in the drag that was recorded last.
+        """The hand's motion in the drag that was recorded last; of several at once the one that began last.
 
         Raises
         ------
@@ -327,11 +361,12 @@ class Session(threading.Thread):
         rows = self._recorded if self._records is None else self._records
         if len(rows) < 2:
             raise InputError(f"{len(rows)} ticks were recorded; expected two at least")
-        kept = [row for row in rows if row.drag == rows[-1].drag]
+        last = max(rows[-1].targets)
+        kept = [row for row in rows if last in row.targets]
         if len(kept) < 2:
             raise InputError("1 tick of the last drag was recorded; expected two at least")
         times = np.array([row.time for row in kept])
-        return Trace(times - times[0], np.array([row.target for row in kept]))
+        return Trace(times - times[0], np.array([row.targets[last] for row in kept]))
 
 
 def _contacts(solution: Solution) -> tuple[tuple[Array, Array], ...]:

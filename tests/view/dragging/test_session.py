@@ -59,7 +59,8 @@ def test_a_body_is_dragged_and_put_back(ball):
     begin = session.shown.q
     for k in range(1, 60):
         session.move(np.array([0.01 * k, 0.0, 1.0]), 1)
-        session._pointer.at = lambda now, pointer=session._pointer: pointer.target
+        (grip,) = session._grips
+        grip.pointer.at = lambda now, pointer=grip.pointer: pointer.target
         session._tick()
     assert session.shown.q[1, 0] > 0.4
     # The ball stays on the floor to the tolerance of ticks.
@@ -79,9 +80,9 @@ def test_what_cannot_be_taken_is_said(ball):
     assert session.shown.status == "floor is fixed" and session.shown.holder is None
     session.grab("ball", np.array([0.0, 0.0, 1.0]), 1)
     session.grab("ball", np.array([0.0, 0.0, 1.0]), 2)
-    assert session.shown.status == "ball is held in another window" and session.shown.holder == 1
+    assert session.shown.status == "ball is held in another window, that of browser 1" and session.shown.holder == 1
     session.move(np.full(3, np.nan), 1)
-    assert "not of finite numbers" in session.shown.status
+    assert "not of finite numbers" in session.shown.notice
     session._tick()
     assert np.isfinite(session.shown.q).all() and session.shown.violation < 1e-11
 
@@ -91,7 +92,7 @@ def test_a_frame_is_turned(ball):
     session.grab("ball", None, 1)
     target = asm.Pose.from_axis_angle((0, 0, 1), 0.3, (0.1, 0.0, 0.5)).q
     session.move(target, 1)
-    session._pointer.at = lambda now: target
+    session._grips[0].pointer.at = lambda now: target
     for _ in range(30):
         session._tick()
     assert np.abs(session.shown.q[1] - target).max() < 1e-6
@@ -195,3 +196,111 @@ def test_a_start_that_does_not_hold_is_refused():
     scene.constrain(asm.Fixed(ground.frame(), arm.frame()), asm.Fixed(ground.frame((1, 0, 0)), arm.frame(), name="b"))
     with pytest.raises(asm.errors.InputError, match="q0 is a start that leads to no pose"):
         Session(scene)
+
+
+@pytest.fixture
+def pair():
+    """Two balls on a floor."""
+    floor = asm.Body("floor", asm.shapes.plane(4.0, 4.0), fixed=True)
+    red, blue = (asm.Body(n, asm.shapes.sphere(0.5), position=(x, 0.0, 0.5)) for n, x in (("red", -1.0), ("blue", 1.0)))
+    scene = asm.Assembly([floor, red, blue])
+    scene.constrain(asm.Contact(floor, red), asm.Contact(floor, blue))
+    return scene
+
+
+def test_two_people_drag_two_bodies_at_once(pair):
+    session = Session(pair)
+    session.grab("red", np.array([-1.0, 0.0, 1.0]), 1)
+    session.grab("blue", np.array([1.0, 0.0, 1.0]), 2)
+    tracker = session._tracker
+    for grip, goal in zip(session._grips, ((-1.0, 0.6, 1.0), (1.0, -0.4, 1.0)), strict=True):
+        session.move(np.array(goal), grip.client)
+        grip.pointer.at = lambda now, goal=np.array(goal): goal
+    for _ in range(60):
+        session._tick()
+    q, shown = session.shown.q, session.shown
+    held = [asm.Pose(row[:3], row[3:]).apply((0.0, 0.0, 0.5)) for row in q[1:]]
+    # Both hands have what they hold where they are, on the floor to the tolerance of ticks.
+    assert np.abs(np.array(held) - [(-1.0, 0.6, 1.0), (1.0, -0.4, 1.0)]).max() < 1e-6
+    assert np.abs(q[1:, 2] - 0.5).max() < 1e-11
+    assert shown.who == "red (browser 1), blue (browser 2)" and len(shown.hands) == 2
+    session.grab("red", np.array([-1.0, 0.6, 1.0]), 2)
+    assert "red is held in another window, that of browser 1" == session.shown.notice
+    session._tick()
+    # It is still read while ticks have their own words.
+    assert session.shown.notice.startswith("red is held") and session.shown.status != session.shown.notice
+    session.release(1)
+    # What nobody holds any more stays, and the other one goes on.
+    still = session.shown.q[1]
+    session._grips[0].pointer.at = lambda now: np.array([1.5, -0.4, 1.0])
+    for _ in range(30):
+        session._tick()
+    assert np.abs(session.shown.q[1] - still).max() < 1e-13 and session.shown.q[2, 0] > 1.3
+    session.release(2)
+    session.grab("red", np.array(still[:3]), 1)
+    assert session._tracker is tracker, "one tracker for all"
+
+
+def test_a_slider_is_a_hand(crank):
+    session = Session(crank)
+    for wanted in (0.8, 1.4):
+        session.slide("hinge.angle", wanted, 3)
+        (grip,) = session._grips
+        grip.pointer.at = lambda now, wanted=wanted: np.array([wanted])
+        for _ in range(25):
+            session._tick()
+        row = session.shown.q[1]
+        assert 2.0 * np.arctan2(row[6], row[3]) == pytest.approx(wanted, abs=1e-6)
+        assert session.shown.who == "arm by hinge.angle (browser 3)" and session.shown.violation < 1e-12
+    # It stops at the limit, which a tracker holds; and lets go when nothing more is said.
+    session.slide("hinge.angle", 3.0, 3)
+    grip.pointer.at = lambda now: np.array([3.0])
+    for _ in range(40):
+        session._tick()
+    assert session.shown.values["hinge.angle"] == pytest.approx(2.0, abs=1e-9)
+    grip.pointer._since -= 10.0
+    session._tick()
+    assert not session._grips and session.shown.status == "nothing is held"
+    with pytest.raises(asm.errors.InputError, match="value is nan"):
+        session.slide("hinge.angle", float("nan"), 3)
+    with pytest.raises(asm.errors.InputError, match="expected one of 'hinge.angle'"):
+        session.slide("hinge.turn", 0.0, 3)
+    # One that has a value is driven to another one.
+    crank.constraint("hinge").angle = 0.5
+    session = Session(crank)
+    session.slide("hinge.angle", 0.75, 3)
+    assert not session._grips and session.shown.values["hinge.angle"] == pytest.approx(0.75, abs=1e-12)
+
+
+@pytest.mark.parametrize("first", [False, True])
+def test_a_way_is_dragged_from_either_side(first):
+    """Of a joint whose second body stands still the first one is moved."""
+    rail, cart = asm.Body("rail", fixed=True), asm.Body("cart")
+    scene = asm.Assembly([rail, cart])
+    frames = (cart.frame((0.0, 0.3, 0.0)), rail.frame()) if first else (rail.frame(), cart.frame((0.0, 0.3, 0.0)))
+    scene.constrain(asm.Cylindrical(*frames, name="slide"))
+    session = Session(scene)
+    for name, wanted in (("slide.slide", 0.7), ("slide.angle", -2.5)):
+        session.slide(name, wanted, 1)
+        session._grips[0].pointer.at = lambda now, wanted=wanted: np.array([wanted])
+        for _ in range(40):
+            session._tick()
+        session.release(1)
+        assert scene.solve(session.shown.q, max_iterations=0).values[name] == pytest.approx(wanted, abs=1e-6)
+    # What was dragged first stayed: a hand that turns is at the place where the body was a tick ago.
+    assert scene.solve(session.shown.q, max_iterations=0).values["slide.slide"] == pytest.approx(0.7, abs=1e-5)
+
+
+def test_a_grab_after_undo_goes_on_from_there(ball):
+    session = Session(ball)
+    session.grab("ball", np.array([0.0, 0.0, 1.0]), 1)
+    session._grips[0].pointer.at = lambda now: np.array([0.5, 0.0, 1.0])
+    for _ in range(20):
+        session._tick()
+    session.release(1)
+    session.undo()
+    begin = session.shown.q
+    session.grab("ball", np.array([0.0, 0.5, 0.5]), 1)
+    session._tick()
+    # At rest where it was taken.
+    assert np.abs(session.shown.q - begin).max() < 1e-9
