@@ -204,13 +204,17 @@ class Tracker(InOneProcess):
             self._settings[BUDGET] = 1e9 * positive("budget", budget)
             if self._packed.table[CLOCK_AT] == 0:
                 raise InputError("budget is given, but this interpreter has no clock for compiled code; expected None")
-        self._begun = first.status
-        self._set_up(first._state)
-        proves = self._packed.keeps_apart and can_prove(self._packed)
-        self._clear = ClearTicks(first, touching * self._packed.scale) if proves else None
+        self._begin_at(first)
         # The loop holds rows to this, or to what rounding of coordinates alone can violate.
         far = float(np.abs(poses[:, :3]).max()) / self._packed.scale
         self._tolerance = 1.25 * max(limit, ROUNDING * far) * self._packed.scale
+
+    def _begin_at(self, first: Solution) -> None:
+        """Have ticks go on from a solution of the packed scene."""
+        packed, self._begun = self._packed, first.status
+        self._set_up(first._state)
+        proves = packed.keeps_apart and can_prove(packed)
+        self._clear = ClearTicks(first, self._touching * packed.scale) if proves else None
 
     def _set_up(self, begin: Array) -> None:
         """What ticks work in, and what they read and write directly; they go on from a state of the packed scene."""
@@ -335,7 +339,7 @@ class Tracker(InOneProcess):
         self._scene = self._inner._scene
         self._edits, self._numbers = changes(), self._told()
         self._settings[RADIUS] = self._radius
-        self._set_up(first)
+        self._begin_at(first)
         self._hands.take_targets(first.q)
 
     @property
