@@ -84,7 +84,8 @@ class ClearanceProof:
         self._begun = np.zeros(len(self.pairs), dtype=bool)
         # Columns: to ask records for them by name takes longer than a tick.
         self._turn, self._shift = self.fronts.pair.turn, self.fronts.pair.shift
-        self._way_depth = self.fronts.pair.way_depth
+        self._way_depth, self._slimmer = self.fronts.pair.way_depth, self.fronts.pair.slimmer
+        self._of_wires = np.array([self.is_of_wires(k) for k in range(len(self.pairs))], dtype=bool)
         # What opened contacts at the last look of a solve.
         self.moves = np.zeros((len(self.pairs), 6))
         # Poses of the last looks, where all pairs had them at the same ones.
@@ -166,10 +167,11 @@ class ClearanceProof:
         return True
 
     def make_slimmer(self, depth: float) -> None:
-        """From now on wires may be in each other by a depth, and on ways by the square of their length as well."""
-        if (self.fronts.pair.slimmer != depth).any():
-            self.fronts.pair.slimmer = depth
-            self._begun[:] = False
+        """From now on two wires may be in each other by a depth, and on ways by the square of their length as well."""
+        asked = np.where(self._of_wires, depth, 0.0)
+        if not np.array_equal(self._slimmer, asked):
+            self._begun[self._slimmer != asked] = False
+            self._slimmer[:] = asked
             self.forget_poses()
 
     def way_depth(self) -> float:
