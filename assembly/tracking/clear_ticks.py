@@ -38,12 +38,19 @@ class _Standing:
         self.solution = solution
         self.q = solution.q
         self._near: dict[int, Contacts] | None = None
+        self._ways: dict[int, float] = {}
 
     def near(self, proof: ClearanceProof) -> dict[int, Contacts]:
         """The contacts that are near, by the number of their pair."""
         if self._near is None:
             self._near = near_contacts(self.solution, proof, NEAR * max(map(proof.size, range(len(proof.pairs)))))
         return self._near
+
+    def way_length(self, proof: ClearanceProof, k: int, before: Array) -> float:
+        """How far points of the second body of pair k went from the poses (n, 7) of the last tick, at most."""
+        if k not in self._ways:
+            self._ways[k] = proof.way_length(k, before, self.q)
+        return self._ways[k]
 
     def opened(self, proof: ClearanceProof, k: int, depth: float) -> Array:
         """The least move (6) of the second body of pair k, by no more than a depth, that opens its contacts."""
@@ -129,7 +136,8 @@ class ClearTicks:
         # Where a long way may not go in by its square, one along flat faces still may do.
         rolling = [k for k in rolling if self._may_go_in(k, there, OPENED[0])]
         others = [k for k in range(len(proof.pairs)) if k not in rolling]
-        for k, answer in zip(others, proof.look(there.q, touching, moves, others, swept=True), strict=True):
+        looked = proof.look(there.q, touching, moves, others, swept=True) if others else []
+        for k, answer in zip(others, looked, strict=True):
             answers[k] = answer
             if not is_proven(answer):
                 rolling.append(k)
@@ -162,7 +170,7 @@ class ClearTicks:
             and not (
                 answer.verdict is Verdict.UNDECIDED
                 and conforms(proof, k, q, self._touching)
-                and proof.way_length(k, self._at.q, q) <= self._limits.sampled * proof.size(k)
+                and there.way_length(proof, k, self._at.q) <= self._limits.sampled * proof.size(k)
             )
         }
 
@@ -171,7 +179,7 @@ class ClearTicks:
         proof, q = self._proof, self._at.q
         found = []
         for k in np.flatnonzero(self._moves.any(axis=1)).tolist():
-            way = proof.way_length(k, q, there.q)
+            way = there.way_length(proof, k, q)
             if ROLLED * way * way > SLIGHTLY * self._touching * proof.radius(k):
                 found.append(k)
         return found
@@ -182,7 +190,7 @@ class ClearTicks:
 
     def _roll_depth(self, k: int, there: _Standing, part: float) -> float:
         """A part of what the way of pair k may go in if it touches all along."""
-        way = self._proof.way_length(k, self._at.q, there.q)
+        way = there.way_length(self._proof, k, self._at.q)
         return max(part * ROLLED * way * way / self._proof.radius(k), ROOM * self._proof.size(k))
 
     def _rolled(self, there: _Standing, moves: Array, which: list[int], part: float) -> list[Answer]:
@@ -196,6 +204,6 @@ class ClearTicks:
                 move = standing.opened(proof, k, depth)
                 if move.any():
                     opened[k] = move
-        proof.look(begin.q, self._touching, before, which=which, swept=True)
-        proof.look(there.q, self._touching, after, which=which, swept=True)
+        proof.go_along(begin.q, self._touching, before, which)
+        proof.go_along(there.q, self._touching, after, which)
         return proof.look(there.q, self._touching, moves, which=which, swept=True)
