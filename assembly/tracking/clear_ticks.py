@@ -55,6 +55,7 @@ class _Standing:
         self.q = solution.q
         self._relative: dict[int, tuple[Array, Array]] = {}
         self._near: dict[int, Contacts] | None = None
+        self._ways: dict[int, float] = {}
 
     def near(self, proof: ClearanceProof) -> dict[int, Contacts]:
         """The contacts that are near, by the number of their pair."""
@@ -77,6 +78,12 @@ class _Standing:
         first = packed.contacts_at + TRACK * len(packed.contacts)
         tracked = state[first:][: TRACK * packed.clearance_rows].reshape(-1, TRACK)
         return _Listed(slots[:, PLACE_PAIR], slots[:, PLACE_NUMBER], tracked[:, NORMAL])
+
+    def way_length(self, proof: ClearanceProof, k: int, before: Array) -> float:
+        """How far points of the second body of pair k went from the poses (n, 7) of the last tick, at most."""
+        if k not in self._ways:
+            self._ways[k] = proof.way_length(k, before, self.q)
+        return self._ways[k]
 
     def opened(self, proof: ClearanceProof, k: int, depth: float) -> Array:
         """The least move (6) of the second body of pair k, by no more than a depth, that opens its contacts."""
@@ -237,7 +244,7 @@ class ClearTicks:
             and not (
                 answer.verdict is Verdict.UNDECIDED
                 and conforms(proof, k, q, self._touching)
-                and proof.way_length(k, self._at.q, q) <= self._limits.sampled * proof.size(k)
+                and there.way_length(proof, k, self._at.q) <= self._limits.sampled * proof.size(k)
             )
         }
 
@@ -246,7 +253,7 @@ class ClearTicks:
         proof, begin = self._proof, self._at
         found = []
         for k in self._opened:
-            way = proof.length_between(k, begin.relative(proof, k), there.relative(proof, k))
+            way = there.way_length(proof, k, begin.q)
             most = SLIGHTLY * self._touching / ROLLED
             if way * way > most * proof.radius(k) and self._turns(k, there, most / way):
                 found.append(k)
@@ -278,7 +285,7 @@ class ClearTicks:
 
     def _roll_depth(self, k: int, there: _Standing, part: float) -> float:
         """A part of what the way of pair k may go in if it touches all along."""
-        way = self._proof.way_length(k, self._at.q, there.q)
+        way = there.way_length(self._proof, k, self._at.q)
         return max(part * ROLLED * way * way / self._proof.radius(k), ROOM * self._proof.size(k))
 
     def _rolled(self, there: _Standing, moves: Array, which: list[int], part: float) -> list[Answer]:
@@ -292,6 +299,6 @@ class ClearTicks:
                 move = standing.opened(proof, k, depth)
                 if move.any():
                     opened[k] = move
-        proof.look(begin.q, self._touching, before, which=which, swept=True)
-        proof.look(there.q, self._touching, after, which=which, swept=True)
+        proof.go_along(begin.q, self._touching, before, which)
+        proof.go_along(there.q, self._touching, after, which)
         return proof.look(there.q, self._touching, moves, which=which, swept=True)

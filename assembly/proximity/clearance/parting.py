@@ -83,9 +83,6 @@ def least_change(rates: Array, asked: Array) -> Array | None:
     if asked.max() <= 0.0:
         return np.zeros(rates.shape[1])
     unit = float(asked.max())
-    if len(asked) == 1:
-        (only,) = rates
-        return np.asarray(only * (unit / float(only @ only)))
     design = np.vstack([rates.T, asked / unit])
     goal = np.zeros(len(design))
     goal[-1] = 1.0

@@ -118,9 +118,24 @@ class ClearanceProof:
         budget : int, optional
             Of each pair, the pairs of nodes after which it stays undecided, where that is not to be the usual number.
         """
-        self._forget()
         rows = list(range(len(self.pairs)) if which is None else which)
         moved = np.zeros((len(self.pairs), 6)) if moves is None else np.ascontiguousarray(moves, dtype=float)
+        tasks = self._looked(q, touching, moved, rows, swept, budget)
+        return [self._answer(k, q, moved[k], tasks[k] >= ON_WAY) for k in rows]
+
+    def go_along(self, q: Array, touching: float, moves: Array, which: Sequence[int]) -> None:
+        """As `look` with `swept`, of which nobody asks what is proven: the next look goes on from there."""
+        tasks = self._looked(q, touching, moves, which, True, None)
+        for k in which:
+            # Of a pair that is clear all the way nothing is left to be found out.
+            if tasks[k] < ON_WAY or self._codes[k] != CLEAR:
+                self._answer(k, q, moves[k], tasks[k] >= ON_WAY)
+
+    def _looked(
+        self, q: Array, touching: float, moves: Array, rows: Sequence[int], swept: bool, budget: int | None
+    ) -> list[int]:
+        """Look at some pairs; what was asked of each."""
+        self._forget()
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         counts, pair = self.fronts.counts, self.fronts.pair
         grown = counts.count > GROWN * counts.fresh + MANY
@@ -128,14 +143,15 @@ class ClearanceProof:
         if swept:
             asked = np.where(pair.known == 1.0, np.where(grown, ON_WAY_ANEW, ON_WAY), asked)
         tasks[rows] = asked[rows]
-        self._run(q, touching, moved, tasks, budget)
+        self._run(q, touching, moves, tasks, budget)
         self._begun[rows] = True
         at = q.tobytes()
         if len(rows) == len(self.pairs):
             self._at = at
         elif self._at != at:
             self._at = None
-        return [self._answer(k, q, moved[k], bool(tasks[k] >= ON_WAY)) for k in rows]
+        told: list[int] = tasks.tolist()
+        return told
 
     def stays_clear(
         self, q: Array, touching: float, moves: Array, budget: int | None = None, at_once: bool = False

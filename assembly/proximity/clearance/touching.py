@@ -241,9 +241,13 @@ def move_apart(proof: ClearanceProof, k: int, q: Array, contacts: Contacts, touc
     if len(normals) > GUIDES:
         few = normals[np.linspace(0, len(normals) - 1, GUIDES).astype(int)]
     guides[: len(few)] = few @ rotation_of(q[proof.pairs[k][0], 3:])
+    arms = places - row[:3] - arm
     for part in OPENED if touching > 0.0 else ():
         # Contacts between which a body is wedged open by less than it is moved.
-        move = least_move(normals, places - row[:3] - arm, part * touching - gaps, radius)
+        if len(gaps) == 1:
+            move = _off_one(normals[0].tolist(), arms[0].tolist(), part * touching - float(gaps[0]), radius)
+        else:
+            move = least_move(normals, arms, part * touching - gaps, radius)
         if move is None:
             return None
         if hypot(*move[:3].tolist()) + radius * hypot(*move[3:].tolist()) <= touching:
@@ -255,6 +259,17 @@ def move_apart(proof: ClearanceProof, k: int, q: Array, contacts: Contacts, touc
         (x, y, z), (u, v, w) = arm.tolist(), move[3:].tolist()
         move[:3] -= (v * z - w * y, w * x - u * z, u * y - v * x)
     return move
+
+
+def _off_one(normal: list[float], arm: list[float], asked: float, radius: float) -> Array:
+    """`least_move` of one contact: along its own row, in plain floats."""
+    if asked <= 0.0:
+        return np.zeros(6)
+    (u, v, w), (x, y, z) = normal, arm
+    turn = ((y * w - z * v) / radius, (z * u - x * w) / radius, (x * v - y * u) / radius)
+    share = asked / (u * u + v * v + w * w + turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    by = share / radius
+    return np.array([share * u, share * v, share * w, by * turn[0], by * turn[1], by * turn[2]])
 
 
 def left_open(proof: ClearanceProof, k: int, q: Array, touching: float) -> Array | None:
