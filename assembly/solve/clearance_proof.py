@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import side_faces
+from assembly.constraints.packing.corners import body_of
 from assembly.constraints.packing.scene import Packed
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.deforming import smaller_answer
+from assembly.proximity.clearance.holder_first import holds_first
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
 from assembly.proximity.clearance.touching import filled_bore, left_open, move_apart, off_contacts
 from assembly.proximity.extrema.pairs import ContactPair
@@ -101,12 +103,17 @@ def owned_pairs(packed: Packed) -> list[tuple[Clearance, tuple[Body, Body], bool
 def proven_pairs(
     packed: Packed, bodies: Sequence[Body]
 ) -> tuple[list[tuple[Face, ...]], list[tuple[int, int]], list[float]]:
-    """Faces of bodies, pairs of their numbers that clearances keep apart, and least gaps, as a proof takes them."""
+    """Faces of bodies, pairs of their numbers that clearances keep apart, and least gaps, as a proof takes them.
+
+    Of two bodies the one in whose bores the other one is goes first.
+    """
     number = {id(body): k for k, body in enumerate(bodies)}
     owned = owned_pairs(packed)
+    shapes = [side_faces(body) for body in bodies]
     rows = [(number[id(a)], number[id(b)]) for _, (a, b), _ in owned]
+    rows = [(b, a) if holds_first(shapes[a], shapes[b]) else (a, b) for a, b in rows]
     minimum = [0.0 if touched else item.minimum for item, _, touched in owned]
-    return [side_faces(body) for body in bodies], rows, minimum
+    return shapes, rows, minimum
 
 
 def new_proof(packed: Packed, bodies: Sequence[Body]) -> ClearanceProof:
@@ -276,11 +283,11 @@ def _opened(proof: ClearanceProof, k: int, q: Array, near: Contacts | None, touc
 
 def _contacts(solution: Solution, rows: Sequence[tuple[int, int]]) -> Iterator[tuple[int, ContactPair, float]]:
     """Contacts of a solution between bodies that clearances keep apart: the pair, the contact, -1 if it is turned."""
+    scene, sides = solution._scene, solution._packed.kept_pairs
     for number, _, contact in listed_contacts(solution):
         # Behind them are corners of contacts, of which nothing is proven.
         if number < len(rows):
-            yield number, contact, 1.0
-    scene = solution._scene
+            yield number, contact, 1.0 if scene.index(body_of(sides[number][0])) == rows[number][0] else -1.0
     if not scene.contacts:
         return
     places = {pair: number for number, pair in enumerate(rows)}

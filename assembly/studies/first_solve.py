@@ -76,6 +76,9 @@ class _FirstSolve:
             ways += self._put_together(together)
         if not self._is_done(ways) and together is not None and together.is_asked and self.scene.objectives:
             ways += self._constraints_first()
+        if not self._is_done(ways) and not self.scene.objectives:
+            # Rows of clearances contradict each other where faces nearly fit: from there few solves arrive.
+            ways += self._seated(False)
         if not self._is_done(ways):
             ways.append(self.scene._solved(self.settings, self.q, self.starts, self.interruption))
             # What holds as it stands is not moved.
@@ -107,7 +110,9 @@ class _FirstSolve:
         solution = self._from(poses)
         if solution.success or self.scene.objectives or self.interruption.is_over():
             return solution
-        return self.scene._solved(self.settings, poses, self.starts, self.interruption)
+        return self._unhindered(poses, False) or self.scene._solved(
+            self.settings, poses, self.starts, self.interruption
+        )
 
     def _resting(self, poses: Array, prove: Prove) -> list[Solution]:
         """The solution where an objective draws bodies onto what they fit near poses, if there is one."""
@@ -169,12 +174,17 @@ class _FirstSolve:
         """What bodies may be in each other and still touch, a length."""
         return float(self.settings[ALLOWED_OVERLAP]) * self.scene.packed().scale
 
+    def _seated(self, is_solved: bool) -> list[Solution]:
+        """A solve from where bodies that are stuck in each other fit; none where no faces nearly fit."""
+        seat = seated(self.scene, self.q, self._touching, self.interruption)
+        if seat is None or self.interruption.is_over():
+            return []
+        return [self._from(seat) if is_solved else self._where_it_fits(seat)]
+
     def _from_apart(self, is_solved: bool) -> list[Solution]:
         """Solves from where bodies that are stuck in each other fit, or are parted; fewer where there is a solution."""
-        touching, ways = self._touching, []
-        seat = seated(self.scene, self.q, touching, self.interruption)
-        if seat is not None:
-            ways.append(self._from(seat) if is_solved else self._where_it_fits(seat))
+        touching = self._touching
+        ways = self._seated(is_solved) if self.scene.objectives else []
         if self._is_done(ways):
             return ways
         apart = parted(self.scene, self.q, touching, self.interruption)

@@ -40,7 +40,7 @@ def parted(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     moved = q.copy()
     with lent_proof(packed, scene.bodies) as proof:
         for _ in range(ROUNDS):
-            stuck = [k for k, answer in enumerate(proof.look(moved, touching)) if is_stuck(answer, touching)]
+            stuck = [k for k, answer in enumerate(proof.as_they_stand(moved, touching)) if is_stuck(answer, touching)]
             if not stuck:
                 return moved if (moved != q).any() else None
             for k in stuck:

@@ -108,7 +108,7 @@ def put_together(
         return None
     with lent_proof(packed, scene.bodies) as proof:
         touching = settings.touching * packed.scale
-        is_clear = not any(is_stuck(answer, touching) for answer in proof.look(q, touching))
+        is_clear = not any(is_stuck(answer, touching) for answer in proof.as_they_stand(q, touching))
         sides = _sides(proof, q)
     solve = partial(inner._from_start, q, starts, options, interruption)
     return PutTogether(is_clear, sides, is_asked, solve)

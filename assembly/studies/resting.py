@@ -22,7 +22,7 @@ from scipy.optimize import nnls
 
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint
-from assembly.constraints.model.joints import Planar
+from assembly.constraints.program.records import UNKNOWN_BLOCKS
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import is_proven
 from assembly.proximity.clearance.proof import ClearanceProof
@@ -46,7 +46,7 @@ from assembly.solve.second_order.dense import LocalModel, null_space
 from assembly.solve.second_order.leave import Fit
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import is_for_proofs
-from assembly.studies.seated import NearFit, drop_farthest, fits
+from assembly.studies.seated import NearFit, NotBelow, drop_farthest, fits
 from assembly.studies.standing_start import with_contacts
 
 if TYPE_CHECKING:
@@ -96,26 +96,13 @@ def resting(
         return None
     begin = perf_counter()
     touching = float(settings[ALLOWED_OVERLAP])
-    with lent_proof(packed, scene.bodies) as proof:
-        near = [
-            proof.pairs[k]
-            for k, answer in enumerate(proof.look(poses, touching * packed.scale))
-            if not is_proven(answer)
-        ]
     others = [item for item in scene.constraints if not isinstance(item, Clearance)]
-    taken = {item.name for item in others}
-    names = (name for name in map("fit {}".format, count()) if name not in taken)
-    held: list[NearFit] = []
-    sides: dict[Constraint, Side] = {}
-    for a, b in near:
-        for fit in fits((scene.bodies[a], scene.bodies[b]), poses[[a, b]], names):
-            held.append(fit)
-            sides[fit.joint] = (a, b, isinstance(fit.joint, Planar))
+    sides = _near_fits(scene, others, poses, touching)
+    held = list(sides)
     settings = settings.copy()
     settings[GATHER] = NEVER
     while held and not interruption.is_over():
-        joints = [fit.joint for fit in held]
-        inner = _with_joints(scene, others, joints)
+        inner = _with_joints(scene, others, [fit.joint for fit in held])
         there = inner._solved(settings, poses, starts, interruption, reference)
         if not there.success:
             if there.status is Status.UNBOUNDED or not drop_farthest(held, there.violations):
@@ -127,8 +114,13 @@ def resting(
         if model is None or len(model.jacobian) != there._packed.rows:
             return None
         is_joint = there._packed.owners >= len(others)
+        # Flat faces that stay off each other are let go.
+        loose = set(there._packed.owners[is_joint & model.one_sided & ~model.touching].tolist())
+        if loose:
+            poses, held = there.q.copy(), [fit for k, fit in enumerate(held, len(others)) if k not in loose]
+            continue
         with lent_proof(packed, scene.bodies) as proof:
-            of_joints = [sides[joints[owner - len(others)]] for owner in there._packed.owners[is_joint]]
+            of_joints = [sides[held[owner - len(others)]] for owner in there._packed.owners[is_joint]]
             closed = _slopes(proof, there, touching * packed.scale)
             pushing = _pushing(closed, model, is_joint, of_joints)
         if pushing is None:
@@ -138,8 +130,26 @@ def resting(
             if solution is not None:
                 solution.seconds = perf_counter() - begin
             return solution
-        poses, held = there.q.copy(), [fit for fit in held if sides[fit.joint] in pushing]
+        poses, held = there.q.copy(), [fit for fit in held if sides[fit] in pushing]
     return None
+
+
+def _near_fits(scene: Assembly, others: Sequence[Constraint], poses: Array, touching: float) -> dict[NearFit, Side]:
+    """How bodies nearly fit that are not proven to be clear at poses, and of which two bodies each is.
+
+    The names of its joints are not those of other constraints.
+    """
+    packed = scene.packed()
+    with lent_proof(packed, scene.bodies) as proof:
+        answers = proof.as_they_stand(poses, touching * packed.scale)
+        near = [pair for pair, answer in zip(proof.pairs, answers, strict=True) if not is_proven(answer)]
+    taken = {item.name for item in others}
+    names = (name for name in map("fit {}".format, count()) if name not in taken)
+    return {
+        fit: (a, b, isinstance(fit.joint, NotBelow))
+        for a, b in near
+        for fit in fits((scene.bodies[a], scene.bodies[b]), poses[[a, b]], names)
+    }
 
 
 def _rises(there: Solution, touching: float) -> bool:
@@ -201,10 +211,11 @@ def _opposed(slopes: Array) -> NDArray[np.bool_]:
 
 def _slopes(proof: ClearanceProof, there: Solution, touching: float) -> tuple[Array, list[Side]]:
     """Slopes of gaps that are closed, in the unknowns of a solve, and the pair of bodies of each."""
-    q, scale = there.q, there._packed.scale
-    moving = [k for k, body in enumerate(there._scene.bodies) if not body.fixed]
-    column = {k: 6 * i for i, k in enumerate(moving)}
-    blocks: list[Array] = [np.empty((0, 6 * len(moving)))]
+    q, packed = there.q, there._packed
+    # Unknowns are numbered by what constraints are between bodies.
+    numbers = packed.table[packed.table[UNKNOWN_BLOCKS] :][: packed.count]
+    column = {body: 6 * int(numbers[body]) for body in np.flatnonzero(numbers >= 0).tolist()}
+    blocks: list[Array] = [np.empty((0, 6 * len(column)))]
     owners: list[Side] = []
     for k, (a, b) in enumerate(proof.pairs):
         least = float(proof.minimum[k])
@@ -212,10 +223,10 @@ def _slopes(proof: ClearanceProof, there: Solution, touching: float) -> tuple[Ar
         normals, places, is_flat = closed_gaps(shapes, *proof.relative(k, q), (least - touching, least + touching))
         turn = rotation_matrix(q[a, 3:])
         normals, places = normals @ turn.T, places @ turn.T + q[a, :3]
-        block = np.zeros((len(normals), 6 * len(moving)))
+        block = np.zeros((len(normals), 6 * len(column)))
         for body, sign in ((a, -1.0), (b, 1.0)):
             if body in column:
-                arms = (places - q[body, :3]) / scale
+                arms = (places - q[body, :3]) / packed.scale
                 block[:, column[body] :][:, :6] = sign * np.hstack([normals, np.cross(arms, normals)])
         blocks.append(block)
         owners += [(a, b, bool(flat)) for flat in is_flat]

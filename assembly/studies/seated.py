@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.contact import side_faces
-from assembly.constraints.model.joints import Cylindrical, Planar, Spherical
+from assembly.constraints.model.joint import SAME_AXIS, Joint, Side
+from assembly.constraints.model.joints import ALONG, Cylindrical, Spherical
 from assembly.geometry.recognition.forms import Cone, Cylinder, Plane, Sphere
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
@@ -30,7 +31,7 @@ from assembly.studies.parting import is_stuck
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["NearFit", "drop_farthest", "fits", "seated"]
+__all__ = ["NearFit", "NotBelow", "drop_farthest", "fits", "seated"]
 
 Array = NDArray[np.float64]
 # Faces that nearly fit lean by no more than this [rad], and are off by no more than that part of the smaller body's
@@ -42,14 +43,25 @@ PARALLEL = 1e-8
 CONTRADICTS = 1e-2
 
 
+class NotBelow(Joint):
+    """Two flat faces that are parallel, the second on the first or above it."""
+
+    _zero = SAME_AXIS
+    _free = {"height": ALONG}
+
+    def __init__(self, frame_a: Side, frame_b: Side, name: str) -> None:
+        super().__init__(frame_a, frame_b, name, "aligned", height=(None, (0.0, None)))
+
+
 class _Face:
     """A face of a body at a pose: what it is, which way it looks, its box; and the same face in the body's axes."""
 
-    def __init__(self, body: Body, row: Array, face: ElementaryFace) -> None:
+    def __init__(self, body: Body, turn: Array, shift: Array, face: ElementaryFace) -> None:
         self.body, self.form, self.is_outward = body, face.form, face.is_outward
-        self.turn, self.shift = rotation_matrix(row[3:]), row[:3]
-        corners = np.stack(np.meshgrid(*face.box.T, indexing="ij"), axis=-1).reshape(-1, 3) @ self.turn.T + self.shift
-        self.low, self.high = corners.min(axis=0), corners.max(axis=0)
+        self.turn, self.shift, self.box = turn, shift, face.box
+        low, high = face.box
+        middle, half = turn @ (0.5 * (low + high)) + shift, np.abs(turn) @ (0.5 * (high - low))
+        self.low, self.high = middle - half, middle + half
 
     def at(self, point: Array) -> Array:
         """A point of the body in the scene's axes."""
@@ -71,7 +83,7 @@ def seated(scene: Assembly, q: Array, touching: float, interruption: Interruptio
         return None
     with lent_proof(packed, scene.bodies) as proof:
         pairs = proof.pairs
-        stuck = [pairs[k] for k, answer in enumerate(proof.look(q, touching)) if is_stuck(answer, touching)]
+        stuck = [pairs[k] for k, answer in enumerate(proof.as_they_stand(q, touching)) if is_stuck(answer, touching)]
     others = [item for item in scene.constraints if not isinstance(item, Clearance)]
     taken = {item.name for item in others}
     names = (name for name in map("fit {}".format, count()) if name not in taken)
@@ -110,11 +122,14 @@ def drop_farthest(held: list[NearFit], violations: Mapping[str, float]) -> bool:
 
 
 def fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterator[NearFit]:
-    """Joints by which faces of two bodies would fit that nearly do at poses (2, 7)."""
+    """Joints by which faces of two bodies would fit that nearly do at poses (2, 7).
+
+    Of flat faces one may stay off the other: not all of a stack that face each other come to touch.
+    """
     reach = OFF * min(body.size for body in bodies)
     ones, others = (
-        [_Face(body, row, face) for face in elementary_faces(side_faces(body))]
-        for body, row in zip(bodies, rows, strict=True)
+        [_Face(body, turn, row[:3], face) for face in elementary_faces(side_faces(body))]
+        for body, row, turn in zip(bodies, rows, map(rotation_matrix, rows[:, 3:]), strict=True)
     )
     axes: list[tuple[Array, Array]] = []
     flush: list[tuple[float, _Face, _Face]] = []
@@ -136,7 +151,9 @@ def fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterat
             nearest[face] = min(off, nearest.get(face, np.inf))
     offs = {(one, other): off for off, one, other in flush if off <= max(nearest[one], nearest[other])}
     for one, other in _first_to_touch(list(offs), reach):
-        yield NearFit(_planar(one, other, next(names)), offs[one, other])
+        (p, m), (q, n) = _plane(one), _plane(other)
+        joint = NotBelow(one.body.frame(p, m), other.body.frame(q, -n), next(names))
+        yield NearFit(joint, offs[one, other])
 
 
 def _first_to_touch(pairs: list[tuple[_Face, _Face]], reach: float) -> list[tuple[_Face, _Face]]:
@@ -169,19 +186,39 @@ def _plane(face: _Face) -> tuple[Array, Array]:
 
 
 def _off_plane(one: _Face, other: _Face) -> float:
-    """How far two flat faces are off each other, in the middle of where both are; infinite if they are not opposed."""
+    """How far two flat faces are off each other, in the middle of where both are; infinite if they cannot be flush.
+
+    They have to be opposed, and none farther behind the other one than its wall is thick: it would be on the other
+    side of the wall.
+    """
     (p, m), (q, n) = _plane(one), _plane(other)
-    up = one.turn @ m
-    if not up @ (other.turn @ n) < -np.cos(LEAN):
+    up, down = one.turn @ m, other.turn @ n
+    if not up @ down < -np.cos(LEAN):
         return float(np.inf)
     middle = 0.5 * (np.maximum(one.low, other.low) + np.minimum(one.high, other.high))
-    return float(abs((middle - one.at(p)) @ up) + abs((middle - other.at(q)) @ up))
+    above, below = float((middle - one.at(p)) @ up), float((middle - other.at(q)) @ down)
+    if above + below < 0.0 and -above - below > min(_thickness(one), _thickness(other)):
+        return float(np.inf)
+    return abs(above) + abs(below)
 
 
-def _planar(one: _Face, other: _Face, name: str) -> Constraint:
-    """The joint of two flat faces that are to be flush."""
-    (p, m), (q, n) = _plane(one), _plane(other)
-    return Planar(one.body.frame(p, m), other.body.frame(q, -n), name)
+def _thickness(face: _Face) -> float:
+    """How far behind a flat face the wall of its body ends that it is one side of; infinite if nothing is behind it."""
+    point, normal = _plane(face)
+    found = [
+        float((point - other.form.point) @ normal)
+        for other in elementary_faces(side_faces(face.body))
+        if isinstance(other.form, Plane)
+        and (other.form.normal if other.is_outward else -other.form.normal) @ normal < PARALLEL - 1.0
+        and _is_beside(face.box, other.box, normal)
+    ]
+    return min((deep for deep in found if deep > 0.0), default=float(np.inf))
+
+
+def _is_beside(one: Array, other: Array, normal: Array) -> bool:
+    """Whether two boxes (2, 3) meet in those directions that are across a normal."""
+    across = np.abs(normal) < 0.5
+    return bool(((one[0] < other[1]) & (other[0] < one[1]))[across].all())
 
 
 def _round(one: _Face, other: _Face, axes: list[tuple[Array, Array]], names: Iterator[str]) -> Iterator[Constraint]:

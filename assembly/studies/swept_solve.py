@@ -214,7 +214,7 @@ class _Walk:
 
     def _names(self, pairs: Iterable[int]) -> tuple[tuple[str, str], ...]:
         bodies = self._scene.bodies
-        return tuple((bodies[a].name, bodies[b].name) for a, b in (self._proof.pairs[k] for k in pairs))
+        return tuple((bodies[a].name, bodies[b].name) for a, b in (sorted(self._proof.pairs[k]) for k in pairs))
 
     def _named(self, pairs: Iterable[int]) -> str:
         return ", ".join(f"{a} and {b}" for a, b in self._names(pairs))

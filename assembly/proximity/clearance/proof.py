@@ -48,6 +48,8 @@ LONGER = 1.0 + 1e-12
 LEAST_SIZE = 1e-30
 # What rounding may take from the room in a bore, in parts of coordinates.
 ROUNDING = 4e-15
+# Poses whose answers are kept.
+REMEMBERED = 4
 # Places in the stack of a ray.
 STACK = 4096
 
@@ -90,6 +92,19 @@ class ClearanceProof:
         self.moves = np.zeros((len(self.pairs), 6))
         # Poses of the last looks, where all pairs had them at the same ones.
         self._at: bytes | None = None
+        self._stood: dict[tuple[bytes, float], list[Answer]] = {}
+
+    def as_they_stand(self, q: Array, touching: float) -> list[Answer]:
+        """What is proven of all pairs at poses (n, 7), without any moves; the last few poses are looked at once.
+
+        Several ways to solve a scene begin with this question, at the same start.
+        """
+        asked = q.tobytes(), touching
+        if asked not in self._stood:
+            while len(self._stood) >= REMEMBERED:
+                self._stood.pop(next(iter(self._stood)))
+            self._stood[asked] = self.look(q, touching)
+        return self._stood[asked]
 
     def look(
         self,
