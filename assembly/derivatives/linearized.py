@@ -16,7 +16,7 @@ from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.constraints.program.records import pool_header_at
 from assembly.geometry.vec import quaternion_matrix
-from assembly.solve.second_order.dense import UNBALANCED
+from assembly.solve.second_order.balance import UNBALANCED
 
 # What is known of a scene before it is evaluated, in a table; offsets are in that table.
 PLAN = record_dtype(
