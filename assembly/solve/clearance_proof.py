@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_p
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.deforming import smaller_answer
 from assembly.proximity.clearance.holder_first import holds_first
-from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
+from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof, stayed_answers
 from assembly.proximity.clearance.touching import filled_bore, left_open, move_apart, off_contacts
 from assembly.proximity.extrema.pairs import ContactPair
 from assembly.solve.contact_pairs import ContactRows, contact_pairs, listed_contacts, rows_of_contacts
@@ -145,7 +146,8 @@ def judge_end(solution: Solution, settings: NDArray[np.float64], interruption: I
         return
     begin = perf_counter()
     solution._clear = prove_end(solution)
-    if solution.success and not all(pair.holds for pair in solution._clear):
+    stayed = isinstance(solution._clear, StayedClear)
+    if solution.success and not (stayed or all(pair.holds for pair in solution._clear)):
         solution.status = Status.STALLED
     elif (
         solution.status is Status.STALLED
@@ -157,7 +159,7 @@ def judge_end(solution: Solution, settings: NDArray[np.float64], interruption: I
     solution.seconds += perf_counter() - begin
 
 
-def prove_end(solution: Solution) -> list[PairAnswer]:
+def prove_end(solution: Solution) -> Sequence[PairAnswer]:
     """What is proven at the pose of a solution of all pairs that its clearances keep apart."""
     packed, scene = solution._packed, solution._scene
     if not can_prove(packed):
@@ -168,9 +170,9 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
     touching = solution._touching * packed.scale
     with lent_proof(packed, scene.bodies) as proof:
         proof.make_slimmer(touching)
-        stayed = _stayed_clear(proof, solution.q, touching)
+        stayed = _stayed_clear(packed, proof, solution.q, touching)
         if stayed is not None:
-            return named_answers(packed, stayed)
+            return stayed
         wedged = _open_recognized(proof, solution.q, touching)
         answers = _first_looks(proof, solution.q, touching, wedged)
         _make_smaller(proof, solution.q, touching, answers, wedged)
@@ -197,22 +199,60 @@ def prove_end(solution: Solution) -> list[PairAnswer]:
     return found
 
 
-def _stayed_clear(proof: ClearanceProof, q: Array, touching: float) -> list[Answer] | None:
+def _stayed_clear(packed: Packed, proof: ClearanceProof, q: Array, touching: float) -> StayedClear | None:
     """What is proven at poses that bodies reach straight from the last ones, staying clear; None where that is unknown.
 
     That is asked first, as most solves go on from the one before: it is one call for all pairs.
     """
     if not proof.has_looked or not proof.stays_clear(q, touching, proof.moves, FEW, at_once=True):
         return None
-    answers = proof.clear_answers(q, proof.moves)
-    return answers if all(answer.depth <= touching for answer in answers) else None
+    bounds, depths = proof.clear_bounds(q, proof.moves)
+    return StayedClear(packed, bounds, depths) if (depths <= touching).all() else None
 
 
-def named_answers(packed: Packed, answers: Sequence[Answer]) -> list[PairAnswer]:
-    """Answers that hold, with the names of what they are of."""
-    found = []
-    for (item, (a, b), touched), answer in zip(owned_pairs(packed), answers, strict=True):
-        proved = is_proven(answer) and not (touched and item.minimum > 0.0)
+class StayedClear(Sequence[PairAnswer]):
+    """What is proven of pairs that stayed clear, all of which hold; the answers are made when they are asked for.
+
+    Parameters
+    ----------
+    packed : Packed
+    bounds, depths : (pairs,)
+        Of bodies after they were moved, and by how much they were.
+    """
+
+    def __init__(self, packed: Packed, bounds: Array, depths: Array) -> None:
+        self._packed, self._bounds, self._depths = packed, bounds, depths
+        # Least gaps may be set anew until then.
+        self._minimum = [item.minimum for item, _, _ in owned_pairs(packed)]
+
+    @cached_property
+    def _answers(self) -> list[PairAnswer]:
+        return named_answers(self._packed, stayed_answers(self._bounds, self._depths), self._minimum)
+
+    @overload
+    def __getitem__(self, at: int) -> PairAnswer: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> list[PairAnswer]: ...
+
+    def __getitem__(self, at: int | slice) -> PairAnswer | list[PairAnswer]:
+        return self._answers[at]
+
+    def __len__(self) -> int:
+        return len(self._bounds)
+
+    def __reduce__(self) -> tuple[type[list[PairAnswer]], tuple[list[PairAnswer]]]:
+        return list, (self._answers,)
+
+
+def named_answers(
+    packed: Packed, answers: Sequence[Answer], minimum: Sequence[float] | None = None
+) -> list[PairAnswer]:
+    """Answers that hold, with the names of what they are of; least gaps are those of now if none are given."""
+    owned, found = owned_pairs(packed), []
+    asked = [item.minimum for item, _, _ in owned] if minimum is None else minimum
+    for (item, (a, b), touched), answer, least in zip(owned, answers, asked, strict=True):
+        proved = is_proven(answer) and not (touched and least > 0.0)
         found.append(PairAnswer(item.name, (a.name, b.name), answer, True, proved))
     return found
 

@@ -38,7 +38,7 @@ from assembly.proximity.clearance.records import (
     PARTED,
 )
 
-__all__ = ["LEAST_SIZE", "ClearanceProof"]
+__all__ = ["LEAST_SIZE", "ClearanceProof", "stayed_answers"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -87,6 +87,8 @@ class ClearanceProof:
         # Columns: to ask records for them by name takes longer than a tick.
         self._turn, self._shift = self.fronts.pair.turn, self.fronts.pair.shift
         self._way_depth, self._slimmer = self.fronts.pair.way_depth, self.fronts.pair.slimmer
+        self._soonest, self._travelled = self.fronts.pair.soonest, self.fronts.pair.travelled
+        self._needed = self.fronts.pair.needed
         self._of_wires = np.array([self.is_of_wires(k) for k in range(len(self.pairs))], dtype=bool)
         # What opened contacts at the last look of a solve.
         self.moves = np.zeros((len(self.pairs), 6))
@@ -211,17 +213,20 @@ class ClearanceProof:
 
     def clear_answers(self, q: Array, moves: Array) -> list[Answer]:
         """What is proven of all pairs at poses (n, 7) at which they stayed clear, after moves (pairs, 6)."""
-        pair = self.fronts.pair
-        bounds = pair.soonest - pair.travelled + pair.needed - pair.slimmer
+        return stayed_answers(*self.clear_bounds(q, moves))
+
+    def clear_bounds(self, q: Array, moves: Array) -> tuple[Array, Array]:
+        """Of pairs that stayed clear, bounds after moves (pairs, 6), and by how much bodies were moved, or slimmer."""
+        needed, slimmer = self._needed, self._slimmer
+        bounds = self._soonest - self._travelled + needed - slimmer
         # Only of pairs with nodes in bores of second bodies: one pair after the other takes longer.
         for k in np.flatnonzero(bounds == -np.inf).tolist():
             bounds[k] = self.bound(k)
-        answers = [Answer(Verdict.CLEAR, bound, swept=True) for bound in bounds.tolist()]
-        closed = ~(bounds > pair.needed)
-        for k in np.flatnonzero(moves.any(axis=1) | closed).tolist():
-            far = self.move_length(k, q, moves[k]) + (float(pair.slimmer[k]) if closed[k] else 0.0)
-            answers[k] = Answer(Verdict.TOUCHING, float(bounds[k]) - far, far, swept=True)
-        return answers
+        depths = np.where(bounds > needed, 0.0, slimmer)
+        if np.count_nonzero(moves):
+            for k in np.flatnonzero(moves.any(axis=1)).tolist():
+                depths[k] += self.move_length(k, q, moves[k])
+        return bounds, depths
 
     def not_clear(self) -> list[int]:
         """The pairs of which `stays_clear` did not find that they do, where it looked at any; else all."""
@@ -456,3 +461,13 @@ class ClearanceProof:
             asked = winding_of(self.forest.arrays, self.forest.roots[body], points, self._stack, found)
             if found[asked - 1] != UNCLEAR or not self.forest.is_full or not self.forest.grow():
                 return int(found[asked - 1])
+
+
+def stayed_answers(bounds: Array, depths: Array) -> list[Answer]:
+    """Answers to pairs that stayed clear, by bounds after moves, and how far these go."""
+    return [
+        Answer(Verdict.TOUCHING, bound - depth, depth, swept=True)
+        if depth > 0.0
+        else Answer(Verdict.CLEAR, bound, swept=True)
+        for bound, depth in zip(bounds.tolist(), depths.tolist(), strict=True)
+    ]
