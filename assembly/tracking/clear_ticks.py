@@ -171,28 +171,29 @@ class ClearTicks:
         there, moves = _Standing(solution), self._moves
         self.way_depth = 0.0
         rolling, last = self._rolling(there), proof.last_poses()
-        others = list(range(len(proof.pairs)))
+        answers: dict[int, Answer] = {}
         if not rolling:
             # Contacts stay for many ticks, and so does what opens them.
             if proof.stays_clear(there.q, touching, moves, QUICK):
                 self._at, self.proved, self.way_depth = there, True, proof.way_depth()
                 return True
-            others = proof.not_clear()
-        # Where a long way may not go in by its square, one along flat faces still may do.
-        rolling = [k for k in rolling if self._may_go_in(k, there, OPENED[0])]
-        others, moves = [k for k in others if k not in rolling], moves.copy()
-        answers = self._straight(there, moves, others)
-        rolling += [k for k in others if not is_proven(answers[k])]
-        if rolling:
-            for k in rolling:
-                moves[k] = there.opened(proof, k, touching)
-            for part in OPENED:
-                left = [
-                    k
-                    for k in rolling
-                    if not (k in answers and is_proven(answers[k])) and self._may_go_in(k, there, part)
-                ]
-                answers.update(zip(left, self._rolled(there, moves, left, part), strict=True) if left else ())
+            left = proof.not_clear()
+        else:
+            # Where a long way may not go in by its square, one along flat faces still may do.
+            rolling = [k for k in rolling if self._may_go_in(k, there, OPENED[0])]
+            others = [k for k in range(len(proof.pairs)) if k not in rolling]
+            left = self._left_by(answers, others, there, moves, QUICK) + rolling
+        moves = moves.copy()
+        for k in left:
+            moves[k] = there.opened(proof, k, touching)
+        changed = [k for k in left if k not in rolling and (moves[k] != self._moves[k]).any()]
+        self._left_by(answers, changed, there, moves, QUICK)
+        for part in OPENED:
+            open_yet = [k for k in left if not (k in answers and is_proven(answers[k]))]
+            may = [k for k in open_yet if self._may_go_in(k, there, part)]
+            answers.update(zip(may, self._rolled(there, moves, may, part), strict=True) if may else ())
+        # What is much, and not deep: it takes more where bodies touch, which are opened in less.
+        self._left_by(answers, [k for k in left if not (k in answers and is_proven(answers[k]))], there, moves, BUDGET)
         self.doubtful = self._not_known(answers, there)
         if self.doubtful:
             proof.go_back(last)
@@ -220,19 +221,13 @@ class ClearTicks:
             else:
                 self._proof.look(self._at.q, self._touching, self._moves, which=[k])
 
-    def _straight(self, there: _Standing, moves: Array, which: list[int]) -> dict[int, Answer]:
-        """What is proven of straight ways: of pairs that are opened as at the last pose, else as they are at this one.
-
-        What opens them is written into the moves.
-        """
-        proof, touching = self._proof, self._touching
-        found = proof.look(there.q, touching, moves, which, swept=True, budget=QUICK)
-        answers = dict(zip(which, found, strict=True))
-        left = [k for k in which if not is_proven(answers[k])]
-        for k in left:
-            moves[k] = there.opened(proof, k, touching)
-        found = proof.look(there.q, touching, moves, left, swept=True)
-        return answers | dict(zip(left, found, strict=True))
+    def _left_by(
+        self, answers: dict[int, Answer], which: list[int], there: _Standing, moves: Array, budget: int
+    ) -> list[int]:
+        """Which of some pairs the straight way is not proven of within a budget; what is proven is added to answers."""
+        found = self._proof.look(there.q, self._touching, moves, which, swept=True, budget=budget) if which else []
+        answers.update(zip(which, found, strict=True))
+        return [k for k in which if not is_proven(answers[k])]
 
     def _not_known(self, answers: dict[int, Answer], there: _Standing) -> dict[int, Answer]:
         """The pairs that are not proven to be clear, or to touch, and whose faces do not lie on each other."""

@@ -42,7 +42,7 @@ Table = NDArray[np.int64]
 # How near first cells are to faces, in parts of the body's size, and how much a boundary turns along a chord [rad].
 TOLERANCE, ANGLE = 8e-3, 0.5
 # An axis is near the middle of a box around all of a body that is off it by no more than this part of the radius of the
-# ball, by which the ball grows: bodies then seem to go so much farther.
+# ball around it, by which the ball grows: bodies then seem to go so much farther.
 NEAR_AXIS = 0.05
 
 

@@ -300,6 +300,28 @@ def test_linked_rings_and_pins_in_bores_are_clear():
     assert answer.verdict is Verdict.CLEAR and 0.0 < answer.bound <= 1e-4 + CLOSE
 
 
+def test_a_shaft_that_turns_on_the_wall_of_its_bore():
+    """About its own axis, and along it: its way is straight, and no cell is asked, however little room is left."""
+    proof = proof_of(
+        asm.shapes.plate(50.0, 50.0, 20.0, holes=[(0.0, 0.0, 10.02)]), asm.shapes.solid_cylinder(10.0, 90.0)
+    )
+    off = 0.02 - 3e-8
+    for k, angle in enumerate(np.linspace(0.0, 0.2, 21)):
+        turned = (off, 0.0, 0.05 * k, np.cos(angle), 0.0, 0.0, np.sin(angle))
+        (answer,) = proof.look(poses(turned), 1e-7, swept=k > 0)
+        assert answer.verdict is Verdict.CLEAR and 0.0 < answer.bound <= 3e-8
+        assert k == 0 or proof.fronts.counts.sought[0] == 0
+
+
+def test_what_is_not_looked_at_does_not_stay_clear():
+    """Where no way is known from the last pose, none is from it to this one."""
+    proof = proof_of(asm.shapes.box(1.0, 1.0, 1.0), asm.shapes.box(1.0, 1.0, 1.0))
+    beside, across = poses((2.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)), poses((0.2, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+    assert proof.look(beside, 0.0)[0].verdict is Verdict.CLEAR
+    proof.forget_poses()
+    assert not proof.stays_clear(across, 0.0, np.zeros((1, 6))) and proof.not_clear() == [0]
+
+
 def test_equal_bodies_at_one_place():
     """No proof can tell: at every place boundaries touch. It says so."""
     shape = parts()["ball"].shape
