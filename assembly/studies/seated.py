@@ -149,34 +149,10 @@ def fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterat
     for off, one, other in flush:
         for face in (one, other):
             nearest[face] = min(off, nearest.get(face, np.inf))
-    offs = {(one, other): off for off, one, other in flush if off <= max(nearest[one], nearest[other])}
-    for one, other in _first_to_touch(list(offs), reach):
-        (p, m), (q, n) = _plane(one), _plane(other)
-        joint = NotBelow(one.body.frame(p, m), other.body.frame(q, -n), next(names))
-        yield NearFit(joint, offs[one, other])
-
-
-def _first_to_touch(pairs: list[tuple[_Face, _Face]], reach: float) -> list[tuple[_Face, _Face]]:
-    """Pairs of flat faces, without those that cannot touch as others that look the same way come first.
-
-    A boss whose flange lies on the rim does not reach the floor of its recess. With m a normal of the first body, and
-    n = -m of the second, faces at p and q are flush where that body is p.m + q.n along m from the first; where it is
-    farther they are apart.
-    """
-    normals = [(_plane(one)[1], _plane(other)[1]) for one, other in pairs]
-    heights = [
-        float(_plane(one)[0] @ m + _plane(other)[0] @ n) for (one, other), (m, n) in zip(pairs, normals, strict=True)
-    ]
-    kept = []
-    for pair, (m, n), height in zip(pairs, normals, heights, strict=True):
-        alike = [
-            known
-            for (to, fro), known in zip(normals, heights, strict=True)
-            if np.abs(to - m).max() < PARALLEL and np.abs(fro - n).max() < PARALLEL
-        ]
-        if height >= max(alike) - PARALLEL * reach:
-            kept.append(pair)
-    return kept
+    for off, one, other in flush:
+        if off <= max(nearest[one], nearest[other]):
+            (p, m), (q, n) = _plane(one), _plane(other)
+            yield NearFit(NotBelow(one.body.frame(p, m), other.body.frame(q, -n), next(names)), off)
 
 
 def _plane(face: _Face) -> tuple[Array, Array]:

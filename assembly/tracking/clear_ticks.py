@@ -200,7 +200,7 @@ class ClearTicks:
             return False
         self.proved = all(map(is_proven, answers.values()))
         self._at, self._moves = there, moves
-        self._leave_closed([k for k in rolling if moves[k].any() and proof.is_of_wires(k)])
+        self._leave_closed([k for k in left if moves[k].any() and proof.is_of_wires(k)])
         self._opened = self._those_opened()
         return True
 
