@@ -117,30 +117,45 @@ def _is_near(p, q, move, near):
     return abs(p[0] - q[0] - move[0]) + abs(p[1] - q[1] - move[1]) <= near
 
 
-@kernel(inner=True)
-def _is_cusp(pool, a, b):
-    """Whether the second of two pieces leaves the end of the first one along the way that this came."""
-    _x, _y, du, dv = piece_line(pool, a.piece, a.piece.t1)
-    _x, _y, ds, dt = piece_line(pool, b.piece, b.piece.t0)
-    along = -(du * ds + dv * dt)
-    return along > 0.0 and abs(du * dt - dv * ds) <= _TANGENT * along
+@kernel(inline=True)
+def _leaving(pool, moved, at_end):
+    """The direction in which a piece leaves one of its ends."""
+    _x, _y, du, dv = piece_line(pool, moved.piece, moved.piece.t1 if at_end else moved.piece.t0)
+    return (-du, -dv) if at_end else (du, dv)
 
 
 @kernel(inner=True)
-def _comes_after(store, trim, numbers, pieces, tolerance, size):
-    """How far around the end of the first of two pieces they are not compared, if the second begins there; else 0."""
-    a, b = pieces
-    # Each may be moved.
+def _is_cusp(pool, pair, ends):
+    """Whether two pieces leave their ends, the last ones or the first ones, the same way."""
+    u, v = _leaving(pool, pair[0], ends[0]), _leaving(pool, pair[1], ends[1])
+    along = u[0] * v[0] + u[1] * v[1]
+    return along > 0.0 and abs(u[0] * v[1] - u[1] * v[0]) <= _TANGENT * along
+
+
+@kernel(inner=True)
+def _common(pool, pair, ends, tolerance, size):
+    """How far around an end, the last or the first one, of two pieces they are not compared; 0 if it is not common.
+
+    Also how long what is between the two may be. In a cusp a piece of a curve that is one by rounding may be there.
+    """
+    a, b = pair
+    p, q = a.end if ends[0] else a.start, b.end if ends[1] else b.start
+    # One of the pieces is moved.
     move = b.move[0] - a.move[0], b.move[1] - a.move[1]
-    if not _is_near(a.end, b.start, move, _CUSP * size):
-        return 0.0
-    cusp = _is_cusp(store.pool, a, b)
-    # In a cusp a piece of a curve that is none but for rounding may be between the two.
-    near = _CUSP * size if cusp else 8.0 * tolerance
-    most = _CUSP * size if cusp else 4.0 * tolerance
-    if not _is_near(a.end, b.start, move, near) or not _follows(store, trim, numbers[0], numbers[1], most):
-        return 0.0
-    return max((_CUSP if cusp else _CORNER) * size, 16.0 * tolerance)
+    if not _is_near(p, q, move, _CUSP * size):
+        return 0.0, 0.0
+    if _is_cusp(pool, pair, ends):
+        return max(_CUSP * size, 16.0 * tolerance), _CUSP * size
+    if not _is_near(p, q, move, 8.0 * tolerance):
+        return 0.0, 0.0
+    return max(_CORNER * size, 16.0 * tolerance), 4.0 * tolerance
+
+
+@kernel(inner=True)
+def _comes_after(store, trim, numbers, pair, tolerance, size):
+    """How far around the end of the first of two pieces they are not compared, if the second begins there; else 0."""
+    around, between = _common(store.pool, pair, (True, False), tolerance, size)
+    return around if around > 0.0 and _follows(store, trim, numbers[0], numbers[1], between) else 0.0
 
 
 @kernel(inner=True)
@@ -158,22 +173,21 @@ def _corners(store, trim, numbers, pair, tolerance, size):
 
 
 @kernel(inner=True)
-def _common_ends(pair, tolerance, size):
+def _common_ends(pool, pair, tolerance, size):
     """The Corners of a pair of pieces that may share any of their ends."""
-    (a, b), move, near = pair, pair[1].move, 8.0 * tolerance
-    start = _is_near(a.start, b.start, move, near) or _is_near(a.start, b.end, move, near)
-    end = _is_near(a.end, b.start, move, near) or _is_near(a.end, b.end, move, near)
-    around = max(_CORNER * size, 16.0 * tolerance)
-    return Corners(int(start) + int(end), a.end if end else a.start, a.start if start else a.end, around, around)
-
-
-@kernel(inner=True)
-def _joined(common, following):
-    """Corners that are common ends, with the room around them of those at which one piece follows the other."""
-    if common.count < following.count:
-        return following
-    around = max(common.around_first, following.around_first, following.around_second)
-    return Corners(common.count, common.first, common.second, around, around)
+    a, _b = pair
+    start, end = 0.0, 0.0
+    for k in range(2):
+        start = max(start, _common(pool, pair, (False, k == 1), tolerance, size)[0])
+        end = max(end, _common(pool, pair, (True, k == 1), tolerance, size)[0])
+    at_start, at_end = start > 0.0, end > 0.0
+    return Corners(
+        int(at_start) + int(at_end),
+        a.end if at_end else a.start,
+        a.start if at_start else a.end,
+        end if at_end else start,
+        start if at_start else end,
+    )
 
 
 @kernel(inline=True)
@@ -276,7 +290,7 @@ def first_crossing(table, pool, pieces, moves, tolerance, joined, where):
             second = _moved(store, record, b, (shift_u - move_u, shift_v - move_v))
             corners = _corners(store, record, (a, b), (first, second), tolerance, size)
             if joined:
-                corners = _joined(_common_ends((first, second), tolerance, size), corners)
+                corners = _common_ends(pool, (first, second), tolerance, size)
             found, u, v, budget = _meet(pool, first, second, corners, tolerance, size, stack, budget)
             if found:
                 where[0] = u + move_u
