@@ -226,3 +226,23 @@ def test_both_sides_of_a_seam_end_at_the_same_places():
     assert made[0].ends[0, 1] == pytest.approx(1.0 + 0.5e-8, abs=1e-15)
     face = asm.Face(TUBE, [row.nurbs(np.ones(2)) for row in made])
     assert len(face.boundary) == 2
+
+
+@pytest.mark.parametrize("move", [1e-12, 1e-7, 1e-5])
+@pytest.mark.parametrize("end", [0, 1])
+def test_an_end_that_is_moved_by_more_than_the_first_leg_does_not_turn_back(move, end):
+    """A short span at the end, as where a seam is next to it, and a corner of the file beside."""
+    x = np.concatenate([np.linspace(0.0, 1e-8, 4), np.linspace(1e-8, 1.0, 4)[1:]])
+    points = np.column_stack([x, 0.1 * x * x, np.ones(7)])
+    knots = np.array([0.0, 0.0, 0.0, 0.0, 1e-8, 1e-8, 1e-8, 1.0, 1.0, 1.0, 1.0])
+    if end:
+        points, knots = points[::-1].copy(), 1.0 - knots[::-1]
+    given = Edge(spline(points[:, :2], knots, 3), (False, False), 1e-3, "edge", 0.0)
+    ends = list(given.corners)
+    ends[end] = (move, move)
+    made = given.moved(*ends)
+    assert made.corners == tuple(ends)
+    ways = np.diff(made.curve.cartesian[0], axis=0) * (-1.0 if end else 1.0)
+    # No leg goes back: of those along which the move is spread each has nine tenths left.
+    assert (ways[:, 0] > 0.0).all()
+    assert np.abs(made.curve.cartesian[0] - given.curve.cartesian[0]).max() <= move * (1.0 + 1e-12)

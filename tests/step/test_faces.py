@@ -9,7 +9,7 @@ from assembly.step.edges import Edges
 from assembly.step.faces import read_face
 from assembly.step.profiles import Unreadable
 from assembly.step.surfaces import patch
-from tests.step.models import MODELS, O, areas, cone, cylinder, faces, off, sphere, torus, volumes
+from tests.step.models import MODELS, O, areas, box, cone, cylinder, faces, off, sphere, torus, volumes, without
 
 # Kinds that have no rational form, and are approximated.
 APPROXIMATED = ("hyperbola", "swollen vase")
@@ -197,3 +197,15 @@ def test_a_gap_beyond_the_tolerance_is_unreadable():
     sheet = sheet_of(PENTAGON, range(5), True, ends)
     with pytest.raises(Unreadable, match=r"two edges that should meet are 0\.001 mm apart"):
         read_face(sheet, Edges(sheet), None)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e2, 1e3])
+def test_holes_that_touch_are_read_at_every_size(scale):
+    """OCCT cuts their edges beside the place where they touch, by more than points that are one to it."""
+    plate = box(40.0 * scale, 20.0 * scale, 5.0 * scale)
+    for x in (15.0, 25.0):
+        plate = without(plate, cylinder(5.0 * scale, 5.0 * scale, ((x * scale, 10.0 * scale, 0.0), (0, 0, 1))))
+    found = [one.face for one in read(plate)]
+    # What two holes take off two sides their walls give back.
+    assert sum(face.area() for face in found) == pytest.approx(2200.0 * scale**2, rel=1e-6)
+    assert sum(face.volume_integral() for face in found) == pytest.approx((4000.0 - 250.0 * pi) * scale**3, rel=1e-6)

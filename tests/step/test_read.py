@@ -385,6 +385,16 @@ def test_a_placement_at_a_point_of_the_plane_is_damage(nested):
         document_of(str(nested))
 
 
+@pytest.mark.parametrize("other", ["VERTEX_POINT", "CARTESIAN_POINT", "PLANE"])
+def test_something_else_in_place_of_a_curve_on_a_surface_is_damage(nested, other):
+    # OCCT takes it for a curve, which ended the process.
+    text = nested.read_text()
+    number = re.search(rf"#(\d+) = {other}\(", text)[1]
+    nested.write_text(re.sub(r"(DEFINITIONAL_REPRESENTATION\('',\()#\d+", rf"\1#{number}", text, count=1))
+    with quiet(), pytest.raises(StepError, match=r"machine.step'; 1 of its entities are damaged"):
+        document_of(str(nested))
+
+
 def test_occt_is_not_waited_for_without_end(damaged, monkeypatch):
     child = "import time; from assembly.step import documents; documents._loaded = lambda *_: time.sleep(60.0)\n"
     monkeypatch.setattr(reader, "_APART", child + reader._APART)

@@ -17,6 +17,9 @@ from assembly.geometry.faces.trim_pieces import bounds_of, links_of, piece_line,
 
 # Around a corner that two pieces share, as a part of the size, they are not compared.
 _CORNER = 1e-5
+# The same where they leave it along one tangent, with a sine of less than the second: in a cusp curves of files go into
+# each other by what rounding makes of them, and so far from the corner they are apart by some 1e-8 of the size at most.
+_CUSP, _TANGENT = 1e-4, 1e-4
 # Near it they may be as near to one another as this part of the square of their distance from it.
 _OPENING = 1e-3
 _BUDGET = 2_000_000
@@ -61,8 +64,9 @@ def _segments(a, b, c, d):
 # A piece that is compared. start, end: its ends; shift: moves its curve into the cell; move: moves it by whole periods;
 # bound: on its second derivative.
 MovedPiece = namedtuple("MovedPiece", "piece start end shift move bound")
-# Corners that two pieces share: how many there are, and where, twice where there is one.
-Corners = namedtuple("Corners", "count first second")
+# Corners that two pieces share: how many there are, and where, twice where there is one; how far around them the two
+# are not compared.
+Corners = namedtuple("Corners", "count first second around_first around_second")
 
 
 @kernel(inline=True)
@@ -92,8 +96,8 @@ def _place(pool, moved, t):
 
 
 @kernel(inner=True)
-def _follows(store, trim, a, b, tolerance):
-    """Whether b comes after a, at once or after a stretch of next to nothing."""
+def _follows(store, trim, a, b, most):
+    """Whether b comes after a, at once or after a stretch of no more than a length."""
     length = 0.0
     k = links_of(store, trim, a).after
     while k >= 0:
@@ -101,7 +105,7 @@ def _follows(store, trim, a, b, tolerance):
             return True
         i = bounds_of(store, trim, k)
         length += abs(i.end[0] - i.start[0]) + abs(i.end[1] - i.start[1])
-        if length > 4.0 * tolerance or k == a:
+        if length > most or k == a:
             return False
         k = links_of(store, trim, k).after
     return False
@@ -113,22 +117,77 @@ def _is_near(p, q, move, near):
     return abs(p[0] - q[0] - move[0]) + abs(p[1] - q[1] - move[1]) <= near
 
 
+@kernel(inline=True)
+def _leaving(pool, moved, at_end):
+    """The direction in which a piece leaves one of its ends."""
+    _x, _y, du, dv = piece_line(pool, moved.piece, moved.piece.t1 if at_end else moved.piece.t0)
+    return (-du, -dv) if at_end else (du, dv)
+
+
 @kernel(inner=True)
-def _corners(store, trim, numbers, pair, tolerance):
+def _is_cusp(pool, pair, ends):
+    """Whether two pieces leave their ends, the last ones or the first ones, the same way."""
+    u, v = _leaving(pool, pair[0], ends[0]), _leaving(pool, pair[1], ends[1])
+    along = u[0] * v[0] + u[1] * v[1]
+    return along > 0.0 and abs(u[0] * v[1] - u[1] * v[0]) <= _TANGENT * along
+
+
+@kernel(inner=True)
+def _common(pool, pair, ends, tolerance, size):
+    """How far around an end, the last or the first one, of two pieces they are not compared; 0 if it is not common.
+
+    Also how long what is between the two may be. In a cusp a piece of a curve that is one by rounding may be there.
+    """
+    a, b = pair
+    p, q = a.end if ends[0] else a.start, b.end if ends[1] else b.start
+    # One of the pieces is moved.
+    move = b.move[0] - a.move[0], b.move[1] - a.move[1]
+    if not _is_near(p, q, move, _CUSP * size):
+        return 0.0, 0.0
+    if _is_cusp(pool, pair, ends):
+        return max(_CUSP * size, 16.0 * tolerance), _CUSP * size
+    if not _is_near(p, q, move, 8.0 * tolerance):
+        return 0.0, 0.0
+    return max(_CORNER * size, 16.0 * tolerance), 4.0 * tolerance
+
+
+@kernel(inner=True)
+def _comes_after(store, trim, numbers, pair, tolerance, size):
+    """How far around the end of the first of two pieces they are not compared, if the second begins there; else 0."""
+    around, between = _common(store.pool, pair, (True, False), tolerance, size)
+    return around if around > 0.0 and _follows(store, trim, numbers[0], numbers[1], between) else 0.0
+
+
+@kernel(inner=True)
+def _corners(store, trim, numbers, pair, tolerance, size):
     """The Corners of a pair of pieces, whose numbers these are."""
-    (a, b), move, near = pair, pair[1].move, 8.0 * tolerance
-    after = _follows(store, trim, numbers[0], numbers[1], tolerance) and _is_near(a.end, b.start, move, near)
-    before = _follows(store, trim, numbers[1], numbers[0], tolerance) and _is_near(a.start, b.end, move, near)
-    return Corners(int(after) + int(before), a.end if after else a.start, a.start if before else a.end)
+    a, b = pair
+    after = _comes_after(store, trim, numbers, pair, tolerance, size)
+    before = _comes_after(store, trim, (numbers[1], numbers[0]), (b, a), tolerance, size)
+    # Places are those of the first piece, which is not moved.
+    at_end, at_start = after > 0.0, before > 0.0
+    first, second = a.end if at_end else a.start, a.start if at_start else a.end
+    return Corners(
+        int(at_end) + int(at_start), first, second, after if at_end else before, before if at_start else after
+    )
 
 
 @kernel(inner=True)
-def _common_ends(pair, tolerance):
+def _common_ends(pool, pair, tolerance, size):
     """The Corners of a pair of pieces that may share any of their ends."""
-    (a, b), move, near = pair, pair[1].move, 8.0 * tolerance
-    start = _is_near(a.start, b.start, move, near) or _is_near(a.start, b.end, move, near)
-    end = _is_near(a.end, b.start, move, near) or _is_near(a.end, b.end, move, near)
-    return Corners(int(start) + int(end), a.end if end else a.start, a.start if start else a.end)
+    a, _b = pair
+    start, end = 0.0, 0.0
+    for k in range(2):
+        start = max(start, _common(pool, pair, (False, k == 1), tolerance, size)[0])
+        end = max(end, _common(pool, pair, (True, k == 1), tolerance, size)[0])
+    at_start, at_end = start > 0.0, end > 0.0
+    return Corners(
+        int(at_start) + int(at_end),
+        a.end if at_end else a.start,
+        a.start if at_start else a.end,
+        end if at_end else start,
+        start if at_start else end,
+    )
 
 
 @kernel(inline=True)
@@ -156,7 +215,6 @@ def _gap(p, q, r, s):
 @kernel(inner=True)
 def _meet(pool, a, b, corners, tolerance, size, stack, budget):
     """Whether two pieces meet beside a common corner, where, and what is left of the budget."""
-    radius = max(_CORNER * size, 16.0 * tolerance)
     stack[0, 0], stack[0, 1] = a.piece.t0, a.piece.t1
     stack[0, 2], stack[0, 3] = b.piece.t0, b.piece.t1
     top = 1
@@ -180,7 +238,7 @@ def _meet(pool, a, b, corners, tolerance, size, stack, budget):
         if corners.count > 0:
             first = max(_farthest(corners.first, p, q), _farthest(corners.first, r, s))
             second = max(_farthest(corners.second, p, q), _farthest(corners.second, r, s))
-            if first <= radius or second <= radius:
+            if first <= corners.around_first or second <= corners.around_second:
                 continue
         extent_a = abs(q[0] - p[0]) + abs(q[1] - p[1])
         extent_b = abs(s[0] - r[0]) + abs(s[1] - r[1])
@@ -230,9 +288,9 @@ def first_crossing(table, pool, pieces, moves, tolerance, joined, where):
                 continue
             first = _moved(store, record, a, (0.0, 0.0))
             second = _moved(store, record, b, (shift_u - move_u, shift_v - move_v))
-            corners = _corners(store, record, (a, b), (first, second), tolerance)
+            corners = _corners(store, record, (a, b), (first, second), tolerance, size)
             if joined:
-                corners = _common_ends((first, second), tolerance)
+                corners = _common_ends(pool, (first, second), tolerance, size)
             found, u, v, budget = _meet(pool, first, second, corners, tolerance, size, stack, budget)
             if found:
                 where[0] = u + move_u

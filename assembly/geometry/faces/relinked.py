@@ -114,11 +114,26 @@ def _kept(parts: list[_Part], surface: NurbsSurface, tolerance: Array) -> list[_
     kept = [parts[k] for k in sorted(k for k, good in zip(order, keep.tolist(), strict=True) if good)]
     if keep.all() or not kept:
         return kept or None
+    short = np.array(lengths)[order] <= float(np.min(tolerance))
+    for k in np.flatnonzero(short & ~keep).tolist():
+        _bridge(rows[k], kept)
     polygon = np.concatenate([p.curve.evaluate(sampled(p.curve.breaks(), 129)) for p in kept]) / tolerance
     periods = np.array(surface._periods) / tolerance
     left = [part for part, good in zip(rows, keep.tolist(), strict=True) if not good]
     at = np.concatenate([part.curve.evaluate(sampled(part.curve.breaks(), 17)) for part in left]) / tolerance
     return kept if _are_near(at, polygon, periods) else None
+
+
+def _bridge(part: _Part, kept: Sequence[_Part]) -> None:
+    """Have one of the parts that are kept end where a short one does, if they are open without that.
+
+    Of a part that is shorter than loops may go into each other it is not known what is left and right of it.
+    """
+    more_end, more_begin = (sum((one.end == at) - (one.begin == at) for one in kept) for at in (part.begin, part.end))
+    if more_end > 0 > more_begin:
+        before = next(one for one in kept if one.end == part.begin)
+        (start, end), (begin, stop) = curve_ends(before.curve), curve_ends(part.curve)
+        before.curve, before.end = with_ends(before.curve, start, end + (stop - begin)), part.end
 
 
 def _are_near(at: Array, polygon: Array, periods: Array) -> bool:

@@ -7,6 +7,7 @@ from assembly.errors import InputError
 from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.loop import Loop
+from assembly.geometry.faces.relinked import _are_near, _distances
 from assembly.geometry.splines.curve import NurbsCurve
 from tests.geometry.loops import circle, polygon, polyline, random_face, segment
 
@@ -293,3 +294,41 @@ def test_arguments_of_another_kind_are_named():
         Face(PLANE).locate([0.0, 1.0], [0.0, 1.0, 2.0])
     with pytest.raises(InputError, match="has no boundary"):
         Face(shapes.torus(3.0, 1.0)).nearest_on_boundary(0.0, 0.0)
+
+
+def cusp(dip):
+    """A side, and a curve back to where it began that comes there along it, from below by a dip."""
+    back = NurbsCurve([(8, 0), (8, 6), (4, -dip), (0, 0)], [0, 0, 0, 0, 1, 1, 1, 1], 3)
+    return [NurbsCurve([(0, 0), (8, 0)], [0, 0, 1, 1], 1), back]
+
+
+def test_curves_may_cross_by_rounding_where_they_leave_a_corner_along_one_tangent():
+    plane = shapes.plane(40.0, 40.0)
+    # They cross at u = 2 dip, and are 3 dip^2 / 72 in each other before.
+    for dip in (0.0, 1e-9, 1e-5, 1e-4):
+        face = Face(plane, cusp(dip), tolerance=1e-8)
+        assert face.area() == pytest.approx(Face(plane, cusp(-1e-3)).area(), rel=1e-3)
+        assert len(face.boundary) == 2
+    with pytest.raises(InputError, match="crosses or touches itself"):
+        Face(plane, cusp(0.5), tolerance=1e-8)
+
+
+@pytest.mark.parametrize("periods", [(0.0, 0.0), (7.0, 0.0), (7.0, 5.0)])
+def test_points_near_a_polygon_are_told_as_by_all_its_sides(periods):
+    random = np.random.default_rng(5)
+    answers = []
+    for spread in np.linspace(0.8, 1.4, 40):
+        polygon = np.cumsum(random.normal(size=(12, 2)), axis=0)
+        part = random.uniform(size=(40, 1))
+        k = random.integers(11, size=40)
+        at = polygon[k] + part * (polygon[k + 1] - polygon[k])
+        way = random.normal(size=at.shape)
+        at += spread * random.uniform(size=part.shape) * way / np.linalg.norm(way, axis=1)[:, None]
+        at += np.array(periods) * random.integers(-2, 3, size=at.shape)
+        apart = at[:, None] - polygon
+        for axis in (0, 1):
+            if periods[axis]:
+                apart[..., axis] -= periods[axis] * np.round(apart[..., axis] / periods[axis])
+        answers.append(bool((_distances(apart) <= 1.0).all()))
+        assert _are_near(at, polygon, np.array(periods)) == answers[-1]
+    assert True in answers and False in answers

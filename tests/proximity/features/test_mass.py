@@ -90,6 +90,40 @@ def test_gaps_between_faces_are_told():
     assert 0.1 * lifted < wrong < found.volume_error < 10.0 * lifted
 
 
+def test_gaps_of_files_are_closed_and_told():
+    """A cap that is off by more than what makes edges one elsewhere: still a volume, with how wrong it may be."""
+    faces = list(asm.shapes.box(1.0, 1.0, 1.0))
+    top = max(range(len(faces)), key=lambda k: faces[k].surface.bounding_box()[0][2])
+    for lifted in (1e-5, 5e-5):
+        faces[top] = asm.Face(asm.shapes.box(1.0, 1.0, 1.0)[top].surface.transformed(translation=(0, 0, lifted)))
+        found = asm.Body("body", faces).mass_properties
+        assert 0.1 * lifted < abs(found.volume - 1.0) < found.volume_error < 10.0 * lifted
+    faces[top] = asm.Face(asm.shapes.box(1.0, 1.0, 1.0)[top].surface.transformed(translation=(0, 0, 1e-2)))
+    with pytest.raises(InputError, match="is open"):
+        _ = asm.Body("body", faces).volume
+
+
+def test_places_along_an_edge_may_be_beyond_the_other_curve_s_ends():
+    """Halves of a ring against a whole one: speeds differ along it, and a first guess leaves the other curve."""
+    low, high = asm.shapes.solid_cylinder(1.0, 2.0), asm.shapes.solid_cylinder(1.0, 2.0)
+    wall = next(face for face in low if face.surface.closed[0])
+    (u0, u1), (v0, v1) = wall.surface.domain
+    others = [face for face in high if not face.surface.closed[0]]
+    halves = []
+    for k in (0, 1):
+        a, b = u0 + 0.5 * k * (u1 - u0), u0 + 0.5 * (k + 1) * (u1 - u0)
+        # A curve whose speed is halved from one end to the other.
+        corners = [(a, v0), (b, v0), (b, v1), (a, v1)]
+        loop = [
+            asm.NurbsCurve([p, q], [0, 0, 1, 1], 1, [1.0, 2.0])
+            for p, q in zip(corners, corners[1:] + corners[:1], strict=True)
+        ]
+        halves.append(asm.Face(wall.surface, loop, name=f"wall {k}", reversed=wall.reversed))
+    found = asm.Body("body", [*others, *halves]).mass_properties
+    assert found.volume == pytest.approx(2.0 * PI, rel=RIGHT)
+    assert found.volume_error < 1e-9
+
+
 def test_what_encloses_nothing_raises():
     with pytest.raises(InputError, match="'bare' has no shape; expected faces that enclose a volume"):
         _ = asm.Body("bare").volume
