@@ -45,7 +45,8 @@ class Stop(NamedTuple):
     Attributes
     ----------
     ended : Ended
-        How the scene that draws it was packed, and the state at the end.
+        How the scene that draws it was packed, and the state at the end; of rows of a call without what follows its
+        results.
     poses : (n, 7)
         Of the bodies of the scene.
     has_ended : bool
@@ -105,7 +106,7 @@ class DrawnTip:
         rows = [k for k, start in enumerate(starts) if self._is_row(packed, start)]
         found: list[Stop | None] = [None] * len(starts)
         if rows:
-            begun = np.array([starts[k].ended.state for k in rows])
+            begun = np.array([starts[k].ended.state[: packed.memory_at] for k in rows])
             for k, stop in zip(rows, self._in_one_call(packed, targets[rows], begun, True), strict=True):
                 found[k] = stop
         return [
@@ -132,9 +133,11 @@ class DrawnTip:
         """A stop as a solution: of a row of a call it is made here, with the numbers that its scene was aimed with."""
         if stop.solution is not None:
             return stop.solution
-        scene = self.scene._scene
+        scene, (packed, known) = self.scene._scene, stop.ended
         assert scene is not None
-        return Solution(scene, *stop.ended, Status.SOLVED, 0.0, np.empty((0, 0)))
+        state = packed.new_state()
+        state[: len(known)] = known
+        return Solution(scene, packed, state, Status.SOLVED, 0.0, np.empty((0, 0)))
 
     def limit(self, target: Array, stop: Stop) -> Solution:
         """The solution of a stop on the way to a place, with what it was asked for."""
@@ -172,7 +175,9 @@ class DrawnTip:
         packed.refresh()
         writes = writes_of(packed, self._place, targets, len(targets))
         assert writes is not None, "targets are numbers of the pool"
-        ended = np.empty((len(begun), packed._state_size))
+        # Rows that the last solve evaluated are left out: they are most of a state, and a step is as far as a cell, so
+        # that to begin with what they say of the place before takes more steps than to begin without.
+        ended = np.empty((len(begun), packed.memory_at))
         solve_slices(packed, scene_settings({}, CTRL_C, True, warm), writes, begun, ended, 1)
         CTRL_C.is_over()
         poses = ended[:, : packed.contacts_at].reshape(len(ended), -1, 7)[:, : self._count].copy()

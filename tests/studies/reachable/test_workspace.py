@@ -7,6 +7,8 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
+from assembly.studies.reachable.drawn_tip import DrawnTip
+from assembly.studies.reachable.grid import grid_of
 
 LONG, SHORT = 1.0, 0.6
 AREA = 4.0 * np.pi * LONG * SHORT
@@ -75,6 +77,28 @@ def test_poses_have_the_tip_in_the_middle_of_their_cells():
         assert solution.feasibility < 1e-12
         place = solution.pose(tip.body).apply(tip.coordinates)
         np.testing.assert_allclose(place, center, rtol=0, atol=1e-6 * 0.2)
+
+
+def test_rows_of_a_front_are_solves_of_their_own():
+    """Within reach and beyond it, from a stop and from poses; what is kept for speed is left out of rows."""
+    scene, tip = planar_arm((LONG, SHORT))
+    first = scene.solve()
+    place = first.pose(tip.body).apply(tip.coordinates)
+    grid = grid_of("xy", place, 0.1)
+    drawn = DrawnTip(scene, tip, grid)
+    (start,) = drawn.all_from(place[None] + [0.02, 0.01, 0.0], first.q[None])
+    assert start.solution is None
+    directions = np.arange(8) * np.pi / 4.0
+    ways = np.column_stack([np.cos(directions), np.sin(directions), np.zeros(8)])
+    targets = np.concatenate([place + 0.1 * ways, place + 0.5 * ways])
+    rows = [drawn.all_to(targets, [start] * 16), drawn.all_from(targets, np.array([start.poses] * 16))]
+    assert all(stop.solution is None for stop in rows[0][:8])
+    for own in rows:
+        alone = [drawn.to(target, drawn.solution(start)) for target in targets]
+        assert [stop.is_there for stop in own] == [stop.is_there for stop in alone]
+        assert 8 <= sum(stop.is_there for stop in own) < 16
+        for stop, other in zip(own, alone, strict=True):
+            assert stop.has_ended and np.abs(drawn.place(stop) - drawn.place(other)).max() < 1e-8
 
 
 def test_an_arm_that_moves_along_itself():
