@@ -329,14 +329,14 @@ class Tracker(InOneProcess):
         """Where the bodies stand now, (n, 7), read-only."""
         return read_only(self._before[: self._packed.contacts_at].reshape(-1, 7).copy())
 
-    def step(self, target: ArrayLike | Pose | Sequence[ArrayLike | Pose]) -> Step:
+    def step(self, target: ArrayLike | Pose | Sequence[ArrayLike | Pose | None]) -> Step:
         """Follow the hands for a tick. Never raises: see `Step.status`.
 
         Parameters
         ----------
         target : (3,), (7,) or Pose
-            Where the hand is: a point, or the pose of the frame it holds. Of several hands a sequence of such targets;
-            if one of them is none, no hand moves.
+            Where the hand is: a point, or the pose of the frame it holds. Of several hands a sequence of such targets,
+            anything for one that holds nothing; if another one is none, no hand moves.
         """
         begin = perf_counter()
         packed = self._packed
