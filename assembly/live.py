@@ -21,7 +21,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m assembly.live", description=ABOUT)
     parser.add_argument("file", help="a scene file")
     parser.add_argument("--host", default="127.0.0.1", help="whom the page is for; 0.0.0.0: everybody on the network")
-    parser.add_argument("--port", type=int, default=8080, help="of the page; if it is taken, the next free one")
+    parser.add_argument("--port", type=int, default=8080, help="of the page; if in use, the next free one is taken")
     parser.add_argument("--stiffness", type=float, default=1.0, help="of the spring that the mouse draws with")
     return parser
 

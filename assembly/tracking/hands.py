@@ -229,7 +229,8 @@ class SeveralHands:
         hand._size = 3 if isinstance(held, Point) else 7
         pose = Pose(row[:3], row[3:])
         if isinstance(term, PointDistance):
-            term._target = term._target if held is None else pose.apply(held.coordinates)
+            if isinstance(held, Point):
+                term._target = pose.apply(held.coordinates)
         elif isinstance(held, Point):
             term.target = Pose(pose.apply(held.coordinates), term.target.quaternion)
         elif held is not None:

@@ -352,13 +352,14 @@ class Tracker(InOneProcess):
         """Where the bodies stand now, (n, 7), read-only."""
         return read_only(self._before[: self._packed.contacts_at].reshape(-1, 7).copy())
 
-    def step(self, target: ArrayLike | Pose | Sequence[ArrayLike | Pose]) -> Step:
+    def step(self, target: ArrayLike | Pose | Sequence[ArrayLike | Pose | None]) -> Step:
         """Follow the target for one tick. Never raises: see `Step.status`.
 
         Parameters
         ----------
         target : (3,), (7,) or Pose
-            A point, or a pose for a frame. For several a sequence of targets; if one of them is invalid, nothing moves.
+            A point, or a pose for a frame. For several a sequence of targets, anything for one that holds nothing; if
+            another one is invalid, nothing moves.
         """
         begin = perf_counter()
         packed = self._packed

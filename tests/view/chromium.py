@@ -26,8 +26,8 @@ FLAGS = (
     "--disable-component-update --disable-sync --disable-extensions --disable-dev-shm-usage --hide-scrollbars "
     "--use-angle=swiftshader --enable-unsafe-swiftshader --remote-debugging-pipe"
 ).split() + ["--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"]
-# The viewer's menu is no part of a picture.
-NO_MENU = "<style>.dg { display: none }</style></head>"
+# The viewer's menu and boxes are no part of a picture.
+NO_MENU = "<style>.dg, #choices { display: none }</style></head>"
 # Virtual milliseconds that a page has before it is looked at, and seconds that an answer may take.
 BUDGET, PATIENCE = 2000, 120.0
 
@@ -131,6 +131,8 @@ class Chromium:
     ) -> None:
         """Write a PNG of a page."""
         with self._opened(page, fragment, "", width, height, scale) as session:
+            # While virtual time stands still there may be no frame to take a picture of.
+            self._ask("Emulation.setVirtualTimePolicy", session, policy="advance")
             # Larger files whose rows are quick to decode.
             found = self._ask("Page.captureScreenshot", session, format="png", optimizeForSpeed=True)
         picture.write_bytes(base64.b64decode(found["data"]))

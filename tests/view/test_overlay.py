@@ -67,6 +67,8 @@ def test_contacts_that_a_clearance_finds_have_one_name_a_pair():
 
 # What the overlay shows, after the mouse was at places in the page and boxes were clicked.
 LOOK = """
+// Virtual time may pass without a frame, in which the viewer takes the size of its window.
+viewer.set_3d_pane_size();
 const canvas = viewer.renderer.domElement, part = id => document.getElementById(id), found = [];
 const box = canvas.getBoundingClientRect();
 const pixel = mesh => {

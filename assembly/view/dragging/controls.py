@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from assembly.view.dragging.joint_values import freedoms_of, reach_of
+from assembly.view.dragging.said import Said
 from assembly.view.dragging.session import Session
 from assembly.view.dragging.shown import Shown
 
@@ -31,13 +32,13 @@ class Controls:
     ----------
     server : ViserServer
     session : Session
-    labels : sequence of viser's labels
-        Names of the bodies.
+    said : Said
+        Names and what else is shown on request.
     scale : float
         From lengths of the scene to those of the page, whose radius is 1.
     """
 
-    def __init__(self, server: ViserServer, session: Session, labels: Sequence[Any], scale: float) -> None:
+    def __init__(self, server: ViserServer, session: Session, said: Said, scale: float) -> None:
         self._session = session
         gui = server.gui
         self._status = gui.add_markdown("")
@@ -66,7 +67,7 @@ class Controls:
             record.on_update(lambda event: session.ask(partial(session.record, bool(event.target.value))))
             play = gui.add_checkbox("play", False, hint="what was recorded")
             play.on_update(lambda event: session.ask(partial(session.play, bool(event.target.value))))
-            gui.add_checkbox("names", False).on_update(partial(self._show_names, labels))
+            said.add_boxes(gui)
         self._graph = self._new_graph(gui)
         self._history = np.zeros((3, POINTS))
         self._graphed = 0.0
@@ -86,11 +87,6 @@ class Controls:
 
     def _clicked(self, call: Callable[[], None], event: Any) -> None:
         self._session.ask(call)
-
-    @staticmethod
-    def _show_names(labels: Sequence[Any], event: Any) -> None:
-        for label in labels:
-            label.visible = bool(event.target.value)
 
     def _slid(self, name: str, event: Any) -> None:
         # Set by the program a slider tells nobody.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import threading
+import warnings
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import partial
@@ -20,12 +21,14 @@ from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
 from assembly.tracking.trace import Trace
 from assembly.view.dragging.controls import Controls
+from assembly.view.dragging.said import Said
 from assembly.view.dragging.session import Session
 from assembly.view.dragging.shown import Shown
 from assembly.view.item import FIELD_OF_VIEW, Stations
 from assembly.view.mesh import body_mesh
 from assembly.view.picture import DIRECTION, body_colors
 from assembly.view.skeleton import fineness, held_points, link_mesh
+from assembly.view.style import Style, checked_style
 
 if TYPE_CHECKING:
     from viser import SceneNodeDragEvent, SceneNodePointerEvent, TransformControlsEvent, ViserServer
@@ -62,7 +65,12 @@ def _server(host: str, port: int) -> ViserServer:
         ) from None
     # It announces itself.
     with redirect_stdout(StringIO()):
-        return ViserServer(host=host, port=port, label="assembly", verbose=False)
+        server = ViserServer(host=host, port=port, label="assembly", verbose=False)
+    if port not in (0, server.get_port()):
+        # It takes the next free one; who sent somebody the address has to know.
+        message = f"port {port} is in use; the page is at port {server.get_port()}"
+        warnings.warn(message, stacklevel=3)
+    return server
 
 
 @dataclass(frozen=True)
@@ -92,15 +100,15 @@ class Live:
         What there is to see now: poses, status, force, violation.
     """
 
-    def __init__(self, session: Session, server: ViserServer) -> None:
-        self._session, self._server = session, server
+    def __init__(self, session: Session, server: ViserServer, style: Style) -> None:
+        self._session, self._server, self._style = session, server, style
         host = server.get_host()
         self.url = f"http://{'localhost' if host in ('0.0.0.0', '127.0.0.1') else host}:{server.get_port()}"
         self._ended = threading.Event()
-        self._frame, meshes = _meshes(session.scene, session.shown.q)
+        self._frame, self._corner, meshes = _meshes(session.scene, session.shown.q, style.angle)
         self._bodies = dict(zip(session.scene.bodies, meshes, strict=True))
         self._draw()
-        self._controls = Controls(server, session, self._labels, self._frame.scale)
+        self._controls = Controls(server, session, self._said, self._frame.scale)
         self._drawn: Shown | None = None
         session.start()
         self._painter = threading.Thread(target=self._paint, name="assembly page", daemon=True)
@@ -152,16 +160,24 @@ class Live:
         camera.position = tuple(toward * 1.15 * RADIUS / np.sin(np.deg2rad(FIELD_OF_VIEW) / 2.0))
         camera.look_at, camera.fov = (0.0, 0.0, 0.0), float(np.deg2rad(FIELD_OF_VIEW))
         self._nodes: dict[Body, Any] = {}
-        self._labels: list[Any] = []
-        colors = body_colors(list(self._bodies))
+        colors = list(body_colors(list(self._bodies)))
         for k, ((body, (vertices, triangles)), color) in enumerate(zip(self._bodies.items(), colors, strict=True)):
             red, green, blue = (round(255 * part) for part in color)
-            node = scene.add_mesh_simple(f"/bodies/{k}", vertices, triangles, color=(red, green, blue), side="double")
-            self._labels.append(scene.add_label(f"/bodies/{k}/name", body.name, visible=False))
+            opacity = self._style.opacity_of(body)
+            node = scene.add_mesh_simple(
+                f"/bodies/{k}",
+                vertices,
+                triangles,
+                color=(red, green, blue),
+                side="double",
+                opacity=None if opacity == 1.0 else opacity,
+            )
             self._nodes[body] = node
             if not body.fixed:
                 node.on_drag(partial(self._dragged, body))
                 node.on_click(partial(self._clicked, body))
+        self._said = Said(self._session.scene, scene, self._frame.scale, self._style, colors)
+        self._said.add_axes(self._frame.there(self._corner))
         self._contacts = [
             scene.add_icosphere(f"/contacts/{k}", 0.012 * RADIUS, (255, 184, 26), visible=False)
             for k in range(MOST_CONTACTS)
@@ -221,7 +237,7 @@ class Live:
             for node, place, row in zip(self._nodes.values(), places, shown.q, strict=True):
                 node.position, node.wxyz = place, row[3:]
             for k, ball in enumerate(self._contacts):
-                ball.visible = k < len(shown.contacts)
+                ball.visible = k < len(shown.contacts) and self._style.glyphs != "none"
                 if ball.visible:
                     ball.position = self._frame.there(shown.contacts[k][0])
             if self._turned is not None and self._turned.name not in [hand.body for hand in shown.hands]:
@@ -238,10 +254,10 @@ class Live:
                     label.position, label.text = self._frame.there(hand.target), f"{np.linalg.norm(hand.force):.3g}"
 
 
-def _meshes(scene: Assembly, q: Array) -> tuple[_Frame, list[tuple[Array, NDArray[np.int64]]]]:
-    """The scale of the page, and the triangles of every body in it."""
+def _meshes(scene: Assembly, q: Array, angle: float) -> tuple[_Frame, Array, list[tuple[Array, NDArray[np.int64]]]]:
+    """The scale of the page, the lowest corner of the bodies, and the triangles of every body in the page."""
     held = held_points(scene)
-    made = {body: body_mesh(body) for body in scene.bodies}
+    made = {body: body_mesh(body, angle=angle) for body in scene.bodies}
     stations = Stations(scene.bodies, q[None])
     seen = [
         stations.points(body, (held[body] if len(held[body]) else np.zeros((1, 3))) if mesh is None else mesh.vertices)
@@ -260,7 +276,7 @@ def _meshes(scene: Assembly, q: Array) -> tuple[_Frame, list[tuple[Array, NDArra
             meshes.append((mesh.vertices, mesh.triangles))
         else:
             meshes.append((frame.scale * mesh.vertices, mesh.triangles))
-    return frame, meshes
+    return frame, low, meshes
 
 
 def live(
@@ -270,6 +286,7 @@ def live(
     stiffness: float = 1.0,
     host: str = "127.0.0.1",
     port: int = 8080,
+    style: Style | None = None,
 ) -> Live:
     """Open a page in which bodies are dragged with the mouse while contacts and clearances hold.
 
@@ -286,7 +303,9 @@ def live(
         Force over distance of the spring that the mouse draws with.
     host : str
     port : int
-        0 to 65535; if it is taken, the next free one.
+        0 to 65535, 0 for any. If it is in use, it is the next free one, and a warning says so.
+    style : Style, optional
+        Opacities, edges, names, axes with their length, legend, glyphs; boxes beside the picture change some of them.
 
     Returns
     -------
@@ -305,5 +324,6 @@ def live(
         raise InputError("scene has no bodies; expected one at least")
     if not isinstance(host, str) or not host:
         raise InputError(f"host is {host!r}; expected a name or an address, say '127.0.0.1'")
+    look = checked_style(style, (body.name for body in scene.bodies))
     session = Session(scene, q0, stiffness)
-    return Live(session, _server(host, integer("port", port, 0, 65535)))
+    return Live(session, _server(host, integer("port", port, 0, 65535)), look)

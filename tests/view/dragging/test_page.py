@@ -1,5 +1,6 @@
 """A scripted mouse drags a paper clip in Chromium: it moves, contacts hold, and no wire crosses."""
 
+import re
 import runpy
 import time
 from pathlib import Path
@@ -80,13 +81,25 @@ def test_a_mouse_drags_a_clip(browser, clips):
     assert checked.feasibility < 1e-9 and checked.crossings == ()
 
 
-def test_a_browser_that_leaves_lets_go(browser, clips):
-    with asm.view.live(clips, port=0) as page:
+def test_a_browser_that_leaves_lets_go_and_others_go_on(browser):
+    floor = asm.Body("floor", asm.shapes.plane(6.0, 6.0), fixed=True)
+    balls = [asm.Body(n, asm.shapes.sphere(0.5), position=(x, 0.0, 0.5)) for n, x in (("red", -1.5), ("blue", 1.5))]
+    scene = asm.Assembly([floor, *balls])
+    scene.constrain(*(asm.Contact(floor, ball) for ball in balls))
+    with asm.view.live(scene, port=0) as page:
         with browser.visited(page.url.replace("localhost", "127.0.0.1")):
             wait_for(lambda: page._server.get_clients())
             (number,) = page._server.get_clients()
-            page._session.ask(lambda: page._session.grab("green", clips["green"].pose.position, number))
-            wait_for(lambda: page.shown.holder == number)
+            page._session.ask(lambda: page._session.grab("red", np.array([-1.5, 0.0, 1.0]), number))
+            page._session.ask(lambda: page._session.grab("blue", np.array([1.5, 0.0, 1.0]), number + 1))
+            for client, x in ((number, -1.0), (number + 1, 1.0)):
+                page._session.ask(lambda c=client, x=x: page._session.move(np.array([x, 0.0, 1.0]), c))
+            wait_for(lambda: np.abs(page.q[1:, 0] - [-1.5, 1.5]).min() > 0.3)
+            shown = page.shown
+            assert shown.who == f"red (browser {number}), blue (browser {number + 1})" and shown.violation < 1e-10
+        wait_for(lambda: len(page.shown.hands) == 1)
+        assert page.shown.hands[0].body == "blue" and "the constraints hold" in page.shown.status
+        page._session.ask(lambda: page._session.release(number + 1))
         wait_for(lambda: page.shown.holder is None)
         assert page.shown.status == "nothing is held"
 
@@ -129,11 +142,28 @@ def test_rings_that_another_browser_takes_away_are_let_go(crank):
 def test_a_port_that_is_taken_and_closing_twice(crank):
     with asm.view.live(crank, port=0) as page:
         port = int(page.url.rsplit(":", 1)[1])
-        with asm.view.live(crank, port=port) as other:
+        with (
+            pytest.warns(UserWarning, match=f"port {port} is in use; the page is at port"),
+            asm.view.live(crank, port=port) as other,
+        ):
             assert other.url != page.url
             other.close()
         other.close()
         assert page.shown.status == "SOLVED"
+
+
+def test_the_page_has_names_joints_axes_and_opacities(crank):
+    style = asm.view.Style(labels=["bodies"], unit="mm", opacity={"arm": 0.5}, legend=True)
+    with asm.view.live(crank, port=0, style=style) as page:
+        said = page._said
+        assert [label.text for label in said.labels["joints"]] == ["hinge"]
+        assert all(label.visible for label in said.labels["bodies"]) and not said.labels["joints"][0].visible
+        assert len(said.glyphs) == 1
+        assert [round(node.opacity or 1.0, 6) for node in page._nodes.values()] == [1.0, 0.5]
+        (length,) = [handle.text for handle in said.axes if getattr(handle, "text", "").startswith("x")]
+        assert re.fullmatch(r"x  [125][\d.e-]* mm", length) or length.startswith("x  0.")
+    with pytest.raises(asm.errors.InputError, match="opacity has 'leg'; expected one of 'ground', 'arm'"):
+        asm.view.live(crank, style=asm.view.Style(opacity={"leg": 0.5}))
 
 
 def test_a_scene_far_from_the_origin_is_in_the_middle_of_the_page():

@@ -213,9 +213,10 @@ def test_two_people_drag_two_bodies_at_once(pair):
     session.grab("red", np.array([-1.0, 0.0, 1.0]), 1)
     session.grab("blue", np.array([1.0, 0.0, 1.0]), 2)
     tracker = session._tracker
-    for grip, goal in zip(session._grips, ((-1.0, 0.6, 1.0), (1.0, -0.4, 1.0)), strict=True):
-        session.move(np.array(goal), grip.client)
-        grip.pointer.at = lambda now, goal=np.array(goal): goal
+    goals = np.array([(-1.0, 0.6, 1.0), (1.0, -0.4, 1.0)])
+    for grip, goal in zip(session._grips, goals, strict=True):
+        session.move(goal, grip.client)
+        grip.pointer.at = lambda now, goal=goal: goal
     for _ in range(60):
         session._tick()
     q, shown = session.shown.q, session.shown
