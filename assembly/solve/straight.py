@@ -28,7 +28,7 @@ __all__ = ["straight_from"]
 Array = NDArray[np.float64]
 
 
-def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, wishes: bool) -> Solution | None:
+def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, has_objective: bool) -> Solution | None:
     """What the loop arrives at from a solution, for a scene as it is packed; None where it takes more, or may.
 
     Parameters
@@ -39,7 +39,7 @@ def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, w
         What the new solution speaks of; None, as `packed` is, where nothing is packed yet.
     packed : Packed or None
         How the scene was packed for its last solve.
-    wishes : bool
+    has_objective : bool
         Whether the scene has an objective.
     """
     if packed is None or scene is None:
@@ -56,7 +56,7 @@ def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, w
     state = begun._ended.state.copy() if packed is earlier else with_numbers_of(packed, earlier, begun._ended.state)
     packed.refresh()
     packed.start_angles(state, True)
-    settings = scene_settings({}, CTRL_C, wishes, True)
+    settings = scene_settings({}, CTRL_C, has_objective, True)
     code, state, history = run(packed, CTRL_C, packed.rows_table, settings, state)
     seconds = perf_counter() - begin
     # What a signal's handler raised is raised here.

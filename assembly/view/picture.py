@@ -145,7 +145,7 @@ def _contact(pair: Pairs, place: Place) -> Iterator[Item]:
     yield Item(path, mesh, color, f, aligned(pair.normals), shown * np.ones(3), in_front=True)
 
 
-def _wish(name: str, target: Array, point: Array, radius: float) -> Iterator[Item]:
+def _target_items(name: str, target: Array, point: Array, radius: float) -> Iterator[Item]:
     """A cross at the target, a ball at the point (k, 3) that is drawn to it, and a line between them."""
     yield Item(("targets", name, "target"), cross(_ARM, 0.3 * MARK), _WISH, target)
     yield Item(("targets", name, "point"), ball(), _WISH, point, scale=np.full(3, radius))
@@ -201,13 +201,13 @@ def _picture(
 ) -> Picture:
     meshes = {body: body_mesh(body) for body in scene.bodies}
     held = held_points(scene)
-    wishes = [objective for _, objective in scene.objectives if isinstance(objective, PointDistance)]
-    drawn = [stations.points(wish.point.body, wish.point.coordinates) for wish in wishes]
-    seen = [*_outline(meshes, held, stations, ellipsoids), *drawn, *(wish.target for wish in wishes)]
+    targets = [objective for _, objective in scene.objectives if isinstance(objective, PointDistance)]
+    drawn = [stations.points(term.point.body, term.point.coordinates) for term in targets]
+    seen = [*_outline(meshes, held, stations, ellipsoids), *drawn, *(term.target for term in targets)]
     outline = np.concatenate([points.reshape(-1, 3) for points in seen])
     radius = 0.5 * float(np.linalg.norm(np.ptp(outline, axis=0)))
     arms = _ARM * radius * np.concatenate([np.eye(3), -np.eye(3)])
-    tips = [wish.target + arms for wish in wishes]
+    tips = [term.target + arms for term in targets]
     size = fineness(scene, held, radius)
     place, distance = framed(np.concatenate([outline, *tips, joint_tips(scene, stations, size * radius)]), toward)
 
@@ -215,9 +215,9 @@ def _picture(
     items.extend(joint_items(scene, stations, place, size))
     for pair in pairs:
         items.extend(_contact(pair, place))
-    for k, (wish, point) in enumerate(zip(wishes, drawn, strict=True)):
-        thick = 0.8 * MARK if wish.point.body.faces else size * JOINT
-        items.extend(_wish(f"target {k + 1}", place(wish.target), place(point), thick))
+    for k, (term, point) in enumerate(zip(targets, drawn, strict=True)):
+        thick = 0.8 * MARK if term.point.body.faces else size * JOINT
+        items.extend(_target_items(f"target {k + 1}", place(term.target), place(point), thick))
     for k, shape in enumerate(ellipsoids):
         items.extend(_ellipsoid(f"ellipsoid {k + 1}", shape, place))
     if interference is not None:
