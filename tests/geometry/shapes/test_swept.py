@@ -167,7 +167,7 @@ LINE = asm.NurbsCurve([[0, 0, 0], [1, 0, 0]], [0, 0, 1, 1], 1)
         (lambda: asm.shapes.revolution(LINE), "is a curve in space"),
         (lambda: asm.shapes.revolution([asm.curves.arc(1, 0, 1, (2, 0))] * 2), "profile"),
         (lambda: asm.shapes.loft([LINE]), "curves is 1 curve; expected two or more"),
-        (lambda: asm.shapes.loft([LINE, LINE]), r"curves\[0\] and curves\[1\] are one"),
+        (lambda: asm.shapes.loft([LINE, LINE]), r"curves\[0\] and curves\[1\] are equal"),
         (lambda: asm.shapes.loft([LINE, asm.curves.circle(1)]), r"curves\[1\] is a plane curve"),
         (lambda: asm.shapes.loft([LINE, space(asm.curves.circle(1))]), "closed and open ones"),
         (lambda: asm.shapes.joined(), "shapes are none; expected one or more"),
