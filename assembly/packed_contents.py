@@ -1,4 +1,4 @@
-"""A scene as it is packed for the compiled loop: once after a change, and again where a solve needs more of it.
+"""A scene as it is packed for the compiled loop: once after a change, and again if a solve needs more slots.
 
 More places for contacts of clearances, rows for the corners of contacts, joints for contacts that are lower pairs: what
 a solve has found to need stays with the scene, and states of solutions of before are taken over.

@@ -1,4 +1,4 @@
-"""How one solve is made of attempts: from its start, with more places or rows where it needs them, and from elsewhere.
+"""How one solve is made of attempts: from its start, with more slots or rows if needed, and from other starts.
 
 What is here is told apart by what is in the scene: corners of contacts, clearances, nearest axes, objectives.
 """

@@ -1,4 +1,4 @@
-"""Proof of what clearances promise at the end of a solve: that bodies are clear of each other, or only touch.
+"""Proof of clearances at the end of a solve: bodies are clear of each other, or only touch.
 
 Bodies that touch are not clear. That they do no more is proven where they are clear after a move of one of them by less
 than what is called touching: the least one that opens the contacts that the solve has listed.

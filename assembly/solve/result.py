@@ -1,4 +1,4 @@
-"""What a solve ended with: the state of the loop, and what it says by itself. `Solution` has the rest."""
+"""The end of a solve: the state of the loop, and what follows from it directly. `Solution` has the rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a solve is of, and how it ended: the bodies, contacts and faces that a solution speaks of; its status."""
+"""The bodies, contacts and faces that a solution refers to, and its status."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the loop is told where a solve begins: its options, and what a scene without an objective asks for."""
+"""Settings of the loop at the start of a solve: its options, and those of a scene without an objective."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Proof that bodies are clear, or only touch, where a solve begins: no contact is known there, and none is looked for.
+"""Proof at the start of a solve that bodies are clear or only touch, without any contact.
 
 What opens faces that touch is told by what is recognized of them: flat faces that lie on each other, a body that fills
 a bore; else by what a look leaves open. Where all that tells nothing, contacts of the loop may (`clearance_proof.py`).

@@ -1,4 +1,4 @@
-"""A first solve of a scene with clearances: from the start itself, and from where bodies are put in other ways.
+"""A first solve of a scene with clearances: from the start itself, and from other arrangements of the bodies.
 
 Rows of clearances lead bodies that are in each other by a little. From a start at which bodies are stuck in each other,
 or joints far from holding, they may lead nowhere, and a solve begins where bodies are put together

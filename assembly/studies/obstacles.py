@@ -1,4 +1,4 @@
-"""Which bodies are in the way where a solve that goes on from a pose fails: those without which it would not.
+"""Which bodies are in the way where a solve from a solution fails: those without whose clearances it would succeed.
 
 A solve that fails under clearances leaves bodies clear of each other, and what drives them behind: it does not say who
 stopped it. So the scene is solved with one pair of bodies after the other left out that are nearly in touch, and

@@ -1,4 +1,4 @@
-"""Bodies that are stuck through each other where a solve begins, parted by the least translations that are found.
+"""Bodies that are stuck through each other at the start of a solve, parted by the shortest translations found.
 
 Rows of a clearance lead bodies apart that are in each other by a little. Of those that are stuck through each other, or
 of which one is within the other, rows may lead anywhere: a solve is begun where they are parted as well, and the least

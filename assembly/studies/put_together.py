@@ -1,4 +1,4 @@
-"""Parts put together without clearances first, where a solve begins with what is asked for far from what it is.
+"""Parts put together without clearances first, where a solve starts far from where its constraints hold.
 
 What the other constraints and the objective ask for is the most that a solution can have. Where nothing crosses at that
 pose, it is the solution: no clearance pushes there. To it bodies may pass through each other, as a bolt on the wrong

@@ -1,4 +1,4 @@
-"""A solve that failed, tried again from other starts: that all holds from another start is an answer.
+"""A failed solve tried again from other starts.
 
 The pose that a solve ends at may be one where a sum of violations is least and not zero, a branch on which limits
 cannot hold, or have turns that contradict each other around a loop. Other starts are the end itself, with turns chosen
@@ -73,7 +73,7 @@ def restarted(
         reference, turns = given, None
     settings = settings.copy()
     settings[ITERATIONS] = min(settings[ITERATIONS], STEPS)
-    # From each start as it is, and with its bodies gathered where that fails: the one often does where the other one
+    # From each start as it is, and with its bodies assembled where that fails: the one often does where the other one
     # does not.
     settings[GATHER] = 0.0
     bodies, spread = failed._scene.bodies, Spread.of(failed._packed, failed.q)

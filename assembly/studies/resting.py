@@ -1,4 +1,4 @@
-"""Bodies that an objective draws onto what they fit: a plug into its seat, a lid onto its rim.
+"""Bodies that an objective draws onto faces that they fit: a plug into its seat, a lid onto its rim.
 
 Faces that lie on each other hold as joints do, as long as contact forces push. So where faces of bodies nearly fit,
 the objective is made least with joints in the place of contacts: a solve of few steps, in which no row comes or goes.

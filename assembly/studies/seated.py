@@ -1,4 +1,4 @@
-"""Bodies that are stuck in each other where they nearly fit, put where they do: a shaft into its bore, flush faces.
+"""Bodies that nearly fit moved to where they do: a shaft into its bore, flush faces.
 
 Of a shaft that leans in its bore, a bolt beside its hole or a slider that is off its rail, rows of a clearance are many
 and contradict each other. But where faces conform but for a little play, tilt and shift, it is known where they fit:
@@ -128,8 +128,8 @@ def fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterat
                     flush.append((off, one, other))
             elif one.is_outward != other.is_outward:
                 yield from (NearFit(joint, 0.0) for joint in _round(one, other, axes, names))
-    # The flank of a key is near both the flank of its slot and the wall beyond: it goes with the nearer one. Feet of
-    # a body all go with the one face that they stand on.
+    # The flank of a key is near both the flank of its slot and the wall beyond: it goes with the nearer one.
+    # Projections of a body all go with the one face that they stand on.
     nearest: dict[_Face, float] = {}
     for off, one, other in flush:
         for face in (one, other):

@@ -1,4 +1,4 @@
-"""A start at which all holds already: it is the solution, and comes back as it is, in the time of one check.
+"""A start at which all constraints hold is the solution, returned in the time of one check.
 
 Without an objective nothing asks to move. So before any contact of a clearance is looked for, joints and given contacts
 are evaluated at the start, and of the pairs that clearances keep apart it is proven that they are clear or only touch

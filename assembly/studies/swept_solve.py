@@ -1,4 +1,4 @@
-"""A solve that goes on from another one, asked for its way: it ends where something is in the way.
+"""A solve from a solution with its way: it ends where something is in the way.
 
 Everything that may change between solves, driven values, offsets, limits and targets, goes from what the start was
 solved with to what is asked for, along a line. At parts of this way the scene is solved, each time from the last pose

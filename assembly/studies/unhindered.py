@@ -1,4 +1,4 @@
-"""A warm solve that no clearance hinders: rows are solved without clearances, and what these ask for is proven after.
+"""A warm solve that no clearance hinders: rows are solved without clearances, which are then proven.
 
 A mechanism whose links slide along each other lists hundreds of contacts, none of which pushes: joints alone say where
 all of it goes. So rows alone are solved first, and bodies are proven to be clear, or to touch, at the pose that these

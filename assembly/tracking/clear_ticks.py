@@ -1,4 +1,4 @@
-"""What ticks promise under clearances, proven: at their poses bodies are clear or touch, and on the way to them."""
+"""Proofs of clearances in ticks: bodies are clear or touch at the poses, and on the way to them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Listed contacts that follow bodies which somebody else moves, and the update of what came near them.
+"""Listed contacts that follow bodies whose poses are given, and the update of what came near them.
 
 A contact is carried along the move by the contact velocity formulation,
 

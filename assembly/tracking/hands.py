@@ -1,4 +1,4 @@
-"""Hands of a tracker: springs that hold points and frames, and where they are drawn to from tick to tick."""
+"""Targets of a tracker: springs that draw points and frames from tick to tick."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Manager: which bodies are near each other and where, as somebody else moves them."""
+"""Manager: which bodies are near each other and where, for given poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recorded motions of a hand: where it was at which time, and its motion between the samples.
+"""Recorded motions of a target: samples at times, and interpolation between them.
 
 Between samples a trace is a cubic spline through all of them, with continuous velocity and acceleration, so that a
 hand recorded at 60 Hz can be followed at 1000. Orientations are the normalized spline of quaternions that are first

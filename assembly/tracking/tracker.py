@@ -1,4 +1,4 @@
-"""Tracker: poses that follow a hand, one call of the compiled loop a tick."""
+"""Tracker: poses that follow targets, one call of the compiled loop for each tick."""
 
 from __future__ import annotations
 

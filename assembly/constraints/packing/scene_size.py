@@ -1,4 +1,4 @@
-"""The length by which a scene is scaled: what its own lengths say, whatever their unit."""
+"""The length by which a scene is scaled, from the scene's own lengths, whatever their unit."""
 
 from __future__ import annotations
 

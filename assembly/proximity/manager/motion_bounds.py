@@ -1,4 +1,4 @@
-"""How far a pair of bodies may go until it is looked at again, and which part of that it has gone.
+"""How far a pair of bodies may move until its next update, and which part of that it has used.
 
 What an update does not list is farther than the pair's motion bound: until a point of one body has moved by that much,
 seen from the other, it cannot touch. It is the smaller one whose motion is measured (`mover`): a wide plate's rim moves

@@ -1,4 +1,4 @@
-"""The global manager's kernel: which pairs of bodies are looked at, which contacts between them are listed.
+"""An update of the contact manager: which pairs of bodies are searched, and which of their contacts are listed.
 
 Every body carries a tree of patches (`proximity/bvh/tree.py`). An update at a pair of bodies descends their trees,
 finds the pairs of patches that may hold an extremum of the distance within the pair's query margin, and the extrema by

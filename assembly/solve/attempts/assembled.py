@@ -1,4 +1,4 @@
-"""Turns chosen where scattered bodies were put together, and the loop from there.
+"""Revolution counts chosen where scattered bodies were put together, and the loop from there.
 
 Poses do not tell how often a body has turned, and turns are chosen for the poses a loop begins at (`Turns`). Those of
 scattered bodies say nothing: a body that gathering turns by half a turn would be on a turn that its limits, or other
@@ -25,7 +25,7 @@ Run = Callable[[Table, Array, Array], Outcome]
 
 
 def run_gathered(packed: Packed, table: Table, settings: Array, state: Array, turns: Array | None, run: Run) -> Outcome:
-    """The outcome of the loop from a state whose bodies are gathered, if they are scattered, on turns they have then.
+    """The outcome of the loop from a state whose bodies are assembled, if they are scattered, on turns they have then.
 
     `turns` are the values that angles are near, zeros by default; `run` is the loop on a table, with settings, from a
     state.
@@ -55,7 +55,7 @@ def _choose_turns(packed: Packed, state: Array, turns: Array | None) -> None:
 
 
 def _assembled(packed: Packed, table: Table, settings: Array, given: Array, turns: Array | None, run: Run) -> Outcome:
-    """The outcome of the loop from where bodies are gathered, with the turns that they have there."""
+    """The outcome of the loop from where bodies are assembled, with the turns that they have there."""
     onward = settings.copy()
     onward[GATHER] = ASSEMBLES
     state = run(table, onward, given.copy()).state

@@ -1,4 +1,4 @@
-"""The loop on a packed scene, and again another way where it did not end SOLVED."""
+"""The loop on a packed scene, and other attempts if it did not end SOLVED."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def _attempt(
 def begin(
     packed: Packed, interruption: Interruption, table: Table, settings: Array, state: Array, turns: Array | None
 ) -> Outcome:
-    """The outcome of the loop from a state, with turns chosen anew where bodies are gathered; see `attempt`."""
+    """The outcome of the loop from a state, with turns chosen anew where bodies are assembled; see `attempt`."""
     if packed.chooses_turns and settings[GATHER] > 0.0:
         return run_gathered(packed, table, settings, state, turns, partial(_run, packed, interruption))
     return _run(packed, interruption, table, settings, state)

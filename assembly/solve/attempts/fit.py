@@ -1,4 +1,4 @@
-"""Rows that repeat each other and disagree a little, as those of CAD files do: held as well as they can be.
+"""Redundant rows that disagree slightly, as those of CAD files do, held as well as possible.
 
 Where |c|^2 is stationary, J^T c = 0, rows are off by a combination of them that no motion changes. Their values moved
 by it agree, and the loop goes on with these; what they were moved by is the disagreement.
@@ -95,7 +95,7 @@ def _fitted_from(twin: Packed, settings: Array, outcome: Outcome, loop: Loop) ->
     onward = settings.copy()
     onward[GATHER], onward[PENALTY] = 0.0, settings[PENALTY_FLOOR]
     at = twin.results_at
-    # Of bodies that were gathered the least move was that from there; it is not looked for anew from the start.
+    # Of bodies that were assembled the least move was that from there; it is not looked for anew from the start.
     gathered = twin.table[IMPLICIT] == 1 and settings[GATHER] == 1.0 and outcome.state[at + SCATTER] == 1.0
     run, pool = loop.begin if gathered else loop.go_on, twin.pool.copy()
     moved: Array | None = None

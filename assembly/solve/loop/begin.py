@@ -1,4 +1,4 @@
-"""How a solve begins: its state read, its contacts found, scattered bodies gathered."""
+"""The beginning of a solve: its state is read, its contacts are found, scattered bodies are assembled."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def find_contacts(program, settings, state, current, rows, n):
 
 @kernel(inner=True)
 def put_together(program, current, rows):
-    """Gather scattered bodies, and begin again from there; returns the contact that has no pair, or -1."""
+    """Assemble scattered bodies, and begin again from there; returns the contact that has no pair, or -1."""
     store, lifted = program.store, program.lifted
     header = header_at(store.table, 0)
     free, lengths, memory = lifted.free, lifted.lengths, lifted.memory
@@ -149,7 +149,7 @@ def put_together(program, current, rows):
 
 @kernel(inline=True, allocates=True)
 def set_out(program, settings, state, current, rows, n):
-    """Find contacts, evaluate rows, gather what is scattered where the settings ask for it.
+    """Find contacts, evaluate rows, assemble scattered bodies where the settings ask for it.
 
     Returns CONTACT_LOST, GATHERED or RUNNING, the contact that is lost or -1, and whether that one is at a fold, to be
     freed.

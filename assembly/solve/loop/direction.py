@@ -1,4 +1,4 @@
-"""The step from a point: the system that gives it, rows foreseen to bind, how much of it may be taken."""
+"""The step from an iterate: its linear system, prediction of active rows, bounds of its length."""
 
 from __future__ import annotations
 

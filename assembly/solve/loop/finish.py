@@ -1,4 +1,4 @@
-"""How a solve ends: what crosses is told, the last pose that held brought back, the pose judged as it is returned."""
+"""The end of a solve: crossings are reported, the last pose that held is restored, the returned pose is judged."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def finish(program, settings, state, iterates, rows, system, at_end):
         result.last_feasible = 1.0
     gathered = header.implicit == 1 and limits.gather > 0.0 and result.scatter == 1.0
     if gathered:
-        # The way from where bodies were gathered was as short as could be; it is measured from where they were given.
+        # The way from where bodies were assembled was as short as could be; it is measured from where they were given.
         scaled_poses(store, state, trial.q)
         recenter(store, trial.q)
     write_pose(store, current.q, state)

@@ -1,4 +1,4 @@
-"""The loop's multipliers: which rows push and how hard, and which of several proposals balances the objective best."""
+"""Multipliers: which rows push and how hard, and which of several candidates balances the objective best."""
 
 from __future__ import annotations
 

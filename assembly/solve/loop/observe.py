@@ -1,4 +1,4 @@
-"""The first two phases of a step: what is near, and what rows and objective are at the current iterate."""
+"""The first two phases of a step: update of the contact manager, and evaluation of rows and objective."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The policy for rows that gain nothing: they are restored alone, to see whether they can hold at all.
+"""The policy for rows that gain nothing: restoration of the rows alone, to see whether they can hold.
 
 Restoring, steps minimize |c|^2 / 2: f = 0, y = 0, mu = 1. Where that is stationary and rows are off, they contradict
 each other nearby.

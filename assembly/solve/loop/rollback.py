@@ -1,4 +1,4 @@
-"""Back from where bodies have sunk into each other: from there rows lead out on either side, the far one as well.
+"""Return to the last pose at which nothing crossed, because from crossed poses rows may lead out on the far side.
 
 In a step bodies may go as far as their motion bounds allow, and a contact may slide around a thin wire on the way.
 Where bodies overlap by more than half their least radius of curvature, the side they came from is unknown, and where

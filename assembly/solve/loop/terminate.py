@@ -1,4 +1,4 @@
-"""The third phase of a step: whether the solve has arrived, or its time is over; what holds is kept."""
+"""The third phase of a step: whether the solve has arrived or its time is over; feasible iterates are kept."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The shortest way back onto the rows, where the time of a solve or a tick is over and they do not hold yet."""
+"""The shortest way back onto the rows, where a solve or tick is out of time and they do not hold yet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scene whose tip is drawn to places, one after the other, with nothing else that it is to do."""
+"""A scene whose tip is drawn to points, one after the other, with no other objective."""
 
 from __future__ import annotations
 
