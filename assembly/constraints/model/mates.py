@@ -1,7 +1,7 @@
 """Mates: joints of faces and edges, by their kinds. Each says how many of six degrees of freedom it takes away.
 
     top, foot = plate.faces(">Z"), bracket.faces("<Z")
-    asm.Flush(top, foot)                                                   # face on face: 3
+    asm.Flush(top, foot)                                             # face on face: 3
     asm.Insert(plate.faces.cylinders(hole=True).near(p), bolt.faces.cylinders(radius=3))     # hole and shank: 5
 
 They are joints of frames that faces and edges have (`face.frame()`), so coordinates, driven values and limits are those
