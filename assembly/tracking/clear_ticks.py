@@ -16,7 +16,7 @@ from assembly.solve.solution import Solution
 __all__ = ["ClearTicks", "WayLimits"]
 
 Array = NDArray[np.float64]
-# Pairs of nodes that a tick looks at for a pair of bodies.
+# Pairs of nodes that a tick processes for a pair of bodies.
 BUDGET = 4000
 # How deep the way of a contact that rolls may go in, in parts of the square of its length over the least radius: a
 # chord of a curve of radius r is s^2 / (8 r) off it, there are two, and a contact may go farther than the bodies.
@@ -32,7 +32,7 @@ NEAR = 1e-2
 
 
 class _Standing:
-    """Where bodies of a solution stand, and which contacts are near there, once that is asked."""
+    """Poses of the bodies of a solution, and the contacts that are near there, found when they are first needed."""
 
     def __init__(self, solution: Solution) -> None:
         self.solution = solution
@@ -51,12 +51,12 @@ class _Standing:
 
 
 class WayLimits(NamedTuple):
-    """Where ways of bodies that touch end to be known.
+    """Limits of what is proven of ways of bodies that touch.
 
     Attributes
     ----------
     sampled : float
-        How far bodies whose faces lie on each other may go in one way, in parts of their size.
+        How far bodies whose faces lie on each other may move in one way, in parts of their size.
     depth : float
         How deep a way may go in, in the unit of the scene.
     """
@@ -68,9 +68,9 @@ class WayLimits(NamedTuple):
 class ClearTicks:
     """The proofs of the pairs that a tracker's clearances keep apart, from tick to tick.
 
-    At its pose a tick is proven to what is called touching. The straight way between two ticks that touch goes in by
-    what is quadratic in its length: what is proven is the way of bodies that are opened by so much, from the last pose,
-    where they are opened, to this one, where they are closed again.
+    The pose of a tick is proven up to `touching`. On the straight way between two ticks bodies that touch overlap by an
+    amount that is quadratic in its length. What is proven is the way of bodies that are moved apart by that amount at
+    the last pose, and moved back at this one.
 
     Parameters
     ----------
@@ -85,11 +85,11 @@ class ClearTicks:
     Attributes
     ----------
     doubtful : dict of int -> Answer
-        Where the last tick does not hold, or the first one: the pairs of which it is not known.
+        If the last tick does not hold, or the first one: the pairs that are not proven.
     proved : bool
         Whether all pairs were proven clear, or touching, at the last tick that holds; else faces lie on each other.
     way_depth : float
-        How deep bodies may be in each other on the way to it, at most.
+        The largest overlap of bodies on the way to it.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class ClearTicks:
         there, moves = _Standing(solution), self._moves
         self.way_depth = 0.0
         rolling, last = self._rolling(there), proof.last_poses()
-        # Contacts stay for many ticks, and so does what opens them.
+        # Contacts, and the moves that open them, stay for many ticks.
         if not rolling and proof.stays_clear(there.q, touching, moves):
             self._at, self.proved = there, True
             return True
