@@ -168,8 +168,7 @@ def patch_at(posed, side, e):
 
 @kernel(inner=True)
 def projection_at(posed, side, e, y):
-    """The signed distance of a point from its projection at one body's element e, the normal there, and whether there
-    is one.
+    """Signed distance of a point from its projection at one body's element e, the normal there; whether there is one.
 
     A projection that Newton's method did not reach is none: off the projection of a point outside, the tangent plane of
     a bulge has it inside. One farther off than BESIDE may be on the far side.
