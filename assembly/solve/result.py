@@ -59,7 +59,7 @@ class Result(ReadOnlyArrays):
     _clear: Sequence[PairAnswer] = ()
     # Of a tick: whether samples stand for its proof.
     _is_sampled = False
-    # What bodies may be in each other and still touch, in parts of the scene's size.
+    # How much bodies may overlap and still count as touching, in parts of the scene's size.
     _touching = Options.touching
     # What the objective asked for; flat contacts alone need it again, for the center of their pressure.
     _targets: Array | None = None

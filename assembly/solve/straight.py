@@ -1,9 +1,9 @@
 """A solve that goes on from a solution by the loop alone, as nearly all of them do.
 
-What `Assembly.solve` may have to try besides (corners, places for contacts, bodies put together, rows that disagree,
-saddles, other starts) asks its questions in every solve, and these took 2 of the 5 microseconds that a warm solve is
-in Python. Here they are asked once a scene (`Packed.is_loop_alone`), and of the end nothing but whether the loop
-arrived. Where it did not, nothing has happened, and the solve begins with all there is.
+Whether `Assembly.solve` needs more than the loop (corners, slots for contacts, bodies put together, rows that disagree,
+saddles, other starts) was asked in every solve, and took 2 of the 5 microseconds that a warm solve spends in Python.
+Here it is asked once for a scene (`Packed.is_loop_alone`), and of the end only whether the loop arrived. If it did not,
+the solve begins anew with everything it may need.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, has_objective: bool) -> Solution | None:
-    """What the loop arrives at from a solution, for a scene as it is packed; None where it takes more, or may.
+    """The solution at which the loop arrives from another one, for a scene as it is packed; None if more may be needed.
 
     Parameters
     ----------
