@@ -1,4 +1,4 @@
-"""Arrays in a block of memory that somebody else holds.
+"""Arrays carved from a block of memory that the caller owns.
 
 An array of its own costs a kernel some hundred nanoseconds: to allocate it, to count references to it wherever it goes,
 to free it. A tick of some microseconds works in thirty. Those that are carved from one block cost nothing, and do not

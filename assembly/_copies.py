@@ -1,4 +1,4 @@
-"""Copies that are their own: what changes in one of two objects does not change in the other."""
+"""Independent copies: what changes in one of two objects does not change in the other."""
 
 from __future__ import annotations
 

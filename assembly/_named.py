@@ -1,4 +1,4 @@
-"""Results by name: a dictionary that says which names there are where it is asked for another one."""
+"""Results by name: a dictionary that lists its names where an unknown one is asked for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Long work that can be watched: a bar of tqdm, or a function of the user's that hears how far it is."""
+"""Progress of long work: a bar of tqdm, or a function of the user's that is called with numbers done and in all."""
 
 from __future__ import annotations
 

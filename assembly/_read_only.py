@@ -1,4 +1,4 @@
-"""Arrays that nobody writes to: writing to what an attribute gives would change nothing, and say nothing."""
+"""Read-only arrays of attributes: writing to them would change nothing, so it raises."""
 
 from __future__ import annotations
 

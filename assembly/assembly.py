@@ -1,4 +1,4 @@
-"""Assembly: bodies, what must hold between them, what is wished for, and the solve."""
+"""Assembly: bodies, constraints between them, objectives, and the solve."""
 
 from __future__ import annotations
 

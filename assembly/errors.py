@@ -1,4 +1,4 @@
-"""What is raised on purpose, and the checks of arguments that raise it.
+"""Errors that this package raises on purpose, and the checks of arguments that raise them.
 
 Bad input raises `InputError` at once. Its text names the argument, what came and what was expected.
 """

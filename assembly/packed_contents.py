@@ -1,7 +1,7 @@
-"""A scene as it is packed for the compiled loop: once after a change, and again where a solve needs more of it.
+"""A scene as it is packed for the compiled loop: once after a change, and again if a solve needs more slots.
 
-More places for contacts of clearances, rows for the corners of contacts, joints for contacts that are lower pairs: what
-a solve has found to need stays with the scene, and states of solutions of before are taken over.
+More slots for contacts of clearances, rows for corners of contacts, joints for contacts that are lower pairs: what a
+solve was found to need stays with the scene, and states of earlier solutions are converted.
 """
 
 from __future__ import annotations
@@ -65,9 +65,10 @@ class PackedContents(Contents):
         self._packings: dict[tuple[tuple[int, Seat], ...], tuple[Packed | None, Scene | None]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """What pickles and deep copies have: what the scene is of, and not how it is packed, which takes 100 times it.
+        """State for pickles and deep copies: what the scene is made of, without its packing, which is 100 times as
+        large.
 
-        That a solve needed more places or rows of corners is kept: the copy solves as the original does.
+        That a solve needed more slots or rows of corners is kept, so that the copy solves as the original does.
         """
         other = copy(self)
         return {**other.__dict__, "_corners": self._corners}
@@ -154,7 +155,7 @@ class PackedContents(Contents):
         self._packed = packed
 
     def _pack_with_more_places(self) -> Packed:
-        """The scene packed again, with more places for contacts of clearances. What is proven of its pairs stays."""
+        """The scene packed again, with more slots for contacts of clearances. Proofs of its pairs are kept."""
         before = self.packed()
         self._crowding *= MORE_PLACES
         packed = self._pack(before)

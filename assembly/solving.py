@@ -1,4 +1,4 @@
-"""How one solve is made of attempts: from its start, with more places or rows where it needs them, and from elsewhere.
+"""How one solve is made of attempts: from its start, with more slots or rows if needed, and from other starts.
 
 What is here is told apart by what is in the scene: corners of contacts, clearances, nearest axes, objectives.
 """
@@ -44,7 +44,7 @@ AT_KINKS = (Status.STALLED, Status.ITERATION_LIMIT, Status.INFEASIBLE, Status.CO
 class Solving(PackedContents):
     """The solves that `Assembly.solve` is made of; see `Assembly`."""
 
-    # Whether solves that fail are left at that: what goes along a branch is to end where the branch does.
+    # Whether failed solves are not tried from elsewhere: following a branch has to end where the branch does.
     _stays_near = False
 
     @property
@@ -61,7 +61,7 @@ class Solving(PackedContents):
         options: dict[str, Any],
         interruption: Interruption,
     ) -> Solution:
-        """A solve that failed, again with other axes or from elsewhere, where that may help."""
+        """Try a failed solve again, with other axes or from other starts, where that may help."""
         if self._stays_near:
             return solution
         if solution.axes and not isinstance(q0, Solution) and not swept:
@@ -81,7 +81,7 @@ class Solving(PackedContents):
         return solution
 
     def _settings(self, options: dict[str, Any], interruption: Interruption, warm: bool) -> Array:
-        """What the loop is told."""
+        """Settings of the loop."""
         settings = scene_settings(options, interruption, bool(self._objectives), warm)
         if options.get("keep_topology") and self.packed().keeps_apart:
             settings = settings.copy()
@@ -95,7 +95,7 @@ class Solving(PackedContents):
         options: dict[str, Any],
         interruption: Interruption,
     ) -> Solution:
-        """A solve from this start and no other one."""
+        """A solve from this start only."""
         self._take_seats(q0, starts)
         settings = self._settings(options, interruption, isinstance(q0, Solution))
         solution = self._solved_or_standing(q0, settings, starts, options, interruption)
@@ -119,14 +119,14 @@ class Solving(PackedContents):
         if not self._objectives and isinstance(q0, Solution):
             from assembly.studies.unhindered import unhindered
 
-            # Where no clearance pushes, rows alone say where all of it goes.
+            # If no clearance pushes, the other rows alone determine the solution.
             solution = unhindered(self._scene_itself, q0, settings, starts, interruption)
             if solution is not None:
                 return solution
         if not self._objectives and not (isinstance(q0, Solution) and q0._lists is None):
             from assembly.studies.standing_start import standing_start
 
-            # Nothing asks to move: where all holds at the start, that is the solution.
+            # Nothing requires a move: if all holds at the start, that is the solution.
             solution = standing_start(self._scene_itself, q0, settings, starts, interruption)
             if solution is not None:
                 return solution
@@ -137,7 +137,7 @@ class Solving(PackedContents):
         return first_solve(self._scene_itself, self._given(q0), settings, starts, options, interruption)
 
     def _at_corners(self, ended: Solution, again: Callable[[], Solution]) -> Solution:
-        """A solve that begins again with the corners of contacts of solids listed; where it fails, what ended before.
+        """A solve that begins again with the corners of contacts of solids listed; the earlier end if it fails.
 
         Solids that come to lie on each other touch at several corners, and the gap of their contact has a kink there.
         """
@@ -149,7 +149,7 @@ class Solving(PackedContents):
         self._pack(packed)
         solution = again()
         if not solution.success:
-            # The scene is as it was: rows of corners cost time.
+            # The packing without corners is restored: their rows cost time.
             self._packed, self._scene, self._corners = packed, scene, False
             return ended
         solution.seconds += ended.seconds
@@ -165,15 +165,14 @@ class Solving(PackedContents):
         turns: Array | None = None,
         judges: bool = True,
     ) -> Solution:
-        """A solve from q0, with as many places for contacts of clearances as it turns out to need.
+        """A solve from q0, with as many slots for contacts of clearances as it needs.
 
-        Postures are measured from q0, or from a reference (n, 7). `turns` are the values that angles are near where
-        these start on a turn of their own. What is only on the way somewhere needs no proof: then nothing judges the
-        end but the loop.
+        Postures are measured from q0, or from a reference (n, 7). `turns` are values near which angles start, which
+        determine their revolution counts. An intermediate solve needs no proof: then only the loop judges its end.
         """
         spent = 0.0
         if isinstance(q0, Solution):
-            # It may take more places, and another packed scene.
+            # It may need more slots, and another packed scene.
             q0._list_contacts()
         while True:
             packed = self.packed()

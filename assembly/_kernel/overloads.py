@@ -1,4 +1,4 @@
-"""Kernels that kernels call: what Numba is told of them, when it is to compile one and not before."""
+"""Kernels that kernels call: Numba is told of them when it compiles one, and not before."""
 
 from __future__ import annotations
 

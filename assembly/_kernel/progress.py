@@ -1,4 +1,4 @@
-"""What is said while kernels compile: how many, for what, about how long, and how far it is."""
+"""Messages while kernels compile: how many, for what, about how long, and how far."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The source files on which a kernel's machine code depends: its module's own, and those that this one imports.
+"""The source files on which a kernel's machine code depends: its module, and those that it imports.
 
 Numba's disk cache looks at a kernel's own file alone. Here every file counts that the module reaches by import
 statements, so that an edit is seen by the entries that it may change, and by no others. Kernel files import by

@@ -1,4 +1,4 @@
-"""What compiles kernels, by a name that a user can read: entries of one name can be exchanged, others cannot."""
+"""The toolchain that compiles kernels, as a name: entries of one name can be exchanged, others cannot."""
 
 from __future__ import annotations
 

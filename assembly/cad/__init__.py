@@ -1,4 +1,4 @@
-"""Parts and assemblies of CadQuery and build123d, in memory: solved where they stand, and as bodies.
+"""Parts and assemblies of CadQuery and build123d, in memory: solved in place, and as bodies.
 
 Neither of the two libraries is imported by this package: who calls it has one of them already.
 """

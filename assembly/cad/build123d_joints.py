@@ -1,4 +1,4 @@
-"""Joints of build123d that `connect_to` has tied, as ours: with their ranges, from where the parts stand.
+"""Joints of build123d connected by `connect_to`, as joints of this package with their ranges.
 
 build123d places the second part of each tie for itself, in the order of the calls; a loop that the last call closes is
 open elsewhere. With A, B the placements of the parts, J of the joint on the first and K of the one on the second:

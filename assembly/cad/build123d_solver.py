@@ -1,4 +1,4 @@
-"""Parts of build123d that joints tie as a scene of bodies without shapes, and the solve that moves them."""
+"""Joined parts of build123d as a scene of bodies without shapes, and the solve that moves them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Constraints of CadQuery as joints: what each kind asks for.
+"""Constraints of CadQuery as joints: what each kind requires.
 
 With p, o points and d, n unit directions of the markers where the parts stand, and v the value:
 

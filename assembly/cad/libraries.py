@@ -1,4 +1,4 @@
-"""Objects of libraries that are imported by who made the objects, and not by this package."""
+"""Objects of libraries that the user has imported; this package does not import them."""
 
 from __future__ import annotations
 

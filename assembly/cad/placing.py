@@ -1,4 +1,4 @@
-"""Assemblies of other libraries put to where a solution has their bodies."""
+"""Assemblies of other libraries moved to the poses of a solution."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Assemblies of other libraries, solved where they stand."""
+"""Assemblies of other libraries, solved in place."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What must hold between bodies, and what is wished for."""
+"""Constraints between bodies, and objectives."""

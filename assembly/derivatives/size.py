@@ -1,4 +1,4 @@
-"""What an objective owes to the scene's size: a posture counts turns of bodies without a shape by half of it.
+"""The dependence of an objective on the scene's size: a posture weights turns of bodies without a shape by half of it.
 
 A frame placed anew, or a distance that is longer than the bodies, may make the scene larger, and a turn in a posture
 weightier. All else that is divided by the size is multiplied by it again.

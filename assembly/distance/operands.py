@@ -1,4 +1,4 @@
-"""What certified queries take: curves, surfaces, points and convex hulls, looked at before a kernel sees them."""
+"""Operands of certified queries: curves, surfaces, points and convex hulls, checked before a kernel reads them."""
 
 from __future__ import annotations
 

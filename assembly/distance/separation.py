@@ -1,4 +1,4 @@
-"""What a certified distance query answers: two bounds that are true, and the points that prove the upper one.
+"""The answer of a certified distance query: two true bounds, and the points that prove the upper one.
 
     lower <= d <= upper,    d = min |a(s) - b(t)|
 

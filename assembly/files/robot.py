@@ -1,4 +1,4 @@
-"""A robot: links as bodies, the joints between them, and what the links weigh."""
+"""A robot: links as bodies, the joints between them, and the links' masses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was set anew since the program began, counted and by name: what packed scenes are compared with.
+"""What was set since the program began, counted and by name: packed scenes are compared with it.
 
 A scene packed at another count looks whether the change is one of its own; where the counts are the same it need not.
 The last things whose numbers were set are remembered, so that a scene writes only what depends on them.

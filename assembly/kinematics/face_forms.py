@@ -1,4 +1,4 @@
-"""What a face is, for those who select faces and mate them: its kind, and the axis, radius and center of that."""
+"""The kind of a face, and its axis, radius and center, for selections and mates."""
 
 from __future__ import annotations
 

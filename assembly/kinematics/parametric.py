@@ -1,4 +1,4 @@
-"""Parametric: a shape that a function makes of numbers, so that these may be set anew."""
+"""Parametric: a shape that a function makes of numbers, which can be set."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Triangles that a body is drawn with where it has no exact faces, or where these are not what it looks like."""
+"""Triangles that are drawn for a body that has no exact faces, or instead of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a body weighs: by the density that it has and what its faces enclose."""
+"""Mass properties of a body, from its density and what its faces enclose."""
 
 from __future__ import annotations
 

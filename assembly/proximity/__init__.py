@@ -1,4 +1,4 @@
-"""Where two shapes are closest, how sure we are, and how that moves."""
+"""Nearest and extremal points of shapes, with certificates, and their motion."""
 
 from __future__ import annotations
 

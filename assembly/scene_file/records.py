@@ -1,4 +1,4 @@
-"""How values stand in a document: each form writes what it reads, and things are lists of fields of such forms."""
+"""How values are written and read: each form writes what it reads, and things are lists of fields of such forms."""
 
 from __future__ import annotations
 

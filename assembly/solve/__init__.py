@@ -1,1 +1,1 @@
-"""From constraints to poses: the loop, its options, and what it hands back."""
+"""From constraints to poses: the loop, its options and its results."""

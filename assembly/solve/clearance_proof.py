@@ -1,7 +1,7 @@
-"""Proof of what clearances promise at the end of a solve: that bodies are clear of each other, or only touch.
+"""Proof of clearances at the end of a solve: bodies are clear of each other, or only touch.
 
-Bodies that touch are not clear. That they do no more is proven where they are clear after a move of one of them by less
-than what is called touching: the least one that opens the contacts that the solve has listed.
+Bodies that touch are not clear. That they only touch is proven if they are clear after a move of one of them by less
+than `touching`: the least move that opens the contacts that the solve has listed.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ __all__ = [
 Array = NDArray[np.float64]
 # Contacts that are open by less than so many times how far a body may be moved are in its way.
 NEAR = 2.0
-# Moves that are tried for contacts that no row tells of.
+# Moves that are tried for contacts without a row.
 TRIES = 3
 # Pairs of nodes that a look may take where bodies conform, or on the way from the last poses.
 FEW = 500
@@ -138,9 +138,10 @@ def can_prove(packed: Packed) -> bool:
 
 
 def judge_end(solution: Solution, settings: NDArray[np.float64], interruption: Interruption) -> None:
-    """Have a solution under clearances STALLED where it is not known that its bodies are clear.
+    """Set a solution under clearances to STALLED if its bodies are not known to be clear.
 
-    Where any pose does, and the loop ended because of a crossing, one that holds is a solution if all is proven.
+    Without an objective, if the loop ended because of a crossing, a pose at which rows hold is a solution if all is
+    proven.
     """
     if solution._is_lost or (interruption.is_over() and not solution.success):
         return
@@ -283,14 +284,14 @@ def _open_recognized(proof: ClearanceProof, q: Array, touching: float) -> set[in
 
 
 def nothing_known() -> None:
-    """Nothing is known of where bodies touch."""
+    """No normals: nothing is known of where bodies touch."""
     return None
 
 
 def _first_looks(proof: ClearanceProof, q: Array, touching: float, wedged: set[int]) -> list[Answer]:
     """What is proven of all pairs where their moves open them; of those that nothing opens, whether they cross.
 
-    No look tells that bodies conform: it would spend all that it may.
+    No look can prove that bodies conform: it would spend its whole budget.
     """
     asked = [k for k in range(len(proof.pairs)) if k not in wedged]
     answers = dict(zip(asked, proof.look(q, touching, proof.moves, which=asked), strict=True))

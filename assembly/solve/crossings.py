@@ -1,10 +1,9 @@
 """Bodies that cross at the pose of a solution.
 
-Of all pairs of bodies those are looked at whose boxes meet: bodies are within the hulls of their control points. A
-proof tells what they are to each other (`proximity/clearance/proof.py`), of most in one look. Of pairs with flat faces
-that lie on each other one body is moved off these before, by less than what is called touching; others that touch are
-moved along the directions that a look leaves open; what fills a bore is made slimmer. Where none of this tells, samples
-do (`samples.py`).
+Pairs of bodies are considered whose boxes meet: bodies are within the hulls of their control points. A proof decides
+(`proximity/clearance/proof.py`), for most in one look. If flat faces lie on each other, one body is first moved off
+them by less than `touching`; others that touch are moved along the directions that a look leaves open; what fills a
+bore is made slimmer. If none of this decides, samples do (`samples.py`).
 """
 
 from __future__ import annotations
@@ -56,7 +55,7 @@ Pair = tuple[Body, Body]
 Normal = Callable[[], Array | None]
 # Pairs whose proofs are made at once.
 AT_ONCE = 64
-# Moves that are tried for what a look leaves open.
+# Moves that are tried for pairs of nodes that a look leaves open.
 TRIES = 2
 # What rounding may make of boxes, in parts of where they end.
 END_ROUNDING = 1e-12
@@ -227,7 +226,7 @@ def looks_at(
 
 
 def _unknown() -> None:
-    """Nothing is known of where bodies touch."""
+    """No normals: nothing is known of where bodies touch."""
     return None
 
 

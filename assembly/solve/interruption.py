@@ -1,4 +1,4 @@
-"""What ends a solve before it is done: a time limit, a callback of the user's, Ctrl-C.
+"""What can end a solve early: a time limit, a callback of the user's, Ctrl-C.
 
 The compiled loop runs without the interpreter. Every 50 ms at most (`solve/loop/pauses.py`) it calls an address in its
 settings: there the interpreter runs again, so that handlers of signals do, and an answer other than 0 ends the loop. An

@@ -1,4 +1,4 @@
-"""What a solve can be told."""
+"""Options of a solve."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a solve ended with: the state of the loop, and what it says by itself. `Solution` has the rest."""
+"""The end of a solve: the state of the loop, and what follows from it directly. `Solution` has the rest."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ class Result(ReadOnlyArrays):
     _clear: Sequence[PairAnswer] = ()
     # Of a tick: whether samples stand for its proof.
     _is_sampled = False
-    # What bodies may be in each other and still touch, in parts of the scene's size.
+    # How much bodies may overlap and still count as touching, in parts of the scene's size.
     _touching = Options.touching
     # What the objective asked for; flat contacts alone need it again, for the center of their pressure.
-    _wishes: Array | None = None
+    _targets: Array | None = None
 
     def __init__(
         self,
@@ -85,7 +85,7 @@ class Result(ReadOnlyArrays):
         # What it was solved with: a solve that goes on from it may ask for the way.
         self._asked = packed.asked
         if scene.contacts:
-            self._wishes = packed.rows_pool[scene.wished(packed)].copy()
+            self._targets = packed.rows_pool[scene.target_places(packed)].copy()
 
     def _list_contacts(self) -> None:
         """List the contacts of clearances, unless they are: a start that holds is returned before any is looked for."""
@@ -222,10 +222,10 @@ class Result(ReadOnlyArrays):
         frames = standing(coordinate, self.q, places)
         return measure(coordinate, frames, 0.0 if near is None else float(state[packed.angles][near]))
 
-    def _wished_pool(self) -> Array:
+    def _pool_as_solved(self) -> Array:
         """The pool with the objective as it was in this solve."""
         pool = self._packed.pool.copy()
-        pool[self._scene.wished(self._packed)] = self._wishes
+        pool[self._scene.target_places(self._packed)] = self._targets
         return pool
 
     def pose(self, body: Body | str) -> Pose:

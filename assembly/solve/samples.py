@@ -1,4 +1,4 @@
-"""Which bodies an update of a contact manager finds to be in each other, where no proof tells.
+"""Which bodies overlap by the samples of a contact manager, where no proof decides.
 
 Updates go on in slices, between which the interpreter runs, so that Ctrl-C and a time limit are answered.
 """

@@ -1,4 +1,4 @@
-"""What a solve is of, and how it ended: the bodies, contacts and faces that a solution speaks of; its status."""
+"""The bodies, contacts and faces that a solution refers to, and its status."""
 
 from __future__ import annotations
 
@@ -63,17 +63,17 @@ class Scene:
         self.seats = seats
         # Joints of nearest axes: what these were where the solve began.
         self.axes: dict[str, Sense] = {}
-        self._wished: slice | NDArray[np.int64] | None = None
+        self._target_places: slice | NDArray[np.int64] | None = None
 
     def of_size(self, scale: float) -> Scene:
         """The same with another size."""
         other = Scene(self.bodies, self.constraints, self.contacts, self.sides, scale, self.seats)
-        other.axes, other._wished = self.axes, self._wished
+        other.axes, other._target_places = self.axes, self._target_places
         return other
 
-    def wished(self, packed: Packed) -> slice | NDArray[np.int64]:
+    def target_places(self, packed: Packed) -> slice | NDArray[np.int64]:
         """Where the pool has what the objective asks for and may change between solves: targets and postures."""
-        if self._wished is None:
+        if self._target_places is None:
             table = packed.rows_table
             records = table[table[TERM_TABLE] :][: TERM * table[TERMS]].reshape(-1, TERM)
             sizes = {POINT_DISTANCE: 7, POSTURE: POSTURE_PARAMETERS}
@@ -81,8 +81,8 @@ class Scene:
             found = np.concatenate([*places, np.empty(0, dtype=np.int64)]).astype(np.int64)
             # Of one term it is a slice, which is read in less time.
             is_one = len(found) > 0 and bool((np.diff(found) == 1).all())
-            self._wished = slice(int(found[0]), int(found[-1]) + 1) if is_one else found
-        return self._wished
+            self._target_places = slice(int(found[0]), int(found[-1]) + 1) if is_one else found
+        return self._target_places
 
     def index(self, body: Body | str) -> int:
         """Place of a body, given itself or its name."""

@@ -1,4 +1,4 @@
-"""What the loop is told where a solve begins: its options, and what a scene without an objective asks for."""
+"""Settings of the loop at the start of a solve: its options, and those of a scene without an objective."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ __all__ = ["scene_settings"]
 Array = NDArray[np.float64]
 
 
-def _made(options: Options, wishes: bool, warm: bool) -> Array:
+def _made(options: Options, has_objective: bool, warm: bool) -> Array:
     """Settings of their own: without an objective any pose will do, and a start with one may stray."""
     settings = CTRL_C.fill(options.settings(warm))
-    if not wishes:
+    if not has_objective:
         settings[ANY_POSE] = 1.0
         settings[GATHER] = 0.0 if warm else 1.0
     elif not warm:
@@ -27,11 +27,15 @@ def _made(options: Options, wishes: bool, warm: bool) -> Array:
     return settings
 
 
-# Those of solves without options, which are never written to: what begins with them copies them before.
-_USUAL = {(wishes, warm): _made(Options(), wishes, warm) for wishes in (False, True) for warm in (False, True)}
+# Settings of solves without options, by (has_objective, warm); a solve copies them before it writes to them.
+_USUAL = {
+    (has_objective, warm): _made(Options(), has_objective, warm)
+    for has_objective in (False, True)
+    for warm in (False, True)
+}
 
 
-def scene_settings(options: dict[str, Any], interruption: Interruption, wishes: bool, warm: bool) -> Array:
+def scene_settings(options: dict[str, Any], interruption: Interruption, has_objective: bool, warm: bool) -> Array:
     """Settings of a solve, which nobody may write to.
 
     Parameters
@@ -40,10 +44,10 @@ def scene_settings(options: dict[str, Any], interruption: Interruption, wishes: 
         See `Options`.
     interruption : Interruption
         Whom the loop asks whether to go on.
-    wishes : bool
+    has_objective : bool
         Whether the scene has an objective.
     warm : bool
         Whether the solve goes on from a solution.
     """
-    settings = _made(Options.of(options), wishes, warm) if options else _USUAL[wishes, warm]
+    settings = _made(Options.of(options), has_objective, warm) if options else _USUAL[has_objective, warm]
     return interruption.settings(settings)

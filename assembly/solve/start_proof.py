@@ -1,7 +1,7 @@
-"""Proof that bodies are clear, or only touch, where a solve begins: no contact is known there, and none is looked for.
+"""Proof at the start of a solve that bodies are clear or only touch, without any contact.
 
-What opens faces that touch is told by what is recognized of them: flat faces that lie on each other, a body that fills
-a bore; else by what a look leaves open. Where all that tells nothing, contacts of the loop may (`clearance_proof.py`).
+How faces that touch are opened follows from their kinds: flat faces that lie on each other, a body that fills a bore;
+otherwise from what a look leaves open. If all that fails, contacts of the loop may tell (`clearance_proof.py`).
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ def is_for_proofs(packed: Packed) -> bool:
 
 
 def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: float) -> list[PairAnswer] | None:
-    """What is proven of all pairs that clearances keep apart; None where that is not all that is to hold.
+    """What is proven of all pairs that clearances keep apart; None if not all of them hold.
 
-    The same poses once more are looked at no more.
+    Equal poses are not checked again.
 
     Parameters
     ----------
@@ -59,12 +59,12 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
     state : array
         Poses, and pairs of the given contacts.
     touching : float
-        What bodies may be in each other and still touch, in parts of the scene's size.
+        How much bodies may overlap and still count as touching, in parts of the scene's size.
     """
     q, asked = state[: packed.contacts_at].reshape(-1, 7), _asked(packed, state)
     if packed.stood is not None and packed.stood[:2] == (asked, touching):
         return packed.stood[2]
-    # Hulls of faces tell most of it before there are any cells; with these it takes some 10 us a pair to look again.
+    # Hulls of faces prove most of it before there are cells; with cells another look takes some 10 us a pair.
     hulled = None if packed.proofs else answers_by_hulls(*proven_pairs(packed, bodies), q, touching * packed.scale)
     if hulled is not None:
         packed.stood = asked, touching, named_answers(packed, hulled)
@@ -107,7 +107,7 @@ def prove_way(
     state : array
         Poses, and pairs of the given contacts.
     touching : float
-        What bodies may be in each other and still touch, in parts of the scene's size.
+        How much bodies may overlap and still count as touching, in parts of the scene's size.
     """
     q, length = state[: packed.contacts_at].reshape(-1, 7), touching * packed.scale
     with lent_proof(packed, bodies) as proof:

@@ -1,9 +1,9 @@
 """A solve that goes on from a solution by the loop alone, as nearly all of them do.
 
-What `Assembly.solve` may have to try besides (corners, places for contacts, bodies put together, rows that disagree,
-saddles, other starts) asks its questions in every solve, and these took 2 of the 5 microseconds that a warm solve is
-in Python. Here they are asked once a scene (`Packed.is_loop_alone`), and of the end nothing but whether the loop
-arrived. Where it did not, nothing has happened, and the solve begins with all there is.
+Whether `Assembly.solve` needs more than the loop (corners, slots for contacts, bodies put together, rows that disagree,
+saddles, other starts) was asked in every solve, and took 2 of the 5 microseconds that a warm solve spends in Python.
+Here it is asked once for a scene (`Packed.is_loop_alone`), and of the end only whether the loop arrived. If it did not,
+the solve begins anew with everything it may need.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ __all__ = ["straight_from"]
 Array = NDArray[np.float64]
 
 
-def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, wishes: bool) -> Solution | None:
-    """What the loop arrives at from a solution, for a scene as it is packed; None where it takes more, or may.
+def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, has_objective: bool) -> Solution | None:
+    """The solution at which the loop arrives from another one, for a scene as it is packed; None if more may be needed.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, w
         What the new solution speaks of; None, as `packed` is, where nothing is packed yet.
     packed : Packed or None
         How the scene was packed for its last solve.
-    wishes : bool
+    has_objective : bool
         Whether the scene has an objective.
     """
     if packed is None or scene is None:
@@ -56,7 +56,7 @@ def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, w
     state = begun._ended.state.copy() if packed is earlier else with_numbers_of(packed, earlier, begun._ended.state)
     packed.refresh()
     packed.start_angles(state, True)
-    settings = scene_settings({}, CTRL_C, wishes, True)
+    settings = scene_settings({}, CTRL_C, has_objective, True)
     code, state, history = run(packed, CTRL_C, packed.rows_table, settings, state)
     seconds = perf_counter() - begin
     # What a signal's handler raised is raised here.

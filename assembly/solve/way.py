@@ -1,4 +1,4 @@
-"""What is known of the way of a solve that goes on from another one."""
+"""What is known of the way of a solve from a solution."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Feet of points of an edge on its surface, and such points moved to where two surfaces cross: for `projected`.
+"""Projections of points of an edge on its surface, moved to where two surfaces cross: for `projected`.
 
 Each point is taken by itself, so that what comes of it does not depend on the points that it is asked for with.
 """
@@ -28,7 +28,7 @@ _DAMPED = 1e-6
 
 # A surface: as `NurbsSurface` has its tables, and its size [length].
 Ground = namedtuple("Ground", "table pool size")
-# Gauss-Newton's step toward a point's foot, how far above the surface the point is, and the unit normal there.
+# Gauss-Newton's step toward a point's projection, how far above the surface the point is, and the unit normal there.
 _Approach = namedtuple("_Approach", "du dv height normal")
 
 
@@ -117,7 +117,7 @@ def _between(own, there, point, places):
         s, t = _moved(there, s, t, other)
         cosine = dot(here.normal, other.normal)
         if count < 2:
-            # Feet of the edge itself, by one step.
+            # Projections of the edge itself, by one step.
             turn = cross(here.normal, other.normal)
             share = -np.expm1(-((dot(turn, turn) / _CROSSING**2) ** 2))
             if count == 0:

@@ -1,4 +1,4 @@
-"""Whether a file's text has the form of a STEP file (ISO 10303-21): OCCT's parser may not end on one that has not.
+"""Whether a text has the form of a STEP file (ISO 10303-21); on other texts OCCT's parser may hang.
 
 Checked is the order of tokens within the parentheses of every statement, that these match, that no two statements have
 one number, that there is a statement for each reference, and that none refers to itself; not what the statements say.

@@ -1,4 +1,4 @@
-"""Whether two solutions of a scene are one: at the same poses, or ends of a straight way of poses that are as good.
+"""Whether two solutions of a scene are the same: equal poses, or ends of a straight way of equally good poses.
 
 What nothing asks for, as how a body is turned of which a point alone counts, comes out as each start left it; so does
 what an objective that is flat at its best hardly asks for. Poses between such solutions hold as well and have the same

@@ -1,10 +1,9 @@
-"""A first solve of a scene with clearances: from the start itself, and from where bodies are put in other ways.
+"""A first solve of a scene with clearances: from the start itself, and from other arrangements of the bodies.
 
-Rows of clearances lead bodies that are in each other by a little. From a start at which bodies are stuck in each other,
-or joints far from holding, they may lead nowhere, and a solve begins where bodies are put together
-(`put_together.py`), seated (`seated.py`), parted (`parting.py`) or separated (`separation.py`) as well. Where all of
-these fail, and bodies cross at the end, it begins where that end is parted. Every way is measured from where the user's
-bodies were.
+Rows of clearances separate bodies that overlap slightly. From a start at which bodies are stuck in each other, or
+joints are far from holding, they may fail. Then a solve also begins where bodies are put together (`put_together.py`),
+seated (`seated.py`), parted (`parting.py`) or separated (`separation.py`). If all of these fail, and bodies cross at
+the end, it begins where that end is parted. Moves are always measured from the user's poses.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["first_solve"]
 
 Array = NDArray[np.float64]
-# How often an end at which bodies cross is parted: of the random scenes that a third time would help none is known.
+# How often an end at which bodies cross is parted: no random scene is known that a third time would help.
 PARTED_ENDS = 2
 
 
@@ -51,14 +50,14 @@ def first_solve(
     """The solution of a scene with clearances from poses q (n, 7), with settings made of options."""
     settings = settings.copy()
     if can_prove(scene.packed()):
-        # To where joints hold bodies are put together without clearances, or not at all.
+        # Bodies are put together without clearances only, not by the initial assembly of the loop.
         settings[GATHER] = NEVER
     return _FirstSolve(scene, q, settings, starts, options, interruption).solution()
 
 
 @dataclass(frozen=True, eq=False)
 class _FirstSolve:
-    """What a first solve is asked for; see `first_solve`."""
+    """The request of a first solve; see `first_solve`."""
 
     scene: Assembly
     q: Array
@@ -81,7 +80,7 @@ class _FirstSolve:
             ways += self._seated(False)
         if not self._is_done(ways):
             ways.append(self.scene._solved(self.settings, self.q, self.starts, self.interruption))
-            # What holds as it stands is not moved.
+            # A start that holds is not moved.
             if not (ways[-1].success and (ways[-1].q == self.q).all()) and not self.interruption.is_over():
                 ways += self._from_apart(ways[-1].success)
         if not self._is_done(ways) and together is not None and together.keeps_topology:
@@ -95,7 +94,7 @@ class _FirstSolve:
         return solution
 
     def _is_done(self, ways: list[Solution]) -> bool:
-        """Whether one of the ways ends at a solution, or there is no time for another one."""
+        """Whether one of the attempts ended at a solution, or there is no time for another one."""
         return bool(ways) and (any(way.success for way in ways) or self.interruption.is_over())
 
     def _from(self, poses: Array) -> Solution:
@@ -103,9 +102,10 @@ class _FirstSolve:
         return self.scene._solved(self.settings, poses, self.starts, self.interruption, self.q)
 
     def _where_it_fits(self, poses: Array) -> Solution:
-        """The same, where bodies fit each other but for little.
+        """A solve that begins where bodies nearly fit.
 
-        Where nothing is asked for and the least move from the user's poses is not found, any pose does that holds.
+        Without an objective, if the least move from the user's poses is not found, any pose at which rows hold is
+        accepted.
         """
         solution = self._from(poses)
         if solution.success or self.scene.objectives or self.interruption.is_over():
@@ -123,9 +123,9 @@ class _FirstSolve:
         return [] if rests is None else [rests]
 
     def _constraints_first(self) -> list[Solution]:
-        """A solve from where constraints hold and bodies are clear, whatever the objective asks for there.
+        """A solve from where constraints hold and bodies are clear, ignoring the objective there.
 
-        Far from there an objective draws bodies into each other before they are where rows can hold them apart.
+        Far from there an objective draws bodies into each other before rows can keep them apart.
         """
         inner = type(self.scene)(self.scene.bodies)
         inner._take_constraints(self.scene.constraints)
@@ -137,10 +137,10 @@ class _FirstSolve:
         return [solution] if solution.success else []
 
     def _put_together(self, together: PutTogether) -> list[Solution]:
-        """The same, from where bodies were put together without clearances; none where these are not found.
+        """The same, from where bodies were put together without clearances; None if that is not found.
 
-        Of bodies that are in each other there, some faces may nearly fit: then a solve begins where these do. An
-        objective alone may ask for bodies that are in each other anyhow, and puts none together of which none fit.
+        If bodies overlap there, some of their faces may nearly fit: then a solve begins where these do. An objective
+        alone may draw bodies into each other in any case, so bodies without such faces are not put together by it.
         """
         there = together.solution
         if there is None or self.interruption.is_over():
@@ -171,7 +171,7 @@ class _FirstSolve:
 
     @property
     def _touching(self) -> float:
-        """What bodies may be in each other and still touch, a length."""
+        """The overlap that still counts as touching, a length."""
         return float(self.settings[ALLOWED_OVERLAP]) * self.scene.packed().scale
 
     def _seated(self, is_solved: bool) -> list[Solution]:
@@ -195,9 +195,9 @@ class _FirstSolve:
         return ways
 
     def _from_parted_end(self, end: Solution) -> list[Solution]:
-        """Solves from where the end of one whose bodies cross there is parted, and the end of that one, if it must be.
+        """Solves from where the end of a solve at which bodies cross is parted, and once more from the end of that one.
 
-        An objective leads bodies through a thin one in a step. Beside where it leads, steps are short.
+        An objective may lead bodies through a thin one in one step. Near its minimum steps are short.
         """
         touching = self._touching
         ways: list[Solution] = []

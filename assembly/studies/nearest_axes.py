@@ -1,4 +1,4 @@
-"""Axes that are nearest where a solve begins, chosen anew where that fails.
+"""Nearest axes chosen at the start of a solve, and chosen anew where that fails.
 
 Where bodies lie scattered, what their axes are nearest to means little, and may contradict what other constraints ask:
 a plate that is to lie flush, and stands upright now, may have its bores on the wrong side of being perpendicular. Then

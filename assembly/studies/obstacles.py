@@ -1,8 +1,8 @@
-"""Which bodies are in the way where a solve that goes on from a pose fails: those without which it would not.
+"""Which bodies are in the way where a solve from a solution fails: those without whose clearances it would succeed.
 
-A solve that fails under clearances leaves bodies clear of each other, and what drives them behind: it does not say who
-stopped it. So the scene is solved with one pair of bodies after the other left out that are nearly in touch, and
-without any clearance where that does not tell: as where two posts stop a bar at once.
+A solve that fails under clearances leaves bodies clear and their drives behind, but does not tell what stopped them. So
+the scene is solved with one pair of nearly touching bodies after the other left out, and without any clearance if that
+does not tell, as when two posts stop a bar at once.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ __all__ = ["Obstacles"]
 
 # Bodies whose contacts are open by less, in parts of the size, are nearly in touch.
 TOUCHED = 1e-4
-# Where more pairs of bodies are, none of them is left out alone: each takes a solve.
+# With more pairs of bodies none is left out alone, as each takes a solve.
 MOST_TRIED = 16
 
 
 class Obstacles:
-    """What is asked about a pose of a scene that a way ends at.
+    """The question about a pose of a scene at which a way ends.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Obstacles:
         self._options, self._interruption = options, interruption
 
     def found(self) -> dict[int, Answer]:
-        """The pairs of bodies, by their numbers in the proof, without which what is asked for now is reached.
+        """The pairs of bodies, by their numbers in the proof, without which the present values are reached.
 
         Of each, what is proven on the way there.
         """

@@ -1,8 +1,8 @@
-"""Bodies that are stuck through each other where a solve begins, parted by the least translations that are found.
+"""Bodies that are stuck through each other at the start of a solve, parted by the shortest translations found.
 
-Rows of a clearance lead bodies apart that are in each other by a little. Of those that are stuck through each other, or
-of which one is within the other, rows may lead anywhere: a solve is begun where they are parted as well, and the least
-way, measured from where the user's bodies were, is the answer.
+Rows of a clearance separate bodies that overlap slightly. For bodies that are stuck through each other, or enclose each
+other, rows may lead anywhere: a solve also begins where they are parted, and the result with the least move from the
+user's poses is the answer.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 __all__ = ["is_stuck", "parted"]
 
 Array = NDArray[np.float64]
-# Rounds in which all pairs that are stuck are parted: to part one may drive another together.
+# Rounds in which all stuck pairs are parted: parting one may push another one together.
 ROUNDS = 12
 
 
 def parted(scene: Assembly, q: Array, touching: float, interruption: Interruption) -> Array | None:
-    """Where no bodies that clearances keep apart are stuck in each other, near poses (n, 7).
+    """Poses near poses (n, 7) at which no bodies that clearances keep apart are stuck in each other.
 
-    None where none are stuck at q by more than what is called touching, and where no way apart is found.
+    None if none overlap at q by more than `touching`, or if no way apart is found.
     """
     packed = scene.packed()
     if not can_prove(packed):
@@ -50,7 +50,7 @@ def parted(scene: Assembly, q: Array, touching: float, interruption: Interruptio
 
 
 def is_stuck(answer: Answer, touching: float) -> bool:
-    """Whether an answer says that two bodies are in each other by more than what is called touching."""
+    """Whether an answer says that two bodies overlap by more than `touching`."""
     if answer.verdict is Verdict.CROSSING:
         return answer.depth > touching
     return answer.verdict is Verdict.ENCLOSED

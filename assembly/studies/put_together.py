@@ -1,14 +1,13 @@
-"""Parts put together without clearances first, where a solve begins with what is asked for far from what it is.
+"""Parts put together without clearances first, where a solve starts far from where its constraints hold.
 
-What the other constraints and the objective ask for is the most that a solution can have. Where nothing crosses at that
-pose, it is the solution: no clearance pushes there. To it bodies may pass through each other, as a bolt on the wrong
-side of its plate has to. So it is the first thing to try from a start at which bodies are in each other, or each is on
-a side of a plane that parts it from the others, as in an exploded view. Elsewhere bodies may be linked, as rings are,
-or in each other's holes, and are to stay so: there it is the last thing.
+The problem without clearances is a relaxation: if nothing crosses at its solution, that is the solution, because no
+clearance pushes there. On the way bodies may pass through each other, as a bolt on the wrong side of its plate must. So
+this is tried first from a start at which bodies cross, or at which planes separate all of them, as in an exploded view.
+Otherwise bodies may be linked, as rings are, or in each other's holes, and should stay so: there it is tried last.
 
-An objective alone also draws bodies onto what is to carry them, a ring down onto a plate, by points beyond. They are to
-come to rest on this side of it. So parts that it draws into each other are put together, and those that are beside each
-other at the end are if they are on the same side as they were.
+An objective alone may also draw bodies onto a support by points beyond it, such as a ring down onto a plate; they
+should come to rest on this side of it. So parts that it draws into each other are put together, but parts that are
+beside each other at the end only if they are on the same side as before.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["PutTogether", "put_together"]
 
 Array = NDArray[np.float64]
-# [size of the scene] Constraints that are off by no more hold.
+# [size of the scene] Constraints with smaller violations count as held.
 HELD = 1e-9
 
 
@@ -47,7 +46,7 @@ class PutTogether:
     keeps_topology : bool
         Whether bodies are clear at the start, but not all parted by planes, so that other ways come first.
     is_asked : bool
-        Whether constraints do not hold at the start; else an objective alone asks to put bodies together.
+        Whether constraints do not hold at the start; otherwise only an objective draws bodies together.
     """
 
     def __init__(
@@ -58,14 +57,14 @@ class PutTogether:
 
     @cached_property
     def solution(self) -> Solution | None:
-        """Where constraints but clearances hold, and objectives are least; None where that is not found."""
+        """The solution without clearances; None if it is not found."""
         solution = self._solve()
         return solution if solution.success else None
 
     def is_meant(self, scene: Assembly, solution: Solution) -> bool:
-        """Whether bodies are to be where a solution has them: constraints ask for it, or none has changed sides.
+        """Whether to accept a solution: constraints require it, or no pair has changed sides.
 
-        Those have sides that a plane parts at the start, and at the solution where they may touch.
+        A pair has sides if a plane separates it at the start, and at the solution, where the bodies may touch.
         """
         if self.is_asked or not solution.success:
             return True
@@ -76,7 +75,7 @@ class PutTogether:
 
 
 def _sides(proof: ClearanceProof, q: Array, moves: Array | None = None) -> list[Array | None]:
-    """Of every pair the normal of a plane between the bodies, after moves if there are; None where none is found."""
+    """For every pair the normal of a plane between the bodies, after given moves; None if none is found."""
     return [proof.plane_between(k, q, moves) for k in range(len(proof.pairs))]
 
 
@@ -87,10 +86,9 @@ def put_together(
     options: dict[str, Any],
     interruption: Interruption,
 ) -> PutTogether | None:
-    """How bodies of a scene are put together without clearances, from poses (n, 7).
+    """Put the bodies of a scene together without clearances, from poses (n, 7).
 
-    None where the other constraints hold and there is no objective, and where the topology of the start is to be kept
-    in any case.
+    None if the other constraints hold and there is no objective, or if the topology of the start is to be kept.
     """
     settings = Options.of(options)
     others = [item for item in scene.constraints if not isinstance(item, Clearance)]

@@ -1,9 +1,9 @@
-"""A solve that failed, tried again from other starts: that all holds from another start is an answer.
+"""A failed solve tried again from other starts.
 
-The pose that a solve ends at may be one where a sum of violations is least and not zero, a branch on which limits
-cannot hold, or have turns that contradict each other around a loop. Other starts are the end itself, with turns chosen
-there, poses about it, and scattered ones. All of them are measured from where the user's bodies were, and of the
-solutions found the one with the least objective is returned. A solve that did not fail pays nothing.
+A failed solve may have ended at a local minimum of the violation, on a branch on which limits cannot hold, or with
+revolution counts that contradict each other around a loop. Other starts are the end itself, with revolution counts
+chosen there, poses about it, and scattered ones. Moves are always measured from the user's poses, and of the solutions
+found the one with the least objective is returned. A solve that succeeds costs nothing more.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ __all__ = ["may_hold_elsewhere", "restarted"]
 Array = NDArray[np.float64]
 # Scattered starts of a round, and rounds.
 SCATTERED, ROUNDS = 4, 2
-# A violation, over the size, that rounding may leave of what holds.
+# A violation, over the size, that rounding may leave where rows hold.
 ROUNDED = 1e-12
 # Steps of each start.
 STEPS = 100.0
 
 
 def may_hold_elsewhere(solution: Solution) -> bool:
-    """Whether a solve ended where constraints do not hold, and not for want of steps or of a contact's pair.
+    """Whether a solve ended where constraints do not hold, with enough steps and without a lost contact.
 
     With contacts or clearances it is not tried elsewhere: scattered bodies would come to be on other sides of each
     other, a ball under the floor that it is to touch, linked rings apart. Nor where equations contradict each other
@@ -64,7 +64,7 @@ def restarted(
     given : (n, 7) or Solution
         Where the solve that failed started.
     interruption : Interruption
-        Whom solves ask whether they are to go on.
+        Asked by solves whether to go on.
     """
     if isinstance(given, Solution):
         packed = given._packed
@@ -73,8 +73,8 @@ def restarted(
         reference, turns = given, None
     settings = settings.copy()
     settings[ITERATIONS] = min(settings[ITERATIONS], STEPS)
-    # From each start as it is, and with its bodies gathered where that fails: the one often does where the other one
-    # does not.
+    # From each start as it is, and with its bodies assembled if that fails: often one succeeds where the other does
+    # not.
     settings[GATHER] = 0.0
     bodies, spread = failed._scene.bodies, Spread.of(failed._packed, failed.q)
     rounds = islice(far_starts(bodies, failed.q, spread, SCATTERED), ROUNDS)

@@ -1,11 +1,11 @@
-"""Bodies that an objective draws onto what they fit: a plug into its seat, a lid onto its rim.
+"""Bodies that an objective draws onto faces that they fit: a plug into its seat, a lid onto its rim.
 
-Faces that lie on each other hold as joints do, as long as contact forces push. So where faces of bodies nearly fit,
-the objective is made least with joints in the place of contacts: a solve of few steps, in which no row comes or goes.
-At its end the objective's slope has to be a sum of slopes of gaps, none of which counts negatively, and the gaps' rows
-that push have to leave no motion that the joints forbid. Then it is a minimum with clearances as well: there the
-objective rises along every motion that opens a contact, and along those that open none the joints' solve says that it
-does. Faces that nothing pushes onto each other are let go, and it is made least again.
+Faces that lie on each other act as joints as long as contact forces push. So where faces of bodies nearly fit, the
+objective is minimized with joints in place of contacts: a solve of few steps with a fixed set of rows. At its end the
+objective's slope has to be a sum of slopes of gaps with nonnegative multipliers, and the rows of gaps that push must
+leave no motion that the joints forbid. Then it is a minimum with clearances as well: the objective increases along
+every motion that opens a contact, and by the joints' solve along those that open none. Joints of faces that nothing
+pushes onto each other are removed, and the objective is minimized again.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def resting(
 ) -> Solution | None:
     """The solution of a scene with clearances and an objective at which bodies rest on what they fit near poses (n, 7).
 
-    None where they do not fit, where what they fit would have to pull, and where it is not proven that they are clear.
+    None if they do not fit, if a fit would have to pull, or if they are not proven to be clear.
 
     Parameters
     ----------
@@ -85,9 +85,9 @@ def resting(
     poses, reference : (n, 7)
         Where to begin, and what moves are measured from.
     prove : callable
-        What is proven of the scene's pairs at a state, for what is called touching; None where that is too little.
+        Proves the scene's pairs at a state, for a given overlap that counts as touching; None if that fails.
     settings : array
-        What the loop is told.
+        Settings of the loop.
     starts : mapping of constraint name -> (4,), optional
     interruption : Interruption
     """
@@ -153,7 +153,7 @@ def _near_fits(scene: Assembly, others: Sequence[Constraint], poses: Array, touc
 
 
 def _rises(there: Solution, touching: float) -> bool:
-    """Whether bodies fit where a solve began, up to `touching`, and the objective was less there: there they stay."""
+    """Whether bodies fit at the start of a solve, up to `touching`, with a lower objective: then they stay there."""
     objective, violation = there.history[:, 0], there.history[:, 1]
     return len(objective) > 1 and bool(
         violation[0] <= touching and objective[-1] - objective[0] > ROUNDED * abs(objective[0])
@@ -172,7 +172,7 @@ def _with_joints(scene: Assembly, others: Sequence[Constraint], joints: Sequence
 def _pushing(
     closed: tuple[Array, list[Side]], model: LocalModel, is_joint: NDArray[np.bool_], of_joints: list[Side]
 ) -> set[Side] | None:
-    """The pairs whose contacts push where joints stand for them; None where these hold what contacts would not.
+    """The pairs whose contacts push where joints replace them; None if the joints hold what contacts would not.
 
     Slopes of closed gaps and the pair of each are given, and which rows of a model are those of joints, of which pairs.
     """
@@ -187,7 +187,7 @@ def _pushing(
         return None
     strong = forces * np.linalg.norm(slopes, axis=1) > PUSHES * size
     pushing = {owners[k] for k in np.flatnonzero(strong)}
-    # Rows against rows that push hold, too: both sides of a bore.
+    # Rows opposite to rows that push hold, too: both sides of a bore.
     loose = null_space(slopes[strong], slopes.shape[1])
     held = strong | (np.linalg.norm(slopes @ loose, axis=1) < PUSHES) | _opposed(slopes @ loose)
     free = null_space(slopes[held], slopes.shape[1])
@@ -255,6 +255,6 @@ def _proven(
     solution = Solution(scene._scene, packed, state, Status.SOLVED, 0.0, history, there.second_order, fit)
     solution._touching, solution._clear = touching, answers
     solution._lists = partial(with_contacts, scene)
-    # Samples stand for a proof where faces lie on each other: there rows are asked as well.
+    # Samples replace a proof where faces lie on each other: there rows are checked as well.
     held = solution.proved or solution.feasibility <= float(settings[FEASIBILITY]) * packed.scale
     return solution if held else None

@@ -1,7 +1,7 @@
-"""Bodies that are stuck in each other where they nearly fit, put where they do: a shaft into its bore, flush faces.
+"""Bodies that nearly fit moved to where they do: a shaft into its bore, flush faces.
 
-Of a shaft that leans in its bore, a bolt beside its hole or a slider that is off its rail, rows of a clearance are many
-and contradict each other. But where faces conform but for a little play, tilt and shift, it is known where they fit:
+For a shaft that is tilted in its bore, a bolt beside its hole or a slider that is off its rail, the many rows of a
+clearance contradict each other. But if faces conform up to a small play, tilt and shift, it is known where they fit:
 where their axes and planes coincide. A solve begins there as well.
 """
 
@@ -34,12 +34,13 @@ if TYPE_CHECKING:
 __all__ = ["NearFit", "NotBelow", "drop_farthest", "fits", "seated"]
 
 Array = NDArray[np.float64]
-# Faces that nearly fit lean by no more than this [rad], and are off by no more than that part of the smaller body's
-# size, or of the radius; a shaft with less than so much of its bore's radius does not fit it.
+# Faces that nearly fit are tilted by at most this [rad], and off by at most that part of the smaller body's size, or of
+# the radius; a shaft with less than this part of its bore's radius does not fit it.
 LEAN, OFF, FILLS = 0.15, 0.1, 0.8
-# Normals that differ by less are parallel, and heights that differ by less of a reach are one: parts of files are off.
+# Normals that differ by less are parallel, and heights that differ by less of a reach are equal: parts of files are
+# inexact.
 PARALLEL = 1e-8
-# A joint that is violated by more than this part of the worst one contradicts others.
+# A joint that is violated by more than this part of the worst one counts as contradicting.
 CONTRADICTS = 1e-2
 
 
@@ -54,7 +55,7 @@ class NotBelow(Joint):
 
 
 class _Face:
-    """A face of a body at a pose: what it is, which way it looks, its box; and the same face in the body's axes."""
+    """A face of a body at a pose: its kind, orientation and box; and the same face in the body's axes."""
 
     def __init__(self, body: Body, turn: Array, shift: Array, face: ElementaryFace) -> None:
         self.body, self.form, self.is_outward = body, face.form, face.is_outward
@@ -73,10 +74,9 @@ class _Face:
 
 
 def seated(scene: Assembly, q: Array, touching: float, interruption: Interruption) -> Array | None:
-    """Where bodies that clearances keep apart, and that are stuck in each other at poses (n, 7), fit each other.
+    """Poses at which bodies that clearances keep apart, and that are stuck in each other at poses (n, 7), fit.
 
-    Where they do not all fit at once, those do that are nearest. None where none are stuck, and where none of their
-    faces nearly fit.
+    If they cannot all fit at once, the nearest do. None if none are stuck, or none of their faces nearly fit.
     """
     packed = scene.packed()
     if not can_prove(packed):
@@ -101,17 +101,17 @@ def seated(scene: Assembly, q: Array, touching: float, interruption: Interruptio
 
 @dataclass(frozen=True, eq=False)
 class NearFit:
-    """A joint by which two faces would fit, and how far two flat ones are off that; zero of round ones."""
+    """A joint by which two faces would fit, and how far two flat ones are off it; zero for round ones."""
 
     joint: Constraint
     off: float
 
 
 def drop_farthest(held: list[NearFit], violations: Mapping[str, float]) -> bool:
-    """Take out, in place, the flat faces that are farthest off each other of those that contradict; whether there were.
+    """Remove, in place, the flat faces that are farthest off among those that contradict; whether there were any.
 
-    Where not all fit at once, as both flanks of a key with play, or a slot's far flank beside its gib, those do that
-    are nearest. A solve that fails says by its violations which ones contradict.
+    If not all can fit at once, such as both flanks of a key with play, or a slot's far flank beside its gib, the
+    nearest do. The violations of a failed solve tell which ones contradict.
     """
     worst = max((violations[fit.joint.name] for fit in held if fit.off > 0.0), default=0.0)
     contradict = [fit for fit in held if fit.off > 0.0 and violations[fit.joint.name] >= CONTRADICTS * worst]
@@ -143,8 +143,8 @@ def fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterat
                     flush.append((off, one, other))
             elif one.is_outward != other.is_outward:
                 yield from (NearFit(joint, 0.0) for joint in _round(one, other, axes, names))
-    # The flank of a key is near both the flank of its slot and the wall beyond: it goes with the nearer one. Feet of
-    # a body all go with the one face that they stand on.
+    # The flank of a key is near both the flank of its slot and the wall beyond: it is paired with the nearer one.
+    # Projections of a body all go with the one face that they stand on.
     nearest: dict[_Face, float] = {}
     for off, one, other in flush:
         for face in (one, other):
@@ -227,7 +227,7 @@ def _is_near_axis(
     radius: float,
     axes: list[tuple[Array, Array]],
 ) -> bool:
-    """Whether two axes, each a point and a direction of its body, all but coincide, and are the first that do."""
+    """Whether two axes, each a point and a direction of its body, nearly coincide, and are the first that do."""
     along = faces[0].turn @ hollow[1]
     off = faces[1].at(full[0]) - faces[0].at(hollow[0])
     off = off - (off @ along) * along

@@ -1,4 +1,4 @@
-"""Where bodies are, seen from the bodies that clearances keep them apart from, and how far they are off a way."""
+"""Poses of bodies relative to those that clearances keep them apart from, and their deviation from a way."""
 
 from __future__ import annotations
 

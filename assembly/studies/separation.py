@@ -1,4 +1,4 @@
-"""Bodies that cross at the start moved apart, where a clearance is to keep them so.
+"""Bodies that cross at the start, moved apart where a clearance requires it.
 
 A clearance keeps bodies apart that are; of bodies deep in each other its rows do not know the way out. The pair that
 closes as two bodies come apart (`closest_features`) does: held not to be negative, together with all other constraints,

@@ -1,9 +1,9 @@
-"""A start at which all holds already: it is the solution, and comes back as it is, in the time of one check.
+"""A start at which all constraints hold is the solution, returned in the time of one check.
 
-Without an objective nothing asks to move. So before any contact of a clearance is looked for, joints and given contacts
-are evaluated at the start, and of the pairs that clearances keep apart it is proven that they are clear or only touch
-(`solve/start_proof.py`). Neither needs the trees of facets that a contact manager looks for contacts with: these are
-packed when an update first needs them. Contacts that are near are listed when the solution is first asked for them.
+Without an objective nothing requires a move. So before contacts of clearances are searched, joints and given contacts
+are evaluated at the start, and the pairs that clearances keep apart are proven to be clear or to touch only
+(`solve/start_proof.py`). Neither needs the facet trees of the contact manager, which are packed when an update first
+needs them. Contacts that are near are listed when something first asks the solution for them.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def standing_start(
     starts: Mapping[str, ArrayLike] | None,
     interruption: Interruption,
 ) -> Solution | None:
-    """The start of a scene with clearances and no objective as its solution, or None where it is none.
+    """The start of a scene with clearances and no objective as its solution, or None if it is not one.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def standing_start(
     q0 : (n, 7) or Solution, optional
         Where to start; a solution only if its contacts are not listed yet.
     settings : array
-        What the loop is told.
+        Settings of the loop.
     starts : mapping of constraint name -> (4,), optional
     interruption : Interruption
     """
@@ -83,9 +83,9 @@ def standing_start(
 
 
 def with_contacts(scene: Assembly, solution: Result) -> Ended:
-    """What a start that was returned as it is ended with, and with the contacts of clearances listed.
+    """The end state of a start that was returned unchanged, with the contacts of clearances listed.
 
-    Where these take more places the scene is packed with more, unless its rows are others by now.
+    If these need more slots the scene is packed with more, unless its rows have changed.
     """
     ended = solution._ended
     settings = CTRL_C.settings(CTRL_C.fill(Options(touching=solution._touching).settings()))
@@ -103,7 +103,7 @@ def with_contacts(scene: Assembly, solution: Result) -> Ended:
 
 
 def _with_more_places(scene: Assembly, packed: Packed, solution: Result) -> Packed | None:
-    """The scene of a solution packed with more places, if it still has the same rows."""
+    """The scene of a solution packed with more slots, if it still has the same rows."""
     if scene._packed_as(packed) is packed:
         return scene._pack_with_more_places()
     there = solution._scene

@@ -1,10 +1,10 @@
-"""A solve that goes on from another one, asked for its way: it ends where something is in the way.
+"""A solve from a solution with its way: it ends where something is in the way.
 
-Everything that may change between solves, driven values, offsets, limits and targets, goes from what the start was
-solved with to what is asked for, along a line. At parts of this way the scene is solved, each time from the last pose
-to which the way is known, and the proof is asked for the straight way of bodies between the two (`docs/certified.md`).
-That is the motion of the mechanism as long as the two hardly differ in the middle. Where one of this fails, the step is
-halved, and the way ends where it is too short to be halved.
+Everything that may change between solves, driven values, offsets, limits and targets, goes along a line from the values
+of the start to the present ones. At parts of this way the scene is solved, each time from the last pose to which the
+way is proven, and the straight way of bodies between the two is proven (`docs/certified.md`). That is the motion of the
+mechanism as long as the two hardly differ in the middle. If anything fails, the step is halved, and the way ends when
+it is too short to be halved.
 """
 
 from __future__ import annotations
@@ -39,28 +39,29 @@ if TYPE_CHECKING:
 __all__ = ["swept_solve"]
 
 Array = NDArray[np.float64]
-# Nothing that is asked for, and no angle that is counted, changes by more in one step: radians, parts of the size.
+# No requested value and no counted angle changes by more in one step: radians, parts of the size.
 LONGEST = 0.25
 # The way is known to this part of it, and of its longest step.
 SHORTEST, LEAST_HALVED = 2.0**-20, 2.0**-10
 # In the middle of a step points of a body, seen from another one, are off its straight way by no more, in parts of the
 # size.
 STRAIGHT = 1e-4
-# Bodies whose faces lie on each other go no farther in one step, in parts of their size: there is no proof between.
+# Bodies whose faces lie on each other move no farther in one step, in parts of their size: nothing is proven in
+# between.
 SAMPLED_WAY = 5e-2
-# Contacts that are open by less, in parts of the size, are where a body is in the way.
+# Contacts that are open by less, in parts of the size, tell where a body is in the way.
 NEAR = 1e-2
 
 
-# Steps of the loop in each solve on the way: what holds after a short step holds after a few.
+# Iterations of each solve on the way: after a short step rows hold after a few.
 ITERATIONS = 30
-# Parts of the way beyond its end at which it is looked for what is in the way.
+# Parts of the way beyond its end at which obstacles are searched.
 BEYOND = (2.0**-10, 2.0**-7, 2.0**-4)
 UNKNOWN = np.full(3, np.nan)
 
 
 class _Hindrance(NamedTuple):
-    """Why a step is not made.
+    """Why a step is not taken.
 
     Attributes
     ----------
@@ -134,7 +135,7 @@ class _Walk:
         return ClearTicks(at, touching, self._proof, WayLimits(SAMPLED_WAY, self._allowed))
 
     def end(self) -> Solution:
-        """The solution of what is asked for, or the last one on the way there."""
+        """The solution for the present values, or the last one on the way there."""
         done, at = 0.0, self._start
         step = longest = self._longest_step()
         there = self._solved(at, step)
@@ -157,7 +158,7 @@ class _Walk:
                 step, there = 0.5 * step, middle
 
     def _longest_step(self) -> float:
-        """A power of two: in steps of it nothing that is asked for changes by more than is allowed."""
+        """A power of two: in steps of it no requested value changes by more than is allowed."""
         change = asked_change(self._start._asked, self._asked, self._packed.asked_units)
         return float(2.0 ** np.floor(np.log2(LONGEST / change))) if change > LONGEST else 1.0
 

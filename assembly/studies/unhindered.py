@@ -1,13 +1,13 @@
-"""A warm solve that no clearance hinders: rows are solved without clearances, and what these ask for is proven after.
+"""A warm solve that no clearance hinders: rows are solved without clearances, which are then proven.
 
-A mechanism whose links slide along each other lists hundreds of contacts, none of which pushes: joints alone say where
-all of it goes. So rows alone are solved first, and bodies are proven to be clear, or to touch, at the pose that these
-lead to. There the least move with clearances is the same one. Whether clearances pushed at the last solution does not
-tell: where their contacts repeat what joints hold, which of them push is anyone's guess.
+A mechanism whose links slide along each other lists hundreds of contacts, none of which pushes: joints alone determine
+its motion. So rows without clearances are solved first, and bodies are proven to be clear, or to touch, at the pose
+found, which is then the least move with clearances, too. Whether clearances pushed at the last solution is no
+criterion: where their contacts are redundant with joints, it is undetermined which of them push.
 
-Nor may bodies have passed through each other. The straight way from the last pose is proven with the same look. Where
-it is not, as that of a pin which goes along an arc in its bore, the way has to be shorter than bodies are thick. Where
-any of this fails, the solve is as it would be without.
+Nor may bodies have passed through each other: the straight way from the last pose is proven with the same look. If it
+cannot be proven, as for a pin that moves along an arc in its bore, the way has to be shorter than the bodies'
+thickness. If any of this fails, the solve proceeds with clearances.
 
 Where parts were put together without clearances it is the same, but for the way.
 """
@@ -47,7 +47,7 @@ def unhindered(
     starts: Mapping[str, ArrayLike] | None,
     interruption: Interruption,
 ) -> Solution | None:
-    """The solution of a scene with clearances and no objective that rows alone lead to, or None where they do not.
+    """The solution of a scene with clearances and no objective found without clearances, or None.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def unhindered(
     last : Solution
         Where to start.
     settings : array
-        What the loop is told.
+        Settings of the loop.
     starts : mapping of constraint name -> (4,), optional
     interruption : Interruption
     """
@@ -83,8 +83,8 @@ def unhindered_at(
 ) -> Solution | None:
     """The same from poses (n, 7) at which rows hold, whatever objective there is.
 
-    No way to there is asked for. Of a minimum without clearances it is known that it is one. Moves are measured from a
-    reference (n, 7), or from the poses.
+    The way there is not proven. A minimum without clearances is a minimum. Moves are measured from a reference (n, 7),
+    or from the poses.
     """
     packed = scene.packed()
     if scene._scene is None or packed.corners or not (can_prove(packed) and is_for_proofs(packed)):
@@ -107,7 +107,7 @@ def _where_clear(
     prove: Callable[[Array, float], list[PairAnswer] | None],
     interruption: Interruption,
 ) -> Solution | None:
-    """The solution that rows alone have led to, if they did, and it is proven there that bodies are clear."""
+    """The solution found without clearances, if there is one and bodies are proven to be clear there."""
     packed, (code, state, history, order, _) = scene.packed(), outcome
     if code != SOLVED or interruption.is_over():
         return None

@@ -1,1 +1,1 @@
-"""Following a hand: what it did, what a scene did about it, and the forces it feels."""
+"""Following a hand: recorded motions, trackers, logs, and the forces that a hand feels."""

@@ -1,4 +1,4 @@
-"""What ticks promise under clearances, proven: at their poses bodies are clear or touch, and on the way to them."""
+"""Proofs of clearances in ticks: bodies are clear or touch at the poses, and on the way to them."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class _Listed(NamedTuple):
 
 
 class _Standing:
-    """Where bodies of a solution stand, and which contacts are near there, once that is asked."""
+    """Poses of the bodies of a solution, and the contacts that are near there, found when they are first needed."""
 
     def __init__(self, solution: Solution) -> None:
         self.solution = solution
@@ -93,12 +93,12 @@ class _Standing:
 
 
 class WayLimits(NamedTuple):
-    """Where ways of bodies that touch end to be known.
+    """Limits of what is proven of ways of bodies that touch.
 
     Attributes
     ----------
     sampled : float
-        How far bodies whose faces lie on each other may go in one way, in parts of their size.
+        How far bodies whose faces lie on each other may move in one way, in parts of their size.
     depth : float
         How deep a way may go in, in the unit of the scene.
     """
@@ -110,9 +110,9 @@ class WayLimits(NamedTuple):
 class ClearTicks:
     """The proofs of the pairs that a tracker's clearances keep apart, from tick to tick.
 
-    At its pose a tick is proven to what is called touching. The straight way between two ticks that touch goes in by
-    what is quadratic in its length: what is proven is the way of bodies that are opened by so much, from the last pose,
-    where they are opened, to this one, where they are closed again.
+    The pose of a tick is proven up to `touching`. On the straight way between two ticks bodies that touch overlap by an
+    amount that is quadratic in its length. What is proven is the way of bodies that are moved apart by that amount at
+    the last pose, and moved back at this one.
 
     Parameters
     ----------
@@ -127,11 +127,11 @@ class ClearTicks:
     Attributes
     ----------
     doubtful : dict of int -> Answer
-        Where the last tick does not hold, or the first one: the pairs of which it is not known.
+        If the last tick does not hold, or the first one: the pairs that are not proven.
     proved : bool
         Whether all pairs were proven clear, or touching, at the last tick that holds; else faces lie on each other.
     way_depth : float
-        How deep bodies may be in each other on the way to it, at most.
+        The largest overlap of bodies on the way to it.
     """
 
     def __init__(
@@ -142,7 +142,6 @@ class ClearTicks:
         limits: WayLimits | None = None,
     ) -> None:
         self._touching, self._limits = touching, limits or WayLimits()
-        self._parts = OPENED if proof is not None else OPENED[:1]
         if proof is None:
             proof = new_proof(first._packed, first._scene.bodies)
             proof.fronts.counts.budget = BUDGET

@@ -1,12 +1,12 @@
-"""Listed contacts that follow bodies which somebody else moves, and the update of what came near them.
+"""Listed contacts that follow bodies whose poses are given, and the update of what came near them.
 
-A contact is carried along the move by the contact velocity formulation,
+A contact is predicted along the move by the contact velocity formulation,
 
     du = RATES z,     z = ZED (d_f, d_g)                                   (proximity/extrema/rates.py)
 
-with the twists d that lead from the last poses to these, and corrected there by Newton's method. One that is not found,
-is a minimum no longer, or was corrected by so much that it may be another root now, is left to the contact manager
-(`proximity/manager/update.py`), whose update of the pair of bodies finds all there are.
+with the twists d that lead from the last poses to these, and corrected there by Newton's method. A contact that is not
+found, is no longer a minimum, or was corrected so much that it may be another extremum, is left to the contact manager
+(`proximity/manager/update.py`), whose update of the pair of bodies finds all contacts.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def correct(store, r, q, guess, tracked, records):
 
 @kernel(inner=True)
 def make_due(table, memory, k):
-    """Let the next update take up the pair of bodies whose contact is at place k."""
+    """Let the next update search the pair of bodies whose contact is in slot k."""
     pairs, places, _events = memory_places(table, header_at(table, 0).manager_record)
     p = int(place_at(memory, places + PLACE_MEMORY * k).pair)
     pair_state_at(memory, pairs + PAIR_MEMORY * p).motion_bound = 0.0
@@ -185,7 +185,8 @@ def doubt_twins(store, memory, k, records):
     signatures=("(i8[::1], f8[::1], f8[:, ::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[:, ::1], 5), i8[::1], f8[::1])")
 )
 def follow(table, pool, q, last, room, free, memory):
-    """Bodies stand at q (n, 7) in the user's coordinates now: carry the listed contacts, update, list what is near.
+    """Bodies are at q (n, 7) in the user's coordinates: predict and correct the listed contacts, update, list what is
+    near.
 
     `last` are poses, tracked values and records of the last call, and become those of this one; `room` is for poses,
     twists, two times tracked values, and two rows of numbers. Returns the number of events, or -1, and nothing has

@@ -1,4 +1,4 @@
-"""What all steps of a tracker have in common: the packed scene, and the springs that are the hands."""
+"""What all steps of a tracker share: the packed scene, and the springs to the targets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hands of a tracker: springs that hold points and frames, and where they are drawn to from tick to tick."""
+"""Targets of a tracker: springs that draw points and frames from tick to tick."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def springs(follow: Followable | Sequence[Followable], stiffness: float | Sequen
 
 
 def _row_of(target: ArrayLike | Pose, size: int, far: float) -> Array | None:
-    """A target as an array of its own; None for what is none. What a target of the user's own raises is let out."""
+    """A target as an array of its own; None if it is invalid. Errors of a target object of the user's are passed on."""
     if type(target) is np.ndarray and target.dtype == np.float64:
         row = target.copy()
     else:

@@ -1,4 +1,4 @@
-"""What happened when a hand was followed, tick by tick: times, violations, statuses, poses and events."""
+"""A log of ticks: times, violations, statuses, poses and events."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Manager: which bodies are near each other and where, as somebody else moves them."""
+"""Manager: which bodies are near each other and where, for given poses."""
 
 from __future__ import annotations
 
@@ -232,8 +232,7 @@ class Manager(OwnState):
 
     @property
     def crossings(self) -> tuple[tuple[str, str], ...]:
-        """Names of the pairs of bodies that overlap by more than `touching`, or enclose each other; () before an
-        update.
+        """Names of pairs of bodies that overlap by more than `touching`, or enclose each other; () before an update.
 
         At the poses of the last update. All pairs are searched anew when this is read, which takes longer than an
         update.

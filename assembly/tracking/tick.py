@@ -1,4 +1,4 @@
-"""What a tick did: how it ended, and where the bodies, the forces and the contacts are then."""
+"""The result of a tick: its status, and the bodies, forces and contacts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recorded motions of a hand: where it was at which time, and its motion between the samples.
+"""Recorded motions of a target: samples at times, and interpolation between them.
 
 Between samples a trace is a cubic spline through all of them, with continuous velocity and acceleration, so that a
 hand recorded at 60 Hz can be followed at 1000. Orientations are the normalized spline of quaternions that are first
@@ -46,7 +46,7 @@ class Speed(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Trace(ReadOnlyArrays):
-    """A hand's motion: points or poses at times.
+    """A recorded motion of a target: points or poses at times.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class Trace(ReadOnlyArrays):
 
     @classmethod
     def through(cls, points: ArrayLike | Sequence[Pose], times: ArrayLike, rate: float = 1000.0) -> Self:
-        """A made motion: from rest through points or poses at given times to rest, evenly sampled.
+        """A computed motion: from rest through points or poses at given times to rest, evenly sampled.
 
         Smooth as a hand: velocity and acceleration are continuous. Between poses turns must be less than half a turn;
         a twist by more goes through several.
@@ -90,7 +90,7 @@ class Trace(ReadOnlyArrays):
         points : (k, 3) or (k, 7), or sequence of k Pose
         times : (k,)
         rate : float
-            Samples a second, or as few more as it takes to have one at both ends.
+            Samples per second, slightly more if needed to have one at both ends.
 
         Raises
         ------

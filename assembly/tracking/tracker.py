@@ -1,4 +1,4 @@
-"""Tracker: poses that follow a hand, one call of the compiled loop a tick."""
+"""Tracker: poses that follow targets, one call of the compiled loop for each tick."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ if TYPE_CHECKING:
 __all__ = ["Tracker"]
 
 Array = NDArray[np.float64]
-# Steps of a tick may be bounded to this, in parts of the scene's size, after ticks that led nowhere.
+# Steps of a tick may be bounded to this, in parts of the scene's size, after ticks that failed.
 SHORTEST_RADIUS = 1e-7
 # What the loop says of a tick whose pose holds.
 _STATUSES = {SOLVED: TrackStatus.FOLLOWED, OUT_OF_TIME: TrackStatus.LATE}
@@ -96,7 +96,7 @@ def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
 
 
 def _held_to(begin: Solution) -> Solution:
-    """A solve that a tracker begins with, which has to hold."""
+    """The solve with which a tracker begins, which has to succeed."""
     if not begin.success:
         raise InputError(f"q0 leads to no pose at which the constraints hold; expected one that does: {begin.message}")
     return begin
@@ -110,13 +110,13 @@ def _begin(scene: Assembly, q0: ArrayLike | Solution | None, touching: float) ->
 
 
 def _tick_settings(limit: float, iterations: int, second_order: bool) -> Array:
-    """What a tick is asked for."""
+    """Settings of a tick."""
     settings = Options().settings(warm=True)
     settings[FEASIBILITY] = limit
     settings[STATIONARITY] = 1e-9
     settings[ITERATIONS] = integer("iterations", iterations, 1, 1000)
     settings[TICK] = 1.0
-    # A tick begins where the last one ended: what bodies may be in each other there was told at the start.
+    # A tick begins where the last one ended: the overlap that is allowed was set at the start.
     settings[ALLOWED_OVERLAP] = 0.0
     settings[FINAL_UPDATE] = 0.0
     settings[SECOND_ORDER] = float(second_order)
@@ -380,7 +380,7 @@ class Tracker(InOneProcess):
         status = _STATUSES.get(code, TrackStatus.APPROACHING)
         if not view[at + VIOLATION] <= self._tolerance:
             status = TrackStatus.VIOLATED
-            # Where a contact came up that the rows of the last tick did not know, there is nowhere to go back to.
+            # If a contact appeared that the rows of the last tick did not have, there is no pose to return to.
             stands = self._before[at + VIOLATION] <= self._tolerance
             begun = carried or self._history[0, 1] * packed.scale <= self._tolerance
             if code == CONTACT_LOST or (begun and stands):
@@ -390,7 +390,7 @@ class Tracker(InOneProcess):
             status = TrackStatus.HELD
         if self._clear is not None and status is not TrackStatus.VIOLATED:
             status = self._proven(status)
-        # After a step too far the next ones are shorter, until they do better.
+        # After a step that was too long the next ones are shorter, until they succeed.
         radius = self._knobs[RADIUS]
         if status is TrackStatus.HELD:
             self._knobs[RADIUS] = max(0.25 * radius, SHORTEST_RADIUS)
@@ -415,7 +415,7 @@ class Tracker(InOneProcess):
         if self._clear.holds(there):
             return status
         self._pose[:] = self._before
-        # What was crossed is perhaps not listed: all pairs are searched again.
+        # The contact that was crossed may not be listed: all pairs are searched again.
         pairs = self._state[packed.memory_at + MEMORY_HEADER :][
             : PAIR_MEMORY * int(packed.table[packed.table[MANAGER_RECORD] + PAIRS])
         ]

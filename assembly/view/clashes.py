@@ -1,4 +1,4 @@
-"""What there is to see of an interference report: bodies that cross in red, the others faint, and the places."""
+"""The picture of an interference report: bodies that cross in red, the others faint, and the places."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A picture as the commands meshcat's viewer obeys.
+"""A picture as commands of meshcat's viewer.
 
 A command is a dictionary, packed as MessagePack; arrays are its extension types 0x16 (uint32) and 0x17 (float32).
 """

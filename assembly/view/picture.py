@@ -163,7 +163,7 @@ def _contact(pair: Pairs, place: Place, style: Style, name: str) -> Iterator[Ite
     yield Item(path, mesh, color, f, turned, shown * np.ones(3), in_front, hides=True, said=said)
 
 
-def _wish(name: str, body: str, target: Array, point: Array, radius: float) -> Iterator[Item]:
+def _target_items(name: str, body: str, target: Array, point: Array, radius: float) -> Iterator[Item]:
     """A cross at the target, a ball at the point (k, 3) that is drawn to it, and a line between them."""
     said = f"{name}, of a point of {body}"
     yield Item(("targets", name, "target"), cross(_ARM, 0.3 * MARK), _WISH, target, said=said, label=name)
@@ -235,10 +235,10 @@ def _picture(
 ) -> Picture:
     meshes = {body: body_mesh(body, angle=style.angle) for body in scene.bodies}
     held = held_points(scene)
-    wishes = [objective for _, objective in scene.objectives if isinstance(objective, PointDistance)]
-    drawn = [stations.points(wish.point.body, wish.point.coordinates) for wish in wishes]
+    aims = [objective for _, objective in scene.objectives if isinstance(objective, PointDistance)]
+    drawn = [stations.points(aim.point.body, aim.point.coordinates) for aim in aims]
     parts = np.concatenate([points.reshape(-1, 3) for points in _outline(meshes, held, stations, ellipsoids)])
-    targets = _nearer(np.array([wish.target for wish in wishes]).reshape(-1, 3), parts)
+    targets = _nearer(np.array([aim.target for aim in aims]).reshape(-1, 3), parts)
     outline = np.concatenate([parts, *(points.reshape(-1, 3) for points in drawn), targets])
     radius = 0.5 * float(np.linalg.norm(np.ptp(outline, axis=0)))
     arms = _ARM * radius * np.concatenate([np.eye(3), -np.eye(3)])
@@ -254,9 +254,9 @@ def _picture(
         label = _FOUND.sub(r"\1", pair.name)
         items.extend(_contact(pair, place, style, "" if label in named else label))
         named.add(label)
-    for k, (wish, point) in enumerate(zip(wishes, drawn, strict=True)):
-        thick = 0.8 * MARK if wish.point.body.faces else size * JOINT
-        items.extend(_wish(f"target {k + 1}", wish.point.body.name, place(wish.target), place(point), thick))
+    for k, (aim, point) in enumerate(zip(aims, drawn, strict=True)):
+        thick = 0.8 * MARK if aim.point.body.faces else size * JOINT
+        items.extend(_target_items(f"target {k + 1}", aim.point.body.name, place(aim.target), place(point), thick))
     for k, shape in enumerate(ellipsoids):
         items.extend(_ellipsoid(f"ellipsoid {k + 1}", shape, place))
     if interference is not None:

@@ -1,4 +1,4 @@
-"""Tolerances, drawn by matplotlib: how measures scatter, and what of."""
+"""Tolerances, drawn by matplotlib: histograms of measures, and contributions."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ def test_a_unit_scales_lengths_and_parameters_of_length(name):
 
 def test_what_has_no_end_is_unreadable():
     face = O.BRepBuilderAPI_MakeFace(O.gp_Pln()).Face()
-    with pytest.raises(Unreadable, match="no boundary, and its surface no end"):
+    with pytest.raises(Unreadable, match="no boundary, and its surface is unbounded"):
         read_face(face, Edges(face), None)
 
 

@@ -1,4 +1,4 @@
-"""Clearance: bodies stay apart, wherever they come near each other."""
+"""Clearance: bodies do not cross, and keep a least gap."""
 
 from __future__ import annotations
 

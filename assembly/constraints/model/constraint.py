@@ -1,4 +1,4 @@
-"""What every constraint has, and the rows that joints and couplings are made of.
+"""What all constraints have in common, and the rows of which joints and couplings are made.
 
 A row is sum_i coefficient_i coordinate_i = value (one-sided: >= value) with one or two coordinates. A coordinate is
 one number that tells how a frame on one body stands to a frame on another (`constraints/program/primitives.py`).

@@ -1,4 +1,4 @@
-"""Contact: two faces touch somewhere, wherever that is."""
+"""Contact: two faces touch at some pair of points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What it is for two elementary faces to be tangent: rows between a plane, an axis or a center on either side.
+"""Tangency of two elementary faces: rows between a plane, an axis or a center of each.
 
 Surfaces count whole. With r and R radii, each with the sign that says whether outward normals go away from the axis or
 the center, and + where they oppose each other (outside), - where they are one (inside):
@@ -82,7 +82,7 @@ def touching_rows(a: BodyFace, b: BodyFace, outside: bool) -> TangentRows | None
         height = sense * _sign(first) * _sign(second) * second.radius
         rows = (TangentRow(((cos(angle), (RADIUS, 0)), (-sin(angle), ALONG)), height),)
         if height > 0.0:
-            # The foot on a line of the cone is not beyond the apex; from inside it never is.
+            # The projection on a line of the cone is not beyond the apex; from inside it never is.
             rows += (TangentRow(((sin(angle), (RADIUS, 0)), (cos(angle), ALONG)), 0.0, one_sided=True),)
         return TangentRows(frame_a, frame_b, "aligned", rows)
     if kinds == ("cylinder", "cone"):

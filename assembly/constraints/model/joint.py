@@ -1,4 +1,4 @@
-"""What all joints have: two frames, rows between them, and coordinates by name.
+"""What all joints have in common: two frames, rows between them, and coordinates by name.
 
 The z axes of the frames are the joint's axes. "aligned" lets them point the same way, "opposed" against each other,
 as the outward normals of two faces do that lie on each other; "nearest" is the one of the two that they are nearer to

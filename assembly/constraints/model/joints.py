@@ -1,4 +1,4 @@
-"""Joints: what each asks of two frames, and what it leaves free.
+"""Joints: what each requires of two frames, and what it leaves free.
 
 Rows and joint coordinates describe frame b as seen from frame a (kinds as in `constraints/program/primitives.py`);
 both z

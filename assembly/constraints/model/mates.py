@@ -1,4 +1,4 @@
-"""Mates: joints of faces and edges, by what these are. Each says what it takes away of the six degrees of freedom.
+"""Mates: joints of faces and edges, by their kinds. Each says how many of six degrees of freedom it takes away.
 
     top, foot = plate.faces(">Z"), bracket.faces("<Z")
     asm.Flush(top, foot)                                             # face on face: 3

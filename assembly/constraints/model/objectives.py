@@ -1,4 +1,4 @@
-"""What is wished for: terms whose sum a solve makes small."""
+"""Objective terms: a solve minimizes their sum."""
 
 from __future__ import annotations
 

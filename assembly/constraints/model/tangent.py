@@ -1,4 +1,4 @@
-"""Tangent: two faces have one tangent plane where they touch, with the side said.
+"""Tangent: two faces touch with a common tangent plane, on a given side.
 
 Of two elementary faces it has rows between planes, axes and centers, of others it is a contact: the class chooses.
 """

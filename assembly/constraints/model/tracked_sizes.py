@@ -1,4 +1,4 @@
-"""What sizes bodies may have whose points are tracked, by contacts and by clearances.
+"""Sizes that bodies may have whose points are tracked by contacts and clearances.
 
 Where two surfaces are nearest is told by determinants of four factors, each of which may be a length of a surface's
 parameters to the power -1 or 1, and whether facets cross by ones of four lengths in space. Beyond these sizes they

@@ -1,4 +1,4 @@
-"""Addresses of the kernels that only some scenes ask for, compiled when a scene is packed that does."""
+"""Addresses of kernels that only some scenes need, compiled when such a scene is packed."""
 
 from __future__ import annotations
 

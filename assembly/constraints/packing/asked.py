@@ -1,4 +1,4 @@
-"""What a solve is asked for that may change between solves, and what is between two of these.
+"""Numbers of a solve that may change between solves, and interpolation between two sets of them.
 
 In the order of the packed scene: values of rows (driven values, limits, offsets), in the user's units; positions of
 targets; targets of frames, as poses.

@@ -1,4 +1,4 @@
-"""What the contact manager of a scene lists: pairs of bodies that clearances keep apart, and corners of contacts.
+"""Pairs of bodies that a scene's contact manager lists: those of clearances, and those with corners of contacts.
 
 The gap of a contact of solids is that of the features that are nearest. Where a body comes to lie on another one,
 several are, and the gap has a kink: a row of the nearest one alone points to where another one is deeper. So a contact

@@ -1,4 +1,4 @@
-"""States of a scene as it was packed before: of another size, or with fewer places for contacts of clearances.
+"""States of an earlier packing of a scene: of another size, or with fewer slots for contacts of clearances.
 
 Another scene with the same bodies and rows (a pickle of this one, one that was built again) may give a state as well.
 """

@@ -1,4 +1,4 @@
-"""In which order the bodies of a large scene leave the step, and which blocks its factor has then.
+"""The order in which bodies of a large scene are eliminated, and the blocks of the factor that follow from it.
 
 An envelope (`constraints/program/envelope.py`) keeps the zeros between a row's entries, which a chain has none of, a
 tree or a grid many.

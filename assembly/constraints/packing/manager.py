@@ -1,6 +1,4 @@
-"""What clearances watch (`proximity/manager/update.py`): which pairs of bodies, and how many contacts may be near at a
-time.
-"""
+"""Pairs of bodies that clearances keep apart (`proximity/manager/update.py`), and their slots for contacts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The table and the pool of a scene, of which the contact manager of clearances is written last, and perhaps never.
+"""Table and pool of a scene in which the contact manager is written last, when it is first needed.
 
 A manager needs trees of facets, which take longer to make than all else of a scene. A start at which all holds, as
 assembled machined parts have, is told without: then they are made when contacts are first asked for, if at all.

@@ -1,4 +1,4 @@
-"""The size of a scene of which only what was set anew is measured again, to the same bits as `scene_size`."""
+"""The size of a scene measured again for what was set, with the same bits as `scene_size`."""
 
 from __future__ import annotations
 

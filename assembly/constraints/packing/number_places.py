@@ -1,4 +1,4 @@
-"""Where a packed scene has the numbers of each thing: found once, so that to set one anew is to write it.
+"""Where a packed scene has the numbers of each thing, found once, so that setting a number is writing it.
 
 What is written has the bits of the scene packed anew. That is so while the scene's size is the same; where it becomes
 another one everything is divided by it, and `packing/renumbered.py` writes the whole pool.

@@ -1,4 +1,4 @@
-"""The order of bodies among the unknowns: such that bodies which meet in a row stand close together."""
+"""The order of bodies among the unknowns: bodies with a common row are close together."""
 
 from __future__ import annotations
 

@@ -25,5 +25,5 @@ def place_numbers(place: ContactPlace, weight: float, scale: float) -> list[floa
 def names_of_whole(constraints: Iterable[Constraint], objectives: Iterable[tuple[float, Objective]] = ()) -> set[str]:
     """Contacts that are of whole surfaces, because trims or places say where on these they are."""
     asked = [item for item in constraints if isinstance(item, (TrimContact, ContactPlace))]
-    wished = [term for _, term in objectives if isinstance(term, ContactPlace)]
-    return {item.contact.name for item in (*asked, *wished)}
+    minimized = [term for _, term in objectives if isinstance(term, ContactPlace)]
+    return {item.contact.name for item in (*asked, *minimized)}

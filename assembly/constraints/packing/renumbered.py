@@ -1,4 +1,4 @@
-"""A packed scene with other numbers in the same places: what changes when a frame is placed anew, or a value set.
+"""A packed scene with other numbers in the same places: after a frame was placed or a value set.
 
 What is in the pool is written by what packs it, into a pool of its own; the table stays. So the bits are those of the
 scene packed anew, and solutions of before keep theirs. Where numbers make trees or surfaces, a shape or a least gap or

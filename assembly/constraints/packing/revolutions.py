@@ -1,4 +1,4 @@
-"""Which turn an angle is on when a solve starts: angles go on past a whole turn, poses do not tell how often.
+"""Revolution counts of angles at the start of a solve: poses do not tell how often an angle has gone around.
 
 A driven angle starts on the turn of its value, one that is coupled to a driven coordinate on the turn that the coupling
 asks for. Other coupled angles keep, in a warm start, the turn they have; otherwise they too are on the turn of their

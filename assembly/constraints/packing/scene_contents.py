@@ -1,4 +1,4 @@
-"""What of a scene contacts and clearances are between, and how many rows they have."""
+"""The sides of contacts and clearances of a scene, and how many rows they have."""
 
 from __future__ import annotations
 

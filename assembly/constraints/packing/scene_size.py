@@ -1,4 +1,4 @@
-"""The length by which a scene is scaled: what its own lengths say, whatever their unit."""
+"""The length by which a scene is scaled, from the scene's own lengths, whatever their unit."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def size_and_extent(
     if on_bodies < LEAST:
         known = max(known, _farthest([p for body in bodies for p in body.pose.apply([np.zeros(3), *marks[body]])]))
     if known < LEAST:
-        wished = [far for far in (limits, _farthest_target(bodies, objectives)) if far > 0.0]
-        known = max(known, min(wished, default=0.0))
+        far_ends = [far for far in (limits, _farthest_target(bodies, objectives)) if far > 0.0]
+        known = max(known, min(far_ends, default=0.0))
     return (_checked(known, marks) if known > 0.0 else 0.0), rests_on_values
 
 

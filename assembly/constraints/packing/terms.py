@@ -1,4 +1,4 @@
-"""The terms of a scene's objective (`constraints/program/objective_terms.py`): what is to be small, or large."""
+"""The terms of a scene's objective as they are packed (`constraints/program/objective_terms.py`)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Rows of contacts: the pair of each is carried to the poses, its gap is the row. `constraints/program/records.py` says
-what stands where.
+"""Rows of contacts: each pair is predicted for the poses, and its gap is the row. `constraints/program/records.py` has
+the layout.
 
 A contact of two surfaces is a pair of points with a common normal, one of solids the closest features of both
 (`proximity/features/solid_contact.py`). Rows of a clearance are contacts as well, of what its contact

@@ -1,4 +1,4 @@
-"""The coordinates all joints are made of: how frame b, on body g, stands to frame a, on body f.
+"""The coordinates of which all joints are made: frame b, on body g, relative to frame a, on body f.
 
     COINCIDENT k      world axis k of d = p_b - p_a
     SLIDE k           (axis k of a) . d

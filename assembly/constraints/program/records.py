@@ -1,4 +1,4 @@
-"""Where everything stands in a packed scene: the one table of integers and the one pool of doubles.
+"""The layout of a packed scene: one table of integers and one pool of doubles.
 
 All lengths in a program are divided by the scene's length scale. Table: a header, the block of unknowns of every body
 (-1: fixed), then a record a row (contacts first, then trims), a joint, a tape and an objective term. The loop works on

@@ -56,7 +56,7 @@ def foot_on(store, loop, u, v):
 
 @kernel(inner=True)
 def nearest_side(store, sides, foot):
-    """The number of the side that a foot on the loop is on."""
+    """The number of the side that a projection on the loop is on."""
     found, least = 0, math.inf
     for k in range(sides.stretches):
         stretch = stretch_at(store.table, sides.stretch_table + STRETCH * k)
@@ -126,7 +126,7 @@ def goes_on(y_side, y_other, corner, least):
 
 @kernel(inner=True)
 def chosen_sides(store, row, before, found, at):
-    """The `Corner` at a place (u, v) whose foot on the loop is `found`, after another one at the iterate before."""
+    """The `Corner` at (u, v) whose projection on the loop is `found`, after another one at the iterate before."""
     sides = loop_sides_at(store.table, row.sides)
     near = nearest_side(store, sides, found)
     other = other_side(before.corner)

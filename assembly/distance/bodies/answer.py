@@ -1,4 +1,4 @@
-"""The nearest points known of two bodies as a query gives them: in the world, and how they face each other."""
+"""The nearest points of two bodies as a query returns them: in the world, and how they face each other."""
 
 from __future__ import annotations
 

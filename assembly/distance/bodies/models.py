@@ -1,4 +1,4 @@
-"""Models of nodes: a quadratic at the middle of a patch, and proven doubts of it.
+"""Models of nodes: a quadratic at the middle of a patch, and a proven bound of its error.
 
 w (S - model) is a polynomial of degree (p + 2, q + 2). A quotient of two Bernstein forms is at most the largest
 quotient of their coefficients: its coefficients over the least weight bound |S - model|, and those of its derivatives,

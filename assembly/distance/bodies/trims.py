@@ -1,4 +1,4 @@
-"""Trimmed faces: which part of a face a node is in, and where the boundary need not be looked at.
+"""Trimmed faces: which part of a face a node is in, and where the boundary need not be considered.
 
 The boundary is cut into pieces that run one way in u and in v (`geometry/faces/trim_pieces.py`), so that a box of
 parameters is met by a piece where the part of it beside the box is. A box that no piece meets is inside or outside as a

@@ -1,4 +1,4 @@
-"""Convex sets around a piece of a curve, to look at: what the search of `distance/enclosures/queries.py` works with."""
+"""Convex sets around a piece of a curve, for display: those of the search of `distance/enclosures/queries.py`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where boundary curves of a face meet or touch, beside the corners that follow one another.
+"""Where boundary curves of a face meet or touch, other than at their common corners.
 
 Along a stretch of one curve, the signed distance g(s) from the other one is asked for: curves cross where g changes its
 sign and touch where |g| has a minimum next to zero. Newton's method on both parameters at once would fail there, as

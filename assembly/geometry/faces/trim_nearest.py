@@ -28,8 +28,8 @@ from assembly.geometry.faces.trim_pieces import (
 
 # Neighbors whose directions differ by less [rad] are one smooth curve.
 SMOOTH = 1e-6
-# A foot this near to the end of a piece is at the end if the point is beyond it by more than the second, both parts of
-# the boundary's size.
+# A projection this near to the end of a piece is at the end if the point is beyond it by more than the second, both
+# parts of the boundary's size.
 _AT_END, _BEYOND = 1e-9, 1e-13
 # Where the speed of a piece is less than this part of its largest, its direction is rounding.
 _SLOW = 1e-9
@@ -97,7 +97,7 @@ def _nearest_inside(store, trim, span, q, best):
 
 
 # Where a boundary is nearest to a point. distance: signed, positive on the side of the material; curve: which boundary
-# curve, or -1; t: its parameter; u, v: the foot; normal_u, normal_v: unit normal there to the material.
+# curve, or -1; t: its parameter; u, v: the projection; normal_u, normal_v: unit normal there to the material.
 TrimFoot = namedtuple("TrimFoot", "distance curve t u v normal_u normal_v")
 
 
@@ -145,7 +145,7 @@ def trim_nearest(store, trim, first, count, u, v):
 
 @kernel(inner=True)
 def _foot_on_piece(store, record, k, t, q):
-    """Where on piece k a foot is that was found at t: its parameter, the way from there, the direction, the end.
+    """Where on piece k a projection is that was found at t: its parameter, the way from there, the direction, the end.
 
     The end is -1 at the start, 1 at the end, 0 in between.
     """
@@ -160,7 +160,7 @@ def _foot_on_piece(store, record, k, t, q):
     unsure = speed <= _SLOW * bounds.bound_1
     far = max(_BEYOND * size, 4e-15 * (abs(q[0]) + abs(q[1])))
     if end == 0 and (unsure or abs(beyond) > far * speed):
-        # The way to the foot is not across the curve: is it an end, that rounding or a vanishing speed has left?
+        # The way to the projection is not across the curve: is it an end, that rounding or a vanishing speed has left?
         first = t - bounds.t0 < bounds.t1 - t if unsure else beyond < 0.0
         ax = (bounds.start[0] if first else bounds.end[0]) - bounds.shift_u - x
         ay = (bounds.start[1] if first else bounds.end[1]) - bounds.shift_v - y
@@ -179,7 +179,7 @@ def _foot_on_piece(store, record, k, t, q):
 
 @kernel(inner=True)
 def _foot(store, trim, span, piece, t, point, q):
-    """The TrimFoot of a point, from the piece and the parameter of the foot; q is the point in the cell."""
+    """The TrimFoot of a point, from the piece and the parameter of the projection; q is the point in the cell."""
     record = trim_at(store.table, trim)
     links = links_of(store, record, piece)
     t, (ox, oy), (dx, dy), end = _foot_on_piece(store, record, piece, t, q)
@@ -207,7 +207,7 @@ def _foot(store, trim, span, piece, t, point, q):
             dy /= length
     u, v = point[0] - ox, point[1] - oy
     if smooth:
-        # Across the curve, not along the tiny and noisy way to the foot.
+        # Across the curve, not along the tiny and noisy way to the projection.
         return TrimFoot(dx * oy - dy * ox, links.curve, t, u, v, -dy, dx)
     s = sign * distance
     if distance > 1e-13 * trim_frame_at(store.pool, record.frame).extent:

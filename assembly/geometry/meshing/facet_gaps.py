@@ -51,7 +51,8 @@ def measured(face: Face, parameters: Array, points: Array, triangles: Indices, t
     along = np.linalg.norm(apart, axis=1)
     ways = points[edges[:, 1]] - points[edges[:, 0]]
     length = np.linalg.norm(ways, axis=1)
-    # Where facets end, none goes on across the foot of the normal. At a seam one does, from corners of the same place.
+    # Where facets end, none goes on across the projection of the normal. At a seam one does, from corners of the same
+    # place.
     _, place = np.unique(points, axis=0, return_inverse=True)
     _, same, uses = np.unique(
         np.sort(place.reshape(-1)[pairs], axis=1) @ np.array([n, 1]), return_inverse=True, return_counts=True

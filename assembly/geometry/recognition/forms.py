@@ -1,4 +1,4 @@
-"""What a surface can be recognized as: records with what each is given by, in the coordinates of the surface.
+"""What a surface can be recognized as: records of the kinds, in the coordinates of the surface.
 
 Each has a `deviation`: no point of the surface is farther than that from the plane, cylinder and so on; of an extrusion
 and a revolution, from one that is exactly that. `outward` says on which side S_u x S_v is: away from the axis or the

@@ -1,4 +1,4 @@
-"""Spines: the center lines of round wires, found from their surfaces.
+"""Centerlines (spines) of round wires, found from their surfaces.
 
 A pipe surface is the envelope of balls of one radius r along a curve, its spine:
 

@@ -1,1 +1,1 @@
-"""Solids and shells: faces, boundary curves, vertices, and how they are packed for kernels."""
+"""B-rep bodies: faces, boundary curves, vertices, and how they are packed for kernels."""

@@ -1,4 +1,4 @@
-"""The faces of a body packed as Bezier pieces (`proximity/brep/bezier_nets.py`), once for all that asks about them."""
+"""The faces of a body packed as Bezier pieces (`proximity/brep/bezier_nets.py`), once for all uses."""
 
 from __future__ import annotations
 

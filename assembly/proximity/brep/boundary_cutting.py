@@ -1,4 +1,4 @@
-"""Rims cut where others end, so that one rim of a face is one rim of its neighbor."""
+"""Boundary curves cut where others end, so that one of a face is one of its neighbor."""
 
 from __future__ import annotations
 

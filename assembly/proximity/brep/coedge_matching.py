@@ -1,4 +1,4 @@
-"""Rims of two faces that are one edge: those that run through the same points in opposite directions."""
+"""Boundary curves of two faces that are one edge: they run through the same points in opposite directions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A body as facets in a tree of boxes and normal cones: where two bodies can be near each other, before any Newton.
+"""A body as facets in a tree of boxes and normal cones: the broad phase before Newton's method.
 
 Faces become patches with two facets each and a proven chord error (`proximity/bvh/facet_patches.py`), edges and
 vertices

@@ -1,4 +1,4 @@
-"""Pairs of patches that may face each other, or of parts of spines, kept from look to look of a pair of bodies.
+"""Pairs of patches that may face each other, or of parts of spines, kept from update to update (a Verlet list).
 
 A descent of two trees (`proximity/bvh/tree.py`, `proximity/manager/centerlines/parts.py`) finds pairs for one pose. One
 that allows for a skin of

@@ -1,4 +1,4 @@
-"""A face as cells: parts of (u, v) with corners on the surface, and how far the face may be from the hull of these.
+"""A face as cells: parts of (u, v) with corners on the surface, and a bound of the face's distance from their hull.
 
 A cell is a rectangle or a triangle of (u, v). Linear interpolation L of the corners over a triangle with the box
 l_u x l_v differs from the surface by no more than

@@ -1,4 +1,4 @@
-"""Directions that part two nodes at a pose, or at both ends of a way at once.
+"""Directions that separate two nodes at a pose, or at both ends of a way at once.
 
 What one plane keeps apart at both ends of a way it keeps apart along the chord: the direction sought is that of the
 largest lesser gap of both. It is the one between a and the hull of b at both poses; those asked before cost less.

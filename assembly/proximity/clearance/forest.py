@@ -1,4 +1,4 @@
-"""Trees of cells of several bodies in one block of memory, which grows, and the fronts of their pairs."""
+"""Trees of cells of several bodies in one growing block of memory, and the fronts of their pairs."""
 
 from __future__ import annotations
 

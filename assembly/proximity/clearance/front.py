@@ -1,4 +1,4 @@
-"""The front of a pair of bodies: pairs of nodes that together stand for all pairs of points, each with what parts it.
+"""The front of a pair of bodies: pairs of nodes that cover all pairs of points, each with what separates it.
 
 As long as points of body b have gone less than a gap, its pair need not be asked again; the least of these lengths
 tells of all pairs at once. After that the gap along the same direction is asked, some nanoseconds; where it does not

@@ -1,4 +1,4 @@
-"""How far faces are within, or outside of, the cone that a hollow wall is of, or a half space.
+"""How far faces are inside or outside of the cone of a hollow wall, or of a half space.
 
 About an axis a, from the apex, with the half angle alpha,
 

@@ -1,4 +1,4 @@
-"""A look at a pair of bodies: proof that they are clear at a pose, and on the way to it, or that they cross."""
+"""A look at a pair of bodies: a proof that they are clear at a pose and on the way to it, or that they cross."""
 
 from __future__ import annotations
 

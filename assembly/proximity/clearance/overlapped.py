@@ -1,4 +1,4 @@
-"""Bodies that are in each other behind flat faces, by less than samples see.
+"""Bodies that overlap behind flat faces, by less than samples detect.
 
 Two flat faces that look at each other from inside do not tell that bodies cross: they may be far sides of thin parts,
 or belong to bodies that are beside each other there. A ball between both planes that is inside of both bodies does.

@@ -1,4 +1,4 @@
-"""The least rigid move that opens the contacts of two bodies: where it is done they are clear, and so they only touch.
+"""The least rigid move that opens the contacts of two bodies: if they are clear after it, they only touch.
 
 A contact with the normal n, from a to b, at an arm p from the middle of b opens by n.(v + w x p) as b is moved by v and
 turned by w. The least move that opens every contact by what is asked of it is a least distance program, and a problem

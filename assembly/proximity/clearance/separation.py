@@ -1,4 +1,4 @@
-"""What parts two nodes: a plane between them, or the bore of a wall of one in which the other one is.
+"""What separates two nodes: a plane between them, or the bore of a wall of one that contains the other.
 
 Everything is seen from body a: a point y of body b is at R y + t. A unit direction n points from a to b, and
 

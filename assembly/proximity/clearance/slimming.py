@@ -1,4 +1,4 @@
-"""Bodies that fill bores of their own radius: no move opens them, but one of both that is made slimmer is clear.
+"""Bodies that fill bores of their own radius: no move opens them, but one of the two made slimmer is clear.
 
 About the axis of a cylinder, or the center of a ball, by P across the axis, or all of it,
 

@@ -38,7 +38,7 @@ def segments_apart(p, q, a, b):
 
 @kernel(inline=True)
 def is_above(x, a, b, c, n):
-    """Whether the foot of x in the plane of a triangle, whose normal is n, is within its sides."""
+    """Whether the projection of x in the plane of a triangle, whose normal is n, is within its sides."""
     return (
         dot(cross(sub(b, a), sub(x, a)), n) > 0.0
         and dot(cross(sub(c, b), sub(x, b)), n) > 0.0

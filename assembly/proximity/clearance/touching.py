@@ -1,4 +1,4 @@
-"""Bodies that touch: what opens their contacts."""
+"""Bodies that touch: the moves and maps that open their contacts."""
 
 from __future__ import annotations
 

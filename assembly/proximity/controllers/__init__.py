@@ -1,1 +1,1 @@
-"""Closest-point controllers (paper 001, section 4): feedback laws that converge from anywhere, and their gains."""
+"""Closest-point controllers (paper 000): feedback laws that converge from anywhere, and their gains."""

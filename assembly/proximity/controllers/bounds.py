@@ -1,4 +1,4 @@
-"""What a closest-point controller needs to promise anything: hypotheses on the patch, and bounds of its gain.
+"""Hypotheses on a patch under which a closest-point controller converges, and bounds of its gain.
 
 A patch meets the hypotheses if, for an axis a,
 

@@ -222,7 +222,7 @@ def face_edge_pair(status, x, over, edge, step, regular):
     is_point = step.is_point
     tilt = 0.0 if is_point else edge.tilt
     is_regular = regular and not (edge.steep and not is_point)
-    # Past a center of curvature the foot is no nearest point of the face; nor is the edge's where it bends away.
+    # Past a center of curvature the projection is no nearest point of the face; nor is the edge's where it bends away.
     nearest = is_point or (is_no_saddle(-fold) and k[0] + k[2] > 0.0 and k[0] * k[2] > k[1] * k[1])
     # Positive, as of two faces, where the pair is closest or deepest.
     fold = fold if is_point else -fold

@@ -1,4 +1,4 @@
-"""Edges and vertices beside faces: the curve an edge is, and what each kind of feature asks of a contact normal.
+"""Edges and vertices beside faces: the curve of an edge, and the condition of each kind of feature on a contact normal.
 
 An edge is C(t) = S(c(t)), a plane curve in the parameters of a surface, or a curve in space:
 

@@ -1,4 +1,4 @@
-"""From any start down to the nearest pair of two patches: the controller that takes over where Newton's method fails.
+"""Descent from any start to the nearest pair of two patches, used where Newton's method fails.
 
 The controller of theorem 2 of paper 000 moves the two witness points against the projection errors. With d = g - f and
 orthonormal tangents P, the slopes of |d|^2 / 2 over lengths on the surfaces are -P_f^T d and P_g^T d, and any positive

@@ -1,4 +1,4 @@
-"""Feet of points on a surface by Newton's method, and the way down the slope of a gap, from foot to foot."""
+"""Projections of points on a surface by Newton's method, and descent along the slope of a gap."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SLIDES = 24
 Projection = namedtuple("Projection", "parameters distance normal settled")
 ProjectionQuery = namedtuple("ProjectionQuery", "store surface y")
 # A place of the surface: the square of its distance, that along the outward normal, Newton's step from there, which is
-# never longer than what brings the tangent plane's foot, and whether it is next to a minimum.
+# never longer than what brings the tangent plane's projection, and whether it is next to a minimum.
 ProjectionPoint = namedtuple("ProjectionPoint", "merit distance normal step still settled")
 
 
@@ -75,7 +75,7 @@ def projection_of(store, g, y, s, t):
 
 @kernel(inner=True)
 def slide_down(store, f, g, pose, start, stride, half):
-    """Parameters at which the gap is smaller than at the start: down its slope on f, the foot on g following.
+    """Parameters at which the gap is smaller than at the start: down its slope on f, the projection on g following.
 
     And whether they are beside the start, within BESIDE times half widths on f; it goes no farther. Newton's method
     goes to saddles of the gap as well; this does not. The first step is `stride` times the sine of the angle between

@@ -1,4 +1,4 @@
-"""Features that a pair holds on to, and points of them: they stay what they are, whatever is closer beside them.
+"""Features that a pair keeps, and points of them: they are not switched, whatever is closer beside them.
 
 So are corners over faces rows of a clearance, and points of edges and of valleys, where the closest pair jumps about.
 """

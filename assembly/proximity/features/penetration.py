@@ -1,4 +1,4 @@
-"""The pair of two shells that cross: how they would come apart, and where they are deepest in each other on that way.
+"""The pair of two B-rep bodies that cross: a way out, and where they are deepest in each other along it.
 
 Nearest points say nothing where shells cross: all crossing points are at distance zero. The pair wanted has normals
 that oppose each other and a negative gap. Two faces without boundaries have it by `global_start`. Of other shells, g is

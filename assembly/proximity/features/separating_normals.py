@@ -1,4 +1,4 @@
-"""Ways in which two shells may come apart from where they meet: the normals of the faces there.
+"""Directions in which two B-rep bodies may come apart where they meet: the normals of the faces there.
 
 At a point of a face that is its normal, of an edge, or on the border of a face, those of its two faces, of a vertex
 those of all faces around it; of g they are turned back. Where one direction leads into all of these faces at once, the

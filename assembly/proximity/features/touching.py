@@ -1,4 +1,4 @@
-"""Bodies that touch and do not cross: with flush faces, a search may find points that they have in common.
+"""Bodies that touch and do not cross: with flush faces, a search may find common points.
 
 Where two flat faces lie on each other, the pair along which the bodies would come apart says little of how deep they
 are in each other: a search may come to a pair along the faces. A move off the faces tells: bodies that so small a move

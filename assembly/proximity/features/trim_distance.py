@@ -1,10 +1,11 @@
 """Signed distance of a point of a surface to a loop, in (u, v), with its derivatives.
 
-With the foot c of u on the loop, n the unit normal there towards material and k the loop's curvature towards n,
+With the projection c of u on the loop, n the unit normal there towards material and k the loop's curvature towards n,
 
     s = n.(u - c),   s_u = n,   s_uu = -k / (1 - k s) (I - n n^T):
 
-the motion of the foot drops out of the gradient. Where the foot is a corner, s_uu = (I - n n^T) / s, as of a point.
+the motion of the projection drops out of the gradient. Where the projection is a corner, s_uu = (I - n n^T) / s, as of
+a point.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from assembly.geometry.faces.trim_nearest import trim_nearest
 from assembly.geometry.faces.trim_pieces import trim_at
 from assembly.geometry.splines.evaluate import CURVE_RECORD, curve_point
 
-# Cosine between n and the tangent at the foot above which the foot is a corner.
+# Cosine between n and the tangent at the projection above which the projection is a corner.
 CORNER = 1e-6
 
 

@@ -91,11 +91,11 @@ def candidate_pairs(manager, p, posed, moving, margin, stack, pairs):
         if 0 <= found <= pairs.shape[0]:
             break
         if margin < LEAST_MOTION_BOUND:
-            # There is no room for what is as near as it should not be.
+            # There is no memory for a contact that violates its least gap.
             found = pairs.shape[0] if found > 0 else 0
             header_of(manager).crowded = 1.0
             break
-        # Out of room: what is nearer is looked at more often.
+        # Out of memory: the motion bound is shorter, and the pair is updated more often.
         margin *= 0.5
     return found, margin
 

@@ -1,4 +1,4 @@
-"""The place of a contact on two bodies: what a least gap of the same bodies does not ask for.
+"""The place of a contact on two bodies: the region in which a least gap of these bodies does not apply.
 
 Around a contact's pair of points the bodies are nearer than any gap above zero. Its place is all that is reached from
 there between the two bodies without their gap rising to the least one: the corners of a face that lies on another face,

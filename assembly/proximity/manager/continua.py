@@ -1,4 +1,4 @@
-"""Of a continuum of extrema few are held: of an edge that lies on a face, of a valley between two faces.
+"""Few points of a continuum of extrema are rows: of an edge that lies on a face, of a valley between two faces.
 
 Where an edge is equally near to a face all along, as two flush plates are along their rims, Newton's method finds as
 many extrema as it has starts. The gap is affine along a straight edge: its ends are corners, which have rows of their

@@ -1,11 +1,11 @@
 """Pairs of points through which bodies with faces that all but touch seem to be in each other: a head on a plate,
 beside its hole.
 
-Where a face lies on another one, or is in it by a little, the pair of an edge of one and of a wall beside it may have
-normals that oppose each other and a gap far below zero: the rim of a head is behind the wall of the hole that it
-covers, and the bottom of a dovetail behind the top of the lip over it. What the bodies have in common at an end of such
-a pair is a sliver between two faces that oppose each other. The way apart there is off these faces, which is next to
-nothing, and they have rows of their own; that of the pair would lead along them.
+Where a face lies on another one, or slightly in it, the pair of an edge of one and of a wall beside it may have opposed
+normals and a gap far below zero: the rim of a head is behind the wall of the hole that it covers, and the bottom of a
+dovetail behind the top of the lip over it. The intersection at an end of such a pair is a sliver between two opposed
+faces. The way apart is off these faces, which is next to nothing, and they have rows of their own; the way along the
+pair would lead along the faces.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How far a pair of bodies may go until it is looked at again, and which part of that it has gone.
+"""How far a pair of bodies may move until its next update, and which part of that it has used.
 
 What an update does not list is farther than the pair's motion bound: until a point of one body has moved by that much,
 seen from the other, it cannot touch. It is the smaller one whose motion is measured (`mover`): a wide plate's rim moves
@@ -33,15 +33,15 @@ from assembly.proximity.manager.records import (
 Mover = namedtuple("Mover", "side tree quaternion turn shift")
 # A ball on it. center: in its axes; place: where that is, seen from the other body.
 MotionBall = namedtuple("MotionBall", "center place radius")
-# What a search finds of a pair. bound: how far the body may go for all that is
-# not in the ball; ball_bound: how far what is in the ball may go, because a contact may be created there, infinite if
-# there is no ball; accepted_bound: how far until a pose that is accepted needs an update.
+# The result of a search of a pair. bound: the motion bound for all that is not in the ball; ball_bound: the motion
+# bound of the ball, in which a contact may be created, infinite without a ball; accepted_bound: the motion after which
+# an accepted pose needs an update.
 PairSearch = namedtuple("PairSearch", "bound ball_bound ball accepted_bound")
 
 
 @kernel(inline=True)
 def no_ball():
-    """A ball where there is none."""
+    """The record of no ball."""
     return MotionBall((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 
 
@@ -104,7 +104,7 @@ def root_ball(store, moving):
 
 @kernel(inner=True)
 def margin_now(manager, p, moving):
-    """Keep where the bodies of pair p stand now. Returns its query margin: for some moves as since the last update."""
+    """Keep the poses of pair p's bodies. Returns its query margin: for several moves like those since the update."""
     header, known, lengths = header_of(manager), pair_state_of(manager, p), lengths_of(manager)
     margin = known.margin
     pair = pair_of(manager, p)
@@ -113,7 +113,8 @@ def margin_now(manager, p, moving):
         pace = moved_from(middle, three_of(known.place), moving)
         pace += 2.0 * radius * turned_by(known, moving.quaternion)
         pace /= max(header.calls - known.called, 1.0)
-        # After a step that was cut, as far as it was to go; but it goes no farther where contacts may be born.
+        # After a step that was cut, as far as the whole step; but motion bounds are no larger where contacts may be
+        # created.
         moves = MOVES if pair.centerline_f < 0 else MOVES_OF_WIRES
         asked = max(moves * pace, min(known.cut_short, pair_lengths_of(manager, p).curved_bound))
         margin = min(max(asked, lengths.least_margin), lengths.largest_margin)
@@ -131,7 +132,7 @@ def margin_now(manager, p, moving):
 def allow_ball(known, ball, bound, sure):
     """Keep a ball on the body that moves and how far what is in it may go, in the PAIR_STATE of its pair.
 
-    Infinite: there is no ball. What is `sure` is how far, until a pose that stays is looked at; 0 if any that moved is.
+    Infinite: there is no ball. `sure` is the motion after which an accepted pose needs an update; 0 if any motion does.
     """
     known.ball_bound = bound
     known.sure = sure

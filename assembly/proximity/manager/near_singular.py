@@ -1,4 +1,4 @@
-"""Valleys of the gap between two faces: curves along which they all but touch, as a ring and the plate that it lies on.
+"""Valleys of the gap between two faces: curves along which they almost touch, as a ring and the plate under it.
 
 Across a valley the gap grows as the curvatures say, along it hardly: where it is least runs around the ring as that
 turns by next to nothing. A point at the bottom of the valley, found by Newton's method across it alone, stays near it

@@ -1,6 +1,4 @@
-"""Which points of valleys between two faces are held: few of them, a step apart, at the bottom
-(`proximity/manager/near_singular.py`).
-"""
+"""Which points of valleys between two faces are rows: few, a step apart, at the bottom (`near_singular.py`)."""
 
 from __future__ import annotations
 

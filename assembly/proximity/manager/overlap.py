@@ -1,10 +1,9 @@
 """Whether two bodies are in each other, whatever extrema there are, and which extrema are of far sides: by facets.
 
-A patch whose middle is inside the other body says so by its foot there, where nothing is between the two; a part of an
-edge that goes through a face does (`proximity/manager/edge_piercing.py`). A segment is inside a body or outside by how
-many facets it cuts. Of
-a body that is wholly inside another one every ray cuts an odd number; so do some rays from outside a tube with open
-ends, but not three of three points.
+A patch whose middle is inside the other body says so by its projection there, where nothing is between the two; a part
+of an edge that goes through a face does (`proximity/manager/edge_piercing.py`). A segment is inside a body or outside
+by how many facets it cuts. Of a body that is wholly inside another one every ray cuts an odd number; so do some rays
+from outside a tube with open ends, but not three of three points.
 """
 
 from __future__ import annotations
@@ -169,10 +168,10 @@ def patch_at(posed, side, e):
 
 @kernel(inner=True)
 def projection_at(posed, side, e, y):
-    """The signed distance of a point from its foot at one body's element e, the normal there, and whether there is one.
+    """Signed distance of a point from its projection at one body's element e, the normal there; whether there is one.
 
-    A foot that Newton's method did not reach is none: off the foot of a point outside, the tangent plane of a bulge has
-    it inside. One farther off than BESIDE may be on the far side.
+    A projection that Newton's method did not reach is none: off the projection of a point outside, the tangent plane of
+    a bulge has it inside. One farther off than BESIDE may be on the far side.
     """
     store = posed.store
     patch = patch_at(posed, side, e)
@@ -189,7 +188,7 @@ def projection_at(posed, side, e, y):
 
 @kernel(inner=True, allocates=True)
 def nearest_projection(posed, side, y, most):
-    """The signed distance of a point from its nearest foot on one body; minus `most` if none is nearer than that."""
+    """The signed distance of a point from its nearest projection on one body; minus `most` if none is nearer."""
     stack = np.empty(DEPTH, np.int64)
     stack[0] = 0
     used = 1
@@ -206,10 +205,10 @@ def nearest_projection(posed, side, y, most):
 
 @kernel(inner=True)
 def is_inside_at(posed, side, e, y, margin):
-    """Whether a point is farther than a margin inside one body, by its foot at element e.
+    """Whether a point is farther than a margin inside one body, by its projection at element e.
 
-    Of a thin wall the foot may be on the far side. Then one on the near side is nearer, or, where that is past an edge,
-    a facet is between; these are up to an offset beside their surfaces.
+    Of a thin wall the projection may be on the far side. Then one on the near side is nearer, or, where that is past an
+    edge, a facet is between; these are up to an offset beside their surfaces.
     """
     offset = posed.offsets[side]
     distance, n, some = projection_at(posed, side, e, y)

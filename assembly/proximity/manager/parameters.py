@@ -14,8 +14,8 @@ LEAST_MARGIN, LARGEST_MARGIN = 0.005, 0.1
 # Extrema nearer than the first part of the query margin are listed; those that are, stay so up to the second. Doubled:
 # more rows, of contacts that are far; with both parts equal they would come and go with every update. Chosen.
 TAKE, KEEP = 0.4, 0.8
-# [length] Bodies cross that are in each other by more than this, or than what is called touching where that is known.
-# Doubled: overlap of twice the depth is no crossing. Chosen: well above rounding, well below what a user sees.
+# [length] Bodies cross that overlap by more than this, or by more than `touching` where that is known. Doubled: overlap
+# of twice the depth is no crossing. Chosen: well above rounding, well below what a user sees.
 CROSSING = 1e-6
 
 # When a pair is looked at again. -------------------------------------------------------------------------------------
@@ -26,14 +26,14 @@ USED, SPENT, BRIEF = 0.5, 0.85, 0.35
 # A query margin is for so many moves as the last ones; of round wires, whose updates take a tenth of the time, for
 # fewer. Doubled: half as many updates, each of more pairs. Chosen.
 MOVES, MOVES_OF_WIRES = 12.0, 6.0
-# [length] A motion bound of no more is none: a pair is then updated after every step. Doubled: nothing. From: a few
-# thousand roundings of a double.
+# [length] A motion bound that is no larger counts as zero: the pair is then updated after every step. Doubled: nothing.
+# From: a few thousand roundings of a double.
 LEAST_MOTION_BOUND = 1e-12
-# What moved by less than this part of its motion bound is where it was. Doubled: nothing. From: 1e-9 of the scene's
-# size, at the largest bounds.
+# A move by less than this part of the motion bound counts as none. Doubled: nothing. From: 1e-9 of the scene's size, at
+# the largest bounds.
 UNMOVED = 1e-8
-# Folds nearer than this part of the least query margin are looked at after every move. Doubled: more updates where
-# contacts may be born. Chosen.
+# Pairs with folds nearer than this part of the least query margin are updated after every move. Doubled: more updates
+# where contacts may be born. Chosen.
 NEAR_FOLD = 0.2
 
 # Lists that are kept from update to update. --------------------------------------------------------------------------
@@ -42,8 +42,9 @@ NEAR_FOLD = 0.2
 SKIN, CENTERLINE_SKIN = 2.0, 4.0
 
 # One update. ---------------------------------------------------------------------------------------------------------
-# So many pairs of patches are looked into, if there are others that are farther apart; in a crowd, all that are nearer
-# than a part of what a ball may go where contacts may be born. Doubled: dearer updates, longer steps. Chosen.
+# So many pairs of patches are searched, if there are others that are farther apart; where patches crowd, all that are
+# nearer than a part of the motion bound of a ball where contacts may be created. Doubled: dearer updates, longer steps.
+# Chosen.
 FEW, CROWDED_PART = 40, 0.5
 # [starts] Led down the slope of the gap in an update, because Newton's method found no minimum from there. Doubled:
 # dearer updates at folds, fewer of them. Chosen.

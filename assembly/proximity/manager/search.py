@@ -39,8 +39,8 @@ from assembly.proximity.manager.overlap import is_outside
 from assembly.proximity.manager.own_extrema import may_have_own
 from assembly.proximity.manager.parameters import SLIDES
 
-# How far a search has come. folding: whether an extremum is near a fold; visited: how many ways of Newton's method are
-# remembered; slides: how many starts went down a slope.
+# Progress of a search. folding: whether an extremum is near a fold; visited: the number of remembered Newton
+# iterations; slides: the number of descents along a slope.
 Progress = namedtuple("Progress", "folding visited slides")
 # Limits of a search. curved_bound: the curvature-limited motion bound; enough: how near is near enough to look into;
 # span: of gaps of new minima; merge_radius: extrema nearer to each other are one.
@@ -132,12 +132,12 @@ def search_patches(posed, moving, limits, facing, extrema, passed):
             break
         bound = facing.distances[c]
         if bound > curved_bound and bound > enough:
-            # Whatever extremum is there is not near enough for a slot, and bounds what the bodies may go;
+            # An extremum there is not near enough for a slot, but limits the motion bound of the bodies;
             rest = min(rest, bound)
             continue
         e, d = facing.pairs[c, 0], facing.pairs[c, 1]
         if bound > enough:
-            # in a crowd, what the ball around it may go.
+            # where patches crowd, that of the ball around it.
             new, bears = -1, True
         else:
             new, bears, progress = search_candidate(posed, e, d, limits.merge_radius, extrema, passed, progress)

@@ -54,7 +54,7 @@ from assembly.proximity.manager.records import (
 )
 from assembly.proximity.manager.wires import both_radii
 
-# A point of a valley that is held goes to its bottom as often as that is lower by more than this.
+# A point of a valley that is a row moves to the valley's bottom if that is lower by more than this.
 SUNK = 1e-13
 # A given contact goes from a saddle to a minimum that is lower by no more than this.
 SHALLOW = 1e-7
@@ -174,11 +174,11 @@ def known_extrema(manager, p, posed, tracked, extrema):
         if extrema.count[0] > before and not lost:
             extremum.origin = LISTED + k
             if vertex_contact >= HELD_F and extremum.gap < tracked_pair.gap - SUNK:
-                # The same contact elsewhere: who solves has to know.
+                # The contact has moved: the solve has to know.
                 log_event(manager, HANDED_OFF, SAME_EXTREMUM, p, slot.number, extremum.gap)
             track_extremum(extremum, tracked_pair)
         else:
-            # A corner that went past its face is none of these.
+            # A corner that has left its face is none of these.
             any_gone = any_gone or (lost and vertex_contact == 0.0)
             kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_EXTREMUM)
             log_event(manager, kind, reason, p, slot.number, tracked_pair.gap)
@@ -188,7 +188,7 @@ def known_extrema(manager, p, posed, tracked, extrema):
 
 @kernel(inline=True)
 def gap_beyond(extrema, i, least):
-    """By how much extremum i is farther than its row asks for: in the place of a contact that is nothing."""
+    """By how much the gap of extremum i exceeds its least gap, which is zero in the place of a contact."""
     extremum = extremum_at(extrema.rows, i)
     return extremum.gap - (0.0 if extremum.place == BESIDE_CONTACT else least)
 
@@ -304,7 +304,7 @@ def minimum_beside(extrema, i):
 
 @kernel(inner=True)
 def keep_slots_of_given(manager, p, extrema, tracked):
-    """Given contacts of surfaces whose minimum has become a saddle go to one of those that it parted into.
+    """Given contacts of surfaces whose minimum has become a saddle move to one of the two new minima.
 
     A contact that stayed would hold the surfaces at the saddle, and they would cross beside it.
     """

@@ -1,4 +1,4 @@
-"""The global manager's kernel: which pairs of bodies are looked at, which contacts between them are listed.
+"""An update of the contact manager: which pairs of bodies are searched, and which of their contacts are listed.
 
 Every body carries a tree of patches (`proximity/bvh/tree.py`). An update at a pair of bodies descends their trees,
 finds the pairs of patches that may hold an extremum of the distance within the pair's query margin, and the extrema by
@@ -107,8 +107,8 @@ CANDIDATES, STACK = 8192, 1024
 Workspace = namedtuple("Workspace", "stack candidates distances passed pairs boxes marks")
 # Ways of Newton's method that are remembered in an update.
 WAYS = 64
-# Whether an update tells if bodies cross where no contact says so. A contact that lost its extremum is a reason to ask
-# in a solve; a tick has no time for it.
+# Whether an update tests for crossings without a contact. A contact that lost its extremum is a reason in a solve; a
+# tick has no time for it.
 NEVER, WHERE_LOST, ALWAYS = 0, 1, 2
 
 
@@ -127,7 +127,7 @@ def list_vertex_contacts(manager, p, posed, workspace, extrema, tracked):
 
 @kernel(inner=True)
 def nearest_fold(extrema, least, margin):
-    """How far what is born at a fold may be: about as far as the nearest extremum beside one. Corners have none."""
+    """The least distance of contacts created at a fold: about that of the nearest extremum near one; not of corners."""
     low = math.inf
     for k in range(extrema.count[0]):
         extremum = extremum_at(extrema.rows, k)
@@ -138,7 +138,7 @@ def nearest_fold(extrema, least, margin):
 
 @kernel(inner=True)
 def crosses_elsewhere(manager, p, posed, extrema, workspace, tracked):
-    """Whether the bodies of pair p are in each other where no contact says so."""
+    """Whether the bodies of pair p cross without a contact that shows it."""
     pair = pair_of(manager, p)
     least = pair_lengths_of(manager, p).least
     depth = max(CROSSING, header_of(manager).overlap)
@@ -187,13 +187,13 @@ def search_by_centerlines(manager, p, posed, moving, margin, tracked, workspace,
     at_list = record.list_table + LIST_INTS * (p % record.lists)
     waiting = near_parts(posed, at_list, p, moving, radii + margin, skin, workspace)
     while waiting < 0 and margin > LEAST_MOTION_BOUND:
-        # Out of room: what is nearer is looked at more often.
+        # Out of memory: the motion bound is shorter, and the pair is updated more often.
         margin *= 0.5
         waiting = near_parts(posed, at_list, p, moving, radii + margin, skin, workspace)
     pair_state_of(manager, p).margin = margin
     any_gone = known_extrema(manager, p, posed, tracked, extrema)
     if waiting < 0:
-        # There is no room for what is as near as it should not be.
+        # There is no memory for a contact that violates its least gap.
         header_of(manager).crowded = 1.0
         return PairSearch(0.0, math.inf, no_ball(), math.inf), any_gone, True
     if waiting == 0:
@@ -318,7 +318,7 @@ def update_due(manager, q, tracked, how, first, most):
             continue
         if p != first and record.clock != 0 and call_address(record.clock, ()) > header.deadline:
             if record.go_on_address == 0 or call_address(record.go_on_address, ()) == ABORTED:
-                # Who set it is told, and goes on in another call.
+                # The caller continues in another call.
                 header.deadline = -1.0
                 break
             header.deadline = call_address(record.clock, ()) + SLICE

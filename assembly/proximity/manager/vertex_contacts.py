@@ -1,11 +1,11 @@
-"""Corners of one solid over a face of another one: what comes next where a face lies all but flat on another one.
+"""Corners of one solid over a face of another one: the next contacts where a face lies almost flat on another one.
 
 Of two solids only extrema of the distance are contacts. Where a face is nearly parallel to another one, the extremum is
 at one corner, and jumps to the next one as the bodies turn: a step knows of the one alone, and the next one is in the
-way. But every vertex and every point of an edge that has its foot on a face must stay outside of it, as long as it is
-near, whichever is the lowest. Those whose cones miss the normal by little are listed beside the extrema, each a contact
-of the two features that it is of. Of a curved edge that is a point here and there which stays where it is on the edge:
-the extremum of a rim that lies almost flat runs around it as the bodies turn by next to nothing.
+way. But every vertex and every point of an edge that has its projection on a face must stay outside of it, as long as
+it is near, whichever is the lowest. Those whose cones miss the normal by little are listed beside the extrema, each a
+contact of the two features that it is of. Of a curved edge that is a point here and there which stays where it is on
+the edge: the extremum of a rim that lies almost flat runs around it as the bodies turn by next to nothing.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Turns chosen where scattered bodies were put together, and the loop from there.
+"""Revolution counts chosen where scattered bodies were put together, and the loop from there.
 
-Poses do not tell how often a body has turned, and turns are chosen for the poses a loop begins at (`Turns`). Those of
-scattered bodies say nothing: a body that gathering turns by half a turn would be on a turn that its limits, or other
-angles around a loop, contradict, and no step of a loop changes that.
+Poses do not tell how often a body has turned, so revolution counts are chosen for the poses at which a loop begins
+(`Turns`). Those of scattered bodies are meaningless: a body that initial assembly turns by half a turn might have a
+count that contradicts its limits, or other angles around a loop, and no step changes that.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Run = Callable[[Table, Array, Array], Outcome]
 
 
 def run_gathered(packed: Packed, table: Table, settings: Array, state: Array, turns: Array | None, run: Run) -> Outcome:
-    """The outcome of the loop from a state whose bodies are gathered, if they are scattered, on turns they have then.
+    """The outcome of the loop from a state; scattered bodies are assembled, with revolution counts chosen then.
 
     `turns` are the values that angles are near, zeros by default; `run` is the loop on a table, with settings, from a
     state.
@@ -42,7 +42,7 @@ def run_gathered(packed: Packed, table: Table, settings: Array, state: Array, tu
 
 
 def _has_turns_of_its_pose(packed: Packed, state: Array, turns: Array | None) -> bool:
-    """Whether the turns in a state are those that a start from its poses has."""
+    """Whether the revolution counts in a state are those of a start from its poses."""
     fresh = state.copy()
     _choose_turns(packed, fresh, turns)
     angles = packed.angles
@@ -55,7 +55,7 @@ def _choose_turns(packed: Packed, state: Array, turns: Array | None) -> None:
 
 
 def _assembled(packed: Packed, table: Table, settings: Array, given: Array, turns: Array | None, run: Run) -> Outcome:
-    """The outcome of the loop from where bodies are gathered, with the turns that they have there."""
+    """The outcome of the loop from assembled bodies, with their revolution counts there."""
     onward = settings.copy()
     onward[GATHER] = ASSEMBLES
     state = run(table, onward, given.copy()).state
@@ -63,7 +63,7 @@ def _assembled(packed: Packed, table: Table, settings: Array, given: Array, turn
     onward[GATHER] = 0.0
     if not packed.is_implicit:
         return run(following_none(packed), onward, state)
-    # The way from where bodies are now is to be as short as can be; how long it was is measured from where they were.
+    # The least move is sought from the present poses, and reported from the original ones.
     outcome = run(table, onward, state)
     onward[ITERATIONS] = 0.0
     with postures_from(packed, given[: packed.contacts_at].reshape(-1, 7)):

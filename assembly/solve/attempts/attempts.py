@@ -1,4 +1,4 @@
-"""The loop on a packed scene, and again another way where it did not end SOLVED."""
+"""The loop on a packed scene, and other attempts if it did not end SOLVED."""
 
 from __future__ import annotations
 
@@ -58,23 +58,23 @@ Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 # Rows of history that are kept, beside the first.
 MOST_HISTORY = 1000
-# A violation that no scene has.
+# A violation larger than any scene's.
 ANYTHING = 1e6
 _LOADING = Options(max_iterations=0).settings()
 _loaded: set[int | None] = set()
 
 
 def new_workspace(packed: Packed) -> tuple[Array, Array, Table]:
-    """Where a solve of a packed scene works: its history, and two blocks of memory.
+    """The workspace of a solve of a packed scene: its history, and two blocks of memory.
 
-    Zeros, because a solve leaves whole records in its state, also what their kind has no use for.
+    Zeros, because a solve leaves whole records in its state, including fields that their kind does not use.
     """
     doubles, integers = workspace_needed(packed.rows_table)
     return np.zeros((MOST_HISTORY + 1, HISTORY)), np.zeros(int(doubles)), np.zeros(int(integers), dtype=np.int64)
 
 
 def load(packed: Packed, start: Callable[[], Array]) -> None:
-    """Have the loop for such a scene in this process: loading it, or compiling it, is no part of a solve's time."""
+    """Load or compile the loop for such a scene, so that this does not count as time of a solve."""
     if packed.end_effectors not in _loaded:
         table, workspace = packed.without_manager(), new_workspace(packed)
         solve_program(table, packed.rows_pool, _LOADING, start(), *workspace, packed.end_effectors)
@@ -91,14 +91,14 @@ def attempt(
 ) -> Outcome:
     """The outcome of a solve from the states that `start` makes; no other attempt is made once it is interrupted.
 
-    `turns` are the values that angles are near, where they start on a turn of their own; zeros by default. `apart` is
-    what rows disagree by, where that is known.
+    `turns` are values near which angles start, which determine their revolution counts; zeros by default. `apart` is
+    the disagreement of rows, if known.
     """
     if apart is not None:
         known = fitted_again(packed, settings, start(), apart, _loop(interruption, turns))
         if known is not None:
             return known
-    # Corners that a contact has for itself are those of a kink that a solve has met.
+    # A contact has corners of its own only after a solve has met a kink.
     if packed.corners and settings[PENALTY] > settings[PENALTY_FLOOR]:
         found = _with_corners_first(packed, settings, start, interruption, turns)
         return _attempt(packed, settings, start, interruption, turns) if found is None else found
@@ -134,7 +134,7 @@ def _attempt(
         return fitted(packed, settings, begin(packed, interruption, table, settings, start(), turns), loop)
 
     if outcome.code == CONTACT_LOST and packed.seek_penetration():
-        # Perhaps solids cross at the start.
+        # Solids may cross at the start.
         table[DEEPEST_AT] = packed.table[DEEPEST_AT]
         outcome = begin(packed, interruption, table, settings, start(), turns)
     outcome = fitted(packed, settings, outcome, loop)
@@ -148,7 +148,7 @@ def _attempt(
         outcome = other if _holds(other) else outcome
     is_scattered = settings[GATHER] == 0.0 and outcome.state[packed.results_at + SCATTER] == 1.0
     if is_scattered and not _holds(outcome) and not interruption.is_over():
-        # What the start itself did not lead to may be reached from gathered bodies.
+        # From assembled bodies the solve may succeed where it failed from the start itself.
         settings = settings.copy()
         settings[GATHER] = 1.0
         other = again(settings)
@@ -161,7 +161,7 @@ def _attempt(
 def begin(
     packed: Packed, interruption: Interruption, table: Table, settings: Array, state: Array, turns: Array | None
 ) -> Outcome:
-    """The outcome of the loop from a state, with turns chosen anew where bodies are gathered; see `attempt`."""
+    """The outcome of the loop from a state, with turns chosen anew where bodies are assembled; see `attempt`."""
     if packed.chooses_turns and settings[GATHER] > 0.0:
         return run_gathered(packed, table, settings, state, turns, partial(_run, packed, interruption))
     return _run(packed, interruption, table, settings, state)
@@ -182,12 +182,12 @@ def _loop(interruption: Interruption, turns: Array | None) -> Loop:
 
 
 def _holds(outcome: Outcome) -> bool:
-    """Whether rows hold and the objective is stationary, whatever it is of second order."""
+    """Whether rows hold and the objective is stationary, whatever its second order."""
     return outcome.code in (SOLVED, UNSURE)
 
 
 def as_it_stands(packed: Packed, interruption: Interruption, settings: Array, state: Array) -> Outcome:
-    """The outcome of the loop where nothing is moved, nor any contact of a clearance looked for."""
+    """The outcome of the loop without steps and without searching contacts of clearances."""
     settings = settings.copy()
     settings[ITERATIONS], settings[GATHER], settings[PLACES], settings[ANY_POSE] = 0.0, NEVER, 0.0, 0.0
     return _run(packed, interruption, packed.without_manager(), settings, state)
@@ -196,7 +196,7 @@ def as_it_stands(packed: Packed, interruption: Interruption, settings: Array, st
 def rows_alone(
     packed: Packed, interruption: Interruption, settings: Array, state: Array, reference: Array | None = None
 ) -> Outcome:
-    """The outcome of the loop where no contact of a clearance is looked for, and nothing is gathered.
+    """The outcome of the loop without searching contacts of clearances, and without initial assembly.
 
     Postures are measured from the state's poses, or from a reference (n, 7).
     """
@@ -207,9 +207,9 @@ def rows_alone(
 
 
 def with_listed(packed: Packed, interruption: Interruption, settings: Array, state: Array) -> Outcome:
-    """The same with the contacts of clearances listed, whatever the rows of these say.
+    """The same with the contacts of clearances listed, whatever their rows.
 
-    Where the settings ask for it, it ends where these find no place.
+    If the settings say so, it ends when these find no slot.
     """
     settings = settings.copy()
     settings[ITERATIONS], settings[GATHER], settings[FEASIBILITY] = 0.0, NEVER, ANYTHING
@@ -234,7 +234,7 @@ def run(
         has_manager = packed.clearance_rows > 0 and table[MANAGER_RECORD] >= 0
         pool = packed.pool if has_manager else packed.rows_pool
         code = solve_program(table, pool, settings, state, *workspace, packed.end_effectors)
-        # A solution keeps the rows that there are: memory that nobody wrote to yet is slow to come by.
+        # A solution keeps the rows that were written: untouched memory is slow to allocate.
         history = workspace[0][: int(state[packed.results_at + COUNT]) + 1].copy()
     finally:
         spare.append(workspace)
@@ -244,7 +244,7 @@ def run(
 def go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:
     """The loop from a state that a solve has led to, with postures measured from where they were.
 
-    Bodies may stay in each other only by what they were where the solve began: the state has that.
+    Bodies may keep only the overlap that they had at the beginning of the solve, which is in the state.
     """
     settings = settings.copy()
     settings[ALLOWED_OVERLAP] = 0.0

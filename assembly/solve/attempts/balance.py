@@ -1,10 +1,10 @@
 """Expressions that do not hold, weighed by their slopes instead of by the scales they were given.
 
-Where rows do not hold, the loop minimizes |c|^2 / 2, and ends where J^T c = 0. Which points these are depends on what
-each row is divided by: nearly nothing of the sum is due to an expression of a scale of 1000, so that rows of joints
-hold along a curve on which it is off least, and only there. Its scale says what counts as held, and not that it may be
-given up. So before what is violated is called a contradiction, the loop goes on with every expression divided by its
-steepest slope where it ended; from where all holds, or is off by less, with the scales as they were given.
+Where rows do not hold, the loop minimizes |c|^2 / 2, and ends where J^T c = 0. These points depend on the scale of each
+row: an expression with a scale of 1000 hardly contributes to the sum, so that the loop may end anywhere on the curve
+along which the other rows hold, where the expression is violated least. The scale says what counts as held, not that
+the row may be given up. So before a violation is called a contradiction, the loop continues with every expression
+divided by its steepest slope at the end, and from there, if that is better, with the given scales.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from assembly.solve.second_order.leave import Outcome
 __all__ = ["balanced"]
 
 Array = NDArray[np.float64]
-# Slopes that are less are none.
+# Smaller slopes count as zero.
 FLAT = 1e-12
-# What forces of violated rows may leave of each other along a coordinate, in parts of what they are there, or of the
+# How much of the forces of violated rows may remain along a coordinate, in parts of the forces there, or of the
 # strongest one anywhere.
 CANCELED, LEVEL = 1e-3, 1e-8
 
 
 def balanced(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Outcome:
-    """An outcome; where expressions do not hold, that of a solve that weighs them by their slopes, if it holds.
+    """An outcome; if expressions do not hold, that of a solve that weights them by their slopes, if it holds.
 
     INFEASIBLE is an end that is least with the scales as they were given, or with these weights. `run` is the loop of a
     packed scene with settings from a state.
@@ -64,7 +64,7 @@ def balanced(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Out
     alike = run(twin, onward, _with_multipliers(packed, outcome.state, 0.0 * slopes))
     spent = int(alike.state[at + COUNT])
     onward[ITERATIONS] = max(settings[ITERATIONS] - spent, 0.0)
-    # A soft penalty would draw it back to where it came from.
+    # A soft penalty would lead back to where it came from.
     onward[PENALTY] = settings[PENALTY_FLOOR]
     after = run(packed, onward, _with_multipliers(packed, alike.state, 1.0 / slopes))
     if after.code != SOLVED:
@@ -72,7 +72,7 @@ def balanced(packed: Packed, settings: Array, outcome: Outcome, run: Run) -> Out
             return outcome
         if alike.code != INFEASIBLE or not _is_least(twin, alike.state):
             return outcome._replace(code=STALLED)
-        # What it is off there, by the scales as they were given.
+        # The violation there, with the given scales.
         onward[ITERATIONS] = 0.0
         after = run(packed, onward, alike.state.copy())._replace(code=INFEASIBLE)
     after.state[at + COUNT] += spent

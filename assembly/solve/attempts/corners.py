@@ -1,13 +1,13 @@
 """Contacts of solids that come to lie on each other: their corners first, then that they touch.
 
-The gap of a contact is the least of the gaps at its corners (`constraints/packing/corners.py`), and has a kink where
-several are the least. The loop first keeps all corners from crossing, each a smooth row g_i >= 0, and leaves the
-contacts themselves alone. From where that ends it goes on with them: where bodies are pressed together they touch
-there already, and where they are not, min g_i = 0 draws them to each other.
+The gap of a contact is the minimum of the gaps at its corners (`constraints/packing/corners.py`), and has a kink where
+several are equal. The loop first keeps all corners from crossing, each a smooth row g_i >= 0, without the contacts
+themselves. From the end of that it continues with the contacts: bodies that are pressed together touch there already,
+and others are drawn to each other by min g_i = 0.
 
 A contact's row is then held at the corner that is nearest, g_k = 0, and does not switch from corner to corner while
-bodies slide on each other. With all others one-sided that is min g_i = 0 as long as corner k pushes. Where it would
-have to pull, another one might open less, and the row is that of the nearest features, whichever these are.
+bodies slide on each other. With all others one-sided that is min g_i = 0 as long as corner k pushes. If it would have
+to pull, another corner might open less, and the row is that of the nearest features.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ __all__ = ["corners_first", "with_corners"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-# Multipliers that are less than this part of the largest are rounding: stationarity is asked for to 1e-9.
+# Multipliers below this part of the largest are rounding: stationarity is required to 1e-9.
 PULLS = 1e-8
 
 
@@ -74,7 +74,7 @@ def corners_first(
     state = start()
     tracked = state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)
     if settings[PENALTY] > settings[PENALTY_FLOOR]:
-        # Of a first solve a pair is known only where the user has said where it begins: that contact keeps it.
+        # In a first solve a pair is known only if the user has given its start: that contact keeps it.
         rows = [row for row in rows if np.isnan(tracked[row, 0])]
     # Where the others are is found anew once bodies are there.
     tracked[rows] = np.nan
@@ -103,7 +103,7 @@ def corners_first(
 
 
 def _pulls(packed: Packed, state: Array, rows: Sequence[int]) -> bool:
-    """Whether a contact has a multiplier of a row >= 0 that is broken, and not only by rounding."""
+    """Whether a contact has a multiplier that a row >= 0 does not allow, beyond rounding."""
     multipliers = state[packed.multipliers_at : packed.residuals_at]
     return bool(multipliers[rows].max() > PULLS * np.abs(multipliers).max())
 
@@ -139,7 +139,7 @@ def _take_nearest(packed: Packed, state: Array, row: int, holds: bool) -> None:
             contact = packed.table[packed.table[ROW_TABLE] + ROW * row :]
             q = state[: packed.contacts_at].reshape(-1, 7)
             _turn_around(tracked[row], q[contact[BODY_F], 3:], q[contact[BODY_G], 3:])
-        # Nothing is allowed to it yet.
+        # It has no allowed overlap yet.
         tracked[row, [IDLE, ALLOWED]] = 0.0
         if not holds:
             tracked[row, STAYS] = 0.0

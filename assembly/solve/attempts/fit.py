@@ -1,12 +1,12 @@
-"""Rows that repeat each other and disagree a little, as those of CAD files do: held as well as they can be.
+"""Redundant rows that disagree slightly, as those of CAD files do, held as well as possible.
 
-Where |c|^2 is stationary, J^T c = 0, rows are off by a combination of them that no motion changes. Their values moved
-by it agree, and the loop goes on with these; what they were moved by is the disagreement.
+Where |c|^2 is stationary, J^T c = 0, rows are off by a combination of them that no motion changes. If their values are
+changed by it they agree, and the loop continues with these values; the change is the disagreement.
 
 With J = U S V^T, no motion nearby changes a combination u where |c| / s is longer than a neighborhood: rows tilted
 against each other by e have s of about e and disagree by about e, while next to a dead center c is of the order of s^2.
-Contacts, limits and expressions have no value to move: what they take part in is balanced by
-the others. See docs/derivations.md.
+Contacts, limits and expressions have no value that could be changed: their part is balanced by the others. See
+docs/derivations.md.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ BALANCED = 1e-3
 
 
 def fitted(packed: Packed, settings: Array, outcome: Outcome, loop: Loop) -> Outcome:
-    """An outcome; where rows are off by no more than they may disagree by, that of a solve in which they agree."""
+    """An outcome; if rows are off by no more than they may disagree, that of a solve in which their values agree."""
     off = outcome.state[packed.results_at + VIOLATION]
     if outcome.code not in (INFEASIBLE, STALLED) or not 0.0 < off <= settings[FIT] * packed.scale:
         return outcome
@@ -95,7 +95,7 @@ def _fitted_from(twin: Packed, settings: Array, outcome: Outcome, loop: Loop) ->
     onward = settings.copy()
     onward[GATHER], onward[PENALTY] = 0.0, settings[PENALTY_FLOOR]
     at = twin.results_at
-    # Of bodies that were gathered the least move was that from there; it is not looked for anew from the start.
+    # Of bodies that were assembled the least move was that from there; it is not looked for anew from the start.
     gathered = twin.table[IMPLICIT] == 1 and settings[GATHER] == 1.0 and outcome.state[at + SCATTER] == 1.0
     run, pool = loop.begin if gathered else loop.go_on, twin.pool.copy()
     moved: Array | None = None
@@ -170,10 +170,10 @@ def _disagreement(packed: Packed, state: Array) -> Array | None:
 
 
 def _nears_pole(packed: Packed, rows: Rows) -> bool:
-    """Whether an angle is so near to where it has no value that its slope is another one within a neighborhood.
+    """Whether an angle is so near to its pole that its slope changes completely within a neighborhood.
 
-    It grows as the inverse of the distance to the pole, where there is none. Any value can be had beside it: whatever
-    rows are off there, they do not repeat each other.
+    The slope grows as the inverse of the distance to the pole, where the angle has no value. Any value can be reached
+    beside it, so violated rows there are not redundant.
     """
     slopes = np.zeros(packed.rows)
     slopes[rows.program_rows] = np.linalg.norm(rows.jacobian, axis=1)
@@ -190,7 +190,7 @@ def _unmoved(jacobian: Array, residual: Array, movable: NDArray[np.bool_]) -> Ar
     worst = float(np.abs(residual).max(initial=0.0))
     sizes = np.pad(sizes, (0, len(left) - len(sizes)))
     parts = np.abs(left.T @ residual)
-    # Next to a dead center that is out of reach what rows are off is level to rounding, and they cannot do better.
+    # Next to a dead center that is out of reach the violation is stationary to rounding, and cannot be reduced.
     level = (sizes * parts <= LEVEL) & (parts > sizes * NEGLIGIBLE)
     kept = left[:, (sizes <= worst / NEIGHBORHOOD) | level]
     wanted = kept.T @ residual

@@ -1,4 +1,4 @@
-"""What postures without a reference are measured from: where each solve starts, however the loop gets on from there."""
+"""Reference poses of postures without a reference: those where each solve starts, whatever the loop does then."""
 
 from __future__ import annotations
 

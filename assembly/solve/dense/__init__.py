@@ -1,1 +1,1 @@
-"""All rows of a scene as dense matrices: what looks at a pose and does not solve."""
+"""All rows of a scene as dense matrices, for diagnosis."""

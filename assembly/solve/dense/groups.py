@@ -1,4 +1,4 @@
-"""Bodies that constraints tie together: each group of them moves by itself, and has a rank of its own."""
+"""Groups of bodies connected by constraints: each moves by itself, and has a rank of its own."""
 
 from __future__ import annotations
 

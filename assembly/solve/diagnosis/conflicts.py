@@ -44,7 +44,7 @@ PART, LEAST = 0.5, 4e-13
 
 
 class _Start(NamedTuple):
-    """Poses (n, 7) of a start, and whether its bodies are gathered first: the one often leads where the other fails."""
+    """Poses (n, 7) of a start, and whether its bodies are assembled first: one often succeeds where the other fails."""
 
     q: Array
     gathers: bool

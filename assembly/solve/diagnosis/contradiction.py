@@ -1,4 +1,4 @@
-"""Equations that cannot hold wherever bodies are: then no other start need be tried.
+"""Equations that cannot hold at any poses, so that no other start need be tried.
 
 An equation is a sum of coordinates of joints, with factors, that is to have a value. Taken as unknowns by themselves,
 coordinates may have any values that poses give them and more. So where the linear equations have no solution, no pose

@@ -49,6 +49,6 @@ def goal(solution: Solution) -> tuple[float, float]:
     packed = solution._packed
     gradient = np.empty(6 * packed.count)
     free = np.empty(packed.pair_rows, dtype=np.int64)
-    table, pool = packed.table_at(solution._state), solution._wished_pool()
+    table, pool = packed.table_at(solution._state), solution._pool_as_solved()
     value = gradient_at(table, pool, solution._state, free, gradient, packed.end_effectors)
     return float(value) * packed.unit, float(np.abs(gradient).max())

@@ -1,4 +1,4 @@
-"""How a scene can move: degrees of freedom by rank, constraints that say too much, motions that are left.
+"""How a scene can move: degrees of freedom by rank, redundant constraints, free motions.
 
 With J the Jacobian of the rows in the twists of the moving bodies, the degrees of freedom at a pose are
 

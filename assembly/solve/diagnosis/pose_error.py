@@ -1,4 +1,4 @@
-"""How far a pose may be from one at which the rows hold exactly, by what is left of their residuals.
+"""How far a pose may be from one at which the rows hold exactly, from their residuals.
 
 With the active rows' Jacobian J = U S V^T, a residual of length e along a direction of singular value s is taken back
 by a move of e / s. Where s all but vanishes, the rows' second derivative k decides. The residual may have either sign,

@@ -1,4 +1,4 @@
-"""Constraints that ask what others ask already, as minimal sets.
+"""Redundant constraints, as minimal sets.
 
 Constraints are taken in the order they were given. Where one adds less to the rank than it has, what it lacks is in the
 span of earlier ones; those that are not needed for that are left out one by one (a deletion filter).

@@ -1,4 +1,4 @@
-"""What a pose is worth: its extremal pairs found afresh, their wrenches, and whether surfaces cross beside them.
+"""A pose judged afresh: its extremal pairs, their wrenches, and whether surfaces cross beside them.
 
 At a solution the wrenches of the contacts balance the objective and the other rows c,
 

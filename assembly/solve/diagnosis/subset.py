@@ -108,7 +108,7 @@ class Problem:
     def solve(self, q: Array, interruption: Interruption, after: Result | None = None, gathers: bool = False) -> Result:
         """The nearest poses that hold the constraints, from poses (n, 7); tracked values go on from a solution's.
 
-        Or any poses that hold them, from where scattered bodies were gathered. TimeoutError where the interruption's
+        Or any poses that hold them, from where scattered bodies were assembled. TimeoutError where the interruption's
         time is over before.
         """
         packed = self.packed

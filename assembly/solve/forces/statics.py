@@ -170,7 +170,12 @@ def _balancing(
     gradient = np.empty(jacobian.shape[1])
     free = np.empty(packed.pair_rows, dtype=np.int64)
     gradient_at(
-        packed.table_at(solution._state), solution._wished_pool(), solution._state, free, gradient, packed.end_effectors
+        packed.table_at(solution._state),
+        solution._pool_as_solved(),
+        solution._state,
+        free,
+        gradient,
+        packed.end_effectors,
     )
     moving = np.repeat([not body.fixed for body in solution._scene.bodies], 6)
     lacking = -(gradient + z @ jacobian)[moving]

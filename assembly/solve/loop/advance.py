@@ -1,4 +1,4 @@
-"""The last phases of a step: its direction, the line search along it, and what follows from how far it went."""
+"""The last phases of a step: its direction, the line search along it, and the acceptance of its result."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from assembly.solve.loop.standstill import bound_nearby, update_floor
 
 @kernel(inline=True)
 def find_step(task, current, trial, rows, system):
-    """The step, and the part of it that is tried. Whether there is one."""
+    """Compute the step, and the part of it to try. Whether there is one."""
     loop, program, restoring = task.loop, task.program, task.loop.restoring == 1
     reach = min(loop.radius, loop.leash)
     if restoring:
@@ -48,13 +48,13 @@ def find_step(task, current, trial, rows, system):
 
 @kernel(inline=True)
 def cut_to_motion_bounds(task, current, trial, system):
-    """Cut the step to what bodies may go. Whether it is tried: a tick may update the manager first, or end."""
+    """Cut the step to what motion bounds allow. Whether to try it: a tick may update the manager first, or end."""
     loop, program = task.loop, task.program
     store, memory, step = program.store, program.lifted.memory, system.directions.step
     most_of_it = loop.cut
     loop.cut, loop.may_go = allowed_share(store, memory, current, trial, step, most_of_it)
     if task.tick and not loop.may_go and loop.asked_at != loop.iteration:
-        # Where a step would go farther than is known to be free, a tick updates the pairs that would use much.
+        # If a step would go beyond motion bounds, a tick updates the pairs that would use much of theirs.
         if may_end(store.table, task.settings, memory, (loop.begin, loop.updates), loop.iteration, HALF):
             loop.status, loop.over = OUT_OF_TIME, 1
             loop.violation = loop.violation if loop.iteration > 0 else math.inf
@@ -69,7 +69,7 @@ def cut_to_motion_bounds(task, current, trial, system):
 
 @kernel(inline=True)
 def take_step(task, current, trial, rows, system):
-    """The line search along the step, into the trial iterate. Whether that is the next one."""
+    """Line search along the step, into the trial iterate. Whether that becomes the next iterate."""
     loop = task.loop
     restoring = loop.restoring == 1
     loop.restored = loop.violation if restoring else math.inf
@@ -86,12 +86,12 @@ def take_step(task, current, trial, rows, system):
 
 @kernel(inline=True)
 def refuse(task):
-    """What to do where no part of a step was accepted: lift a pair, restore rows, lead back, or end."""
+    """If no part of a step was accepted: lift a pair, restore rows, lead back, or end."""
     loop, free = task.loop, task.program.lifted.free
     table = task.program.store.table
     pairs = header_at(table, 0).contacts
     if loop.lost >= 0 and free[loop.lost] < 0 and not is_of_solids(table, loop.lost):
-        # An update may put another contact in its place, time and again.
+        # An update may replace it by another contact, again and again.
         loop.lifts += 1
         loop.iteration += 1 if loop.lifts > pairs else 0
         return

@@ -1,4 +1,4 @@
-"""How a solve begins: its state read, its contacts found, scattered bodies gathered."""
+"""The beginning of a solve: its state is read, its contacts are found, scattered bodies are assembled."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def read_state(store, state, current, trial, rows):
     recenter(store, current.q)
     read_tracked(store.table, state, current.tracked)
     for k in range(header.contacts):
-        # Before anything is evaluated no pair is near a fold.
+        # Before the first evaluation no pair counts as near a fold.
         contact_record_at(current.records, k).fold = 1.0
     for r in range(header.rows):
         current.residual[r] = math.inf
@@ -55,7 +55,7 @@ def read_state(store, state, current, trial, rows):
 
 @kernel(inner=True)
 def let_touch(table, current, touching):
-    """Let contacts of bodies that are in each other by no more than `touching` stay so: their rows hold."""
+    """Let contacts of bodies that overlap by no more than `touching` keep their overlap: their rows hold."""
     for k in range(header_at(table, 0).contacts):
         pair = tracked_at(current.tracked, k)
         if is_clearance_row(table, k) or not current.residual[k] < 0.0:
@@ -75,9 +75,9 @@ def goes_on_from_last(settings):
 
 @kernel(inline=True)
 def overlap_allowed(settings):
-    """How far bodies of contacts may be in each other at the start of this solve and stay so.
+    """How much bodies of contacts may overlap at the start of this solve and keep the overlap.
 
-    A solve or a tick that goes on from the last one has its allowance with its pairs, and gets none on top.
+    A solve or a tick from the last one keeps the allowance of its pairs, and gets no additional one.
     """
     return 0.0 if goes_on_from_last(settings) else settings_at(settings, 0).touching
 
@@ -86,9 +86,9 @@ def overlap_allowed(settings):
 def find_contacts(program, settings, state, current, rows, n):
     """Find the contacts of the start and evaluate its rows, unless the last solve or tick left them in the state.
 
-    Bodies of a contact or a clearance that are in each other by no more than touching there may stay so.
-    Returns the contact that has no pair, or -1, and whether the rows were evaluated. They are not where a contact has
-    no pair to start from, or where pairs are lifted, for which rows have to be rearranged first.
+    Bodies of a contact or a clearance that overlap by no more than touching there may keep the overlap. Returns the
+    contact that has no pair, or -1, and whether the rows were evaluated. They are not where a contact has no pair to
+    start from, or where pairs are lifted, for which rows have to be rearranged first.
     """
     limits = settings_at(settings, 0)
     store, lifted = program.store, program.lifted
@@ -124,7 +124,7 @@ def find_contacts(program, settings, state, current, rows, n):
 
 @kernel(inner=True)
 def put_together(program, current, rows):
-    """Gather scattered bodies, and begin again from there; returns the contact that has no pair, or -1."""
+    """Assemble scattered bodies, and begin again from there; returns the contact that has no pair, or -1."""
     store, lifted = program.store, program.lifted
     header = header_at(store.table, 0)
     free, lengths, memory = lifted.free, lifted.lengths, lifted.memory
@@ -149,10 +149,10 @@ def put_together(program, current, rows):
 
 @kernel(inline=True, allocates=True)
 def set_out(program, settings, state, current, rows, n):
-    """Find contacts, evaluate rows, gather what is scattered where the settings ask for it.
+    """Find contacts, evaluate rows, assemble scattered bodies where the settings ask for it.
 
     Returns CONTACT_LOST, GATHERED or RUNNING, the contact that is lost or -1, and whether that one is at a fold, to be
-    freed.
+    lifted.
     """
     limits = settings_at(settings, 0)
     store, shape = program.store, program.structure
@@ -162,15 +162,15 @@ def set_out(program, settings, state, current, rows, n):
     result.last_feasible = 0.0
     result.curved = 0.0
     lost, evaluated = find_contacts(program, settings, state, current, rows, n)
-    # What goes on begins where the last one ended: there a pair that Newton's method loses is at a fold, or at the end
-    # of a patch, where its coordinates were unknowns.
+    # A solve from a solution begins where the last one ended: a pair that Newton's method loses there is at a fold or
+    # at the end of a patch, where its coordinates were unknowns.
     folded = lost >= 0 and evaluated and goes_on_from_last(settings) and not is_of_solids(store.table, lost)
     status = CONTACT_LOST if lost >= 0 and not folded else RUNNING
     result.scatter = 1.0 if status == RUNNING and scattered(store.table, current.residual, shape.one_sided) else 0.0
     if limits.gather > 0.0 and result.scatter == 1.0:
         lost = put_together(program, current, rows)
         if has_place(store.table, state):
-            # It is of where the last solve ended, and bodies are no more there.
+            # It belongs to the end of the last solve, but the bodies have been moved since.
             forget_factor(store.table, state)
         folded = False
         status = GATHERED if limits.gather == ASSEMBLES else RUNNING
@@ -182,14 +182,14 @@ def set_out(program, settings, state, current, rows, n):
 
 @kernel(inner=True, allocates=True)
 def rearrange(program, count, rows, current):
-    """Rows and unknowns for other contacts or `count` free pairs.
+    """Rows and unknowns for other contacts or `count` lifted pairs.
 
     Returns the rows, the system of a step, and which contact is lost at this point, or -1.
     """
     store, shape = program.store, program.structure
     header = header_at(store.table, 0)
     for r in range(rows.count, rows.y.size):
-        # New rows of tangency say nothing yet: least squares leave them out.
+        # New rows of tangency have no multipliers yet: least squares leave them out.
         rows.y[r] = 0.0
         rows.better_y[r] = 0.0
         rows.active[r] = 0.0
@@ -214,7 +214,7 @@ def begin_loop(task, current):
     loop.violation = loop.value = loop.dual = math.inf
     loop.last_violation = loop.last_dual = math.inf
     loop.mu, loop.floor = limits.penalty, limits.penalty_floor
-    # The first step of a tick needs about what that of the last one did; half of it is tried first.
+    # The first step of a tick needs about the shift of the last tick; half of it is tried first.
     loop.shift = 2.0 * task.result.first_shift if task.tick else 0.0
     loop.used_shift, loop.radius, loop.leash, loop.cut_length = 0.0, limits.radius, math.inf, math.inf
     loop.longest, loop.slope, loop.cut, loop.alpha = 0.0, 0.0, 1.0, 0.0

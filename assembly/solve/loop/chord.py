@@ -1,14 +1,13 @@
-"""The first steps of a solve that goes on from another one: Newton's method by the factor that one left.
+"""The first steps of a solve from a solution: chord steps with the factor that the last solve left.
 
 With A and W the Jacobian and the weights (1 / mu) of the rows that count where the factor was made,
 
     (H + d I + A^T W A) dx = -(grad f + J^T y + A^T W c),        dy = W (A dx + c)
 
-is a step of the whole system of `augmented_lagrangian.py`, by an older matrix (the chord method): the first one is the
-tangent predictor of what values and targets have changed. Where the next one would not arrive, a factor is made anew,
-once. The iterate at which all holds is handed to the loop, which judges it as any other. Where steps gain too little, a
-row that counts begins to pull, or a pair is next to a fold, nothing has happened, and the loop begins where the solve
-does.
+is a step of the whole system of `augmented_lagrangian.py` with an older matrix (the chord method); the first one is the
+tangent predictor for changed values and targets. If the next step would not arrive, a factor is made anew, once. The
+iterate at which all holds is passed to the loop, which judges it as any other. If steps gain too little, an active row
+begins to pull, or a pair is near a fold, the loop begins at the start of the solve as if no step had been taken.
 """
 
 from __future__ import annotations
@@ -45,8 +44,8 @@ from assembly.solve.loop.residuals import add_transposed, move, times, violation
 from assembly.solve.loop.settings import RUNNING
 from assembly.solve.loop.terminate import keep_what_holds
 
-# How such steps ended: how many there were, or -1 where the loop is to begin from the start; whether the iterates have
-# changed places; the violation and the dual residual at the last iterate, and at the one before.
+# How such steps ended: their number, or -1 if the loop is to begin from the start; whether the two iterates were
+# exchanged; the violation and the dual residual at the last iterate, and at the one before.
 Chord = namedtuple("Chord", "steps swapped violation dual last_violation last_dual")
 
 
@@ -69,7 +68,7 @@ def chord_step(shape, kept, point, rows, system):
 
 @kernel(inner=True)
 def round_poses(store, q, told):
-    """Poses as the user's coordinates have them, which go into `told`."""
+    """Poses rounded to the user's coordinates, which go into `told`."""
     units, header = pool_header_at(store.pool, 0), header_at(store.table, 0)
     for b in range(header.bodies):
         if store.table[header.unknown_blocks + b] >= 0:
@@ -82,7 +81,7 @@ def round_poses(store, q, told):
 
 @kernel(inner=True)
 def write_told(table, told, state):
-    """Poses of moving bodies, as the user's coordinates have them, into a state."""
+    """Poses of moving bodies, rounded to the user's coordinates, into a state."""
     for b in range(told.shape[0]):
         if table[header_at(table, 0).unknown_blocks + b] >= 0:
             for k in range(7):
@@ -91,9 +90,9 @@ def write_told(table, told, state):
 
 @kernel(inner=True)
 def weigh_as_kept(kept, one_sided, rows):
-    """Let the rows count that do in the kept factor. Whether none of these pulls.
+    """Make the rows active that are active in the kept factor. Whether none of these pulls.
 
-    One that does not count may be broken on the way: it is part of the violation, and holds at the end.
+    A row that is not active may be violated on the way: it is part of the violation, and holds at the end.
     """
     for r in range(rows.count):
         counts = one_sided[r] == 0 or kept.weights[r] > 0.0
@@ -145,9 +144,9 @@ def go_along(task, kept, iterates, rows, system, is_first):
 def wants_factor(task, count, arrived, violation, dual, last):
     """Whether a factor is to be made at an iterate, in place of an earlier solve's.
 
-    Where the steps arrived it is for the next solve; a tick that arrived soon leaves the one it had. On the way it is
-    made where one more step by the old one would not arrive. Newton's step leaves L e^2 / 2 of a distance e, a chord
-    step by the same matrix L e of what is off then: twice the part that the step before has left.
+    At the end of the steps it is for the next solve; a tick that arrived soon keeps its old factor. On the way it is
+    made if one more step with the old factor would not arrive. Newton's step leaves L e^2 / 2 of a distance e, a chord
+    step with the same matrix leaves L e of the remainder: twice the part that the step before has left.
     """
     if arrived:
         return not (task.tick and count <= FEW_STEPS)
@@ -172,7 +171,7 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
         log(history, count, (value, violation, dual, rows.mu, CHORD_SHIFT, 1.0, limits.radius))
         if not (math.isfinite(value) and weigh_as_kept(kept, shape.one_sided, rows)):
             return failed
-        # A tick ends after its steps at any pose that holds.
+        # A tick ends after its steps at any pose at which rows hold.
         arrived = violation <= feasible and (dual <= stationarity or (task.tick and count >= task.loop.limit))
         last = max(last_violation, last_dual)
         if not (arrived or max(violation, dual) <= CHORD_GAIN * last):
@@ -198,7 +197,7 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
 
 @kernel(inline=True, allocates=True)
 def go_on_by_chords(task, history, state, iterates, rows, system):
-    """Steps by the factor that the last solve left, if it did. Whether the iterates have changed places."""
+    """Steps with the factor that the last solve left, if any. Whether the two iterates were exchanged."""
     loop, limits, store = task.loop, task.limits, task.program.store
     current, trial, held = iterates
     kept = kept_in(store.table, state)
@@ -209,7 +208,7 @@ def go_on_by_chords(task, history, state, iterates, rows, system):
         return False
     loop.violation = violation_of(current.residual, task.program.structure.one_sided, rows.count)
     if task.any_pose and loop.violation <= loop.feasible:
-        # What holds is not moved, whatever the least move of the last solve was.
+        # If rows hold, nothing is moved, whatever the least move of the last solve was.
         return False
     if task.tick or task.watched:
         keep_what_holds(task, held, current, rows)
@@ -217,7 +216,7 @@ def go_on_by_chords(task, history, state, iterates, rows, system):
     chord = chord_steps(task, history, state, kept, current, trial, rows, system)
     if chord.steps < 0:
         forget_factor(store.table, state)
-        # Of motion bounds it is known what bodies would have used elsewhere.
+        # The recorded use of motion bounds belongs to other poses.
         loop.measured = 0
         if loop.changed:
             # Other contacts are listed at the start: no step was taken yet.
@@ -226,7 +225,7 @@ def go_on_by_chords(task, history, state, iterates, rows, system):
         take_rows(store, state, kept, current)
         return False
     if chord.steps > 0:
-        # From here on the state has the poses that were found, not those of the start.
+        # From here on the state has the new poses, not those of the start.
         write_told(store.table, task.told, state)
     loop.iteration, loop.alpha = chord.steps, 1.0
     loop.last_violation, loop.last_dual = chord.last_violation, chord.last_dual

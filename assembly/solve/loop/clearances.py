@@ -76,7 +76,7 @@ def place_clearance_rows(table, lifted, current, rows, begins):
             rows.y[r] = 0.0
             rows.better_y[r] = 0.0
         free[r] = -1
-        # Nothing is known of it yet.
+        # Its row has not been evaluated yet.
         contact_record.fold = 1.0
         contact_record.slack = 0.0
         current.residual[r] = 1.0
@@ -181,7 +181,7 @@ def go_back(table, memory, numbers):
 
 @kernel(inner=True)
 def measure_pairs(store, memory, first, end, q):
-    """Measure what pairs from first to before `end` used of their motion bounds. The largest part that is known."""
+    """Measure what pairs from first to before `end` used of their motion bounds. Returns the largest known part."""
     header = header_at(store.table, 0)
     record = header.manager_record
     most = call_address(header.parts_address, (store.table, store.pool, record, memory, first, end, q))
@@ -204,7 +204,7 @@ def allowed_share(store, memory, current, trial, step, share):
     at = memory_places(store.table, record)[0]
     allowed = 1.0
     for p in range(manager.pairs):
-        # Of every pair by itself: one that is nearly spent, but hardly moves, is not in the way.
+        # For every pair by itself: a pair whose bound is nearly used but that hardly moves does not limit the step.
         o = pair_state_at(memory, at + PAIR_MEMORY * p)
         end = o.part
         o.cut_short = end * o.motion_bound
@@ -218,7 +218,7 @@ def allowed_share(store, memory, current, trial, step, share):
         flank = pair_at(store.table, manager.pair_table + PAIR_RECORD * p).minimum + 1
         most = min(store.pool[flank], lengths_at(store.pool, manager.lengths).largest_margin)
         if begin <= UNMOVED and o.margin >= min(o.cut_short, most):
-            # It was updated right here, as far out as another update would search.
+            # It was updated at this pose, as far out as another update would search.
             o.part = begin
     return share * allowed, False
 
@@ -234,8 +234,8 @@ def is_too_far(store, memory, point):
 def ends_unseen(store, memory, before, after):
     """Whether a clearance's contact of solids ends along a step that goes farther than it is open.
 
-    What takes its place, where features meet, is not listed yet, and was no nearer: over such a step it could pass
-    through, and be found at the far side, or nowhere.
+    The contact that replaces it, where features meet, is not listed yet, and was no nearer: in such a step it could
+    pass through, and be found at the far side, or nowhere.
     """
     header = header_at(store.table, 0)
     record = header.manager_record

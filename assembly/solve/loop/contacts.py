@@ -53,7 +53,7 @@ def start_contacts(store, q, contacts, free, lengths):
     header = header_at(store.table, 0)
     for k in range(header.contacts):
         pair = tracked_at(contacts, k)
-        # What a clearance has lost its contact manager finds.
+        # Contacts lost by a clearance are found by its contact manager.
         idle = contact_of(store.table, k).body_f < 0 or is_clearance_row(store.table, k)
         if not math.isnan(contacts[k, 0]) or idle:
             continue
@@ -80,10 +80,10 @@ def is_near_fold(records, k, below):
 
 @kernel(inner=True)
 def lift_folds(store, lifted, point, active, below, lost, trims):
-    """Mark the pairs near a fold, and the lost one, as free. Returns how many are free now.
+    """Mark the pairs near a fold, and the lost one, as lifted. Returns how many are lifted now.
 
-    An idle one-sided row asks nothing of its pair. With `trims`, pairs whose trims count are freed as well: the second
-    derivative of a trim is known in the coordinates alone.
+    An idle one-sided row does not need its pair. With `trims`, pairs with active trims are lifted as well: the second
+    derivative of a trim is known in the coordinates only.
     """
     header = header_at(store.table, 0)
     free, lengths, contacts, records = lifted.free, lifted.lengths, point.tracked, point.records
@@ -107,9 +107,9 @@ def lift_folds(store, lifted, point, active, below, lost, trims):
 
 @kernel(inner=True)
 def lifted_pairs_hold(store, q, contacts, free, tolerance):
-    """Whether every free pair is extremal by the frames of tracked pairs, which know poles.
+    """Whether every lifted pair is extremal by the frames of tracked pairs, which handle poles.
 
-    Its own rows do not tell at a pole or an apex: there a tangent vanishes, and its row with it.
+    Its own rows do not show it at a pole or an apex: there a tangent vanishes, and its row with it.
     """
     header = header_at(store.table, 0)
     for k in range(header.contacts):
@@ -125,9 +125,9 @@ def lifted_pairs_hold(store, q, contacts, free, tolerance):
 
 @kernel(inner=True)
 def choose_sides(program, current, rows, least):
-    """Choose the sides of loops that rows of trims are of at the iterate, and evaluate these. Whether some are others.
+    """Choose the sides of loops for the rows of trims at the iterate, and evaluate these. Whether some have changed.
 
-    Multipliers that are proposed tell whether a contact goes on around a corner, if they are above `least`.
+    Proposed multipliers tell whether a contact moves on around a corner, if they are above `least`.
     """
     store, lifted = program.store, program.lifted
     header = header_at(store.table, 0)

@@ -1,4 +1,4 @@
-"""The step from a point: the system that gives it, rows foreseen to bind, how much of it may be taken."""
+"""The step from an iterate: its linear system, prediction of active rows, bounds of its length."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from assembly.solve.loop.residuals import add_transposed, move, times
 
 @kernel(inline=True)
 def first_shift(program, restoring, shift, violation, dual):
-    """The shift that is tried first, after one of `shift`: no larger than what inertia needs so near to a solution.
+    """The shift to try first, after the last one of `shift`: no larger than inertia needs near a solution.
 
-    That falls with the distance to it. Where rows alone count and depend on each other there, the squares of their
-    slopes do, too; contacts of a clearance come and go instead.
+    It decreases with the distance to the solution. So do the squares of the rows' slopes where rows alone count and
+    become dependent at the solution; with clearances, contacts come and go instead.
     """
     least, off = LEAST_SHIFT, dual
     if restoring and violation < NEARLY_HELD and header_at(program.store.table, 0).manager_record < 0:
@@ -32,11 +32,10 @@ def first_shift(program, restoring, shift, violation, dual):
 
 @kernel(inline=True)
 def find_direction(program, current, rows, system, trust, restoring):
-    """The step of the augmented Lagrangian at a point, into the system.
+    """Compute the step of the augmented Lagrangian at a point, into the system.
 
-    The rows get which of them count, what they push with, and which do because the step would break them. Returns the
-    shift of the matrix and that of the factor the step is by, negative where there is none; the step's largest
-    component and turn.
+    Sets which rows are active, their forces, and which are active because the step would break them. Returns the shift
+    of the matrix and that of the factor (negative if there is none), and the step's largest component and rotation.
     """
     shape, order = program.structure, program.structure.sparsity
     gradient, lagrangian, matrix = system.gradient, system.hessian, system.factor
@@ -92,14 +91,14 @@ def cut_step(shape, current, rows, system, cut):
         steepest = max(steepest, abs(descent[i]))
     for r in range(rows.count):
         if rows.foreseen[r] == 1.0:
-            # What the row adds to the descent is not in the merit before it binds.
+            # The row's part of the descent is not in the merit before the row becomes active.
             slope -= (rows.y[r] + current.residual[r] / rows.mu) * times(shape.bases, current.jacobian, r, step)
     return slope, steepest
 
 
 @kernel(inline=True)
 def propose(shape, current, rows, straight, alpha):
-    """The multipliers of first order after a share alpha of the straight step."""
+    """First-order multipliers after a share alpha of the straight step."""
     y, better_y = rows.y, rows.better_y
     for r in range(rows.count):
         better_y[r] = 0.0
@@ -112,9 +111,9 @@ def propose(shape, current, rows, straight, alpha):
 
 @kernel(inner=True)
 def leave_saddle(program, current, trial, number, system):
-    """A small move off a saddle of the violations, into the trial point; whether it is one.
+    """A small move off a saddle of the violations, into the trial point; whether there was one.
 
-    Of axes that are parallel and are to stand at right angles, say. `number` is how many moves there have been.
+    For example, parallel axes that are to be perpendicular. `number` counts these moves.
     """
     store, step = program.store, system.directions.step
     n = step.size

@@ -1,4 +1,4 @@
-"""How a solve ends: what crosses is told, the last pose that held brought back, the pose judged as it is returned."""
+"""The end of a solve: crossings are reported, the last pose that held is restored, the returned pose is judged."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ from assembly.solve.loop.settings import (
 from assembly.solve.loop.workspace import results_of
 
 # How the loop ended: status, and objective, violation, dual residual of its last iterate; the violation that counts as
-# none, whether there is a last feasible iterate.
+# zero, whether there is a last feasible iterate.
 End = namedtuple("End", "status value violation dual feasible holds")
 
 
 @kernel(inner=True)
 def find_crossing(program, current, rows):
-    """Update all pairs where a solve failed; whether bodies are in each other, with or without a row that says so."""
+    """Update all pairs if a solve failed; whether bodies cross, with or without a row that shows it."""
     table, lifted = program.store.table, program.lifted
     update_around(program.store, lifted.memory, current, EVERYTHING)
     place_clearance_rows(table, lifted, current, rows, False)
@@ -59,7 +59,7 @@ def find_crossing(program, current, rows):
 
 @kernel(inner=True)
 def return_to(program, held, rows, current, tick):
-    """Back to the last pose that held; what is near there is found again."""
+    """Return to the last pose that held, and update the contacts there."""
     store, lifted = program.store, program.lifted
     bring_back(held, rows, current)
     if header_at(store.table, 0).manager_record >= 0:
@@ -92,11 +92,11 @@ def finish(program, settings, state, iterates, rows, system, at_end):
         result.last_feasible = 1.0
     gathered = header.implicit == 1 and limits.gather > 0.0 and result.scatter == 1.0
     if gathered:
-        # The way from where bodies were gathered was as short as could be; it is measured from where they were given.
+        # The least move was measured from the assembled bodies; it is reported from the given poses.
         scaled_poses(store, state, trial.q)
         recenter(store, trial.q)
     write_pose(store, current.q, state)
-    # A tick that went well ends at a pose that was just evaluated, and so do steps to poses as they are returned.
+    # A successful tick ends at a pose that was just evaluated, as do chord steps, whose poses are returned unchanged.
     is_as_told = (
         status == SOLVED and not gathered and rows.count == header.rows and is_as_returned(store, current.q, state)
     )
@@ -121,7 +121,7 @@ def finish(program, settings, state, iterates, rows, system, at_end):
     result.improper = write_rows(store.table, current, rows.y, lifted, tick, pool_header_at(store.pool, 0).scale, state)
     if limits.second_order > 0.0 and result.last_feasible + result.carried == 0.0 and status != CONTACT_LOST:
         status = test_end(program, settings, results, status, current, rows, system)
-    # With clearances what a tick ends with depends on rounding where wires wedge: there, rows are evaluated afresh.
+    # With clearances the end of a tick depends on rounding where wires wedge: there rows are evaluated afresh.
     lasts = status == SOLVED if watched else status != CONTACT_LOST
     is_kept = lasts and result.last_feasible == 0.0 and rows.count == header.rows
     leave(program, limits, state, trial if is_judged else current, rows, system, is_kept, status == SOLVED)

@@ -1,4 +1,4 @@
-"""What factorizations tell of second order: whether no curvature is negative along motions that keep the rows.
+"""Second-order information from factorizations: whether no curvature is negative along motions that keep the rows.
 
 With H the Hessian of the Lagrangian, J the rows that push and Z a basis of the motions that keep them, Z^T H Z has no
 eigenvalue below -d if H + J^T J / mu + d I has a Cholesky factor, whatever mu is (Debreu, Finsler). The last step of a

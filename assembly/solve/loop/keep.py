@@ -1,4 +1,4 @@
-"""What a solve leaves for the next one, beside its rows: the factor of a step's matrix at its end, or close by."""
+"""What a solve leaves for the next one, beside its rows: the factor of a step's matrix at or near its end."""
 
 from __future__ import annotations
 

@@ -24,10 +24,10 @@ from assembly.solve.loop.parameters import BENT, HALVED, LARGEST_TURN, LETS_GO, 
 from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.residuals import add_transposed, merit, move, times
 
-# How a step is kept short: the shift of the Hessian, the length it may have, whether the shift grows for that.
+# How the length of a step is limited: the shift of the Hessian, the largest length, whether the shift is raised for it.
 Trust = namedtuple("Trust", "shift radius damps")
-# What is known along a step: the merit's slope, the step's largest component; whether a contact that ends where solids
-# are in each other may be given up, and whether bodies may go all the way for certain.
+# What is known of a step: the merit's slope, the step's largest component; whether a contact that ends where solids
+# overlap may be given up, and whether motion bounds cover the whole step.
 Line = namedtuple("Line", "slope longest lets_go is_free")
 
 
@@ -35,9 +35,9 @@ Line = namedtuple("Line", "slope longest lets_go is_free")
 def damped_step(program, system, trust):
     """The step of the system's factor, its shift raised until the step is not much longer than the radius.
 
-    Nor may a body turn by much more than a radian. Scaled down instead, a step would lose what its stiff directions
-    gain, those that bring the rows to hold. That is for who `damps`; with contacts rows change fast along the step.
-    Returns the shift, and the step's largest component and turn.
+    Nor may a body turn by much more than a radian. Scaling the step instead would lose what its stiff directions gain,
+    which bring the rows to hold. The shift is raised only if `damps`: with contacts rows change fast along the step.
+    Returns the shift, and the step's largest component and rotation.
     """
     order, matrix = program.structure.sparsity, system.factor
     descent, step, scratch = system.directions.descent, system.directions.step, system.directions.straight
@@ -73,7 +73,7 @@ def damped_step(program, system, trust):
 
 @kernel(inline=True)
 def dexterities_at(end_effectors, program, count, point, order, gradient, hessian):
-    """Their terms of the objective. Where `end_effectors` is None there are none: what they need is not compiled."""
+    """Dexterity terms of the objective; none if `end_effectors` is None, whose kernels are then not compiled."""
     return 0.0 if end_effectors is None else add_dexterities(program, count, point, order, gradient, hessian)
 
 
@@ -103,9 +103,10 @@ def rounding_of(rows, residual, gradient, size):
 
 @kernel(inline=True)
 def bend_step(shape, current, trial, rows, system, alpha, promised):
-    """Bend a step, of which a share alpha leads to the trial point, by the factor at hand.
+    """Bend a step, a share alpha of which leads to the trial point, with the present factor (second-order correction).
 
-    To where rows hold, or if `promised` to what the linear model of the straight step leaves of them.
+    It is bent to where rows hold, or if `promised` to the residuals that the linear model of the straight step
+    predicts.
     """
     descent, step = system.directions.descent, system.directions.step
     residual, active, forces = current.residual, rows.active, rows.forces
@@ -124,7 +125,7 @@ def bend_step(shape, current, trial, rows, system, alpha, promised):
 
 @kernel(inline=True)
 def search_line(program, current, trial, rows, system, line, value, restoring):
-    """Try alpha times the step, alpha from 1 down, until the augmented Lagrangian falls enough.
+    """Try alpha times the step, alpha from 1 down, until the augmented Lagrangian decreases enough.
 
     The trial point is left in `trial`. Returns whether one was accepted, alpha, and the contact lost by the last trial
     or -1. `value` is the objective here, which counts unless rows alone do (`restoring`).
@@ -134,7 +135,7 @@ def search_line(program, current, trial, rows, system, line, value, restoring):
     step, straight, longest = system.directions.step, system.directions.straight, line.longest
     residual = current.residual
     current_merit = merit(residual, shape.one_sided, rows) + (0.0 if restoring else value)
-    # Of the violations alone no objective rounds anything off.
+    # If violations alone count, there is no rounding of an objective.
     size = abs(current_merit) + (0.0 if restoring else abs(value))
     noise = rounding_of(rows, residual, system.gradient, size)
     alpha = 1.0
@@ -145,7 +146,7 @@ def search_line(program, current, trial, rows, system, line, value, restoring):
         predict_pairs(store, shape.bases, lifted, current, trial, step, alpha)
         known = line.is_free and alpha == 1.0 and bends % 3 == 0
         if header.manager_record >= 0 and not known and is_too_far(store, lifted.memory, trial):
-            # Bent, it would go farther than is known to be free.
+            # The bent step would exceed motion bounds.
             bends = BENT
             alpha *= 0.5
             continue
@@ -156,7 +157,7 @@ def search_line(program, current, trial, rows, system, line, value, restoring):
             and lost < 0
             and ends_unseen(store, lifted.memory, current, trial)
         ):
-            # A tick has no final update, which would tell of what it led through.
+            # A tick has no final update, which would detect what it passed through.
             bends = BENT
             alpha *= 0.5
             continue
@@ -174,7 +175,7 @@ def search_line(program, current, trial, rows, system, line, value, restoring):
                 bend_step(shape, current, trial, rows, system, alpha, bends > TO_ROWS)
             if bends <= BENT:
                 continue
-        # A bent step may be longer than it was.
+        # A bent step may be longer than the straight one.
         short = line.lets_go and bends % 3 == 0 and alpha <= HALVED and alpha * longest < LETS_GO
         if lost >= 0 and short and may_go(store.table, lost, residual):
             pair = tracked_at(current.tracked, lost)
@@ -182,7 +183,7 @@ def search_line(program, current, trial, rows, system, line, value, restoring):
                 pair.stays = MAY_GO - pair.stays
                 continue
         alpha *= 0.5
-        # A pair near a fold is freed; a clearance's is given up where its gap does not close.
+        # A pair near a fold is lifted; a clearance's pair is given up if its gap does not close.
         if lost >= 0 and alpha * longest < 0.01 and not is_clearance_row(store.table, lost):
             break
     hold_all(store.table, current.tracked)

@@ -1,6 +1,6 @@
 """What changes from step to step of the loop: one record, which each of its phases reads and writes.
 
-The phases are told what does not change by a `Task`: the program, the settings, and which policies a solve has.
+What does not change is in a `Task`: the program, the settings, and which policies a solve has.
 """
 
 from __future__ import annotations
@@ -80,14 +80,14 @@ LOOP_STATE = np.dtype(NUMBERS.descr + COUNTS.descr)
 loop_at = record_view(LOOP_STATE)
 LOOP = size_of(LOOP_STATE)
 
-# What stays as it is: the program, arrays and records of settings and results, workspace for poses in the user's
-# coordinates, what is known of the way back (`way_back.py`), the record of the loop; whether it is a tick, has a
-# contact manager, is content with any pose that holds, and leads what fails back onto its rows.
+# What does not change: the program, arrays and records of settings and results, workspace for poses in the user's
+# coordinates, the state of the way back (`way_back.py`), the record of the loop; whether it is a tick, has a contact
+# manager, accepts any pose at which rows hold, and leads failed solves back onto their rows.
 Task = namedtuple("Task", "program settings limits results result told way loop tick watched any_pose leads_back")
 
 
 @kernel(inline=True)
 def lead_back(loop, status):
-    """The solve ends with this status; what steps follow only lead back onto the rows."""
+    """The solve ends with this status; further steps only lead back onto the rows."""
     loop.ended = status
     loop.led_back_by = loop.iteration + BACK_STEPS

@@ -1,4 +1,4 @@
-"""The loop's multipliers: which rows push and how hard, and which of several proposals balances the objective best."""
+"""Multipliers: which rows push and how hard, and which of several candidates balances the objective best."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from assembly.solve.loop.residuals import NOT_ORDERED, add_row, add_transposed, 
 
 @kernel(inner=True)
 def weigh_rows(rows, one_sided, residual):
-    """Into `active` 1 / mu for the rows that count, into `forces` what they push with: -(y + c / mu)."""
+    """Write 1 / mu into `active` for active rows, and their forces -(y + c / mu) into `forces`."""
     for r in range(rows.count):
         t = rows.y[r] + residual[r] / rows.mu
         idle = one_sided[r] == 1 and t >= 0.0
@@ -37,7 +37,7 @@ def weigh_rows(rows, one_sided, residual):
 
 @kernel(inline=True)
 def let_count(shape, r, counts, point, rows, system):
-    """Let row r, which is idle here, count in the step, or no more: in the descent and in the Lagrangian."""
+    """Make row r, which is idle here, active in the step, or inactive again: in the descent and in the Lagrangian."""
     mu, jacobian = rows.mu, point.jacobian
     sign = 1.0 if counts else -1.0
     rows.foreseen[r] = 1.0 if counts else 0.0
@@ -48,7 +48,7 @@ def let_count(shape, r, counts, point, rows, system):
 
 @kernel(inner=True)
 def predict_active_set(program, point, rows, system):
-    """Let one-sided rows count that are idle here and would push at the end of the step; those that would not, no more.
+    """Make one-sided rows active that are idle here and would push at the end of the step, and others inactive.
 
     Their sign is that of y + (c + J step) / mu. Returns how many rows changed.
     """
@@ -59,7 +59,7 @@ def predict_active_set(program, point, rows, system):
         if shape.one_sided[r] == 0 or (rows.active[r] > 0.0 and foreseen[r] == 0.0):
             continue
         if header.contacts <= r < header.contacts + header.trims:
-            # Their slopes change too fast for that.
+            # Their slopes change too fast for a prediction.
             continue
         pushes = rows.y[r] + (point.residual[r] + times(shape.bases, point.jacobian, r, step)) / rows.mu < 0.0
         if pushes != (foreseen[r] == 1.0):
@@ -70,7 +70,7 @@ def predict_active_set(program, point, rows, system):
 
 @kernel(inner=True)
 def leave_out(shape, point, rows, system):
-    """No row that is idle here counts in the step."""
+    """Make no row active in the step that is idle here."""
     for r in range(rows.count):
         if rows.foreseen[r] == 1.0:
             let_count(shape, r, False, point, rows, system)
@@ -80,11 +80,11 @@ def leave_out(shape, point, rows, system):
 def toward_rows(program, point, rows, system, softness, enough):
     """The shortest step after which rows hold to first order, into the system, whose matrices are overwritten.
 
-    One-sided rows that hold count where it would break them by more than `enough`, and none does that it would pull
-    back: to bring such rows to zero is to ask for more than they do, and where they all but depend on others, for a
-    long step. Where those that count do so, too, `softness` weighs its square against theirs. What it leaves of the
-    program's rows by that is to be a small part or at most `enough`: the softness falls until it is. Returns the
-    softness.
+    One-sided rows that hold are active if the step would break them by more than `enough`, and none is that the step
+    would pull back: to bring such rows to zero would require more than they do, and a long step where they nearly
+    depend on others. Where active rows nearly depend on each other, `softness` weighs the square of the step against
+    their residuals. The residuals that remain are to be a small part or at most `enough`: the softness is lowered until
+    they are. Returns the softness.
     """
     shape, residual, jacobian = program.structure, point.residual, point.jacobian
     bases, one_sided, order = shape.bases, shape.one_sided, shape.sparsity
@@ -131,23 +131,23 @@ def toward_rows(program, point, rows, system, softness, enough):
 
 @kernel(inner=True)
 def curvature_multipliers(rows, residual, restoring):
-    """Into `forces` the multipliers whose rows' curvature goes into the matrix."""
+    """Write into `forces` the multipliers whose rows' curvature goes into the matrix."""
     forces = rows.forces
     most = 0.0
     for r in range(rows.count):
-        # Far from feasible, c / mu would drown the curvature of the objective; y is what it tends to.
+        # Far from feasible, c / mu would hide the curvature of the objective; y is its limit.
         forces[r] = (residual[r] if rows.active[r] > 0.0 else 0.0) if restoring else rows.y[r]
         most = max(most, abs(forces[r]))
     if most < WEAK and not restoring:
-        # Forces on their way to zero: their curvature would only spoil the inertia, and cost the fast end. What is left
-        # of violations that cannot all vanish does not go to zero.
+        # The curvature of forces that tend to zero would only spoil the inertia and fast convergence. Forces of
+        # violations that cannot all vanish do not tend to zero.
         for r in range(rows.count):
             forces[r] = 0.0
 
 
 @kernel(inline=True)
 def write_slope(shape, point, rows, system, y):
-    """The Lagrangian's slope, grad f + J^T y, into the room for the descent."""
+    """The Lagrangian's slope, grad f + J^T y, into the array of the descent."""
     slope = system.directions.descent
     for i in range(slope.size):
         slope[i] = system.gradient[i]
@@ -210,7 +210,7 @@ def least_squares_multipliers(shape, point, rows, system, rounds, y):
 
 @kernel(inner=True)
 def exchange(shape, point, rows, system, y, most):
-    """Let one-sided rows that pull count no more, and those count that are near and would balance more, the last first.
+    """Make one-sided rows that pull inactive, and those active that are near and would balance more, the last first.
 
     `most` of them at most. Returns how many there are.
     """
@@ -232,11 +232,11 @@ def exchange(shape, point, rows, system, y, most):
 
 @kernel(inner=True)
 def pushing_multipliers(shape, point, rows, system, exchanges, rounds, y):
-    """Multipliers of least squares, none of which pulls: with so many exchanges of the active rows at most.
+    """Least-squares multipliers, none of which pulls, with a limited number of exchanges of active rows.
 
-    Where rows depend on each other, it takes some of them only, and which these are is not known from the gaps. All
-    that are wrong are exchanged at once as long as they become fewer (block pivoting, Portugal, Judice and Vicente
-    1994); what still pulls in the end is set to zero.
+    Where rows are dependent only some of them push, and gaps do not tell which. All wrong ones are exchanged at once as
+    long as they become fewer (block pivoting, Portugal, Judice and Vicente 1994); what still pulls in the end is set to
+    zero.
     """
     fewest = rows.count + 1
     patience = BLOCKED
@@ -266,7 +266,7 @@ def take_better(rows):
 
 @kernel(inline=True)
 def choose_multipliers(shape, point, rows, system, shortened, vectors, holds, good):
-    """The better of y, of what the last step proposed, and of least squares, into y.
+    """Choose the best of y, the multipliers proposed by the last step, and least squares, into y.
 
     Least squares are computed after a `shortened` step, and where rows hold (`holds`) but the best of the others leaves
     a dual residual above `good`: the active set may be wrong, and one-sided rows are exchanged. In the latter case, and
@@ -292,7 +292,7 @@ def choose_multipliers(shape, point, rows, system, shortened, vectors, holds, go
 
 @kernel(inner=True)
 def forget_objective(order, rows, system):
-    """No objective and no multipliers: where rows cannot all hold, what is left is to violate them least."""
+    """No objective and no multipliers: if rows cannot all hold, they are to be violated least."""
     for r in range(rows.count):
         rows.y[r] = 0.0
     for i in range(system.gradient.size):

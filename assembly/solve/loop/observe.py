@@ -1,4 +1,4 @@
-"""The first two phases of a step: what is near, and what rows and objective are at the current iterate."""
+"""The first two phases of a step: update of the contact manager, and evaluation of rows and objective."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def observe(task, current, rows):
         place_clearance_rows(table, lifted, current, rows, False)
     weigh_rows(rows, one_sided, current.residual)
     if loop.folded:
-        # Nothing is known of its row yet.
+        # Its row has not been evaluated yet.
         rows.active[loop.lost] = 1.0 / rows.mu
     if header_at(table, 0).contacts > 0:
         lift_trims = limits.lift_trims == 1.0
@@ -63,7 +63,7 @@ def rearrange_rows(task, current, rows):
     loop.changed = 0
     if loop.iteration == 0 and lost < 0:
         let_touch(task.program.store.table, current, overlap_allowed(task.settings))
-    # What was hard for other rows need not be for these.
+    # A penalty that was needed for other rows need not be for these.
     loop.floor = task.limits.penalty_floor
     loop.mu = max(loop.mu, loop.floor)
     begin_way(task.way)
@@ -82,17 +82,17 @@ def evaluate_iterate(task, history, current, rows, system):
     table = program.store.table
     header = header_at(table, 0)
     if loop.lost >= 0 and program.lifted.free[loop.lost] < 0:
-        # A pair that is lost and cannot be lifted (an idle row, a pole): nothing moves any more.
+        # A pair is lost and cannot be lifted (an idle row, a pole): nothing moves any more.
         task.result.culprit = float(loop.lost)
         loop.status = CONTACT_LOST if loop.folded else STALLED
     loop.lost = -1
     violation = off_rows(table, program.lifted, program.structure.one_sided, current, task.tick)
     loop.violation = violation
     loop.value = goal(program, rows.count, current, 1, system.gradient, system.hessian)
-    # Rows of vectors depend on one another: their multipliers drift where nothing keeps them short.
+    # Rows of vectors are dependent: their multipliers drift unless they are kept short.
     vectors = header.vector_trims == 1
     shortened = loop.iteration > 0 and (loop.alpha < 1.0 or vectors)
-    # Which rows push is not known at a first start, nor of contacts, and a least move has none where all holds.
+    # Which rows push is not known at a first start, nor for contacts; a least move has no forces where all rows hold.
     first = loop.iteration == 0 and violation <= loop.feasible and (rows.mu > loop.floor or header.implicit == 1)
     loop.first = first
     touches = first or (task.watched and not task.tick and violation <= TOUCHING)
@@ -112,7 +112,7 @@ def evaluate_iterate(task, history, current, rows, system):
         loop.over = 1
         return False
     if not math.isfinite(violation) or not math.isfinite(loop.value) or not math.isfinite(loop.dual):
-        # Only where the start is so: a step to such a place is not taken.
+        # Only if the start is such; a step to such a pose is not taken.
         loop.status = STALLED
         return False
     return True

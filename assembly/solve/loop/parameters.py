@@ -172,7 +172,7 @@ LINGERS = 40
 FAR, STRAYING = 1e3, 60
 
 # Initial assembly (`initial_guess.py`). ------------------------------------------------------------------------------
-# [length, or a sine] Bodies are gathered where a start violates a row of a joint by more than this. Doubled: more
+# [length, or a sine] Bodies are assembled where a start violates a row of a joint by more than this. Doubled: more
 # starts go to the loop as they are, which takes longer from there. Chosen.
 SCATTERED = 0.5
 # [steps] Of the fit of one body to those that are placed. Doubled: fits that creep go on longer. Chosen.

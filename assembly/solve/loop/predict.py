@@ -15,7 +15,7 @@ from assembly.solve.loop.residuals import times
 
 @kernel(inline=True)
 def longest_way(d, at, alpha, far):
-    """How far a body's points go along alpha d, which are not farther than `far` from its origin."""
+    """A bound of the motion along alpha d of a body's points that are not farther than `far` from its origin."""
     if at < 0:
         return 0.0
     shift = math.sqrt(d[at] * d[at] + d[at + 1] * d[at + 1] + d[at + 2] * d[at + 2])
@@ -25,9 +25,9 @@ def longest_way(d, at, alpha, far):
 
 @kernel(inner=True)
 def keep_open_row(store, bases, k, current, trial, d, alpha):
-    """Keep what is known of row k, of a clearance, if it is open all along alpha d for certain. Whether it is.
+    """Keep the values of row k of a clearance if it is certainly open all along alpha d. Whether it is.
 
-    No gap changes by more than points of the two bodies go, those of each seen from where they were.
+    No gap changes by more than points of the two bodies move.
     """
     left = contact_record_at(current.records, k).slack
     if not left > 0.0 or bases[k, 2] >= 0:
@@ -47,7 +47,7 @@ def keep_open_row(store, bases, k, current, trial, d, alpha):
 
 @kernel(inner=True)
 def predict_pairs(store, bases, lifted, current, trial, d, alpha):
-    """Contact coordinates along alpha d: by the contact velocity, or, for a free pair, by its own unknowns.
+    """Contact coordinates along alpha d: by the contact velocity, or, for a lifted pair, by its own unknowns.
 
     Gaps follow to first order. Angles start from their current values: no component of a straight step's rotation
     vectors is above a radian. The guess goes into `lifted`. Rows of clearances that stay open for certain are marked
@@ -92,7 +92,7 @@ def predict_pairs(store, bases, lifted, current, trial, d, alpha):
 
 @kernel(inner=True)
 def keep_inside(store, k, out):
-    """Coordinates that are unknowns may run over the end of a patch."""
+    """Coordinates that are unknowns may pass the end of a patch."""
     for side in range(2):
         i = 2 * side
         out[k, i], out[k, i + 1], _clamped = into_domain(

@@ -1,4 +1,4 @@
-"""The policy for rows that gain nothing: they are restored alone, to see whether they can hold at all.
+"""The policy for rows that gain nothing: restoration of the rows alone, to see whether they can hold.
 
 Restoring, steps minimize |c|^2 / 2: f = 0, y = 0, mu = 1. Where that is stationary and rows are off, they contradict
 each other nearby.
@@ -24,7 +24,7 @@ from assembly.solve.loop.workspace import rows_in
 def choose_restoration(task, rows, system):
     """Begin or end to restore rows. Whether the step goes on."""
     loop = task.loop
-    # At a pose where rows depend on each other a soft objective only leads away: rows are restored until they hold.
+    # At a pose where rows are dependent the least move only leads away: rows are restored until they hold.
     is_singular = task.any_pose and not task.watched and loop.entered < NEARLY_HELD
     if loop.restoring and loop.violation <= (loop.feasible if is_singular else max(0.1 * loop.entered, loop.feasible)):
         if is_singular:
@@ -36,11 +36,12 @@ def choose_restoration(task, rows, system):
     if detect_standstill(task, rows):
         loop.check_at, loop.check_violation = loop.iteration, loop.violation
     if not loop.restoring and loop.iteration >= loop.check_at:
-        # The rows gain nothing: see whether they can hold at all. One that has just closed has had no time to.
+        # The violation does not decrease: see whether rows can hold at all. A row that has just become active had no
+        # time.
         least = TOUCHING if loop.check_violation <= loop.feasible else loop.feasible
         if loop.violation > max(least, 0.5 * loop.check_violation) and loop.restorations < RESTORATIONS:
             begin_restoration(loop)
-            # What the penalty's matrix needed says nothing of this one.
+            # The shift of the penalty's matrix does not apply to this one.
             loop.shift = 0.0
         check_later(loop)
     if loop.restoring:
@@ -51,7 +52,7 @@ def choose_restoration(task, rows, system):
 
 @kernel(inline=True)
 def detect_standstill(task, rows):
-    """Count steps that leave what rows are off; whether there were enough in a row."""
+    """Count steps that do not reduce the violation; whether there were enough in a row."""
     loop, way = task.loop, task.way
     is_open = loop.violation > loop.feasible and not (loop.restoring or task.watched or task.tick)
     by_floor = is_open and loop.mu <= loop.floor
@@ -68,7 +69,7 @@ def detect_standstill(task, rows):
 
 @kernel(inline=True)
 def begin_restoration(loop):
-    """Leave the objective alone until rows hold, or it is known that they do not."""
+    """Ignore the objective until rows hold, or it is known that they cannot."""
     loop.restoring = 1
     loop.restorations += 1
     loop.entered = loop.violation
@@ -76,22 +77,22 @@ def begin_restoration(loop):
 
 @kernel(inline=True)
 def check_later(loop):
-    """See again after some steps whether rows have gained anything."""
+    """Check again after some steps whether the violation has decreased."""
     loop.check_at, loop.check_violation = loop.iteration + PATIENCE, loop.violation
 
 
 @kernel(inline=True)
 def judge_restoring_step(task, iterates, system, steepest):
-    """Of a step that restores rows: whether it is taken, and if not, whether the trial iterate is the next one.
+    """For a step that restores rows: whether it is taken, and if not, whether the trial iterate is the next one.
 
-    Where it is stationary, or gains next to nothing, rows contradict each other, or the solve is led back.
+    If it is stationary, or gains next to nothing, rows contradict each other, or the solve is led back.
     """
     loop, way, program = task.loop, task.way, task.program
     ends = steepest <= 1e-9 * loop.violation or loop.longest < 1e-12
     ends = ends or stays_off(way, loop.feasible, steepest, loop.violation, loop.restored)
     slows = loop.iteration >= loop.check_at and loop.violation > 0.99 * loop.check_violation
     if (ends or slows) and task.watched and loop.iteration < loop.limit:
-        # A contact may have come to where a given one stands, of which no clearance asks anything.
+        # A contact may have moved to where a given one is, to which no clearance applies.
         loop.changed = update_again(program.store, program.lifted, iterates.current, EVERYTHING)
         if loop.changed:
             loop.iteration += 1

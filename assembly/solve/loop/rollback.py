@@ -1,13 +1,13 @@
-"""Back from where bodies have sunk into each other: from there rows lead out on either side, the far one as well.
+"""Return to the last pose at which nothing crossed, because from crossed poses rows may lead out on the far side.
 
 In a step bodies may go as far as their motion bounds allow, and a contact may slide around a thin wire on the way.
 Where bodies overlap by more than half their least radius of curvature, the side they came from is unknown, and where
 they cross without a listed contact, no row says so. The solve goes back to the last pose at which nothing crossed, and
 its next steps are bounded by the loop's `leash`.
 
-A solve that gets no further goes back to such a pose, too, and begins again there. Which contacts are listed depends on
-the way it came: one that ends where bodies touch holds every step, and steps that are cut again and again leave short
-ones behind. A solve that begins there has neither.
+A solve that makes no progress returns to such a pose, too, and begins again there. Which contacts are listed depends on
+the way it came: a contact that ends where bodies touch blocks every step, and steps that were cut again and again leave
+a short radius. A solve that begins there has neither.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from assembly.solve.loop.workspace import rows_in
 
 @kernel(inner=True)
 def has_sunk(store, memory, residual):
-    """Whether bodies are deep in each other, or where no contact says so.
+    """Whether bodies overlap deeply, or without a contact that shows it.
 
-    Of solids rows lead out the way they came: corners stay on their faces.
+    For solids, rows lead out the way bodies came: corners stay on their faces.
     """
     header = header_at(store.table, 0)
     for k in range(header.clearance_rows):
         r = header.first_clearance_row + k
         row = contact_of(store.table, r)
         if row.clearance_number > 0 and row.shell_f < 0:
-            # How far bodies may go in one step is behind the least gap, which the residual is less.
+            # The residual is the gap minus the least gap.
             at = row.minimum
             if residual[r] + store.pool[at] < -DEEP * store.pool[at + 1]:
                 return True
@@ -46,7 +46,7 @@ def has_sunk(store, memory, residual):
 
 @kernel(inner=True)
 def begin_again(store, held, lifted, current, rows):
-    """Back to the pose that is held. Its contacts are found anew; no row has pushed yet."""
+    """Return to the last feasible pose. Its contacts are found anew; multipliers are zero."""
     header = header_at(store.table, 0)
     bring_back(held, rows, current)
     forget_clearance_rows(store.table, lifted.memory)
@@ -59,21 +59,21 @@ def begin_again(store, held, lifted, current, rows):
 
 @kernel(inline=True)
 def must_roll_back(task):
-    """Whether bodies have sunk into each other, and there is a pose to go back to."""
+    """Whether bodies have sunk into each other, and there is a pose to return to."""
     loop = task.loop
     return loop.sunk and loop.holds and loop.ended == RUNNING and loop.iteration < loop.limit
 
 
 @kernel(inline=True)
 def roll_back(task, held, current, rows):
-    """Back to the last feasible iterate, and on from there with shorter steps."""
+    """Return to the last feasible iterate, and continue from there with shorter steps."""
     loop = task.loop
     loop.leash = SHORTER * min(loop.leash, loop.alpha * loop.longest)
     if loop.leash < SHORTEST:
         loop.status = STALLED
         return
     return_to(task.program, held, rows, current, task.tick)
-    # Rows of tangency have other pairs now.
+    # Rows of tangency belong to other pairs now.
     loop.rows = header_at(task.program.store.table, 0).rows
     loop.measured, loop.changed = 0, 1
     loop.iteration += 1
@@ -82,7 +82,7 @@ def roll_back(task, held, current, rows):
 
 @kernel(inline=True)
 def restart(task, held, current, rows):
-    """Let a solve that gets no further begin again where it last held. Whether it does."""
+    """Let a solve that makes no progress begin again at its last feasible iterate. Whether it does."""
     loop, limits = task.loop, task.limits
     may_begin = task.watched and not task.tick and loop.holds and loop.begun < BEGINNINGS
     if loop.status != STALLED or loop.over or not may_begin or loop.iteration + LEFT > loop.limit:

@@ -1,4 +1,4 @@
-"""What the loop is told and what it tells: its settings, its results, its outcomes."""
+"""Settings, results and outcomes of the loop."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from assembly._record import place_of, record_dtype, record_view, size_of
 SOLVED, INFEASIBLE, STALLED, ITERATION_LIMIT, CONTACT_LOST, OUT_OF_TIME, RUNNING = 0, 1, 2, 3, 4, 5, 6
 # SOLVED by first derivatives, but no factorization told that no curvature is negative (`solve/loop/inertia.py`).
 UNSURE = 100
-# Scattered bodies were gathered, and turns are to be chosen where they are now.
+# Scattered bodies were assembled, and turns are to be chosen where they are now.
 GATHERED = 101
 # What a solve or a tick is asked for. Lengths are scaled.
 SETTINGS_RECORD = record_dtype(
@@ -56,7 +56,7 @@ PLACES = place_of(SETTINGS_RECORD, "places")
 SETTINGS = size_of(SETTINGS_RECORD)
 # Whether the end is tested for a minimum (TESTED: and saddles are left before they are reached to the last digit).
 TESTED, REACHED = 1.0, 2.0
-# Whether scattered bodies are gathered (ASSEMBLES: and the loop ends there).
+# Whether scattered bodies are assembled (ASSEMBLES: and the loop ends there).
 NEVER, GATHERS, ASSEMBLES = -1.0, 1.0, 2.0
 # Results at the end of the state.
 RESULTS_RECORD = record_dtype(

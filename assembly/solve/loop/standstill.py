@@ -1,4 +1,4 @@
-"""Where whole steps gain nothing of the violation: rows contradict each other, or only a harder penalty holds them."""
+"""Whole steps that do not reduce the violation: rows contradict each other, or need a harder penalty."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The third phase of a step: whether the solve has arrived, or its time is over; what holds is kept."""
+"""The third phase of a step: whether the solve has arrived or its time is over; feasible iterates are kept."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from assembly.solve.loop.settings import ITERATION_LIMIT, OUT_OF_TIME, RUNNING, 
 
 @kernel(inline=True)
 def terminate(task, held, current, rows, system):
-    """Whether the loop ends at this iterate, or begins its next step elsewhere; else the step goes on from it."""
+    """Whether the loop ends at this iterate, or continues from another one; otherwise the step continues from it."""
     loop, program = task.loop, task.program
     loop.sunk = task.watched and not task.tick and has_sunk(program.store, program.lifted.memory, current.residual)
     if loop.sunk and loop.iteration == loop.back_at:
-        # Bodies were in each other there too, and nothing had asked: that is no place to return to.
+        # Bodies crossed there too, unnoticed: it is no pose to return to.
         loop.holds, loop.leash = 0, math.inf
     goes_back = must_roll_back(task)
     count_rounded_steps(loop, task.limits)
     arrived = is_solution(task, current, rows, system)
     final_update = task.watched and task.limits.final_update == 1.0
-    # Where every final update finds other contacts, the limit ends it.
+    # If every final update finds other contacts, the limit ends the solve.
     if arrived and goes_around(task, current, rows):
         return True
     if arrived and not goes_back and not (final_update and loop.iteration > loop.limit):
@@ -48,7 +48,7 @@ def terminate(task, held, current, rows, system):
 
 @kernel(inline=True)
 def count_rounded_steps(loop, limits):
-    """Count whole steps in a row at feasible iterates that gain nothing of the slope: what is left may be rounding."""
+    """Count whole steps in a row at feasible iterates that do not reduce the slope: the remainder may be rounding."""
     most = max(GAIN * loop.last_dual, limits.stationarity)
     stands = loop.alpha * loop.cut == 1.0 and loop.dual > most and loop.violation <= loop.feasible
     loop.stood = loop.stood + 1 if stands else 0
@@ -56,7 +56,7 @@ def count_rounded_steps(loop, limits):
 
 @kernel(inline=True)
 def is_solution(task, current, rows, system):
-    """Whether the iterate holds and its dual residual is none, or rounding."""
+    """Whether the iterate is feasible and its dual residual zero, or rounding."""
     loop = task.loop
     rounded = loop.stood >= STANDS and is_rounding(task.program, current, rows, system, loop.longest, loop.dual)
     dual = 0.0 if rounded else loop.dual
@@ -66,7 +66,7 @@ def is_solution(task, current, rows, system):
 
 @kernel(inline=True)
 def goes_around(task, current, rows):
-    """Whether a contact on a loop goes on around a corner, by the multipliers of the iterate: then that is no end."""
+    """Whether a contact on a loop moves on around a corner, by the iterate's multipliers: then the solve goes on."""
     loop = task.loop
     if header_at(task.program.store.table, 0).trim_sides_address == 0:
         return False
@@ -81,7 +81,7 @@ def goes_around(task, current, rows):
 def arrive(task, final_update, current):
     """End at a solution, unless a final update of all pairs finds other contacts."""
     loop, program = task.loop, task.program
-    # A contact that ends right here is lost and found again by every update.
+    # A contact that ends at this pose is lost and found again by every update.
     if final_update and loop.iteration != loop.final_update_at:
         loop.changed = update_again(program.store, program.lifted, current, EVERYTHING)
         if loop.changed:
@@ -89,7 +89,7 @@ def arrive(task, final_update, current):
             loop.final_update_at = loop.iteration
             return
     table = program.store.table
-    # Deeper than updates reach no row tells of a crossing.
+    # Crossings deeper than updates search have no row.
     crosses = final_update and any_crossed(table, header_at(table, 0).manager_record, program.lifted.memory)
     loop.status = STALLED if crosses else SOLVED
     loop.over = 1
@@ -97,7 +97,7 @@ def arrive(task, final_update, current):
 
 @kernel(inline=True)
 def keep_what_holds(task, held, current, rows):
-    """Keep what holds, of a tick or where nothing else is asked for; with clearances, what does not cross."""
+    """Keep a feasible iterate, of a tick or without an objective; with clearances, one at which nothing crosses."""
     loop = task.loop
     table = task.program.store.table
     clear = task.watched and not task.tick and not loop.sunk and is_clear(table, current.residual)
@@ -128,7 +128,7 @@ def stop_at_limits(task, current):
         if loop.ended == RUNNING:
             loop.status, loop.over = ITERATION_LIMIT, 1
             return True
-    # A least move may be at a kink, where steps go to and fro.
+    # The least move may be at a kink, where steps alternate.
     touches = loop.lingers > 0 or loop.violation <= TOUCHING
     loop.lingers += 1 if task.any_pose and not (loop.restoring and not task.watched) and touches else 0
     if task.leads_back and loop.ended == RUNNING and loop.lingers > LINGERS:
@@ -136,7 +136,8 @@ def stop_at_limits(task, current):
     if loop.ended != RUNNING and (feasible or loop.iteration >= loop.led_back_by):
         loop.status = loop.ended
         return True
-    # What holds is not left for what there is hardly time to end, and ends what an earlier call began.
+    # A feasible iterate is kept rather than starting what there is hardly time to finish; it also ends what an earlier
+    # call began.
     part = 1.0 if not feasible else (0.0 if loop.done > 0 else HALF)
     begins = loop.iteration + loop.done > 0 and (loop.iteration > 0 or part < 1.0)
     if begins and is_spent(store.table, task.settings, loop.begin, part):

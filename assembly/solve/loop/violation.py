@@ -1,4 +1,4 @@
-"""How far rows are from holding, with what free pairs lack of tangency: in full, or as their gaps feel it.
+"""How far rows are from holding, with the tangency of lifted pairs counted in full, or by its effect on the gaps.
 
 A free pair's coordinates are unknowns; it is an extremum of the distance only where its rows of tangency t hold.
 """

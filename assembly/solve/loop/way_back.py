@@ -1,4 +1,4 @@
-"""The shortest way back onto the rows, where the time of a solve or a tick is over and they do not hold yet."""
+"""The shortest way back onto the rows, where a solve or tick is out of time and they do not hold yet."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from assembly.solve.loop.residuals import move
 from assembly.solve.loop.settings import RUNNING, STALLED
 from assembly.solve.loop.violation import off_rows
 
-# What is known of the way back, and of a loop that stands still (`standstill.py`).
+# State of the way back, and of a loop without progress (`standstill.py`).
 WAY_RECORD = record_dtype(
     "f8",
     softness=1,  # of the last step back
@@ -35,9 +35,9 @@ WAY = size_of(WAY_RECORD)
 
 @kernel(inline=True)
 def way_back(program, current, trial, rows, system, progress, enough, tick):
-    """A share of the least step that leaves little of the gaps, into the trial point.
+    """Take a share of the least step that leaves little of the violation, into the trial point.
 
-    Returns how far off the rows it leads: infinitely where bodies may not go so far, or a pair is lost.
+    Returns the violation there: infinite if motion bounds do not allow it, or a pair is lost.
     """
     store, shape, lifted, step = program.store, program.structure, program.lifted, system.directions.step
     progress.softness = toward_rows(program, current, rows, system, progress.softness, enough)
@@ -52,7 +52,7 @@ def way_back(program, current, trial, rows, system, progress, enough, tick):
 
 @kernel(inner=True)
 def begin_way(way):
-    """Rows have changed: what was found of steps and violations counts no more."""
+    """Rows have changed: what was counted of steps and violations is reset."""
     progress = way_at(way, 0)
     progress.share = 1.0
     progress.lowest = math.inf
@@ -82,7 +82,7 @@ def step_back(program, iterates, rows, system, way, violation, enough, tick):
 
 @kernel(inline=True)
 def lead_to_rows(task, iterates, rows, system):
-    """A step the shortest way back onto the rows, as the time is over. Whether the trial iterate is the next one."""
+    """A step of the shortest way back onto the rows, out of time. Whether the trial iterate is the next one."""
     loop, way = task.loop, task.way
     enough = 0.1 * loop.feasible
     taken = step_back(task.program, iterates, rows, system, way, loop.violation, enough, task.tick)

@@ -1,4 +1,4 @@
-"""Room that a solve works in: arrays in two blocks of memory, of doubles and of integers (`_carve.py`)."""
+"""The workspace of a solve: arrays in two blocks of memory, of doubles and of integers (`_carve.py`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Saddles and maxima left: to a pose that is seen to be lower, and on from there with the loop."""
+"""Leaving saddles and maxima: to a pose that is seen to be lower, and on from there with the loop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A batch of solves: rows through the loop in slices, on threads, and what is left by itself."""
+"""A batch of solves: rows through the loop in slices, on threads, and remaining rows one by one."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def _by_the_loop(asked: _Asked, out: dict[str, Any], threads: int, retry: bool) 
     codes = ended[:, packed.results_at].astype(np.int64)
     left = codes != SOLVED if retry else codes == UNSURE
     if not warm and packed.chooses_turns:
-        # Bodies that were gathered may be on other turns.
+        # Bodies that were assembled may be on other turns.
         left |= ended[:, packed.results_at + SCATTER] == 1.0
     if isinstance(asked.starts, list):
         left |= np.array([item._fit is not None for item in asked.starts])

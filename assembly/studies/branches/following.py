@@ -238,10 +238,10 @@ def _begun(curve: Curve, place: Place) -> tuple[Curve, Point]:
     rank = point.basis.shape[1]
     if rank > n:
         raise InputError(f"{curve.parameter.name} cannot change: rows have no solution near the start")
-    wishes = not packed.is_implicit
-    if rank == n and not wishes:
+    has_objective = not packed.is_implicit
+    if rank == n and not has_objective:
         return curve, _settled(curve, point)
-    if not wishes:
+    if not has_objective:
         raise InputError(f"scene leaves {n - rank} motions free with {curve.parameter.name} given; {EXPECTED}")
     at_bound = packed.one_sided & (np.abs(point.residual) <= AT_BOUND)
     if rank == n and not at_bound.any():

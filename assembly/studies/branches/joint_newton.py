@@ -1,4 +1,4 @@
-"""Newton's method in the coordinates of joints: bodies hang on a tree of joints, and loops are to close.
+"""Newton's method in joint coordinates: bodies hang on a tree of joints, and loops are closed.
 
 A joint of the tree leads from the frame on its parent to that on its child by a motion M (a rotation by rows, then a
 shift), which holds whatever the coordinates are. A unit of coordinate k moves M to M exp(S_k), S_k constant in the

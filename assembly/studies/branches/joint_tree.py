@@ -1,4 +1,4 @@
-"""What joints let bodies reach: a tree of joints that carries bodies, and the rows that close loops.
+"""Poses that joints allow: a tree of joints that carries bodies, and the rows that close loops.
 
 Of the joints between bodies those with the fewest coordinates are taken first, from fixed bodies on. What the tree does
 not hold are rows: of joints that close loops, and of all other constraints that are rows.

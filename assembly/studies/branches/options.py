@@ -1,4 +1,4 @@
-"""What following a branch can be told."""
+"""Options of following a branch."""
 
 from __future__ import annotations
 

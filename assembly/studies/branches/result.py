@@ -1,4 +1,4 @@
-"""What was found of a branch."""
+"""A branch that was found."""
 
 from __future__ import annotations
 

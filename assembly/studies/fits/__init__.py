@@ -1,4 +1,4 @@
-"""Play: how far a measure goes while parts move within the fits that are left to them."""
+"""Play: the range of a measure while parts move within their fits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a pair of bodies is: by their nearest points and, where these meet, by what is proven of the pair.
+"""The kind of a pair of bodies: from their nearest points and, where these meet, from what is proven.
 
 Nearest points that are apart tell all (`assembly.proximity.distance`). Bodies that have points in common touch or
 cross: a look at the pair tells which (`assembly/solve/crossings.py`).

@@ -1,4 +1,4 @@
-"""The search: pairs that boxes do not tell to be far apart, their nearest points, and one search for crossings."""
+"""The search: pairs that boxes cannot exclude, their nearest points, and one search for crossings."""
 
 from __future__ import annotations
 

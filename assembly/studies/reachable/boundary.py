@@ -3,8 +3,8 @@
 Points around the boundary are counted, each for the place nearest to it, by a hat of their height over the tangent
 plane there: a Dirac function, smeared over half a cell to either side. What the boundary's curvature adds on one side
 it takes away on the other. Where pieces of the boundary meet at an angle, a point counts for the nearest place of
-either piece, if its foot on the tangent plane there is on the boundary: at a corner that goes into the set not behind
-the other piece, at one that goes out not before it.
+either piece, if its projection on the tangent plane there is on the boundary: at a corner that goes into the set not
+behind the other piece, at one that goes out not before it.
 """
 
 from __future__ import annotations
@@ -161,7 +161,8 @@ def _nearest(boundary: Boundary, candidates: Indices, others: NDArray[np.bool_],
 
 
 def _on_it(boundary: Boundary, points: Array, places: Indices, candidates: Indices) -> Array:
-    """Which parts (k,) of what points (k, d) stand for are on the boundary, by their feet on the planes at places (k,).
+    """Which parts (k,) of what points (k, d) stand for are on the boundary, by their projections on the planes at
+    places (k,).
 
     The nearest candidate of another piece says so, in space of two others: a place of the boundary that is before the
     plane there is at a corner that goes into the set. A point stands for what is half a step to either side of it.

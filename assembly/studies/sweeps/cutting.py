@@ -1,4 +1,4 @@
-"""How a plan is cut into runs, by its rows alone: who begins where, whatever computes them, and when.
+"""How a plan is cut into runs, by its rows alone: which row starts from which, whoever computes them.
 
 Of 10,000 rows in their order every 1,024th is solved first, one from the other. From each of these every 32nd of the
 rows up to the next one is, and from each of these the 31 rows up to the next one. Each of these chains is a run. Of

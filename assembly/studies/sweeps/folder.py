@@ -1,4 +1,4 @@
-"""What is finished of a study, on disk: a manifest that says what it is of, and a file of lines a chunk.
+"""Finished parts of a study on disk: a manifest that identifies the study, and a file of lines for each chunk.
 
 A part is written beside its place and moved there as a whole, and says at its end how many rows it has. So a process
 that is killed leaves whole parts, and at most one unfinished file, which the next one removes; what a power failure

@@ -1,4 +1,4 @@
-"""What a study is of, so that a folder is not filled with rows of another one."""
+"""The identity of a study, so that a folder is not filled with rows of another one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs handed to workers in chunks, as long as they take, until all are done.
+"""Runs handed to workers in chunks of about the requested duration, until all are done.
 
 Of an executor nothing is used but `submit`, and that its futures say when they are done.
 """

@@ -1,4 +1,4 @@
-"""What is known of a study's rows: filled by runs in any order, or read from a folder."""
+"""The rows of a study: filled by runs in any order, or read from a folder."""
 
 from __future__ import annotations
 

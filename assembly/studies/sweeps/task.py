@@ -1,4 +1,4 @@
-"""What is sent to a worker: nothing that this file imports loads Numba, so that the worker may be told what to load."""
+"""What is sent to a worker. Nothing imported here loads Numba, so the worker can be told which kernels to load."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Dimensions of a mechanism that are found for what it is to do."""
+"""Synthesis: dimensions with which a mechanism does what is wanted."""

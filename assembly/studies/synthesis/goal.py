@@ -1,4 +1,4 @@
-"""What an optimizer asks of a synthesis: residuals, a cost, room to bounds, and their derivatives.
+"""What an optimizer needs of a synthesis: residuals, a cost, margins to bounds, and their derivatives.
 
 Dimensions x (p,) are counted in parts of the width of their bounds. Where the greatest of a measure is minimized, one
 variable more, s, follows them.

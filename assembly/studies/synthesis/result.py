@@ -1,4 +1,4 @@
-"""What synthesis found."""
+"""The result of a synthesis."""
 
 from __future__ import annotations
 

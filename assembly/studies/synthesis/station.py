@@ -1,4 +1,4 @@
-"""Station: a state that a mechanism is driven to, and what is wanted of it there."""
+"""Station: a state to which a mechanism is driven, and the values that measures should have there."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What tolerances of dimensions do to measures of an assembly."""
+"""Tolerances: effects of scatter of dimensions on measures of an assembly."""

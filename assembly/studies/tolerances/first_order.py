@@ -1,4 +1,4 @@
-"""What scatter of parameters does to measures of a solution, to first order, and what is bent."""
+"""Effects of scatter of parameters on measures of a solution, to first order, and curvature."""
 
 from __future__ import annotations
 

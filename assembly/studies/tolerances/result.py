@@ -1,4 +1,4 @@
-"""What tolerances do, as a table and a plot."""
+"""Effects of tolerances, as a table and a plot."""
 
 from __future__ import annotations
 

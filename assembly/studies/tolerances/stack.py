@@ -1,4 +1,4 @@
-"""Stacks of tolerances: worst case, root sum square, shift of the mean, and samples that are solved in full.
+"""Stacks of tolerances: worst case, root sum square, shift of the mean, and samples that are solved.
 
 To first order a measure is f + sum d_i x_i with the derivatives d_i of the solution by its parameters, and x_i their
 differences from their values, independent of each other. Its variance is the sum of d_i^2 sigma_i^2, and the farthest

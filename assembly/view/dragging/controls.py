@@ -1,4 +1,4 @@
-"""Beside the picture: the status in words, joint coordinates as sliders, buttons, a graph of violation and time."""
+"""Controls beside the picture: the status, joint coordinates as sliders, buttons, a graph of violation and time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A joint's coordinate at a value: driven there for one solve."""
+"""Driving a joint's coordinate to a value for one solve."""
 
 from __future__ import annotations
 

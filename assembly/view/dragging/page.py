@@ -1,4 +1,4 @@
-"""The page of a scene that is dragged: viser's server, meshes that the mouse takes, and what stands beside them."""
+"""The page of a scene that is dragged: viser's server, meshes for the mouse, and controls."""
 
 from __future__ import annotations
 

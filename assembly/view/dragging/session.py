@@ -1,4 +1,4 @@
-"""What happens while a scene is dragged: one thread runs the tracker's ticks, and answers what browsers ask for.
+"""A session of dragging: one thread runs the tracker's ticks and answers the browsers' requests.
 
 Browsers, or whoever else drags, put calls into a queue and never wait; the thread takes them between ticks. What there
 is to show is one frozen `Shown`, put in the place of the last.

@@ -194,7 +194,7 @@ def test_a_start_that_does_not_hold_is_refused():
     ground, arm = asm.Body("ground", fixed=True), asm.Body("arm")
     scene = asm.Assembly([ground, arm])
     scene.constrain(asm.Fixed(ground.frame(), arm.frame()), asm.Fixed(ground.frame((1, 0, 0)), arm.frame(), name="b"))
-    with pytest.raises(asm.errors.InputError, match="q0 is a start that leads to no pose"):
+    with pytest.raises(asm.errors.InputError, match="q0 leads to no pose at which the constraints hold"):
         Session(scene)
 
 

@@ -1,1 +1,1 @@
-"""Whether bodies are clear or only touch, told by convex hulls of whole faces: no cell is made for it."""
+"""Proofs that bodies are clear or only touch, by convex hulls of whole faces, without cells."""

@@ -1,4 +1,4 @@
-"""Convex hulls around the faces of a body, each made of discs and points, and how far they reach along directions.
+"""Convex hulls around the faces of a body, made of discs and points, and their extent along directions.
 
 A hull is that of discs, and of points as discs without a radius, each with a ball of radius `pad` around it. Along a
 unit vector n a disc with center c, axis a and radius r reaches to

@@ -1,4 +1,4 @@
-"""What one face is within, and what it is beside: hulls of discs and points, and hollows that no point of it is in.
+"""Hulls that contain a face, made of discs and points, and hollows: convex sets that contain no point of it.
 
 A face on a cylinder, a cone or a sphere is on the border of a convex set, so that what is wholly within that set is
 clear of it: a shaft of its bore, a plug of its seat, a ball of its socket. A flat face with a hole is beside the

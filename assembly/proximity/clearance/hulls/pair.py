@@ -1,4 +1,4 @@
-"""What hulls of faces tell of two bodies: that they are clear, or that they only touch.
+"""Proof by hulls of faces that two bodies are clear, or only touch.
 
 Bodies between which a plane is are clear. Of others every two faces have to be parted by a plane, or one of them has to
 be within the hollow of the other one, and neither body may be within the other. Where gaps are too small the second

@@ -1,4 +1,4 @@
-"""What hulls of faces tell of the pairs of bodies of a scene, where nothing else was made of these yet."""
+"""Proofs by hulls of faces for all pairs of bodies of a scene, before anything else is made of them."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Minima of the distance of two centerlines: of a box where F is convex, and of a thin one
 (`proximity/manager/centerlines/box.py`).
 
-Where F may have two minima beside each other, one centerline is followed by feet on the other one: at t(s) with F_t = 0
-and F_tt > 0,
+Where F may have two minima beside each other, one centerline is followed by projections on the other one: at t(s) with
+F_t = 0 and F_tt > 0,
 
     phi(s) = F(s, t(s)),   phi' = F_s,   phi'' = F_ss - F_st^2 / F_tt,
 
@@ -19,26 +19,26 @@ from assembly._newton import bracketed_newton, damped_newton
 from assembly.geometry.vec import dot
 from assembly.proximity.manager.centerlines.box import FreeEnds, Lengths, difference_at
 
-# Steps of Newton's method over a box, and to a foot.
+# Steps of Newton's method over a box, and to a projection.
 STEPS, PROJECTIONS = 30, 13
 # Slopes of the distance below this count as zero at the borders of a box: the next box has the same point. Those of F
 # below the second are rounding.
 LEVEL, ROUNDED_SLOPE = 1e-10, 1e-16
 # A valley with no more slope than this at both ends is level: rounding tells where it has minima.
 NOISE = 1e-14
-# A foot is one where a step toward it would be shorter than this; one that lowers F by less of it is rounding.
+# A projection is one where a step toward it would be shorter than this; one that lowers F by less of it is rounding.
 SHORT, PROMISE = 1e-12, 1e-15
 # Two PosedParts of which one is followed: side 0 if that is f, 1 g.
 Course = namedtuple("Course", "parts side")
 # F, its slopes on both centerlines and its second derivatives: x along the followed one, y along the other one.
 Slopes = namedtuple("Slopes", "merit x y xx yy xy")
 BoxQuery = namedtuple("BoxQuery", "course box")
-# The foot of x on the other centerline. A course with feet that are found from y on, or are `held` there. A course
-# whose feet come to an `end` of the other centerline; sense: -1 where F_y falls there.
+# The projection of x on the other centerline. A course with projections that are found from y on, or are `held` there.
+# A course whose projections come to an `end` of the other centerline; sense: -1 where F_y falls there.
 FootQuery = namedtuple("FootQuery", "course x")
 CourseQuery = namedtuple("CourseQuery", "course held y")
 KinkQuery = namedtuple("KinkQuery", "course end sense")
-# phi' and phi'', the foot, and whether it is one. F_y at an end and its rate.
+# phi' and phi'', the projection, and whether it is one. F_y at an end and its rate.
 Projected = namedtuple("Projected", "slope curvature foot found")
 SlopeAtEnd = namedtuple("SlopeAtEnd", "slope curvature")
 # Room for the minima of a thin box: both ends, and three in each of the pieces between these and two kinks.
@@ -134,7 +134,7 @@ def _slopes_across(query, y):
 
 @kernel(inline=True)
 def _step_across(query, y, at):
-    """Newton's step to a foot; there is none from where F is not convex along the other centerline."""
+    """Newton's step to a projection; there is none from where F is not convex along the other centerline."""
     step = -at.y / at.yy if at.yy > 0.0 else 0.0
     return step, not at.y * step < -PROMISE * at.merit
 
@@ -149,7 +149,7 @@ _foot = kernel(inner=True)(damped_newton(_slopes_across, _step_across, _move_acr
 
 @kernel(inner=True)
 def projection_at(query, x):
-    """The `Projected` of x: its foot on the other centerline."""
+    """The `Projected` of x: its projection on the other centerline."""
     y = query.y
     if not query.held:
         y = _foot(FootQuery(query.course, x), y)[2]
@@ -180,7 +180,7 @@ def held_at(course, own, x):
 
 @kernel(inner=True)
 def kink_at(course, end, left, right):
-    """Where between two places the foot comes to an end of the other centerline's piece: F_y = 0 there."""
+    """Where between two places the projection comes to an end of the other centerline's piece: F_y = 0 there."""
     sense = 1.0 if slopes_of(course, right, end).y > 0.0 else -1.0
     return _kink(KinkQuery(course, end, sense), left, right, 0.5 * (left + right))[0]
 
@@ -207,10 +207,10 @@ def turns_of(width, a, b, bend_a, bend_b):
 
 @kernel(inner=True)
 def piece_minima(course, held, left, right, y, ends, places, count):
-    """Minima of phi between two places all of whose feet are `held` at y, or are none of them, found from y on.
+    """Minima of phi between two places all of whose projections are `held` at y, or are none of them, found from y on.
 
     `ends`: whether the followed centerline has a free end at either place. Returns how many `places` there are, the
-    larger slope at both ends, and whether there are feet.
+    larger slope at both ends, and whether there are projections.
     """
     side = course.side
     query = CourseQuery(course, held, y)
@@ -246,7 +246,7 @@ def piece_minima(course, held, left, right, y, ends, places, count):
 def near_singular_minima(parts, box, open_ends, places):
     """Minima of phi over a thin box: s and t of each into `places`, (MINIMA, 2).
 
-    That centerline is followed across which F is curved the most. Where feet come to a free end phi' has a kink.
+    That centerline is followed across which F is curved the most. Where projections come to a free end phi' has a kink.
     Between kinks it may go through zero and back where it turns: over a thin box that is where the cubic does that has
     its values and slopes at both ends.
 
@@ -265,7 +265,7 @@ def near_singular_minima(parts, box, open_ends, places):
     left, right = own_box.from_f, own_box.to_f
     other_left, other_right = own_box.from_g, own_box.to_g
     k = 0.5 * (other_right - other_left)
-    # Feet may go on beyond the box along the same piece, but not beyond a free end.
+    # Projections may go on beyond the box along the same piece, but not beyond a free end.
     own = (other_left if ends.start_g else other_left - k, other_right if ends.end_g else other_right + k)
     begin = held_at(course, own, left)
     end = held_at(course, own, right)

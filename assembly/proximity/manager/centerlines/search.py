@@ -2,8 +2,8 @@
 
 Wires touch where the distance of their centerlines has a minimum, less their radii. Boxes of both, lengths along a part
 of either, are halved until it is known of each how many minima it holds (`proximity/manager/centerlines/box.py`); where
-that takes boxes that are all but points, feet tell (`minima.py`). So no contact is missed, and it is known how far
-bodies may go until there may be others: what is excluded by a margin stays so for motions that are shorter.
+that takes boxes that are all but points, projections tell (`minima.py`). So no contact is missed, and it is known how
+far bodies may go until there may be others: what is excluded by a margin stays so for motions that are shorter.
 """
 
 from __future__ import annotations
