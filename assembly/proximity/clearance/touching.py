@@ -242,6 +242,7 @@ def move_apart(proof: ClearanceProof, k: int, q: Array, contacts: Contacts, touc
         few = normals[np.linspace(0, len(normals) - 1, GUIDES).astype(int)]
     guides[: len(few)] = few @ rotation_of(q[proof.pairs[k][0], 3:])
     arms = places - row[:3] - arm
+    move: Array | None
     for part in OPENED if touching > 0.0 else ():
         # Contacts between which a body is wedged open by less than it is moved.
         if len(gaps) == 1:
