@@ -289,14 +289,11 @@ class ClearanceProof:
         return self.forest.grow() if self.forest.is_full else self.fronts.grow()
 
     def _run(self, q: Array, touching: float, moves: Array, tasks: Table, budget: int | None = None) -> None:
-        counts = self.fronts.counts
-        if budget is None:
-            self._look(q, touching, moves, tasks)
-            return
-        usual = counts.budget.copy()
-        counts.budget = budget
+        usual = self.fronts.counts.budget.copy()
+        if budget is not None:
+            self.fronts.counts.budget = budget
         self._look(q, touching, moves, tasks)
-        counts.budget = usual
+        self.fronts.counts.budget = usual
 
     def _look(self, q: Array, touching: float, moves: Array, tasks: Table) -> None:
         """Look at pairs, and again with more room at those that had too little."""
