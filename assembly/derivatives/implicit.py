@@ -25,8 +25,7 @@ from assembly.derivatives.result import Moved, Sensitivity
 from assembly.errors import InputError, items
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
-from assembly.solve.second_order.balance import UNBALANCED
-from assembly.solve.second_order.dense import CUT, PUSHING, STATIONARY
+from assembly.solve.second_order.dense import CUT, PUSHING, STATIONARY, UNBALANCED
 from assembly.solve.solution import Solution
 
 if TYPE_CHECKING:

@@ -16,7 +16,6 @@ from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.constraints.program.records import pool_header_at
 from assembly.geometry.vec import quaternion_matrix
-from assembly.solve.second_order.balance import UNBALANCED
 
 # What is known of a scene before it is evaluated, in a table; offsets are in that table.
 PLAN = record_dtype(
@@ -285,7 +284,7 @@ def add_measures(plan, table, given, out):
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])", allocates=True)
 def linearize(table, pool, state, figures, forces, evaluated, out):
-    """Write the equations of a solution; whether they are finite and in balance, and every distance has a way.
+    """Write the equations of a solution; whether they are finite, and every distance has a way.
 
     Parameters
     ----------
@@ -299,7 +298,7 @@ def linearize(table, pool, state, figures, forces, evaluated, out):
     out
         Zeros, that become: rows and coordinates (m + e, n), the Hessian (n, n), what a unit of each parameter adds to
         rows (m, p), coordinates (e, p), slopes (n, p) and the value (p,); slopes of measures (k, n) and what parameters
-        add to these (k, p); the slopes of the Lagrangian (n,).
+        add to these (k, p); the slopes of the Lagrangian (n,), and the largest of them.
     """
     plan = plan_at(table, 0)
     m, e, n, p = plan.rows, plan.coordinates, plan.unknowns, plan.parameters
@@ -343,8 +342,7 @@ def linearize(table, pool, state, figures, forces, evaluated, out):
             for i in range(n):
                 left[0, i] += forces[r] * rows[r, i]
         for i in range(n):
-            if abs(left[0, i]) > UNBALANCED:
-                return False
+            out[at + n] = max(out[at + n], abs(left[0, i]))
     turns = np.empty((plan.bodies, 3, 3))
     write_turns(plan, state, turns)
     given = (pool, state, figures, turns)

@@ -35,7 +35,7 @@ from assembly.derivatives.probed import ProbedScene
 from assembly.derivatives.result import Layout, Moved, Sensitivity
 from assembly.kinematics.body import Body, Frame
 from assembly.solve.second_order.curvature import curvature_at
-from assembly.solve.second_order.dense import PUSHING
+from assembly.solve.second_order.dense import PUSHING, UNBALANCED
 from assembly.solve.solution import Solution
 
 __all__ = ["Plan", "layout_of", "plan_of"]
@@ -147,7 +147,7 @@ class Plan:
         self._plan = self._written(packed, entries, measured)
         m, e, n, p = packed.rows, len(coordinates), self._unknowns, len(self._parameters)
         k = len(self._measures)
-        shapes = [(m + e, n), (n, n), (m, p), (e, p), (n, p), (p,), (k, n), (k, p), (n,)]
+        shapes = [(m + e, n), (n, n), (m, p), (e, p), (n, p), (p,), (k, n), (k, p), (n,), (1,)]
         ends = np.cumsum([int(np.prod(shape)) for shape in shapes]).tolist()
         self._parts = list(zip([0, *ends], ends, shapes, strict=False))
         self._is_implicit, self._rows = packed.is_implicit, m
@@ -297,6 +297,8 @@ class Plan:
         desk.out.fill(0.0)
         if not linearize(self._plan, pool, state, self._figures_of_now(packed), desk.forces, desk.evaluated, desk.out):
             return None
+        if desk.out[-1] > UNBALANCED:
+            return None
         held = self._held(packed, desk.evaluated[1 : 1 + rows], desk.forces[:rows])
         return None if held is None else self._stepped(packed, held, desk)
 
@@ -324,7 +326,7 @@ class Plan:
 
     def _stepped(self, packed: Packed, held: Table | slice, desk: _Desk) -> Sensitivity | None:
         """The step, and what measures change by; None where ranks are in doubt, or rows contradict each other."""
-        jacobian, hessian, rows_by, _, slopes_by, values, slopes, own, _ = desk.parts
+        jacobian, hessian, rows_by, _, slopes_by, values, slopes, own, *_ = desk.parts
         rows_held, asked = jacobian[: self._rows][held], rows_by[held]
         (r, n), p = rows_held.shape, asked.shape[1]
         steps, forces, free = np.empty((n, p)), np.empty((r, p)), desk.free

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.contact import TOUCHING
-from assembly.solve.second_order.balance import UNBALANCED
 from assembly.solve.second_order.curvature import curvature_at, least_curvature, walk
 
 __all__ = ["LocalModel", "Neighbor", "null_space"]
@@ -19,7 +18,9 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 # A multiplier that is stronger pushes.
 PUSHING = 1e-7
-# What multipliers may leave of the objective's slope at a stationary point.
+# Multipliers that leave more of the objective's slope are balanced anew.
+UNBALANCED = 1e-9
+# What they may leave at a stationary point.
 STATIONARY = 1e-6
 # Singular values of rows of length one that count as none; what least squares take for none.
 DEPENDENT, CUT = 1e-7, 1e-9
