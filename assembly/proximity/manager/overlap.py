@@ -1,8 +1,8 @@
 """Whether two bodies are in each other, whatever extrema there are, and which extrema are of far sides: by facets.
 
-A patch whose middle is inside the other body says so by its projection there, where nothing is between the two; a part of an
-edge that goes through a face does (`proximity/manager/edge_piercing.py`). Whether a body is wholly inside another one,
-so that none of their patches are near each other, only the proof of clearances says.
+A patch whose middle is inside the other body says so by its projection there, where nothing is between the two; a part
+of an edge that goes through a face does (`proximity/manager/edge_piercing.py`). Whether a body is wholly inside another
+one, so that none of their patches are near each other, only the proof of clearances says.
 """
 
 from __future__ import annotations
