@@ -14,7 +14,7 @@ Where parts were put together without clearances it is the same, but for the way
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -104,7 +104,7 @@ def _where_clear(
     outcome: Outcome,
     begin: float,
     settings: Array,
-    prove: Callable[[Array, float], list[PairAnswer] | None],
+    prove: Callable[[Array, float], Sequence[PairAnswer] | None],
     interruption: Interruption,
 ) -> Solution | None:
     """The solution found without clearances, if there is one and bodies are proven to be clear there."""
