@@ -28,9 +28,7 @@ QUICK, BUDGET = 500, 4000
 # How deep the way of a contact that rolls may go in, in parts of the square of its length over the least radius: a
 # chord of a curve of radius r is s^2 / (8 r) off it, there are two, and a contact may go farther than the bodies.
 ROLLED = 1.0
-# Parts of it that bodies are opened by, one after the other: as they are, they may cross elsewhere. A tick tries the
-# first: where that is not proven the next one goes a quarter as far, by which it opens a sixteenth. Of those ticks 130
-# are held then instead of 102, and 99 percent of all take 13 ms where it was 98.
+# Parts of it that bodies are opened by, one after the other: opened by more, they may cross elsewhere.
 OPENED = (1.0, 0.1, 0.01)
 # The part of what is called touching that such a way may go in without being opened.
 SLIGHTLY = 0.1

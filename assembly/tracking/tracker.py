@@ -5,48 +5,30 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from time import perf_counter, sleep
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly._copies import InOneProcess
 from assembly._read_only import read_only
 from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import structure_changes
 from assembly.constraints.model.objectives import PointDistance
-from assembly.constraints.packing.corners import body_of
-from assembly.constraints.packing.earlier import taken_over
-from assembly.constraints.packing.renumbered import numbers_told
-from assembly.constraints.packing.scene import MOST_CROWDING, structure_of
-from assembly.constraints.program.records import CLOCK_AT, MANAGER_RECORD
+from assembly.constraints.packing.scene import MOST_CROWDING
+from assembly.constraints.program.records import CLOCK_AT
 from assembly.errors import InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.changes import changes
 from assembly.kinematics.pose import Pose, pose_rows
-from assembly.proximity.features.solid_contact import STAYS, TRACK
-from assembly.proximity.manager.records import (
-    CLOCK,
-    EVENT_COUNT,
-    MARK_AT,
-    MEMORY_HEADER,
-    PAIR_MEMORY,
-    PAIR_TURN,
-    PAIRS,
-)
-from assembly.solve.attempts.attempts import new_workspace
-from assembly.solve.clearance_proof import can_prove
+from assembly.proximity.manager.records import EVENT_COUNT
 from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.parameters import ROUNDING
 from assembly.solve.loop.settings import (
     ALLOWED_OVERLAP,
     BUDGET,
     CARRIED,
-    CARRIES,
     CONTACT_LOST,
     FEASIBILITY,
     FINAL_UPDATE,
-    HISTORY,
     ITERATIONS,
     LAST_FEASIBLE,
     OUT_OF_TIME,
@@ -58,17 +40,13 @@ from assembly.solve.loop.settings import (
     VIOLATION,
 )
 from assembly.solve.options import Options
-from assembly.solve.scene import Scene, Status
+from assembly.solve.scene import Status
 from assembly.solve.solution import Solution
-from assembly.tracking.clear_ticks import ClearTicks
-from assembly.tracking.followed import Followed
 from assembly.tracking.hands import Followable, SeveralHands, new_hands, springs, with_hands
 from assembly.tracking.log import TrackLog
 from assembly.tracking.tick import Step, TrackStatus
+from assembly.tracking.tick_memory import TickMemory, forget_updates
 from assembly.tracking.trace import Trace
-
-if TYPE_CHECKING:
-    from assembly.constraints.packing.scene import Packed
 
 __all__ = ["Tracker"]
 
@@ -78,21 +56,6 @@ SHORTEST_RADIUS = 1e-7
 # What the loop says of a tick whose pose holds.
 _STATUSES = {SOLVED: TrackStatus.FOLLOWED, OUT_OF_TIME: TrackStatus.LATE}
 _CODES = {status: k for k, status in enumerate(TrackStatus)}
-
-
-def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
-    """Let rows of clearances follow extrema, from edges onto faces as well, which corners do not.
-
-    Ticks have no final update. Which rows are in the place of a contact, or are its own pair, their first update tells.
-    """
-    record = packed.table[MANAGER_RECORD]
-    packed.table[record + CLOCK] = packed.table[CLOCK_AT] if keeps_time else 0
-    first, count = len(packed.contacts), sum(packed.places[: len(packed.clearances)])
-    # Corners of contacts, which are listed behind, carry bodies that lie on each other: they stay.
-    state[packed.contacts_at : packed.angles_at].reshape(-1, TRACK)[first : first + count, STAYS] = 0.0
-    if packed.table[record + MARK_AT]:
-        pairs = state[packed.memory_at + MEMORY_HEADER :][: PAIR_MEMORY * int(packed.table[record + PAIRS])]
-        pairs.reshape(-1, PAIR_MEMORY)[:, PAIR_TURN] = np.nan
 
 
 def _held_to(begin: Solution) -> Solution:
@@ -123,7 +86,7 @@ def _tick_settings(limit: float, iterations: int, second_order: bool) -> Array:
     return settings
 
 
-class Tracker(InOneProcess):
+class Tracker(TickMemory):
     """Makes points or frames of bodies follow targets; made by `Assembly.tracker`.
 
     Every tick is a few steps of the loop that `solve` runs, from the pose and the multipliers of the tick before. A
@@ -194,10 +157,7 @@ class Tracker(InOneProcess):
         if first.disagreeing:
             # What rows disagree by depends on the pose.
             limit = max(limit, Options.fit)
-        self._packed: Packed = inner.packed()
-        assert inner._scene is not None
-        self._scene: Scene = inner._scene
-        self._edits, self._numbers = changes(), self._told()
+        self._take_packed()
         self._settings = _tick_settings(limit, iterations, second_order)
         self._budget = budget
         if budget is not None:
@@ -208,63 +168,6 @@ class Tracker(InOneProcess):
         # The loop holds rows to this, or to what rounding of coordinates alone can violate.
         far = float(np.abs(poses[:, :3]).max()) / self._packed.scale
         self._tolerance = 1.25 * max(limit, ROUNDING * far) * self._packed.scale
-
-    def _begin_at(self, first: Solution) -> None:
-        """Have ticks go on from a solution of the packed scene."""
-        packed, self._begun = self._packed, first.status
-        self._set_up(first._state)
-        proves = packed.keeps_apart and can_prove(packed)
-        self._clear = ClearTicks(first, self._touching * packed.scale) if proves else None
-
-    def _set_up(self, begin: Array) -> None:
-        """What ticks work in, and what they read and write directly; they go on from a state of the packed scene."""
-        packed, budget = self._packed, self._budget
-        self._history = np.zeros((1, HISTORY))
-        names = [(body_of(a).name, body_of(b).name) for a, b in packed.kept_pairs]
-        self._followed = Followed(self._scene, packed, names, self._hands, self._begun)
-        # At its end are the rows of the last tick; steps have no copy of those.
-        self._size = packed.kept_at
-        self._state = np.zeros(packed.kept_at + packed.kept_size)
-        self._state[: begin.size] = begin
-        if packed.clearance_rows:
-            _follow_extrema(packed, self._state, budget is not None)
-        self._pose = self._state[: self._size]
-        # Numbers are read from a view in half the time it takes to read them from the array.
-        self._view: Any = self._state.data
-        self._before = self._pose.copy()
-        self._knobs: Any = self._settings.data
-        _, doubles, integers = new_workspace(packed)
-        self._arguments = (
-            packed.table,
-            packed.pool,
-            self._settings,
-            self._state,
-            self._history,
-            doubles,
-            integers,
-            packed.end_effectors,
-        )
-        self._radius = float(self._settings[RADIUS])
-        self._seen = float(self._state[packed.memory_at + EVENT_COUNT]) if packed.clearance_rows else 0.0
-        self._hands.pack(packed)
-        # Other values of constraints may ask for another pose than the one that a tick goes on from, or goes back to.
-        self._settings[CARRIES] = float(budget is not None and not packed._sources)
-
-    def _take_more_places(self) -> None:
-        """Have more places for contacts of clearances: from the last pose all of them are found anew.
-
-        What found no place at a tick no row keeps away from there on.
-        """
-        before, radius = self._packed, self._radius
-        self._packed = packed = self._inner._pack_with_more_places()
-        assert self._inner._scene is not None
-        self._scene = self._inner._scene
-        self._numbers = self._told()
-        result = self._before[before.results_at : before.memory_at]
-        self._set_up(taken_over(before, packed, self._before))
-        self._radius = radius
-        self._before[packed.results_at : packed.memory_at] = result
-        self._pose[:] = self._before
 
     def __repr__(self) -> str:
         stiffness = self._hands.stiffness
@@ -334,10 +237,7 @@ class Tracker(InOneProcess):
             self._hands.pack(self._packed)
             self._hands.take_targets(before)
             raise
-        self._packed = self._inner.packed()
-        assert self._inner._scene is not None
-        self._scene = self._inner._scene
-        self._edits, self._numbers = changes(), self._told()
+        self._take_packed()
         self._settings[RADIUS] = self._radius
         self._begin_at(first)
         self._hands.take_targets(first.q)
@@ -410,28 +310,13 @@ class Tracker(InOneProcess):
     def _proven(self, status: TrackStatus) -> TrackStatus:
         """The status of a tick, whose pose is that of the last one where bodies are not known to be clear at it."""
         assert self._clear is not None
-        packed = self._packed
         there = Solution(self._scene, self._packed, self._pose.copy(), Status.SOLVED, 0.0, self._history)
         if self._clear.holds(there):
             return status
         self._pose[:] = self._before
         # The contact that was crossed may not be listed: all pairs are searched again.
-        pairs = self._state[packed.memory_at + MEMORY_HEADER :][
-            : PAIR_MEMORY * int(packed.table[packed.table[MANAGER_RECORD] + PAIRS])
-        ]
-        pairs.reshape(-1, PAIR_MEMORY)[:, PAIR_TURN] = np.nan
+        forget_updates(self._packed, self._state)
         return TrackStatus.HELD
-
-    def _has_changed(self) -> bool:
-        """Whether a constraint of the scene, and not of another one, gained or lost a row, or a number was set anew."""
-        packed = self._packed
-        if packed.structure != structure_of(self._inner._seated_constraints()) or self._told() != self._numbers:
-            return True
-        packed.stamp, self._edits = structure_changes(), changes()
-        return False
-
-    def _told(self) -> list[object]:
-        return numbers_told(self._packed, self._inner.bodies, self._inner.constraints)
 
     def run(self, trace: Trace | Sequence[Trace], *, paced: bool = False, stride: int = 1) -> TrackLog:
         """Follow recorded motions, one tick per sample.

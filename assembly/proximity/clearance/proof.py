@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import asin, hypot, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import rows_of
-from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_of
 from assembly.proximity.clearance.answers import Answer, Verdict
-from assembly.proximity.clearance.body_cells import BodyCells
-from assembly.proximity.clearance.forest import Fronts, PackedForest
+from assembly.proximity.clearance.body_pairs import BodyPairs
+from assembly.proximity.clearance.forest import Fronts
 from assembly.proximity.clearance.inside import UNCLEAR, winding_of
 from assembly.proximity.clearance.look import (
     AT_POSE,
@@ -42,8 +40,6 @@ __all__ = ["LEAST_SIZE", "ClearanceProof", "stayed_answers"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-# What rounding may add to a length.
-LONGER = 1.0 + 1e-12
 # Of smaller bodies, and of larger ones than one over it, nothing is proven: products of six lengths are no numbers.
 LEAST_SIZE = 1e-30
 # What rounding may take from the room in a bore, in parts of coordinates.
@@ -54,7 +50,7 @@ REMEMBERED = 4
 STACK = 4096
 
 
-class ClearanceProof:
+class ClearanceProof(BodyPairs):
     """The proofs of pairs of bodies, kept from look to look.
 
     Parameters
@@ -73,15 +69,10 @@ class ClearanceProof:
         pairs: Sequence[tuple[int, int]],
         minimum: Sequence[float],
     ) -> None:
-        self.pairs = list(pairs)
-        self.faces = shapes = [first_equal(faces) for faces in shapes]
-        used = sorted({body for pair in pairs for body in pair})
-        self._number = {body: k for k, body in enumerate(used)}
-        self.forest = PackedForest([shapes[body] for body in used])
+        super().__init__(shapes, pairs, minimum)
         local = [(self._number[a], self._number[b]) for a, b in pairs]
         self.fronts = Fronts(self.forest, local, minimum)
         self.fronts.counts.body_a, self.fronts.counts.body_b = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-        self.minimum = np.array(minimum, dtype=float)
         self._codes, self._stack = np.zeros(len(self.pairs), dtype=np.int64), np.zeros(STACK, dtype=np.int64)
         self._begun = np.zeros(len(self.pairs), dtype=bool)
         # Columns: to ask records for them by name takes longer than a tick.
@@ -250,11 +241,6 @@ class ClearanceProof:
         if self.forest.is_large:
             self.forest.forget(self.fronts)
 
-    def cells_of_both(self, k: int) -> tuple[BodyCells, BodyCells]:
-        """The trees of both bodies of pair k."""
-        a, b = self.pairs[k]
-        return self.forest.cells[self._number[a]], self.forest.cells[self._number[b]]
-
     def is_apart(self, k: int, q: Array, distance: float, budget: int, moves: Array | None = None) -> bool:
         """Whether it is proven, within a budget, that bodies of pair k are farther apart and none is in the other.
 
@@ -311,22 +297,6 @@ class ClearanceProof:
             kept = np.where(waiting == BEGUN_ANEW, AT_POSE, waiting)
             waiting = np.where(short, kept, PASSED_BY)
 
-    def near_pairs(self, q: Array, distance: float) -> list[int]:
-        """The pairs whose balls around all of a body are no farther apart than a distance over their least gaps."""
-        a, b = np.array(self.pairs, dtype=np.int64).reshape(-1, 2).T
-        middle, radius = np.zeros((len(q), 3)), np.zeros(len(q))
-        for body, k in self._number.items():
-            cells = self.forest.cells[k]
-            middle[body] = rotation_of(q[body, 3:]) @ cells.middle + q[body, :3]
-            radius[body] = cells.extent
-        apart = np.linalg.norm(middle[b] - middle[a], axis=1) - radius[a] - radius[b]
-        found: list[int] = np.flatnonzero(apart <= self.minimum + distance).tolist()
-        return found
-
-    def cells_of(self, k: int) -> BodyCells:
-        """The tree of the second body of pair k."""
-        return self.forest.cells[self._number[self.pairs[k][1]]]
-
     def bound(self, k: int) -> float:
         """A lower bound of the distance of pair k at its last look, where that ended clear."""
         pair = self.fronts.pair
@@ -370,12 +340,6 @@ class ClearanceProof:
             return Answer(Verdict.TOUCHING, bound - far, far, swept=swept)
         return Answer(Verdict.CLEAR, bound, swept=swept)
 
-    def relative(self, k: int, q: Array) -> tuple[Array, Array]:
-        """The rotation and the shift of the second body of pair k, seen from the first."""
-        a, b = self.pairs[k]
-        turn = rotation_of(q[a, 3:])
-        return turn.T @ rotation_of(q[b, 3:]), (q[b, :3] - q[a, :3]) @ turn
-
     def left(self, k: int) -> tuple[np.recarray, np.recarray]:
         """The pairs of nodes that a look at pair k left open: PARTED and NODES of each."""
         count = int(self.fronts.counts.next_count[k])
@@ -385,42 +349,6 @@ class ClearanceProof:
         links = rows_of(NODES, nodes)
         is_open &= links.how == BY_PLANE
         return rows[is_open], links[is_open]
-
-    def size(self, k: int) -> float:
-        """The size of the larger body of pair k."""
-        return max(self.forest.cells[self._number[body]].size for body in self.pairs[k])
-
-    def is_of_wires(self, k: int) -> bool:
-        """Whether both bodies of pair k are round wires."""
-        return all(cells.is_of_wires for cells in self.cells_of_both(k))
-
-    def radius(self, k: int) -> float:
-        """The least radius of what is round of either body of pair k."""
-        return min(cells.radius for cells in self.cells_of_both(k))
-
-    def move_length(self, k: int, q: Array, move: Array) -> float:
-        """How far a move takes points of the second body of pair k, at most."""
-        if not move.any():
-            return 0.0
-        if not move[3:].any():
-            return float(np.linalg.norm(move[:3]))
-        cells = self.cells_of(k)
-        # In plain floats: np.cross takes longer than all the rest.
-        x, y, z = (rotation_of(q[self.pairs[k][1], 3:]) @ cells.middle).tolist()
-        dx, dy, dz, u, v, w = move.tolist()
-        way = hypot(dx + v * z - w * y, dy + w * x - u * z, dz + u * y - v * x)
-        return way + cells.extent * hypot(u, v, w)
-
-    def way_length(self, k: int, before: Array, after: Array) -> float:
-        """How far points of the second body of pair k go between two poses, seen from the first, at most."""
-        return self.length_between(k, self.relative(k, before), self.relative(k, after))
-
-    def length_between(self, k: int, before: tuple[Array, Array], after: tuple[Array, Array]) -> float:
-        """The same of what the second body is turned and shifted by."""
-        cells = self.cells_of(k)
-        turn, shift = after[0] - before[0], after[1] - before[1]
-        angle = 2.0 * asin(min(1.0, hypot(*turn.ravel().tolist()) / sqrt(8.0)))
-        return (hypot(*(turn @ cells.middle + shift).tolist()) + angle * cells.extent) * LONGER
 
     def last_poses(self) -> tuple[Array, Array]:
         """The rotations (pairs, 9) and shifts (pairs, 3) of second bodies at the last looks that ended clear."""
