@@ -80,7 +80,8 @@ class ClearanceProof(BodyPairs):
         self._way_depth, self._slimmer = self.fronts.pair.way_depth, self.fronts.pair.slimmer
         self._soonest, self._travelled = self.fronts.pair.soonest, self.fronts.pair.travelled
         self._needed = self.fronts.pair.needed
-        self._of_wires = np.array([self.is_of_wires(k) for k in range(len(self.pairs))], dtype=bool)
+        # What two wires may be slimmer at most, and other bodies not at all.
+        self._slimmest = np.array([self.radius(k) if self.is_of_wires(k) else 0.0 for k in range(len(self.pairs))])
         # What opened contacts at the last look of a solve.
         self.moves = np.zeros((len(self.pairs), 6))
         # Poses of the last looks, where all pairs had them at the same ones.
@@ -191,8 +192,11 @@ class ClearanceProof(BodyPairs):
         return True
 
     def make_slimmer(self, depth: float) -> None:
-        """From now on two wires may be in each other by a depth, and on ways by the square of their length as well."""
-        asked = np.where(self._of_wires, depth, 0.0)
+        """From now on two wires may be in each other by a depth, and on ways by the square of their length as well.
+
+        By no more than the thinner one's radius: what passes through the other one is in it by both radii.
+        """
+        asked = np.minimum(depth, self._slimmest)
         if not np.array_equal(self._slimmer, asked):
             self._begun[self._slimmer != asked] = False
             self._slimmer[:] = asked

@@ -207,7 +207,8 @@ def chord_of(forest, b, way):
 def loss_on_way(forest, nodes, way, gap, sag):
     """How much less the gap of two pieces of wires may be along a way than at both ends, where it is at least `gap`.
 
-    Infinite where that is more than the square of the way's length over the lesser radius.
+    Infinite where that is more than the square of the way's length over the lesser radius, or than that radius: what
+    passes through the other wire is in it by both.
     """
     distance = gap + both_radii(forest, nodes.a, nodes.b)
     s = chord_of(forest, nodes.b, way)
@@ -216,4 +217,4 @@ def loss_on_way(forest, nodes, way, gap, sag):
         return math.inf
     loss = 0.25 * s * s / (distance + math.sqrt(left)) + sag
     least = min(node_at(forest.nodes, nodes.a).first[1], node_at(forest.nodes, nodes.b).first[1])
-    return loss if loss * least <= way.moved * way.moved else math.inf
+    return loss if loss * least <= way.moved * way.moved and loss <= least else math.inf

@@ -215,3 +215,22 @@ def test_nothing_is_in_another_that_may_not_be_slimmer():
         assert is_proven(answer) is proven
     assert proof.stays_clear(linked(-6e-10), 1e-9, np.zeros((1, 6)))
     assert not proof.stays_clear(linked(-2e-9), 1e-9, np.zeros((1, 6)))
+
+
+@pytest.mark.parametrize(("radius", "touching"), [(0.1, 1e-9), (1e-4, 1e-3)])
+@pytest.mark.parametrize("off", [2.0, 2.5, 4.0])
+def test_no_way_leads_through_a_wire(radius, touching, off):
+    """From one side of a wire to the other one: midway spines cross, of which both ends tell nothing.
+
+    Nor does it where more than a wire is thick is called touching.
+    """
+    wire = asm.shapes.pipe(Path((0, 0, -1)).line(2.0), radius)
+    proof, turn = proof_of(wire, wire), Rotation.from_rotvec([1.2, 0.0, 0.0])
+    proof.make_slimmer(touching)
+    begin, end = (poses(at(x * radius, 0.0, 0.0, turn)) for x in (off, -off))
+    assert is_proven(proof.look(begin, touching)[0])
+    assert not is_proven(proof.look(end, touching, swept=True)[0])
+    assert not proof.stays_clear(end, touching, np.zeros((1, 6)), at_once=True)
+    # They pass where nobody asks for the way.
+    proof.forget_poses()
+    assert is_proven(proof.look(end, touching)[0])
