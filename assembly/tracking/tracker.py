@@ -315,7 +315,7 @@ class Tracker(InOneProcess):
         Parameters
         ----------
         q0 : (n, 7) or Solution
-            The constraints are solved from there.
+            The constraints are solved from there, as in `Assembly.solve`; the hands draw to where they are at rest.
 
         Raises
         ------
