@@ -71,8 +71,8 @@ class Assembly(Solving):
         Parameters
         ----------
         q0 : (n, 7) or Solution, optional
-            Where to start: one row for each body (fixed bodies too), or an earlier solution of this assembly, whose
-            contacts and multipliers are used as well. By default the bodies' own poses.
+            Where to start: one row for each body (a fixed one stays where its row says), or an earlier solution of this
+            assembly, whose contacts and multipliers are used as well. By default the bodies' own poses.
         starts : mapping of constraint name -> (4,), optional
             Surface parameters near the pair that a contact is to track; for other contacts a global search finds the
             pair.

@@ -108,7 +108,11 @@ class Measure:
             return solution.contacts[self.thing.name].gap
         if self.kind == "wrench":
             assert self.on is not None
-            return float(solution.wrenches[self.thing.name][self.on.name].vector[self.axis])
+            wrenches = solution.wrenches[self.thing.name]
+            if self.on.name not in wrenches:
+                known = ", ".join(map(repr, wrenches))
+                raise InputError(f"measure is of what is exerted on {self.on!r}; expected one of {known}")
+            return float(wrenches[self.on.name].vector[self.axis])
         if self.kind == "touching":
             return place_value(self.axis, self.thing, solution)
         sides = self.thing if self.kind == "distance" else (self.thing,)

@@ -108,7 +108,8 @@ class Tracker(TickMemory):
         Force over distance; one for each target, or one for all.
     budget : float, optional
         Seconds after which the compiled loop of a tick begins no further step or update; the next tick continues with
-        what is not done. Without a budget a tick takes as long as it needs.
+        what is not done. The proof under a `Clearance` is not counted. Without a budget a tick takes as long as it
+        needs.
     iterations : int
         Number of steps after which a tick ends if the constraints hold; otherwise up to four times as many.
     tolerance : float
@@ -218,7 +219,7 @@ class Tracker(TickMemory):
         Parameters
         ----------
         q0 : (n, 7) or Solution
-            The constraints are solved from there.
+            The constraints are solved from there, as in `Assembly.solve`; the hands draw to where they are at rest.
 
         Raises
         ------

@@ -282,6 +282,11 @@ def test_measures_of_what_is_not_there_raise():
         asm.Measure(touch, "u")
     with pytest.raises(TypeError, match="solution is 3; expected a Solution"):
         asm.Measure(rod, "x").value(3)
+    balls = [asm.Body(f"ball {k}", asm.shapes.sphere(1.0), position=(3.0 * k, 0, 0)) for k in range(2)]
+    clear, apart = asm.Assembly(balls), asm.Clearance()
+    clear.constrain(apart)
+    with pytest.raises(asm.errors.InputError, match="what is exerted on Body.*; expected one of 'ball 0', 'ball 1'"):
+        asm.Measure(apart, "fx", on=rod).value(clear.solve())
 
 
 def test_frames_are_said_in_one_line():

@@ -253,6 +253,46 @@ def test_what_is_beside_a_thin_plate_is_not_in_it(thickness, ball, turn):
         assert told or deepest < -1e-3
 
 
+INNER = {
+    "box": asm.shapes.box(0.5, 0.4, 0.3),
+    "ball": asm.Face(asm.shapes.sphere(0.25)),
+    "ring": asm.Face(asm.shapes.torus(0.3, 0.1)),
+}
+
+
+# Of each a place in it and one that is not; the ring's is in its tube, and in its hole.
+OUTER = {
+    "box": (asm.shapes.box(4.0, 4.0, 4.0), (0.2, 0.1, 0.0), (7.0, 0.0, 0.0)),
+    "ball": (asm.Face(asm.shapes.sphere(2.0)), (0.2, 0.1, 0.0), (0.0, 0.0, 3.0)),
+    "ring": (asm.Face(asm.shapes.torus(3.0, 1.0)), (3.0, 0.1, 0.0), (0.0, 0.1, 0.0)),
+}
+
+
+@pytest.mark.parametrize("inner", list(INNER))
+@pytest.mark.parametrize("outer", list(OUTER))
+def test_a_body_wholly_inside_another_one_is_in_it(outer, inner):
+    shape, *places = OUTER[outer]
+    inner_in, outer_around = judge(shape, INNER[inner]), judge(INNER[inner], shape)
+    for turn in (UPRIGHT, TURNED):
+        for place, inside in zip(places, (True, False), strict=True):
+            q = np.array([(0.0, 0.0, 0.0, *UPRIGHT), (*place, *turn)])
+            for told, deepest in (inner_in(q), outer_around(q[::-1])):
+                # The gap of a contact of round wires says so, or the look.
+                assert (told or deepest < -0.1) == inside
+                assert inside or not deepest < 0.0
+
+
+def test_rays_that_leave_a_tube_by_its_open_end_do_not_put_a_body_inside():
+    tube = asm.shapes.cylinder(1.0, 6.0)
+    crossed = judge(tube, asm.shapes.sphere(0.3))
+    rng = np.random.default_rng(8)
+    for _ in range(60):
+        # All around the ends, and never within.
+        place = rng.uniform((-3.0, -3.0, 3.4), (3.0, 3.0, 5.0))
+        place[2] *= rng.choice([-1.0, 1.0])
+        assert not crossed([(0.0, 0.0, 0.0, *UPRIGHT), (*place, *UPRIGHT)])[0]
+
+
 @pytest.mark.parametrize("x", [0.0, 0.5, 3.0])
 def test_plates_with_flush_sides_are_not_in_each_other(x):
     # Segments between far sides run along the sides, through the borders of faces.
@@ -266,13 +306,6 @@ def test_what_is_behind_a_sheet_is_not_in_it():
     tilted = Rotation.from_rotvec([0.1, 0.17, 0.3]).as_quat(scalar_first=True)
     told, deepest = judge(sheet, asm.shapes.box(1.0, 1.0, 0.1))([(0.0, 0.0, 0.0, *UPRIGHT), (0.1, 0.2, -0.3, *tilted)])
     assert not told and not deepest < 0.0
-
-
-INNER = {
-    "box": asm.shapes.box(0.5, 0.4, 0.3),
-    "ball": asm.Face(asm.shapes.sphere(0.25)),
-    "ring": asm.Face(asm.shapes.torus(0.3, 0.1)),
-}
 
 
 @pytest.mark.parametrize("inner", list(INNER))
@@ -300,6 +333,12 @@ def test_seams_that_faces_leave_open_hide_no_contact(error, cases):
         crossed, gap = judged(dented(rng, (0.5, 0.4, 0.3), from_box, depth))
         # As far off as the faces are.
         assert crossed or gap == pytest.approx(-depth, abs=2.0 * error)
+
+
+@pytest.mark.parametrize("shape", [asm.shapes.box(1.0, 1.0, 1.0), asm.shapes.solid_cylinder(0.4, 1.0)])
+def test_bodies_at_one_place_are_in_each_other(shape):
+    judged, rng = judge(shape, shape), np.random.default_rng(17)
+    assert all(judged(placed(rng, np.zeros(3)))[0] for _ in range(20))
 
 
 @pytest.mark.parametrize("side", [1.0, 0.5, 0.01])

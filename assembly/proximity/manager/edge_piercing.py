@@ -28,8 +28,9 @@ WIDER = 1.5
 FLAT = 1e-9
 
 
-# Where a segment cuts a triangle. hit: whether it does; q, r: the shares of these corners there.
-TriangleCut = namedtuple("TriangleCut", "hit q r")
+# Where a segment cuts a triangle. hit: whether it does; part: which part of the way; q, r: the shares of these corners
+# there; turns: whether the segment goes to the side to which the corners turn left.
+TriangleCut = namedtuple("TriangleCut", "hit part q r turns")
 
 
 @kernel(inline=True)
@@ -44,14 +45,14 @@ def cut_at(a, d, p, q, r, end, beside):
     h = cross(d, f)
     det = dot(e, h)
     if abs(det) < 1e-300:
-        return TriangleCut(False, 0.0, 0.0)
+        return TriangleCut(False, 0.0, 0.0, 0.0, False)
     s = sub(a, p)
     u = dot(s, h) / det
     w = cross(s, e)
     v = dot(d, w) / det
     t = dot(f, w) / det
     hit = min(u, v, 1.0 - u - v) >= -beside and end < t < 1.0 - end
-    return TriangleCut(hit=hit, q=u, r=v)
+    return TriangleCut(hit=hit, part=t, q=u, r=v, turns=det < 0.0)
 
 
 @kernel(inner=True)

@@ -1,8 +1,9 @@
 """Whether two bodies are in each other, whatever extrema there are, and which extrema are of far sides: by facets.
 
 A patch whose middle is inside the other body says so by its projection there, where nothing is between the two; a part
-of an edge that goes through a face does (`proximity/manager/edge_piercing.py`). Whether a body is wholly inside another
-one, so that none of their patches are near each other, only the proof of clearances says.
+of an edge that goes through a face does (`proximity/manager/edge_piercing.py`). A segment is inside a body or outside
+by how many facets it cuts. Of a body that is wholly inside another one every ray cuts an odd number; so do some rays
+from outside a tube with open ends, but not three of three points.
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.faces.trim import trim_side
 from assembly.geometry.splines.domain import is_within
-from assembly.geometry.splines.evaluate import surface_point
-from assembly.geometry.vec import add, matvec, matvec_t, scale, sub
+from assembly.geometry.splines.evaluate import surface_at, surface_point
+from assembly.geometry.vec import add, cross, matvec, matvec_t, scale, sub
+from assembly.proximity.brep.apexes import unit
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import EDGE_RECORD, FACE_RECORD, edge_at, face_at, shell_at
 from assembly.proximity.bvh.tree import (
@@ -36,6 +38,9 @@ DEPTH = 256
 # A segment that passes a facet by less than this part of its sides cuts it, where being cut by two is no harm: one
 # through a common side may miss both.
 BETWEEN = 1e-9
+# What is wholly inside is asked of points this far below a surface, and twice as far as the other's facets are off:
+# bodies at one place are in each other.
+BELOW = 1e-6
 
 
 @kernel(inline=True)
@@ -117,7 +122,7 @@ def next_near(store, tree, y, distance, stack, used):
 def facets_cut(posed, side, a, d, end, beside):
     """How many facets of one body's faces cut the segment from a to a + d, but for that part at its ends; body axes.
 
-    Or are beside it, by that part of their sides.
+    Or are beside it, by that part of their sides. And whether the first of them leads out of the body.
     """
     store = posed.store
     tree = tree_at(store.table, posed.trees[side])
@@ -125,6 +130,8 @@ def facets_cut(posed, side, a, d, end, beside):
     stack[0] = 0
     used = 1
     count = 0
+    first = 2.0
+    leaves = False
     while used > 0:
         used -= 1
         i = stack[used]
@@ -147,7 +154,10 @@ def facets_cut(posed, side, a, d, end, beside):
             here = (u + (x + y if k == 0 else x) * wide, v + (y if k == 0 else x + y) * high)
             if cut.hit and in_trim(posed, side, code, here[0], here[1]):
                 count += 1
-    return count
+                if cut.part < first:
+                    first = cut.part
+                    leaves = cut.turns == (surface_at(store.table, r).sign > 0)
+    return count, leaves
 
 
 @kernel(inline=True)
@@ -208,7 +218,7 @@ def is_inside_at(posed, side, e, y, margin):
         return False
     if -distance <= 2.0 * offset:
         return True
-    return facets_cut(posed, side, y, scale(-distance, n), offset / -distance, 0.0) == 0
+    return facets_cut(posed, side, y, scale(-distance, n), offset / -distance, 0.0)[0] == 0
 
 
 @kernel(inline=True)
@@ -240,16 +250,78 @@ def middle(posed, side, e):
     return surface_point(store.table, store.pool, f, patch.middle[0], patch.middle[1]).point, True
 
 
+@kernel(inline=True)
+def is_patch(posed, side, e):
+    """Whether an element of one body is of a face."""
+    shell = posed.shells[side]
+    return shell < 0 or patch_at(posed, side, e).feature < shell_at(posed.store.table, shell).faces
+
+
+@kernel(inner=True)
+def below_part(posed, side, k, below):
+    """A point `below` the middle of a patch in the k-th of three parts of a body's patches, and whether there is one.
+
+    The parts are of different faces, if there are some: a point of a face that touches may be taken for inside.
+    """
+    store = posed.store
+    elements = tree_at(store.table, posed.trees[side]).elements
+    patches = 0
+    for e in range(elements):
+        patches += int(is_patch(posed, side, e))
+    passed = 0
+    for e in range(elements):
+        if is_patch(posed, side, e):
+            if passed >= patches * k // 3:
+                a, some = middle(posed, side, e)
+                if some:
+                    patch = patch_at(posed, side, e)
+                    f = surface_of_code(posed, side, np.int64(patch.feature))
+                    _p, su, sv, _uu, _uv, _vv = surface_point(
+                        store.table, store.pool, f, patch.middle[0], patch.middle[1]
+                    )
+                    return sub(a, scale(float(surface_at(store.table, f).sign) * below, unit(cross(su, sv)))), True
+            passed += 1
+    return (0.0, 0.0, 0.0), False
+
+
+@kernel(inner=True)
+def is_wholly_inside(posed, side, below):
+    """Whether f (side 0) is wholly inside g, or g in f: by rays, each another way, from three points `below` it."""
+    store = posed.store
+    tree, other = posed.trees[side], posed.trees[1 - side]
+    # Some direction that no face is likely to lie along, and far enough.
+    far = 10.0 * (
+        node_at(store.pool, tree_at(store.table, tree).node_pool).radius
+        + node_at(store.pool, tree_at(store.table, other).node_pool).radius
+    )
+    for k in range(3):
+        a, some = below_part(posed, side, k, below)
+        if not some:
+            return False
+        ray = (0.6012 * far, 0.3517 * far, 0.7174 * far)
+        if k == 1:
+            ray = scale(-1.0, ray)
+        elif k == 2:
+            ray = (0.5218 * far, -0.8125 * far, -0.2601 * far)
+        cut, leaves = facets_cut(posed, 1 - side, seen_by_other(posed, side, a), ray, 0.0, 0.0)
+        # In a bore that is open at its ends a ray goes into the material.
+        if cut % 2 == 0 or not leaves:
+            return False
+    return True
+
+
 @kernel(inner=True)
 def crosses(posed, stack, candidates, margin):
-    """Whether two bodies are in each other by more than a margin, whatever extrema there are."""
+    """Whether two bodies are in each other by more than a margin, or wholly, whatever extrema there are."""
     count = overlapping(posed.store, posed.trees, posed.pose, stack, candidates)
     for c in range(count):
         if is_deep(posed, candidates[c, 0], candidates[c, 1], margin):
             return True
         if posed.surfaces[0] < 0 and pierces(posed, (candidates[c, 0], candidates[c, 1]), margin):
             return True
-    return False
+    return is_wholly_inside(posed, 0, BELOW + 2.0 * posed.offsets[1]) or is_wholly_inside(
+        posed, 1, BELOW + 2.0 * posed.offsets[0]
+    )
 
 
 @kernel(inner=True)
@@ -272,7 +344,7 @@ def is_cut(posed, side, extremum):
     if side == 1:
         a, b = seen_by_other(posed, 0, a), seen_by_other(posed, 0, b)
     end = posed.offsets[side] / -extremum.gap
-    return end < 0.5 and facets_cut(posed, side, a, sub(b, a), end, BETWEEN) > 0
+    return end < 0.5 and facets_cut(posed, side, a, sub(b, a), end, BETWEEN)[0] > 0
 
 
 @kernel(inner=True)
