@@ -116,7 +116,7 @@ class Solving(PackedContents):
         """The same, without corners of contacts."""
         if not self.packed().keeps_apart or settings[ITERATIONS] == 0.0:
             return self._solved(settings, q0, starts, interruption)
-        if not self._objectives and isinstance(q0, Solution):
+        if isinstance(q0, Solution) and (not self._objectives or not _is_pushed(q0)):
             from assembly.studies.unhindered import unhindered
 
             # If no clearance pushes, the other rows alone determine the solution.
@@ -218,3 +218,12 @@ class Solving(PackedContents):
                     judge_end(solution, settings, interruption)
                 return solution
             self._pack_with_more_places()
+
+
+def _is_pushed(solution: Solution) -> bool:
+    """Whether a contact of a clearance pushes at a solution; none does where contacts were not even listed."""
+    if solution._lists is not None:
+        return False
+    packed, state = solution._ended
+    first = packed.multipliers_at + len(packed.contacts)
+    return bool(state[first : first + packed.clearance_rows].any())

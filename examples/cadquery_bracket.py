@@ -6,7 +6,10 @@ Prints where the bracket stands; writes cadquery_bracket.html for a browser.
 
 from __future__ import annotations
 
-import cadquery as cq
+try:
+    import cadquery as cq
+except ImportError:
+    raise SystemExit("CadQuery is not installed; pip install cadquery, in an environment of its own") from None
 
 import assembly as asm
 

@@ -8,7 +8,10 @@ from __future__ import annotations
 
 from time import perf_counter
 
-import cadquery as cq
+try:
+    import cadquery as cq
+except ImportError:
+    raise SystemExit("CadQuery is not installed; pip install cadquery, in an environment of its own") from None
 
 import assembly as asm
 

@@ -27,7 +27,10 @@ def designs(count: int) -> tuple[asm.Assembly, asm.Plan, dict[str, object]]:
 
 
 def main(count: int = 8192, workers: int = 4) -> asm.Study:
-    from distributed import Client, LocalCluster
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise SystemExit("Dask's distributed is not installed; install the extra cluster") from None
 
     begin = perf_counter()
     alone = asm.study(*designs(count))

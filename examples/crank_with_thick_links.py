@@ -70,8 +70,11 @@ def main() -> list[asm.Solution]:
     for solution in solutions[::6]:
         at, rocker = solution.values["drive.angle"], solution.values["swing.angle"]
         print(f"{np.degrees(at):11.1f}{np.degrees(rocker):15.6f}{np.degrees(swing(at)):13.6f}")
+    # Poses alone: with solutions their contacts, some three hundred, are drawn as well.
     poses = np.array([solution.q for solution in solutions])
-    asm.view.animate(scene, poses, "crank_with_thick_links.html", seconds=6.0, direction=(0.2, -0.8, 1.0))
+    said = [f"crank {np.degrees(solution.values['drive.angle']):.0f} deg" for solution in solutions]
+    direction = (0.2, -0.8, 1.0)
+    asm.view.animate(scene, poses, "crank_with_thick_links.html", seconds=6.0, direction=direction, captions=said)
     return solutions
 
 

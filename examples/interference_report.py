@@ -37,7 +37,8 @@ def main() -> asm.Interference:
     report = asm.interference(scene, margin=0.5)
     print(report)
     report.to_csv("interference_report.csv")
-    asm.view.save_html("interference_report.html", scene, interference=report)
+    style = asm.view.Style(legend=True, unit="mm")
+    asm.view.save_html("interference_report.html", scene, interference=report, style=style)
     return report
 
 

@@ -64,7 +64,9 @@ def main() -> list[asm.Solution]:
         proved = "proved" if solution.proved else "not proved"
         print(f"{angle:11.1f}{at:10.4f}{FREE + at:21.6f}{FREE - at:14.6f}   {solution.status.name}, {proved}")
     poses = np.array([solution.q for solution in solutions])
-    asm.view.animate(scene, poses, "shaft_in_bearings.html", seconds=6.0, direction=(0.25, -1.0, 0.6))
+    said = [f"shaft {np.degrees(solution.values['axis.angle']):.0f} deg" for solution in solutions]
+    direction = (0.25, -1.0, 0.6)
+    asm.view.animate(scene, poses, "shaft_in_bearings.html", seconds=6.0, direction=direction, captions=said)
     return solutions
 
 

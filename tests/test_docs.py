@@ -79,6 +79,18 @@ def test_links_lead_somewhere(path):
     assert missing == []
 
 
+def anchors(path):
+    """What headings of a page are called in links."""
+    headings = re.findall(r"^#+ (.*)$", re.sub(r"```.*?```", "", path.read_text(), flags=re.S), flags=re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda p: p.name)
+def test_links_to_headings_lead_to_one(path):
+    targets = re.findall(r"\]\(([\w./]*\.md)?#([^)\s]+)\)", path.read_text())
+    assert [each for each in targets if each[1] not in anchors(path.parent / each[0] if each[0] else path)] == []
+
+
 @pytest.mark.parametrize("path", PAGES, ids=lambda p: p.name)
 def test_files_that_pages_name_exist(path):
     named = re.findall(r"`((?:assembly|tests|docs|examples|benchmarks)/[\w/.]+\.(?:py|md|png))`", path.read_text())

@@ -58,6 +58,11 @@ class Measure:
         if on is not None:
             if not isinstance(thing, Constraint) or component not in WRENCH:
                 raise InputError(f"component is {component!r} with on={on!r}; expected a constraint and 'fx' to 'tz'")
+            if not isinstance(on, Body):
+                raise TypeError(f"on is {on!r}; expected a Body")
+            # A clearance names no bodies: it is of all of them.
+            if thing.bodies and not any(on is body for body in thing.bodies):
+                raise InputError(f"on is {on!r}; expected one of {', '.join(repr(body) for body in thing.bodies)}")
             self.kind, self.axis, label = "wrench", WRENCH.index(component), f"{thing.name} on {on.name}.{component}"
             self.unit = "force" if self.axis < 3 else "torque"
         elif isinstance(thing, (Point, Frame, Body)):
@@ -75,10 +80,13 @@ class Measure:
             self.kind, self.axis, label = "touching", COMPONENTS.index(component), f"{thing.contact.name}.{component}"
             self.unit = "parameter" if self.axis < 2 else "length"
         elif isinstance(thing, Contact):
+            _none_expected(thing, component)
             self.kind, label = "gap", f"{thing.name}.gap"
         elif isinstance(thing, str) and thing == "objective":
+            _none_expected(thing, component)
             self.kind, self.unit, label = "objective", "objective", "objective"
         elif isinstance(thing, tuple) and len(thing) == 2 and all(isinstance(p, (Point, Frame, Body)) for p in thing):
+            _none_expected(thing, component)
             self.kind, label = "distance", "-".join(place_of(side)[0].name for side in thing)
         else:
             raise TypeError(
@@ -90,6 +98,8 @@ class Measure:
 
     def value(self, solution: Solution) -> float:
         """The value at a solution, in the user's units; angles continue past whole turns."""
+        if not isinstance(solution, Solution):
+            raise TypeError(f"solution is {solution!r}; expected a Solution")
         if self.kind == "objective":
             return solution.objective
         if self.kind == "coordinate":
@@ -108,6 +118,12 @@ class Measure:
 
     def __repr__(self) -> str:
         return f"Measure({self.name!r})"
+
+
+def _none_expected(thing: Any, component: str | None) -> None:
+    """Raise where a component is asked of what is one number."""
+    if component is not None:
+        raise InputError(f"component is {component!r} of {thing!r}; expected none: it is one number")
 
 
 def place_of(thing: Point | Frame | Body) -> tuple[Body, Array]:

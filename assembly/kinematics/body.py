@@ -80,13 +80,18 @@ class Point(ReadOnlyArrays):
         return f"{self.body.name}.point({x:g}, {y:g}, {z:g})"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Frame(ReadOnlyArrays):
     """A frame on a body: origin (3,) and axes (3, 3), the columns x, y, z, in body coordinates."""
 
     body: Body
     origin: Array
     axes: Array
+
+    def __repr__(self) -> str:
+        rows = (row + 0.0 for row in (self.origin, *self.axes.T))  # no minus zeros
+        at, x, _, z = ("({:g}, {:g}, {:g})".format(*row) for row in rows)
+        return f"{self.body.name}.frame({at}, z={z}, x={x})"
 
     def place(self, at: ArrayLike | None = None, z: ArrayLike | None = None, x: ArrayLike | None = None) -> None:
         """Set the frame anew on its body: its origin, its axes, or both, as `Body.frame` takes them.

@@ -352,7 +352,8 @@ def _near_rows(rows: ContactRows, proof: ClearanceProof, reach: float) -> dict[i
         number = places.get((f, g), places.get((g, f), -1)) if pair < 0 else pair
         if 0 <= number < len(minimum) and gaps[k] - minimum[number] < reach:
             near.setdefault(number, []).append(k)
-            if pair < 0 and (f, g) not in places:
+            # A proof may have the pair the other way round (`proven_pairs`).
+            if (f, g) != proof.pairs[number]:
                 turned.append(k)
     normals, points = rows.normals.copy(), rows.points[:, 1].copy()
     normals[turned], points[turned] = -normals[turned], rows.points[turned, 0]

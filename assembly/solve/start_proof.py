@@ -23,6 +23,7 @@ from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import (
     TRIES,
     PairAnswer,
+    StayedClear,
     lent_proof,
     named_answers,
     nothing_known,
@@ -47,7 +48,7 @@ def is_for_proofs(packed: Packed) -> bool:
     return not any(touched and item.minimum > 0.0 for item, _, touched in owned_pairs(packed))
 
 
-def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: float) -> list[PairAnswer] | None:
+def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: float) -> Sequence[PairAnswer] | None:
     """What is proven of all pairs that clearances keep apart; None if not all of them hold.
 
     Equal poses are not checked again.
@@ -92,7 +93,7 @@ def _asked(packed: Packed, state: Array) -> bytes:
 
 def prove_way(
     packed: Packed, bodies: Sequence[Body], last: Array, state: Array, touching: float
-) -> list[PairAnswer] | None:
+) -> Sequence[PairAnswer] | None:
     """What is proven of all pairs at poses, and that none has passed through the other on the way from the last ones.
 
     The straight way is proven; where it is not, it has to be shorter than the least radius of what is round of the two
@@ -115,10 +116,10 @@ def prove_way(
         if not proof.has_looked:
             # Hulls told of the last poses.
             _answers(proof, last, length)
-        elif not proof.is_at(last):
+        elif not (proof.is_at(last) or proof.stays_clear(last, length, proof.moves, QUICK, at_once=True)):
             proof.look(last, length, proof.moves)
         if proof.stays_clear(q, length, proof.moves, QUICK):
-            found = named_answers(packed, proof.clear_answers(q, proof.moves))
+            found = StayedClear(packed, *proof.clear_bounds(q, proof.moves))
             packed.stood = _asked(packed, state), touching, found
             return found
         if any(proof.way_length(k, last, q) > proof.radius(k) for k in _unproven_ways(proof, q, length)):

@@ -57,7 +57,7 @@ __all__ = ["Prove", "resting"]
 Array = NDArray[np.float64]
 # Two bodies, and whether it is their flat faces that lie on each other.
 Side = tuple[int, int, bool]
-Prove = Callable[[Array, float], list[PairAnswer] | None]
+Prove = Callable[[Array, float], Sequence[PairAnswer] | None]
 # [of the objective's slope] What contact forces may leave of it: the joints' solve holds 1e-10 of a largest one of 1.
 BALANCED = 1e-9
 # What rounding alone may change of an objective, in parts of it.

@@ -2,8 +2,10 @@
 
 A mechanism whose links slide along each other lists hundreds of contacts, none of which pushes: joints alone determine
 its motion. So rows without clearances are solved first, and bodies are proven to be clear, or to touch, at the pose
-found, which is then the least move with clearances, too. Whether clearances pushed at the last solution is no
-criterion: where their contacts are redundant with joints, it is undetermined which of them push.
+found, which is then the least move, or a minimum of the objective, with clearances, too. Whether clearances pushed at
+the last solution is no criterion without an objective: where their contacts are redundant with joints, it is
+undetermined which of them push. An objective draws bodies onto what is in their way, and rows without clearances are
+then tried only from solutions at which none pushed.
 
 Nor may bodies have passed through each other: the straight way from the last pose is proven with the same look. If it
 cannot be proven, as for a pin that moves along an arc in its bore, the way has to be shorter than the bodies'
@@ -14,7 +16,7 @@ Where parts were put together without clearances it is the same, but for the way
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -47,7 +49,7 @@ def unhindered(
     starts: Mapping[str, ArrayLike] | None,
     interruption: Interruption,
 ) -> Solution | None:
-    """The solution of a scene with clearances and no objective found without clearances, or None.
+    """The solution of a scene with clearances that is found without these, or None.
 
     Parameters
     ----------
@@ -104,7 +106,7 @@ def _where_clear(
     outcome: Outcome,
     begin: float,
     settings: Array,
-    prove: Callable[[Array, float], list[PairAnswer] | None],
+    prove: Callable[[Array, float], Sequence[PairAnswer] | None],
     interruption: Interruption,
 ) -> Solution | None:
     """The solution found without clearances, if there is one and bodies are proven to be clear there."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import place_of
+from assembly.constraints.packing.corners import body_of
 from assembly.constraints.packing.manager import is_of_surfaces
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
@@ -149,6 +150,9 @@ class ClearTicks:
         self._proof = proof
         pairs = first._packed.kept_pairs[: len(proof.pairs)]
         self._of_features = {k for k, pair in enumerate(pairs) if not is_of_surfaces(pair)}
+        # A proof may have a pair the other way round.
+        firsts = [first._scene.index(body_of(side)) for side, _ in pairs]
+        self._turned = {k for k, one in enumerate(firsts) if one != proof.pairs[k][0]}
         self._at = _Standing(first)
         self._moves, self._opened = np.zeros((len(proof.pairs), 6)), list[int]()
         self.way_depth = 0.0
@@ -272,6 +276,8 @@ class ClearTicks:
         if not (turned > angle).any():
             return False
         (first, _), (second, _) = (standing.relative(self._proof, k) for standing in (self._at, there))
+        if k in self._turned:
+            first, second = first.T, second.T
         return bool(((turned > angle) & (np.abs(other @ second - one @ first).max(axis=1) > angle)).any())
 
     def _may_go_in(self, k: int, there: _Standing, part: float) -> bool:

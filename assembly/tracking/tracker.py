@@ -18,7 +18,7 @@ from assembly.constraints.program.records import CLOCK_AT
 from assembly.errors import InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.changes import changes
-from assembly.kinematics.pose import Pose
+from assembly.kinematics.pose import Pose, pose_rows
 from assembly.proximity.manager.records import EVENT_COUNT
 from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.parameters import ROUNDING
@@ -223,11 +223,11 @@ class Tracker(TickMemory):
         Raises
         ------
         InputError, TypeError
-            A tracker of a single hand, or a start from which the constraints cannot be solved.
+            A tracker of a single hand, no poses of all bodies, or ones from which the constraints cannot be solved.
         """
         if not isinstance(self._hands, SeveralHands):
             raise InputError("the tracker has a single hand; expected one that was made with a list")
-        poses = self._scene_given._given(q0.q if isinstance(q0, Solution) else q0)
+        poses = pose_rows("q0", q0.q if isinstance(q0, Solution) else q0, len(self._scene_given.bodies))
         before = self.q
         self._hands.at_rest(poses)
         try:

@@ -65,15 +65,15 @@ class Style:
         if isinstance(self.labels, bool):
             labels = LABELED if self.labels else ()
         else:
-            labels = items("labels", self.labels, f"True, False or some of {', '.join(map(repr, LABELED))}")
+            labels = items("labels", self.labels, f"True, False or a list of some of {', '.join(map(repr, LABELED))}")
             for each in labels:
-                if each not in LABELED:
+                if not isinstance(each, str) or each not in LABELED:
                     raise InputError(f"labels has {each!r}; expected some of {', '.join(map(repr, LABELED))}")
         object.__setattr__(self, "labels", labels)
         if not isinstance(self.unit, str):
             raise TypeError(f"unit is {self.unit!r}; expected a string, 'mm' say")
         check_encodable("unit", self.unit)
-        if self.glyphs not in get_args(Glyphs):
+        if not isinstance(self.glyphs, str) or self.glyphs not in get_args(Glyphs):
             raise InputError(f"glyphs is {self.glyphs!r}; expected one of {', '.join(map(repr, get_args(Glyphs)))}")
         angle = number("angle", self.angle)
         if not _FINEST <= angle <= _COARSEST:

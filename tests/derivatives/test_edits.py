@@ -262,3 +262,28 @@ def test_a_least_gap_of_a_contact_is_held_saved_and_no_clearance_beside_it(tmp_p
         scene.solve()
     film.minimum = 0.0
     assert scene.solve().success
+
+
+def test_measures_of_what_is_not_there_raise():
+    case = slider_crank()
+    scene = case.scene
+    ground, _, rod, piston = scene.bodies
+    hinge = scene.constraints[0]
+    with pytest.raises(TypeError, match="on is 'crank'; expected a Body"):
+        asm.Measure(hinge, "fx", on="crank")
+    with pytest.raises(asm.errors.InputError, match=r"on is Body\('rod', 0 faces\); expected one of Body\('ground'"):
+        asm.Measure(hinge, "fx", on=rod)
+    with pytest.raises(asm.errors.InputError, match="component is 'x' of .*; expected none"):
+        asm.Measure((rod, piston), "x")
+    with pytest.raises(asm.errors.InputError, match="component is 'x' of 'objective'; expected none"):
+        asm.Measure("objective", "x")
+    touch = asm.Contact(asm.Body("a", asm.shapes.sphere(1.0)), asm.Body("b", asm.shapes.sphere(1.0)))
+    with pytest.raises(asm.errors.InputError, match="component is 'u' of .*; expected none"):
+        asm.Measure(touch, "u")
+    with pytest.raises(TypeError, match="solution is 3; expected a Solution"):
+        asm.Measure(rod, "x").value(3)
+
+
+def test_frames_are_said_in_one_line():
+    frame = asm.Body("arm").frame((1, 0, 2.5), z=(0, 0, -1), x=(0, 1, 0))
+    assert repr(frame) == "arm.frame((1, 0, 2.5), z=(0, 0, -1), x=(0, 1, 0))"

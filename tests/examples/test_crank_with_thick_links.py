@@ -58,4 +58,4 @@ def test_it_prints_the_rocker(run):
     for line in run.lines[2:]:
         _, found, exact = line.split()
         assert found == exact
-    assert "MeshCat.Viewer" in run.page
+    assert "MeshCat.Viewer" in run.page and "crank 180 deg" in run.page

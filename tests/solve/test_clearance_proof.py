@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.kinematics.pose import rotation_of
 from assembly.proximity.clearance.answers import Verdict
 from assembly.solve import clearance_proof
 from assembly.solve.clearance_proof import lent_proof, near_contacts, new_proof, opening_move, prove_end
@@ -71,6 +72,24 @@ def test_contacts_are_the_same_as_rows_and_one_by_one(given, monkeypatch):
     for number, contacts in alone.items():
         for told, expected in zip(rows[number], contacts, strict=True):
             assert told == pytest.approx(expected, abs=1e-10)
+
+
+def test_contacts_of_a_pair_that_a_proof_has_the_other_way_round():
+    """Of a pin and a plate a proof has the plate first, in whose bore the pin fits: normals point from there."""
+    pin = asm.Body("pin", asm.shapes.solid_cylinder(0.3, 1.2), (0.1, 0.02, 0.1), (0.99, 0.05, 0.08, 0.0))
+    plate = asm.Body("plate", asm.shapes.plate(3.0, 2.0, 0.5, [(0.0, 0.0, 0.5)]), fixed=True)
+    found = asm.Assembly([pin, plate])
+    found.constrain(asm.Clearance())
+    found.minimize(asm.PointDistance(pin.point(0, 0, 0.4), (2.0, 0.3, 0.4)))
+    solution = found.solve()
+    proof = new_proof(found.packed(), found.bodies)
+    assert solution.success and proof.pairs == [(1, 0)]
+    (near,) = near_contacts(solution, proof, 1e-3).values()
+    # It has come out of the bore, and leans on an edge of the plate from beyond.
+    assert len(near.normals) and (near.normals[:, 0] > 0.1).all()
+    # Points are those of the second body, the pin.
+    offs = (near.places - solution.q[0, :3]) @ rotation_of(solution.q[0, 3:])
+    assert np.hypot(offs[:, 0], offs[:, 1]).max() <= 0.3 + 1e-9 and np.abs(offs[:, 2]).max() <= 0.6 + 1e-9
 
 
 def test_a_least_gap_is_proven():

@@ -75,6 +75,31 @@ def test_what_is_in_the_way_pushes():
         assert solution.q[1:, 0] == pytest.approx([slide, other], abs=1e-8)
 
 
+def test_an_objective_goes_by_rows_alone_until_a_clearance_pushes(monkeypatch):
+    """A ball is drawn over a floor, into it, and up again: the same poses as with contacts listed at every solve."""
+    ends = []
+    for alone in (True, False):
+        floor = asm.Body("floor", asm.shapes.box(6.0, 6.0, 1.0), fixed=True)
+        ball = asm.Body("ball", asm.shapes.sphere(0.5), position=(0.0, 0.0, 2.0))
+        scene, aim = asm.Assembly([floor, ball]), asm.PointDistance(ball.point(0, 0, 0), (0.0, 0.0, 2.0))
+        scene.constrain(asm.Clearance())
+        scene.minimize(aim)
+        if not alone:
+            without(monkeypatch)
+        solution, found, unlisted = scene.solve(), [], []
+        for height in (1.8, 1.5, 0.9, 0.8, 0.9, 1.3, 1.6, 1.8):
+            aim.target = (2.0 - height, 0.1, height)
+            solution = scene.solve(solution)
+            assert solution.success and solution.proved
+            assert solution.q[1, 2] == pytest.approx(max(height, 1.0), abs=1e-8)
+            found.append(solution.q[1, :3])
+            unlisted.append(solution._lists is not None)
+        # Where the last solution was pushed contacts are listed, else only where rows alone led into the floor.
+        assert unlisted == [alone and free for free in (True, True, False, False, False, False, True, True)]
+        ends.append(np.array(found))
+    assert ends[0] == pytest.approx(ends[1], abs=1e-9)
+
+
 @pytest.mark.parametrize("slide", [1.0, 0.95])
 def test_no_rows_alone_lead_linked_rings_apart(slide, monkeypatch):
     """Where they end the rings are clear, but on the way there they are not."""

@@ -108,5 +108,7 @@ def test_what_cannot_be_held_is_refused(scene):
         tracker.hold(0, red)
     with pytest.raises(TypeError, match="follow is 'red'"):
         tracker.hold(0, "red")
+    with pytest.raises(asm.errors.InputError, match="q0 is None; expected real numbers"):
+        tracker.restart(None)
     with pytest.raises(asm.errors.InputError, match="stiffness"):
         tracker.hold(1, blue, -1.0)

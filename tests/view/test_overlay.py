@@ -214,8 +214,10 @@ def test_driven_values_are_said(browser, tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"labels": "bodies"}, "labels is 'bodies'"),
+        ({"labels": "bodies"}, "labels is 'bodies'; expected True, False or a list of some of 'bodies'"),
+        ({"labels": [np.ones(2)]}, r"labels has array\(\[1., 1.\]\)"),
         ({"labels": ["names"]}, "labels has 'names'; expected some of 'bodies', 'joints', 'contacts', 'targets'"),
+        ({"glyphs": np.array(["none", "none"])}, "glyphs is array"),
         ({"glyphs": "behind"}, "glyphs is 'behind'; expected one of 'occluded', 'in front', 'none'"),
         ({"opacity": 1.5}, "opacity is 1.5; expected a number from 0 to 1"),
         ({"opacity": {"red": np.nan}}, r"opacity\['red'\] is nan"),
