@@ -11,8 +11,9 @@ from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.tangent import ContactTangent
 from assembly.errors import InputError
+from assembly.scene_file.body_kinds import BODY, FACE, SURFACE
 from assembly.scene_file.fields import at, bad, each, members, whole, written
-from assembly.scene_file.kinds import BODY, CONSTRAINTS, FACE, OBJECTIVES, SURFACE
+from assembly.scene_file.kinds import CONSTRAINTS, OBJECTIVES
 from assembly.scene_file.records import Listed, Parts
 from assembly.scene_file.references import refers_to_others
 

@@ -1,14 +1,10 @@
-"""What stands in a scene file: a table of the fields of every kind of thing. A kind that is not here is not saved."""
+"""What stands in a scene file of constraints and objectives: the fields of every kind. Others are not saved."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from operator import methodcaller
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import Contact
@@ -37,30 +33,15 @@ from assembly.constraints.model.placements import Angle, Distance, PointOnLine, 
 from assembly.constraints.model.tangent import ContactTangent, SurfaceTangent, Tangent
 from assembly.constraints.model.trim_contact import TrimContact, single_face
 from assembly.errors import InputError
-from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.loop import Loop
-from assembly.geometry.splines.curve import NurbsCurve
-from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body, Frame, Point
-from assembly.kinematics.picture_mesh import PictureMesh
-from assembly.kinematics.pose import Pose
+from assembly.scene_file.body_kinds import FRAME, LOOP, NAME, NUMBER, NUMBERS, POSE, VECTOR
 from assembly.scene_file.features import Feature
-from assembly.scene_file.fields import bad, each, flag, number, or_null, table, text, vector, whole
+from assembly.scene_file.fields import bad, each, flag, number, or_null, table, text, whole
 from assembly.scene_file.records import Field, Listed, OneOf, OrNull, Parts, Plain, Record
-from assembly.scene_file.references import BODY_NAME, CONSTRAINT_NAME, CONTACT_NAME, FREEDOM, SIDE, Index
+from assembly.scene_file.references import BODY_NAME, CONSTRAINT_NAME, CONTACT_NAME, FREEDOM, SIDE
 
-__all__ = ["BODY", "CONSTRAINTS", "FACE", "OBJECTIVES", "SURFACE"]
-
-# Axes of a frame are unit vectors at right angles to this; nine digits of a decimal do.
-RIGHT_ANGLES = 1e-9
-
-
-class _BodyFace(Index):
-    """The index of a face; files of version 1 have the face itself."""
-
-    def read(self, path: str, value: Any, parts: Parts) -> Face:
-        face: Face = FACE.read(path, value, parts) if parts.version == 1 else super().read(path, value, parts)
-        return face
+__all__ = ["CONSTRAINTS", "OBJECTIVES"]
 
 
 class _TrimLoop:
@@ -97,28 +78,6 @@ def _trim(contact: Contact, side: str, loop: Loop | str | int, **others: Any) ->
         else:
             raise InputError(f"loop is {loop}; expected an index of one of {len(face.holes)} holes of the face")
     return TrimContact(contact, loop, side=side, **others)  # type: ignore[arg-type]  # words are checked there
-
-
-def _array(values: Sequence[Any]) -> NDArray[np.float64]:
-    array = np.array(values, dtype=np.float64)
-    array.flags.writeable = False
-    return array
-
-
-def _to_list(array: NDArray[np.float64]) -> list[Any]:
-    values: list[Any] = array.tolist()
-    return values
-
-
-def _read_axes(path: str, value: Any) -> NDArray[np.float64]:
-    """Columns x, y, z of what stands as rows in a file; right to the bit, so not normalized."""
-    rows = _array(each(path, value, vector, 3))
-    # Lengths first: squares of large numbers overflow.
-    if not (np.abs(rows).max() < 2.0 and np.abs(rows @ rows.T - np.eye(3)).max() <= RIGHT_ANGLES):
-        raise InputError(f"{path} is {rows.tolist()}; expected unit vectors x, y, z at right angles")
-    if not np.linalg.det(rows) > 0.0:
-        raise InputError(f"{path} is {rows.tolist()}, left-handed; expected z = x cross y")
-    return _array(rows.T.tolist())
 
 
 def _read_limits(path: str, value: Any) -> list[float | None]:
@@ -162,25 +121,13 @@ def _point_distance(body: Body, point: list[float], target: list[float], weight:
     return PointDistance(body.point(*point), target, weight)
 
 
-NUMBER = Plain(number)
-NUMBERS = Plain(table(1), _to_list)
-VECTOR = Plain(vector, _to_list)
-SURFACE_INDEX = Index("surfaces")
 DRIVEN = Plain(or_null(number))
 LIMITS = Plain(or_null(_read_limits), lambda limits: None if limits is None else list(limits))
-FRAME = Record(
-    Frame,
-    Field("body", BODY_NAME),
-    Field("origin", Plain(lambda path, value: _array(vector(path, value)), _to_list)),
-    Field("axes", Plain(_read_axes, lambda array: array.T.tolist())),
-)
-POSE = Record(Pose, Field("position", NUMBERS), Field("quaternion", NUMBERS))
 LINES = Plain(
     lambda path, value: "\n".join(each(path, value, text)),
     lambda document: document.splitlines(),
 )
 
-NAME = Field("name", Plain(text))
 UNILATERAL = Field("unilateral", Plain(flag))
 # Of what is never one-sided as well.
 UNILATERAL_OR_NOT = Field("unilateral", Plain(flag), lambda item: getattr(item, "unilateral", False))
@@ -194,62 +141,6 @@ OFFSET = Field("offset", NUMBER)
 FEATURE = Feature(FRAME)
 HELD = (Field("value", DRIVEN), Field("limits", LIMITS))
 
-SURFACE = Record(
-    NurbsSurface,
-    Field("name", Plain(or_null(text))),
-    Field("degree", Plain(lambda path, value: each(path, value, whole, 2), list)),
-    Field(
-        "knots",
-        Plain(lambda path, value: each(path, value, table(1), 2), lambda knots: [*map(_to_list, knots)]),
-    ),
-    Field("control_points", Plain(table(3), _to_list)),
-    Field("weights", Plain(table(2), _to_list)),
-)
-CURVE = Record(
-    NurbsCurve,
-    Field("name", Plain(or_null(text))),
-    Field("degree", Plain(whole)),
-    Field("knots", NUMBERS),
-    Field(
-        "control_points",
-        Plain(lambda path, value: each(path, value, lambda at, pair: each(at, pair, number, 2)), _to_list),
-    ),
-    Field("weights", NUMBERS),
-)
-LOOP = Record(
-    Loop,
-    Field("tolerance", NUMBER),
-    Field("curves", Listed(CURVE)),
-    make=lambda tolerance, curves: Loop.unchecked(curves, tolerance, None, "curves"),
-)
-COLOR = Field("color", Plain(or_null(vector), lambda color: None if color is None else list(color)), since=2)
-FACE = Record(
-    Face,
-    Field("surface", SURFACE_INDEX),
-    Field("name", Plain(or_null(text))),
-    Field("reversed", Plain(flag)),
-    COLOR,
-    Field("outer", OrNull(LOOP), since=2),
-    Field("holes", Listed(LOOP), since=2),
-)
-PICTURE = Record(
-    PictureMesh,
-    Field("vertices", Plain(table(2), _to_list)),
-    Field("triangles", Plain(lambda path, value: each(path, value, lambda at, row: each(at, row, whole, 3)), _to_list)),
-    Field("colors", OrNull(Plain(table(2), _to_list))),
-)
-BODY = Record(
-    Body,
-    NAME,
-    Field("fixed", Plain(flag)),
-    Field("position", NUMBERS, "pose.position"),
-    Field("quaternion", NUMBERS, "pose.quaternion"),
-    COLOR,
-    Field("density", NUMBER, since=3),
-    Field("picture", OrNull(PICTURE), since=4),
-    Field("shape", Listed(_BodyFace("faces")), lambda body: [side.face for side in body.faces]),
-    make=lambda shape, **others: Body(shape=shape or None, **others),
-)
 EXPRESSION = Record(
     Expression,
     NAME,

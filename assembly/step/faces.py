@@ -13,11 +13,12 @@ from assembly.geometry.faces.boundary import OVERSHOOT
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.step.chains import chained, head_to_tail
 from assembly.step.edges import Edges
 from assembly.step.occt import occt
 from assembly.step.profiles import Unreadable
 from assembly.step.surfaces import Patch
-from assembly.step.trims import Edge, chained, curves_of, edge_curves, head_to_tail
+from assembly.step.trims import Edge, curves_of, edge_curves
 from assembly.step.wires import Wire, outermost
 
 __all__ = ["Read", "read_face"]

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from assembly.errors import InputError
 from assembly.geometry.splines.curve import NurbsCurve
+from assembly.step.crossings import crossings
 from assembly.step.edge_feet import move_between, move_to_feet
 from assembly.step.occt import occt
-from assembly.step.profiles import Spline, Unreadable, approximated, crossings, knot_row, point, profile
+from assembly.step.profiles import Spline, Unreadable, approximated, knot_row, point, profile
 from assembly.step.surfaces import CONFUSION, Patch
 
 __all__ = ["Side", "Space", "is_loose", "points_of", "projected", "space_of"]

@@ -24,8 +24,9 @@ from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.carriers import carrier_of, spline_curve
+from assembly.step.crossings import crossings
 from assembly.step.occt import occt, parts
-from assembly.step.profiles import approximated, crossings
+from assembly.step.profiles import approximated
 
 __all__ = ["Sewn", "sewn"]
 

@@ -12,9 +12,10 @@ from assembly.geometry.seams.region_cuts import cut_open, part_of
 from assembly.geometry.seams.region_pieces import EDGE, POLE, SEAM, Uncut
 from assembly.geometry.seams.region_strips import strip
 from assembly.geometry.splines.bezier import full_knots
+from assembly.step.chains import chained
 from assembly.step.profiles import Straight, Turning, Unreadable, approximated, arc, spline
 from assembly.step.surfaces import Patch
-from assembly.step.trims import Edge, chained
+from assembly.step.trims import Edge
 
 
 def circle(center, radius, clockwise=False):

@@ -11,8 +11,9 @@ import assembly as asm
 from assembly.step import trims
 from assembly.step.bodies import read_shape
 from assembly.step.carriers import spline_curve
+from assembly.step.crossings import crossings
 from assembly.step.edge_feet import move_between, move_to_feet
-from assembly.step.profiles import approximated, crossings, point
+from assembly.step.profiles import approximated, point
 from assembly.step.projected import Side, is_loose, points_of, projected, space_of
 from assembly.step.surfaces import patch
 from tests.step.models import MODELS, O, cylinder, edges, faces, parts, without
