@@ -99,9 +99,10 @@ def _rectangle(x, y):
 
 
 @pytest.mark.parametrize("swapped", [False, True])
-def test_a_shaft_turns_in_its_ring_whatever_body_is_first(swapped):
-    shaft = asm.Body("shaft", turned_part([(0, -45), (10, -45), (10, 50), (0, 50)]))
-    ring = asm.Body("ring", tube(10.01, 22.0, 12.0), fixed=True)
+def test_a_shaft_turns_in_its_bearing_whatever_body_is_first(swapped):
+    """The bearing's hole is far from its middle: seen from the shaft it goes around, which no way is proven of."""
+    shaft = asm.Body("shaft", turned_part([(0, -45), (10, -45), (10, 50), (0, 50)]), position=(30, 0, 0))
+    ring = asm.Body("ring", asm.shapes.plate(100, 50, 12, [(30, 0, 10.01)]), fixed=True)
     bodies = [shaft, ring] if swapped else [ring, shaft]
     scene = asm.Assembly(bodies)
     scene.constrain(asm.Clearance())
