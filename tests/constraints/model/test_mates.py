@@ -156,13 +156,13 @@ WRONG_KIND = {
         "face_b is bolt.point(0, 0, 0); expected",
     ),
     "a body for a plane": (lambda: asm.Flush(PLATE, BOLT.faces("<Z")), "face_a is Body('plate'"),
-    "a frame for a point": (lambda: asm.Symmetric(BALL.frame(), BOLT.point(0, 0, 0), PLATE.face("top")), "a is Frame"),
+    "a frame for a point": (lambda: asm.Symmetric(BALL.frame(), BOLT.point(0, 0, 0), PLATE.face("top")), "a is ball.frame("),
     "an edge for a plane": (
         lambda: asm.Flush(PLATE.edges.circles()[:1], BOLT.faces("<Z")),
         "plate.edges[12], a circle",
     ),
     "a name": (lambda: asm.Coaxial("hole 1", SHANK), "a is 'hole 1'; expected a cylinder"),
-    "a frame in a cone": (lambda: asm.Concentric(BALL.frame(), CONE.face()), "a is Frame"),
+    "a frame in a cone": (lambda: asm.Concentric(BALL.frame(), CONE.face()), "a is ball.frame("),
     "a face for two": (
         lambda: asm.Width(PLATE.face("top"), BOLT.faces("|Z")[:2]),
         "slot is plate.face('top'); expected two",
