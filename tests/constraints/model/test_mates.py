@@ -156,7 +156,10 @@ WRONG_KIND = {
         "face_b is bolt.point(0, 0, 0); expected",
     ),
     "a body for a plane": (lambda: asm.Flush(PLATE, BOLT.faces("<Z")), "face_a is Body('plate'"),
-    "a frame for a point": (lambda: asm.Symmetric(BALL.frame(), BOLT.point(0, 0, 0), PLATE.face("top")), "a is ball.frame("),
+    "a frame for a point": (
+        lambda: asm.Symmetric(BALL.frame(), BOLT.point(0, 0, 0), PLATE.face("top")),
+        "a is ball.frame(",
+    ),
     "an edge for a plane": (
         lambda: asm.Flush(PLATE.edges.circles()[:1], BOLT.faces("<Z")),
         "plate.edges[12], a circle",

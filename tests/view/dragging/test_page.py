@@ -50,6 +50,8 @@ def test_a_mouse_drags_a_clip(browser, clips):
         (client,) = page._server.get_clients().values()
         row = page.q[1]
         corners = asm.Pose(row[:3], row[3:]).apply(body_mesh(clips["green"]).vertices)
+        # A page that is drawn slowly answers slowly: a mouse that lets go before is answered by nothing, ever.
+        waits = (3.0 * 2.0**k for k in range(6))
 
         def grabbed():
             # The lower end of the clip, a little inside of its outline.
@@ -60,7 +62,7 @@ def test_a_mouse_drags_a_clip(browser, clips):
             for k in range(1, 16):
                 browser.mouse(tab, "mouseMoved", x + 4.0 * k, y - 2.0 * k)
                 time.sleep(0.03)
-            end = time.monotonic() + 3.0
+            end = time.monotonic() + next(waits)
             while page.shown.held != "green" and time.monotonic() < end:
                 time.sleep(0.05)
             if page.shown.held != "green":
@@ -68,7 +70,7 @@ def test_a_mouse_drags_a_clip(browser, clips):
                 browser.mouse(tab, "mouseReleased", x + 60.0, y - 30.0)
             return page.shown.held == "green"
 
-        wait_for(grabbed)
+        wait_for(grabbed, 3.0 * PATIENCE)
         wait_for(lambda: np.abs(page.q[1] - start[1]).max() > 0.5)
         shown = page.shown
         assert shown.violation < 1e-9 and np.isfinite(shown.q).all()
