@@ -190,7 +190,7 @@ def run(quick: bool, ticks: int | None = None) -> dict[str, Any]:
         "figures": [
             *ticks_of_clips(ticks or (200 if quick else 100_000), None),
             *ticks_of_clips(ticks or (200 if quick else 100_000), BUDGET),
-            *drift(1_000 if quick else ticks or 1_000_000),
+            *drift(1_000 if quick else ticks or 100_000),
             *kept_apart(count, "near", NEAR, count),
             *kept_apart(count, "out of reach", TAUT, count),
             *(manager_of_rings(3, 30) if quick else manager_of_rings(12, 5_000)),
