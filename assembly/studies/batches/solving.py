@@ -161,8 +161,9 @@ def solve_slices(packed: Packed, settings: Array, writes: Writes, begun: Array, 
     quiet = settings.copy()
     quiet[ASK_ADDRESS] = 0.0
     with ThreadPoolExecutor(threads) as pool:
-        futures = [pool.submit(work, quiet) for _ in range(threads)]
         try:
+            # Threads that began already go on while others are submitted: an exception here ends them as well.
+            futures = [pool.submit(work, quiet) for _ in range(threads)]
             for future in futures:
                 future.result()
         except BaseException:

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import signal
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
+from time import sleep
 
 import numpy as np
 import pytest
@@ -227,28 +231,66 @@ class Stop(Exception):
     """What a handler raises."""
 
 
-@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers of signals on this system")
+def raise_on_alarm(*_):
+    raise Stop
+
+
+@pytest.fixture
+def stopping():
+    before = signal.signal(signal.SIGALRM, raise_on_alarm)
+    yield
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="no signal of a timer on this system")
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_signal_ends_a_batch(threads, monkeypatch):
+def test_a_signal_ends_a_batch(threads, monkeypatch, stopping):
     scene = linkage()
-    q0s = np.repeat(near(scene, 200, 0.3), 200, 0)
-
-    def stop(*_):
-        raise Stop
-
+    q0s = np.repeat(near(scene, 20, 0.3), 200, 0)
     slices = []
     solve_rows = solving.solve_rows
-    monkeypatch.setattr(solving, "solve_rows", lambda *given: slices.append(0) or solve_rows(*given))
-    before = signal.signal(signal.SIGALRM, stop)
-    try:
-        signal.setitimer(signal.ITIMER_REAL, 0.05)
-        with pytest.raises(Stop):
-            scene.solve_many(q0s, threads=threads)
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
-    assert len(slices) < len(q0s) / solving.SLICE
+
+    def slowly(*given):
+        """Send the signal with the third slice; slices after it take long enough for the main thread to hear of it."""
+        slices.append(0)
+        if len(slices) == 3:
+            os.kill(os.getpid(), signal.SIGALRM)
+        if len(slices) >= 3:
+            sleep(0.05)
+        solve_rows(*given)
+
+    monkeypatch.setattr(solving, "solve_rows", slowly)
+    with pytest.raises(Stop):
+        scene.solve_many(q0s, threads=threads)
+    assert 3 <= len(slices) < len(q0s) / solving.SLICE
     assert scene.solve_many(q0s[:2]).success.all()
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="no signal of a timer on this system")
+def test_a_signal_while_threads_are_made_ends_those_that_began(monkeypatch, stopping):
+    scene = linkage()
+    q0s = np.repeat(near(scene, 20, 0.3), 200, 0)
+    begun, slices = Event(), []
+
+    class Pool(ThreadPoolExecutor):
+        """Sends the signal when the second thread is submitted, once the first one solves."""
+
+        def submit(self, *given):
+            if self._threads:
+                assert begun.wait(60.0)
+                os.kill(os.getpid(), signal.SIGALRM)
+            return super().submit(*given)
+
+    def slowly(*_):
+        slices.append(0)
+        begun.set()
+        sleep(0.05)
+
+    monkeypatch.setattr(solving, "solve_rows", slowly)
+    monkeypatch.setattr(solving, "ThreadPoolExecutor", Pool)
+    with pytest.raises(Stop):
+        scene.solve_many(q0s, threads=2)
+    assert 1 <= len(slices) < len(q0s) / solving.SLICE
 
 
 def test_bad_input():
