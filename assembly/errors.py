@@ -120,7 +120,7 @@ def real_array(name: str, value: ArrayLike, shape: Sequence[int | str]) -> NDArr
     # What nearly always comes, without numpy's price for small arrays. A sum may overflow: that is seen below.
     if array is not None and array.ndim == len(shape) and math.isfinite(sum(array.ravel().tolist())):
         pairs = zip(array.shape, shape, strict=True)
-        if all(has == want or (has >= 1 and isinstance(want, str)) for has, want in pairs):
+        if array.shape == shape or all(has == want or (has >= 1 and isinstance(want, str)) for has, want in pairs):
             return array
     wanted = "(" + ", ".join(str(extent) for extent in shape) + ("," if len(shape) == 1 else "") + ")"
     if array is None:
@@ -158,7 +158,7 @@ def number(name: str, value: Any) -> float:
         result = float(value)
     except (TypeError, ValueError, OverflowError, RuntimeError):  # the last is CasADi's, of a vector
         raise InputError(f"{name} is {_shown(value)}; expected a finite real number") from None
-    if not np.isfinite(result):
+    if not math.isfinite(result):
         raise InputError(f"{name} is {result}; expected a finite real number")
     return result
 

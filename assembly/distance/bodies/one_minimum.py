@@ -15,13 +15,16 @@ from assembly._kernel import kernel
 from assembly.distance.bodies.descent import body_search_at, load_places
 from assembly.distance.bodies.nodes import links_of, node_of
 from assembly.distance.bodies.pair import (
+    STIFFER,
     doubt_of_points,
     flat_bend_sum,
     flat_dot,
     flat_size,
+    load_quadratic,
     load_tense,
     pair_work_at,
     sweep,
+    tension_at_most,
 )
 from assembly.distance.curves.bounds import least_change
 from assembly.distance.patches.pair import patch_work_at
@@ -147,14 +150,36 @@ def has_one_minimum(pair):
 
 
 @kernel(inline=True)
-def may_have_one_minimum(pair, a, i, b, j, upper, doubt):
-    """The tension with which a pair has one minimum, models loaded; -1 where none is known. `doubt` of a slope."""
-    halvings = links_of(a, i).depth + links_of(b, j).depth
-    pair.margin = _MARGIN if halvings < _HALVINGS else _LEAST_MARGIN
-    tension = load_tense(pair, upper).tension
+def has_one_with(pair, a, i, b, j, tension, doubt):
+    """Whether a pair whose quadratic is loaded with a tension is proven to have one minimum. `doubt` of a slope."""
     load_change(pair, a, i, b, j, tension)
     hold_variables(pair, doubt)
-    return tension if has_one_minimum(pair) else -1.0
+    return has_one_minimum(pair)
+
+
+@kernel(inline=True)
+def is_any_held(pair):
+    """Whether Phi is known to be least at an end of a variable."""
+    return pair.held[0] != 0.0 or pair.held[1] != 0.0 or pair.held[2] != 0.0 or pair.held[3] != 0.0
+
+
+@kernel(inline=True)
+def may_have_one_minimum(pair, a, i, b, j, upper, doubt):
+    """The tension with which a pair has one minimum, models loaded; -1 where none is known. `doubt` of a slope.
+
+    A tension with which Phi is convex in all variables is best. Where there is none, as at the rim of a hole beside a
+    pin, more of it may make Phi convex in those that are not held.
+    """
+    halvings = links_of(a, i).depth + links_of(b, j).depth
+    pair.margin = _MARGIN if halvings < _HALVINGS else _LEAST_MARGIN
+    tense = load_tense(pair, upper)
+    if has_one_with(pair, a, i, b, j, tense.tension, doubt):
+        return tense.tension
+    more = tension_at_most(pair, upper, STIFFER)
+    if tense.convex or not more > tense.tension or not is_any_held(pair):
+        return -1.0
+    load_quadratic(pair, more)
+    return more if has_one_with(pair, a, i, b, j, more, doubt) else -1.0
 
 
 @kernel(inner=True)

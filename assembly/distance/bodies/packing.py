@@ -204,6 +204,7 @@ def _static(faces: Sequence[Face], blocks: list[PatchBlock], count: int, center:
         p, q = block.degree
         table[first : first + len(block.nets)] = _patch_row(
             degree_u=p, degree_v=q, face=block.face, curve=block.curve, sign=block.sign,
+            single=int(block.curve == NONE and len(block.nets) == 1),
             tables_u=at[p], tables_v=at[q], trim=trim, spine=place,
         )  # fmt: skip
         first += len(block.nets)

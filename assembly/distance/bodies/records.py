@@ -82,6 +82,7 @@ PATCH = record_dtype(
     face=1,  # number of the face that it is of
     curve=1,  # number of the face's boundary curve; NONE: a patch of the face
     sign=1,  # 1, or -1 where the outward normal of its face is -Su x Sv
+    single=1,  # 1: the surface of its face has no other patch
     node=1,  # the node that is all of it
     net=1,  # where its control points begin
     tables_u=1,  # where in the pool the tables of its degrees begin

@@ -30,7 +30,7 @@ from assembly.distance.bodies.pair import (
 )
 from assembly.distance.bodies.records import NONE, BodyTree, body_head_at
 from assembly.distance.bodies.spines import norm, spine_bound
-from assembly.distance.bodies.trims import is_outside
+from assembly.distance.bodies.trims import flat_is_elsewhere, is_outside
 from assembly.distance.patches.pair import patch_work_at
 from assembly.distance.piece_search import CROWDED, ended
 from assembly.geometry.splines.bezier_pieces import UNIT
@@ -78,7 +78,10 @@ def pair_bound(search, i, j):
     if bound < state.limit and links_of(a, i).spine != NONE and links_of(b, j).spine != NONE:
         bound = max(bound, spine_bound(a, links_of(a, i).spine, b, links_of(b, j).spine, search.pose))
     if bound < state.limit and not (is_group(a, i) or is_group(b, j)):
-        bound = bound_patches(search, i, j, bound)
+        if flat_is_elsewhere(a, i, b, j, search.pose, search.errors.slack):
+            bound = math.inf
+        else:
+            bound = bound_patches(search, i, j, bound)
     tie = packed_way((state.key_way[0], state.key_way[1], state.key_way[2]))
     # The other pairs of the same two nodes begin as this one did.
     state.key = key

@@ -8,6 +8,9 @@ The nearest points of a trimmed face are inside it, where the distance has no sl
 whose curves are patches of the body as well. So a part of the face through which the boundary passes is let go where
 the distance falls everywhere on it, along u or v, towards a side that is within the patch: where the face ends before,
 the boundary's curve is nearer.
+
+On a flat face the way between nearest points inside it is along the normal. Parts of it are let go with all parts of
+the other body that are beside them, seen along the normal, whether the boundary passes through them or not.
 """
 
 from __future__ import annotations
@@ -17,11 +20,14 @@ import math
 from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.distance.bodies.nodes import links_of, node_of, patch_of
-from assembly.distance.bodies.pair import doubt_of_points
+from assembly.distance.bodies.pair import doubt_of_points, least_along
 from assembly.distance.bodies.records import CUT, GROUP, INSIDE, NONE, OUTSIDE, UNPLACED, patch_span_at
+from assembly.distance.bodies.spines import norm
 from assembly.geometry.faces.trim import trim_side
 from assembly.geometry.faces.trim_pieces import bounds_of, piece_at, piece_of, trim_at, trim_frame_at
 from assembly.geometry.faces.trim_pieces import links_of as piece_links
+from assembly.geometry.splines.bezier_pieces import UNIT
+from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, scale, sub
 
 # The boundary is known to some multiple of what is on it.
 _GRAIN = 4.0
@@ -152,3 +158,72 @@ def nearest_is_elsewhere(pair, a, i, b, j, slack):
     if place_node(a, i) == CUT and falls_to_side(pair, a, i, b, j, True, slack):
         return True
     return place_node(b, j) == CUT and falls_to_side(pair, a, i, b, j, False, slack)
+
+
+@kernel(inline=True)
+def is_flat_inside(tree, k):
+    """Whether node k is flat, and all of its points that may be on the boundary of its face, or on a crease, are on
+    curves of the tree as well.
+
+    Flat: of degree one in both directions, with equal weights. The boundary of a trimmed face is curves of the tree;
+    the sides of its patch are no creases where there is no other patch.
+    """
+    links, node = links_of(tree, k), node_of(tree, k)
+    patch = patch_of(tree, links.patch)
+    if patch.degree_u != 1 or patch.degree_v != 1:
+        return False
+    if patch.trim == NONE or patch.single != 1:
+        if node.low_u == 0.0 or node.high_u == 1.0 or node.low_v == 0.0 or node.high_v == 1.0:
+            return False
+    nets, at = tree.nets, links.net + 3
+    return nets[at] == nets[at + 4] and nets[at] == nets[at + 8] and nets[at] == nets[at + 12]
+
+
+@kernel(inner=True)
+def is_beside(flat, i, tree, j, place, slack):
+    """Whether no point of node j is straight over a point of the flat node i: then none is nearest to its inside.
+
+    With S = P + u e1 + v e2 and w = alpha e1 + beta e2 of the middles' difference D, the way D* between nearest points
+    has D*.Su = D*.Sv = 0 inside the face, so that D*.w = 0. Su and Sv are off e1 and e2 by at most the twist of the
+    net, which is no parallelogram to the last digit, and twice what its points may be off.
+
+    `place`: turn and shift of the other node's body, seen from the flat one's.
+    """
+    turn, shift = place
+    links, node, other = links_of(flat, i), node_of(flat, i), node_of(tree, j)
+    nets, at = flat.nets, links.net + 16
+    first = (nets[at], nets[at + 4], nets[at + 8])
+    e2 = sub((nets[at + 1], nets[at + 5], nets[at + 9]), first)
+    e1 = sub((nets[at + 2], nets[at + 6], nets[at + 10]), first)
+    last = sub((nets[at + 3], nets[at + 7], nets[at + 11]), first)
+    twist = sub(last, add(e1, e2))
+    between = sub(sub(node.middle, shift), matvec(turn, other.middle))
+    g11, g12, g22 = dot(e1, e1), dot(e1, e2), dot(e2, e2)
+    determinant = g11 * g22 - g12 * g12
+    if not determinant > 1e-6 * g11 * g22:
+        # A sliver, whose plane rounding could turn.
+        return False
+    r1, r2 = dot(e1, between), dot(e2, between)
+    alpha, beta = (g22 * r1 - g12 * r2) / determinant, (g11 * r2 - g12 * r1) / determinant
+    w = add(scale(alpha, e1), scale(beta, e2))
+    length = norm(w)
+    far = norm(between) + node.radius + other.radius + node.away + other.away + slack
+    if not length > 1e-9 * far:
+        return False
+    w, alpha, beta = scale(1.0 / length, w), abs(alpha) / length, abs(beta) / length
+    least = least_along(flat, i, w) + least_along(tree, j, neg(matvec_t(turn, w))) - dot(w, shift)
+    off = (alpha + beta) * (norm(twist) + 4.0 * node.away + slack)
+    off += 16.0 * UNIT * (1.0 + alpha * math.sqrt(g11) + beta * math.sqrt(g22))
+    return least > far * off + slack + node.away + other.away
+
+
+@kernel(inline=True)
+def flat_is_elsewhere(a, i, b, j, pose, slack):
+    """Whether one of two parts of patches is flat, and the other one is beside it."""
+    if is_flat_inside(a, i) and is_beside(a, i, b, j, (pose.turn, pose.shift), slack):
+        return True
+    if not is_flat_inside(b, j):
+        return False
+    m = pose.turn
+    back = (m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
+    return is_beside(b, j, a, i, (back, neg(matvec(back, pose.shift))), slack)

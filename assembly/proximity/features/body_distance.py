@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import ReadOnlyArrays, read_only
-from assembly.distance.bodies.query import Nearest, Spot, bodies_apart
+from assembly.distance.bodies.query import Nearest, bodies_apart
 from assembly.distance.piece_search import SPENT
 from assembly.errors import InputError, integer, positive
 from assembly.geometry.faces.face import Face
@@ -59,7 +59,7 @@ class BodyDistance(ReadOnlyArrays):
     points: Array
     status: DistanceStatus
     evaluations: int
-    _where: tuple[tuple[Faces, Faces], tuple[Spot, Spot], Array] = field(repr=False)
+    _where: tuple[tuple[Faces, Faces], Nearest, Array] = field(repr=False)
 
     @property
     def converged(self) -> bool:
@@ -75,7 +75,7 @@ class BodyDistance(ReadOnlyArrays):
         """
         if self.status is not DistanceStatus.ENCLOSED:
             return None
-        faces, _spots, q = self._where
+        faces, _found, q = self._where
         return read_only(parting_translation(faces, q))
 
     @property
@@ -99,18 +99,19 @@ class BodyDistance(ReadOnlyArrays):
 
         None where both are on edges or vertices.
         """
-        faces, spots, q = self._where
+        faces, found, q = self._where
         for side, sign in ((0, 1.0), (1, -1.0)):
             if self.features[side].kind == "face":
-                return read_only(sign * rotation_matrix(q[side, 3:]) @ normals_at(faces[side], spots[side])[0])
+                return read_only(sign * rotation_matrix(q[side, 3:]) @ normals_at(faces[side], found.spot(side))[0])
         return None
 
     @cached_property
     def features(self) -> tuple[Feature, Feature]:
         """The faces, edges or vertices on which the points are."""
-        faces, spots, q = self._where
+        faces, found, q = self._where
         first, second = (
-            feature_at(faces[k], spots[k], rotation_matrix(q[k, 3:]).T @ (self.points[k] - q[k, :3])) for k in range(2)
+            feature_at(faces[k], found.spot(k), rotation_matrix(q[k, 3:]).T @ (self.points[k] - q[k, :3]))
+            for k in range(2)
         )
         return first, second
 
@@ -162,8 +163,7 @@ def distance(
     status = _status(found, tolerance)
     if status is DistanceStatus.CONVERGED and found.lower > 0.0 and _is_enclosed(faces, q, found, tolerance):
         status = DistanceStatus.ENCLOSED
-    where = faces, (found.spot(0), found.spot(1)), q
-    return BodyDistance(found.lower, found.upper, found.points, status, found.pairs, where)
+    return BodyDistance(found.lower, found.upper, found.points, status, found.pairs, (faces, found, q))
 
 
 class Beyond(NamedTuple):

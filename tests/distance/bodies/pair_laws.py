@@ -10,10 +10,11 @@ import sys
 
 import numpy as np
 
+import assembly as asm
 from assembly.distance.bodies.descent import BodyQuestion, BodySearch, body_search_at
 from assembly.distance.bodies.models import describe_node
 from assembly.distance.bodies.nodes import halves_of, links_of, node_of, patch_of
-from assembly.distance.bodies.one_minimum import proven_bound
+from assembly.distance.bodies.one_minimum import may_have_one_minimum, proven_bound
 from assembly.distance.bodies.packing import tree_of
 from assembly.distance.bodies.pair import (
     PAIR_DOUBLES,
@@ -29,10 +30,10 @@ from assembly.distance.bodies.pair import (
 from assembly.distance.bodies.query import SEARCH
 from assembly.distance.bodies.records import ALL, GROUP, BodyTree
 from assembly.distance.bodies.search import errors_of
-from assembly.distance.bodies.trims import falls_to_side
+from assembly.distance.bodies.trims import falls_to_side, flat_is_elsewhere, is_beside, is_flat_inside
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.bezier import bernstein
-from tests.distance.bodies.example_shapes import trimmed_faces, wavy
+from tests.distance.bodies.example_shapes import solids, trimmed_faces, wavy
 
 COUNT = 9
 TIGHT = 1e-14
@@ -71,7 +72,56 @@ def sides_hold(p, q, tree_a, i, tree_b, j, of_a):
     return any(falls)
 
 
+def roomy(faces):
+    """The tree of a body, with room for more halves."""
+    kept = tree_of(faces)
+    kept.make_room(200)
+    return BodyTree(*kept.arrays)
+
+
+def flat_pairs(rounds):
+    """No samples of a node are straight over samples of a flat one that it is said to be beside."""
+    rng = np.random.default_rng(1)
+    told = 0
+    plates = solids()
+    shapes = [*plates.values(), (Face(wavy(rng, 1)),), (Face(asm.shapes.torus(1.0, 0.3)),)]
+    for _ in range(rounds):
+        flat, other = roomy(plates["plate"]), roomy(tuple(shapes[int(rng.integers(len(shapes)))]))
+        i, j = (random_node(tree, rng, int(rng.integers(0, 9))) for tree in (flat, other))
+        while not is_flat_inside(flat, i):
+            i = random_node(flat, rng, int(rng.integers(0, 9)))
+        turn = tuple(np.linalg.qr(rng.standard_normal((3, 3)))[0].ravel())
+        matrix = np.array(turn).reshape(3, 3)
+        gap = rng.standard_normal(3) * 10.0 ** rng.uniform(-3.0, 0.3)
+        shift = np.array(node_of(flat, i).middle) - matrix @ np.array(node_of(other, j).middle) + gap
+        if not is_beside(flat, i, other, j, (turn, tuple(shift)), 0.0):
+            continue
+        told += 1
+        p, q = grid_of(flat, i), grid_of(other, j) @ matrix.T + shift
+        e1, e2 = p[-1, 0] - p[0, 0], p[0, -1] - p[0, 0]
+        normal = np.cross(e1, e2) / np.linalg.norm(np.cross(e1, e2))
+        apart = p.reshape(-1, 1, 3) - q.reshape(1, -1, 3)
+        along = apart - (apart @ normal)[..., None] * normal
+        assert np.linalg.norm(along, axis=2).min() > 0.0
+        # All on one side of a line, so that none between the samples is over the flat one either.
+        middle = along.reshape(-1, 3)[np.linalg.norm(along, axis=2).argmin()]
+        assert (along @ (node_difference(flat, i, other, j, matrix, shift, normal)) > 0.0).all(), middle
+        pose = BodyPose(turn, tuple(shift), 0.0)
+        assert flat_is_elsewhere(flat, i, other, j, pose, 0.0)
+        back = BodyPose(tuple(matrix.T.ravel()), tuple(-matrix.T @ shift), 0.0)
+        assert flat_is_elsewhere(other, j, flat, i, back, 0.0)
+    print("flat", told)
+    assert told > 0.2 * rounds
+
+
+def node_difference(a, i, b, j, matrix, shift, normal):
+    """The way between the middles of two nodes, without what is along a normal."""
+    d = np.array(node_of(a, i).middle) - matrix @ np.array(node_of(b, j).middle) - shift
+    return d - (d @ normal) * normal
+
+
 def main(rounds):
+    flat_pairs(4 * rounds)
     rng = np.random.default_rng(0)
     told = dict.fromkeys(("ball", "hull", "model", "proof", "fall"), 0)
     for k in range(rounds):
@@ -109,6 +159,8 @@ def main(rounds):
         load_frame(pair, turn, n)
         load_models(pair, a, i, b, j, pose)
         tension = load_tense(pair, upper).tension
+        # A proof may take more tension than a model.
+        tensions = {"model": tension, "proof": max(0.0, may_have_one_minimum(pair, a, i, b, j, upper, errors.slope))}
         bounds = {
             "ball": ball_bound(a, i, b, j, pose, errors.slack),
             "hull": hull_bound(pair, a, i, b, j, pose, errors.slack),
@@ -120,10 +172,10 @@ def main(rounds):
             told[name] += bound > 0.0
         # The quadratic and the only minimum bound Phi, which is sharper.
         along = differences @ np.array(n)
-        phi = along + tension * ((differences**2).sum(axis=2) - along**2)
-        for name in ("model", "proof"):
+        for name, tension in tensions.items():
+            phi = along + tension * ((differences**2).sum(axis=2) - along**2)
             assert bounds[name] <= float(phi.min()) + TIGHT * (1.0 + tension), (name, bounds[name], phi.min(), depth)
-            assert bounds[name] * tension <= 0.5
+            assert tension == 0.0 or bounds[name] <= 0.5 / tension
         for of_a in (True, False):
             if falls_to_side(pair, a, i, b, j, of_a, errors.slack):
                 told["fall"] += 1

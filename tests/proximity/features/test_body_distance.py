@@ -9,13 +9,14 @@ import threading
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 import assembly as asm
 from assembly.errors import InputError
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity import DistanceStatus, FeatureStatus, closest_features, distance, minimum_distance
-from tests.distance.bodies.example_shapes import ellipse, points_on, random_pose, solids, trimmed_faces, wavy
+from tests.distance.bodies.example_shapes import HALF, ellipse, points_on, random_pose, solids, trimmed_faces, wavy
 
 SHAPES = asm.shapes
 # Bounds of a search for 1e-10 are that far from each other; closed forms are off by some units of the last place.
@@ -162,6 +163,53 @@ def test_a_pin_in_its_bore():
     plate, pin = SHAPES.plate(2.0, 2.0, 1.0, [(0.0, 0.0, 0.5)]), SHAPES.solid_cylinder(0.4, 2.0)
     check(plate, pin, (None, at(0.0)), 0.1)
     check(plate, pin, (None, at(0.05)), 0.05)
+
+
+@pytest.mark.parametrize(
+    ("shift", "turn", "expected", "pairs"),
+    [
+        # Side by side: the walls are parallel, and their rims are in a plane.
+        ((5.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), 2.0, 700),
+        ((5.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0), 2.0, 700),
+        # Crossed, and end to end.
+        ((5.0, 0.0, 0.0), (HALF, HALF, 0.0, 0.0), 2.0, 700),
+        ((0.0, 0.0, 4.0), (1.0, 0.0, 0.0, 0.0), 1.0, 700),
+    ],
+)
+def test_solid_pins(shift, turn, expected, pairs):
+    # Counts of pairs: thousands, where parts of flat faces beside the other pin are kept.
+    found = distance(SHAPES.solid_cylinder(1.0, 3.0), SHAPES.solid_cylinder(2.0, 3.0), poses=(None, [*shift, *turn]))
+    assert found.lower <= expected <= found.upper and found.upper - found.lower < 1e-11
+    assert found.evaluations < pairs
+
+
+def rim_gap(turn, shift, radius, height, pin):
+    """The least distance of points of the circles at both ends of a hole from the wall of a pin about the z axis."""
+
+    def gap(t, z):
+        x = turn @ (radius * np.cos(t), radius * np.sin(t), z) + shift
+        return np.hypot(x[0], x[1]) - pin
+
+    ends = (-0.5 * height, 0.5 * height)
+    starts = [(t, z) for z in ends for t in np.linspace(0.0, 2.0 * np.pi, 60)]
+    t, z = min(starts, key=lambda at: gap(*at))
+    near = minimize_scalar(lambda s: gap(s, z), bracket=(t - 0.1, t, t + 0.1), tol=1e-14)
+    return near.fun
+
+
+def test_a_tilted_pin_in_a_hole(cases):
+    # At the rim, where the wall and the bore bend alike, no direction in which the distance is convex in all places.
+    rng = np.random.default_rng(4)
+    pin, plate = SHAPES.solid_cylinder(1.0, 3.0), SHAPES.plate(6.0, 6.0, 1.0, [(0.0, 0.0, 1.1)])
+    for _ in range(cases(4, 200)):
+        e = np.array([1.0, *rng.normal(scale=0.02, size=2), 0.0])
+        shift = np.array([*rng.normal(scale=0.01, size=2), rng.uniform(-0.5, 0.5)])
+        turn = rotation_matrix(e / np.linalg.norm(e))
+        expected = rim_gap(turn, shift, 1.1, 1.0, 1.0)
+        found = distance(pin, plate, poses=(None, [*shift, *e]))
+        assert found.status is DistanceStatus.CONVERGED and found.evaluations < 40_000
+        # The reference finds its place to the root of the last digit, and the value to some units of it.
+        assert found.lower <= expected + 1e-14 and expected - 1e-14 <= found.upper
 
 
 def test_bodies_that_meet_are_nowhere_apart():
