@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
-from assembly.geometry.splines.curve import NurbsCurve
 from assembly.step.crossings import crossings
 from assembly.step.edge_feet import move_between, move_to_feet
 from assembly.step.occt import occt
 from assembly.step.profiles import Spline, Unreadable, approximated, knot_row, point, profile
 from assembly.step.surfaces import CONFUSION, Patch
+from assembly.step.tracks import Track, track
 
 __all__ = ["Side", "Space", "is_loose", "points_of", "projected", "space_of"]
 
@@ -54,13 +54,12 @@ def points_of(curve: Any, low: float, high: float) -> Callable[[Array], Array]:
     if isinstance(curve, exact + flat):
         try:
             source, along, _ = profile(curve, low, high, cut=True)
-            points, weights = source.cartesian
-            made = NurbsCurve(points, source.knots, source.degree, weights)
         except (Unreadable, InputError):
             pass
         else:
-            first, last = made.domain
-            return lambda t: made.evaluate(np.minimum(np.maximum(along(t), first), last))
+            made = track(source, along)
+            if made is not None:
+                return made
     return lambda t: np.array([point(curve.Value(x)) for x in t.tolist()])
 
 
@@ -109,10 +108,13 @@ class Side:
 
     @cached_property
     def _points(self) -> Callable[[Array], Array]:
-        return points_of(*self._flat)
+        made = points_of(*self._flat)
+        return made.with_maps((self.patch.u, self.patch.v)) if isinstance(made, Track) else made
 
     def given(self, t: Array) -> Array:
         """Parameters (n, 2) of the surface on the curve."""
+        if isinstance(self._points, Track):
+            return self._points(t)
         there = self._points(t)
         return np.column_stack([self.patch.u(there[:, 0]), self.patch.v(there[:, 1])])
 
