@@ -236,7 +236,7 @@ def point(p: Any) -> Array:
 
 def reals(array: Any) -> Array:
     """Values of a one-dimensional array."""
-    return np.array([array.Value(k) for k in range(array.Lower(), array.Upper() + 1)], dtype=np.float64)
+    return np.array(list(map(array.Value, range(array.Lower(), array.Upper() + 1))), dtype=np.float64)
 
 
 def knot_row(knots: Any, times: Any) -> Array:
@@ -247,7 +247,12 @@ def knot_row(knots: Any, times: Any) -> Array:
 def _bspline(curve: Any) -> Spline:
     """Of a B-spline or Bezier curve of OCCT, in space or in the plane, that is not periodic."""
     n = curve.NbPoles()
-    poles = np.array([point(curve.Pole(k)) for k in range(1, n + 1)])
+    # Elements of the array cost a tenth of the curve's own.
+    each = map(curve.Poles().Value, range(1, n + 1))
+    if isinstance(curve, (occt().Geom2d_BSplineCurve, occt().Geom2d_BezierCurve)):
+        poles = np.array([(p.X(), p.Y()) for p in each])
+    else:
+        poles = np.array([(p.X(), p.Y(), p.Z()) for p in each])
     weights = np.array([curve.Weight(k) for k in range(1, n + 1)]) if curve.IsRational() else None
     degree = curve.Degree()
     if degree > bezier.MAX_DEGREE:

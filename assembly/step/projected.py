@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from math import isclose
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,6 +45,15 @@ def _dot(a: Array, b: Array) -> Array:
 def _norm(a: Array) -> Array:
     """Lengths of rows."""
     return np.sqrt(_dot(a, a))
+
+
+def _slopes(values: Array, t: Array) -> Array:
+    """Derivatives by a parameter from differences, of second order inside, as `np.gradient` has them."""
+    steps = np.diff(t)[:, None]
+    ways = np.diff(values, axis=0) / steps
+    left, right = steps[:-1], steps[1:]
+    inside = (left * ways[1:] + right * ways[:-1]) / (left + right)
+    return np.concatenate([ways[:1], inside, ways[-1:]])
 
 
 def points_of(curve: Any, low: float, high: float) -> Callable[[Array], Array]:
@@ -153,10 +163,11 @@ class _Edge:
 
         What the curve is ahead or behind on its way does not count.
         """
-        given, there = self.own.given(t), self.projection(t)
+        given = self.own.given(t)
+        there = self._from(t, given)
         su, sv = self.own.slopes(given)
         across = su * (there - given)[:, :1] + sv * (there - given)[:, 1:]
-        slopes = np.gradient(given, t, axis=0)
+        slopes = _slopes(given, t)
         along = su * slopes[:, :1] + sv * slopes[:, 1:]
         along /= np.maximum(_norm(along), 1e-300)[:, None]
         across -= _dot(across, along)[:, None] * along
@@ -164,9 +175,15 @@ class _Edge:
 
     def projection(self, t: Array) -> Array:
         """Parameters (n, 2) on the surface, of the intersection where there is one."""
-        points, start = np.ascontiguousarray(self.space.points(t)), self.own.given(t)
+        return self._from(t, self.own.given(t))
+
+    def _from(self, t: Array, start: Array) -> Array:
+        """The same from the parameters on the curve that is given."""
+        points = np.ascontiguousarray(self.space.points(t))
         if self.other is not None:
-            move_between(self.own.ground, self.other.ground, points, np.hstack([start, self.other.given(t)]))
+            move_between(
+                self.own.ground, self.other.ground, points, np.concatenate([start, self.other.given(t)], axis=1)
+            )
         return self.own.feet(points, start)
 
     def joints(self, low: float, high: float) -> Array:
@@ -217,7 +234,8 @@ def projected(space: Space, own: Side, other: Side | None, low: float, high: flo
     spline, deviation
         The deviation is that of the interpolation, in (u, v).
     """
-    if not np.allclose((space.low, space.high), (low, high), rtol=1e-9, atol=1e-9 * (high - low)):
+    near = {"rel_tol": 1e-9, "abs_tol": 1e-9 * (high - low)}
+    if not (isclose(space.low, low, **near) and isclose(space.high, high, **near)):
         return None
     made = _Edge(space, own, other)
     try:

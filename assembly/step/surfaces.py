@@ -224,11 +224,13 @@ def _net(surface: Any) -> tuple[Array, tuple[Array, Array], tuple[int, int]]:
     n, m = surface.NbUPoles(), surface.NbVPoles()
     rational = surface.IsURational() or surface.IsVRational()
     net = np.ones((n, m, 4))
-    for i in range(n):
-        for j in range(m):
-            weight = surface.Weight(i + 1, j + 1) if rational else 1.0
-            net[i, j, :3] = weight * point(surface.Pole(i + 1, j + 1))
-            net[i, j, 3] = weight
+    # Elements of the array cost a tenth of the surface's own.
+    each = surface.Poles().Value
+    rows = ((each(i, j) for j in range(1, m + 1)) for i in range(1, n + 1))
+    net[..., :3] = [[(p.X(), p.Y(), p.Z()) for p in row] for row in rows]
+    if rational:
+        net[..., 3] = [[surface.Weight(i, j) for j in range(1, m + 1)] for i in range(1, n + 1)]
+        net[..., :3] *= net[..., 3:]
     if hasattr(surface, "UKnots"):
         knots = (
             knot_row(surface.UKnots(), surface.UMultiplicities()),

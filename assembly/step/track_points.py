@@ -20,8 +20,8 @@ _STEPS = 200
 def fill_table(points, knots, powers, record, pool):
     """Fill record and pool of an open spline from its homogeneous control points (n, 4), x and y or x, y and z first.
 
-    As `curve_tables.bezier_tables` does for plane curves. `powers` is `bezier.power_matrix` of the degree. False where a
-    value is not finite or a knot is smaller than the one before it.
+    As `curve_tables.bezier_tables` does for plane curves. `powers` is `bezier.power_matrix` of the degree. False
+    where a value is not finite or a knot is smaller than the one before it.
     """
     p, n = powers.shape[0] - 1, points.shape[0]
     arc = spline_curve_at(record, 0)
@@ -73,7 +73,7 @@ def fill_table(points, knots, powers, record, pool):
 
 @kernel(inner=True, exact=True)
 def _mapped(way, x):
-    """Our parameter of one of OCCT's, as `profiles.Turning` has it; `way` is that, or begins with 0 where it is kept."""
+    """Our parameter of one of OCCT's, as `profiles.Turning` has it; `way` begins with 0 where it is kept."""
     spans, low, high, radius = way[0], way[1], way[2], way[3]
     if spans == 0.0:
         return x
