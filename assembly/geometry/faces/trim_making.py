@@ -151,3 +151,56 @@ def lay_trim(curves, shape, chains, matrices, limits, table, pool, report):
         report[FIRST], report[SECOND] = piece_links_at(links, a).curve, piece_links_at(links, b).curve
     report[DONE] = 1.0
     return stop, used + bounds.size + FRAME
+
+
+@kernel(inner=True)
+def _measure_loop(curves, shape, places, box):
+    """Fill least and most u, and v, of curves, and the size; whether they are clamped, long enough and head to tail."""
+    points, _weights, knots = curves
+    begin, stop, point, knot, short = places
+    box[0], box[1], box[2], box[3] = np.inf, -np.inf, np.inf, -np.inf
+    first = point
+    for c in range(begin, stop):
+        for k in range(point, point + shape[c, 1]):
+            box[0], box[1] = min(box[0], points[k, 0]), max(box[1], points[k, 0])
+            box[2], box[3] = min(box[2], points[k, 1]), max(box[3], points[k, 1])
+        point += shape[c, 1]
+    box[4] = np.sqrt((box[1] - box[0]) ** 2 + (box[3] - box[2]) ** 2)
+    end = point - 1
+    point = first
+    for c in range(begin, stop):
+        p, n = shape[c, 0], shape[c, 1]
+        if knots[knot] != knots[knot + p] or knots[knot + n] != knots[knot + n + p]:
+            return False
+        if points[point, 0] != points[end, 0] or points[point, 1] != points[end, 1]:
+            return False
+        side = 0.0
+        for axis in range(2):
+            low, high = points[point, axis], points[point, axis]
+            for k in range(point + 1, point + n):
+                low, high = min(low, points[k, axis]), max(high, points[k, axis])
+            side = max(side, high - low)
+        if not side > short * box[4]:
+            return False
+        end = point + n - 1
+        point += n
+        knot += n + p + 1
+    return True
+
+
+@kernel(signatures="(Tuple((f8[:, ::1], f8[::1], f8[::1])), i8[:, ::1], i8[:, ::1], f8, f8[:, ::1])")
+def measure_loops(curves, shape, loops, short, boxes):
+    """Whether curves of loops are clamped, meet exactly head to tail, and none is shorter than a part of its loop.
+
+    `loops` (n, 3) tells the curves of each as `lay_trim` has it. A row of `boxes` becomes least and most u, least and
+    most v, and the size, of the control points.
+    """
+    point, knot = 0, 0
+    for loop in range(loops.shape[0]):
+        begin, stop = loops[loop, 0], loops[loop, 1]
+        if not _measure_loop(curves, shape, (begin, stop, point, knot, short), boxes[loop]):
+            return False
+        for c in range(begin, stop):
+            point += shape[c, 1]
+            knot += shape[c, 1] + shape[c, 0] + 1
+    return True

@@ -34,7 +34,7 @@ from assembly.geometry.splines.curve import COINCIDENT, NurbsCurve
 from assembly.geometry.splines.curve_packing import NOT_FINITE, joined_curves, packed_curves, power_matrices
 from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_COEFFICIENTS, CURVE_RECORD
 
-__all__ = ["TrimTable", "build"]
+__all__ = ["TrimTable", "build", "made_at_once"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -278,7 +278,7 @@ def build(
     rows = [(chain.start, chain.stop, closes) for chain, closes in zip(chains, closing, strict=True)]
     linked = np.array(rows, dtype=np.int64).reshape(-1, 3)
     if rows and not (silent or periods[0] or periods[1]):
-        made = _made_at_once(curves, linked, domain)
+        made = made_at_once(joined_curves(curves), linked, domain)
         if made is not None:
             return made
     pieces = _Pieces([*curves, *silent], linked)
@@ -307,19 +307,25 @@ def build(
     return _table(pieces, len(curves), linked, (low, high), periods, walk)
 
 
-def _made_at_once(
-    curves: Sequence[NurbsCurve], chains: Ints, domain: tuple[tuple[float, float], tuple[float, float]]
+def made_at_once(
+    curves: tuple[tuple[Array, Array, Array], Ints],
+    chains: Ints,
+    domain: tuple[tuple[float, float], tuple[float, float]],
 ) -> TrimTable | None:
-    """The table of curves on a surface that is open both ways; None where pieces of theirs have to be left out."""
-    given, shape = joined_curves(curves)
+    """The table of curves on a surface that is open both ways; None where pieces of theirs have to be left out.
+
+    The curves are as `joined_curves` has them, `chains` (n, 3) as `trim_making.lay_trim` takes them.
+    """
+    given, shape = curves
     limits = np.array([*domain[0], *domain[1], COINCIDENT, ON_BOUNDARY, NOISE, CROSSES])
     report = np.empty(trim_making.BESIDE + 2 * len(chains))
     # Of all spans that there may be.
-    spans = sum(len(curve.weights) - curve.degree for curve in curves)
-    points = sum((len(curve.weights) - curve.degree) * (curve.degree + 1) for curve in curves)
+    sizes = shape.tolist()
+    spans = sum(count - degree for degree, count in sizes)
+    points = sum((count - degree) * (degree + 1) for degree, count in sizes)
     most = trim_making.PIECES_OF_POINT * points
-    ints = np.empty(TRIM_RECORD + (CURVE_RECORD + 1) * len(curves) + 1 + PIECE_INTS * most, dtype=np.int64)
-    doubles = np.empty(4 * points + spans + len(curves) + PIECE_DOUBLES * most + FRAME)
+    ints = np.empty(TRIM_RECORD + (CURVE_RECORD + 1) * len(shape) + 1 + PIECE_INTS * most, dtype=np.int64)
+    doubles = np.empty(4 * points + spans + len(shape) + PIECE_DOUBLES * most + FRAME)
     matrices = (power_matrices(), _BINOMIALS)
     stop, end = trim_making.lay_trim(given, shape, chains, matrices, limits, ints, doubles, report)
     table, pool = ints[:stop].copy(), doubles[:end].copy()
@@ -333,7 +339,7 @@ def _made_at_once(
     crossed = None if a < 0.0 else (int(a), int(b), np.array([u, v]))
     beyond = ((bottom, bottom), (bottom, bottom))
     return TrimTable(
-        table, pool, len(curves), int(pieces), np.array(left), np.array(right), beyond, extent, largest, crossed
+        table, pool, len(shape), int(pieces), np.array(left), np.array(right), beyond, extent, largest, crossed
     )
 
 
