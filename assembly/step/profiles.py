@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly._read_only import read_only
 from assembly.errors import AssemblyError
 from assembly.geometry.splines import bezier
 from assembly.step.occt import occt
@@ -164,7 +163,7 @@ def arc(map_: Turning) -> Spline:
 
 @lru_cache(maxsize=256)
 def _ring(low: float, high: float, spans: int) -> Array:
-    """Control points of an arc of the unit circle, read-only: many arcs of a body have the same angles."""
+    """Control points of an arc of the unit circle, not to be changed: many arcs of a body have the same angles."""
     half = 0.5 * ((high - low) / spans)
     at = low + half * np.arange(2 * spans + 1)
     weights = np.where(np.arange(at.size) % 2 == 1, cos(half), 1.0)
@@ -174,7 +173,7 @@ def _ring(low: float, high: float, spans: int) -> Array:
     if high - low >= 2.0 * pi - _SAME_ANGLE:
         ring[-1] = ring[0]
     # The middle control point of an arc lies 1 / cos h out; in homogeneous form that is the weight's inverse.
-    return read_only(np.column_stack([ring, weights]))
+    return np.column_stack([ring, weights])
 
 
 def approximated(function: Callable[[Array], Array], breaks: Array, tolerance: float) -> tuple[Spline, float]:
