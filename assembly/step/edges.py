@@ -6,7 +6,7 @@ What is asked of OCCT is asked once an edge, and of faces on other sides only fo
 from __future__ import annotations
 
 from functools import cached_property
-from math import isfinite
+from math import isclose, isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -156,7 +156,7 @@ class Edges:
         other = next(same, None)
         if other is None or other.curve is None:
             return None
-        if not np.allclose((traced.low, traced.high), (other.low, other.high), rtol=1e-9, atol=0.0):
+        if not (isclose(traced.low, other.low, rel_tol=1e-9) and isclose(traced.high, other.high, rel_tol=1e-9)):
             return None
         return self.side(other, others[0], there.patch)
 

@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly._read_only import read_only
 from assembly.errors import AssemblyError
 from assembly.geometry.splines import bezier
 from assembly.step.occt import occt
@@ -164,7 +163,7 @@ def arc(map_: Turning) -> Spline:
 
 @lru_cache(maxsize=256)
 def _ring(low: float, high: float, spans: int) -> Array:
-    """Control points of an arc of the unit circle, read-only: many arcs of a body have the same angles."""
+    """Control points of an arc of the unit circle, not to be changed: many arcs of a body have the same angles."""
     half = 0.5 * ((high - low) / spans)
     at = low + half * np.arange(2 * spans + 1)
     weights = np.where(np.arange(at.size) % 2 == 1, cos(half), 1.0)
@@ -174,7 +173,7 @@ def _ring(low: float, high: float, spans: int) -> Array:
     if high - low >= 2.0 * pi - _SAME_ANGLE:
         ring[-1] = ring[0]
     # The middle control point of an arc lies 1 / cos h out; in homogeneous form that is the weight's inverse.
-    return read_only(np.column_stack([ring, weights]))
+    return np.column_stack([ring, weights])
 
 
 def approximated(function: Callable[[Array], Array], breaks: Array, tolerance: float) -> tuple[Spline, float]:
@@ -236,7 +235,7 @@ def point(p: Any) -> Array:
 
 def reals(array: Any) -> Array:
     """Values of a one-dimensional array."""
-    return np.array([array.Value(k) for k in range(array.Lower(), array.Upper() + 1)], dtype=np.float64)
+    return np.array(list(map(array.Value, range(array.Lower(), array.Upper() + 1))), dtype=np.float64)
 
 
 def knot_row(knots: Any, times: Any) -> Array:
@@ -247,7 +246,12 @@ def knot_row(knots: Any, times: Any) -> Array:
 def _bspline(curve: Any) -> Spline:
     """Of a B-spline or Bezier curve of OCCT, in space or in the plane, that is not periodic."""
     n = curve.NbPoles()
-    poles = np.array([point(curve.Pole(k)) for k in range(1, n + 1)])
+    # Elements of the array cost a tenth of the curve's own.
+    each = map(curve.Poles().Value, range(1, n + 1))
+    if isinstance(curve, (occt().Geom2d_BSplineCurve, occt().Geom2d_BezierCurve)):
+        poles = np.array([(p.X(), p.Y()) for p in each])
+    else:
+        poles = np.array([(p.X(), p.Y(), p.Z()) for p in each])
     weights = np.array([curve.Weight(k) for k in range(1, n + 1)]) if curve.IsRational() else None
     degree = curve.Degree()
     if degree > bezier.MAX_DEGREE:

@@ -11,18 +11,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from math import isclose
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
-from assembly.geometry.splines.curve import NurbsCurve
 from assembly.step.crossings import crossings
 from assembly.step.edge_feet import move_between, move_to_feet
 from assembly.step.occt import occt
 from assembly.step.profiles import Spline, Unreadable, approximated, knot_row, point, profile
 from assembly.step.surfaces import CONFUSION, Patch
+from assembly.step.tracks import Track, track
 
 __all__ = ["Side", "Space", "is_loose", "points_of", "projected", "space_of"]
 
@@ -46,6 +47,15 @@ def _norm(a: Array) -> Array:
     return np.sqrt(_dot(a, a))
 
 
+def _slopes(values: Array, t: Array) -> Array:
+    """Derivatives by a parameter from differences, of second order inside, as `np.gradient` has them."""
+    steps = np.diff(t)[:, None]
+    ways = np.diff(values, axis=0) / steps
+    left, right = steps[:-1], steps[1:]
+    inside = (left * ways[1:] + right * ways[:-1]) / (left + right)
+    return np.concatenate([ways[:1], inside, ways[-1:]])
+
+
 def points_of(curve: Any, low: float, high: float) -> Callable[[Array], Array]:
     """Points of a curve of OCCT at parameters in an interval: of its spline where that is exact, which is quicker."""
     o = occt()
@@ -54,13 +64,12 @@ def points_of(curve: Any, low: float, high: float) -> Callable[[Array], Array]:
     if isinstance(curve, exact + flat):
         try:
             source, along, _ = profile(curve, low, high, cut=True)
-            points, weights = source.cartesian
-            made = NurbsCurve(points, source.knots, source.degree, weights)
         except (Unreadable, InputError):
             pass
         else:
-            first, last = made.domain
-            return lambda t: made.evaluate(np.minimum(np.maximum(along(t), first), last))
+            made = track(source, along)
+            if made is not None:
+                return made
     return lambda t: np.array([point(curve.Value(x)) for x in t.tolist()])
 
 
@@ -109,10 +118,13 @@ class Side:
 
     @cached_property
     def _points(self) -> Callable[[Array], Array]:
-        return points_of(*self._flat)
+        made = points_of(*self._flat)
+        return made.with_maps((self.patch.u, self.patch.v)) if isinstance(made, Track) else made
 
     def given(self, t: Array) -> Array:
         """Parameters (n, 2) of the surface on the curve."""
+        if isinstance(self._points, Track):
+            return self._points(t)
         there = self._points(t)
         return np.column_stack([self.patch.u(there[:, 0]), self.patch.v(there[:, 1])])
 
@@ -151,10 +163,11 @@ class _Edge:
 
         What the curve is ahead or behind on its way does not count.
         """
-        given, there = self.own.given(t), self.projection(t)
+        given = self.own.given(t)
+        there = self._from(t, given)
         su, sv = self.own.slopes(given)
         across = su * (there - given)[:, :1] + sv * (there - given)[:, 1:]
-        slopes = np.gradient(given, t, axis=0)
+        slopes = _slopes(given, t)
         along = su * slopes[:, :1] + sv * slopes[:, 1:]
         along /= np.maximum(_norm(along), 1e-300)[:, None]
         across -= _dot(across, along)[:, None] * along
@@ -162,9 +175,15 @@ class _Edge:
 
     def projection(self, t: Array) -> Array:
         """Parameters (n, 2) on the surface, of the intersection where there is one."""
-        points, start = np.ascontiguousarray(self.space.points(t)), self.own.given(t)
+        return self._from(t, self.own.given(t))
+
+    def _from(self, t: Array, start: Array) -> Array:
+        """The same from the parameters on the curve that is given."""
+        points = np.ascontiguousarray(self.space.points(t))
         if self.other is not None:
-            move_between(self.own.ground, self.other.ground, points, np.hstack([start, self.other.given(t)]))
+            move_between(
+                self.own.ground, self.other.ground, points, np.concatenate([start, self.other.given(t)], axis=1)
+            )
         return self.own.feet(points, start)
 
     def joints(self, low: float, high: float) -> Array:
@@ -215,7 +234,8 @@ def projected(space: Space, own: Side, other: Side | None, low: float, high: flo
     spline, deviation
         The deviation is that of the interpolation, in (u, v).
     """
-    if not np.allclose((space.low, space.high), (low, high), rtol=1e-9, atol=1e-9 * (high - low)):
+    near = {"rel_tol": 1e-9, "abs_tol": 1e-9 * (high - low)}
+    if not (isclose(space.low, low, **near) and isclose(space.high, high, **near)):
         return None
     made = _Edge(space, own, other)
     try:

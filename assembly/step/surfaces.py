@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.splines import bezier
+from assembly.geometry.splines.known_surface import known_surface
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.step.occt import occt
 from assembly.step.profiles import (
@@ -29,8 +30,8 @@ from assembly.step.profiles import (
     knot_row,
     point,
     profile,
-    spline,
 )
+from assembly.step.turned_nets import fill_turned
 
 __all__ = ["Patch", "patch"]
 
@@ -88,41 +89,36 @@ def _slack(low: float, high: float, least: float = -np.inf, most: float = np.inf
     return max(least, low - slack), min(most, high + slack)
 
 
-def _revolved(shape: Spline, turning: Turning, origin: Array, axis: Array) -> Spline:
-    """A profile turned about an axis: homogeneous (n_u, n_v, 4)."""
-    points, weights = shape.cartesian
-    along = (points - origin) @ axis
-    foot = origin + along[:, None] * axis
-    out = points - foot
-    # Ends that lie on the axis are poles.
-    out[np.linalg.norm(out, axis=1) < CONFUSION] = 0.0
-    ring = arc(turning).points
-    (a, b, c), (x, y, z) = axis, out.T
-    across = np.column_stack([b * z - c * y, c * x - a * z, a * y - b * x])
-    net = np.empty((len(ring), len(points), 4))
-    net[..., :3] = (
-        ring[:, 2, None, None] * foot[None] + ring[:, 0, None, None] * out[None] + ring[:, 1, None, None] * across[None]
-    ) * weights[None, :, None]
-    net[..., 3] = ring[:, 2, None] * weights[None]
-    return Spline(net, turning.knots, 2)
-
-
 def _surface(net: Array, knots: tuple[Array, Array], degree: tuple[int, int]) -> NurbsSurface:
     return NurbsSurface(net[..., :3] / net[..., 3:], knots, degree, net[..., 3])
 
 
 def _turned(shape: Spline, turning: Turning, v: Direction, origin: Array, axis: Array, deviation: float) -> Patch:
-    made = _revolved(shape, turning, origin, axis)
-    return Patch(_surface(made.points, (made.knots, shape.knots), (2, shape.degree)), turning, v, deviation)
+    """A profile turned about an axis; ends of it that lie on the axis are poles."""
+    ring = arc(turning)
+    net, weights = np.empty((len(ring.points), len(shape.points), 3)), np.empty((len(ring.points), len(shape.points)))
+    fill_turned(np.ascontiguousarray(shape.points), ring.points, origin, axis, CONFUSION, net, weights)
+    knots, degree = (ring.knots, shape.knots), (2, shape.degree)
+    made = (
+        known_surface(net, knots, degree, weights) if shape.degree <= 2 else NurbsSurface(net, knots, degree, weights)
+    )
+    return Patch(made, turning, v, deviation)
 
 
 def _plane(surface: Any, box: Box) -> Patch:
     place = surface.Position()
     u, v = _slack(*box[:2]), _slack(*box[2:])
-    origin, x, y = point(place.Location()), point(place.XDirection()), point(place.YDirection())
-    net = origin + np.array(u)[:, None, None] * x + np.array(v)[None, :, None] * y
-    knots = [[end for end in ends for _ in (0, 1)] for ends in (u, v)]
-    return Patch(NurbsSurface(net, knots, (1, 1)), Straight(True), Straight(True))
+    axes = [(p.X(), p.Y(), p.Z()) for p in (place.Location(), place.XDirection(), place.YDirection())]
+    # Four corners: plain floats cost a tenth of arrays.
+    columns = list(zip(*axes, strict=True))
+    net = np.array([[[o + a * x + b * y for o, x, y in columns] for b in v] for a in u])
+    return Patch(known_surface(net, (_doubled(u), _doubled(v)), (1, 1)), Straight(True), Straight(True))
+
+
+def _doubled(ends: tuple[float, float]) -> Array:
+    """The knots of a line."""
+    low, high = ends
+    return np.array([low, low, high, high])
 
 
 def _round(surface: Any, box: Box) -> Patch:
@@ -130,16 +126,16 @@ def _round(surface: Any, box: Box) -> Patch:
     o = occt()
     place = surface.Position()
     origin, x, axis = point(place.Location()), point(place.XDirection()), point(place.Direction())
+    up = axis
     # A left-handed placement turns the other way round.
     if not place.Direct():
         axis = -axis
-    up = point(place.Direction())
     low, high = box[2:]
     v: Direction = Straight(True)
     if isinstance(surface, o.Geom_CylindricalSurface):
         radius = surface.Radius()
-        ends = np.array(_slack(low, high))
-        shape = spline(origin + radius * x + ends[:, None] * up, np.repeat(ends, 2), 1)
+        ends = _slack(low, high)
+        shape = _ruling(origin, x, up, (radius, radius), ends, ends)
     elif isinstance(surface, o.Geom_ConicalSurface):
         angle, base = surface.SemiAngle(), surface.RefRadius()
         apex = -base / sin(angle)
@@ -148,11 +144,10 @@ def _round(surface: Any, box: Box) -> Patch:
             raise Unreadable("a cone goes through its apex")
         # The side on which most of the face lies.
         least, most = (apex, np.inf) if high - apex > apex - low else (-np.inf, apex)
-        ends = np.array(_slack(low, high, least, most))
-        radii = base + ends * sin(angle)
-        radii[ends == apex] = 0.0
-        radius = float(np.abs(radii).max())
-        shape = spline(origin + radii[:, None] * x + (ends * cos(angle))[:, None] * up, np.repeat(ends, 2), 1)
+        ends = _slack(low, high, least, most)
+        first, last = (0.0 if end == apex else base + end * sin(angle) for end in ends)
+        radius = max(abs(first), abs(last))
+        shape = _ruling(origin, x, up, (first, last), (ends[0] * cos(angle), ends[1] * cos(angle)), ends)
     else:
         if isinstance(surface, o.Geom_SphericalSurface):
             center, minor = origin, surface.Radius()
@@ -167,6 +162,20 @@ def _round(surface: Any, box: Box) -> Patch:
         space = minor * (ring[:, :1] * x + ring[:, 1:2] * up) + ring[:, 2:] * center
         shape = Spline(np.column_stack([space, ring[:, 2]]), flat.knots, 2)
     return _turned(shape, Turning.over(box[0], box[1], radius), v, origin, axis, 0.0)
+
+
+def _ruling(
+    origin: Array,
+    x: Array,
+    up: Array,
+    radii: tuple[float, float],
+    heights: tuple[float, float],
+    ends: tuple[float, float],
+) -> Spline:
+    """The line between two points in a plane of an axis, with its parameters there."""
+    rows = list(zip(origin.tolist(), x.tolist(), up.tolist(), strict=True))
+    net = [[o + r * out + h * along for o, out, along in rows] + [1.0] for r, h in zip(radii, heights, strict=True)]
+    return Spline(np.array(net), _doubled(ends), 1)
 
 
 def _extruded(surface: Any, box: Box) -> Patch:
@@ -224,11 +233,13 @@ def _net(surface: Any) -> tuple[Array, tuple[Array, Array], tuple[int, int]]:
     n, m = surface.NbUPoles(), surface.NbVPoles()
     rational = surface.IsURational() or surface.IsVRational()
     net = np.ones((n, m, 4))
-    for i in range(n):
-        for j in range(m):
-            weight = surface.Weight(i + 1, j + 1) if rational else 1.0
-            net[i, j, :3] = weight * point(surface.Pole(i + 1, j + 1))
-            net[i, j, 3] = weight
+    # Elements of the array cost a tenth of the surface's own.
+    each = surface.Poles().Value
+    rows = ((each(i, j) for j in range(1, m + 1)) for i in range(1, n + 1))
+    net[..., :3] = [[(p.X(), p.Y(), p.Z()) for p in row] for row in rows]
+    if rational:
+        net[..., 3] = [[surface.Weight(i, j) for j in range(1, m + 1)] for i in range(1, n + 1)]
+        net[..., :3] *= net[..., 3:]
     if hasattr(surface, "UKnots"):
         knots = (
             knot_row(surface.UKnots(), surface.UMultiplicities()),

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
-from assembly.step.crossings import crossings
 from assembly.step.edges import Edges
 from assembly.step.occt import occt
 from assembly.step.profiles import Direction, Spline, Unreadable, approximated, profile, spline
 from assembly.step.projected import projected
 from assembly.step.surfaces import Patch
+from assembly.step.tracks import track
 from assembly.step.wires import Traced, Wire
 
 __all__ = ["Edge", "Pair", "Segment", "curves_of", "edge_curves"]
@@ -151,25 +151,21 @@ def curves_of(edges: Sequence[Edge], scales: Array) -> list[NurbsCurve]:
 
 def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: float) -> tuple[Spline, float]:
     """A plane curve of OCCT's (u, v) mapped to ours by interpolation."""
-    points, weights = source.cartesian
-    curve = NurbsCurve(points, source.knots, source.degree, weights)
-    breaks = curve.breaks()
+    plain = track(source)
+    if plain is None:
+        raise Unreadable("a curve in the surface's parameters has knots or points that doubles cannot hold")
+    breaks = plain.breaks
     at = sampled(breaks, 17)
-    values = curve.evaluate(at)
+    values = plain(at)
     joints = [along.joints(column.min(), column.max()) for along, column in zip(maps, values.T, strict=True)]
-    breaks = np.unique(np.append(breaks, crossings(values, at, curve.evaluate, joints)))
+    breaks = np.unique(np.append(breaks, plain.crossings(at, joints)))
     short = 1e-9 * (breaks[-1] - breaks[0])
     keep = np.append(True, np.diff(breaks) > short)
     keep[-1] = True
     breaks = breaks[keep]
     if breaks.size > 2 and breaks[-1] - breaks[-2] <= short:
         breaks = np.delete(breaks, -2)
-
-    def mapped(t: Array) -> Array:
-        there = curve.evaluate(np.clip(t, breaks[0], breaks[-1]))
-        return np.column_stack([maps[0](there[:, 0]), maps[1](there[:, 1])])
-
-    return approximated(mapped, breaks, tolerance)
+    return approximated(plain.with_maps(maps), breaks, tolerance)
 
 
 class _Draft(NamedTuple):

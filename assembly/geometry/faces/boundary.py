@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from assembly.errors import InputError
 from assembly.geometry.faces.loop import TOLERANCE, Loop, all_ends, curve_ends
 from assembly.geometry.faces.overshoot import clipped, extent, rates, widened
+from assembly.geometry.faces.plain_boundary import plain_boundary
 from assembly.geometry.faces.relinked import Relinked, relinked
 from assembly.geometry.faces.trim_table import TrimTable, build
 from assembly.geometry.splines.curve import NurbsCurve
@@ -180,11 +181,10 @@ def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[N
 
 def _as_loop(given: LoopLike, name: str, surface: NurbsSurface) -> Loop:
     """A loop with the surface's periods."""
-    if isinstance(given, Loop):
-        return Loop.unchecked(given.curves, given.tolerance, surface._periods, name)
-    if not isinstance(given, (NurbsCurve, Iterable)):
+    if not isinstance(given, (Loop, NurbsCurve, Iterable)):
         raise TypeError(f"{name} is {given!r}; expected a Loop, a NurbsCurve or several")
-    return Loop.unchecked(given, TOLERANCE, surface._periods, name)
+    curves, tolerance = (given.curves, given.tolerance) if isinstance(given, Loop) else (given, TOLERANCE)
+    return Loop.unchecked(curves, tolerance, surface._periods, name)
 
 
 def _in_domain(
@@ -289,6 +289,8 @@ def make_boundary(
     """Check loops and turn them; see `Face`."""
     if outer is None and not holes:
         return Boundary(surface, None, (), *_natural_boundary(_Sheet.of(surface)))
+    if outer is not None and (plain := plain_boundary(surface, outer, holes, SLACK)) is not None:
+        return Boundary(surface, plain[0][0], tuple(plain[0][1:]), *plain[1:])
     chains: list[tuple[list[NurbsCurve], Array]] = []
     names: list[str] = []
     silent: list[NurbsCurve] = []

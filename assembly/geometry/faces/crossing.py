@@ -254,8 +254,8 @@ def _meet(pool, a, b, corners, tolerance, size, stack, budget):
     return False, 0.0, 0.0, budget
 
 
-@kernel(signatures="(i8[::1], f8[::1], i8[::1], f8[:, ::1], f8, b1, f8[::1])", allocates=True)
-def first_crossing(table, pool, pieces, moves, tolerance, joined, where):
+@kernel(inner=True, allocates=True)
+def find_crossing(table, pool, pieces, moves, tolerance, joined, where):
     """The first two pieces that cross, touch or overlap: their numbers, and the point in `where`; (-1, -1): none.
 
     `pieces` are numbers of pieces of the trim at the start of the table, in the order of their least u after each is
@@ -297,3 +297,9 @@ def first_crossing(table, pool, pieces, moves, tolerance, joined, where):
                 where[1] = v + move_v
                 return a, b
     return -1, -1
+
+
+@kernel(signatures="(i8[::1], f8[::1], i8[::1], f8[:, ::1], f8, b1, f8[::1])", allocates=True)
+def first_crossing(table, pool, pieces, moves, tolerance, joined, where):
+    """`find_crossing` for Python."""
+    return find_crossing(table, pool, pieces, moves, tolerance, joined, where)

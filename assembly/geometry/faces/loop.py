@@ -24,9 +24,10 @@ Array = NDArray[np.float64]
 # Curves that end this part of the loop's size from where the next one begins are joined.
 TOLERANCE = 1e-9
 # Curves smaller than this part of the loop's size are left out.
-_NO_LENGTH = 1e-12
+NO_LENGTH = 1e-12
 # What rounding may make of an area, as a part of the size's square, for loops of up to thousands of corners.
 _ROUNDING = 1e-9
+_NO_TURN = read_only(np.zeros(2))
 
 
 def _checked_period(value: Sequence[float]) -> tuple[float, float]:
@@ -133,6 +134,14 @@ class Loop(ReadOnlyArrays):
         loop._make(curves, tolerance, period, name)
         return loop
 
+    @classmethod
+    def known(cls, curves: tuple[NurbsCurve, ...], size: float) -> Loop:
+        """A loop of a size whose curves meet exactly, on a surface that is open both ways."""
+        loop = object.__new__(cls)
+        loop.curves, loop.size, loop.turn = curves, size, _NO_TURN
+        loop.tolerance, loop.period = TOLERANCE, (0.0, 0.0)
+        return loop
+
     def _make(
         self, curves: NurbsCurve | Iterable[NurbsCurve], tolerance: float, period: tuple[float, float] | None, name: str
     ) -> None:
@@ -152,7 +161,7 @@ class Loop(ReadOnlyArrays):
         if not self.size > 0.0:
             raise InputError(f"{name} is a single point; expected a loop")
         # Files have edges of no length where something else was once; they have no direction.
-        parts = [c for c in parts if _largest_side(c) > _NO_LENGTH * self.size]
+        parts = [c for c in parts if _largest_side(c) > NO_LENGTH * self.size]
         self._join([_clamped(curve) for curve in parts], period is not None, name)
 
     def _join(self, parts: list[NurbsCurve], known: bool, name: str) -> None:

@@ -224,8 +224,8 @@ def _weights_differ(c, p):
     return most > MOST_WEIGHTS * least
 
 
-@kernel(signatures="(f8[::1], f8[::1], i8[:, ::1], f8[:, ::1], f8[:, ::1])", allocates=True)
-def cut_curves(pieces, pool, records, binomials, rows):
+@kernel(inner=True, allocates=True)
+def cut_all(pieces, pool, records, binomials, rows):
     """Cut curves into pieces.
 
     `pieces` holds the homogeneous Bezier points (u w, v w, w) of all spans of all curves in order, `pool` and `records`
@@ -288,3 +288,9 @@ def cut_curves(pieces, pool, records, binomials, rows):
                     count += 1
                     low = end
     return count
+
+
+@kernel(signatures="(f8[::1], f8[::1], i8[:, ::1], f8[:, ::1], f8[:, ::1])", allocates=True)
+def cut_curves(pieces, pool, records, binomials, rows):
+    """`cut_all` for Python."""
+    return cut_all(pieces, pool, records, binomials, rows)

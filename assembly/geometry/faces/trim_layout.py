@@ -22,11 +22,8 @@ def _place_on_curve(pool, link, bound, t):
     return u, v
 
 
-@kernel(
-    signatures="(f8[:, ::1], i8[:, ::1], f8[::1], i8[:, ::1], i8[:, ::1], f8[:, ::1])",
-    exact=True,
-)
-def fill_pieces(rows, records, pool, chains, links, bounds):
+@kernel(inner=True, exact=True)
+def lay_pieces(rows, records, pool, chains, links, bounds):
     """Fill the pieces that `cut_curves` found, in the order of their curves.
 
     `chains` (n, 3) holds the first curve, the one behind the last one, and whether the chain closes; curves without a
@@ -74,6 +71,15 @@ def fill_pieces(rows, records, pool, chains, links, bounds):
     return high_u - low_u, high_v - low_v
 
 
+@kernel(
+    signatures="(f8[:, ::1], i8[:, ::1], f8[::1], i8[:, ::1], i8[:, ::1], f8[:, ::1])",
+    exact=True,
+)
+def fill_pieces(rows, records, pool, chains, links, bounds):
+    """`lay_pieces` for Python."""
+    return lay_pieces(rows, records, pool, chains, links, bounds)
+
+
 @kernel(signatures="(f8[:, ::1], i8, f8, f8)", exact=True)
 def move_pieces(bounds, axis, low, period):
     """Move pieces that pass no border between cells into the cell that begins at `low`."""
@@ -89,8 +95,8 @@ def move_pieces(bounds, axis, low, period):
         bound.end[axis] = min(max(bound.end[axis] + move, low), low + period)
 
 
-@kernel(signatures="(f8[:, ::1], f8)", exact=True)
-def any_empty(bounds, noise):
+@kernel(inner=True, exact=True)
+def has_empty(bounds, noise):
     """Whether a piece has no length but rounding, this part of the largest coordinate."""
     largest = 0.0
     for k in range(bounds.shape[0]):
@@ -105,8 +111,14 @@ def any_empty(bounds, noise):
     return False
 
 
-@kernel(signatures="(i8[:, ::1], f8[:, ::1], f8, f8)", exact=True)
-def join_pieces(links, bounds, period_u, period_v):
+@kernel(signatures="(f8[:, ::1], f8)", exact=True)
+def any_empty(bounds, noise):
+    """`has_empty` for Python."""
+    return has_empty(bounds, noise)
+
+
+@kernel(inner=True, exact=True)
+def link_ends(links, bounds, period_u, period_v):
     """Let every piece begin exactly where the one before it ends, but for whole periods."""
     for k in range(bounds.shape[0]):
         before = piece_links_at(links, k).before
@@ -120,17 +132,20 @@ def join_pieces(links, bounds, period_u, period_v):
                 start[axis] = end[axis]
 
 
+@kernel(signatures="(i8[:, ::1], f8[:, ::1], f8, f8)", exact=True)
+def join_pieces(links, bounds, period_u, period_v):
+    """`link_ends` for Python."""
+    return link_ends(links, bounds, period_u, period_v)
+
+
 @kernel(inner=True, exact=True)
 def _length(bounds, k):
     bound = piece_bounds_at(bounds, k)
     return abs(bound.end[0] - bound.start[0]) + abs(bound.end[1] - bound.start[1])
 
 
-@kernel(
-    signatures="(f8[::1], i8[:, ::1], f8[:, ::1], i8[:, ::1], i8[::1], Tuple((f8, f8)), f8[::1], f8[::1])",
-    exact=True,
-)
-def finish_pieces(pool, links, bounds, chains, first, distances, u, v):
+@kernel(inner=True, exact=True)
+def close_pieces(pool, links, bounds, chains, first, distances, u, v):
     """Fill what follows from ends: boxes, signs of directions, the first piece of each curve, points beside chains.
 
     Points are to the left (the first half of `u` and `v`) and to the right of the longest piece of every chain, near
@@ -181,3 +196,12 @@ def finish_pieces(pool, links, bounds, chains, first, distances, u, v):
         u[c], v[c] = x + across_u, y + across_v
         u[chains.shape[0] + c], v[chains.shape[0] + c] = x - across_u, y - across_v
     return of_boundary, way
+
+
+@kernel(
+    signatures="(f8[::1], i8[:, ::1], f8[:, ::1], i8[:, ::1], i8[::1], Tuple((f8, f8)), f8[::1], f8[::1])",
+    exact=True,
+)
+def finish_pieces(pool, links, bounds, chains, first, distances, u, v):
+    """`close_pieces` for Python."""
+    return close_pieces(pool, links, bounds, chains, first, distances, u, v)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly._record import place_of, rows_of
+from assembly.errors import InputError
+from assembly.geometry.faces import trim_making
 from assembly.geometry.faces.crossing import first_crossing
 from assembly.geometry.faces.monotone import ROW, cut_curves
 from assembly.geometry.faces.trim import windings
@@ -28,11 +30,11 @@ from assembly.geometry.faces.trim_pieces import (
     piece_bounds_at,
     piece_links_at,
 )
-from assembly.geometry.splines.curve import NurbsCurve
-from assembly.geometry.splines.curve_packing import packed_curves
+from assembly.geometry.splines.curve import COINCIDENT, NurbsCurve
+from assembly.geometry.splines.curve_packing import NOT_FINITE, joined_curves, packed_curves, power_matrices
 from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_COEFFICIENTS, CURVE_RECORD
 
-__all__ = ["TrimTable", "build"]
+__all__ = ["TrimTable", "build", "made_at_once"]
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -40,6 +42,8 @@ Ints = NDArray[np.int64]
 ON_BOUNDARY = 1e-12
 # Some roundings of a coordinate, as a part of it.
 NOISE = 1e-14
+# Boundary curves nearer to each other than this part of the boundary's size cross or touch.
+CROSSES = 1e-9
 # What is the place of something else, of a trim in the table and in the pool, and of a piece in the pool.
 _IN_TABLE = [place_of(TRIM, field) for field in ("first", "piece_table", "curve_pieces")]
 _IN_POOL = [place_of(TRIM, field) for field in ("piece_pool", "frame", "step_pool")]
@@ -67,6 +71,8 @@ class TrimTable:
         w beyond the low and the high end of u, and of v, each where the other direction is closed.
     extent, largest : float
         Size of the boundary in (u, v), and its largest coordinate.
+    crossed
+        What `crossing` finds at the tolerance `CROSSES`; False where that is not known yet.
     """
 
     table: Ints
@@ -78,6 +84,7 @@ class TrimTable:
     beyond: tuple[tuple[float, float], tuple[float, float]]
     extent: float
     largest: float
+    crossed: tuple[int, int, Array] | Literal[False] | None = False
 
     def at(self, table_at: int, pool_at: int) -> tuple[Ints, Array]:
         """The same for being appended to a table and a pool of these lengths."""
@@ -106,6 +113,8 @@ class TrimTable:
 
         Curves may meet where one follows the other; if they are joined, at all of their ends.
         """
+        if self.crossed is not False and tolerance == CROSSES and not joined:
+            return self.crossed
         links, doubles = _blocks(self.table, self.pool, self.pieces)
         count = int(self.table[_BOUNDARY])
         low = doubles[:count, _BOX : _BOX + 4 : 2]
@@ -268,6 +277,10 @@ def build(
     """
     rows = [(chain.start, chain.stop, closes) for chain, closes in zip(chains, closing, strict=True)]
     linked = np.array(rows, dtype=np.int64).reshape(-1, 3)
+    if rows and not (silent or periods[0] or periods[1]):
+        made = made_at_once(joined_curves(curves), linked, domain)
+        if made is not None:
+            return made
     pieces = _Pieces([*curves, *silent], linked)
     low, high = [domain[0][0], domain[1][0]], [domain[0][1], domain[1][1]]
     steps: list[tuple[float, float]] = []
@@ -292,6 +305,42 @@ def build(
         w += step
         walk += [u, w]
     return _table(pieces, len(curves), linked, (low, high), periods, walk)
+
+
+def made_at_once(
+    curves: tuple[tuple[Array, Array, Array], Ints],
+    chains: Ints,
+    domain: tuple[tuple[float, float], tuple[float, float]],
+) -> TrimTable | None:
+    """The table of curves on a surface that is open both ways; None where pieces of theirs have to be left out.
+
+    The curves are as `joined_curves` has them, `chains` (n, 3) as `trim_making.lay_trim` takes them.
+    """
+    given, shape = curves
+    limits = np.array([*domain[0], *domain[1], COINCIDENT, ON_BOUNDARY, NOISE, CROSSES])
+    report = np.empty(trim_making.BESIDE + 2 * len(chains))
+    # Of all spans that there may be.
+    sizes = shape.tolist()
+    spans = sum(count - degree for degree, count in sizes)
+    points = sum((count - degree) * (degree + 1) for degree, count in sizes)
+    most = trim_making.PIECES_OF_POINT * points
+    ints = np.empty(TRIM_RECORD + (CURVE_RECORD + 1) * len(shape) + 1 + PIECE_INTS * most, dtype=np.int64)
+    doubles = np.empty(4 * points + spans + len(shape) + PIECE_DOUBLES * most + FRAME)
+    matrices = (power_matrices(), _BINOMIALS)
+    stop, end = trim_making.lay_trim(given, shape, chains, matrices, limits, ints, doubles, report)
+    table, pool = ints[:stop].copy(), doubles[:end].copy()
+    done, pieces, extent, largest, a, b, u, v, *beside = report.tolist()
+    if done < 0.0:
+        raise InputError(NOT_FINITE)
+    if done == 0.0:
+        return None
+    left, right = beside[: len(chains)], beside[len(chains) :]
+    bottom = float(pool[table[_FRAME] + _BOTTOM])
+    crossed = None if a < 0.0 else (int(a), int(b), np.array([u, v]))
+    beyond = ((bottom, bottom), (bottom, bottom))
+    return TrimTable(
+        table, pool, len(shape), int(pieces), np.array(left), np.array(right), beyond, extent, largest, crossed
+    )
 
 
 def _table(

@@ -76,11 +76,8 @@ def closes(curve, bezier, begin, end, coincident):
     return size > 0.0 and np.sqrt(gap_u**2 + gap_v**2) <= coincident * size
 
 
-@kernel(
-    signatures="(Tuple((f8[:, ::1], f8[::1], f8[::1])), i8[:, ::1], f8[:, :, ::1], f8, f8[::1], f8[::1], i8[:, ::1])",
-    allocates=True,
-)
-def bezier_tables(curves, shape, powers, coincident, bezier, pool, records):
+@kernel(inner=True, allocates=True)
+def lay_bezier_tables(curves, shape, powers, coincident, bezier, pool, records):
     """Fill Bezier points (u w, v w, w), pools and records of curves.
 
     `curves` are points, weights and knots of all in order, `shape` (curves, 2) their degrees and numbers of control
@@ -127,6 +124,15 @@ def bezier_tables(curves, shape, powers, coincident, bezier, pool, records):
         first_point += n
         first_knot += n + p + 1
     return at, place, finite
+
+
+@kernel(
+    signatures="(Tuple((f8[:, ::1], f8[::1], f8[::1])), i8[:, ::1], f8[:, :, ::1], f8, f8[::1], f8[::1], i8[:, ::1])",
+    allocates=True,
+)
+def bezier_tables(curves, shape, powers, coincident, bezier, pool, records):
+    """`lay_bezier_tables` for Python."""
+    return lay_bezier_tables(curves, shape, powers, coincident, bezier, pool, records)
 
 
 @kernel(signatures="(f8[::1], i8[:, ::1], f8, f8, f8[::1], f8[::1])", allocates=True)

@@ -1,0 +1,45 @@
+"""Surfaces of arrays that are known to fit, as those of planes, cylinders, cones, spheres and tori of files."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly.geometry.splines.surface import NurbsSurface
+
+__all__ = ["known_surface"]
+
+Array = NDArray[np.float64]
+
+
+def known_surface(
+    points: Array, knots: tuple[Array, Array], degree: tuple[int, int], weights: Array | None = None
+) -> NurbsSurface:
+    """A surface of arrays that are its own from now on.
+
+    Shapes, the order of knots and the signs of weights are not looked at. Where numbers are not finite, or a side of
+    the domain has no length, `NurbsSurface` says so.
+
+    Parameters
+    ----------
+    points : (n, m, 3)
+    knots : of u and of v, clamped
+    degree : of u and of v
+    weights : (n, m), optional
+        Ones by default.
+    """
+    row_u, row_v = knots[0].tolist(), knots[1].tolist()
+    if weights is None:
+        weights = np.ones(points.shape[:2])
+    # A sum may overflow: that is seen where all is checked.
+    finite = isfinite(sum(points.ravel().tolist()) + sum(row_u) + sum(row_v))
+    if not (finite and row_u[0] < row_u[-1] and row_v[0] < row_v[-1]):
+        return NurbsSurface(points, knots, degree, weights)
+    made = object.__new__(NurbsSurface)
+    for array in (points, weights, *knots):
+        array.flags.writeable = False
+    made.control_points, made.knots, made.degree, made.weights = points, knots, degree, weights
+    made.name, made.domain = None, ((row_u[0], row_u[-1]), (row_v[0], row_v[-1]))
+    return made
