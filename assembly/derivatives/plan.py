@@ -74,7 +74,7 @@ def plan_of(
 
 
 def kept_plan(solution: object, of: object, wrt: object) -> Plan | None:
-    """The plan that was made for these measures and parameters, lists or tuples, which were looked at then: None where there is none yet."""
+    """The plan that was made for these measures and parameters, lists or tuples; None where there is none yet."""
     if type(solution) is not Solution or type(of) not in SEQUENCES or type(wrt) not in SEQUENCES:
         return None
     try:
