@@ -19,7 +19,7 @@ from assembly.derivatives.measure import Measure
 from assembly.derivatives.measured import rates_of
 from assembly.derivatives.numbers import FrameNumber, LeastGap, PlaceNumber, RowNumber, TargetNumber
 from assembly.derivatives.parameter import Parameter
-from assembly.derivatives.plan import layout_of, plan_of
+from assembly.derivatives.plan import kept_plan, layout_of, plan_of
 from assembly.derivatives.probed import Evaluated, ProbedScene
 from assembly.derivatives.result import Moved, Sensitivity
 from assembly.errors import InputError, items
@@ -61,12 +61,21 @@ def sensitivity(
         A solution that failed, or of other numbers than the scene has now; a parameter that enters nothing.
     """
     the_scene(scene)
+    plan = kept_plan(solution, of, wrt)
+    if plan is not None:
+        # Made for these very measures and parameters, which were looked at then.
+        planned = plan.derived(*_checked(scene, solution))
+        if planned is not None:
+            return planned
     measures = several("of", of, Measure)
     parameters = several("wrt", wrt, Parameter)
     packed, state = _checked(scene, solution)
-    plan = plan_of(solution, scene.bodies, (measures, parameters))
-    planned = None if plan is None else plan.derived(packed, state)
-    return planned if planned is not None else _derived(scene, solution, measures, parameters)
+    if plan is None:
+        plan = plan_of(solution, scene.bodies, (measures, parameters))
+        planned = None if plan is None else plan.derived(packed, state)
+        if planned is not None:
+            return planned
+    return _derived(scene, solution, measures, parameters)
 
 
 def _derived(
@@ -281,5 +290,10 @@ def _result(
         loose,
         below.rank,
         reasons,
-        Moved(layout_of(problem.bodies, problem.constraints, packed, True), steps, forces, packed.scale, packed.unit),
+        Moved(
+            layout_of(problem.bodies, problem.constraints, packed, True),
+            np.concatenate((steps, forces)),
+            packed.scale,
+            packed.unit,
+        ),
     )

@@ -24,7 +24,7 @@ AGREE = 1e-7
 
 @kernel(inner=True)
 def reflect(v, beta, rows, first, along):
-    """Apply I - beta v v^T, whose v begins at `first`, to the columns of an array (n, p) from that row on."""
+    """Apply I - beta v v^T, whose v begins at `first`, to the columns of an array (n, p)."""
     count = rows.shape[1]
     for k in range(count):
         along[k] = 0.0
@@ -39,24 +39,57 @@ def reflect(v, beta, rows, first, along):
 
 
 @kernel(inner=True)
-def factorize_rows(lower, reflections, order, choose):
-    """L Q^T of rows (r, n) in place; reflections (r, n) and their factors in the last column. Returns the rank, or -1.
+def reflect_on(v, beta, columns, k, along, squares):
+    """Reflect the columns behind the k-th; squared lengths of what they have behind that entry are written on the way.
 
-    With `choose` the row that has most left comes next, and what has next to nothing left ends it.
+    They are added up anew every time: what is left of a row that others span is a rounding of its length.
     """
-    r, n = lower.shape
+    count = columns.shape[1]
+    for i in range(k + 1, count):
+        along[i] = squares[i] = 0.0
+    for j in range(k, columns.shape[0]):
+        factor = beta * v[j]
+        for i in range(k + 1, count):
+            along[i] += factor * columns[j, i]
+    for i in range(k + 1, count):
+        columns[k, i] -= v[k] * along[i]
+    for j in range(k + 1, columns.shape[0]):
+        factor = v[j]
+        for i in range(k + 1, count):
+            left = columns[j, i] - factor * along[i]
+            columns[j, i] = left
+            squares[i] += left * left
+
+
+@kernel(inner=True)
+def write_squares(columns, squares):
+    """Squared lengths of rows, the columns of an array (n, r)."""
+    for i in range(columns.shape[1]):
+        squares[i] = 0.0
+    for j in range(columns.shape[0]):
+        for i in range(columns.shape[1]):
+            squares[i] += columns[j, i] * columns[j, i]
+
+
+@kernel(inner=True)
+def factorize_rows(upper, reflections, order, choose, room):
+    """L Q^T of rows, the columns of `upper` (n, r), in place, so that it becomes L^T. Returns the rank, or -1.
+
+    Reflections (r, n) have their factors in the last column. With `choose` the row that has most left comes next, and
+    what has next to nothing left ends it. Rows stand in columns, so that sums run over all of them side by side.
+    """
+    n, r = upper.shape
+    along, squares = room
     rank = min(r, n)
     for k in range(r):
         order[k] = k
+    write_squares(upper, squares)
     for k in range(min(r, n)):
-        best, most = k, -1.0
-        for i in range(k, r if choose else k + 1):
-            square = 0.0
-            for j in range(k, n):
-                square += lower[i, j] * lower[i, j]
-            if square > most:
-                best, most = i, square
-        length = math.sqrt(most)
+        best = k
+        for i in range(k + 1, r if choose else k + 1):
+            if squares[i] > squares[best]:
+                best = i
+        length = math.sqrt(squares[best])
         if length <= NONE:
             rank = k
             break
@@ -64,28 +97,20 @@ def factorize_rows(lower, reflections, order, choose):
             return -1
         if best != k:
             for j in range(n):
-                lower[k, j], lower[best, j] = lower[best, j], lower[k, j]
+                upper[j, k], upper[j, best] = upper[j, best], upper[j, k]
             order[k], order[best] = order[best], order[k]
-        pivot = -length if lower[k, k] > 0.0 else length
+        pivot = -length if upper[k, k] > 0.0 else length
         v = reflections[k]
-        square = 0.0
         for j in range(k, n):
-            v[j] = lower[k, j]
+            v[j] = upper[j, k]
+        # |v|^2 of v = x - pivot e with |x| = |pivot|.
+        beta = 1.0 / (length * (length + abs(v[k])))
         v[k] -= pivot
-        for j in range(k, n):
-            square += v[j] * v[j]
-        beta = 2.0 / square
         v[n] = beta
-        for i in range(k + 1, r):
-            w = 0.0
-            for j in range(k, n):
-                w += v[j] * lower[i, j]
-            w *= beta
-            for j in range(k, n):
-                lower[i, j] -= w * v[j]
-        lower[k, k] = pivot
+        reflect_on(v, beta, upper, k, along, squares)
+        upper[k, k] = pivot
         for j in range(k + 1, n):
-            lower[k, j] = 0.0
+            upper[j, k] = 0.0
     return rank
 
 
@@ -98,27 +123,29 @@ def reflect_back(reflections, rank, rows, along):
 
 
 @kernel(inner=True)
-def forward_rows(lower, rank, rows):
-    """L^-1 of the first rows, in place."""
+def forward_rows(upper, rank, rows):
+    """L^-1 of the first rows, in place, of L^T."""
     for i in range(rank):
         for j in range(i):
-            factor = lower[i, j]
+            factor = upper[j, i]
             for k in range(rows.shape[1]):
                 rows[i, k] -= factor * rows[j, k]
+        over = 1.0 / upper[i, i]
         for k in range(rows.shape[1]):
-            rows[i, k] /= lower[i, i]
+            rows[i, k] *= over
 
 
 @kernel(inner=True)
-def backward_rows(lower, rank, rows):
+def backward_rows(upper, rank, rows):
     """L^-T of the first rows, in place."""
     for i in range(rank - 1, -1, -1):
         for j in range(i + 1, rank):
-            factor = lower[j, i]
+            factor = upper[i, j]
             for k in range(rows.shape[1]):
                 rows[i, k] -= factor * rows[j, k]
+        over = 1.0 / upper[i, i]
         for k in range(rows.shape[1]):
-            rows[i, k] /= lower[i, i]
+            rows[i, k] *= over
 
 
 @kernel(inner=True)
@@ -158,14 +185,14 @@ def add_free_steps(hessian, free, lacking, steps):
         for b in range(a + 1):
             total = 0.5 * (form[a, b] + form[b, a])
             for c in range(b):
-                total -= form[a, c] * form[b, c]
+                total -= form[c, a] * form[c, b]
             if a > b:
-                form[a, b] = total / form[b, b]
+                form[b, a] = total / form[b, b]
             elif total > CURVED * largest:
                 form[a, a] = math.sqrt(total)
             else:
                 return False
-        # What is above the diagonal is read no more in this row.
+        # What is above the diagonal is the factor; what is below is read no more in this column.
     forward_rows(form, d, amounts)
     backward_rows(form, d, amounts)
     for i in range(n):
@@ -177,38 +204,46 @@ def add_free_steps(hessian, free, lacking, steps):
 
 
 @kernel(inner=True, allocates=True)
-def least_forces(lower, rank, pulls, forces, shared, along):
-    """The least forces (r, p) of rows of length one that pull as much, and those in balance with each other (r, r).
-
-    `pulls` are in the basis of the rows, (rank, p) first.
-    """
+def least_forces(upper, rank, pulls, forces, along):
+    """The least forces (r, p) of rows of length one that pull as much; of pulls the first are in the rows' basis."""
     r, count = forces.shape
-    if rank == r:
-        for i in range(r):
-            for k in range(count):
-                forces[i, k] = pulls[i, k]
-        backward_rows(lower, rank, forces)
-        return
-    across, reflections, order = np.zeros((rank, r)), np.zeros((rank, r + 1)), np.empty(rank, np.int64)
-    for i in range(rank):
-        for j in range(r):
-            across[i, j] = lower[j, i]
-    factorize_rows(across, reflections, order, False)
     for i in range(r):
         for k in range(count):
             forces[i, k] = pulls[i, k] if i < rank else 0.0
-        for k in range(r - rank):
-            shared[i, k] = 1.0 if i == rank + k else 0.0
+    if rank == r:
+        backward_rows(upper, rank, forces)
+        return
+    # Rows that repeat each other share a force: their transpose has rank rows, which are independent.
+    across, reflections, order = np.zeros((r, rank)), np.zeros((rank, r + 1)), np.empty(rank, np.int64)
+    for j in range(r):
+        for i in range(rank):
+            across[j, i] = upper[i, j]
+    factorize_rows(across, reflections, order, False, (along, np.empty(rank)))
     forward_rows(across, rank, forces)
     reflect_back(reflections, rank, forces, along)
-    reflect_back(reflections, rank, shared, along)
 
 
-@kernel(
-    signatures="(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])",
-    allocates=True,
-)
-def least_steps(jacobian, hessian, rows_by, slopes_by, steps, forces, free, shared):
+@kernel(inner=True, allocates=True)
+def scale_rows(jacobian, scales, upper):
+    """Rows (r, n) of length one as columns, and what they are scaled by; whether it is clear which are none."""
+    r, n = jacobian.shape
+    for i in range(r):
+        for j in range(n):
+            upper[j, i] = jacobian[i, j]
+    write_squares(upper, scales)
+    for i in range(r):
+        length = math.sqrt(scales[i])
+        if NONE < length < SOME:
+            return False
+        scales[i] = 1.0 / length if length > NONE else 0.0
+    for j in range(n):
+        for i in range(r):
+            upper[j, i] *= scales[i]
+    return True
+
+
+@kernel(inner=True, allocates=True)
+def least_steps(jacobian, hessian, rows_by, slopes_by, steps, forces, free):
     """Write what `kkt.Moves` has; returns the rank and how many parameters contradict, or (-1, 0): it is not clear.
 
     Parameters
@@ -216,50 +251,39 @@ def least_steps(jacobian, hessian, rows_by, slopes_by, steps, forces, free, shar
     jacobian, hessian, rows_by, slopes_by : (r, n), (n, n), (r, p), (n, p)
         Rows that hold, and what a unit of each parameter adds.
     steps, forces : (n, p), (r, p)
-        Written; a step is no number where rows contradict each other.
-    free, shared : (n, n), (r, r)
-        Written; the first n - rank and r - rank columns count.
+        Written; a step is no number where rows contradict each other. Forces that nobody asks for are (0, p).
+    free : (n, n)
+        Written; the first n - rank columns count.
     """
     r, n = jacobian.shape
     count = rows_by.shape[1]
-    lower, reflections, order = np.empty((r, n)), np.zeros((r, n + 1)), np.empty(r, np.int64)
+    upper, reflections, order = np.empty((n, r)), np.zeros((r, n + 1)), np.empty(r, np.int64)
     scales, along = np.zeros(r), np.empty(max(count, n, r))
-    for i in range(r):
-        square = 0.0
-        for j in range(n):
-            square += jacobian[i, j] * jacobian[i, j]
-        length = math.sqrt(square)
-        if NONE < length < SOME:
-            return -1, 0
-        scales[i] = 1.0 / length if length > NONE else 0.0
-        for j in range(n):
-            lower[i, j] = jacobian[i, j] * scales[i]
-    rank = factorize_rows(lower, reflections, order, True)
+    if not scale_rows(jacobian, scales, upper):
+        return -1, 0
+    rank = factorize_rows(upper, reflections, order, True, (along, np.empty(r)))
     if rank < 0:
         return -1, 0
-    asked = np.empty((r, count))
+    asked, sizes = np.empty((r, count)), np.zeros(count)
     for i in range(r):
         row = order[i]
         scale = scales[row] if scales[row] > 0.0 else 1.0
         for k in range(count):
             asked[i, k] = -scale * rows_by[row, k]
-    sizes = np.zeros(count)
-    for i in range(r):
-        for k in range(count):
             sizes[k] = max(sizes[k], abs(asked[i, k]))
-    forward_rows(lower, rank, asked)
+    forward_rows(upper, rank, asked)
     contradicting = 0
     for k in range(count):
         off = 0.0
         for i in range(rank, r):
             left = asked[i, k]
             for j in range(rank):
-                left -= lower[i, j] * asked[j, k]
+                left -= upper[j, i] * asked[j, k]
             off = max(off, abs(left))
-        contradicting += off > AGREE * max(sizes[k], AGREE)
         for i in range(n):
             steps[i, k] = asked[i, k] if i < rank else 0.0
         if off > AGREE * max(sizes[k], AGREE):
+            contradicting += 1
             steps[0, k] = math.nan
     reflect_back(reflections, rank, steps, along)
     lacking = np.empty((n, count))
@@ -275,15 +299,15 @@ def least_steps(jacobian, hessian, rows_by, slopes_by, steps, forces, free, shar
         for i in range(n):
             for a in range(d):
                 free[i, a] = basis[i, a]
+    if forces.shape[0] == 0:
+        return rank, contradicting
     lacking_slopes(hessian, slopes_by, steps, lacking)
     for k in range(rank):
         reflect(reflections[k], reflections[k, n], lacking, k, along)
-    scaled, ways = np.zeros((r, count)), np.zeros((r, max(r - rank, 0)))
-    least_forces(lower, rank, lacking, scaled, ways, along)
+    scaled = np.zeros((r, count))
+    least_forces(upper, rank, lacking, scaled, along)
     for i in range(r):
         row = order[i]
         for k in range(count):
             forces[row, k] = scales[row] * scaled[i, k]
-        for k in range(r - rank):
-            shared[row, k] = scales[row] * ways[i, k]
     return rank, contradicting

@@ -34,6 +34,8 @@ PLAN = record_dtype(
     measured=1,  # how many measures there are
     measures=1,
     measure_count=1,
+    one_sided=1,  # of every row 1 if it may open
+    limits=1,  # of rows and balance, in the figures: see `derivatives/derived.py`
 )
 plan_at = record_view(PLAN)
 PLAN_SIZE = size_of(PLAN)
@@ -72,13 +74,14 @@ MEASURE_SIZE = size_of(MEASURE)
 @kernel(inner=True)
 def reduce_rows(plan, table, rows, out):
     """Rows (m, all columns) to the columns of moving bodies, with which their frames go."""
-    for r in range(out.shape[0]):
-        for b in range(plan.bodies + plan.probes):
-            body = b if b < plan.bodies else table[plan.hosts + b - plan.bodies]
-            block = table[plan.blocks + body]
-            if block >= 0:
-                for i in range(6):
-                    out[r, 6 * block + i] += rows[r, 6 * b + i]
+    for b in range(plan.bodies + plan.probes):
+        body = b if b < plan.bodies else table[plan.hosts + b - plan.bodies]
+        block = table[plan.blocks + body]
+        if block < 0:
+            continue
+        for r in range(out.shape[0]):
+            for i in range(6):
+                out[r, 6 * block + i] += rows[r, 6 * b + i]
 
 
 @kernel(inner=True)
@@ -282,7 +285,7 @@ def add_measures(plan, table, given, out):
     return True
 
 
-@kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])", allocates=True)
+@kernel(inner=True, allocates=True)
 def linearize(table, pool, state, figures, forces, evaluated, out):
     """Write the equations of a solution; whether they are finite, and every distance has a way.
 
@@ -296,17 +299,19 @@ def linearize(table, pool, state, figures, forces, evaluated, out):
     evaluated
         What `curvature_at` wrote of the scene with probes: m rows and coordinates, n twists of bodies and probes.
     out
-        Zeros, that become: rows and coordinates (m + e, n), the Hessian (n, n), what a unit of each parameter adds to
-        rows (m, p), coordinates (e, p), slopes (n, p) and the value (p,); slopes of measures (k, n) and what parameters
-        add to these (k, p); the slopes of the Lagrangian (n,), and the largest of them.
+        Zeros, the first of which become: rows and coordinates (m + e, n), the Hessian (n, n), what a unit of each
+        parameter adds to rows (m, p), coordinates (e, p), slopes (n, p) and the value (p,); slopes of measures (k, n)
+        and what parameters add to these (k, p); the slopes of the Lagrangian (n,), and the largest of them.
     """
     plan = plan_at(table, 0)
     m, e, n, p = plan.rows, plan.coordinates, plan.unknowns, plan.parameters
     k, columns = plan.measured, 6 * (plan.bodies + plan.probes)
     size = 1 + (m + e) + columns + (m + e) * columns + columns * columns
+    infinite = 0
     for i in range(size):
-        if not math.isfinite(evaluated[i]):
-            return False
+        infinite += not math.isfinite(evaluated[i])
+    if infinite > 0:
+        return False
     gradient = carve(evaluated, 1 + m + e, (1, columns))
     jacobian = carve(evaluated, 1 + m + e + columns, (m + e, columns))
     hessian = carve(evaluated, 1 + m + e + columns + (m + e) * columns, (columns, columns))

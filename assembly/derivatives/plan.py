@@ -1,7 +1,7 @@
 """How solutions of a scene are derived by the same parameters again and again: what depends on its structure alone.
 
-A plan stays with the packed scene and its twins of other numbers. With it all derivatives of a solution are three
-compiled calls: evaluate (`curvature_at`), linearize, and step (`least_steps`). What is rarer goes the general way of
+A plan stays with the packed scene and its twins of other numbers. With it all derivatives of a solution are two
+compiled calls: evaluate (`curvature_at`), and `derive`. What is rarer goes the general way of
 `derivatives/implicit.py`, which gives the same: numbers that make faces, wrenches, pairs at folds, dexterities,
 clearances, rows at their bounds without a force, and ranks and curvatures that are in doubt.
 """
@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._read_only import read_only
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.objectives import FrameDistance
 from assembly.constraints.packing.measured_size import base_of
@@ -25,25 +26,25 @@ from assembly.constraints.program.contact import TOUCHING
 from assembly.constraints.program.objective_terms import POSTURE, POSTURE_QUATERNION, TERM
 from assembly.derivatives import linearized as records
 from assembly.derivatives.columns import Frames
-from assembly.derivatives.least_steps import least_steps
-from assembly.derivatives.linearized import linearize
+from assembly.derivatives.derived import derive
 from assembly.derivatives.measure import Measure, place_of
 from assembly.derivatives.measured import FREE
 from assembly.derivatives.numbers import FrameOrigin, FrameTurn, LeastGap, RowNumber, TargetNumber, turn_rates
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.probed import ProbedScene
-from assembly.derivatives.result import Layout, Moved, Sensitivity
+from assembly.derivatives.result import Layout, Least, Moved, Sensitivity
 from assembly.kinematics.body import Body, Frame
 from assembly.solve.second_order.curvature import curvature_at
 from assembly.solve.second_order.dense import PUSHING, UNBALANCED
 from assembly.solve.solution import Solution
 
-__all__ = ["Plan", "layout_of", "plan_of"]
+__all__ = ["Plan", "kept_plan", "layout_of", "plan_of"]
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 # Plans that a scene keeps; with more the first are made anew.
 MOST_PLANS = 8
+SEQUENCES = {list, tuple}
 # Unknowns up to which the plain loops of `least_steps` take less time than singular values of LAPACK.
 MOST_UNKNOWNS = 96
 # Numbers of a pair of frames in a pool.
@@ -60,16 +61,26 @@ def plan_of(
 ) -> Plan | None:
     """The plan of measures and parameters, made at first use; None where there is none."""
     plans = solution._packed.derivative_plans
-    key = (*map(id, asked[0]), 0, *map(id, asked[1]))
+    key = tuple(asked[0]), tuple(asked[1])
     if key not in plans:
         while len(plans) >= MOST_PLANS:
             del plans[next(iter(plans))]
-        # Measures and parameters are kept with their plan, so that their identities are not those of others.
         try:
-            plans[key] = asked, Plan(solution, bodies, asked)
+            plans[key] = Plan(solution, bodies, asked)
         except Unplanned:
-            plans[key] = asked, None
-    plan: Plan | None = plans[key][1]
+            plans[key] = None
+    plan: Plan | None = plans[key]
+    return plan
+
+
+def kept_plan(solution: object, of: object, wrt: object) -> Plan | None:
+    """The plan that was made for these measures and parameters, lists or tuples; None where there is none yet."""
+    if type(solution) is not Solution or type(of) not in SEQUENCES or type(wrt) not in SEQUENCES:
+        return None
+    try:
+        plan: Plan | None = solution._packed.derivative_plans.get((tuple(of), tuple(wrt)))  # type: ignore[arg-type]
+    except TypeError:  # what cannot be a key is no measure
+        return None
     return plan
 
 
@@ -84,15 +95,13 @@ def layout_of(
 
 
 class _Desk(NamedTuple):
-    """Where a thread derives: the pool with probes behind it, multipliers, and what calls write, whole and in parts."""
+    """Where a thread derives: the pool and the state with probes behind it, multipliers, and what calls write."""
 
     pool: Array
+    state: Array
     forces: Array
     evaluated: Array
     out: Array
-    parts: tuple[Array, ...]
-    free: Array
-    shared: Array
 
 
 class Plan:
@@ -138,22 +147,29 @@ class Plan:
         self._placed: list[tuple[int, Frame]] = []
         entries = self._entries(packed, places)
         measured = self._measured(packed, places)
+        limits, self._figures = len(self._figures), [*self._figures, TOUCHING, PUSHING, UNBALANCED, FREE]
         self._numbers = np.array(self._figures)
         # Figures as they are unless frames were turned or placed anew, with the scale that they are for.
         self._scaled = (0.0, self._numbers)
-        # Of every number of a state with probes its place in that without.
-        self._gathered = np.empty(0, dtype=np.int64)
+        # Of every number of a state with probes, which stand where their bodies do behind these, its place in that
+        # without.
+        numbers, bodies_end = np.arange(state.size), packed.contacts_at
+        on_probes = numbers[:bodies_end].reshape(-1, 7)[self._hosts].ravel()
+        self._gathered = np.concatenate((numbers[:bodies_end], on_probes, numbers[bodies_end:]))
         self._desks: list[_Desk] = []
-        self._plan = self._written(packed, entries, measured)
+        self._plan = self._written(packed, entries, measured, limits)
         m, e, n, p = packed.rows, len(coordinates), self._unknowns, len(self._parameters)
         k = len(self._measures)
-        shapes = [(m + e, n), (n, n), (m, p), (e, p), (n, p), (p,), (k, n), (k, p), (n,), (1,)]
-        ends = np.cumsum([int(np.prod(shape)) for shape in shapes]).tolist()
-        self._parts = list(zip([0, *ends], ends, shapes, strict=False))
+        # Where in what is written equations end, rates, steps and forces, and what is told of measures and of the
+        # objective.
+        at = (m + e) * (n + p) + n * n + n * p + p + k * (n + p) + n + 1
+        self._shapes = (k, p), (n + m, p)
+        self._ends = at, at + k * p, at + (k + n + m) * p, at + (k + n + m) * p + k, at + (k + n + m + 1) * p + k
+        self._least = Least(read_only(~packed.one_sided), n, e) if packed.is_implicit else None
         self._is_implicit, self._rows = packed.is_implicit, m
-        self._one_sided = packed.one_sided if packed.one_sided.any() else None
         self._lengths = [k for k, item in enumerate(self._measures) if item.kind == "gap" or _is_slide(item)]
         self._objectives = [k for k, item in enumerate(self._measures) if item.kind == "objective"]
+        self._none_loose = read_only(np.zeros(k, dtype=bool))
 
     def _entries(self, packed: Packed, places: dict[int, int]) -> list[dict[str, int]]:
         """What parameters add, and where."""
@@ -229,12 +245,15 @@ class Plan:
                     self._figures += place.tolist()
         return measured
 
-    def _written(self, packed: Packed, entries: list[dict[str, int]], measured: list[dict[str, int]]) -> Table:
+    def _written(
+        self, packed: Packed, entries: list[dict[str, int]], measured: list[dict[str, int]], limits: int
+    ) -> Table:
         """The table of the plan."""
         blocks = np.array(self._layout.blocks, dtype=np.int64)
         parts: list[Table] = [np.zeros(records.PLAN_SIZE, dtype=np.int64), blocks, self._hosts]
         parts += [_record(records.ENTRY, entry) for entry in entries]
         parts += [_record(records.MEASURE, entry) for entry in measured]
+        parts.append(packed.one_sided.astype(np.int64))
         table = np.concatenate(parts)
         header = records.plan_at(table, 0)
         header.bodies, header.probes = blocks.size, self._hosts.size
@@ -245,6 +264,7 @@ class Plan:
         header.parameters, header.measure_count = len(self._parameters), len(measured)
         header.measures = header.entries + records.ENTRY_SIZE * len(entries)
         header.measured = len(self._measures)
+        header.one_sided, header.limits = table.size - packed.rows, limits
         return table
 
     def _figures_of_now(self, packed: Packed) -> Array:
@@ -277,10 +297,8 @@ class Plan:
         pool = np.concatenate((packed.rows_pool, np.zeros(FRAMES * len(self._pairs)), self._behind))
         rows, columns = self._most
         evaluated = np.empty(1 + rows + columns + rows * columns + columns * columns)
-        out = np.empty(self._parts[-1][1])
-        parts = tuple(out[first:end].reshape(shape) for first, end, shape in self._parts)
-        n, m = self._unknowns, self._rows
-        return _Desk(pool, np.zeros(rows), evaluated, out, parts, np.empty((n, n)), np.empty((m, m)))
+        state, out = np.empty(self._gathered.size), np.empty(self._ends[-1])
+        return _Desk(pool, state, np.zeros(rows), evaluated, out)
 
     def _derived(self, packed: Packed, state: Array, desk: _Desk) -> Sensitivity | None:
         rows, pool = self._rows, packed.rows_pool
@@ -292,64 +310,28 @@ class Plan:
             pool = desk.pool
         if not self._is_implicit:
             desk.forces[:rows] = state[packed.multipliers_at : packed.residuals_at]
-        if curvature_at(self._table, pool, self._probed(packed, state), desk.forces, desk.evaluated, None) != 0:
+        # Places are those of the state, and without checks are copied in a third of the time.
+        state.take(self._gathered, out=desk.state, mode="clip")
+        if curvature_at(self._table, pool, desk.state, desk.forces, desk.evaluated, None) != 0:
             return None
-        desk.out.fill(0.0)
-        if not linearize(self._plan, pool, state, self._figures_of_now(packed), desk.forces, desk.evaluated, desk.out):
-            return None
-        if desk.out[-1] > UNBALANCED:
-            return None
-        held = self._held(packed, desk.evaluated[1 : 1 + rows], desk.forces[:rows])
-        return None if held is None else self._stepped(packed, held, desk)
+        figures = self._figures_of_now(packed)
+        rank = derive(self._plan, pool, state, figures, desk.forces, desk.evaluated, desk.out)
+        return None if rank < 0 else self._told(packed, rank, desk.out.copy())
 
-    def _probed(self, packed: Packed, state: Array) -> Array:
-        """The state of the scene with probes, which stand where their bodies do behind these."""
-        if not self._hosts.size:
-            return state.copy()
-        gathered = self._gathered
-        if gathered.size != state.size + 7 * self._hosts.size:
-            places, bodies = np.arange(state.size), packed.contacts_at
-            probes = places[:bodies].reshape(-1, 7)[self._hosts].ravel()
-            gathered = self._gathered = np.concatenate((places[:bodies], probes, places[bodies:]))
-        return state.take(gathered)
-
-    def _held(self, packed: Packed, residual: Array, forces: Array) -> Table | slice | None:
-        """The rows that hold; None where one of them is at its bound without a force."""
-        if self._one_sided is None:
-            return slice(None)
-        one_sided = self._one_sided
-        touching = np.abs(residual) <= TOUCHING
-        pushing = touching & (forces < -PUSHING)
-        if (one_sided & touching & ~pushing).any():
-            return None
-        return np.flatnonzero(~one_sided | pushing)
-
-    def _stepped(self, packed: Packed, held: Table | slice, desk: _Desk) -> Sensitivity | None:
-        """The step, and what measures change by; None where ranks are in doubt, or rows contradict each other."""
-        jacobian, hessian, rows_by, _, slopes_by, values, slopes, own, *_ = desk.parts
-        rows_held, asked = jacobian[: self._rows][held], rows_by[held]
-        (r, n), p = rows_held.shape, asked.shape[1]
-        steps, forces, free = np.empty((n, p)), np.empty((r, p)), desk.free
-        shared = desk.shared if r == self._rows else np.empty((r, r))
-        rank, contradicting = least_steps(rows_held, hessian, asked, slopes_by, steps, forces, free, shared)
-        if rank < 0 or contradicting:
-            return None
-        # The sums have no negative zeros.
-        rates = slopes.dot(steps)
-        rates += own
+    def _told(self, packed: Packed, rank: int, out: Array) -> Sensitivity:
+        """What `derive` wrote, in an array of its own."""
+        at, rates_end, moved_end, loose_end, _ = self._ends
+        measured, stepped = self._shapes
+        rates = out[at:rates_end].reshape(measured)
         for i in self._lengths:
             rates[i] *= packed.scale
         for i in self._objectives:
-            rates[i] = (values + desk.forces[: self._rows] @ rows_by) * packed.unit + 0.0
-        loose = np.zeros(len(self._measures), dtype=bool)
-        if self._is_implicit and rank < n:
-            changed = np.abs(slopes @ free[:, : n - rank]).max(axis=1)
-            loose = changed > FREE * np.maximum(1.0, np.abs(slopes).max(axis=1))
-        everywhere = forces
-        if not isinstance(held, slice):
-            everywhere = np.zeros((self._rows, p))
-            everywhere[held] = forces
-        moved = Moved(self._layout, steps, everywhere, packed.scale, packed.unit)
+            rates[i] = out[loose_end:] * packed.unit
+        loose = self._none_loose
+        if self._is_implicit and rank < self._unknowns:
+            loose = out[moved_end:loose_end] > 0.0
+        numbers = out[rates_end:moved_end].reshape(stepped)
+        moved = Moved(self._layout, numbers, packed.scale, packed.unit, self._least, out)
         return Sensitivity.smooth(self._measures, self._parameters, rates, loose, rank, moved)
 
 

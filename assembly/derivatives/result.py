@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from assembly._html import Table, as_html
 from assembly._read_only import ReadOnlyArrays, read_only
+from assembly.derivatives.kkt import System, solve_system
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError
@@ -44,14 +45,37 @@ class Layout(NamedTuple):
     lengths: Flags
 
 
+class Least(NamedTuple):
+    """Of a least move the rows that hold (m,), and how many unknowns and measured coordinates the equations have."""
+
+    held: Flags
+    unknowns: int
+    coordinates: int
+
+
 class Moved(NamedTuple):
-    """What unknowns (n, p) and multipliers (m, p) change by a unit of each parameter, scaled, and their units."""
+    """What unknowns and multipliers (n + m, p) change by a unit of each parameter, scaled, and their units.
+
+    Multipliers of a least move are computed from its equations (`derivatives/linearized.py`) when they are read.
+    """
 
     layout: Layout
-    steps: Array
-    forces: Array
+    numbers: Array
     scale: float
     unit: float
+    least: Least | None = None
+    equations: Array | None = None
+
+    def forces(self) -> Array:
+        """What multipliers (m, p) change by."""
+        m, p = len(self.layout.lengths), self.numbers.shape[1]
+        if self.least is None or self.equations is None:
+            return self.numbers[len(self.numbers) - m :]
+        held, n, e = self.least
+        ends = np.cumsum([(m + e) * n, n * n, m * p])
+        rows, hessian, rows_by = np.split(self.equations[: ends[-1]], ends[:-1])
+        system = System(rows.reshape(-1, n)[:m], hessian.reshape(n, n), rows_by.reshape(m, p), np.zeros((n, p)), True)
+        return solve_system(system, held).forces
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,14 +154,14 @@ class Sensitivity(ReadOnlyArrays):
         moved = self._moved
         scales = np.repeat([moved.scale, 1.0], 3)
         none = np.zeros((6, len(self.wrt)))
-        blocks = [moved.steps[6 * k : 6 * k + 6] if k >= 0 else none for k in moved.layout.blocks]
+        blocks = [moved.numbers[6 * k : 6 * k + 6] if k >= 0 else none for k in moved.layout.blocks]
         return {name: read_only(block.T * scales) for name, block in zip(moved.layout.bodies, blocks, strict=True)}
 
     @cached_property
     def multipliers(self) -> Mapping[str, Array]:
         """Derivatives of `Solution.multipliers`: of every constraint, by name, (rows, p)."""
         moved, layout = self._moved, self._moved.layout
-        forces = moved.forces * moved.unit
+        forces = moved.forces() * moved.unit
         forces = np.where(layout.lengths[:, None], forces / moved.scale, forces)
         return {name: read_only(forces[rows]) for name, rows in zip(layout.constraints, layout.spans, strict=True)}
 
