@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly._progress import Progress
 from assembly.errors import InputError
-from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.changes import changes
 from assembly.kinematics.pose import pose_rows
 from assembly.solve.interruption import CTRL_C, Interruption
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from assembly.solve.diagnosis.mobility import Mobility
     from assembly.studies.batches.result import Batch
     from assembly.studies.multistart import Executor
+    from assembly.tracking.hands import Followable
     from assembly.tracking.tracker import Tracker
 
 __all__ = ["Assembly"]
@@ -232,12 +232,13 @@ class Assembly(Solving):
 
         return poses_at(self, values)
 
-    def tracker(self, follow: Point | Frame | Body | Sequence[Point | Frame | Body], **options: Any) -> Tracker:
-        """A tracker that makes a point or a frame of a body, or several of them, follow targets.
+    def tracker(self, follow: Followable | Sequence[Followable], **options: Any) -> Tracker:
+        """A tracker that makes a point or a frame of a body, a joint's coordinate, or several of them follow targets.
 
         Parameters
         ----------
-        follow : Point, Frame or Body, or a list of them
+        follow : Point, Frame, Body or Freedom, or a list of them
+            A `Freedom` is a joint's coordinate, `joint.coordinate("angle")`.
         **options
             See `Tracker`.
         """

@@ -18,8 +18,14 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 ROOT = Path(__file__).resolve().parent.parent
 
 # The first example of a test may compile kernels, so no deadline; the same examples in every run,
-# so that a failure is one for everybody.
-hypothesis.settings.register_profile("assembly", deadline=None, derandomize=True, max_examples=50)
+# so that a failure is one for everybody. How long examples take to draw says how busy the machine is.
+hypothesis.settings.register_profile(
+    "assembly",
+    deadline=None,
+    derandomize=True,
+    max_examples=50,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+)
 hypothesis.settings.register_profile("long", hypothesis.settings.get_profile("assembly"), max_examples=150)
 hypothesis.settings.load_profile("assembly")
 

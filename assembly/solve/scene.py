@@ -78,6 +78,8 @@ class Scene:
             records = table[table[TERM_TABLE] :][: TERM * table[TERMS]].reshape(-1, TERM)
             sizes = {POINT_DISTANCE: 7, POSTURE: POSTURE_PARAMETERS}
             places = [np.arange(sizes.get(kind, 0)) + at for kind, _, at, *_ in records.tolist()]
+            for term, (weight_at, *numbers_at) in packed._coordinates:
+                places += [np.array([weight_at]), *(np.arange(len(term.numbers)) + at for at in numbers_at)]
             found = np.concatenate([*places, np.empty(0, dtype=np.int64)]).astype(np.int64)
             # Of one term it is a slice, which is read in less time.
             is_one = len(found) > 0 and bool((np.diff(found) == 1).all())

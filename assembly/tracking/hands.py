@@ -1,4 +1,4 @@
-"""Targets of a tracker: springs that draw points and frames from tick to tick."""
+"""Hands of a tracker: springs that draw points and frames from tick to tick, one or several."""
 
 from __future__ import annotations
 
@@ -9,46 +9,20 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.assembly import Assembly
-from assembly.constraints.model.objectives import FrameDistance, PointDistance
+from assembly.constraints.model.constraint import Freedom
+from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance
 from assembly.constraints.packing.scene import Packed
-from assembly.errors import FARTHEST, InputError, positive
+from assembly.errors import FARTHEST, InputError
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
 from assembly.tracking.trace import Trace
 
-__all__ = ["Followable", "Hand", "Hands", "SeveralHands", "Targets", "new_hands", "springs", "with_hands"]
+__all__ = ["Followable", "Hand", "Hands", "SeveralHands", "SpringNumbers", "Targets"]
 
 Array = NDArray[np.float64]
-Followable: TypeAlias = Point | Frame | Body
+Followable: TypeAlias = Point | Frame | Body | Freedom
 # Of one hand, or of each of several.
 Targets: TypeAlias = Array | tuple[Array, ...]
-
-
-def springs(follow: Followable | Sequence[Followable], stiffness: float | Sequence[float]) -> list[float]:
-    """Weights of the terms of what hands hold: half their stiffness.
-
-    Raises
-    ------
-    InputError, TypeError
-        Nothing held, something that cannot be, or not one stiffness for all or for each.
-    """
-    if not isinstance(follow, (list, tuple)):
-        if not isinstance(follow, (Point, Frame, Body)):
-            raise TypeError(f"follow is {follow!r}; expected a Point, a Frame, a Body or a list of them")
-        return [0.5 * positive("stiffness", stiffness)]
-    if not follow:
-        raise InputError("follow is empty; expected a Point, a Frame or a Body at least")
-    for k, held in enumerate(follow):
-        if not isinstance(held, (Point, Frame, Body)):
-            raise TypeError(f"follow[{k}] is {held!r}; expected a Point, a Frame or a Body")
-    if not isinstance(stiffness, (list, tuple, np.ndarray)) or np.ndim(stiffness) == 0:
-        return [0.5 * positive("stiffness", stiffness)] * len(follow)
-    if len(stiffness) != len(follow):
-        raise InputError(
-            f"stiffness has {len(stiffness)} numbers; expected one, or one for each of {len(follow)} hands"
-        )
-    return [0.5 * positive(f"stiffness[{k}]", value) for k, value in enumerate(stiffness)]
 
 
 def _row_of(target: ArrayLike | Pose, size: int, far: float) -> Array | None:
@@ -88,7 +62,7 @@ class Hand:
         The spring.
     """
 
-    def __init__(self, follow: Followable, place: int, row: Array, weight: float) -> None:
+    def __init__(self, follow: Point | Frame | Body, place: int, row: Array, weight: float) -> None:
         pose = Pose(row[:3], row[3:])
         term: PointDistance | FrameDistance
         if isinstance(follow, Point):
@@ -97,7 +71,7 @@ class Hand:
             term = FrameDistance(follow, pose, weight=weight)
             term.target = pose @ Pose(term.frame.origin, axes_quaternion(term.frame.axes))
         self.follow: Followable | tuple[Followable, ...] = follow
-        self.terms = (term,)
+        self.terms: tuple[Objective, ...] = (term,)
         self._term, self._place = term, place
         # What is held now, or None, and by which spring; only one of several hands changes these.
         self._held: Followable | None = follow
@@ -122,21 +96,21 @@ class Hand:
     @property
     def stiffness(self) -> float | list[float]:
         """Force over distance."""
-        return 2.0 * self._term.weight
+        return 2.0 * self.terms[0].weight
 
     def where(self) -> Targets:
         """The target that the loop has."""
         term = self._term
-        return term._target if isinstance(term, PointDistance) else term.target.q
+        return term._target if isinstance(term, PointDistance) else term.target.q[: self._size]
 
     def aimed(self, target: Any) -> Targets | None:
         """The target as an array, after the loop was told; None for what is none."""
         try:
-            row = _row_of(target, self._size, self._far)
+            row = self.checked(target)
             if row is None:
                 return None
             if not self._writes:
-                self._aim_term(row)
+                self.aim(self.read(row))
         except Exception:  # whatever a target of the user's own does when it is read
             return None
         if self._writes:
@@ -149,18 +123,77 @@ class Hand:
             self._packed.refresh()
         return row
 
-    def _aim_term(self, row: Array) -> None:
-        term = self._term
-        if isinstance(term, PointDistance):
-            term._target = row
-        else:
-            term.target = Pose(row[:3], row[3:])
-
     def recorded(self, trace: Any) -> tuple[Array, Sequence[Any]]:
         """Times (k,) and targets of a recorded hand."""
         if not isinstance(trace, Trace):
             raise TypeError(f"trace is {trace!r}; expected a Trace")
         return trace.times, list(trace.targets)
+
+    def checked(self, target: Any) -> Array | None:
+        """The target as an array; None for what is none."""
+        return _row_of(target, self._size, self._far)
+
+    def read(self, row: Array) -> Any:
+        """A target that was checked as the term takes it; raises where it is no pose."""
+        term = self._term
+        if isinstance(term, PointDistance):
+            return row
+        return Pose(row, term.target.quaternion) if len(row) == 3 else Pose(row[:3], row[3:])
+
+    def aim(self, target: Any) -> None:
+        """Draw to a target that was read, from the next time on that the scene is read."""
+        term = self._term
+        if isinstance(term, PointDistance):
+            term._target = target
+        else:
+            term.target = target
+
+    def numbers_in(self, packed: Packed) -> SpringNumbers:
+        """Where the loop has the numbers of the spring."""
+        return SpringNumbers(packed, self._term)
+
+    def can_hold(self, k: int, follow: Followable) -> Followable:
+        """What hand k, this one, may hold instead.
+
+        Raises
+        ------
+        InputError
+            Something of another body, or what its spring cannot draw.
+        """
+        body = self._term.bodies[0]
+        if isinstance(follow, Freedom) or (follow if isinstance(follow, Body) else follow.body) is not body:
+            raise InputError(f"follow is {follow!r}; expected something of body {body.name!r}, which hand {k} holds")
+        if isinstance(self._term, PointDistance) and not isinstance(follow, Point):
+            raise InputError(f"follow is {follow!r}; expected a Point, which is what hand {k} was made with")
+        return follow
+
+    def take(self, held: Followable | None, stiffness: float, q: Array) -> None:
+        """Hold something else from now on, at rest, bodies at q (n, 7)."""
+        self._held, self._spring, term = held, stiffness, self._term
+        self._size = 3 if isinstance(held, Point) else 7
+        if isinstance(held, Point) or held is None:
+            self.rest(q)
+        elif isinstance(term, FrameDistance):
+            assert not isinstance(held, Freedom)
+            term._frame = held.frame() if isinstance(held, Body) else held
+            self.begin_anew(q)
+
+    def begin_anew(self, q: Array) -> None:
+        """Have the term at rest as it is, whatever is held, bodies at q (n, 7)."""
+        term, pose = self._term, Pose(q[self._place, :3], q[self._place, 3:])
+        if isinstance(term, PointDistance):
+            term._target = pose.apply(term.point.coordinates)
+        else:
+            term.target = pose @ Pose(term.frame.origin, axes_quaternion(term.frame.axes))
+
+    def rest(self, q: Array) -> None:
+        """Have the target of a point that is held where that is, bodies at q (n, 7)."""
+        held = self._held
+        if isinstance(held, Point):
+            self.aim(self.read(Pose(q[self._place, :3], q[self._place, 3:]).apply(held.coordinates)))
+
+    def check_recorded(self) -> None:
+        """Raise an InputError where no trace has targets of this hand."""
 
     def wrenches(self, q: Array, targets: Targets) -> Array:
         """Force and torque of the spring on the hand, (1, 6), bodies at q (n, 7)."""
@@ -175,7 +208,7 @@ class Hand:
         pose = Pose(q[self._place, :3], q[self._place, 3:])
         if isinstance(held, Point):
             return np.append(stiffness * (pose.apply(held.coordinates) - target), np.zeros(3))
-        assert isinstance(term, FrameDistance)
+        assert isinstance(term, FrameDistance) and not isinstance(held, Freedom)
         frame = held.frame() if isinstance(held, Body) else held
         force = stiffness * (pose.apply(frame.origin) - target[:3])
         turn = rotation_matrix(pose.quaternion) @ frame.axes @ rotation_matrix(target[3:]).T
@@ -185,21 +218,23 @@ class Hand:
 
 
 class SeveralHands:
-    """Hands that hold a scene at once; parameters are those of `Hand`, one for each.
+    """Hands that hold a scene at once.
 
     Each may hold something else of its body later on, or nothing: `Tracker.hold`.
 
+    Parameters
+    ----------
+    hands : list of Hand
+
     Attributes
     ----------
-    terms : tuple of PointDistance or FrameDistance
+    terms : tuple of PointDistance, FrameDistance or CoordinateDistance
         The springs.
     """
 
-    def __init__(
-        self, follow: Sequence[Followable], places: Sequence[int], rows: Sequence[Array], weights: Sequence[float]
-    ) -> None:
-        self._hands = [Hand(*each) for each in zip(follow, places, rows, weights, strict=True)]
-        self.terms = tuple(hand._term for hand in self._hands)
+    def __init__(self, hands: list[Hand]) -> None:
+        self._hands = hands
+        self.terms = tuple(hand.terms[0] for hand in self._hands)
         self._packed: Packed | None = None
         self._springs: list[SpringNumbers] = []
 
@@ -215,51 +250,35 @@ class SeveralHands:
     def pack(self, packed: Packed) -> None:
         """Take how far targets may be, which the scene itself writes, and where the numbers of the springs are."""
         if packed is not self._packed:
-            self._springs = [SpringNumbers(packed, term) for term in self.terms]
-        self._packed, self._far = packed, FARTHEST * packed.scale
+            self._springs = [hand.numbers_in(packed) for hand in self._hands]
+        self._packed = packed
         for hand, numbers in zip(self._hands, self._springs, strict=True):
+            hand._far = FARTHEST * packed.scale
             numbers.write(hand._held, hand._spring)
 
-    def holding(self, k: int, held: Followable | None, stiffness: float, row: Array) -> SeveralHands:
-        """The same hands, one of which holds something else from now on, at rest; its body is at (7,)."""
+    def can_hold(self, k: int, follow: Followable) -> Followable:
+        """What hand k may hold; raises as `Hand.can_hold` does."""
+        return self._hands[k].can_hold(k, follow)
+
+    def holding(self, k: int, held: Followable | None, stiffness: float, q: Array) -> SeveralHands:
+        """The same hands, one of which holds something else from now on, at rest; bodies are at q (n, 7)."""
         hands, hand = copy(self), copy(self._hands[k])
         hands._springs = self._springs
         hands._hands = [*self._hands[:k], hand, *self._hands[k + 1 :]]
-        hand._held, hand._spring, term = held, stiffness, hand._term
-        hand._size = 3 if isinstance(held, Point) else 7
-        pose = Pose(row[:3], row[3:])
-        if isinstance(term, PointDistance):
-            if isinstance(held, Point):
-                term._target = pose.apply(held.coordinates)
-        elif isinstance(held, Point):
-            term.target = Pose(pose.apply(held.coordinates), term.target.quaternion)
-        elif held is not None:
-            term._frame = held.frame() if isinstance(held, Body) else held
-            term.target = pose @ Pose(term.frame.origin, axes_quaternion(term.frame.axes))
+        hand.take(held, stiffness, q)
         self._springs[k].write(held, stiffness)
         return hands
 
     def at_rest(self, q: Array) -> None:
         """Have every hand hold what its tracker was made with, at rest, bodies at q (n, 7); until `pack`."""
         for hand, numbers in zip(self._hands, self._springs, strict=True):
-            term, pose = hand._term, Pose(q[hand._place, :3], q[hand._place, 3:])
-            if isinstance(term, PointDistance):
-                term._target = pose.apply(term.point.coordinates)
-                numbers.write(term.point, 2.0 * term.weight)
-            else:
-                term.target = pose @ Pose(term.frame.origin, axes_quaternion(term.frame.axes))
-                numbers.write(term.frame, 2.0 * term.weight)
+            hand.begin_anew(q)
+            numbers.restore()
 
     def take_targets(self, q: Array) -> None:
         """Have every hand at rest where it holds, bodies at q (n, 7)."""
         for hand in self._hands:
-            term, held = hand._term, hand._held
-            if isinstance(term, FrameDistance) and isinstance(held, Point):
-                pose = Pose(q[hand._place, :3], q[hand._place, 3:])
-                term.target = Pose(pose.apply(held.coordinates), term.target.quaternion)
-            elif isinstance(held, Point):
-                assert isinstance(term, PointDistance)
-                term._target = Pose(q[hand._place, :3], q[hand._place, 3:]).apply(held.coordinates)
+            hand.rest(q)
 
     @property
     def stiffness(self) -> float | list[float]:
@@ -268,9 +287,7 @@ class SeveralHands:
 
     def where(self) -> Targets:
         """The targets that the loop has."""
-        return tuple(
-            np.asarray(hand._term._target if isinstance(hand._held, Point) else hand.where()) for hand in self._hands
-        )
+        return tuple(np.asarray(hand.where()) for hand in self._hands)
 
     def aimed(self, targets: Any) -> Targets | None:
         """The targets as arrays, after the loop was told all of them; None, and none told, where one is none."""
@@ -279,19 +296,14 @@ class SeveralHands:
                 return None
             pairs = list(zip(targets, self._hands, strict=True))
             # Whatever is said to a hand that holds nothing, nothing is drawn there.
-            rows = [None if hand._held is None else _row_of(target, hand._size, self._far) for target, hand in pairs]
-            if any(row is None and hand._held is not None for row, hand in zip(rows, self._hands, strict=True)):
-                return None
-            poses = [None if row is None or len(row) != 7 else Pose(row[:3], row[3:]) for row in rows]
+            held = [(hand, hand.checked(target)) for target, hand in pairs if hand._held is not None]
+            told = [(hand, hand.read(row)) for hand, row in held if row is not None]
         except Exception:  # whatever targets of the user's own do when they are read
             return None
-        for term, row, pose in zip(self.terms, rows, poses, strict=True):
-            if row is None:
-                continue
-            if isinstance(term, PointDistance):
-                term._target = row
-            else:
-                term.target = Pose(row, term.target.quaternion) if pose is None else pose
+        if len(told) < len(held):
+            return None
+        for hand, read in told:
+            hand.aim(read)
         assert self._packed is not None
         self._packed.refresh()
         return self.where()
@@ -302,6 +314,8 @@ class SeveralHands:
             raise TypeError(f"trace is {trace!r}; expected a Trace for each of {len(self.terms)} hands")
         if len(trace) != len(self.terms):
             raise InputError(f"trace has {len(trace)} traces; expected one for each of {len(self.terms)} hands")
+        for hand in self._hands:
+            hand.check_recorded()
         for k, each in enumerate(trace):
             if not np.array_equal(each.times, trace[0].times):
                 raise InputError(f"trace[{k}] has other times than trace[0]; expected the same: resample them")
@@ -316,7 +330,7 @@ class SpringNumbers:
     """Where the loop has the numbers of a spring: its weights, and the point of the body that it draws."""
 
     def __init__(self, packed: Packed, term: PointDistance | FrameDistance) -> None:
-        self._pool, self._scale, self._weight = packed.pool, packed.scale, term.weight
+        self._pool, self._scale, self._weight, self._term = packed.pool, packed.scale, term.weight, term
         # Before the target are the weight and the point.
         self._at = next(at for target, at in packed._targets if target is term) - 4
         turns = [at for target, at in packed._turns if target is term]
@@ -324,6 +338,11 @@ class SpringNumbers:
         # As they were packed, for the stiffness that the term has.
         self._drawn = float(self._pool[self._at])
         self._turned = 0.0 if self._turn_at is None else float(self._pool[self._turn_at])
+
+    def restore(self) -> None:
+        """Have the spring draw what its term says."""
+        term = self._term
+        self.write(term.point if isinstance(term, PointDistance) else term.frame, 2.0 * self._weight)
 
     def write(self, held: Followable | None, stiffness: float) -> None:
         """Have the spring draw what is held; nothing for None."""
@@ -339,42 +358,3 @@ class SpringNumbers:
 
 
 Hands: TypeAlias = Hand | SeveralHands
-
-
-def new_hands(
-    bodies: Sequence[Body], follow: Followable | Sequence[Followable], poses: Array, weights: Sequence[float]
-) -> Hands:
-    """The hands that hold bodies at poses (n, 7).
-
-    Raises
-    ------
-    InputError
-        A body that is not one of these, or does not move.
-    """
-    several = not isinstance(follow, (Point, Frame, Body))
-    held = [follow] if isinstance(follow, (Point, Frame, Body)) else list(follow)
-    places = []
-    for k, item in enumerate(held):
-        body = item if isinstance(item, Body) else item.body
-        if body not in bodies:
-            name = f"follow[{k}]" if several else "follow"
-            raise InputError(f"{name} is of body {body.name!r}; expected one of {[body.name for body in bodies]}")
-        if body.fixed:
-            name = f"follow[{k}]" if several else "follow"
-            raise InputError(f"{name} is of body {body.name!r}, which is fixed; expected a body that moves")
-        places.append(bodies.index(body))
-    if not several:
-        return Hand(held[0], places[0], poses[places[0]], weights[0])
-    return SeveralHands(held, places, [poses[place] for place in places], weights)
-
-
-def with_hands(scene: Assembly, hands: Hands) -> Assembly:
-    """The same scene with the hands' springs among its objectives."""
-    inner = Assembly(scene.bodies)
-    inner._take_constraints(scene.constraints)
-    for sign, objective in scene.objectives:
-        (inner.minimize if sign > 0.0 else inner.maximize)(objective)
-    inner.minimize(*hands.terms)
-    # Solids that lie on each other go on doing so.
-    inner._corners = scene._corners
-    return inner

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import read_only
 from assembly.assembly import Assembly
-from assembly.constraints.model.constraint import structure_changes
-from assembly.constraints.model.objectives import PointDistance
+from assembly.constraints.model.constraint import Freedom, structure_changes
 from assembly.constraints.packing.scene import MOST_CROWDING
 from assembly.constraints.program.records import CLOCK_AT
 from assembly.errors import InputError, integer, number, positive
@@ -42,8 +41,9 @@ from assembly.solve.loop.settings import (
 from assembly.solve.options import Options
 from assembly.solve.scene import Status
 from assembly.solve.solution import Solution
-from assembly.tracking.hands import Followable, SeveralHands, new_hands, springs, with_hands
+from assembly.tracking.hands import Followable, SeveralHands
 from assembly.tracking.log import TrackLog
+from assembly.tracking.new_hands import new_hands, springs, with_hands
 from assembly.tracking.tick import Step, TrackStatus
 from assembly.tracking.tick_memory import TickMemory, forget_updates
 from assembly.tracking.trace import Trace
@@ -87,7 +87,7 @@ def _tick_settings(limit: float, iterations: int, second_order: bool) -> Array:
 
 
 class Tracker(TickMemory):
-    """Makes points or frames of bodies follow targets; made by `Assembly.tracker`.
+    """Makes points or frames of bodies, or coordinates of joints, follow targets; made by `Assembly.tracker`.
 
     Every tick is a few steps of the loop that `solve` runs, from the pose and the multipliers of the tick before. A
     spring draws the point to its target with `stiffness` times the distance, and the constraints hold all the time.
@@ -99,13 +99,15 @@ class Tracker(TickMemory):
     scene : Assembly
         Its present bodies, constraints and objectives; driven values and limits may change between ticks, but none may
         be added or removed.
-    follow : Point, Frame or Body, or a list of them
-        What follows the target, or a list of several. The target of a `Point` is a point (3,), that of the others a
-        pose (7,) or a `Pose`; for a list it is a sequence of targets in its order.
+    follow : Point, Frame, Body or Freedom, or a list of them
+        What follows the target, or a list of several. The target of a `Point` is a point (3,), that of a `Freedom`, as
+        in `joint.coordinate("angle")`, a number, that of the others a pose (7,) or a `Pose`; for a list it is a
+        sequence of targets in its order. Coordinates are angles about an axis or ways along one, without a value.
     q0 : (n, 7) or Solution, optional
         Where to begin; by default the bodies' poses. The constraints are solved from there, with the target at rest.
     stiffness : float or sequence of float
-        Force over distance; one for each target, or one for all.
+        Force over distance; one for each target, or one for all. Of a turn it is that of a spring which acts half the
+        size of the turned body from its axis.
     budget : float, optional
         Seconds after which the compiled loop of a tick begins no further step or update; the next tick continues with
         what is not done. The proof under a `Clearance` is not counted. Without a budget a tick takes as long as it
@@ -151,7 +153,7 @@ class Tracker(TickMemory):
         self._scene_given = scene
         self._touching = touching
         poses = _begin(scene, q0, touching)
-        self._hands = new_hands(scene.bodies, follow, poses, weights)
+        self._hands = new_hands(scene, follow, poses, weights)
         self._inner = inner = with_hands(scene, self._hands)
         # A solve packs anew where contacts found no place: what it ends with is what ticks go on with.
         first = _held_to(inner.solve(poses, touching=touching))
@@ -189,8 +191,9 @@ class Tracker(TickMemory):
         ----------
         hand : int
             Which one, in the order of what the tracker was made with.
-        follow : Point, Frame, Body or None
-            Of the same body. A hand that was made with a point holds points, other ones hold anything.
+        follow : Point, Frame, Body, Freedom or None
+            Of the same body. A hand that was made with a point holds points, one that was made with a coordinate that
+            coordinate, other ones hold points and frames.
         stiffness : float
 
         Raises
@@ -201,16 +204,11 @@ class Tracker(TickMemory):
         if not isinstance(self._hands, SeveralHands):
             raise InputError("the tracker has a single hand; expected one that was made with a list")
         k = integer("hand", hand, 0, len(self._hands.terms) - 1)
-        term, spring = self._hands.terms[k], positive("stiffness", stiffness)
-        if follow is not None and not isinstance(follow, (Point, Frame, Body)):
-            raise TypeError(f"follow is {follow!r}; expected a Point, a Frame, a Body or None")
-        body = term.bodies[0]
-        if follow is not None and (follow if isinstance(follow, Body) else follow.body) is not body:
-            raise InputError(f"follow is {follow!r}; expected something of body {body.name!r}, which hand {k} holds")
-        if isinstance(term, PointDistance) and follow is not None and not isinstance(follow, Point):
-            raise InputError(f"follow is {follow!r}; expected a Point, which is what hand {k} was made with")
-        place = self._scene_given.bodies.index(body)
-        self._hands = self._hands.holding(k, follow, spring, self.q[place])
+        spring = positive("stiffness", stiffness)
+        if follow is not None and not isinstance(follow, (Point, Frame, Body, Freedom)):
+            raise TypeError(f"follow is {follow!r}; expected a Point, a Frame, a Body, a joint's coordinate or None")
+        held = None if follow is None else self._hands.can_hold(k, follow)
+        self._hands = self._hands.holding(k, held, spring, self.q)
         self._followed = replace(self._followed, hands=self._hands)
 
     def restart(self, q0: ArrayLike | Solution) -> None:
@@ -258,9 +256,10 @@ class Tracker(TickMemory):
 
         Parameters
         ----------
-        target : (3,), (7,) or Pose
-            A point, or a pose for a frame. For several a sequence of targets, anything for one that holds nothing; if
-            another one is invalid, nothing moves.
+        target : (3,), (7,), Pose or float
+            A point, a pose for a frame, or a number for a coordinate; an angle is turned to it the shorter way round.
+            For several a sequence of targets, anything for one that holds nothing; if another one is invalid, nothing
+            moves.
         """
         begin = perf_counter()
         packed = self._packed

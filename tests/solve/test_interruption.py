@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -72,7 +71,8 @@ def test_asking_changes_nothing(scene, whole):
 
 
 def test_a_callback_ends_a_solve_at_a_pose_that_holds(scene, whole):
-    solution = scene.solve(**LIMIT, callback=lambda iteration, objective, feasibility: True)
+    # Where the machine is busy with something else the first question may come before the first step.
+    solution = scene.solve(**LIMIT, callback=lambda iteration, objective, feasibility: iteration > 0)
     assert solution.status is asm.Status.STOPPED and not solution.success
     assert 0 < solution.iterations < whole.iterations
     # The start holds, so there is one.
@@ -119,30 +119,37 @@ def test_a_callback_may_solve(scene, whole):
 @pytest.mark.parametrize("options", [{}, {"time_limit": 100.0}, {"callback": print}], ids=str)
 def test_ctrl_c_ends_a_solve(scene, whole, options, ctrl_c):
     timer = threading.Timer(0.3 * whole.seconds, lambda: os.kill(os.getpid(), signal.SIGINT))
-    timer.start()
-    begin = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
+        # Within: however late it is, the signal comes to nobody else. A thousand solves take many minutes.
+        timer.start()
         for _ in range(1000):  # also where the machine is so quick that a solve was over before
             scene.solve(**LIMIT, **options)
-    assert time.perf_counter() - begin < 100.0
     timer.join()
     np.testing.assert_array_equal(scene.solve(**LIMIT).q, whole.q)
 
 
 def test_ctrl_c_ends_solves_of_many_starts(scene, whole, ctrl_c, caplog):
-    timer = threading.Timer(1.5 * whole.seconds, lambda: os.kill(os.getpid(), signal.SIGINT))
-    timer.start()
+    timer = threading.Timer(0.5 * whole.seconds, lambda: os.kill(os.getpid(), signal.SIGINT))
+
+    def begin(done, total):
+        """Start the timer after the first solve, while there are many to come."""
+        if done and timer.ident is None:
+            timer.start()
+
     # What was found until then is returned, and that it is not all is said.
-    found = scene.solve_all(starts=1000, **LIMIT)
+    found = scene.solve_all(starts=1000, progress=begin, **LIMIT)
     timer.join()
-    assert all(solution.success for solution in found)
+    assert found and all(solution.success for solution in found)
     (said,) = [record for record in caplog.records if "was interrupted" in record.message]
     assert said.args[0] < 1000
 
 
 def test_solves_of_many_starts_have_one_time_limit():
-    # A million starts take minutes; the first few take milliseconds.
-    found = long_arm(2).solve_all(starts=10**6, time_limit=0.5)
+    # A million starts take minutes; the first few take milliseconds, and longer where the machine is busy.
+    for limit in (0.5, 5.0, 50.0):
+        found = long_arm(2).solve_all(starts=10**6, time_limit=limit)
+        if found:
+            break
     assert found and all(solution.success for solution in found)
 
 
@@ -251,8 +258,10 @@ def test_an_update_that_is_thrown_away_ends_at_once(crowded):
     states: list[np.ndarray] = []
 
     def callback(iteration, objective, feasibility):
-        states.append(asked.watched[0])
-        raise LookupError
+        # The first question may come before the first pair, where the machine is busy with something else.
+        if seen(packed, asked.watched[0]) > 0:
+            states.append(asked.watched[0])
+            raise LookupError
 
     asked = interruption.Interruption(callback=callback)
     with pytest.raises(LookupError):
@@ -277,8 +286,12 @@ def test_what_is_waited_for():
 
 def test_ctrl_c_ends_what_is_waited_for(ctrl_c):
     done = threading.Event()
-    timer = threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT))
-    timer.start()
+
+    def compute():
+        os.kill(os.getpid(), signal.SIGINT)
+        done.wait(60.0)
+
     with pytest.raises(KeyboardInterrupt):
-        interruption.CTRL_C.wait_for("a rest", lambda: done.wait(60.0))
+        interruption.CTRL_C.wait_for("a rest", compute)
+    assert not done.is_set()
     done.set()

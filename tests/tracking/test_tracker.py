@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 import pytest
@@ -182,9 +182,10 @@ def test_a_spent_budget_returns_a_pose_that_holds():
     tracker = clips(budget=1e-9, iterations=50)
     first = tracker.q
     target = first[2, :3] + [5.0, 5.0, -20.0]
-    begin = perf_counter()
+    begin = process_time()
     steps = [tracker.step(target) for _ in range(5)]
-    assert perf_counter() - begin < 5.0
+    # Of this process: others may have the machine meanwhile.
+    assert process_time() - begin < 5.0
     for step in steps:
         # One step of the loop was all there was time for: from where it did not hold there is no way but back.
         assert step.status in (TrackStatus.LATE, TrackStatus.HELD)

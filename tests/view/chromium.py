@@ -93,6 +93,9 @@ class Chromium:
         self._ask("Page.enable", session)
         self._ask("Page.navigate", session, url=bare.as_uri() + fragment)
         self._wait("Page.loadEventFired")
+        # Virtual time does not wait for other threads, which may unpack the viewer.
+        drawn = 'typeof drawn === "undefined" ? 0 : drawn.then(() => 0)'
+        self._ask("Runtime.evaluate", session, expression=drawn, awaitPromise=True)
         self._ask("Emulation.setVirtualTimePolicy", session, policy="pauseIfNetworkFetchesPending", budget=BUDGET)
         self._wait("Emulation.virtualTimeBudgetExpired")
         yield session

@@ -49,7 +49,7 @@ class Balance(HTMLParser):
 def outputs():
     cells = [nbformat.v4.new_code_cell(text) for text in (SCENE, *CELLS)]
     book = nbformat.v4.new_notebook(cells=cells)
-    nbclient.NotebookClient(book, timeout=300, kernel_name="python3").execute()
+    nbclient.NotebookClient(book, timeout=300, startup_timeout=300, kernel_name="python3").execute()
     return {cell.source: cell.outputs[-1]["data"] for cell in book.cells[1:]}
 
 

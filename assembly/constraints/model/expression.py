@@ -7,7 +7,7 @@ at t = 0, and the Hessian is that of y . v for multipliers y. `geometry/expressi
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -25,7 +25,7 @@ from assembly.kinematics.pose import pose_rows
 if TYPE_CHECKING:
     import casadi as ca
 
-__all__ = ["Expression", "Tape", "Tapes"]
+__all__ = ["Expression", "Tape", "Tapes", "derived_tapes"]
 
 Array = NDArray[np.float64]
 _BINARY = frozenset(
@@ -144,21 +144,7 @@ class Expression(Constraint, Objective):
 
         Neither divided by the scale nor multiplied by the weight.
         """
-        import casadi as ca
-
-        bodies, count = len(self.bodies), self.count
-        x, y = ca.SX.sym("x", 7 * bodies), ca.SX.sym("y", count)
-        t = ca.SX.sym("t", 6 * bodies)
-        moved = [_retracted(x[7 * k : 7 * k + 7], t[6 * k : 6 * k + 6]) for k in range(bodies)]
-        values = self._expanded(ca.vertcat(*moved))
-        jacobian = ca.jacobian(values, t)
-        hessian, _ = ca.hessian(ca.dot(y, values), t)
-        rows, upper = ca.substitute(
-            [ca.vertcat(values, ca.vec(jacobian.T)), ca.triu(hessian)], [t], [ca.SX.zeros(6 * bodies)]
-        )
-        return Tapes(
-            packed(compact("rows", x, rows)), packed(compact("hessian", ca.vertcat(x, y), ca.vec(ca.triu2symm(upper))))
-        )
+        return derived_tapes(self._expanded, len(self.bodies), self.count)
 
     def document(self) -> str:
         """The function as text, one line per instruction, for files; `from_document` reads it.
@@ -254,6 +240,44 @@ def _expanded(function: ca.Function) -> ca.Function:
     for _ in instructions(expanded):
         pass  # names an instruction that tapes do not have
     return expanded
+
+
+def derived_tapes(
+    function: Callable[[ca.SX], ca.SX],
+    bodies: int,
+    count: int,
+    symbols: ca.SX | None = None,
+    numbers: Sequence[float] = (),
+) -> Tapes:
+    """Values and derivatives of a function of one column of poses.
+
+    Parameters
+    ----------
+    function : callable
+        SX (7 b,) -> SX (m,).
+    bodies, count : int
+        b and m.
+    symbols : SX, optional
+        What else the values depend on; these are the first constants of both lists.
+    numbers : sequence of float
+        What they are at first.
+    """
+    import casadi as ca
+
+    x, y = ca.SX.sym("x", 7 * bodies), ca.SX.sym("y", count)
+    t = ca.SX.sym("t", 6 * bodies)
+    given = ca.SX(0, 1) if symbols is None else symbols
+    moved = [_retracted(x[7 * k : 7 * k + 7], t[6 * k : 6 * k + 6]) for k in range(bodies)]
+    values = function(ca.vertcat(*moved))
+    jacobian = ca.jacobian(values, t)
+    hessian, _ = ca.hessian(ca.dot(y, values), t)
+    rows, upper = ca.substitute(
+        [ca.vertcat(values, ca.vec(jacobian.T)), ca.triu(hessian)], [t], [ca.SX.zeros(6 * bodies)]
+    )
+    return Tapes(
+        packed(compact("rows", ca.vertcat(x, given), rows), numbers),
+        packed(compact("hessian", ca.vertcat(x, y, given), ca.vec(ca.triu2symm(upper))), numbers),
+    )
 
 
 def _retracted(pose: ca.SX, twist: ca.SX) -> ca.SX:

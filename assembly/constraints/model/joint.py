@@ -179,6 +179,10 @@ class Joint(OwnState, RowConstraint):
         known = ", ".join(map(repr, self._freedoms)) or "none, the joint leaves no coordinate free"
         raise InputError(f"name is {name!r}; expected a coordinate of {self.name!r}: {known}")
 
+    def coordinate(self, name: str | None = None) -> Freedom:
+        """The same as `freedom`."""
+        return self.freedom(name)
+
     @property
     def equations(self) -> tuple[Equation, ...]:
         """Rows now: the joint's own, then driven values, then limits, both in the order of the coordinates."""

@@ -105,6 +105,9 @@ class NumberPlaces:
             if key in self._bodies or key in self._tips or key in self._placed:
                 return None
             if key in self._frames:
+                if packed._coordinates:
+                    # The instructions that draw a coordinate have the numbers of its frames.
+                    return None
                 frames.append(key)
             elif key in self._contacts:
                 if self._has_corners or packed.clearances:

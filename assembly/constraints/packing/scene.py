@@ -310,6 +310,10 @@ class Packed(WrittenScene):
         for frame_distance, at in self._turns:
             asked.append(frame_distance.target)
             pool[at : at + 4] = frame_distance.body_quaternion
+        for term, (_, *places) in self._coordinates:
+            numbers = term.numbers
+            for at in places:
+                pool[at : at + len(numbers)] = numbers
 
     def ask_for(self, asked: Asked) -> None:
         """Set values and targets of the scene's constraints and objectives, and write them."""

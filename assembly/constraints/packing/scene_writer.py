@@ -74,6 +74,7 @@ class SceneWriter(Writer):
         self._pair_rows = pair_rows
         self._angle_places: dict[Coordinate, int] = {}
         self._tape_room = [0, 0, 0]
+        self._constants: dict[int, int] = {}
 
     def places_of(self, bodies: Iterable[Body]) -> list[int]:
         """The numbers of bodies."""
@@ -119,13 +120,19 @@ class SceneWriter(Writer):
         for instructions in expression.tapes:
             table = instructions.table.copy()
             table[tape.CONSTANTS] += self.pool_at
-            offsets.append(self.add(table, instructions.constants)[0])
+            listed, at = self.add(table, instructions.constants)
+            offsets.append(listed)
+            self._constants[listed] = at
             workspace[2] = max(workspace[2], int(table[tape.WORK]))
         bodies, count = len(expression.bodies), expression.count
         workspace[0] = max(workspace[0], 7 * bodies + count)
         workspace[1] = max(workspace[1], count + 6 * bodies * count, 36 * bodies**2)
         listed, at = self.add(self.places_of(expression.bodies), [expression.scale])
         return [*offsets, count, bodies, listed, row, at, 0]
+
+    def constants_at(self, listed: int) -> int:
+        """Where the constants of a list of instructions are in the pool; the list is there in the table."""
+        return self._constants[listed]
 
     def add_shared(self) -> None:
         """Write what rows and terms asked for: frames, and the room that tapes take."""

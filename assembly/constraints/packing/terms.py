@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.model.contact_place import ContactPlace
+from assembly.constraints.model.coordinate_distance import CoordinateDistance
 from assembly.constraints.model.dexterity import MEASURES, Dexterity, TipTask
 from assembly.constraints.model.expression import Expression
 from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance, Posture, Weight
@@ -79,6 +80,8 @@ class TermPacking:
         Terms with a pose as target, and where its quaternion is in the pool.
     drawn : list of ContactPlace
         Terms that are places of contacts.
+    coordinates : list of (CoordinateDistance, list of int)
+        Terms with a value as target; where the weight of each is in the pool, and its target, of values and Hessians.
     """
 
     def __init__(
@@ -86,6 +89,7 @@ class TermPacking:
     ) -> None:
         self.targets: list[tuple[PointDistance | FrameDistance, int]] = []
         self.turns: list[tuple[FrameDistance, int]] = []
+        self.coordinates: list[tuple[CoordinateDistance, list[int]]] = []
         self._writer = writer
         self._rows = rows
         self._bodies = bodies
@@ -113,9 +117,7 @@ class TermPacking:
         elif isinstance(term, ContactPlace):
             self._add_place(weight, term)
         elif isinstance(term, Expression):
-            _, at = self._writer.add(pool=[weight])
-            listed, _ = self._writer.add(self._writer.tape(term, -1))
-            self._records.append([terms.TAPE_TERM, -1, at, listed])
+            self._add_expression(weight, term)
         else:
             assert isinstance(term, Posture)
             self._add_posture(weight, term)
@@ -164,6 +166,14 @@ class TermPacking:
             self._records.append([terms.PLACE, -1, at, 0, 0, contact, term.side, term.rows])
             self.drawn.append(term)
 
+    def _add_expression(self, weight: float, term: Expression) -> None:
+        writer = self._writer
+        _, at = writer.add(pool=[weight])
+        record = writer.tape(term, -1)
+        if isinstance(term, CoordinateDistance):
+            self.coordinates.append((term, [at, *(writer.constants_at(place) for place in record[:2])]))
+        self._records.append([terms.TAPE_TERM, -1, at, writer.add(record)[0]])
+
     def _add_dexterity(self, weight: float, term: Dexterity) -> None:
         """The record is that of `solve/loop/dexterity.py`."""
         writer, task = self._writer, term.tip_task
@@ -198,7 +208,7 @@ def dexterity_numbers(term: Dexterity, weight: float, scale: float, factors: Seq
 
 def natural_unit(term: Objective, scale: float) -> float:
     """What a term of order one in scaled lengths counts in the user's units."""
-    if isinstance(term, Expression):
+    if isinstance(term, Expression) and not isinstance(term, CoordinateDistance):
         return 1.0
     if isinstance(term, Weight):
         return scale * term.mass

@@ -126,7 +126,7 @@ class WrittenScene(ManagerLast, SceneContents):
         self.tracked = int(header[layout.TRACKED])
         self.shells, self._angles = writer.shells, writer.angles
         self.body_places, self._frames = writer.places, writer.frames
-        self._targets, self._turns = terms.targets, terms.turns
+        self._targets, self._turns, self._coordinates = terms.targets, terms.turns, terms.coordinates
         self._turned = Turns(self._angles, [(equation, at) for equation, at, _ in self._values])
         self.chooses_turns = self._turned.chosen and not self.clearance_rows
         told = self._turned.told

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
-from assembly.geometry.expression.tape import CONST, HEAD, OPERATIONS
+from assembly.geometry.expression.tape import CONST, HEAD, INPUT, OPERATIONS
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -56,14 +56,20 @@ def instructions(function: ca.Function) -> Iterator[tuple[str, int, tuple[int, .
             yield name, out[0], tuple(arguments)
 
 
-def packed(function: ca.Function) -> Tape:
-    """The instructions of a function of one column as integers and constants."""
+def packed(function: ca.Function, numbers: Sequence[float] = ()) -> Tape:
+    """The instructions of a function of one column as integers and constants.
+
+    The last inputs may be numbers that are written between solves: they are the first of the constants.
+    """
     codes = {name: code for code, name in enumerate(OPERATIONS)}
-    constants: list[float] = []
+    constants = list(numbers)
+    first = function.size1_in(0) - len(constants)
     table: list[tuple[int, int, int, int]] = []
     for name, out, arguments in instructions(function):
         code = codes[name]
-        if code == CONST:
+        if code == INPUT and arguments[0] >= first:
+            table.append((CONST, out, int(arguments[0]) - first, 0))
+        elif code == CONST:
             table.append((code, out, len(constants), 0))
             constants.append(arguments[0])
         else:

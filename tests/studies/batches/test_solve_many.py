@@ -6,6 +6,7 @@ import dataclasses
 import os
 import signal
 from concurrent.futures import ThreadPoolExecutor
+from itertools import count
 from threading import Event
 from time import sleep
 
@@ -247,15 +248,17 @@ def stopping():
 def test_a_signal_ends_a_batch(threads, monkeypatch, stopping):
     scene = linkage()
     q0s = np.repeat(near(scene, 20, 0.3), 200, 0)
-    slices = []
+    # Two threads never draw the same number.
+    slices, numbers = [], count(1)
     solve_rows = solving.solve_rows
 
     def slowly(*given):
         """Send the signal with the third slice; slices after it take long enough for the main thread to hear of it."""
-        slices.append(0)
-        if len(slices) == 3:
+        number = next(numbers)
+        slices.append(number)
+        if number == 3:
             os.kill(os.getpid(), signal.SIGALRM)
-        if len(slices) >= 3:
+        if number >= 3:
             sleep(0.05)
         solve_rows(*given)
 
