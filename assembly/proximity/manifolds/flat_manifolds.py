@@ -75,7 +75,8 @@ def flat_manifold(a: PlaneRegion, b: PlaneRegion, turn: Array, shift: Array) -> 
         return None
     found = rows_of(ROW, rows[:count])
     off = a.deviation + b.deviation / float(np.linalg.norm(found.normal, axis=1).min())
-    return Manifold(found.normal.copy(), found.place.copy(), found.gap.copy(), float(bound) - 2.0 * off)
+    kinds = np.column_stack([found.kind, found.first, found.second])
+    return Manifold(found.normal.copy(), found.place.copy(), found.gap.copy(), float(bound) - 2.0 * off, kinds)
 
 
 def flat_manifolds(

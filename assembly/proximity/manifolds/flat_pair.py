@@ -17,7 +17,17 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
 from assembly.proximity.manifolds.clip import are_beside, convex_corners, cross_segments, is_on_arc, is_within
-from assembly.proximity.manifolds.records import FRAME_SIZE, ROW_SIZE, SEGMENT_SIZE, frame_at, row_at, segment_at
+from assembly.proximity.manifolds.records import (
+    CORNER_A,
+    CROSSING,
+    FRAME_SIZE,
+    LOWEST_A,
+    ROW_SIZE,
+    SEGMENT_SIZE,
+    frame_at,
+    row_at,
+    segment_at,
+)
 
 # Planes that lean more than this cosine do not face each other.
 FACING = 0.5
@@ -83,6 +93,13 @@ def put_row(rows, points, count, frame, lift, at, normal):
     return gap
 
 
+@kernel(inline=True)
+def name_row(rows, count, kind, first, second):
+    """Write what a row is of: see `records.py`."""
+    row = row_at(rows, count)
+    row.kind, row.first, row.second = kind, first, second
+
+
 @kernel(inner=True)
 def crossing_normal(frame, lift, s, t, at):
     """The direction along which what is between two borders grows where they cross: across both, with m.n = 1."""
@@ -124,6 +141,8 @@ def put_corners(regions, frame, lift, tolerance, found, points):
                     if count == len(found):
                         return FULL
                     put_row(found, points, count, frame, lift, (x, y), normal)
+                    at = k + 0.5 * half
+                    name_row(found, count, CORNER_A + turn, at, at)
                     count += 1
     return count
 
@@ -144,6 +163,7 @@ def put_crossings(regions, frame, lift, tolerance, found, points, count):
                     return FULL
                 at = (crossed[k, 0], crossed[k, 1])
                 put_row(found, points, count, frame, lift, at, crossing_normal(frame, lift, s, t, at))
+                name_row(found, count, CROSSING, i, j)
                 count += 1
     return count
 
@@ -169,6 +189,7 @@ def put_lowest(regions, frame, lift, tolerance, found, points, count):
                 if count == len(found):
                     return FULL
                 put_row(found, points, count, frame, lift, (x, y), normal)
+                name_row(found, count, LOWEST_A + turn, k, k)
                 count += 1
     return count
 

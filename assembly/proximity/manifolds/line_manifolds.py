@@ -17,7 +17,7 @@ from assembly.geometry.recognition.forms import Cone, Cylinder, Sphere
 from assembly.proximity.manifolds.elementary_faces import elementary_faces
 from assembly.proximity.manifolds.line_span import line_span
 from assembly.proximity.manifolds.manifold import Manifold
-from assembly.proximity.manifolds.records import FRAME
+from assembly.proximity.manifolds.records import BALL, CUT, END, FRAME, SEGMENT
 from assembly.proximity.manifolds.regions import PlaneRegion, plane_region
 
 __all__ = ["line_manifold", "line_manifolds"]
@@ -33,7 +33,7 @@ def line_manifold(region: PlaneRegion, form: Cylinder | Cone | Sphere, turn: Arr
     """The manifold of a plane face and what is round and full, at x -> turn x + shift seen from the face's body.
 
     None where the line that is nearest to the plane leans by more than 30 degrees, is not on the face's side of it, or
-    is nowhere over the region. Gaps are along the plane's normal.
+    is nowhere over the region. Gaps are along the plane's normal, the bound is of those along the line.
     """
     frame = rows_of(FRAME, region.frame[None])[0]
     n = frame.normal
@@ -44,23 +44,25 @@ def line_manifold(region: PlaneRegion, form: Cylinder | Cone | Sphere, turn: Arr
     off = ends - frame.origin
     flat = np.column_stack([off @ frame.right, off @ frame.up])
     size = max(region.size, float(np.linalg.norm(ends[1] - ends[0])))
-    ways = np.zeros((2, 2))
+    borders = np.full(2, -1)
     if isinstance(form, Sphere):
         # A short line in its place.
         flat = flat + ON_BORDER * size * np.array([[-1.0, 0.0], [1.0, 0.0]])
-    low, high = line_span(region.segments, flat.ravel(), ON_BORDER * size, ways)
+    low, high = line_span(region.segments, flat.ravel(), ON_BORDER * size, borders)
     if low > high or (high - low < 1e-9 and not isinstance(form, Sphere)):
         return None
     if isinstance(form, Sphere):
-        places, normals = ends[:1], n[None]
+        places, normals, kinds = ends[:1], n[None], np.array([[BALL, 0.0, 0.0]])
     else:
         way = ends[1] - ends[0]
         places = ends[0] + np.array([[low], [high]]) * way
-        normals = np.array([_normal(frame, way, border) for border in ways])
+        cuts = zip(borders.tolist(), places, strict=True)
+        normals = np.array([_normal(frame, way, _tangent(region, k, at)) for k, at in cuts])
+        kinds = np.array([[END if k < 0 else CUT, float(k), float(end)] for end, k in enumerate(borders.tolist())])
     gaps = (places - frame.origin) @ n
     lean = float(np.abs(n @ (ends[1] - ends[0]))) / size
     bound = float(gaps.min()) - form.deviation - region.deviation - 4.0 * lean * ON_BORDER * size
-    return Manifold(np.array(normals), places.copy(), gaps, bound)
+    return Manifold(np.array(normals), places.copy(), gaps, bound, kinds)
 
 
 def _nearest_line(form: Cylinder | Cone | Sphere, n: Array) -> Array | None:
@@ -85,6 +87,17 @@ def _nearest_line(form: Cylinder | Cone | Sphere, n: Array) -> Array | None:
     line = origin + heights[:, None] * form.axis - radii[:, None] * side
     way = line[1] - line[0]
     return line if abs(float(way @ n)) <= LYING * float(np.linalg.norm(way)) else None
+
+
+def _tangent(region: PlaneRegion, segment: int, place: Array) -> Array:
+    """The direction (2,) of a border at a place, zero where there is no border (-1)."""
+    if segment < 0:
+        return np.zeros(2)
+    frame, s = rows_of(FRAME, region.frame[None])[0], rows_of(SEGMENT, region.segments)[segment]
+    if s.radius == 0.0:
+        return np.asarray(s.end - s.begin)
+    off = place - frame.origin
+    return np.array([s.center[1] - off @ frame.up, off @ frame.right - s.center[0]])
 
 
 def _normal(frame: np.record, way: Array, border: Array) -> Array:

@@ -6,12 +6,11 @@ import numpy as np
 
 from assembly._kernel import kernel
 from assembly.proximity.manifolds.clip import cross_segments, is_within
-from assembly.proximity.manifolds.flat_pair import tangent
 from assembly.proximity.manifolds.records import SEGMENT_SIZE, segment_at
 
 
-@kernel(signatures="(f8[:, ::1], f8[::1], f8, f8[:, ::1])", allocates=True)
-def line_span(segments, line, tolerance, ways):
+@kernel(signatures="(f8[:, ::1], f8[::1], f8, i8[::1])", allocates=True)
+def line_span(segments, line, tolerance, borders):
     """From where to where a line is in a region, in parts of its length: the outermost of its points there.
 
     Parameters
@@ -21,8 +20,8 @@ def line_span(segments, line, tolerance, ways):
         Both ends, in the coordinates of the plane.
     tolerance : float
         What is no farther from a border is in the region.
-    ways : (2, 2)
-        Where the directions of borders are written that the line ends at; zero where it ends by itself.
+    borders : (2,)
+        Where the numbers of segments are written that the line ends at; -1 where it ends by itself.
 
     Returns
     -------
@@ -35,8 +34,7 @@ def line_span(segments, line, tolerance, ways):
     dx, dy = line[2] - line[0], line[3] - line[1]
     low, high = np.inf, -np.inf
     for i in range(2):
-        for k in range(2):
-            ways[i, k] = 0.0
+        borders[i] = -1
         if is_within(segments, line[2 * i], line[2 * i + 1], tolerance):
             low, high = min(low, float(i)), max(high, float(i))
     for k in range(len(segments)):
@@ -46,8 +44,8 @@ def line_span(segments, line, tolerance, ways):
             part = ((x - line[0]) * dx + (y - line[1]) * dy) / (dx * dx + dy * dy)
             if part < low:
                 low = part
-                ways[0, 0], ways[0, 1] = tangent(t, x, y)
+                borders[0] = k
             if part > high:
                 high = part
-                ways[1, 0], ways[1, 1] = tangent(t, x, y)
+                borders[1] = k
     return low, high

@@ -28,13 +28,16 @@ class Manifold(ReadOnlyArrays):
     gaps : (m,)
         Negative where the second face is within the first body.
     bound : float
-        No gap of the whole pair is less.
+        No gap of the whole pair is less; of what is round on a plane, none along its line.
+    kinds : (m, 3)
+        What each row is of: `kind`, `first` and `second` of `ROW` (`records.py`), in the order of those who found it.
     """
 
     normals: Array
     places: Array
     gaps: Array
     bound: float
+    kinds: Array
 
     def rates(self) -> Array:
         """How gaps change by twists (v, w) of the second body: (m, 6)."""
@@ -42,4 +45,5 @@ class Manifold(ReadOnlyArrays):
 
     def turned(self, turn: Array, shift: Array) -> Manifold:
         """The same with the bodies exchanged, where the first one is at x -> turn x + shift seen from the second."""
-        return Manifold(-self.normals @ turn.T, self.places @ turn.T + shift, self.gaps.copy(), self.bound)
+        normals, places = -self.normals @ turn.T, self.places @ turn.T + shift
+        return Manifold(normals, places, self.gaps.copy(), self.bound, self.kinds)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +19,8 @@ from assembly.proximity.manifolds.line_manifolds import line_manifold
 from assembly.proximity.manifolds.manifold import Manifold
 from assembly.proximity.manifolds.regions import PlaneRegion, plane_region
 from assembly.proximity.manifolds.round_manifolds import SAME_ANGLE, round_manifold
+from assembly.proximity.manifolds.row_derivatives import flat_derivatives, line_derivatives, round_derivatives
+from assembly.proximity.manifolds.second_rates import Row, of_both
 
 __all__ = ["ContactManifold", "contact_manifold"]
 
@@ -46,14 +49,34 @@ class ContactManifold(ReadOnlyArrays):
     gaps: Array
     bound: float
     _origins: Array = field(repr=False)
+    _turns: Array = field(repr=False)
+    # Each with which body stays, 0 or 1, in whose axes it is.
+    _rows: tuple[tuple[int, Row], ...] = field(repr=False)
 
     def rates(self) -> tuple[Array, Array]:
-        """Derivatives of the gaps by the twists of the bodies of a and of b, (m, 6) each.
+        """Row of the gaps by the twists of the bodies of a and of b, (m, 6) each.
 
         A twist is a velocity of the body's origin and an angular velocity, in world axes.
         """
         a, b = (np.hstack([self.normals, np.cross(self.places - at, self.normals)]) for at in self._origins)
         return -a, b
+
+    def second_rates(self) -> Array:
+        """Second derivatives of the gaps by the twists of the body of a, then of b: (m, 12, 12), symmetric.
+
+        Along x + t v, exp(t w) e with constant twists a gap's second derivative is twist^T second twist. Of two rows
+        there is none at a kink: of the lowest point of an arc where planes are flush (it is no row there), and of the
+        nearest direction of a ring where axes meet, which is taken to stay there.
+        """
+        second = np.empty((len(self._rows), 2, 6, 2, 6))
+        for form, (k, row), normal, place in zip(second, self._rows, self.normals, self.places, strict=True):
+            order = [k, 1 - k]
+            normal = (1 - 2 * k) * normal
+            rates = np.concatenate([normal, np.cross(place - self._origins[k], normal)])
+            both = np.kron(np.eye(2), self._turns[k])
+            arm = self._origins[k] - self._origins[1 - k]
+            form[:] = of_both(rates, both @ row.second() @ both.T, arm).reshape(2, 6, 2, 6)[order][:, :, order]
+        return second.reshape(-1, 12, 12)
 
 
 def contact_manifold(a: BodyFace, b: BodyFace, *, poses: tuple[Pose, Pose] | None = None) -> ContactManifold | None:
@@ -85,15 +108,20 @@ def contact_manifold(a: BodyFace, b: BodyFace, *, poses: tuple[Pose, Pose] | Non
     if a.body is b.body:
         raise InputError(f"a and b are {a!r} and {b!r}, of one body; expected faces of two bodies")
     one, other = (a.body.pose, b.body.pose) if poses is None else _checked(poses)
-    first = one.matrix[:3, :3]
-    turn, shift = first.T @ other.matrix[:3, :3], (other.position - one.position) @ first
-    found = _found((a, b), (_side(a), _side(b)), turn, shift)
+    sides = _side(a), _side(b)
+    is_exchanged = _is_exchanged((a, b), sides)
+    order = (1, 0) if is_exchanged else (0, 1)
+    poses = one, other
+    found = _found(sides[order[0]], sides[order[1]], poses[order[0]], poses[order[1]])
     if found is None:
         return None
-    origins = np.array([one.position, other.position])
-    return ContactManifold(
-        found.places @ first.T + one.position, found.normals @ first.T, found.gaps, found.bound, origins
-    )
+    rows, bound = found
+    origins, turns = (np.array(parts) for parts in zip(*((p.position, p.matrix[:3, :3]) for p in poses), strict=True))
+    stays = [order[1] if row.of_second else order[0] for row in rows]
+    normals = np.array([(1 - 2 * k) * turns[k] @ row.normal for k, row in zip(stays, rows, strict=True)])
+    places = np.array([turns[k] @ row.place + origins[k] for k, row in zip(stays, rows, strict=True)])
+    gaps = np.array([row.gap for row in rows])
+    return ContactManifold(places, normals, gaps, bound, origins, turns, tuple(zip(stays, rows, strict=True)))
 
 
 def _checked(poses: tuple[Pose, Pose]) -> tuple[Pose, Pose]:
@@ -128,27 +156,34 @@ def _fitting(a: Side | None, b: Side | None) -> tuple[Cylinder | Cone, Cylinder 
     return None
 
 
-def _found(
-    faces: tuple[BodyFace, BodyFace], sides: tuple[Side | None, Side | None], turn: Array, shift: Array
-) -> Manifold | None:
-    """The manifold in the axes of the first body, the second one at x -> turn x + shift."""
+def _is_exchanged(faces: tuple[BodyFace, BodyFace], sides: tuple[Side | None, Side | None]) -> bool:
+    """Whether rows are sought with the second face first: a plane under what is round, or a hollow wall."""
     a, b = sides
-    back, from_b = turn.T, -turn.T @ shift
-    exchanged: Manifold | None
+    if isinstance(a, PlaneRegion) and (isinstance(b, PlaneRegion) or _full(b) is not None):
+        return False
+    if isinstance(b, PlaneRegion) and _full(a) is not None:
+        return True
+    if _fitting(a, b) is not None:
+        return isinstance(a, ElementaryFace) and a.is_outward
+    kinds = " and a ".join(face.kind for face in faces)
+    raise InputError(
+        f"a and b are {faces[0]!r} and {faces[1]!r}, a {kinds}; expected planes with edges of lines and arcs, a "
+        "cylinder or a cone in a hollow one, or what is round on a plane"
+    )
+
+
+def _found(a: Side | None, b: Side | None, one: Pose, other: Pose) -> tuple[Sequence[Row], float] | None:
+    """Rows, each in the axes of the body that stays, and the bound of all gaps; a plane or a hollow wall is first."""
+    first = one.matrix[:3, :3]
+    turn, shift = first.T @ other.matrix[:3, :3], (other.position - one.position) @ first
+    manifold: Manifold | None
     if isinstance(a, PlaneRegion) and isinstance(b, PlaneRegion):
-        return flat_manifold(a, b, turn, shift)
+        manifold = flat_manifold(a, b, turn, shift)
+        return None if manifold is None else (flat_derivatives(a, b, turn, shift, manifold), manifold.bound)
     if isinstance(a, PlaneRegion) and (full := _full(b)) is not None:
-        return line_manifold(a, full, turn, shift)
-    if isinstance(b, PlaneRegion) and (full := _full(a)) is not None:
-        exchanged = line_manifold(b, full, back, from_b)
-    elif (pair := _fitting(a, b)) is not None:
-        if isinstance(a, ElementaryFace) and not a.is_outward:
-            return round_manifold(*pair, turn, shift)
-        exchanged = round_manifold(pair[1], pair[0], back, from_b)
-    else:
-        kinds = " and a ".join(face.kind for face in faces)
-        raise InputError(
-            f"a and b are {faces[0]!r} and {faces[1]!r}, a {kinds}; expected planes with edges of lines and arcs, a "
-            "cylinder or a cone in a hollow one, or what is round on a plane"
-        )
-    return None if exchanged is None else exchanged.turned(turn, shift)
+        manifold = line_manifold(a, full, turn, shift)
+        return None if manifold is None else line_derivatives(a, full, turn, shift, manifold)
+    pair = _fitting(a, b)
+    assert pair is not None
+    manifold = round_manifold(*pair, turn, shift)
+    return None if manifold is None else (round_derivatives(*pair, turn, shift, manifold), manifold.bound)

@@ -48,7 +48,8 @@ def round_manifold(hollow: Cylinder | Cone, full: Cylinder | Cone, turn: Array, 
         return None
     found = rows_of(ROW, rows[:count])
     off = hollow.deviation + full.deviation
-    return Manifold(found.normal.copy(), found.place.copy(), found.gap.copy(), float(bound) - off)
+    kinds = np.column_stack([found.kind, found.first, found.second])
+    return Manifold(found.normal.copy(), found.place.copy(), found.gap.copy(), float(bound) - off, kinds)
 
 
 def round_manifolds(

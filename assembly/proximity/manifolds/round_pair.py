@@ -20,7 +20,7 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, cross, dot, matvec, neg, scale, sub
 from assembly.proximity.manifolds.flat_pair import FACING, triple
-from assembly.proximity.manifolds.records import round_at, row_at
+from assembly.proximity.manifolds.records import NEAREST_RIM, NEAREST_RING, RIM, RING, round_at, row_at
 
 # Rows of a ring: in so many directions that the wall keeps, and in that in which the ring is nearest.
 HELD = 4
@@ -235,6 +235,12 @@ def round_rows(hollow_wall, full_wall, turn, shift, rows):
                 put_ring_row(hollow, sides, ring, angle, rows, count)
             else:
                 put_rim_row(full, origin, sides, ring, angle, rows, count)
+            row, is_near = row_at(rows, count), i == HELD
+            if of_full:
+                row.kind = NEAREST_RING if is_near else RING
+            else:
+                row.kind = NEAREST_RIM if is_near else RIM
+            row.first, row.second = k, k
             count += 1
     if is_cone:
         top = most_level(hollow, (sub(first, o), b, radius_at(full, low)))

@@ -1,0 +1,206 @@
+"""Rows of a manifold with exact first and second derivatives, from what each is between.
+
+Rows of a manifold take arcs that lean for circles, and lines of what is round for its lowest points over a border; here
+each begins there, and goes to where it is stationary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assembly._record import rows_of
+from assembly.geometry.recognition.forms import Cone, Cylinder, Sphere
+from assembly.proximity.manifolds.manifold import Manifold
+from assembly.proximity.manifolds.places import Affine, Arc, Place, Wall
+from assembly.proximity.manifolds.records import (
+    CORNER_A,
+    CORNER_B,
+    CROSSING,
+    END,
+    FRAME,
+    LOWEST_A,
+    LOWEST_B,
+    NEAREST_RING,
+    RIM,
+    RING,
+    SEGMENT,
+)
+from assembly.proximity.manifolds.regions import PlaneRegion
+from assembly.proximity.manifolds.second_rates import Level, Ray, Row, skew
+
+__all__ = ["flat_derivatives", "line_derivatives", "round_derivatives"]
+
+Array = NDArray[np.float64]
+NONE = np.empty(0)
+# The sine of the angle at which borders cross that are tangent as far as rounding tells.
+TANGENT = 1e-7
+
+
+class _Posed:
+    """A trimmed plane at x -> turn x + shift."""
+
+    def __init__(self, region: PlaneRegion, turn: Array, shift: Array) -> None:
+        frame = rows_of(FRAME, region.frame[None])[0]
+        self.origin: Array = turn @ frame.origin + shift
+        self.right: Array = turn @ frame.right
+        self.up: Array = turn @ frame.up
+        self.normal: Array = turn @ frame.normal
+        self._segments: Any = rows_of(SEGMENT, region.segments)
+
+    def flat(self, place: Array) -> Array:
+        """Coordinates of a place seen along the normal."""
+        return np.array([(place - self.origin) @ self.right, (place - self.origin) @ self.up])
+
+    def lifted(self, xy: Array) -> Array:
+        """The point of the plane at coordinates."""
+        return np.asarray(self.origin + xy[0] * self.right + xy[1] * self.up)
+
+    def plane(self, place: Array) -> tuple[Place, Array]:
+        """All of it, and the coordinates of what of it is at a place."""
+        return Affine(self.origin, np.column_stack([self.right, self.up])), self.flat(place)
+
+    def border(self, k: int, place: Array) -> tuple[Place, Array]:
+        """A border, and the coordinate of what of it is at a place."""
+        s, at = self._segments[k], self.flat(place)
+        if s.radius == 0.0:
+            way = (s.end - s.begin) / np.linalg.norm(s.end - s.begin)
+            slope = (way[0] * self.right + way[1] * self.up)[:, None]
+            return Affine(self.lifted(s.begin), slope), np.array([(at - s.begin) @ way])
+        off = at - s.center
+        return Arc(self.lifted(s.center), s.radius * self.right, s.radius * self.up), np.array([np.arctan2(*off[::-1])])
+
+    def corner(self, number: float) -> Place:
+        """The beginning of a border, or the middle of an arc."""
+        s = self._segments[int(number)]
+        at = s.begin
+        if number % 1.0:
+            out = 0.5 * (s.begin + s.end) - s.center
+            at = s.center + s.radius / np.linalg.norm(out) * out
+        return Affine(self.lifted(at), np.empty((3, 0)))
+
+
+def _told(manifold: Manifold) -> Iterator[tuple[list[float], tuple[float, Array, Array]]]:
+    """What each row is of, and its gap, normal and place."""
+    rows = zip(manifold.gaps.tolist(), manifold.normals, manifold.places, strict=True)
+    return zip(manifold.kinds.tolist(), rows, strict=True)
+
+
+def flat_derivatives(a: PlaneRegion, b: PlaneRegion, turn: Array, shift: Array, manifold: Manifold) -> Sequence[Row]:
+    """Of the rows of two plane faces, the second one at x -> turn x + shift."""
+    first, second = _Posed(a, np.eye(3), np.zeros(3)), _Posed(b, turn, shift)
+    found = []
+    for (kind, i, j), at in _told(manifold):
+        place = at[2]
+        stays, moves = first.plane(place), second.plane(place)
+        if kind == CORNER_A:
+            stays = first.corner(i), NONE
+        elif kind == CORNER_B:
+            moves = second.corner(j), NONE
+        if kind in (CROSSING, LOWEST_A):
+            stays = first.border(int(i), place)
+        if kind in (CROSSING, LOWEST_B):
+            moves = second.border(int(j), place)
+        if kind == CROSSING and _are_tangent(stays, moves, first.normal):
+            # Where borders touch they do not cross for long: what is on the first stays there.
+            stays, moves = (Affine(place, np.empty((3, 0))), NONE), second.plane(place)
+        found.append(Ray.near(stays, moves, first.normal, at))
+    return found
+
+
+def _are_tangent(one: tuple[Place, Array], other: tuple[Place, Array], n: Array) -> bool:
+    s, t = (place.at(x)[1][:, 0] for place, x in (one, other))
+    return bool(abs(s @ skew(n) @ t) <= TANGENT * np.linalg.norm(s) * np.linalg.norm(t))
+
+
+def _wall(form: Cylinder | Cone, turn: Array, shift: Array, toward: Array) -> Wall:
+    """A cylinder or a cone at x -> turn x + shift, with angles from a direction across its axis."""
+    axis = turn @ form.axis
+    right = toward - (toward @ axis) * axis
+    right = right / np.linalg.norm(right)
+    if isinstance(form, Cone):
+        return Wall(turn @ form.apex + shift, axis, right, skew(axis) @ right, 0.0, float(np.tan(form.half_angle)))
+    return Wall(turn @ form.point + shift, axis, right, skew(axis) @ right, form.radius, 0.0)
+
+
+def _circle(wall: Wall, height: float) -> Arc:
+    """The circle of a wall at a height."""
+    radius = wall.radius + height * wall.widening
+    return Arc(wall.origin + height * wall.axis, radius * wall.right, radius * wall.up)
+
+
+def line_derivatives(
+    region: PlaneRegion, form: Cylinder | Cone | Sphere, turn: Array, shift: Array, manifold: Manifold
+) -> tuple[Sequence[Row], float]:
+    """Of the rows of a plane face and what is round, at x -> turn x + shift; and a bound of gaps of the whole pair.
+
+    Over the plane what is round and full is convex. So it is nowhere below its tangent plane where its lowest row is,
+    and nowhere below the lower end of its line.
+    """
+    plane, found = _Posed(region, np.eye(3), np.zeros(3)), []
+    n = plane.normal
+    if isinstance(form, Sphere):
+        center = Affine(turn @ form.center + shift, np.empty((3, 0)))
+        (_, at), *_ = _told(manifold)
+        return [Level(*at, False, NONE, center, plane.origin, None)], manifold.bound
+    wall = _wall(form, turn, shift, -n)
+    ends = [_circle(wall, height).at(np.zeros(1))[0] for height in form.heights]
+    for (kind, i, end), at in _told(manifold):
+        place = at[2]
+        if kind == END:
+            moves: tuple[Place, Array] = _circle(wall, form.heights[int(end)]), np.zeros(1)
+            stays = plane.plane(ends[int(end)])
+            if wall.radius + form.heights[int(end)] * wall.widening <= 0.0:
+                moves = Affine(ends[int(end)], np.empty((3, 0))), NONE
+        else:
+            moves = wall, np.array([(place - wall.origin) @ wall.axis, 0.0])
+            stays = plane.border(int(i), place)
+        found.append(Ray.near(stays, moves, n, at))
+    lowest = min(found, key=lambda row: row.gap)
+    slope = -np.array([lowest.normal @ plane.right, lowest.normal @ plane.up])
+    over_face = lowest.gap + _least(region, slope) - float(slope @ plane.flat(lowest.place))
+    whole = min(float((end - plane.origin) @ n) for end in ends)
+    return found, min(max(whole, over_face), lowest.gap) - float(manifold.gaps.min() - manifold.bound)
+
+
+def _least(region: PlaneRegion, slope: Array) -> float:
+    """The least of slope.x over a region."""
+    segments = rows_of(SEGMENT, region.segments)
+    least = float((segments.begin @ slope).min())
+    for s in segments[segments.radius > 0.0]:
+        way = -slope / max(float(np.linalg.norm(slope)), 1e-300)
+        # An arc turns by a quarter at most: what is within it is on one side of its chord.
+        beyond = np.cross(np.append(s.end - s.begin, 0.0), np.append(s.center + s.radius * way - s.begin, 0.0))[2]
+        if beyond * s.sweep <= 0.0:
+            least = min(least, float((s.center + s.radius * way) @ slope))
+    return least
+
+
+def round_derivatives(
+    hollow: Cylinder | Cone, full: Cylinder | Cone, turn: Array, shift: Array, manifold: Manifold
+) -> Sequence[Row]:
+    """Of the rows of a bore and a shaft, or of cones: what is full at x -> turn x + shift, seen from the wall."""
+    found = []
+    for (kind, *_), (gap, normal, place) in _told(manifold):
+        is_ring = kind in (RING, NEAREST_RING)
+        if is_ring:
+            stays = _wall(hollow, np.eye(3), np.zeros(3), -normal)
+            moves = _wall(full, turn, shift, place - (turn @ _origin(full) + shift))
+        else:
+            normal, place = -turn.T @ normal, turn.T @ (place - shift)
+            stays = _wall(full, np.eye(3), np.zeros(3), normal)
+            moves = _wall(hollow, turn.T, -turn.T @ shift, place - turn.T @ (_origin(hollow) - shift))
+        # Normals of a wall by their angle are right - widening axis, over the length of that.
+        size = (-1.0 if is_ring else 1.0) / float(np.hypot(1.0, stays.widening))
+        circle: Place = _circle(moves, float((place - moves.origin) @ moves.axis))
+        of, x = (Affine(place, np.empty((3, 0))), NONE) if kind == RIM else (circle, np.zeros(1))
+        angle = None if kind == RING else (size * stays.up, -size * stays.right)
+        found.append(Level(gap, normal, place, not is_ring, x, of, stays.origin, angle))
+    return found
+
+
+def _origin(form: Cylinder | Cone) -> Array:
+    return form.apex if isinstance(form, Cone) else form.point
