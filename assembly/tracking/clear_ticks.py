@@ -136,7 +136,7 @@ class ClearTicks:
     unlisted : frozenset of int
         Pairs whose contacts are not listed: what opens them is recognized from their faces.
     in_the_way : list of int
-        Of these, the pairs that the last tick does not hold of at its pose, and not on the way there alone.
+        The pairs that the last tick does not hold of; of those that are not listed, at its pose and not on the way alone.
     """
 
     def __init__(
@@ -214,6 +214,7 @@ class ClearTicks:
         self._left_by(answers, [k for k in left if not (k in answers and is_proven(answers[k]))], there, moves, BUDGET)
         self.doubtful = self._not_known(answers, there)
         if self.doubtful:
+            self.in_the_way = list(self.doubtful)
             proof.go_back(last)
             return False
         self.proved = all(map(is_proven, answers.values()))

@@ -32,9 +32,10 @@ from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import is_for_proofs
 from assembly.tracking.clear_ticks import ClearTicks
+from assembly.tracking.fitting import fits_of
 from assembly.tracking.followed import Followed
 from assembly.tracking.hands import Hands
-from assembly.tracking.joined_pairs import JoinedPairs, joined_pairs
+from assembly.tracking.proven_pairs import ProvenPairs, joined_pairs
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -94,9 +95,10 @@ class TickMemory(InOneProcess):
         proves = packed.keeps_apart and can_prove(packed)
         self._clear = ClearTicks(first, self._touching * packed.scale) if proves else None
         # What no proof tells of, rows alone keep apart.
-        may = proves and self._clear is not None and self._clear.proved and is_for_proofs(packed)
-        joined = joined_pairs(packed, self._inner.constraints, self._inner.bodies) if may else []
-        self._joined = JoinedPairs(packed, joined, first._state)
+        proves = self._clear is not None and self._clear.proved and is_for_proofs(packed)
+        bodies, constraints = self._inner.bodies, self._inner.constraints
+        joined, fits = (joined_pairs(packed, constraints, bodies), fits_of(packed, bodies)) if proves else ([], {})
+        self._rows = ProvenPairs(packed, joined, fits, first._state)
 
     def _set_up(self, begin: Array) -> None:
         """What ticks work in, and what they read and write directly; they go on from a state of the packed scene."""
@@ -137,7 +139,7 @@ class TickMemory(InOneProcess):
         self._scene, self._numbers = self._inner._scene, self._told()
         result = self._before[before.results_at : before.memory_at]
         self._set_up(taken_over(before, packed, self._before))
-        self._joined.packed = packed
+        self._rows.packed = packed
         self._radius = radius
         self._before[packed.results_at : packed.memory_at] = result
         self._pose[:] = self._before

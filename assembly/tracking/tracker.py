@@ -300,34 +300,35 @@ class Tracker(TickMemory):
     def _moved_clear(self) -> TrackStatus | None:
         """Run the loop, and prove where that led; None if it goes on in the next tick.
 
-        Pairs that joints keep apart have no rows at first. Those in the way get theirs, and the tick begins again.
+        Some pairs have no rows at first, or those of earlier ticks (`proven_pairs.py`). Where the proof refuses the pose
+        of these, they get the rows of the last pose, once, and the tick begins again.
         """
+        begun_again = set[int]()
         while True:
             status = self._moved()
             if status is None or self._clear is None or status is TrackStatus.VIOLATED:
                 return status
-            self._clear.unlisted = self._joined.unlisted
+            self._clear.unlisted = self._rows.unlisted
             there = Solution(self._scene, self._packed, self._pose.copy(), Status.SOLVED, 0.0, self._history)
             if self._clear.holds(there):
-                self._joined.settle(self._pose)
+                self._rows.settle(self._pose)
                 return status
             self._pose[:] = self._before
-            in_the_way = self._clear.in_the_way
-            if not in_the_way:
+            again = self._rows.without_updates(self._clear.doubtful) & set(self._clear.in_the_way) - begun_again
+            if self._budget is not None or not again:
                 # The contact that was crossed may not be listed: all pairs are searched again.
+                self._rows.list_again(self._state, self._clear.in_the_way)
                 forget_updates(self._packed, self._state)
                 return TrackStatus.HELD
-            self._joined.list_again(self._before, in_the_way)
-            self._pose[:] = self._before
-            if self._budget is not None:
-                return TrackStatus.HELD
+            self._rows.list_again(self._state, again)
+            begun_again |= again
 
     def _moved(self) -> TrackStatus | None:
-        """Run the loop once; the status of the tick if bodies are clear, or None if the loop goes on in the next one."""
+        """Run the loop once; the status of the tick if bodies are clear, None if the loop goes on in the next one."""
         view, at = self._view, self._packed.results_at
         carried = view[at + CARRIED] > 0.0
-        self._joined.leave_out(self._state)
-        code = solve_program(*(self._rows_alone if self._joined.has_no_rows else self._arguments))
+        self._rows.leave_out(self._state)
+        code = solve_program(*(self._rows_alone if self._rows.has_no_rows else self._arguments))
         if view[at + CARRIED] > 0.0:
             return None
         status = _STATUSES.get(code, TrackStatus.APPROACHING)

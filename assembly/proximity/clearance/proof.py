@@ -28,6 +28,7 @@ from assembly.proximity.clearance.look import (
 from assembly.proximity.clearance.records import (
     BY_BORE_B,
     BY_PLANE,
+    BY_SLEEVE,
     CLEAR,
     CROSSING,
     NO_ROOM,
@@ -312,6 +313,8 @@ class ClearanceProof(BodyPairs):
         # Nodes in bores of the second body never keep a gap: they are asked at every pose, and so at this one.
         expiry = self.fronts.parted[k, :count].view(PARTED)[:, 0]["expiry"]
         links = self.fronts.nodes[k, :count].view(NODES)[:, 0]
+        if (links["how"] >= BY_SLEEVE).any():
+            return needed
         in_bore = links["how"] == BY_BORE_B
         kept = float(expiry[~in_bore].min(initial=np.inf)) - travelled + needed
         turn, shift = pair.turn[k].reshape(3, 3), pair.shift[k]

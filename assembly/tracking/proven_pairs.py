@@ -1,4 +1,4 @@
-"""Pairs of bodies that joints connect, whose clearances have rows in a tick only where a proof asks for them.
+"""Pairs of bodies whose clearances have rows in a tick only where a proof asks for them.
 
 Links of a mechanism slide on each other and turn in each other's bores. Hundreds of their contacts are near, and none
 pushes: joints alone determine the motion. So the contact manager of a tracker lists no contact of such a pair. The
@@ -6,13 +6,18 @@ tick is solved without, and the proof tells whether bodies are clear, or touch o
 Only where it refuses the pose of a pair, that pair's contacts are listed, and the tick is solved once more. They are
 listed until none of them pushes at the end of a tick.
 
-Bodies that no chain of joints connects, and pairs with a contact between the two, have rows at all times.
+It is the same with a shaft in a bore, whether joints connect them or not. A thousand pairs of patches of such walls
+face each other, so that an update takes milliseconds and is due at every step, though the contacts stay: they are on
+the rims at both ends of what the walls have in common, which keep apart all that is between. So between two refusals
+of the proof nothing is updated, contacts go along their rims, and those of wall on wall have no rows.
+
+Other bodies that no chain of joints connects, and pairs with a contact between the two, have rows at all times.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +25,9 @@ from numpy.typing import NDArray
 from assembly._record import place_of
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import Contact
-from assembly.proximity.features.solid_contact import TRACK
+from assembly.proximity.features.solid_contact import FEATURE_F, FEATURE_G, PAIR_GAP, TRACK
 from assembly.proximity.manager.records import (
     CROSSED,
-    FAR,
     MEMORY_HEADER,
     MOTION_BOUND,
     PAIR_MEMORY,
@@ -32,20 +36,22 @@ from assembly.proximity.manager.records import (
     PART,
     PLACE_MEMORY,
     PLACE_PAIR,
-    STATE,
 )
 from assembly.solve.clearance_proof import owned_pairs
+from assembly.tracking.fitting import Fit
 
 if TYPE_CHECKING:
     from assembly.constraints.model.constraint import Constraint
     from assembly.constraints.packing.scene import Packed
     from assembly.kinematics.body import Body
 
-__all__ = ["JoinedPairs", "joined_pairs"]
+__all__ = ["ProvenPairs", "joined_pairs"]
 
 Array = NDArray[np.float64]
 # [over the size of the scene] A motion bound that no motion uses up, and no product of two of which overflows.
 ANY_MOTION = 1e100
+# [over the size of the scene] A contact that is not as open touches: what counts as touching by default.
+CLOSED = 1e-9
 BALL_BOUND, SURE, DOUBT, CUT_SHORT, WANTING = (
     place_of(PAIR_STATE, name) for name in ("ball_bound", "sure", "doubt", "cut_short", "wanting")
 )
@@ -86,16 +92,27 @@ def joined_pairs(packed: Packed, constraints: Iterable[Constraint], bodies: Sequ
     ]
 
 
-class JoinedPairs:
+class _Parts(NamedTuple):
+    """Views of a state: rows of pairs, of slots, of the contacts tracked in them, and the multipliers of these."""
+
+    pairs: Array
+    slots: Array
+    tracked: Array
+    multipliers: Array
+
+
+class ProvenPairs:
     """Which pairs of a tracker's clearances have no rows now.
 
     Parameters
     ----------
     packed : Packed
     joined : sequence of int
-        Numbers of the pairs that may be without.
-    state : array
-        Of the solution with which the tracker begins; pairs that push there keep their rows.
+        Numbers of the pairs that joints connect.
+    fits : dict of int -> list of Fit
+        Of every pair its bores with shafts that fit.
+    first : array
+        State of the solution with which the tracker begins; pairs that push there keep their rows.
 
     Attributes
     ----------
@@ -105,61 +122,81 @@ class JoinedPairs:
         Pairs whose contacts are not listed.
     """
 
-    def __init__(self, packed: Packed, joined: Sequence[int], state: Array) -> None:
-        self.packed, self._joined = packed, frozenset(joined)
-        self.unlisted = self._joined - self._pushing(state)
+    def __init__(self, packed: Packed, joined: Sequence[int], fits: dict[int, list[Fit]], first: Array) -> None:
+        self.packed, self._joined, self._fits = packed, frozenset(joined), fits
+        self.unlisted = self._joined
+        self.settle(first)
 
     @property
     def has_no_rows(self) -> bool:
         """Whether no pair that clearances keep apart has rows, so that the contact manager has nothing to do."""
         return bool(self.unlisted) and len(self.unlisted) == len(self.packed.kept_pairs)
 
-    def _parts(self, state: Array) -> tuple[Array, Array, Array]:
+    def _parts(self, state: Array) -> _Parts:
         """Views of a state: what is known of pairs, of slots, and of the contacts tracked in them."""
         packed = self.packed
         pairs_at = packed.memory_at + MEMORY_HEADER
         slots_at = pairs_at + PAIR_MEMORY * len(packed.kept_pairs)
-        first = packed.contacts_at + TRACK * len(packed.contacts)
-        return (
+        first, row = packed.contacts_at + TRACK * len(packed.contacts), packed.multipliers_at + len(packed.contacts)
+        return _Parts(
             state[pairs_at:slots_at].reshape(-1, PAIR_MEMORY),
             state[slots_at:][: PLACE_MEMORY * packed.clearance_rows].reshape(-1, PLACE_MEMORY),
             state[first:][: TRACK * packed.clearance_rows].reshape(-1, TRACK),
+            state[row:][: packed.clearance_rows],
         )
 
-    def _pushing(self, state: Array) -> set[int]:
-        """The pairs a contact of which pushes."""
-        packed = self.packed
-        slots = self._parts(state)[1]
-        first = packed.multipliers_at + len(packed.contacts)
-        pushes = state[first : first + packed.clearance_rows] != 0.0
-        return set(slots[pushes, PLACE_PAIR].astype(int).tolist())
+    def _in_bores(self, state: Array, which: Iterable[int]) -> set[int]:
+        """Those of some pairs of which a shaft is in a bore."""
+        q = state[: self.packed.contacts_at].reshape(-1, 7)
+        return {k for k in which if any(fit.holds(q) for fit in self._fits.get(k, ()))}
 
     def leave_out(self, state: Array) -> None:
-        """Free the slots of pairs that are not listed, and have no motion ask for an update of theirs."""
-        if not self.unlisted:
+        """Free the slots of pairs that are not listed, and have no motion ask for updates of these and of shafts."""
+        listed = self._fits.keys() - self.unlisted
+        if not self.unlisted and not listed:
             return
-        pairs, slots, tracked = self._parts(state)
+        parts = self._parts(state)
         out = sorted(self.unlisted)
-        known = pairs[out]
+        free = np.isin(parts.slots[:, PLACE_PAIR], out)
+        in_bores = self._in_bores(state, listed) if listed else set()
+        for k in in_bores:
+            if np.isnan(parts.pairs[k, PAIR_TURN]):
+                continue
+            out.append(k)
+            for fit in self._fits[k]:
+                walls = (parts.tracked[:, [FEATURE_F, FEATURE_G]] == fit.numbers).all(axis=1)
+                free |= walls & (parts.slots[:, PLACE_PAIR] == k)
+        known = parts.pairs[out]
         known[:, PAIR_TURN : PAIR_TURN + 4] = (1.0, 0.0, 0.0, 0.0)
-        known[:, MOTION_BOUND], known[:, STATE] = ANY_MOTION, FAR
+        known[:, MOTION_BOUND] = ANY_MOTION
         known[:, [BALL_BOUND, SURE]] = np.inf
         known[:, [PART, CROSSED, DOUBT, CUT_SHORT, WANTING]] = 0.0
-        pairs[out] = known
-        free = np.isin(slots[:, PLACE_PAIR], out)
-        if free.any():
-            slots[free, PLACE_PAIR] = -1.0
-            tracked[free, 0] = np.nan
-            first = self.packed.multipliers_at + len(self.packed.contacts)
-            state[first : first + len(free)][free] = 0.0
+        parts.pairs[out] = known
+        parts.slots[free, PLACE_PAIR] = -1.0
+        parts.tracked[free, 0] = np.nan
+        parts.multipliers[free] = 0.0
+
+    def without_updates(self, which: Iterable[int]) -> set[int]:
+        """Those of some pairs that have no rows, or rows which motion does not ask to be updated."""
+        return set(which) & (self.unlisted | self._fits.keys())
 
     def list_again(self, state: Array, which: Iterable[int]) -> None:
-        """Have the next tick list contacts of some pairs."""
-        some = sorted(self.unlisted.intersection(which))
-        self._parts(state)[0][some, PAIR_TURN] = np.nan
+        """Have the next run of the loop update pairs, of those without updates of their own."""
+        some = sorted(self.without_updates(which))
+        self._parts(state).pairs[some, PAIR_TURN] = np.nan
         self.unlisted = self.unlisted.difference(some)
 
     def settle(self, state: Array) -> None:
-        """Leave out pairs, from the next tick on, of which no contact pushes at the end of a tick."""
-        if len(self.unlisted) < len(self._joined):
-            self.unlisted = self._joined - self._pushing(state)
+        """Leave out pairs, from the next tick on, of which no contact pushes at the end of a tick.
+
+        Of a shaft that no joint holds in its bore, whose contacts are few, none may touch, either.
+        """
+        listed = (self._joined | self._fits.keys()) - self.unlisted
+        if not listed:
+            return
+        parts = self._parts(state)
+        pairs = parts.slots[:, PLACE_PAIR]
+        pushing = set(pairs[parts.multipliers != 0.0].tolist())
+        touching = set(pairs[parts.tracked[:, PAIR_GAP] < CLOSED].tolist())
+        free = self._in_bores(state, listed - self._joined)
+        self.unlisted |= (listed & self._joined) - pushing | free - pushing - touching
