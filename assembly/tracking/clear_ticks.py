@@ -135,6 +135,8 @@ class ClearTicks:
         The largest overlap of bodies on the way to it.
     unlisted : frozenset of int
         Pairs whose contacts are not listed: what opens them is recognized from their faces.
+    renewable : frozenset of int
+        Pairs which may get other rows in this tick.
     in_the_way : list of int
         The pairs that the last tick does not hold of; of those that are not listed, at its pose and not on the way alone.
     """
@@ -162,7 +164,7 @@ class ClearTicks:
         self._at = _Standing(first)
         self._moves, self._opened = np.zeros((len(proof.pairs), 6)), list[int]()
         self.way_depth = 0.0
-        self.unlisted, self.in_the_way = frozenset[int](), list[int]()
+        self.unlisted, self.renewable, self.in_the_way = frozenset[int](), frozenset[int](), list[int]()
         answers = dict(enumerate(proof.look(first.q, touching)))
         left = [k for k, answer in answers.items() if not is_proven(answer)]
         for k in left:
@@ -199,12 +201,7 @@ class ClearTicks:
             moves[k] = self._opening(there, k)
         changed = [k for k in left if k not in rolling and (moves[k] != self._moves[k]).any()]
         self._left_by(answers, changed, there, moves, QUICK)
-        unknown = {k: answers.get(k, UNKNOWN) for k in left if k in self.unlisted}
-        self.doubtful = {k: answer for k, answer in unknown.items() if not is_proven(answer)}
-        if self.doubtful:
-            found = proof.look(there.q, touching, moves, which=list(self.doubtful), budget=QUICK)
-            self.in_the_way = [k for k, answer in zip(self.doubtful, found, strict=True) if not is_proven(answer)]
-            proof.go_back(last)
+        if self._ask_rows(answers, left, there, moves, last):
             return False
         for part in OPENED:
             open_yet = [k for k in left if not (k in answers and is_proven(answers[k]))]
@@ -222,6 +219,26 @@ class ClearTicks:
         self._leave_closed([k for k in left if moves[k].any() and proof.is_of_wires(k)])
         self._opened = self._those_opened()
         return True
+
+    def _ask_rows(
+        self, answers: dict[int, Answer], left: list[int], there: _Standing, moves: Array, last: tuple[Array, Array]
+    ) -> bool:
+        """Whether a tick is refused because of pairs that have no rows, or that may get others.
+
+        Of the latter only if they are not clear at its pose. What would take long to prove is not tried before.
+        """
+        proof = self._proof
+        asked = [k for k in left if k in self.unlisted | self.renewable and not is_proven(answers.get(k, UNKNOWN))]
+        if not asked:
+            return False
+        found = dict(zip(asked, proof.look(there.q, self._touching, moves, which=asked, budget=QUICK), strict=True))
+        proof.go_back(last, asked)
+        self.in_the_way = [k for k in asked if not is_proven(found[k])]
+        refused = [k for k in asked if k in self.unlisted or k in self.in_the_way]
+        self.doubtful = {k: answers.get(k, UNKNOWN) for k in refused}
+        if refused:
+            proof.go_back(last)
+        return bool(refused)
 
     def _opening(self, there: _Standing, k: int) -> Array:
         """The move (6) that opens pair k at the pose of a tick."""

@@ -35,6 +35,7 @@ from assembly.proximity.manager.records import (
     PAIR_TURN,
     PART,
     PLACE_MEMORY,
+    PLACE_NUMBER,
     PLACE_PAIR,
 )
 from assembly.solve.clearance_proof import owned_pairs
@@ -52,6 +53,7 @@ Array = NDArray[np.float64]
 ANY_MOTION = 1e100
 # [over the size of the scene] A contact that is not as open touches: what counts as touching by default.
 CLOSED = 1e-9
+SOON = 10.0
 BALL_BOUND, SURE, DOUBT, CUT_SHORT, WANTING = (
     place_of(PAIR_STATE, name) for name in ("ball_bound", "sure", "doubt", "cut_short", "wanting")
 )
@@ -118,14 +120,17 @@ class ProvenPairs:
     ----------
     packed : Packed
         Set anew where the scene is packed with more slots.
+    fitting : frozenset of int
+        Pairs with a bore and a shaft that fits it.
     unlisted : frozenset of int
         Pairs whose contacts are not listed.
     """
 
     def __init__(self, packed: Packed, joined: Sequence[int], fits: dict[int, list[Fit]], first: Array) -> None:
         self.packed, self._joined, self._fits = packed, frozenset(joined), fits
+        self.fitting = frozenset(fits)
         self.unlisted = self._joined
-        self.settle(first)
+        self.settle(first, first)
 
     @property
     def has_no_rows(self) -> bool:
@@ -152,7 +157,7 @@ class ProvenPairs:
 
     def leave_out(self, state: Array) -> None:
         """Free the slots of pairs that are not listed, and have no motion ask for updates of these and of shafts."""
-        listed = self._fits.keys() - self.unlisted
+        listed = self.fitting - self.unlisted
         if not self.unlisted and not listed:
             return
         parts = self._parts(state)
@@ -178,7 +183,7 @@ class ProvenPairs:
 
     def without_updates(self, which: Iterable[int]) -> set[int]:
         """Those of some pairs that have no rows, or rows which motion does not ask to be updated."""
-        return set(which) & (self.unlisted | self._fits.keys())
+        return set(which) & (self.unlisted | self.fitting)
 
     def list_again(self, state: Array, which: Iterable[int]) -> None:
         """Have the next run of the loop update pairs, of those without updates of their own."""
@@ -186,17 +191,20 @@ class ProvenPairs:
         self._parts(state).pairs[some, PAIR_TURN] = np.nan
         self.unlisted = self.unlisted.difference(some)
 
-    def settle(self, state: Array) -> None:
+    def settle(self, before: Array, state: Array) -> None:
         """Leave out pairs, from the next tick on, of which no contact pushes at the end of a tick.
 
-        Of a shaft that no joint holds in its bore, whose contacts are few, none may touch, either.
+        Of a shaft that no joint holds in its bore, whose contacts are few, none may be so near, either, that it could
+        touch within some ticks (SOON) if it went on as in this one.
         """
-        listed = (self._joined | self._fits.keys()) - self.unlisted
+        listed = (self._joined | self.fitting) - self.unlisted
         if not listed:
             return
-        parts = self._parts(state)
-        pairs = parts.slots[:, PLACE_PAIR]
-        pushing = set(pairs[parts.multipliers != 0.0].tolist())
-        touching = set(pairs[parts.tracked[:, PAIR_GAP] < CLOSED].tolist())
+        last, now = self._parts(before), self._parts(state)
+        pairs, gaps = now.slots[:, PLACE_PAIR], now.tracked[:, PAIR_GAP]
+        pushing = set(pairs[now.multipliers != 0.0].tolist())
+        stayed = last.slots[:, PLACE_NUMBER] == now.slots[:, PLACE_NUMBER]
+        went = np.where(stayed, np.abs(gaps - last.tracked[:, PAIR_GAP]), np.inf)
+        near = set(pairs[gaps <= np.maximum(SOON * went, CLOSED)].tolist())
         free = self._in_bores(state, listed - self._joined)
-        self.unlisted |= (listed & self._joined) - pushing | free - pushing - touching
+        self.unlisted |= (listed & self._joined) - pushing | free - pushing - near

@@ -303,15 +303,16 @@ class Tracker(TickMemory):
         Some pairs have no rows at first, or those of earlier ticks (`proven_pairs.py`). Where the proof refuses the pose
         of these, they get the rows of the last pose, once, and the tick begins again.
         """
-        begun_again = set[int]()
+        begun_again = frozenset[int]()
         while True:
             status = self._moved()
             if status is None or self._clear is None or status is TrackStatus.VIOLATED:
                 return status
             self._clear.unlisted = self._rows.unlisted
+            self._clear.renewable = self._rows.fitting - begun_again
             there = Solution(self._scene, self._packed, self._pose.copy(), Status.SOLVED, 0.0, self._history)
             if self._clear.holds(there):
-                self._rows.settle(self._pose)
+                self._rows.settle(self._before, self._pose)
                 return status
             self._pose[:] = self._before
             again = self._rows.without_updates(self._clear.doubtful) & set(self._clear.in_the_way) - begun_again
