@@ -128,9 +128,12 @@ class ProvenPairs:
 
     def __init__(self, packed: Packed, joined: Sequence[int], fits: dict[int, list[Fit]], first: Array) -> None:
         self.packed, self._joined, self._fits = packed, frozenset(joined), fits
-        self.fitting = frozenset(fits)
-        self.unlisted = self._joined
-        self.settle(first, first)
+        self.fitting, self.unlisted = frozenset(fits), frozenset[int]()
+        # Pairs whose contacts are listed, and of which motion asks for no update.
+        self._kept = frozenset[int]()
+        # Numbers and gaps of contacts at the end of the last tick.
+        self._last = np.empty(0), np.empty(0)
+        self.settle(first)
 
     @property
     def has_no_rows(self) -> bool:
@@ -150,24 +153,20 @@ class ProvenPairs:
             state[row:][: packed.clearance_rows],
         )
 
-    def _in_bores(self, state: Array, which: Iterable[int]) -> set[int]:
-        """Those of some pairs of which a shaft is in a bore."""
-        q = state[: self.packed.contacts_at].reshape(-1, 7)
-        return {k for k in which if any(fit.holds(q) for fit in self._fits.get(k, ()))}
-
     def leave_out(self, state: Array) -> None:
         """Free the slots of pairs that are not listed, and have no motion ask for updates of these and of shafts."""
-        listed = self.fitting - self.unlisted
-        if not self.unlisted and not listed:
+        if not self.unlisted and not self._kept:
             return
         parts = self._parts(state)
-        out = sorted(self.unlisted)
-        free = np.isin(parts.slots[:, PLACE_PAIR], out)
-        in_bores = self._in_bores(state, listed) if listed else set()
-        for k in in_bores:
-            if np.isnan(parts.pairs[k, PAIR_TURN]):
-                continue
-            out.append(k)
+        out = np.array(sorted(self.unlisted | self._kept))
+        # What is to be updated first is what the loop sees then.
+        out = out[parts.pairs[out, MOTION_BOUND] != ANY_MOTION]
+        if not len(out):
+            return
+        fresh = [k for k in out.tolist() if k not in self.unlisted and np.isnan(parts.pairs[k, PAIR_TURN])]
+        out = np.setdiff1d(out, fresh)
+        free = np.isin(parts.slots[:, PLACE_PAIR], sorted(self.unlisted))
+        for k in self._kept.difference(fresh):
             for fit in self._fits[k]:
                 walls = (parts.tracked[:, [FEATURE_F, FEATURE_G]] == fit.numbers).all(axis=1)
                 free |= walls & (parts.slots[:, PLACE_PAIR] == k)
@@ -181,30 +180,40 @@ class ProvenPairs:
         parts.tracked[free, 0] = np.nan
         parts.multipliers[free] = 0.0
 
-    def without_updates(self, which: Iterable[int]) -> set[int]:
+    def without_updates(self, which: Iterable[int]) -> frozenset[int]:
         """Those of some pairs that have no rows, or rows which motion does not ask to be updated."""
-        return set(which) & (self.unlisted | self.fitting)
+        return (self.unlisted | self.fitting).intersection(which)
 
     def list_again(self, state: Array, which: Iterable[int]) -> None:
         """Have the next run of the loop update pairs, of those without updates of their own."""
         some = sorted(self.without_updates(which))
-        self._parts(state).pairs[some, PAIR_TURN] = np.nan
-        self.unlisted = self.unlisted.difference(some)
+        if some:
+            pairs = self._parts(state).pairs
+            pairs[some, PAIR_TURN], pairs[some, MOTION_BOUND] = np.nan, 0.0
+            self._kept |= self.unlisted.intersection(some) & self.fitting
+            self.unlisted = self.unlisted.difference(some)
 
-    def settle(self, before: Array, state: Array) -> None:
+    def settle(self, state: Array) -> None:
         """Leave out pairs, from the next tick on, of which no contact pushes at the end of a tick.
 
         Of a shaft that no joint holds in its bore, whose contacts are few, none may be so near, either, that it could
-        touch within some ticks (SOON) if it went on as in this one.
+        touch within some ticks (SOON) if it went on as in this one. What has left its bore has rows like others.
         """
-        listed = (self._joined | self.fitting) - self.unlisted
-        if not listed:
+        if not self.fitting and self._joined <= self.unlisted:
             return
-        last, now = self._parts(before), self._parts(state)
-        pairs, gaps = now.slots[:, PLACE_PAIR], now.tracked[:, PAIR_GAP]
-        pushing = set(pairs[now.multipliers != 0.0].tolist())
-        stayed = last.slots[:, PLACE_NUMBER] == now.slots[:, PLACE_NUMBER]
-        went = np.where(stayed, np.abs(gaps - last.tracked[:, PAIR_GAP]), np.inf)
-        near = set(pairs[gaps <= np.maximum(SOON * went, CLOSED)].tolist())
-        free = self._in_bores(state, listed - self._joined)
-        self.unlisted |= (listed & self._joined) - pushing | free - pushing - near
+        q = state[: self.packed.contacts_at].reshape(-1, 7)
+        loose = {k for k in self.fitting - self._joined if any(fit.holds(q) for fit in self._fits[k])}
+        parts = self._parts(state)
+        gone = (self.unlisted | self._kept) - self._joined - loose
+        self.list_again(state, gone)
+        pairs, numbers, gaps = parts.slots[:, PLACE_PAIR], parts.slots[:, PLACE_NUMBER], parts.tracked[:, PAIR_GAP]
+        busy = set(pairs[parts.multipliers != 0.0].tolist())
+        if loose - self.unlisted:
+            before = self._last if len(self._last[0]) == len(numbers) else (np.full(len(numbers), -1.0), gaps)
+            went = np.where(before[0] == numbers, np.abs(gaps - before[1]), np.inf)
+            near = set(pairs[gaps <= np.maximum(SOON * went, CLOSED)].tolist())
+            self._last = numbers.copy(), gaps.copy()
+        else:
+            near = set[float]()
+        self.unlisted |= ((self._joined - busy) | (loose - busy - near)) - gone
+        self._kept = frozenset(loose) - self.unlisted

@@ -312,7 +312,7 @@ class Tracker(TickMemory):
             self._clear.renewable = self._rows.fitting - begun_again
             there = Solution(self._scene, self._packed, self._pose.copy(), Status.SOLVED, 0.0, self._history)
             if self._clear.holds(there):
-                self._rows.settle(self._before, self._pose)
+                self._rows.settle(self._pose)
                 return status
             self._pose[:] = self._before
             again = self._rows.without_updates(self._clear.doubtful) & set(self._clear.in_the_way) - begun_again
