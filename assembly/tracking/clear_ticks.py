@@ -14,9 +14,10 @@ from assembly.constraints.packing.manager import is_of_surfaces
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.proof import ClearanceProof
+from assembly.proximity.clearance.touching import off_contacts
 from assembly.proximity.features.solid_contact import TRACK, TRACKED_PAIR
 from assembly.proximity.manager.records import MEMORY_HEADER, PAIR_MEMORY, PLACE_MEMORY, PLACE_NUMBER, PLACE_PAIR
-from assembly.solve.clearance_proof import near_contacts, new_proof, opening_move
+from assembly.solve.clearance_proof import near_contacts, new_proof, nothing_known, opening_move
 from assembly.solve.solution import Solution
 
 __all__ = ["ClearTicks", "WayLimits"]
@@ -34,6 +35,7 @@ OPENED = (1.0, 0.1, 0.01)
 SLIGHTLY = 0.1
 # It may go in by so much of the size in any case: directions that part bodies are then found at once.
 ROOM = 1e-6
+UNKNOWN = Answer(Verdict.UNDECIDED)
 # Where the normal of a contact is among what is tracked of it.
 NORMAL = slice(place_of(TRACKED_PAIR, "normal"), place_of(TRACKED_PAIR, "normal") + 3)
 # Contacts that are nearer, in parts of the size, are remembered of a pose.
@@ -131,6 +133,12 @@ class ClearTicks:
         Whether all pairs were proven clear, or touching, at the last tick that holds; else faces lie on each other.
     way_depth : float
         The largest overlap of bodies on the way to it.
+    unlisted : frozenset of int
+        Pairs whose contacts are not listed: what opens them is recognized from their faces.
+    renewable : frozenset of int
+        Pairs which may get other rows in this tick.
+    in_the_way : list of int
+        The pairs that the last tick does not hold of; of those that are not listed, at its pose and not on the way alone.
     """
 
     def __init__(
@@ -156,6 +164,7 @@ class ClearTicks:
         self._at = _Standing(first)
         self._moves, self._opened = np.zeros((len(proof.pairs), 6)), list[int]()
         self.way_depth = 0.0
+        self.unlisted, self.renewable, self.in_the_way = frozenset[int](), frozenset[int](), list[int]()
         answers = dict(enumerate(proof.look(first.q, touching)))
         left = [k for k, answer in answers.items() if not is_proven(answer)]
         for k in left:
@@ -173,7 +182,7 @@ class ClearTicks:
         """
         proof, touching = self._proof, self._touching
         there, moves = _Standing(solution), self._moves
-        self.way_depth = 0.0
+        self.way_depth, self.in_the_way = 0.0, []
         rolling, last = self._rolling(there), proof.last_poses()
         answers: dict[int, Answer] = {}
         if not rolling:
@@ -189,9 +198,11 @@ class ClearTicks:
             left = self._left_by(answers, others, there, moves, QUICK) + rolling
         moves = moves.copy()
         for k in left:
-            moves[k] = there.opened(proof, k, touching)
+            moves[k] = self._opening(there, k)
         changed = [k for k in left if k not in rolling and (moves[k] != self._moves[k]).any()]
         self._left_by(answers, changed, there, moves, QUICK)
+        if self._ask_rows(answers, left, there, moves, last):
+            return False
         for part in OPENED:
             open_yet = [k for k in left if not (k in answers and is_proven(answers[k]))]
             may = [k for k in open_yet if self._may_go_in(k, there, part)]
@@ -200,6 +211,7 @@ class ClearTicks:
         self._left_by(answers, [k for k in left if not (k in answers and is_proven(answers[k]))], there, moves, BUDGET)
         self.doubtful = self._not_known(answers, there)
         if self.doubtful:
+            self.in_the_way = list(self.doubtful)
             proof.go_back(last)
             return False
         self.proved = all(map(is_proven, answers.values()))
@@ -207,6 +219,33 @@ class ClearTicks:
         self._leave_closed([k for k in left if moves[k].any() and proof.is_of_wires(k)])
         self._opened = self._those_opened()
         return True
+
+    def _ask_rows(
+        self, answers: dict[int, Answer], left: list[int], there: _Standing, moves: Array, last: tuple[Array, Array]
+    ) -> bool:
+        """Whether a tick is refused because of pairs that have no rows, or that may get others.
+
+        Of the latter only if they are not clear at its pose. What would take long to prove is not tried before.
+        """
+        proof = self._proof
+        asked = [k for k in left if k in self.unlisted | self.renewable and not is_proven(answers.get(k, UNKNOWN))]
+        if not asked:
+            return False
+        found = dict(zip(asked, proof.look(there.q, self._touching, moves, which=asked, budget=QUICK), strict=True))
+        proof.go_back(last, asked)
+        self.in_the_way = [k for k in asked if not is_proven(found[k])]
+        refused = [k for k in asked if k in self.unlisted or k in self.in_the_way]
+        self.doubtful = {k: answers.get(k, UNKNOWN) for k in refused}
+        if refused:
+            proof.go_back(last)
+        return bool(refused)
+
+    def _opening(self, there: _Standing, k: int) -> Array:
+        """The move (6) that opens pair k at the pose of a tick."""
+        if k not in self.unlisted:
+            return there.opened(self._proof, k, self._touching)
+        off = off_contacts(self._proof, k, there.q, self._touching, nothing_known)
+        return np.zeros(6) if off is None else off
 
     def _those_opened(self) -> list[int]:
         """The pairs that a move opens."""
@@ -252,6 +291,8 @@ class ClearTicks:
         proof, begin = self._proof, self._at
         found = []
         for k in self._opened:
+            if k in self.unlisted:
+                continue
             way = there.way_length(proof, k, begin.q)
             most = SLIGHTLY * self._touching / ROLLED
             if way * way > most * proof.radius(k) and self._turns(k, there, most / way):

@@ -30,9 +30,12 @@ from assembly.solve.clearance_proof import can_prove
 from assembly.solve.loop.settings import CARRIES, HISTORY, RADIUS
 from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution
+from assembly.solve.start_proof import is_for_proofs
 from assembly.tracking.clear_ticks import ClearTicks
+from assembly.tracking.fitting import fits_of
 from assembly.tracking.followed import Followed
 from assembly.tracking.hands import Hands
+from assembly.tracking.proven_pairs import ProvenPairs, joined_pairs
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -91,6 +94,11 @@ class TickMemory(InOneProcess):
         self._set_up(first._state)
         proves = packed.keeps_apart and can_prove(packed)
         self._clear = ClearTicks(first, self._touching * packed.scale) if proves else None
+        # What no proof tells of, rows alone keep apart.
+        proves = self._clear is not None and self._clear.proved and is_for_proofs(packed)
+        bodies, constraints = self._inner.bodies, self._inner.constraints
+        joined, fits = (joined_pairs(packed, constraints, bodies), fits_of(packed, bodies)) if proves else ([], {})
+        self._rows = ProvenPairs(packed, joined, fits, first._state)
 
     def _set_up(self, begin: Array) -> None:
         """What ticks work in, and what they read and write directly; they go on from a state of the packed scene."""
@@ -110,16 +118,10 @@ class TickMemory(InOneProcess):
         self._before = self._pose.copy()
         self._knobs: Any = self._settings.data
         _, doubles, integers = new_workspace(packed)
-        self._arguments = (
-            packed.table,
-            packed.pool,
-            self._settings,
-            self._state,
-            self._history,
-            doubles,
-            integers,
-            packed.end_effectors,
-        )
+        work = (self._settings, self._state, self._history, doubles, integers, packed.end_effectors)
+        self._arguments = (packed.table, packed.pool, *work)
+        # Where no pair has rows, there is no contact manager.
+        self._rows_alone = (packed.without_manager(), packed.pool, *work)
         self._radius = float(self._settings[RADIUS])
         self._seen = float(self._state[packed.memory_at + EVENT_COUNT]) if packed.clearance_rows else 0.0
         self._hands.pack(packed)
@@ -137,6 +139,7 @@ class TickMemory(InOneProcess):
         self._scene, self._numbers = self._inner._scene, self._told()
         result = self._before[before.results_at : before.memory_at]
         self._set_up(taken_over(before, packed, self._before))
+        self._rows.packed = packed
         self._radius = radius
         self._before[packed.results_at : packed.memory_at] = result
         self._pose[:] = self._before

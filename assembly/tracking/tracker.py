@@ -269,27 +269,11 @@ class Tracker(TickMemory):
         if row is None:
             status = TrackStatus.CHANGED if changed else TrackStatus.BAD_TARGET
             return Step(self._followed, self._before, status, self._hands.where(), self._seen, perf_counter() - begin)
-        view, at = self._view, packed.results_at
-        carried = view[at + CARRIED] > 0.0
-        code = solve_program(*self._arguments)
-        if view[at + CARRIED] > 0.0:
+        status = self._moved_clear()
+        if status is None:
             # The next tick goes on from a pose that does not hold yet; here the last one stands.
-            stands = self._before[at + VIOLATION] <= self._tolerance
-            status = TrackStatus.LATE if stands else TrackStatus.VIOLATED
+            status = TrackStatus.LATE if self._stands else TrackStatus.VIOLATED
             return Step(self._followed, self._before, status, row, self._seen, perf_counter() - begin)
-        status = _STATUSES.get(code, TrackStatus.APPROACHING)
-        if not view[at + VIOLATION] <= self._tolerance:
-            status = TrackStatus.VIOLATED
-            # If a contact appeared that the rows of the last tick did not have, there is no pose to return to.
-            stands = self._before[at + VIOLATION] <= self._tolerance
-            begun = carried or self._history[0, 1] * packed.scale <= self._tolerance
-            if code == CONTACT_LOST or (begun and stands):
-                status = TrackStatus.HELD if stands else TrackStatus.VIOLATED
-                self._pose[:] = self._before
-        elif view[at + LAST_FEASIBLE] == 1.0:
-            status = TrackStatus.HELD
-        if self._clear is not None and status is not TrackStatus.VIOLATED:
-            status = self._proven(status)
         # After a step that was too long the next ones are shorter, until they succeed.
         radius = self._knobs[RADIUS]
         if status is TrackStatus.HELD:
@@ -298,7 +282,7 @@ class Tracker(TickMemory):
             self._knobs[RADIUS] = min(4.0 * radius, self._radius)
         seen = self._seen
         if packed.clearance_rows:
-            self._seen = view[packed.memory_at + EVENT_COUNT]
+            self._seen = self._view[packed.memory_at + EVENT_COUNT]
         # What steps keep nobody writes to.
         self._before = self._pose.copy()
         ended, followed = self._before, self._followed
@@ -307,16 +291,55 @@ class Tracker(TickMemory):
         way_depth = 0.0 if self._clear is None else self._clear.way_depth if self._clear.proved else None
         return Step(followed, ended, status, row, seen, perf_counter() - begin, way_depth)
 
-    def _proven(self, status: TrackStatus) -> TrackStatus:
-        """The status of a tick, whose pose is that of the last one where bodies are not known to be clear at it."""
-        assert self._clear is not None
-        there = Solution(self._scene, self._packed, self._pose.copy(), Status.SOLVED, 0.0, self._history)
-        if self._clear.holds(there):
-            return status
-        self._pose[:] = self._before
-        # The contact that was crossed may not be listed: all pairs are searched again.
-        forget_updates(self._packed, self._state)
-        return TrackStatus.HELD
+    @property
+    def _stands(self) -> bool:
+        """Whether constraints hold at the pose of the last tick."""
+        return bool(self._before[self._packed.results_at + VIOLATION] <= self._tolerance)
+
+    def _moved_clear(self) -> TrackStatus | None:
+        """Run the loop, and prove where that led; None if it goes on in the next tick.
+
+        Some pairs have no rows at first, or those of earlier ticks (`proven_pairs.py`). Where the proof refuses the pose
+        of these, they get the rows of the last pose, once, and the tick begins again.
+        """
+        begun_again = frozenset[int]()
+        while True:
+            status = self._moved()
+            if status is None or self._clear is None or status is TrackStatus.VIOLATED:
+                return status
+            self._clear.unlisted = self._rows.unlisted
+            self._clear.renewable = self._rows.fitting - begun_again
+            there = Solution(self._scene, self._packed, self._pose.copy(), Status.SOLVED, 0.0, self._history)
+            if self._clear.holds(there):
+                self._rows.settle(self._pose)
+                return status
+            self._pose[:] = self._before
+            again = self._rows.without_updates(self._clear.doubtful) & set(self._clear.in_the_way) - begun_again
+            if self._budget is not None or not again:
+                # The contact that was crossed may not be listed: all pairs are searched again.
+                self._rows.list_again(self._state, self._clear.in_the_way)
+                forget_updates(self._packed, self._state)
+                return TrackStatus.HELD
+            self._rows.list_again(self._state, again)
+            begun_again |= again
+
+    def _moved(self) -> TrackStatus | None:
+        """Run the loop once; the status of the tick if bodies are clear, None if the loop goes on in the next one."""
+        view, at = self._view, self._packed.results_at
+        carried = view[at + CARRIED] > 0.0
+        self._rows.leave_out(self._state)
+        code = solve_program(*(self._rows_alone if self._rows.has_no_rows else self._arguments))
+        if view[at + CARRIED] > 0.0:
+            return None
+        status = _STATUSES.get(code, TrackStatus.APPROACHING)
+        if not view[at + VIOLATION] <= self._tolerance:
+            # If a contact appeared that the rows of the last tick did not have, there is no pose to return to.
+            begun = carried or self._history[0, 1] * self._packed.scale <= self._tolerance
+            if code == CONTACT_LOST or (begun and self._stands):
+                self._pose[:] = self._before
+                return TrackStatus.HELD if self._stands else TrackStatus.VIOLATED
+            return TrackStatus.VIOLATED
+        return TrackStatus.HELD if view[at + LAST_FEASIBLE] == 1.0 else status
 
     def run(self, trace: Trace | Sequence[Trace], *, paced: bool = False, stride: int = 1) -> TrackLog:
         """Follow recorded motions, one tick per sample.

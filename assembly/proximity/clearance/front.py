@@ -19,6 +19,7 @@ from assembly.proximity.clearance.halve import put, vector
 from assembly.proximity.clearance.records import (
     BY_BORE_B,
     BY_PLANE,
+    BY_SLEEVE,
     BY_SPINES,
     NODES_SIZE,
     PARTED_SIZE,
@@ -27,7 +28,7 @@ from assembly.proximity.clearance.records import (
     pair_proof_at,
     parted_at,
 )
-from assembly.proximity.clearance.separation import gap_of
+from assembly.proximity.clearance.sleeves import gap_of
 from assembly.proximity.clearance.spines import loss_on_way, spine_gap
 from assembly.proximity.clearance.way import sag_of, stays_apart
 
@@ -122,9 +123,10 @@ def replace_front(front, pose, travelled):
 def expiry_of(nodes, travelled, gap):
     """Until points of b have gone so far in all, two nodes are parted for certain.
 
-    Points of a are seen from b in a bore of which the root's radius tells nothing: they are asked every time.
+    Points of a are seen from b in a bore of which the root's radius tells nothing: they are asked every time. So is
+    what leans in a bore, which is nearer by more than it goes.
     """
-    return -math.inf if nodes.how == BY_BORE_B else travelled + gap
+    return -math.inf if nodes.how == BY_BORE_B or nodes.how >= BY_SLEEVE else travelled + gap
 
 
 @kernel(inner=True)

@@ -29,6 +29,7 @@ from assembly.proximity.clearance.halve import halve, put, vector
 from assembly.proximity.clearance.inside import FOREST
 from assembly.proximity.clearance.records import (
     BY_PLANE,
+    BY_SLEEVE,
     BY_SPINES,
     CLEAR,
     CROSSING,
@@ -44,7 +45,8 @@ from assembly.proximity.clearance.records import (
     pair_proof_at,
     parted_at,
 )
-from assembly.proximity.clearance.separation import best_bore, gap_of, is_cell, is_round, is_wire, separation
+from assembly.proximity.clearance.separation import is_cell, is_round, is_wire, separation
+from assembly.proximity.clearance.sleeves import best_bore, gap_of
 from assembly.proximity.clearance.spines import spine_gap
 from assembly.proximity.clearance.stab import crossing_of
 from assembly.proximity.clearance.way import pose_at, sag_of, stays_apart, way_of
@@ -52,6 +54,8 @@ from assembly.proximity.clearance.way import pose_at, sag_of, stays_apart, way_o
 # The most pairs that directions are sought for over a whole way: halving it is cheaper than more. The shortest part of
 # a way.
 SWEPT_BUDGET, SHORTEST = 1000, 1.0 / 256.0
+# What was found of two nodes: no cause to say they are apart, parted, or apart at both ends of a way too long to tell.
+NOT_PARTED, ARE_PARTED, NEED_SHORTER = 0, 1, 2
 # How a pair of nodes was left: parted, to be replaced by children, open, or with it the look ends.
 DONE, DIVIDED, ENDED = 0, 1, 2
 
@@ -72,23 +76,26 @@ def part_wires(forest, front, way, nodes, needed):
 
 @kernel(inner=True)
 def part_nodes(forest, front, way, nodes, hint, needed):
-    """Seek what parts two nodes: whether it does, the direction, gaps before and after, and whether hulls overlap."""
+    """Seek what parts two nodes: what was found, the direction, gaps before and after, and whether hulls overlap."""
     found, overlap = best_direction(forest, front, nodes, way, hint, needed)
     n, gaps = found.n, (found.before - needed, found.after - needed)
     travelled = pair_proof_at(front.pair, 0).travelled + way.moved
     if stays_apart(forest, nodes, way, n, gaps):
         keep(front, nodes, n, travelled + gaps[1])
-        return True, n, gaps, overlap
+        return ARE_PARTED, n, gaps, overlap
     if is_wire(forest, nodes.a) and is_wire(forest, nodes.b) and part_wires(forest, front, way, nodes, needed):
-        return True, n, gaps, overlap
+        return ARE_PARTED, n, gaps, overlap
     how, room = best_bore(forest, nodes.a, nodes.b, way.after)
     if how != BY_PLANE and room > needed:
         inside = Parted(nodes.a, nodes.b, how)
         at_start = gap_of(forest, inside, way.before, n) - needed if way.swept else math.inf
         if stays_apart(forest, inside, way, n, (at_start, room - needed)):
             keep(front, inside, n, expiry_of(inside, travelled, room - needed))
-            return True, n, gaps, overlap
-    return False, n, gaps, overlap
+            return ARE_PARTED, n, gaps, overlap
+        if how >= BY_SLEEVE and at_start > 0.0:
+            # What is round is exact: smaller nodes tell no more.
+            return NEED_SHORTER, n, gaps, overlap
+    return NOT_PARTED, n, gaps, overlap
 
 
 @kernel(inline=True)
@@ -194,8 +201,10 @@ def seek(forest, front, way, limits, tail):
             continue
         counts.sought += 1
         parted, n, gaps, overlap = part_nodes(forest, front, way, nodes, hint, limits.needed)
-        if parted:
+        if parted == ARE_PARTED:
             continue
+        if parted == NEED_SHORTER:
+            return UNSWEPT
         cells = is_cell(forest, nodes.a) and is_cell(forest, nodes.b)
         if cells and overlap and crosses(forest, front, nodes, way.after, limits.touch):
             return CROSSING

@@ -28,6 +28,7 @@ from assembly.proximity.clearance.look import (
 from assembly.proximity.clearance.records import (
     BY_BORE_B,
     BY_PLANE,
+    BY_SLEEVE,
     CLEAR,
     CROSSING,
     NO_ROOM,
@@ -312,6 +313,8 @@ class ClearanceProof(BodyPairs):
         # Nodes in bores of the second body never keep a gap: they are asked at every pose, and so at this one.
         expiry = self.fronts.parted[k, :count].view(PARTED)[:, 0]["expiry"]
         links = self.fronts.nodes[k, :count].view(NODES)[:, 0]
+        if (links["how"] >= BY_SLEEVE).any():
+            return needed
         in_bore = links["how"] == BY_BORE_B
         kept = float(expiry[~in_bore].min(initial=np.inf)) - travelled + needed
         turn, shift = pair.turn[k].reshape(3, 3), pair.shift[k]
@@ -358,10 +361,11 @@ class ClearanceProof(BodyPairs):
         """The rotations (pairs, 9) and shifts (pairs, 3) of second bodies at the last looks that ended clear."""
         return self._turn.copy(), self._shift.copy()
 
-    def go_back(self, poses: tuple[Array, Array]) -> None:
-        """Make earlier poses, from which all ways were clear, the last ones again."""
+    def go_back(self, poses: tuple[Array, Array], which: Sequence[int] | None = None) -> None:
+        """Make earlier poses, from which all ways were clear, the last ones again; of some pairs, or of all."""
         pair, self._at = self.fronts.pair, None
-        for k, (turn, shift) in enumerate(zip(*poses, strict=True)):
+        for k in range(len(self.pairs)) if which is None else which:
+            turn, shift = poses[0][k], poses[1][k]
             now = pair.turn[k].reshape(3, 3).copy(), pair.shift[k].copy()
             pair.travelled[k] += self.length_between(k, now, (turn.reshape(3, 3), shift))
             pair.turn[k], pair.shift[k] = turn, shift

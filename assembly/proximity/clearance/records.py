@@ -123,11 +123,12 @@ NODES = record_dtype(
     "i8",
     a=1,
     b=1,
-    how=1,  # BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES: what parts them
+    how=1,  # BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, BY_SLEEVE: what parts them
 )
 nodes_at = record_view(NODES)
 NODES_SIZE = size_of(NODES)
-# A plane between them; the bore of a wall of a in which b is, or the other way around; the distance of two spines.
-BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES = 0, 1, 2, 3
+# A plane between them; the bore of a wall of a in which b is, or the other way around; the distance of two spines; the
+# bore of a in which the part of b beside a is, in three ways (`sleeves.py`).
+BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, BY_SLEEVE = 0, 1, 2, 3, 4
 # How a look ends. UNSWEPT: the way is too long to be proven at once; NO_ROOM: memory is full, and has to be grown.
 CLEAR, CROSSING, OPEN, NO_ROOM, UNSWEPT = 0, 1, 2, 3, 4

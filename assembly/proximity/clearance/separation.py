@@ -17,12 +17,8 @@ import math
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, scale, sub
-from assembly.kinematics.motion import inverse_pose
 from assembly.proximity.clearance.halve import corner_of, vector
 from assembly.proximity.clearance.records import (
-    BY_BORE_A,
-    BY_BORE_B,
-    BY_PLANE,
     FLAT,
     NONE,
     WIRE,
@@ -90,16 +86,6 @@ def room_in_bore(forest, wall, k, pose):
     return bore.bore - most - node.disc - node.rho
 
 
-@kernel(inner=True)
-def gap_of(forest, nodes, pose, n):
-    """The gap of two nodes, kept apart by a plane of direction n, or by a bore; of spines see `spines.py`."""
-    if nodes.how == BY_PLANE:
-        return separation(forest, nodes.a, nodes.b, pose, n)
-    if nodes.how == BY_BORE_A:
-        return room_in_bore(forest, nodes.a, nodes.b, pose)
-    return room_in_bore(forest, nodes.b, nodes.a, inverse_pose(pose))
-
-
 @kernel(inline=True)
 def put_point(out, i, x):
     """Write point i of several one after another."""
@@ -154,16 +140,3 @@ def normal_of(forest, k):
     """A unit normal of a cell; of one of a flat face that of the face, which its small corners do not tell as well."""
     node = node_at(forest.nodes, k)
     return vector(node.ruling) if links_at(forest.links, k).form == FLAT else vector(node.axes[2])
-
-
-@kernel(inner=True)
-def best_bore(forest, a, b, pose):
-    """Which of two nodes is the wall of a bore that the other one is in, and by how much it is clear of that."""
-    how, best = BY_PLANE, -math.inf
-    if node_at(forest.nodes, a).bore > 0.0:
-        how, best = BY_BORE_A, room_in_bore(forest, a, b, pose)
-    if node_at(forest.nodes, b).bore > 0.0:
-        gap = room_in_bore(forest, b, a, inverse_pose(pose))
-        if gap > best:
-            how, best = BY_BORE_B, gap
-    return how, best

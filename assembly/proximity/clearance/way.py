@@ -16,11 +16,11 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, blend, dot, matmul_t, matvec, scale, sub
+from assembly.geometry.vec import add, blend, dot, matmul_t, matvec, neg, scale, sub
 from assembly.kinematics.motion import RelativePose
 from assembly.proximity.clearance.halve import corner_of, vector
-from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, node_at
-from assembly.proximity.clearance.separation import across, is_round, is_wire, placed
+from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, BY_SLEEVE, node_at
+from assembly.proximity.clearance.separation import across, highest, is_round, is_wire, placed
 
 # swept: whether the way is looked at, or its end alone. moved: the longest way of a point of b. sag: of any point;
 # factor: of a point at distance 1 from the axis of rotation. axis, middle: of that, in axes of b (zero: it is not
@@ -31,6 +31,8 @@ ROUNDED_UP = 1.0 + 1e-12
 LEAST_SINE, LARGEST_ANGLE = 1e-9, 3.0
 # What the axis may be off, as a part of distances; the sag of so small angles is far below that.
 AXIS_OFF = 1e-6
+# How far what leans in a sleeve may turn on a way [rad]: bounds of `sleeve_sag` rest on it.
+MOST_TURN = 0.05
 # What rounding does to the sine of the angle, of which the axis is a part: that of two matrices and of their product.
 SINE_OFF = 1e-14
 
@@ -114,6 +116,34 @@ def part_along(way, n):
 
 
 @kernel(inner=True)
+def sleeve_sag(way, forest, a, b):
+    """By how much the room of node b in a sleeve of node a is less on the way than between its values at both ends.
+
+    With w the angle of the way, w1 the part of it by which b's axis goes, and dashes for derivatives along the way:
+    |s'| <= 1.1 w1, |s''| <= 2 w w1, |e''| <= 1.3 |c''| + z |s''| + 2 |c'| |s'| for the center c of b at a height z from
+    the plane, and r sqrt(1 + (v.s)^2) has a second derivative up to 1.8 r w w1. Below an angle of 0.25.
+    """
+    wall, node = node_at(forest.nodes, a), node_at(forest.nodes, b)
+    u, axis = vector(wall.ruling), vector(node.axes[0])
+    angle = 4.0 * math.asin(min(math.sqrt(0.5 * way.factor), 1.0))
+    turned = angle
+    if dot(way.axis, way.axis) > 0.0:
+        turned *= min(across(way.axis, axis) + way.lean, 1.0)
+    if turned > MOST_TURN:
+        return math.inf
+    center = vector(node.center)
+    start, end = placed(way.before, way.middle), placed(way.after, way.middle)
+    d = sub(end, start)
+    off = off_axis(way, center)
+    bent, pace = angle * angle * off, math.sqrt(dot(d, d)) + angle * off
+    top, bottom = highest(forest, a, u), -highest(forest, a, neg(u))
+    before, after = dot(placed(way.before, center), u), dot(placed(way.after, center), u)
+    far = max(top, bottom, before, after) - min(top, bottom, before, after) + bent
+    second = 1.3 * bent + (2.0 * far + 1.8 * node.disc) * angle * turned + 2.2 * pace * turned
+    return 0.125 * second
+
+
+@kernel(inner=True)
 def stays_apart(forest, nodes, way, n, gaps):
     """Whether two nodes are kept apart all the way by what keeps them apart at both poses, by gaps before and after.
 
@@ -126,6 +156,10 @@ def stays_apart(forest, nodes, way, n, gaps):
         return True
     if nodes.how == BY_BORE_B:
         sag = sag_backward(way, forest, nodes.a)
+        return after > sag and before > sag
+    if nodes.how >= BY_SLEEVE:
+        # An end of the shaft may be asked instead of the section beyond it.
+        sag = max(sleeve_sag(way, forest, nodes.a, nodes.b), sag_of(way, forest, nodes.b))
         return after > sag and before > sag
     part = 1.0 if nodes.how == BY_BORE_A else part_along(way, n)
     if after > part * way.sag and before > part * way.sag:

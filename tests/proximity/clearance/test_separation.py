@@ -19,7 +19,8 @@ from assembly.proximity.clearance.directions import best_direction
 from assembly.proximity.clearance.front import Front, Parted
 from assembly.proximity.clearance.look import gap_along
 from assembly.proximity.clearance.records import BY_PLANE, Forest
-from assembly.proximity.clearance.separation import best_bore, room_in_bore, separation
+from assembly.proximity.clearance.separation import room_in_bore, separation
+from assembly.proximity.clearance.sleeves import best_bore
 from assembly.proximity.clearance.way import Way, part_along, pose_at, sag_of, way_of
 from tests.proximity.clearance.nodes import forest_of, halve_all, tree_of
 from tests.proximity.clearance.scenes import direction, faces_of

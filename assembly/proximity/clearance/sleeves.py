@@ -1,0 +1,143 @@
+"""A shaft that is longer than its bore and leans in it: only what is within the bore's height is in the bore.
+
+What the node of a body stands for that has the bore lies farther from its axis than the bore's radius, and between two
+planes across the axis. So a cylinder of the other body is apart from it where its part between these planes is within
+the bore. Along every ruling the distance from the axis is convex: it is largest where the ruling crosses one of both
+planes, or ends. A plane at height z cuts the cylinder of radius r, whose axis leans by the vector s (the tangent of its
+angle, seen along the bore) and meets the plane at e, in an ellipse. Its support along a unit v across the axis is
+
+    v.e + r sqrt(1 + (v.s)^2)
+
+and the largest value of that over v the largest distance D of a point of the section. Squared, that is a quadratic
+over the unit circle, for which any multiplier l gives an upper bound, and the best one the maximum itself (here by
+Newton's method). Of the distance of the bodies the room R - D is a lower bound, times the cosine of the angle.
+
+Either end of the cylinder may be taken instead of the section beyond it: its disc is within a ball.
+"""
+
+from __future__ import annotations
+
+import math
+
+from assembly._kernel import kernel
+from assembly.geometry.vec import add, dot, matvec, neg, scale, sub
+from assembly.kinematics.motion import inverse_pose
+from assembly.proximity.clearance.halve import vector
+from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, BY_PLANE, BY_SLEEVE, node_at
+from assembly.proximity.clearance.separation import across, highest, is_round, placed, room_in_bore, separation
+
+__all__ = ["best_bore", "gap_of"]
+
+# The least cosine of the angle by which a shaft leans at a pose, and on a way from there (`sleeve_sag` in `way.py`).
+UPRIGHT, LEAST_COSINE = 0.98, 0.96
+# Steps of Newton's method: it begins near by, and three are exact to rounding.
+STEPS = 3
+
+
+@kernel(inner=True)
+def farthest_of_section(e, lean, radius):
+    """The largest distance from the bore's axis of the section of a cylinder, at most.
+
+    Parameters
+    ----------
+    e : vector
+        Where its axis meets the plane of the section, from the bore's axis.
+    lean : vector
+        By how much its axis goes sideways for each unit of height.
+    radius : float
+    """
+    slope = math.sqrt(dot(lean, lean))
+    square = dot(e, e)
+    along = dot(e, lean) / slope if slope > 0.0 else math.sqrt(square)
+    beside = math.sqrt(max(square - along * along, 0.0))
+    # Over c^2 + s^2 = 1 the largest value of 2 (p c + q s) + k c^2.
+    k = radius * radius * slope * slope
+    p, q = radius * math.sqrt(1.0 + slope * slope) * abs(along), radius * beside
+    least, m = max(k + p, q), math.sqrt(p * p + q * q)
+    l = max(m + k * (p / m) ** 2, least) if m > 0.0 else least
+    for _ in range(STEPS):
+        u = p / (l - k) if p > 0.0 else 0.0
+        v = q / l if q > 0.0 else 0.0
+        slow = (2.0 * u * u / (l - k) if p > 0.0 else 0.0) + (2.0 * v * v / l if q > 0.0 else 0.0)
+        if slow > 0.0:
+            l = max(l - (1.0 - u * u - v * v) / slow, least)
+    most = l + (p * p / (l - k) if p > 0.0 else 0.0) + (q * q / l if q > 0.0 else 0.0)
+    return math.sqrt(square + radius * radius + most)
+
+
+@kernel(inner=True)
+def sleeve_room(forest, wall, k, pose, how):
+    """How far the part of a cylinder, node k, beside a node with a bore is from that node; else negative.
+
+    `how` - BY_SLEEVE: 0 if both its ends are beyond the bore, 1 or 2 if the end along its axis, or the other, is asked.
+    The pose is seen from the node with the bore.
+    """
+    bore, node = node_at(forest.nodes, wall), node_at(forest.nodes, k)
+    u, spine = vector(bore.ruling), vector(bore.spine)
+    a = matvec(pose.rotation, vector(node.axes[0]))
+    cosine = dot(a, u)
+    if not abs(cosine) >= UPRIGHT:
+        return -math.inf
+    c = sub(placed(pose, vector(node.center)), spine)
+    height = dot(c, u)
+    lean = scale(1.0 / cosine, sub(a, scale(cosine, u)))
+    c = sub(c, scale(height, u))
+    top, bottom = highest(forest, wall, u) - dot(spine, u), -highest(forest, wall, neg(u)) - dot(spine, u)
+    # Where the end along the axis is, and where the other one.
+    ahead, behind = (top, bottom) if cosine > 0.0 else (bottom, top)
+    most = 0.0
+    if how - BY_SLEEVE != 1:
+        most = farthest_of_section(add(c, scale(ahead - height, lean)), lean, node.disc)
+    else:
+        most = across(add(c, scale(node.half[0], a)), u) + node.disc
+    if how - BY_SLEEVE != 2:
+        most = max(most, farthest_of_section(add(c, scale(behind - height, lean)), lean, node.disc))
+    else:
+        most = max(most, across(sub(c, scale(node.half[0], a)), u) + node.disc)
+    return LEAST_COSINE * (bore.bore - most)
+
+
+@kernel(inner=True)
+def best_sleeve(forest, a, b, pose):
+    """How node b, a cylinder, is best within the bore of node a, and the room there; BY_PLANE where that cannot be."""
+    one, other = node_at(forest.nodes, a), node_at(forest.nodes, b)
+    axis = vector(one.ruling)
+    if not one.bore > 0.0 or dot(axis, axis) == 0.0 or not is_round(forest, b):
+        return BY_PLANE, -math.inf
+    if other.rho > 0.0 or not other.half[0] > 0.0:
+        return BY_PLANE, -math.inf
+    how, best = BY_PLANE, -math.inf
+    for i in range(3):
+        room = sleeve_room(forest, a, b, pose, BY_SLEEVE + i)
+        if room > best:
+            how, best = BY_SLEEVE + i, room
+    return how, best
+
+
+@kernel(inner=True)
+def gap_of(forest, nodes, pose, n):
+    """The gap of two nodes, kept apart by a plane of direction n, or by a bore; of spines see `spines.py`."""
+    if nodes.how == BY_PLANE:
+        return separation(forest, nodes.a, nodes.b, pose, n)
+    if nodes.how == BY_BORE_A:
+        return room_in_bore(forest, nodes.a, nodes.b, pose)
+    if nodes.how >= BY_SLEEVE:
+        return sleeve_room(forest, nodes.a, nodes.b, pose, nodes.how)
+    return room_in_bore(forest, nodes.b, nodes.a, inverse_pose(pose))
+
+
+@kernel(inner=True)
+def best_bore(forest, a, b, pose):
+    """Which of two nodes is the wall of a bore that the other one is in, and by how much it is clear of that."""
+    how, best = BY_PLANE, -math.inf
+    if node_at(forest.nodes, a).bore > 0.0:
+        how, best = BY_BORE_A, room_in_bore(forest, a, b, pose)
+    if node_at(forest.nodes, b).bore > 0.0:
+        gap = room_in_bore(forest, b, a, inverse_pose(pose))
+        if gap > best:
+            how, best = BY_BORE_B, gap
+    if not best > 0.0:
+        sleeve, gap = best_sleeve(forest, a, b, pose)
+        if gap > best:
+            how, best = sleeve, gap
+    return how, best
