@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
-from typing import Any, TypeGuard
+from typing import Any, Self, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint, Coordinate, structure_changes
 from assembly.constraints.model.contact import Contact, lone_surfaces
 from assembly.constraints.model.contents import Contents
@@ -63,6 +64,8 @@ class PackedContents(Contents):
         self._seats: tuple[tuple[int, Seat], ...] = ()  # where the last solve began
         self._axes_at: Array | None = None  # where axes are nearest, if that is not where a solve begins
         self._packings: dict[tuple[tuple[int, Seat], ...], tuple[Packed | None, Scene | None]] = {}
+        # Scenes of the same bodies without clearances, or objectives, which solves begin with; packed once.
+        self._parts: dict[tuple[bool, bool], Self] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """State for pickles and deep copies: what the scene is made of, without its packing, which is 100 times as
@@ -98,6 +101,19 @@ class PackedContents(Contents):
                 raise InputError(f"bodies are {[body.name for body in self._bodies]}, none moving; expected one")
             return self._pack(before)
         return self._packed
+
+    def _part(self, has_clearances: bool, has_objectives: bool) -> Self:
+        """The same bodies with some of the constraints and terms; kept until the scene has others."""
+        key = has_clearances, has_objectives
+        part = self._parts.get(key)
+        if part is None:
+            kept = [item for item in self._constraints if has_clearances or not isinstance(item, Clearance)]
+            part = type(self)(self._bodies)
+            part._take_constraints(kept)
+            for sign, objective in self._objectives if has_objectives else ():
+                (part.minimize if sign > 0.0 else part.maximize)(objective)
+            self._parts[key] = part
+        return part
 
     def _notice_edits(self) -> None:
         """Forget how the scene is packed if a body became fixed or free, or a constraint enabled or disabled."""
@@ -256,8 +272,12 @@ class PackedContents(Contents):
         q0: ArrayLike | Solution | None,
         starts: Mapping[str, ArrayLike] | None,
         turns: Array | None = None,
+        contacts: Array | None = None,
     ) -> Array:
-        """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results."""
+        """State of the loop: configuration, contact parameters (NaN: to be found), multipliers, room for results.
+
+        Of poses the pairs of contacts may be known: `contacts` are their parameters.
+        """
         if isinstance(q0, Solution):
             state = self._state_of("q0", packed, q0).copy()
         else:
@@ -269,6 +289,8 @@ class PackedContents(Contents):
             if turns is not None:
                 state[packed.angles] = turns
             self._place_tangents(packed, state)
+            if contacts is not None:
+                state[packed.contacts_at :][: len(contacts)] = contacts
         if starts is not None:
             self._place_starts(packed, state, starts)
         packed.refresh()

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.constraints.packing.corners import corners_of
-from assembly.constraints.packing.scene import MOST_CROWDING
+from assembly.constraints.packing.scene import MOST_CROWDING, Packed
 from assembly.packed_contents import PackedContents
 from assembly.solve.attempts.attempts import attempt, load
 from assembly.solve.attempts.postures import postures_from
@@ -155,6 +155,12 @@ class Solving(PackedContents):
         solution.seconds += ended.seconds
         return solution
 
+    def _turns_of(self, packed: Packed) -> Array | None:
+        """Values near which the angles of a packed scene start; None where nothing is known of them."""
+        if not self._turns_near:
+            return None
+        return np.array([self._turns_near.get(angle, 0.0) for angle in packed._angles])
+
     def _solved(
         self,
         settings: Array,
@@ -164,11 +170,13 @@ class Solving(PackedContents):
         reference: Array | None = None,
         turns: Array | None = None,
         judges: bool = True,
+        contacts: Array | None = None,
     ) -> Solution:
         """A solve from q0, with as many slots for contacts of clearances as it needs.
 
         Postures are measured from q0, or from a reference (n, 7). `turns` are values near which angles start, which
         determine their revolution counts. An intermediate solve needs no proof: then only the loop judges its end.
+        `contacts` are the pairs of the given ones at q0 as a state has them, where these are known.
         """
         spent = 0.0
         if isinstance(q0, Solution):
@@ -176,8 +184,7 @@ class Solving(PackedContents):
             q0._list_contacts()
         while True:
             packed = self.packed()
-            if self._turns_near:
-                turns = np.array([self._turns_near.get(angle, 0.0) for angle in packed._angles])
+            turns = turns if not self._turns_near else self._turns_of(packed)
             apart = None
             if isinstance(q0, Solution) and q0._fit is not None and q0._packed.rows == packed.rows:
                 apart = q0._fit.apart
@@ -185,7 +192,7 @@ class Solving(PackedContents):
             if packed.clearance_rows and settings[PLACES] != may_grow:
                 settings = settings.copy()
                 settings[PLACES] = float(may_grow)
-            start = partial(self._start, packed, q0, starts, turns)
+            start = partial(self._start, packed, q0, starts, turns, contacts)
             load(packed, start)
             begin = perf_counter()
             if reference is None:

@@ -26,6 +26,7 @@ from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_p
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.deforming import smaller_answer
 from assembly.proximity.clearance.holder_first import holds_first
+from assembly.proximity.clearance.hulls.scene import answers_by_hulls
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof, stayed_answers
 from assembly.proximity.clearance.touching import filled_bore, left_open, move_apart, off_contacts
 from assembly.proximity.extrema.pairs import ContactPair
@@ -49,9 +50,11 @@ __all__ = [
     "near_contacts",
     "new_proof",
     "nothing_known",
+    "open_recognized",
     "opening_move",
     "owned_pairs",
     "prove_end",
+    "proven_by_hulls",
     "proven_pairs",
 ]
 
@@ -132,6 +135,18 @@ def lent_proof(packed: Packed, bodies: Sequence[Body]) -> Iterator[ClearanceProo
         packed.proofs.append(proof)
 
 
+def proven_by_hulls(
+    packed: Packed, bodies: Sequence[Body], proof: ClearanceProof | None, q: Array, touching: float
+) -> list[Answer] | None:
+    """That all pairs are clear or touch at poses, by hulls of faces; None where these do not tell it.
+
+    Of faces that lie on each other they tell more than looks, in less time; of wires that touch nothing.
+    """
+    if proof is not None and proof.has_wires:
+        return None
+    return answers_by_hulls(*proven_pairs(packed, bodies), q, touching)
+
+
 def can_prove(packed: Packed) -> bool:
     """Whether a scene has a size at which a proof is possible; else rows alone keep bodies apart."""
     return LEAST_SIZE < packed.scale < 1.0 / LEAST_SIZE
@@ -174,7 +189,10 @@ def prove_end(solution: Solution) -> Sequence[PairAnswer]:
         stayed = _stayed_clear(packed, proof, solution.q, touching)
         if stayed is not None:
             return stayed
-        wedged = _open_recognized(proof, solution.q, touching)
+        hulled = proven_by_hulls(packed, scene.bodies, proof, solution.q, touching)
+        if hulled is not None:
+            return named_answers(packed, hulled)
+        wedged = open_recognized(proof, solution.q, touching)
         answers = _first_looks(proof, solution.q, touching, wedged)
         _make_smaller(proof, solution.q, touching, answers, wedged)
         held = {k for k in wedged if conforms(proof, k, solution.q, touching)}
@@ -266,14 +284,15 @@ def _make_smaller(proof: ClearanceProof, q: Array, touching: float, answers: lis
             answers[k] = smaller
 
 
-def _open_recognized(proof: ClearanceProof, q: Array, touching: float) -> set[int]:
+def open_recognized(proof: ClearanceProof, q: Array, touching: float) -> set[int]:
     """Find what opens pairs that are recognized to touch, among the moves of a proof; the pairs that nothing opens.
 
     What opened a pair at the last solve may do so here.
     """
     wedged = set()
     for k in proof.near_pairs(q, touching):
-        if proof.moves[k].any():
+        # Wires that touch are slimmer instead.
+        if proof.moves[k].any() or proof.is_of_wires(k):
             continue
         off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, nothing_known)
         if off is None:

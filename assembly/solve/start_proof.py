@@ -16,7 +16,6 @@ from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.deforming import smaller_answer
-from assembly.proximity.clearance.hulls.scene import answers_by_hulls
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
 from assembly.proximity.features.solid_contact import TRACK
@@ -28,7 +27,7 @@ from assembly.solve.clearance_proof import (
     named_answers,
     nothing_known,
     owned_pairs,
-    proven_pairs,
+    proven_by_hulls,
 )
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.samples import PosedBodies, sampled
@@ -51,7 +50,7 @@ def is_for_proofs(packed: Packed) -> bool:
 def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: float) -> Sequence[PairAnswer] | None:
     """What is proven of all pairs that clearances keep apart; None if not all of them hold.
 
-    Equal poses are not checked again.
+    Equal poses are not checked again, whether all held there or not.
 
     Parameters
     ----------
@@ -65,8 +64,9 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
     q, asked = state[: packed.contacts_at].reshape(-1, 7), _asked(packed, state)
     if packed.stood is not None and packed.stood[:2] == (asked, touching):
         return packed.stood[2]
-    # Hulls of faces prove most of it before there are cells; with cells another look takes some 10 us a pair.
-    hulled = None if packed.proofs else answers_by_hulls(*proven_pairs(packed, bodies), q, touching * packed.scale)
+    # Hulls of faces prove most of it before there are cells, and of faces that lie on each other in less time.
+    known = packed.proofs[-1] if packed.proofs else None
+    hulled = proven_by_hulls(packed, bodies, known, q, touching * packed.scale)
     if hulled is not None:
         packed.stood = asked, touching, named_answers(packed, hulled)
         return packed.stood[2]
@@ -74,12 +74,14 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
         proof.make_slimmer(touching * packed.scale)
         answers, conforming = _answers(proof, q, touching * packed.scale)
     if answers is None:
+        packed.stood = asked, touching, None
         return None
     owned = owned_pairs(packed)
     if conforming:
         given = state[packed.contacts_at :][: TRACK * len(packed.contacts)].reshape(-1, TRACK)
         posed = PosedBodies(bodies, q, touching, packed.contacts, given)
         if sampled(posed, [owned[k][1] for k in conforming], CTRL_C).crossing:
+            packed.stood = asked, touching, None
             return None
     found = named_answers(packed, answers)
     packed.stood = asked, touching, found
@@ -92,7 +94,12 @@ def _asked(packed: Packed, state: Array) -> bytes:
 
 
 def prove_way(
-    packed: Packed, bodies: Sequence[Body], last: Array, state: Array, touching: float
+    packed: Packed,
+    bodies: Sequence[Body],
+    last: Array,
+    state: Array,
+    touching: float,
+    may_jump: bool = True,
 ) -> Sequence[PairAnswer] | None:
     """What is proven of all pairs at poses, and that none has passed through the other on the way from the last ones.
 
@@ -109,20 +116,28 @@ def prove_way(
         Poses, and pairs of the given contacts.
     touching : float
         How much bodies may overlap and still count as touching, in parts of the scene's size.
+    may_jump : bool
+        Whether a short way is accepted that is not proven. Else the last poses may be any, of no solution.
     """
     q, length = state[: packed.contacts_at].reshape(-1, 7), touching * packed.scale
     with lent_proof(packed, bodies) as proof:
         proof.make_slimmer(length)
-        if not proof.has_looked:
-            # Hulls told of the last poses.
-            _answers(proof, last, length)
-        elif not (proof.is_at(last) or proof.stays_clear(last, length, proof.moves, QUICK, at_once=True)):
-            proof.look(last, length, proof.moves)
+        if not (proof.is_at(last) or proof.stays_clear(last, length, proof.moves, QUICK, at_once=True)):
+            if may_jump:
+                # Hulls may have told of the last poses: what opens faces that touch there is not known yet.
+                _answers(proof, last, length)
+            elif proof.moves.any():
+                proof.look(last, length, proof.moves)
+            else:
+                proof.look_from(last, length)
         if proof.stays_clear(q, length, proof.moves, QUICK):
             found = StayedClear(packed, *proof.clear_bounds(q, proof.moves))
             packed.stood = _asked(packed, state), touching, found
             return found
-        if any(proof.way_length(k, last, q) > proof.radius(k) for k in _unproven_ways(proof, q, length)):
+        if not may_jump and not (proof.fronts.pair.known == 1.0).all():
+            return None
+        unproven = _unproven_ways(proof, q, length)
+        if any(not may_jump or proof.way_length(k, last, q) > proof.radius(k) for k in unproven):
             return None
     return prove_start(packed, bodies, state, touching)
 
@@ -175,7 +190,8 @@ def _opening(proof: ClearanceProof, q: Array, touching: float) -> tuple[Array, s
     """
     moves, hopeless = proof.moves.copy(), set()
     for k in proof.near_pairs(q, touching):
-        if moves[k].any():
+        # Wires that touch are slimmer instead.
+        if moves[k].any() or proof.is_of_wires(k):
             continue
         off = None if filled_bore(proof, k, q, touching) else off_contacts(proof, k, q, touching, nothing_known)
         if off is None:

@@ -17,17 +17,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import can_prove
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import ALLOWED_OVERLAP, GATHER, NEVER
+from assembly.solve.second_order.leave import Outcome
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import prove_start, prove_way
 from assembly.studies.parting import parted
 from assembly.studies.put_together import PutTogether, put_together
-from assembly.studies.resting import Prove, resting
+from assembly.studies.resting import resting
 from assembly.studies.seated import seated
 from assembly.studies.separation import separated
-from assembly.studies.unhindered import unhindered_at
+from assembly.studies.unhindered import Prove, clear_end, rows_from_start, unhindered_at
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -69,15 +71,24 @@ class _FirstSolve:
     def solution(self) -> Solution:
         """The solution."""
         begin = perf_counter()
-        together = put_together(self.scene, self.q, self.starts, self.options, self.interruption)
-        ways = self._resting(self.q, partial(prove_way, self.scene.packed(), self.scene.bodies, self.q))
+        scene, rest = self.scene, (self.settings, self.starts, self.interruption)
+        alone = rows_from_start(scene, self.q, *rest)
+        prove = partial(prove_way, scene.packed(), scene.bodies, self.q)
+        found = self._clear_end(alone, partial(prove, may_jump=False))
+        if found is not None:
+            found.seconds = perf_counter() - begin
+            return found
+        together = put_together(scene, self.q, alone, self.starts, self.options, self.interruption)
+        ways = self._resting(self.q, prove) if scene.objectives else []
         if not self._is_done(ways) and together is not None and not together.keeps_topology:
             ways += self._put_together(together)
         if not self._is_done(ways) and together is not None and together.is_asked and self.scene.objectives:
             ways += self._constraints_first()
         if not self._is_done(ways) and not self.scene.objectives:
             # Rows of clearances contradict each other where faces nearly fit: from there few solves arrive.
-            ways += self._seated(False)
+            ways += self._resting(self.q, partial(prove_start, self.scene.packed(), self.scene.bodies))
+            if not self._is_done(ways):
+                ways += self._seated(False)
         if not self._is_done(ways):
             ways.append(self.scene._solved(self.settings, self.q, self.starts, self.interruption))
             # A start that holds is not moved.
@@ -97,17 +108,22 @@ class _FirstSolve:
         """Whether one of the attempts ended at a solution, or there is no time for another one."""
         return bool(ways) and (any(way.success for way in ways) or self.interruption.is_over())
 
-    def _from(self, poses: Array) -> Solution:
-        """A solve that begins at other poses than the user's."""
-        return self.scene._solved(self.settings, poses, self.starts, self.interruption, self.q)
+    def _from(self, poses: Array, contacts: Array | None = None) -> Solution:
+        """A solve that begins at other poses than the user's, with the pairs of contacts there if they are known."""
+        rest = (self.settings, poses, self.starts, self.interruption)
+        return self.scene._solved(*rest, reference=self.q, contacts=contacts)
 
-    def _where_it_fits(self, poses: Array) -> Solution:
+    def _clear_end(self, alone: Outcome, prove: Prove) -> Solution | None:
+        """The solution where rows have ended without clearances, if it is proven that no clearance pushes there."""
+        return clear_end(self.scene, alone, self.settings, prove, self.interruption)
+
+    def _where_it_fits(self, poses: Array, contacts: Array | None = None) -> Solution:
         """A solve that begins where bodies nearly fit.
 
         Without an objective, if the least move from the user's poses is not found, any pose at which rows hold is
         accepted.
         """
-        solution = self._from(poses)
+        solution = self._from(poses, contacts)
         if solution.success or self.scene.objectives or self.interruption.is_over():
             return solution
         return self._unhindered(poses, False) or self.scene._solved(
@@ -117,7 +133,7 @@ class _FirstSolve:
     def _resting(self, poses: Array, prove: Prove) -> list[Solution]:
         """The solution where an objective draws bodies onto what they fit near poses, if there is one."""
         scene = self.scene
-        if not scene.objectives or self.interruption.is_over():
+        if self.interruption.is_over():
             return []
         rests = resting(scene, poses, self.q, prove, self.settings, self.starts, self.interruption)
         return [] if rests is None else [rests]
@@ -127,9 +143,7 @@ class _FirstSolve:
 
         Far from there an objective draws bodies into each other before rows can keep them apart.
         """
-        inner = type(self.scene)(self.scene.bodies)
-        inner._take_constraints(self.scene.constraints)
-        there = inner._from_start(self.q, self.starts, self.options, self.interruption)
+        there = self.scene._part(True, False)._from_start(self.q, self.starts, self.options, self.interruption)
         if not there.success or self.interruption.is_over():
             return []
         solution = self._from(there.q.copy())
@@ -142,20 +156,24 @@ class _FirstSolve:
         If bodies overlap there, some of their faces may nearly fit: then a solve begins where these do. An objective
         alone may draw bodies into each other in any case, so bodies without such faces are not put together by it.
         """
-        there = together.solution
-        if there is None or self.interruption.is_over():
+        if together.there is None or self.interruption.is_over():
             return []
-        poses = there.q.copy()
-        solution = self._unhindered(poses, True)
+        (poses, alone), packed = together.there, self.scene.packed()
+        prove, contacts = partial(prove_start, packed, self.scene.bodies), None
+        if alone is None:
+            solution = self._unhindered(poses, True)
+        else:
+            solution = self._clear_end(alone, prove)
+            contacts = alone.state[packed.contacts_at :][: TRACK * len(packed.contacts)]
         if solution is None:
-            rests = self._resting(poses, partial(prove_start, self.scene.packed(), self.scene.bodies))
+            rests = self._resting(poses, prove)
             solution = rests[0] if rests else None
         seat = None if solution else seated(self.scene, poses, self._touching, self.interruption)
         if seat is not None:
             solution = None if self.scene.objectives else self._unhindered(seat, False)
             solution = solution or self._where_it_fits(seat)
         if together.is_asked and (solution is None or not solution.success) and not self.interruption.is_over():
-            solution = self._where_it_fits(poses)
+            solution = self._where_it_fits(poses, contacts)
         if solution is None or not together.is_meant(self.scene, solution):
             return []
         solution.put_together = True

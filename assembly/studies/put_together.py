@@ -13,18 +13,18 @@ beside each other at the end only if they are on the same side as before.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from assembly.constraints.model.clearance import Clearance
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.solve.clearance_proof import can_prove, lent_proof
+from assembly.solve.clearance_proof import can_prove, lent_proof, open_recognized
 from assembly.solve.interruption import Interruption
-from assembly.solve.loop.settings import GATHER, NEVER
+from assembly.solve.loop.settings import CONTACT_LOST, SOLVED
 from assembly.solve.options import Options
+from assembly.solve.second_order.leave import Outcome
 from assembly.solve.solution import Solution
 from assembly.studies.parting import is_stuck
 
@@ -36,6 +36,13 @@ __all__ = ["PutTogether", "put_together"]
 Array = NDArray[np.float64]
 # [size of the scene] Constraints with smaller violations count as held.
 HELD = 1e-9
+
+
+class There(NamedTuple):
+    """Where bodies are put together: poses (n, 7), and how rows alone ended there if that is how they were found."""
+
+    poses: Array
+    alone: Outcome | None
 
 
 class PutTogether:
@@ -50,16 +57,15 @@ class PutTogether:
     """
 
     def __init__(
-        self, is_clear: bool, sides: list[Array | None], is_asked: bool, solve: Callable[[], Solution]
+        self, is_clear: bool, sides: list[Array | None], is_asked: bool, solve: Callable[[], There | None]
     ) -> None:
         self.keeps_topology = is_clear and any(side is None for side in sides)
         self.is_asked, self._sides, self._solve = is_asked, sides, solve
 
     @cached_property
-    def solution(self) -> Solution | None:
+    def there(self) -> There | None:
         """The solution without clearances; None if it is not found."""
-        solution = self._solve()
-        return solution if solution.success else None
+        return self._solve()
 
     def is_meant(self, scene: Assembly, solution: Solution) -> bool:
         """Whether to accept a solution: constraints require it, or no pair has changed sides.
@@ -69,6 +75,8 @@ class PutTogether:
         if self.is_asked or not solution.success:
             return True
         with lent_proof(scene.packed(), scene.bodies) as proof:
+            # Hulls that prove a solution tell of no plane.
+            open_recognized(proof, solution.q, solution._touching * scene.packed().scale)
             ends = _sides(proof, solution.q, proof.moves)
         both = zip(self._sides, ends, strict=True)
         return all(side is None or end is None or float(side @ end) > 0.0 for side, end in both)
@@ -82,31 +90,31 @@ def _sides(proof: ClearanceProof, q: Array, moves: Array | None = None) -> list[
 def put_together(
     scene: Assembly,
     q: Array,
+    alone: Outcome,
     starts: Mapping[str, ArrayLike] | None,
     options: dict[str, Any],
     interruption: Interruption,
 ) -> PutTogether | None:
-    """Put the bodies of a scene together without clearances, from poses (n, 7).
+    """Put the bodies of a scene together without clearances, from poses (n, 7) and how rows alone ended from there.
 
     None if the other constraints hold and there is no objective, or if the topology of the start is to be kept.
     """
-    settings = Options.of(options)
-    others = [item for item in scene.constraints if not isinstance(item, Clearance)]
-    packed = scene.packed()
-    if settings.keep_topology or settings.max_iterations == 0 or not can_prove(packed):
+    settings, packed = Options.of(options), scene.packed()
+    if settings.keep_topology or not can_prove(packed):
         return None
-    inner = type(scene)(scene.bodies)
-    inner._take_constraints(others)
-    for sign, objective in scene.objectives:
-        (inner.minimize if sign > 0.0 else inner.maximize)(objective)
-    as_it_is = inner._settings(options | {"max_iterations": 0}, interruption, warm=False)
-    as_it_is[GATHER] = NEVER
-    is_asked = bool(others) and not inner._solved(as_it_is, q, starts, interruption).feasibility <= HELD * packed.scale
+    has_others = len(packed.clearances) < sum(item._is_asked for item in scene.constraints)
+    is_asked = has_others and (alone.code == CONTACT_LOST or not float(alone.history[0, 1]) <= HELD)
     if not (is_asked or scene.objectives) or interruption.is_over():
         return None
     with lent_proof(packed, scene.bodies) as proof:
         touching = settings.touching * packed.scale
         is_clear = not any(is_stuck(answer, touching) for answer in proof.as_they_stand(q, touching))
         sides = _sides(proof, q)
-    solve = partial(inner._from_start, q, starts, options, interruption)
+
+    def solve() -> There | None:
+        if alone.code == SOLVED:
+            return There(alone.state[: packed.contacts_at].reshape(-1, 7).copy(), alone)
+        solution = scene._part(False, True)._from_start(q, starts, options, interruption)
+        return There(solution.q.copy(), None) if solution.success else None
+
     return PutTogether(is_clear, sides, is_asked, solve)

@@ -10,7 +10,7 @@ pushes onto each other are removed, and the objective is minimized again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import count
 from time import perf_counter
@@ -28,7 +28,8 @@ from assembly.proximity.clearance.answers import is_proven
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.manifolds.closed_gaps import closed_gaps
 from assembly.solve.attempts.attempts import as_it_stands
-from assembly.solve.clearance_proof import PairAnswer, can_prove, lent_proof
+from assembly.solve.attempts.postures import postures_from
+from assembly.solve.clearance_proof import can_prove, lent_proof
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import (
     ALLOWED_OVERLAP,
@@ -48,16 +49,16 @@ from assembly.solve.solution import Solution
 from assembly.solve.start_proof import is_for_proofs
 from assembly.studies.seated import NearFit, NotBelow, drop_farthest, fits
 from assembly.studies.standing_start import with_contacts
+from assembly.studies.unhindered import Prove
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["Prove", "resting"]
+__all__ = ["resting"]
 
 Array = NDArray[np.float64]
 # Two bodies, and whether it is their flat faces that lie on each other.
 Side = tuple[int, int, bool]
-Prove = Callable[[Array, float], Sequence[PairAnswer] | None]
 # [of the objective's slope] What contact forces may leave of it: the joints' solve holds 1e-10 of a largest one of 1.
 BALANCED = 1e-9
 # What rounding alone may change of an objective, in parts of it.
@@ -110,7 +111,8 @@ def resting(
             continue
         if _rises(there, touching):
             return None
-        model = LocalModel.at(there._packed, there._state)
+        with postures_from(there._packed, reference):
+            model = LocalModel.at(there._packed, there._state)
         if model is None or len(model.jacobian) != there._packed.rows:
             return None
         is_joint = there._packed.owners >= len(others)

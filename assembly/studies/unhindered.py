@@ -11,7 +11,8 @@ Nor may bodies have passed through each other: the straight way from the last po
 cannot be proven, as for a pin that moves along an arc in its bore, the way has to be shorter than the bodies'
 thickness. If any of this fails, the solve proceeds with clearances.
 
-Where parts were put together without clearances it is the same, but for the way.
+Where parts were put together without clearances it is the same, but for the way. A first solve begins so as well: the
+way of bodies that are clear at the start has to be proven.
 """
 
 from __future__ import annotations
@@ -37,9 +38,11 @@ from assembly.studies.standing_start import with_contacts
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["unhindered", "unhindered_at"]
+__all__ = ["Prove", "clear_end", "rows_from_start", "unhindered", "unhindered_at"]
 
 Array = NDArray[np.float64]
+# Proves a scene's pairs at a state, for a given overlap that counts as touching; None if that fails.
+Prove = Callable[[Array, float], Sequence[PairAnswer] | None]
 
 
 def unhindered(
@@ -101,12 +104,37 @@ def unhindered_at(
     return _where_clear(scene, outcome, begin, settings, prove, interruption)
 
 
+def rows_from_start(
+    scene: Assembly,
+    q: Array,
+    settings: Array,
+    starts: Mapping[str, ArrayLike] | None,
+    interruption: Interruption,
+) -> Outcome:
+    """How rows end without clearances from poses (n, 7), with no initial assembly, whatever bodies do then."""
+    packed = scene.packed()
+    turns = scene._turns_of(packed)
+    start = partial(scene._start, packed, q, starts, turns)
+    load(packed, start)
+    return rows_alone(packed, interruption, settings, start())
+
+
+def clear_end(
+    scene: Assembly, alone: Outcome, settings: Array, prove: Prove, interruption: Interruption
+) -> Solution | None:
+    """The solution where rows have ended without clearances, or None where there is none, or it is not proven."""
+    packed = scene.packed()
+    if scene._scene is None or packed.corners or not (can_prove(packed) and is_for_proofs(packed)):
+        return None
+    return _where_clear(scene, alone, perf_counter(), settings, prove, interruption)
+
+
 def _where_clear(
     scene: Assembly,
     outcome: Outcome,
     begin: float,
     settings: Array,
-    prove: Callable[[Array, float], Sequence[PairAnswer] | None],
+    prove: Prove,
     interruption: Interruption,
 ) -> Solution | None:
     """The solution found without clearances, if there is one and bodies are proven to be clear there."""

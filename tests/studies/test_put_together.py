@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.studies.put_together import put_together
+from assembly.studies.unhindered import rows_from_start
 from tests.studies.machined import bolt, disturbed, turned_part
 
 # [length] What holds to 1e-12 of some hundred.
@@ -48,6 +49,13 @@ def linked(off, apart=False):
     to = (1.0 + off, 0.0, 0.0) if apart else (1.0, 0.0, off)
     scene.constrain(asm.Spherical(a.point(*to), b.point(0, 0, 0), "lead"), asm.Clearance())
     return scene
+
+
+def asked(scene, q=None, interruption=CTRL_C, **options):
+    """What a first solve would put together, from the bodies' own poses or others."""
+    q = np.array(scene.q) if q is None else q
+    alone = rows_from_start(scene, q, scene._settings(options, CTRL_C, warm=False), None, CTRL_C)
+    return put_together(scene, q, alone, None, options, interruption)
 
 
 def passes_through(solution):
@@ -108,10 +116,9 @@ def test_rings_come_apart_where_they_may_alone(off):
 def test_it_is_tried_last_where_bodies_are_clear_and_not_all_parted_by_planes():
     near, far = linked(0.05), bolted()
     for scene, keeps in ((near, True), (linked(2.0, True), True), (far, False)):
-        together = put_together(scene, np.array(scene.q), None, {}, CTRL_C)
+        together = asked(scene)
         assert together.keeps_topology == keeps
-    assert put_together(near, np.array(near.q), None, {"keep_topology": True}, CTRL_C) is None
-    assert put_together(far, np.array(far.q), None, {"max_iterations": 0}, CTRL_C) is None
+    assert asked(near, keep_topology=True) is None
 
 
 def test_it_is_tried_first_from_a_start_that_crosses():
@@ -123,23 +130,23 @@ def test_it_is_tried_first_from_a_start_that_crosses():
         a, b = scene.bodies
         near = asm.Assembly([a, b])
         near.constrain(asm.Spherical(a.point(x + 0.01, 0.0, 0.0), b.point(0, 0, 0), "lead"), asm.Clearance())
-        assert put_together(near, q, None, {}, CTRL_C).keeps_topology == keeps
+        assert asked(near, q).keeps_topology == keeps
 
 
 def test_there_is_none_where_joints_hold_or_cannot():
     scene = linked(0.0)
-    assert put_together(scene, np.array(scene.q), None, {}, CTRL_C) is None
+    assert asked(scene) is None
     scene.constrain(asm.Distance(scene.bodies[0].point(0, 0, 0), scene.bodies[1].point(0, 0, 0), 3.0, "contradiction"))
-    assert put_together(scene, np.array(scene.q), None, {}, CTRL_C).solution is None
+    assert asked(scene).there is None
     ball = asm.Body("ball", asm.shapes.sphere(0.1), (0.0, 0.0, 3.0))
     alone = asm.Assembly([scene.bodies[0], ball])
     alone.constrain(asm.Clearance())
-    assert put_together(alone, np.array(alone.q), None, {}, CTRL_C) is None
+    assert asked(alone) is None
 
 
 def test_where_time_is_over_there_is_none():
     scene = bolted()
-    assert put_together(scene, np.array(scene.q), None, {}, Interruption(1e-9)) is None
+    assert asked(scene, interruption=Interruption(1e-9)) is None
 
 
 @pytest.mark.parametrize("angle", [0.4, 7.0, -9.0])
@@ -223,8 +230,8 @@ def test_what_an_objective_draws_into_each_other_without_fitting_stays_on_its_si
     scene = asm.Assembly([one, two])
     scene.constrain(asm.Clearance())
     scene.minimize(asm.PointDistance(two.point(0, 0, 0), (0.0, 0.0, 0.2)))
-    together = put_together(scene, np.array(scene.q), None, {}, CTRL_C)
-    assert not together.keeps_topology and not together.is_asked and together.solution.success
+    together = asked(scene)
+    assert not together.keeps_topology and not together.is_asked and together.there is not None
     solution = scene.solve()
     assert solution.success and not solution.put_together
     assert np.linalg.norm(solution.q[1, :3]) == pytest.approx(1.5, abs=1e-9)

@@ -39,7 +39,7 @@ Table = NDArray[np.int64]
 OUTGROWN = 1e4
 
 # Bytes of a state, what touching is, and what was proven there.
-Stood = tuple[bytes, float, Sequence[Any]]
+Stood = tuple[bytes, float, Sequence[Any] | None]
 OwnedPairs = list[Any]
 # How many times as many places as they ask for a solve gives to clearances.
 MORE_PLACES, MOST_CROWDING = 4, 16

@@ -94,12 +94,15 @@ class ClearanceProof(BodyPairs):
 
         Several ways to solve a scene begin with this question, at the same start.
         """
-        asked = q.tobytes(), touching
-        if asked not in self._stood:
-            while len(self._stood) >= REMEMBERED:
-                self._stood.pop(next(iter(self._stood)))
-            self._stood[asked] = self.look(q, touching)
-        return self._stood[asked]
+        known = self._stood.get((q.tobytes(), touching))
+        return self.look_from(q, touching) if known is None else known
+
+    def look_from(self, q: Array, touching: float) -> list[Answer]:
+        """The same, looked at in any case: ways lead on from these poses."""
+        while len(self._stood) >= REMEMBERED:
+            self._stood.pop(next(iter(self._stood)))
+        found = self._stood[q.tobytes(), touching] = self.look(q, touching)
+        return found
 
     def look(
         self,
@@ -231,6 +234,11 @@ class ClearanceProof(BodyPairs):
     def is_at(self, q: Array) -> bool:
         """Whether all pairs were clear at their last looks, and these were at poses (n, 7)."""
         return self._at == q.tobytes() and bool((self.fronts.pair.known == 1.0).all())
+
+    @property
+    def has_wires(self) -> bool:
+        """Whether both bodies of any pair are round wires."""
+        return bool(self._slimmest.any())
 
     @property
     def has_looked(self) -> bool:
