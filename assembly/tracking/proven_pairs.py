@@ -168,6 +168,8 @@ class ProvenPairs:
         free = np.isin(parts.slots[:, PLACE_PAIR], sorted(self.unlisted))
         for k in self._kept.difference(fresh):
             for fit in self._fits[k]:
+                if not fit.is_by_rims:
+                    continue
                 walls = (parts.tracked[:, [FEATURE_F, FEATURE_G]] == fit.numbers).all(axis=1)
                 free |= walls & (parts.slots[:, PLACE_PAIR] == k)
         known = parts.pairs[out]
