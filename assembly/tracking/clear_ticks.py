@@ -138,7 +138,7 @@ class ClearTicks:
     renewable : frozenset of int
         Pairs which may get other rows in this tick.
     in_the_way : list of int
-        The pairs that the last tick does not hold of; of those that are not listed, at its pose and not on the way alone.
+        The pairs that the last tick does not hold of; not those without rows of which the way alone is not proven.
     """
 
     def __init__(
@@ -156,6 +156,8 @@ class ClearTicks:
         # Wires are in each other by the distance of their spines, which no move has to open.
         proof.make_slimmer(touching if self._limits.depth == np.inf else 0.0)
         self._proof = proof
+        # It tells of poses alone; made when it is first needed.
+        self._judge: ClearanceProof | None = None
         pairs = first._packed.kept_pairs[: len(proof.pairs)]
         self._of_features = {k for k, pair in enumerate(pairs) if not is_of_surfaces(pair)}
         # A proof may have a pair the other way round.
@@ -201,7 +203,8 @@ class ClearTicks:
             moves[k] = self._opening(there, k)
         changed = [k for k in left if k not in rolling and (moves[k] != self._moves[k]).any()]
         self._left_by(answers, changed, there, moves, QUICK)
-        if self._ask_rows(answers, left, there, moves, last):
+        if self._ask_rows(answers, left, there, moves):
+            proof.go_back(last)
             return False
         for part in OPENED:
             open_yet = [k for k in left if not (k in answers and is_proven(answers[k]))]
@@ -220,24 +223,21 @@ class ClearTicks:
         self._opened = self._those_opened()
         return True
 
-    def _ask_rows(
-        self, answers: dict[int, Answer], left: list[int], there: _Standing, moves: Array, last: tuple[Array, Array]
-    ) -> bool:
+    def _ask_rows(self, answers: dict[int, Answer], left: list[int], there: _Standing, moves: Array) -> bool:
         """Whether a tick is refused because of pairs that have no rows, or that may get others.
 
-        Of the latter only if they are not clear at its pose. What would take long to prove is not tried before.
+        Of the latter only if they are not clear at its pose, which another proof tells: this one goes on from the last
+        pose. What would take long to prove is not tried before.
         """
-        proof = self._proof
         asked = [k for k in left if k in self.unlisted | self.renewable and not is_proven(answers.get(k, UNKNOWN))]
         if not asked:
             return False
-        found = dict(zip(asked, proof.look(there.q, self._touching, moves, which=asked, budget=QUICK), strict=True))
-        proof.go_back(last, asked)
-        self.in_the_way = [k for k in asked if not is_proven(found[k])]
+        if self._judge is None:
+            self._judge = new_proof(there.solution._packed, there.solution._scene.bodies)
+        found = self._judge.look(there.q, self._touching, moves, which=asked, budget=QUICK)
+        self.in_the_way = [k for k, answer in zip(asked, found, strict=True) if answer.part < 1.0]
         refused = [k for k in asked if k in self.unlisted or k in self.in_the_way]
         self.doubtful = {k: answers.get(k, UNKNOWN) for k in refused}
-        if refused:
-            proof.go_back(last)
         return bool(refused)
 
     def _opening(self, there: _Standing, k: int) -> Array:

@@ -159,15 +159,17 @@ class ProvenPairs:
             return
         parts = self._parts(state)
         out = np.array(sorted(self.unlisted | self._kept))
-        # What is to be updated first is what the loop sees then.
-        out = out[parts.pairs[out, MOTION_BOUND] != ANY_MOTION]
+        out = out[(parts.pairs[out, MOTION_BOUND] != ANY_MOTION) | np.isnan(parts.pairs[out, PAIR_TURN])]
         if not len(out):
             return
+        # What is to be updated keeps the rows that it gets.
         fresh = [k for k in out.tolist() if k not in self.unlisted and np.isnan(parts.pairs[k, PAIR_TURN])]
         out = np.setdiff1d(out, fresh)
         free = np.isin(parts.slots[:, PLACE_PAIR], sorted(self.unlisted))
         for k in self._kept.difference(fresh):
             for fit in self._fits[k]:
+                if not fit.is_by_rims:
+                    continue
                 walls = (parts.tracked[:, [FEATURE_F, FEATURE_G]] == fit.numbers).all(axis=1)
                 free |= walls & (parts.slots[:, PLACE_PAIR] == k)
         known = parts.pairs[out]
@@ -192,6 +194,10 @@ class ProvenPairs:
             pairs[some, PAIR_TURN], pairs[some, MOTION_BOUND] = np.nan, 0.0
             self._kept |= self.unlisted.intersection(some) & self.fitting
             self.unlisted = self.unlisted.difference(some)
+
+    def update_all(self) -> None:
+        """Have motion ask for updates of all that is listed, and cut steps by them, until a tick holds."""
+        self._kept = frozenset[int]()
 
     def settle(self, state: Array) -> None:
         """Leave out pairs, from the next tick on, of which no contact pushes at the end of a tick.

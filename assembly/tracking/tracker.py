@@ -269,11 +269,12 @@ class Tracker(TickMemory):
         if row is None:
             status = TrackStatus.CHANGED if changed else TrackStatus.BAD_TARGET
             return Step(self._followed, self._before, status, self._hands.where(), self._seen, perf_counter() - begin)
-        status = self._moved_clear()
-        if status is None:
+        ended_with = self._moved_clear()
+        if ended_with is None:
             # The next tick goes on from a pose that does not hold yet; here the last one stands.
             status = TrackStatus.LATE if self._stands else TrackStatus.VIOLATED
             return Step(self._followed, self._before, status, row, self._seen, perf_counter() - begin)
+        status = ended_with
         # After a step that was too long the next ones are shorter, until they succeed.
         radius = self._knobs[RADIUS]
         if status is TrackStatus.HELD:
@@ -299,8 +300,8 @@ class Tracker(TickMemory):
     def _moved_clear(self) -> TrackStatus | None:
         """Run the loop, and prove where that led; None if it goes on in the next tick.
 
-        Some pairs have no rows at first, or those of earlier ticks (`proven_pairs.py`). Where the proof refuses the pose
-        of these, they get the rows of the last pose, once, and the tick begins again.
+        Some pairs have no rows at first, or those of earlier ticks (`proven_pairs.py`). Where the proof refuses a pose,
+        they get the rows of the last one, once, and the tick begins again.
         """
         begun_again = frozenset[int]()
         while True:
@@ -318,6 +319,7 @@ class Tracker(TickMemory):
             if self._budget is not None or not again:
                 # The contact that was crossed may not be listed: all pairs are searched again.
                 self._rows.list_again(self._state, self._clear.in_the_way)
+                self._rows.update_all()
                 forget_updates(self._packed, self._state)
                 return TrackStatus.HELD
             self._rows.list_again(self._state, again)

@@ -369,11 +369,10 @@ class ClearanceProof(BodyPairs):
         """The rotations (pairs, 9) and shifts (pairs, 3) of second bodies at the last looks that ended clear."""
         return self._turn.copy(), self._shift.copy()
 
-    def go_back(self, poses: tuple[Array, Array], which: Sequence[int] | None = None) -> None:
-        """Make earlier poses, from which all ways were clear, the last ones again; of some pairs, or of all."""
+    def go_back(self, poses: tuple[Array, Array]) -> None:
+        """Make earlier poses, from which all ways were clear, the last ones again."""
         pair, self._at = self.fronts.pair, None
-        for k in range(len(self.pairs)) if which is None else which:
-            turn, shift = poses[0][k], poses[1][k]
+        for k, (turn, shift) in enumerate(zip(*poses, strict=True)):
             now = pair.turn[k].reshape(3, 3).copy(), pair.shift[k].copy()
             pair.travelled[k] += self.length_between(k, now, (turn.reshape(3, 3), shift))
             pair.turn[k], pair.shift[k] = turn, shift

@@ -1,0 +1,117 @@
+"""Shafts that lean in bores: sections by dense angles, rooms by samples of both bodies, and what ways take of them.
+
+Kernels are run as plain Python.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+from scipy.spatial.transform import Rotation
+
+import assembly as asm
+from assembly._record import Store
+from assembly.kinematics.motion import RelativePose
+from assembly.proximity.clearance.records import BY_SLEEVE, NONE, Forest
+from assembly.proximity.clearance.sleeves import best_sleeve, farthest_of_section, sleeve_room
+from assembly.proximity.clearance.way import pose_at, sag_of, sleeve_sag, way_of
+from tests.proximity.clearance.nodes import forest_of, tree_of
+from tests.proximity.clearance.scenes import faces_of
+
+BORE, HEIGHT, SHAFT = 1.03, 2.0, 1.0
+PLATE = asm.shapes.plate(6, 6, HEIGHT, [(0, 0, BORE)])
+
+
+def scene(length):
+    """The packed trees of a plate and a shaft, the root of one and the node of the other's wall."""
+    forest = forest_of(faces_of(PLATE), faces_of(asm.shapes.solid_cylinder(SHAFT, length)))
+    table, pool, faces, links, nodes, used = forest.arrays
+    kinds, rows = tree_of(forest)
+    is_wall = (kinds.face == NONE) & (rows.disc > 0.0) & (rows.half[:, 0] > 0.0) & (rows.rho == 0.0)
+    # The caps of the shaft are discs, and cells of other faces have some thickness.
+    wall = max(np.flatnonzero(is_wall & (np.abs(rows.disc - SHAFT) < 1e-9)), key=lambda k: rows.half[k, 0])
+    return Forest(Store(table, pool), faces, links, nodes, used), int(forest.roots[0]), int(wall)
+
+
+def relative(turn, shift):
+    return RelativePose(tuple(turn.as_matrix().ravel().tolist()), tuple(map(float, shift)))
+
+
+def leaning(rng, most):
+    """A turn by up to so much, from the bore's axis, after one about it."""
+    about = Rotation.from_rotvec((0.0, 0.0, rng.uniform(0.0, 6.28)))
+    across = rng.normal(size=2)
+    across *= most * rng.random() / np.linalg.norm(across)
+    return Rotation.from_rotvec((*across, 0.0)) * about
+
+
+def test_the_farthest_point_of_a_section(cases):
+    """It is what dense angles find, to rounding: where the shaft leans along its offset, across it, and without one."""
+    rng = np.random.default_rng(0)
+    for k in range(cases(40, 2000)):
+        e, lean = (scale * np.array([*rng.normal(size=2), 0.0]) for scale in (10.0 ** -rng.uniform(0, 8), 0.1))
+        e, lean = e * (k % 5 > 0), lean * 10.0 ** -rng.uniform(0, 6) * (k % 7 > 0)
+        if k % 3 == 0:
+            lean = np.array([-e[1], e[0], 0.0]) * (0.1 / max(np.linalg.norm(e), 1.0))
+        slope = np.linalg.norm(lean)
+        along = lean / slope if slope > 0.0 else np.array([1.0, 0.0, 0.0])
+        beside = np.array([-along[1], along[0], 0.0])
+
+        longer = np.hypot(1.0, slope)
+
+        def off(angle, e=e, along=along, beside=beside, longer=longer):
+            return -np.linalg.norm(e + SHAFT * (longer * np.cos(angle) * along + np.sin(angle) * beside))
+
+        angles = np.linspace(0.0, 2.0 * np.pi, 200)
+        best = angles[int(np.argmin([off(angle) for angle in angles]))]
+        found = minimize_scalar(off, bounds=(best - 0.05, best + 0.05), method="bounded", options={"xatol": 1e-10})
+        told = farthest_of_section(tuple(e), tuple(lean), SHAFT)
+        assert told >= -found.fun - 1e-14
+        assert told == pytest.approx(-found.fun, rel=1e-13)
+
+
+@pytest.mark.parametrize("length", [6.0, 2.4])
+def test_the_room_is_less_than_the_distance_of_samples(cases, length):
+    """Of a shaft longer than its bore, and of one that ends in it; and a shaft that just fits has a little of it."""
+    rng, roomy = np.random.default_rng(1), 0
+    forest, plate, wall = scene(length)
+    angle, z = rng.uniform(0.0, 2.0 * np.pi, 4000), rng.uniform(-0.5 * HEIGHT, 0.5 * HEIGHT, 4000)
+    of_bore = np.column_stack([BORE * np.cos(angle), BORE * np.sin(angle), np.where(z > 0.9, 1.0, z)])
+    for _ in range(cases(30, 1000)):
+        turn = leaning(rng, 0.03)
+        shift = np.array([*rng.normal(scale=0.01, size=2), rng.uniform(-1.5, 1.5)])
+        how, room = best_sleeve(forest, plate, wall, relative(turn, shift))
+        seen = turn.inv().apply(of_bore - shift)
+        beyond = np.abs(seen[:, 2]) - 0.5 * length
+        off = np.hypot(seen[:, 0], seen[:, 1]) - SHAFT
+        least = np.where(beyond > 0.0, np.hypot(np.maximum(off, 0.0), np.maximum(beyond, 0.0)), off).min()
+        if room > 0.0:
+            assert how >= BY_SLEEVE and room <= least + 1e-12
+            roomy += 1
+        elif length > 5.0:
+            # Samples miss little of where a long shaft is in the wall.
+            assert least < 2e-3
+    assert roomy > 3
+
+
+def test_no_way_takes_more_of_the_room_than_told(cases):
+    """At any part of a way, with any rotation and slide, the room is what it is at both ends less the sag at least."""
+    rng = np.random.default_rng(2)
+    forest, plate, wall = scene(6.0)
+    closest = 0.0
+    for k in range(cases(12, 400)):
+        size = 10.0 ** -rng.uniform(0, 2)
+        before = leaning(rng, 0.02), np.array([*rng.normal(scale=0.01, size=2), rng.uniform(-1.0, 1.0)])
+        spin = Rotation.from_rotvec((0.0, 0.0, size * rng.normal() * (k % 2)))
+        after = leaning(rng, 0.02 * size) * before[0] * spin, before[1] + size * rng.normal(scale=(0.01, 0.01, 0.3))
+        poses = relative(*before), relative(*after)
+        way = way_of(*poses, (0.0, 0.0, 0.3 * rng.normal()), 4.0, True)
+        for how in range(BY_SLEEVE, BY_SLEEVE + 3):
+            sag = max(sleeve_sag(way, forest, plate, wall), sag_of(way, forest, wall))
+            ends = min(sleeve_room(forest, plate, wall, pose, how) for pose in poses)
+            rooms = [sleeve_room(forest, plate, wall, pose_at(way, s), how) for s in np.linspace(0.0, 1.0, 9)]
+            assert min(rooms) >= ends - sag - 1e-13
+            closest = max(closest, (ends - min(rooms)) / sag if sag < np.inf else 0.0)
+    # Not a bound that nothing comes near.
+    assert closest > 0.01

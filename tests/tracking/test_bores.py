@@ -1,0 +1,128 @@
+"""Shafts, pins and balls that a hand drags in bores and sockets: judged by circles and lines alone.
+
+A rim of the bore is in the shaft where a point of it is nearer to the shaft's axis than its radius, and a rim of the
+shaft in the wall where a point of it is farther from the bore's axis than that. A wall between two rims is no nearer.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+import assembly as asm
+from assembly.tracking.tick import TrackStatus
+from tests.studies.machined import socket
+
+BORE, SHAFT, PLAY, HEIGHT = 10.02, 10.0, 0.02, 20.0
+# Of the larger body's size: what is called touching.
+TOUCHING = 1e-9
+AROUND = np.linspace(0.0, 2.0 * np.pi, 181)
+
+
+def least(function):
+    """The least value of a function of an angle."""
+    best = AROUND[int(np.argmin([function(angle) for angle in AROUND]))]
+    found = minimize_scalar(function, bounds=(best - 0.04, best + 0.04), method="bounded", options={"xatol": 1e-11})
+    return min(float(found.fun), float(function(best)))
+
+
+def shaft_depth(row, length):
+    """By how much a shaft at a pose row (7,) is in the wall of a bore about the z axis; negative where it is clear."""
+    pose = asm.Pose(row[:3], row[3:])
+    axis, middle = pose.apply((0, 0, 1)) - pose.position, pose.position
+    depths = []
+    for z in (-0.5 * HEIGHT, 0.5 * HEIGHT):
+        if abs((z - middle[2]) / axis[2]) < 0.5 * length:
+
+            def to_axis(angle, z=z):
+                return np.linalg.norm(
+                    np.cross(np.array([BORE * np.cos(angle), BORE * np.sin(angle), z]) - middle, axis)
+                )
+
+            depths.append(SHAFT - least(to_axis))
+    for end in (-0.5 * length, 0.5 * length):
+        if abs(pose.apply((0, 0, end))[2]) < 0.5 * HEIGHT:
+
+            def to_wall(angle, end=end):
+                place = pose.apply((SHAFT * np.cos(angle), SHAFT * np.sin(angle), end))
+                return BORE - np.hypot(place[0], place[1])
+
+            depths.append(-least(to_wall))
+    return max(depths, default=-np.inf)
+
+
+def bearing(length, position=(0.0, 0.0, 0.0)):
+    """A plate with a bore, and a shaft with a play in it."""
+    bodies = [
+        asm.Body("plate", asm.shapes.plate(50, 50, HEIGHT, [(0, 0, BORE)]), fixed=True),
+        asm.Body("shaft", asm.shapes.solid_cylinder(SHAFT, length), position=position),
+    ]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+    return scene, bodies[1]
+
+
+def dragged(scene, held, path, judge, size):
+    """The last step, and how many ended how; every tick is proven, and none is deeper than what is called touching."""
+    tracker, statuses = scene.tracker(held), Counter()
+    for target in path:
+        step = tracker.step(target)
+        statuses[step.status] += 1
+        assert step.proved
+        assert judge(step.q) <= TOUCHING * size
+    assert not statuses[TrackStatus.HELD]
+    return step, statuses
+
+
+def test_a_shaft_pressed_on_its_bore_slides_and_turns():
+    """It goes along the bore and turns in it with the hand, however the wall is pressed."""
+    scene, shaft = bearing(90.0)
+    path = [
+        asm.Pose((0.03 * np.sin(0.1 * k), 0.0, 0.05 * k), (np.cos(0.01 * k), 0.0, 0.0, np.sin(0.01 * k)))
+        for k in range(1, 81)
+    ]
+    step, statuses = dragged(scene, shaft, path, lambda q: shaft_depth(q[1], 90.0), 90.0)
+    assert statuses[TrackStatus.FOLLOWED] >= len(path) - 2
+    assert step.q[1, 2] == pytest.approx(4.0, abs=1e-6)
+    assert step.q[1, 0] == pytest.approx(PLAY, abs=1e-6)
+    assert np.abs(step.q[1, 3:]) == pytest.approx(np.abs((np.cos(0.8), 0.0, 0.0, np.sin(0.8))), abs=1e-6)
+
+
+def test_a_shaft_leans_in_its_bore():
+    """Held above the bore, it touches both rims, on opposed sides: where lines and circles say."""
+    scene, shaft = bearing(90.0)
+    path = [(0.01 * k, 0.0, 30.0) for k in range(1, 13)] + [(0.12, 0.0, 30.0 + 0.1 * k) for k in range(1, 21)]
+    step, _ = dragged(scene, shaft.point(0, 0, 30), path, lambda q: shaft_depth(q[1], 90.0), 90.0)
+    axis = asm.Pose(step.q[1, :3], step.q[1, 3:]).apply((0, 0, 1)) - step.q[1, :3]
+    # Both sections fill the bore: R = |e| + r / cos, with e opposed at both rims.
+    tilt = np.arctan2(np.hypot(*axis[:2]), axis[2])
+    assert 0.5 * HEIGHT * np.tan(tilt) + SHAFT / np.cos(tilt) == pytest.approx(BORE, abs=1e-4)
+
+
+def test_a_pin_is_dropped_into_its_hole():
+    """Down past the rim, and in the hole to the wall."""
+    scene, pin = bearing(30.0, (0.005, 0.0, 26.0))
+    path = [(0.005, 0.0, 26.0 - 0.4 * k) for k in range(1, 66)] + [(0.005 + 0.002 * k, 0.0, 0.0) for k in range(1, 21)]
+    step, _ = dragged(scene, pin.point(0, 0, 0), path, lambda q: shaft_depth(q[1], 30.0), 50.0)
+    # It leans by what rims let it, now on one of them and now on both, so that ticks are still on their way.
+    assert step.q[1, :3] == pytest.approx((PLAY, 0.0, 0.0), abs=1e-4)
+
+
+def test_a_ball_goes_down_into_its_socket():
+    """Down to the bottom, and there along the wall."""
+    radius, ball = 10.0, asm.Body("ball", asm.shapes.sphere(10.0 - PLAY), position=(0, 0, 1))
+    scene = asm.Assembly([asm.Body("socket", socket(radius, 20.0, 15.0), fixed=True), ball])
+    scene.constrain(asm.Clearance())
+
+    def depth(q):
+        across, high = np.hypot(q[1, 0], q[1, 1]), q[1, 2]
+        off_rim = (radius - PLAY) - np.hypot(radius - across, high)
+        return max(np.hypot(across, high) - PLAY, off_rim) if high <= 0.0 else off_rim
+
+    path = [asm.Pose((0, 0, 1 - 0.1 * k)) for k in range(1, 13)]
+    path += [asm.Pose((0.002 * k, 0, -0.2), (np.cos(0.01 * k), np.sin(0.01 * k), 0, 0)) for k in range(1, 16)]
+    step, _ = dragged(scene, ball, path, depth, 40.0)
+    assert np.linalg.norm(step.q[1, :3]) == pytest.approx(PLAY, abs=1e-6)
