@@ -157,6 +157,21 @@ def test_what_opened_contacts_elsewhere_is_no_proof_of_more_than_touching():
     assert pair.proved and pair.answer.depth <= touching
 
 
+def test_what_leans_as_far_as_its_bore_lets_it_is_proven_to_touch():
+    """It touches opposite sides at its ends; as ellipses both ends have room beside that, which balls have not."""
+    plate = asm.Body("plate", asm.shapes.plate(60, 60, 40, [(0, 0, 18.0)]), fixed=True)
+    disc = asm.Body("disc", asm.shapes.solid_cylinder(17.998, 20.0), (0.001, 0.0, 0.3))
+    scene = asm.Assembly([plate, disc])
+    scene.constrain(asm.Clearance())
+    scene.minimize(
+        asm.PointDistance(disc.point(0, 0, 10), (3, 0, 10)), asm.PointDistance(disc.point(0, 0, -10), (-3, 0.5, -10))
+    )
+    solution = scene.solve()
+    assert solution.success and solution.proved
+    # Its play of 0.004 over its height: so far it leans.
+    assert 2.0 * np.hypot(*solution.q[1, 4:6]) == pytest.approx(0.004 / 20.0, rel=0.01)
+
+
 @pytest.mark.parametrize("thicker", [0.0, 1e-6])
 def test_a_shaft_that_fills_its_bore_is_proven_to_touch(thicker):
     """No move opens the bore; made slimmer by what is called touching the shaft is clear. A thicker one is not."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, scale, sub
+from assembly.geometry.vec import add, cross, dot, matvec, matvec_t, neg, scale, sub
 from assembly.proximity.clearance.halve import corner_of, vector
 from assembly.proximity.clearance.records import (
     FLAT,
@@ -25,6 +25,9 @@ from assembly.proximity.clearance.records import (
     links_at,
     node_at,
 )
+
+# Steps of Newton's method toward the best bound of a disc in a bore; each bound on the way holds.
+NEWTON = 6
 
 
 @kernel(inline=True)
@@ -64,26 +67,66 @@ def separation(forest, a, b, pose, n):
 
 
 @kernel(inner=True)
-def room_in_bore(forest, wall, k, pose):
-    """How far node k, at a pose seen from the wall's body, is from the wall of a bore in which it is; else negative."""
+def farthest_of_disc(d, axis, ruling, radius):
+    """A bound of how far a disc about d, across a unit vector, is from the line along an axis through the origin.
+
+    Or from the origin, where the axis is zero. Seen along the line the disc is an ellipse c + E y, |y| <= 1, with half
+    axes r and r cos(lean). For any m above the squares of these
+
+        |c + E y|^2 <= |c|^2 + m + c.E (m - E^2)^-1 E c,
+
+    with equality for one m, near which Newton's method on the slope by m ends (as for trust regions).
+    """
+    if dot(axis, axis) == 0.0:
+        height, beside = dot(d, ruling), across(d, ruling)
+        return math.hypot(beside + radius, height)
+    off, side = sub(d, scale(dot(d, axis), axis)), cross(ruling, axis)
+    sine = math.sqrt(dot(side, side))
+    far = math.sqrt(dot(off, off))
+    if radius == 0.0 or far == 0.0 or sine == 0.0:
+        return far + radius
+    wide, narrow = abs(dot(off, side)) / sine * radius, abs(dot(off, cross(axis, side))) / sine
+    narrow *= radius * math.sqrt(max(1.0 - sine * sine, 0.0))
+    less = radius * radius * sine * sine
+    # m - r^2: the slope is 1 - (wide / x)^2 - (narrow / (x + less))^2, and rises.
+    x = max(wide, narrow - less)
+    for _ in range(NEWTON):
+        if x <= 0.0:
+            break
+        p, q = wide / x, narrow / (x + less)
+        square = p * p + q * q
+        if square <= 1.0:
+            break
+        x += square * (math.sqrt(square) - 1.0) / (p * p / x + q * q / (x + less))
+    more = wide * wide / x if x > 0.0 else 0.0
+    return math.sqrt(far * far + radius * radius + x + more + narrow * narrow / (x + less))
+
+
+@kernel(inner=True)
+def room_in_bore(forest, wall, k, pose, as_ball):
+    """How far node k, at a pose seen from the wall's body, is from the wall of a bore in which it is; else negative.
+
+    With `as_ball` its disc is taken for a ball of the same radius: what it is at least, however its axis turns.
+    """
     bore, node = node_at(forest.nodes, wall), node_at(forest.nodes, k)
     axis, spine = vector(bore.ruling), vector(bore.spine)
-    most = 0.0
+    ruling = matvec(pose.rotation, vector(node.ruling))
+    disc, most = 0.0 if as_ball else node.disc, 0.0
     if links_at(forest.links, k).face != NONE:
         for i in range(4):
             d = sub(placed(pose, corner_of(node, i)), spine)
-            most = max(most, across(d, axis))
+            most = max(most, farthest_of_disc(d, axis, ruling, disc))
     else:
         center = sub(placed(pose, vector(node.center)), spine)
         u = scale(node.half[0], matvec(pose.rotation, vector(node.axes[0])))
         v = scale(node.half[1], matvec(pose.rotation, vector(node.axes[1])))
         w = scale(node.half[2], matvec(pose.rotation, vector(node.axes[2])))
-        for i in range(8):
-            d = add(center, u) if i & 1 else sub(center, u)
+        for i in range(2 if is_round(forest, k) else 8):
+            d = sub(center, u) if i & 1 else add(center, u)
             d = add(d, v) if i & 2 else sub(d, v)
             d = add(d, w) if i & 4 else sub(d, w)
-            most = max(most, across(d, axis))
-    return bore.bore - most - node.disc - node.rho
+            most = max(most, farthest_of_disc(d, axis, ruling, disc))
+    return bore.bore - most - node.rho - (node.disc - disc)
 
 
 @kernel(inline=True)

@@ -120,10 +120,10 @@ def gap_of(forest, nodes, pose, n):
     if nodes.how == BY_PLANE:
         return separation(forest, nodes.a, nodes.b, pose, n)
     if nodes.how == BY_BORE_A:
-        return room_in_bore(forest, nodes.a, nodes.b, pose)
+        return room_in_bore(forest, nodes.a, nodes.b, pose, False)
     if nodes.how >= BY_SLEEVE:
         return sleeve_room(forest, nodes.a, nodes.b, pose, nodes.how)
-    return room_in_bore(forest, nodes.b, nodes.a, inverse_pose(pose))
+    return room_in_bore(forest, nodes.b, nodes.a, inverse_pose(pose), False)
 
 
 @kernel(inner=True)
@@ -131,9 +131,9 @@ def best_bore(forest, a, b, pose):
     """Which of two nodes is the wall of a bore that the other one is in, and by how much it is clear of that."""
     how, best = BY_PLANE, -math.inf
     if node_at(forest.nodes, a).bore > 0.0:
-        how, best = BY_BORE_A, room_in_bore(forest, a, b, pose)
+        how, best = BY_BORE_A, room_in_bore(forest, a, b, pose, False)
     if node_at(forest.nodes, b).bore > 0.0:
-        gap = room_in_bore(forest, b, a, inverse_pose(pose))
+        gap = room_in_bore(forest, b, a, inverse_pose(pose), False)
         if gap > best:
             how, best = BY_BORE_B, gap
     if not best > 0.0:

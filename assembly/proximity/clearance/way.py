@@ -20,7 +20,7 @@ from assembly.geometry.vec import add, blend, dot, matmul_t, matvec, neg, scale,
 from assembly.kinematics.motion import RelativePose
 from assembly.proximity.clearance.halve import corner_of, vector
 from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, BY_SLEEVE, node_at
-from assembly.proximity.clearance.separation import across, highest, is_round, is_wire, placed
+from assembly.proximity.clearance.separation import across, highest, is_round, is_wire, placed, room_in_bore
 
 # swept: whether the way is looked at, or its end alone. moved: the longest way of a point of b. sag: of any point;
 # factor: of a point at distance 1 from the axis of rotation. axis, middle: of that, in axes of b (zero: it is not
@@ -84,12 +84,15 @@ def sag_of(way, forest, b):
     return way.factor * (off_axis(way, center) + node.radius)
 
 
-@kernel(inline=True)
-def as_ball(forest, b, pose, n, gap):
-    """The gap along n if the disc of what is round were a ball: what it is at least, however its axis turns."""
-    node = node_at(forest.nodes, b)
-    if node.disc == 0.0 or not is_round(forest, b):
+@kernel(inner=True)
+def as_ball(forest, nodes, pose, n, gap):
+    """A gap, if the disc of what is round in node b were a ball: what it is at least, however its axis turns."""
+    node = node_at(forest.nodes, nodes.b)
+    if node.disc == 0.0 or not is_round(forest, nodes.b):
         return gap
+    if nodes.how == BY_BORE_A:
+        room = room_in_bore(forest, nodes.a, nodes.b, pose, False)
+        return gap - (room - room_in_bore(forest, nodes.a, nodes.b, pose, True))
     flat = across(n, matvec(pose.rotation, vector(node.ruling)))
     return gap - node.disc * (1.0 - flat + 1e-15)
 
@@ -165,10 +168,7 @@ def stays_apart(forest, nodes, way, n, gaps):
     if after > part * way.sag and before > part * way.sag:
         return True
     sag = part * sag_of(way, forest, nodes.b)
-    if nodes.how == BY_BORE_A:
-        # The room in a bore is that of a ball instead of a disc already.
-        return after > sag and before > sag
-    after, before = as_ball(forest, nodes.b, way.after, n, after), as_ball(forest, nodes.b, way.before, n, before)
+    after, before = as_ball(forest, nodes, way.after, n, after), as_ball(forest, nodes, way.before, n, before)
     return after > sag and before > sag
 
 

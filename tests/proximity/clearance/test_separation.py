@@ -18,10 +18,10 @@ from assembly.kinematics.motion import RelativePose
 from assembly.proximity.clearance.directions import best_direction
 from assembly.proximity.clearance.front import Front, Parted
 from assembly.proximity.clearance.look import gap_along
-from assembly.proximity.clearance.records import BY_PLANE, Forest
-from assembly.proximity.clearance.separation import room_in_bore, separation
+from assembly.proximity.clearance.records import BY_BORE_A, BY_PLANE, Forest
+from assembly.proximity.clearance.separation import farthest_of_disc, room_in_bore, separation
 from assembly.proximity.clearance.sleeves import best_bore
-from assembly.proximity.clearance.way import Way, part_along, pose_at, sag_of, way_of
+from assembly.proximity.clearance.way import Way, part_along, pose_at, sag_of, stays_apart, way_of
 from tests.proximity.clearance.nodes import forest_of, halve_all, tree_of
 from tests.proximity.clearance.scenes import direction, faces_of
 from tests.proximity.clearance.splines import points_of, shapes
@@ -95,6 +95,30 @@ def test_gaps_of_all_nodes(name, cases):
         assert gap <= (second @ n).min() - (first @ n).max() + ROUNDING
 
 
+@pytest.mark.parametrize("is_ball", [False, True])
+def test_the_farthest_of_a_disc_in_a_bore(is_ball, cases):
+    """No sample of the disc's border is farther from the axis, or the center, and one nearly is, however it leans."""
+    rng, turns = np.random.default_rng(6), np.linspace(0.0, 2.0 * np.pi, 4001)
+    for k in range(cases(200, 20000)):
+        axis, radius = direction(rng), rng.uniform(0.1, 2.0)
+        side = np.cross(axis, direction(rng))
+        side /= np.linalg.norm(side)
+        lean = 0.0 if k % 5 == 0 else 10.0 ** rng.uniform(-9.0, 0.2)
+        ruling = np.cos(lean) * axis + np.sin(lean) * np.cross(axis, side)
+        center = 10.0 ** rng.uniform(-9.0, 0.0) * direction(rng)
+        if k % 3 == 0:
+            # Where the middle is off along the lean, or across it, or not at all.
+            center = (k % 2) * 10.0 ** rng.uniform(-9.0, 0.0) * (side if k % 4 < 2 else np.cross(axis, side))
+        line = np.zeros(3) if is_ball else axis
+        first = np.cross(ruling, side)
+        points = center + radius * (np.cos(turns)[:, None] * side + np.sin(turns)[:, None] * first)
+        far = np.linalg.norm(points - np.outer(points @ line, line), axis=1).max()
+        bound = farthest_of_disc(tuple(center), tuple(line), tuple(ruling), radius)
+        # Samples are 0.0016 rad apart, which leaves the squares of half of it of what is farthest.
+        assert far <= bound + ROUNDING
+        assert bound - far <= 1e-6 * (radius + np.linalg.norm(center))
+
+
 def test_room_in_a_bore(cases):
     """What is told is less than the distance of any sample of the other body from the wall."""
     rng, roomy = np.random.default_rng(2), 0
@@ -111,7 +135,7 @@ def test_room_in_a_bore(cases):
             face = walls[int(abs(nodes.bore[wall] - 0.5) > 0.05)]
             turn, place = random_turn(rng), nodes.spine[wall] + 0.15 * rng.normal(size=3)
             points = turn.apply(points_of(shape, 60, rng)) + place
-            room = room_in_bore(packed(forest), wall, forest.roots[1], relative(turn, place))
+            room = room_in_bore(packed(forest), wall, forest.roots[1], relative(turn, place), False)
             surface = face.surface.evaluate(*(rng.uniform(*ends, 800) for ends in face.surface.domain))
             assert room <= distances(points, surface).min() + ROUNDING
             off = points[:, :2] - nodes.spine[wall, :2]
@@ -169,6 +193,36 @@ def test_ways_go_straight_and_turn_about_one_axis(cases):
         turned = [Rotation.from_matrix(np.reshape(pose_at(way, s).rotation, (3, 3))) for s in (0.0, 0.25, 0.5, 1.0)]
         angles = [(turned[0].inv() * r).magnitude() for r in turned]
         assert angles[1:3] == pytest.approx([0.25 * angles[3], 0.5 * angles[3]], abs=1e-7)
+
+
+def test_what_leans_in_a_bore_stays_in_it_all_the_way(cases):
+    """A thin disc that leans has room beside it, which it has not where it stands upright on its way."""
+    rng, stay = np.random.default_rng(7), 0
+    radius = 0.499
+    plate, disc = faces_of(asm.shapes.plate(3.0, 3.0, 2.0, [(0.0, 0.0, 0.5)])), asm.shapes.solid_cylinder(radius, 0.002)
+    forest = forest_of(plate, faces_of(disc))
+    _, nodes = tree_of(forest)
+    wall = int(np.flatnonzero(np.abs(nodes.bore - 0.5) < 1e-6)[0])
+    # The exact hull of the cylinder's wall.
+    below = range(forest.roots[1], len(nodes.disc))
+    inner = next(k for k in below if abs(nodes.disc[k] - radius) < 1e-9 and nodes.half[k, 0] > 0.0009)
+    around = np.linspace(0.0, 2.0 * np.pi, 721)
+    rims = radius * np.column_stack([np.cos(around), np.sin(around), 0.0 * around])
+    points = np.concatenate([rims + (0.0, 0.0, h) for h in (-0.001, 0.001)])
+    for _ in range(cases(60, 3000)):
+        azimuth, side = rng.uniform(0.0, 6.3), 10.0 ** rng.uniform(-4.0, -1.7)
+        axis = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+        leans = rng.choice([0.3, 0.03]) * rng.uniform(-1.0, 1.0, 2)
+        ends = [relative(Rotation.from_rotvec(lean * axis), side * np.cross(axis, [0.0, 0.0, 1.0])) for lean in leans]
+        way, parted = way_between(*ends, np.zeros(3), 0.6), Parted(wall, inner, BY_BORE_A)
+        gaps = tuple(room_in_bore(packed(forest), wall, inner, pose, False) for pose in ends)
+        if not stays_apart(packed(forest), parted, way, (0.0, 0.0, 0.0), gaps):
+            continue
+        stay += 1
+        for s in np.linspace(0.0, 1.0, 21):
+            here = posed(pose_at(way, float(s)), points)
+            assert np.hypot(here[:, 0], here[:, 1]).max() <= 0.5 + 1e-12
+    assert stay > cases(5, 300)
 
 
 def test_directions_part_what_is_apart(cases):
