@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.cad.libraries import shown
-from assembly.cad.locations import pose_of
+from assembly.cad.locations import SCALE_ROUNDING, pose_of
 from assembly.errors import InputError, items, text
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.step.bodies import read_shape, solids_in, unique
 from assembly.step.documents import StepWarning
+from assembly.step.images import image_of, placement_of
 from assembly.step.occt import occt, parts
 from assembly.step.tree import Color
 
@@ -259,7 +260,8 @@ def from_occt(shape: Any, name: str = "part", *, fixed: Iterable[str] = (), stri
     ----------
     shape : OCP.TopoDS.TopoDS_Shape
         Lengths are not converted. Equal solids at several locations share their faces: geometry is in the solid's own
-        coordinates, and the body's pose is its location.
+        coordinates, and the body's pose is its location. Where that mirrors or scales, the body is an image of the
+        solid.
     name : str
         Of the body; of several "part", "part 2" and so on. Faces are "face 1", "face 2" in OCCT's order.
     fixed : iterable of str
@@ -283,7 +285,17 @@ def from_occt(shape: Any, name: str = "part", *, fixed: Iterable[str] = (), stri
         raise TypeError(f"shape is {shown(shape)}; expected a TopoDS_Shape, of a CadQuery or build123d object .wrapped")
     text("name", name)
     made = Bodies(strict, fixed)
+    images: list[tuple[Any, float, Any]] = []
     for piece in () if shape.IsNull() else solids_in(shape):
         own = piece.Located(o.TopLoc_Location())
-        made.add(name, [own], pose_of(piece.Location(), repr(name)), None)
+        if abs(piece.Location().Transformation().ScaleFactor() - 1.0) <= SCALE_ROUNDING:
+            made.add(name, [own], pose_of(piece.Location(), repr(name)), None)
+            continue
+        pose, factor = placement_of(piece.Location())
+        same = (image for known, scale, image in images if scale == factor and known.IsEqual(own))
+        image = next(same, None)
+        if image is None:
+            image, _ = image_of(own, bool, factor)
+            images.append((own, factor, image))
+        made.add(name, [image], pose, None)
     return made.finished("shape")

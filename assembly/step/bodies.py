@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
-from assembly.kinematics.pose import Pose, axes_quaternion
 from assembly.step.documents import StepError, document_of
 from assembly.step.edges import Edges
 from assembly.step.faces import read_face
+from assembly.step.images import image_of, placement_of
 from assembly.step.occt import occt, parts, quiet
 from assembly.step.profiles import Unreadable
 from assembly.step.tree import Color, Part, free_labels, leaves
@@ -117,14 +115,6 @@ def unique(name: str, taken: set[str]) -> str:
     return candidate
 
 
-def _pose(location: Any, scale: float) -> Pose:
-    transform = location.Transformation()
-    rows = np.array([[transform.Value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)])
-    if np.abs(rows[:, :3].T @ rows[:, :3] - np.eye(3)).max() > 1e-9 or np.linalg.det(rows[:, :3]) < 0.0:
-        raise Unreadable("its placement is mirrored or scaled, which no rigid body can be")
-    return Pose(scale * rows[:, 3], axes_quaternion(rows[:, :3]))
-
-
 def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], list[str]]:
     """The bodies of a document, and what there is to warn of; lengths are millimeters times `scale`."""
     file, count = source.file, source.count
@@ -136,28 +126,32 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
         inexact: list[str] = []
         built = 0
         taken: set[str] = set()
-        read: dict[str, list[Shape]] = {}
+        read: dict[tuple[str, float], list[Shape]] = {}
         said = iter(source.names)
         for label in free_labels(root):
             for leaf in leaves(label, o.TopLoc_Location(), file.stem, None):
                 entry = o.TCollection_AsciiString()
                 o.TDF_Tool.Entry_s(leaf.label, entry)
-                key = entry.ToCString()
+                try:
+                    pose, factor = placement_of(leaf.location, scale)
+                except Unreadable as reason:
+                    missing.append(f"{leaf.name!r}: {reason}")
+                    continue
+                # Images of a part are parts of their own; how many faces a file has is known of parts.
+                key = entry.ToCString(), factor
                 if key not in read:
-                    part = Part(leaf.label)
-                    read[key] = [read_shape(shape, part.said, part.color, scale) for shape in solids_in(part.shape)]
-                    source.advance(sum(len(shape.faces) + len(shape.missing) for shape in read[key]))
+                    original = Part(leaf.label)
+                    images = (image_of(shape, original.said, factor) for shape in solids_in(original.shape))
+                    read[key] = [read_shape(shape, told, original.color, scale) for shape, told in images]
+                    faces = sum(len(shape.faces) + len(shape.missing) for shape in read[key])
+                    if sum(part == key[0] for part, _ in read) == 1:
+                        source.advance(faces)
+                        built += faces
                     for shape in read[key]:
-                        built += len(shape.faces) + len(shape.missing)
                         missing += [f"{leaf.name!r}, {text}" for text in shape.missing]
                         inexact += [f"{leaf.name!r}, {text}" for text in shape.inexact]
                 for shape in read[key]:
                     own, at = next(said, None) or shape.name, leaf.name or file.stem
-                    try:
-                        pose = _pose(leaf.location, scale)
-                    except Unreadable as reason:
-                        missing.append(f"{leaf.name!r}: {reason}")
-                        continue
                     if shape.faces:
                         name = unique(own or at, taken)
                         body = Body(name, shape.faces, pose.position, pose.quaternion)

@@ -122,16 +122,21 @@ def _counted(reader: Any) -> tuple[int, int, int]:
     model = reader.Reader().WS().Model()
     everything = range(1, model.NbEntities() + 1)
     values = list(map(model.Value, everything))
-    kinds = [type(value).__name__ for value in values]
-    broken = [
-        kind for k, kind in zip(everything, kinds, strict=True) if model.IsErrorEntity(k) and not _is_beside(kind)
-    ]
+    classes = list(map(type, values))
+    # Thousands of entities are of some dozens of kinds.
+    kinds = {each: each.__name__ for each in set(classes)}
+    broken = [kinds[classes[k - 1]] for k in filter(model.IsErrorEntity, everything)]
+    broken = [kind for kind in broken if not _is_beside(kind)]
     styles = sum(kind.startswith("StepVisual_") for kind in broken)
-    flat = sum(
-        _is_flat(value) for value, kind in zip(values, kinds, strict=True) if kind == "StepGeom_Axis2Placement3d"
-    )
-    bare = sum(_is_bare(value) for value, kind in zip(values, kinds, strict=True) if kind == "StepGeom_Pcurve")
-    faces = sum(kind in ("StepShape_AdvancedFace", "StepShape_FaceSurface") for kind in kinds)
+    chosen: dict[str, list[Any]] = {"StepGeom_Axis2Placement3d": [], "StepGeom_Pcurve": []}
+    wanted = {each: chosen[kind] for each, kind in kinds.items() if kind in chosen}
+    for value, each in zip(values, classes, strict=True):
+        if each in wanted:
+            wanted[each].append(value)
+    flat = sum(map(_is_flat, chosen["StepGeom_Axis2Placement3d"]))
+    bare = sum(map(_is_bare, chosen["StepGeom_Pcurve"]))
+    sided = {each for each, kind in kinds.items() if kind in ("StepShape_AdvancedFace", "StepShape_FaceSurface")}
+    faces = sum(each in sided for each in classes)
     return len(broken) - styles + flat + bare, styles, faces
 
 

@@ -25,7 +25,7 @@ from assembly.step.profiles import Spline, Unreadable, approximated, knot_row, p
 from assembly.step.surfaces import CONFUSION, Patch
 from assembly.step.tracks import Track, track
 
-__all__ = ["Side", "Space", "is_loose", "points_of", "projected", "space_of"]
+__all__ = ["Side", "Space", "is_loose", "points_of", "projected", "space_of", "strays"]
 
 Array = NDArray[np.float64]
 # How far a curve may be off its edge, over the size of the surface: less changes no digit that counts.
@@ -34,6 +34,8 @@ _OFF = 1e-10
 _FOLLOWED = 1e-10
 # Places of a stretch at which a curve is compared with its edge.
 _PLACES = 9
+# Those at which it is asked whether it leaves its edge at all.
+_LOOKS = 33
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -128,12 +130,22 @@ class Side:
         there = self._points(t)
         return np.column_stack([self.patch.u(there[:, 0]), self.patch.v(there[:, 1])])
 
-    def slopes(self, uv: Array) -> tuple[Array, Array]:
-        """Derivatives (n, 3) of the surface at parameters, which count as the end where they are beyond it."""
+    def points(self, t: Array) -> Array:
+        """Points (n, 3) of the surface on the curve, whose parameters count as the end where they are beyond it."""
+        at = self._inside(self.given(t))
+        made: Array = self.patch.surface.evaluate(at[:, 0], at[:, 1])
+        return made
+
+    def _inside(self, uv: Array) -> Array:
         at = uv.copy()
         for axis, (low, high) in enumerate(self.patch.surface.domain):
             if not self.is_closed[axis]:
                 np.clip(at[:, axis], low, high, out=at[:, axis])
+        return at
+
+    def slopes(self, uv: Array) -> tuple[Array, Array]:
+        """Derivatives (n, 3) of the surface at parameters, which count as the end where they are beyond it."""
+        at = self._inside(uv)
         _, su, sv = self.patch.surface.evaluate(at[:, 0], at[:, 1], 1)
         return su, sv
 
@@ -215,6 +227,18 @@ def is_loose(edge: Any) -> bool:
     """Whether an edge has a tolerance of its own, beyond what OCCT gives all, which it finds by samples."""
     o = occt()
     return o.BRep_Tool.Tolerance_s(edge) > 2.0 * CONFUSION and not o.BRep_Tool.Degenerated_s(edge)
+
+
+def strays(space: Space | None, own: Side, tolerance: float) -> bool:
+    """Whether the curve on a surface that is given for an edge leaves it by more than its tolerance somewhere.
+
+    Points of both at one parameter are compared, and only half as many again of the tolerance counts.
+    """
+    if space is None:
+        return False
+    t = np.linspace(space.low, space.high, _LOOKS)
+    there = own.points(t)
+    return bool(_norm(there - space.points(t)).max() > 1.5 * tolerance)
 
 
 def projected(space: Space, own: Side, other: Side | None, low: float, high: float) -> tuple[Spline, float] | None:

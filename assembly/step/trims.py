@@ -19,7 +19,7 @@ from assembly.geometry.splines.curve_parts import sampled
 from assembly.step.edges import Edges
 from assembly.step.occt import occt
 from assembly.step.profiles import Direction, Spline, Unreadable, approximated, profile, spline
-from assembly.step.projected import projected
+from assembly.step.projected import projected, strays
 from assembly.step.surfaces import Patch
 from assembly.step.tracks import track
 from assembly.step.wires import Traced, Wire
@@ -199,8 +199,18 @@ def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> list[Edge]:
     drafts = []
     for traced in wire.edges:
         known = edges.known(traced.edge)
+        made = _projected(traced, wire, patch, edges) if known.loose else None
+        if made is None:
+            made = _draft(traced, patch)
+            # OCCT follows edges around axes by samples, and its tolerance says nothing of what is between them.
+            if not (known.loose or patch.is_straight or made.level[0] or made.level[1]) and strays(
+                edges.space(traced.edge), edges.side(traced, wire.face, patch), known.tolerance
+            ):
+                better = _projected(traced, wire, patch, edges)
+                if better is not None:
+                    made, known = better, known._replace(loose=True)
         rows.append(known)
-        drafts.append((_projected(traced, wire, patch, edges) if known.loose else None) or _draft(traced, patch))
+        drafts.append(made)
     # Ends of all curves that are level are mapped at once.
     level = [draft for draft in drafts if draft.level[0] or draft.level[1]]
     places = np.array([(draft.curve.start, draft.curve.end) for draft in level if isinstance(draft.curve, Segment)])
@@ -208,7 +218,7 @@ def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> list[Edge]:
     if level and not patch.is_straight:
         mapped = np.column_stack([patch.u(mapped[:, 0]), patch.v(mapped[:, 1])])
     points = iter(mapped.tolist())
-    made = []
+    found = []
     for traced, known, (curve, sides, deviation) in zip(wire.edges, rows, drafts, strict=True):
         if sides[0] or sides[1]:
             (u, v), (x, y) = next(points), next(points)
@@ -216,8 +226,8 @@ def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> list[Edge]:
         if traced.edge.Orientation() == o.TopAbs_REVERSED:
             curve = _reversed(curve)
         tolerance = edges.forgiven(known.tolerance, size)
-        made.append(Edge(curve, sides, tolerance, known.name, deviation, traced.seam, known.loose))
-    return made
+        found.append(Edge(curve, sides, tolerance, known.name, deviation, traced.seam, known.loose))
+    return found
 
 
 def _reversed(curve: Spline | Segment) -> Spline | Segment:

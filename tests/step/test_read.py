@@ -6,6 +6,7 @@ import re
 import tempfile
 from itertools import pairwise
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from assembly.step import StepError, StepWarning, bodies, reader
 from assembly.step.documents import document_of
 from assembly.step.edges import Edges
 from assembly.step.faces import read_face
+from assembly.step.images import placement_of
 from assembly.step.occt import quiet, settings
 from assembly.step.profiles import Unreadable
 from tests.step import forked
@@ -211,15 +213,72 @@ def test_faces_that_occt_drops_are_counted(tmp_path, monkeypatch):
     assert len(body.faces) == 6
 
 
-@pytest.mark.parametrize("mirror", [True, False])
-def test_placements_that_are_not_rigid_are_refused(mirror):
+def wedge():
+    """A prism that is none of its mirror images, with a hole through it."""
+    corners = [(0, 0, 0), (3, 0, 0), (0, 2, 0)]
+    made = O.BRepBuilderAPI_MakePolygon(*(O.gp_Pnt(*corner) for corner in corners), True)
+    solid = O.BRepPrimAPI_MakePrism(O.BRepBuilderAPI_MakeFace(made.Wire()).Face(), O.gp_Vec(0, 0, 1)).Shape()
+    hole = O.BRepPrimAPI_MakeCylinder(O.gp_Ax2(O.gp_Pnt(0.7, 0.5, -1), O.gp_Dir(0, 0, 1)), 0.25, 3.0).Shape()
+    return O.BRepAlgoAPI_Cut(solid, hole).Shape()
+
+
+@pytest.mark.parametrize("kind", ["mirror", "point", "scale"])
+def test_placements_that_mirror_or_scale_place_images(kind):
     transform = O.gp_Trsf()
-    if mirror:
-        transform.SetMirror(O.gp_Ax2(O.gp_Pnt(0, 0, 0), O.gp_Dir(0, 0, 1)))
+    axes = O.gp_Ax2(O.gp_Pnt(1, 2, 3), O.gp_Dir(1, 2, -1))
+    if kind == "mirror":
+        transform.SetMirror(axes)
+    elif kind == "point":
+        transform.SetMirror(O.gp_Pnt(1, 2, 3))
     else:
-        transform.SetScale(O.gp_Pnt(0, 0, 0), 2.0)
-    with pytest.raises(Unreadable, match="mirrored or scaled"):
-        bodies._pose(O.TopLoc_Location(transform), 1.0)
+        transform.SetScale(O.gp_Pnt(1, 2, 3), 2.0)
+    file = File()
+    part, root = file.part(wedge(), "wedge"), file.group("pair")
+    top = faces(O.XCAFDoc_ShapeTool.GetShape_s(part))[-1]
+    side = file.shapes.AddSubShape(part, top)
+    file.named(side, "top")
+    file.paint(side, (1.0, 0.0, 0.0))
+    for location in (O.gp_Trsf(), transform, transform):
+        file.shapes.AddComponent(root, part, O.TopLoc_Location(location))
+    file.shapes.UpdateAssemblies()
+    count = len(faces(O.XCAFDoc_ShapeTool.GetShape_s(part)))
+    (own, image, again), told = bodies.bodies_in(bodies.Source(Path("pair.step"), file.document, count), 1.0, True)
+    assert not told
+    assert all(a.face is b.face for a, b in zip(image.faces, again.faces, strict=True))
+    factor = 2.0 if kind == "scale" else 1.0
+    assert image.volume == pytest.approx(factor**3 * own.volume, rel=1e-12)
+    center = O.gp_Pnt(*map(float, own.center_of_mass)).Transformed(transform)
+    place = image.pose.matrix[:3] @ np.append(image.center_of_mass, 1.0)
+    np.testing.assert_allclose(place, [center.X(), center.Y(), center.Z()], rtol=0, atol=1e-11)
+    assert [side.face.color for side in image.faces if side.name == "top"] == [(1.0, 0.0, 0.0)]
+
+
+def test_mirrored_solids_in_memory_are_images():
+    transform = O.gp_Trsf()
+    transform.SetMirror(O.gp_Ax2(O.gp_Pnt(1, 2, 3), O.gp_Dir(1, 2, -1)))
+    compound, build = O.TopoDS_Compound(), O.BRep_Builder()
+    build.MakeCompound(compound)
+    solid = wedge()
+    for location in (O.gp_Trsf(), transform, transform):
+        build.Add(compound, solid.Located(O.TopLoc_Location(location), False))
+    own, image, again = asm.cad.from_occt(compound)
+    assert all(a.face is b.face for a, b in zip(image.faces, again.faces, strict=True))
+    assert image.volume == pytest.approx(own.volume, rel=1e-12)
+    center = O.gp_Pnt(*map(float, own.center_of_mass)).Transformed(transform)
+    place = image.pose.matrix[:3] @ np.append(image.center_of_mass, 1.0)
+    np.testing.assert_allclose(place, [center.X(), center.Y(), center.Z()], rtol=0, atol=1e-11)
+
+
+def test_placements_without_volume_are_refused():
+    class Flat:
+        def Transformation(self):
+            return self
+
+        def Value(self, row, column):
+            return float(row == column < 3)
+
+    with pytest.raises(Unreadable, match="no volume"):
+        placement_of(Flat())
 
 
 def test_approximated_faces_are_named(tmp_path):

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
-from assembly.geometry.faces.loop import TOLERANCE, Loop, all_ends, curve_ends
+from assembly.geometry.faces.loop import TOLERANCE, Loop, curve_ends
+from assembly.geometry.faces.loop_seams import SLACK, segment, without_seams
 from assembly.geometry.faces.overshoot import clipped, extent, rates, widened
 from assembly.geometry.faces.plain_boundary import plain_boundary
 from assembly.geometry.faces.relinked import Relinked, relinked
@@ -23,8 +24,6 @@ __all__ = ["OVERSHOOT", "Boundary", "LoopLike", "make_boundary"]
 
 Array = NDArray[np.float64]
 LoopLike = NurbsCurve | Iterable[NurbsCurve] | Loop
-# How far beyond the domain, or off a pole edge or a seam, a curve may be, as a part of the domain.
-SLACK = 1e-9
 # How far loops may leave the surface, or go into each other, as a part of its size, where no tolerance is given.
 OVERSHOOT = 1e-4
 _EDGE = "the edge of the domain"
@@ -40,18 +39,6 @@ class Boundary:
     curves: tuple[NurbsCurve, ...]
     chains: tuple[range, ...]
     table: TrimTable
-
-
-def segment(start: Array, end: Array) -> NurbsCurve:
-    """A line in the plane with speed one."""
-    length = float(np.linalg.norm(np.subtract(end, start)))
-    return NurbsCurve(np.array([start, end]), [0.0, 0.0, length, length], 1)
-
-
-def _pole_edges(surface: NurbsSurface) -> list[tuple[int, float]]:
-    """Axis and value of the edges of the domain that are one point."""
-    ends = [(axis, surface.domain[axis][side]) for axis in range(2) for side in range(2)]
-    return [end for k, end in enumerate(ends) if surface._pole_bits >> k & 1]
 
 
 class _Sheet(NamedTuple):
@@ -95,87 +82,6 @@ def _natural(sheet: _Sheet) -> tuple[list[list[NurbsCurve]], list[NurbsCurve]]:
     # The left edge runs into the bottom one.
     if len(chains) > 1 and last == 3 and not closed[1] and not poles & 4:
         chains[0] = chains.pop() + chains[0]
-    return chains, silent
-
-
-def _on_line(curve: NurbsCurve, axis: int, value: float, slack: float) -> bool:
-    return bool(np.abs(curve.control_points[:, axis] - value).max() <= slack)
-
-
-def _are_seam(a: NurbsCurve, b: NurbsCurve, period: Array, slack: Array) -> bool:
-    """Whether b runs back along a, one period away."""
-    ends_a, ends_b = curve_ends(a), curve_ends(b)[::-1]
-    jump = ends_b - ends_a
-    whole = np.where(period > 0.0, np.round(jump / np.where(period > 0.0, period, 1.0)) * period, 0.0)
-    if not whole.any() or (np.abs(jump - whole) > slack).any():
-        return False
-    # Straight lines along the edge of the domain, or the same curve point by point.
-    axis = int(np.argmax(np.abs(whole[0])))
-    if _on_line(a, axis, ends_a[0, axis], slack[axis]) and _on_line(b, axis, ends_b[0, axis], slack[axis]):
-        return True
-    part = np.linspace(0.0, 1.0, 9)
-    points = a.evaluate(a.domain[0] + part * (a.domain[1] - a.domain[0]))
-    others = b.evaluate(b.domain[1] - part * (b.domain[1] - b.domain[0]))
-    return bool((np.abs(others - points - whole[0]) <= slack).all())
-
-
-def _without_seams(loop: Loop, surface: NurbsSurface) -> tuple[list[tuple[list[NurbsCurve], Array]], list[NurbsCurve]]:
-    """Chains of a loop (with the way from their start to their end if that is whole periods), and pole edges."""
-    curves = list(loop.curves)
-    if not surface._pole_bits and not any(surface._periods):
-        return [(curves, loop.turn)], []
-    slack = SLACK * np.ptp(np.array(surface.domain), axis=1)
-    period = np.array(surface._periods)
-    silent: list[NurbsCurve] = []
-    keep = np.ones(len(curves), dtype=bool)
-    for axis, value in _pole_edges(surface):
-        for k, curve in enumerate(curves):
-            if keep[k] and _on_line(curve, axis, value, slack[axis]):
-                keep[k] = False
-                ends = curve_ends(curve)
-                ends[:, axis] = value
-                silent.append(segment(*ends))
-    if period.any():
-        ends = all_ends(curves)
-        jump = ends[None, :, ::-1] - ends[:, None]
-        whole = np.where(period > 0.0, np.round(jump / np.where(period > 0.0, period, 1.0)) * period, 0.0)
-        for k, other in np.argwhere((np.abs(jump - whole) <= slack).all(axis=(2, 3))).tolist():
-            if k < other and keep[k] and keep[other] and _are_seam(curves[k], curves[other], period, slack):
-                keep[k] = keep[other] = False
-    if keep.all():
-        return [(curves, loop.turn)], silent
-    # Runs of what is left, then linked where one ends at the start of another.
-    count = len(curves)
-    runs: list[list[NurbsCurve]] = []
-    for k in range(count):
-        if keep[k]:
-            if runs and keep[k - 1] and k > 0:
-                runs[-1].append(curves[k])
-            else:
-                runs.append([curves[k]])
-    if len(runs) > 1 and keep[0] and keep[-1]:
-        runs[0] = runs.pop() + runs[0]
-    whole = np.where(period > 0.0, period, 1.0)
-    reach = max(loop.tolerance, SLACK) * loop.size
-
-    def apart(a: list[NurbsCurve], b: list[NurbsCurve]) -> Array:
-        jump = curve_ends(a[-1])[1] - curve_ends(b[0])[0]
-        return np.asarray(jump - np.where(period > 0.0, np.round(jump / whole) * period, 0.0))
-
-    chains = []
-    while runs:
-        chain = runs.pop(0)
-        while np.abs(apart(chain, chain)).max() > reach:
-            follows = [k for k, run in enumerate(runs) if np.abs(apart(chain, run)).max() <= reach]
-            if not follows:
-                break
-            chain = chain + runs.pop(follows[0])
-        # Joined once more: by whole periods, and exactly at the new corners.
-        if np.abs(apart(chain, chain)).max() <= reach:
-            joined = Loop.unchecked(chain, 2.0 * reach / loop.size, surface._periods, "loop")
-            chains.append((list(joined.curves), joined.turn))
-        else:
-            chains.append((chain, np.full(2, np.nan)))
     return chains, silent
 
 
@@ -310,12 +216,12 @@ def make_boundary(
     else:
         if not outer_loop.turn.any() and outer_loop.is_clockwise:
             outer_loop = outer_loop.reversed()
-        chains, silent = _without_seams(outer_loop, surface)
+        chains, silent = without_seams(outer_loop, surface)
         names = ["outer"] * len(chains)
     for k, loop in enumerate(hole_loops):
         if not loop.turn.any() and not loop.is_clockwise:
             hole_loops[k] = loop = loop.reversed()
-        more, points = _without_seams(loop, surface)
+        more, points = without_seams(loop, surface)
         chains += more
         silent += points
         names += [f"holes[{k}]"] * len(more)

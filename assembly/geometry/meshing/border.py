@@ -33,6 +33,9 @@ SPARE = 0.02
 _KINK = 1e-3
 # Ends of curves nearer than this part of the boundary's extent are one corner.
 _JOINED = 1e-6
+# Beginnings of curves of different loops that are nearer, as loops that touch have them, are one corner: two corners a
+# rounding apart make triangles whose sides no arithmetic tells.
+_TOUCH = 1e-9
 _HALVINGS = 40
 
 
@@ -217,7 +220,9 @@ def border(face: Face, tolerance: float, angle: float) -> Border:
         return Border(face, none, none, np.empty((0, 2)), np.empty((0, 2, 2)))
     steps = _steps(face, tolerance, angle)
     places = [curve.evaluate(t) for curve, t in zip(face.boundary, steps, strict=True)]
-    reach = _JOINED * np.ptp(np.concatenate(places), axis=0).max()
+    size = float(np.ptp(np.concatenate(places), axis=0).max())
+    reach = _JOINED * size
+    _meet_where_loops_touch(places, _TOUCH * size)
     curves, chains, spans, ends = [], [], [], []
     for number, members in enumerate(_linked_at_poles(face, places, reach)):
         for k, after in zip(members, [*members[1:], members[0]], strict=True):
@@ -244,6 +249,22 @@ def border(face: Face, tolerance: float, angle: float) -> Border:
             break
         found = found.split(rows)
     return found
+
+
+def _meet_where_loops_touch(places: list[Array], reach: float) -> None:
+    """Move the first corner of a curve, which ends the curve before it as well, to that of another one there."""
+    if len(places) < 2:
+        return
+    starts = np.array([row[0] for row in places])
+    order = np.lexsort(starts.T[::-1])
+    # Few are near: only neighbors along u are compared.
+    for n, k in enumerate(order[1:].tolist(), 1):
+        for m in order[n - 1 :: -1].tolist():
+            if starts[k, 0] - starts[m, 0] > reach:
+                break
+            if abs(starts[k, 1] - starts[m, 1]) <= reach:
+                starts[k] = places[k][0] = starts[m]
+                break
 
 
 def _linked_at_poles(face: Face, places: list[Array], reach: float) -> list[list[int]]:

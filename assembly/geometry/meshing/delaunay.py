@@ -193,7 +193,13 @@ def triangulated(points: Array, segments: Indices, soft: Sequence[int] = ()) -> 
     missing = [int(k) for k in np.flatnonzero(~found)]
     for k in sorted(missing, key=lambda k: k in yielding):
         p, q = pairs[k]
+        passed: set[int] = set()
         while p != q:
+            if p in passed:
+                # Corners a rounding apart, each on the way from the other.
+                blocked.extend([k] if k not in yielding else [])
+                break
+            passed.add(p)
             if (p, q) in mesh.third:
                 fixed[p, q] = k
                 break

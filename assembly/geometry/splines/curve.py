@@ -186,8 +186,8 @@ class NurbsCurve(FoundAgain, ReadOnlyArrays):
         made = []
         for row, turn, domain, name in zip(points, knots, intervals, names, strict=True):
             line = object.__new__(cls)
-            line.control_points, line.degree, line.knots, line.weights = row, 1, turn, _ONES
-            line.name, line.domain, line._is_clamped = name, domain, True
+            known = {"control_points": row, "degree": 1, "knots": turn, "weights": _ONES, "name": name}
+            line.__dict__.update(known, domain=domain, _is_clamped=True)
             made.append(line)
         return made
 

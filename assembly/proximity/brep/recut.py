@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from assembly.geometry.faces.boundary import segment
 from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.loop import TOLERANCE, Loop
+from assembly.geometry.faces.loop_seams import segment
 from assembly.geometry.splines.curve import NurbsCurve
 
 __all__ = ["with_cuts"]

@@ -288,6 +288,28 @@ def test_chords_that_cross_are_parted(gap):
     assert (normals_of(found)[:, 2] > 0).all()
 
 
+@pytest.mark.parametrize("radius", [1.0, 1.0 - 1e-12, 1.0 + 1e-10])
+def test_cusps_between_loops_that_touch(radius):
+    net = np.array([[[-1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]], [[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]]])
+    square = asm.NurbsSurface(net, [[-1.0, -1.0, 1.0, 1.0]] * 2, (1, 1))
+    face = asm.Face(square, None, [asm.curves.circle(radius)])
+    assert len(face.chains) == 4
+    made = facets(face, 1e-4)
+    # Chords of the hole are inside it, by at most the tolerance.
+    assert 4.0 - np.pi <= made.area <= 4.0 - np.pi + 1e-4 * 2.0 * np.pi
+    assert len(made.triangles) < 1000
+
+
+def test_ways_between_corners_a_rounding_apart_end():
+    # Corners that arithmetic cannot tell apart lie on the way from each to the other.
+    random = np.random.default_rng(3)
+    base = random.random((12, 2))
+    points = np.concatenate([base, np.nextafter(base, 2.0), np.nextafter(base, -1.0)])
+    segments = random.permutation(len(points)).reshape(-1, 2)
+    found = triangulated(points, segments)
+    assert set(found.owner) | set(found.blocked) == set(range(len(segments)))
+
+
 def test_chords_that_are_not_parted(monkeypatch):
     # A ring much thinner than the tolerance, with no leave to part its chords: what is found is in the ring.
     monkeypatch.setattr("assembly.geometry.meshing.polygon._PARTINGS", 0)
