@@ -92,7 +92,8 @@ class Stops(NamedTuple):
     @property
     def is_left(self) -> Flags:
         """Whether a row of a call has not arrived, (k,), and needs a solve of its own."""
-        return ~self.has_ended & np.array([each is None for each in self.solutions], dtype=bool)
+        left: Flags = ~self.has_ended & np.array([each is None for each in self.solutions], dtype=bool)
+        return left
 
     def take(self, rows: Any) -> Stops:
         """Some of them."""
