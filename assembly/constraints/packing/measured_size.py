@@ -49,7 +49,8 @@ class MeasuredSize:
                     base = base_of(mark)
                     self.frames.setdefault(id(base), (base, []))[1].append((b, k))
         self._boxes = [_box(marks) for marks in self._marks]
-        self._on_bodies = _longest(self._boxes)
+        self._rough = [hypot(*box) for box in self._boxes]
+        self._take_longest()
         self._far = max(map(abs, chain.from_iterable(chain.from_iterable(self._marks))), default=0.0)
         self._asked: list[tuple[object, str]] = []
         self._fixed_asked = 0.0
@@ -75,9 +76,17 @@ class MeasuredSize:
                 marks[k] = origin
                 box = _box(marks)
                 if box != self._boxes[b]:
-                    self._boxes[b], is_other = box, True
+                    rough = hypot(*box)
+                    is_other = is_other or rough >= self._near or self._rough[b] >= self._near
+                    self._boxes[b], self._rough[b] = box, rough
         if is_other:
-            self._on_bodies = _longest(self._boxes)
+            self._take_longest()
+
+    def _take_longest(self) -> None:
+        """The longest diagonal of the boxes; of those that are as long within rounding the bits decide."""
+        self._near = near = (1.0 - ROUNDING) * max(self._rough)
+        alike = zip(self._boxes, self._rough, strict=True)
+        self._on_bodies = max([_diagonal(box) for box, about in alike if about >= near])
 
     def size(self) -> float | None:
         """The size now; None where it rests on values and places in the world, or is out of range: measure in full."""
@@ -103,13 +112,6 @@ def _box(marks: Sequence[Sequence[float]]) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     xs, ys, zs = zip(*marks, strict=True)
     return max(xs) - min(xs), max(ys) - min(ys), max(zs) - min(zs)
-
-
-def _longest(boxes: Sequence[tuple[float, float, float]]) -> float:
-    """The longest diagonal; of those that are as long within rounding the bits decide."""
-    rough = [hypot(*box) for box in boxes]
-    near = (1.0 - ROUNDING) * max(rough)
-    return max([_diagonal(box) for box, about in zip(boxes, rough, strict=True) if about >= near])
 
 
 @lru_cache(64)

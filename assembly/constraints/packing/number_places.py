@@ -18,6 +18,7 @@ from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.dexterity import Dexterity
 from assembly.constraints.model.objectives import FrameDistance, Objective
 from assembly.constraints.packing.measured_size import MeasuredSize, base_of
+from assembly.constraints.packing.rescaled import FRAME, RescaledNumbers
 from assembly.constraints.program import records as layout
 from assembly.kinematics.body import Body, Frame
 from assembly.kinematics.changes import numbers_set
@@ -58,6 +59,9 @@ class NumberPlaces:
         self._numbers = numbers_set()
         self.size: float | None = None
         self._size = MeasuredSize(bodies, constraints, objectives)
+        self._rescaled = RescaledNumbers(packed, bodies, objectives)
+        # Frames whose origins were set since `_rescaled` took them.
+        self._stale: set[int] = set()
         self._bodies = {id(body) for body in bodies}
         self._clearances = {id(item): k for k, item in enumerate(packed.clearances)}
         self._contacts = {id(item): (item, at) for item, at in zip(packed.contacts, packed.gaps, strict=True)}
@@ -121,10 +125,13 @@ class NumberPlaces:
         is_next = packed.numbers == self._numbers
         # Else another packing with the same places was asked for meanwhile.
         self._size.read(frames if is_next else self._size.frames)
+        self._stale.update(frames if is_next else self._frames)
         self._numbers = numbers_set()
         self.size = self._size.size()
-        if self.size != packed.scale or not packed.has_size or packed._reference != reference.tolist():
+        if self.size is None or not packed.has_size or packed._reference != reference.tolist():
             return None
+        if self.size != packed.scale:
+            return self._of_size(packed, self.size, frames, is_next)
         changed = [own for key in frames for own in self._changed(packed, key, is_next)]
         gaps = [own for item in clearances for own in self._gaps_of(packed, item) if packed.pool[own[0]] != own[1]]
         if clearances and any((packed.pool[at] > 0.0) != (gap > 0.0) for at, gap in gaps):
@@ -145,6 +152,26 @@ class NumberPlaces:
         if gaps:
             # What was proven was of other gaps.
             other.proofs = []
+        return other
+
+    def _of_size(self, packed: Packed, size: float, frames: Sequence[int], is_next: bool) -> Packed | None:
+        """The scene with another size, and numbers of frames; None where it has lengths that are not of frames."""
+        if not self._rescaled.is_possible:
+            return None
+        for key in self._stale:
+            base, entries = self._frames[key]
+            self._rescaled.has_moved([(at - packed.frames_at) // FRAME for at, _, _ in entries], base)
+        self._stale.clear()
+        other = self._rescaled.written(packed, size)
+        if other is None:
+            return None
+        other.numbers = self._numbers
+        for key in frames:
+            base, entries = self._frames[key]
+            if not is_next or self._axes.get(key) is not base.axes:
+                for at, frame, _ in entries:
+                    other.rows_pool[at + 3 : at + FRAME] = frame.axes.T.ravel()
+                self._axes[key] = base.axes
         return other
 
     def _changed(self, packed: Packed, key: int, is_next: bool) -> list[tuple[int, list[float]]]:

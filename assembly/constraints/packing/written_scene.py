@@ -85,11 +85,16 @@ class WrittenScene(ManagerLast, SceneContents):
         self.reference = bodies[0].pose.position.copy()
         self._reference = self.reference.tolist()
         self.unit = max(term.weight * natural_unit(term, scale) for _, term in goals)
-        if not LEAST_UNIT <= self.unit <= 1.0 / LEAST_UNIT:
+        if not self.is_unit(self.unit):
             raise InputError(
                 f"the objective counts in units of {self.unit:g}, by its weights and the scene's size {scale:g}; "
                 f"expected from {LEAST_UNIT:g} to {1.0 / LEAST_UNIT:g}"
             )
+
+    @staticmethod
+    def is_unit(unit: float) -> bool:
+        """Whether an objective may count in this unit."""
+        return LEAST_UNIT <= unit <= 1.0 / LEAST_UNIT
 
     def _write(
         self, bodies: Sequence[Body], constraints: Sequence[Constraint], objectives: Sequence[tuple[float, Objective]]
@@ -184,11 +189,19 @@ class WrittenScene(ManagerLast, SceneContents):
     def _keep_values(self, values: list[tuple[Equation, int, float]]) -> None:
         """Keep the equations of rows that have a value, where it is in the pool, and its unit."""
         self._values = values
-        self._sources = [item for item in values if item[0].source is not None]
+        self._sourced = [k for k, (equation, _, _) in enumerate(values) if equation.source is not None]
+        self._sources = [values[k] for k in self._sourced]
         # What every solve reads of them: where a value is kept, where it goes, its unit, whether it is a length.
         self._reads = [
             (*equation.place(), at, unit, not equation.terms[0][1].is_angle) for equation, at, unit in self._sources
         ]
+
+    def _keep_units(self, values: list[tuple[Equation, int, float]]) -> None:
+        """Keep the same equations in the same places, with other units."""
+        self._values = values
+        self._sources = sources = [values[k] for k in self._sourced]
+        reads = zip(self._reads, sources, strict=True)
+        self._reads = [(*before[:4], unit, before[5]) for before, (_, _, unit) in reads]
 
     def _take_addresses(self) -> None:
         """Where the kernels are that only contacts, trims, clearances, expressions or many bodies ask for."""

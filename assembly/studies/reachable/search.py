@@ -97,21 +97,20 @@ def workspace(
     with watched(progress, "workspace", 0, "solve") as flood.advance:
         for start in (first, *(_solved(scene, each, f"starts[{k}]") for k, each in enumerate(others))):
             place = start.pose(point.body).apply(point.coordinates)
-            stop = drawn.to(grid.origin + (place - grid.origin) @ grid.axes.T @ grid.axes, start.q)
-            flood.run(grid.cell(drawn.place(stop)), stop, region.holds)
+            stop = drawn.begin(grid.origin + (place - grid.origin) @ grid.axes.T @ grid.axes, start.q)
+            flood.run(grid.cell(drawn.places(stop.poses)[0]), stop, region.holds)
     return _found(scene, flood, region)
 
 
 def _found(scene: Assembly, flood: Flood, region: _Region) -> Workspace:
     """Cells, poses and boundary in order."""
     grid = flood.grid
-    order = sorted(flood.reached)
-    cells = np.array(order, dtype=np.int64).reshape(-1, grid.dimension)
+    cells, poses = flood.reached.in_order()
     limits = [limit for at in sorted(flood.limits) for limit in flood.limits[at]]
     targets, places, normals = (np.array([limit[k] for limit in limits]).reshape(-1, 3) for k in range(3))
     return Workspace(
         cells=cells,
-        poses=np.array([flood.reached[at][0][0] for at in order]).reshape(len(cells), len(scene.bodies), 7),
+        poses=poses,
         boundary=places,
         normals=normals,
         content=content(grid, cells, places, normals, region.holds),

@@ -9,6 +9,7 @@ import assembly as asm
 from assembly.errors import InputError
 from assembly.studies.reachable.drawn_tip import DrawnTip
 from assembly.studies.reachable.grid import grid_of
+from assembly.studies.reachable.known_poses import KnownPoses
 
 LONG, SHORT = 1.0, 0.6
 AREA = 4.0 * np.pi * LONG * SHORT
@@ -86,19 +87,50 @@ def test_rows_of_a_front_are_solves_of_their_own():
     place = first.pose(tip.body).apply(tip.coordinates)
     grid = grid_of("xy", place, 0.1)
     drawn = DrawnTip(scene, tip, grid)
-    (start,) = drawn.all_from(place[None] + [0.02, 0.01, 0.0], first.q[None])
-    assert start.solution is None
+    start = drawn.all_from(place[None] + [0.02, 0.01, 0.0], first.q[None])
+    assert start.solutions[0] is None
     directions = np.arange(8) * np.pi / 4.0
     ways = np.column_stack([np.cos(directions), np.sin(directions), np.zeros(8)])
     targets = np.concatenate([place + 0.1 * ways, place + 0.5 * ways])
-    rows = [drawn.all_to(targets, [start] * 16), drawn.all_from(targets, np.array([start.poses] * 16))]
-    assert all(stop.solution is None for stop in rows[0][:8])
+    starts = start.take(np.zeros(16, dtype=int))
+    rows = [drawn.all_to(targets, starts), drawn.all_from(targets, starts.poses)]
+    assert [each is None for each in rows[0].solutions[:8]] == [True] * 8
+    left = drawn.all_to(targets, starts, alone=False)
+    assert [each is None for each in left.solutions] == [True] * 16
     for own in rows:
-        alone = [drawn.to(target, drawn.solution(start)) for target in targets]
-        assert [stop.is_there for stop in own] == [stop.is_there for stop in alone]
-        assert 8 <= sum(stop.is_there for stop in own) < 16
-        for stop, other in zip(own, alone, strict=True):
-            assert stop.has_ended and np.abs(drawn.place(stop) - drawn.place(other)).max() < 1e-8
+        alone = [drawn.to(target, drawn.solution(start, 0)) for target in targets]
+        assert own.is_there.tolist() == [stop.is_there for stop in alone]
+        assert 8 <= own.is_there.sum() < 16 and own.has_ended.all()
+        places = drawn.places(np.array([stop.poses for stop in alone]))
+        assert np.abs(drawn.places(own.poses) - places).max() < 1e-8
+        # What is left is what a solve of its own was made for.
+        if own is rows[0]:
+            assert left.is_left.tolist() == [each is not None for each in own.solutions]
+    assert np.abs(places[0] - alone[0].solution.pose(tip.body).apply(tip.coordinates)).max() < 1e-14
+
+
+def test_poses_of_cells_are_known_once():
+    """Against one at a time: those of a cell that are nearer than a length are one, in one call as in several."""
+    rng = np.random.default_rng(4)
+    known, before, arm = KnownPoses((2, 3), 0.7, 0.05), {}, 0.7
+    for count in (40, 1, 0, 400):
+        cells = rng.integers(0, 6, (count, 2))
+        poses = np.round(rng.normal(size=(count, 3, 7)), 0)
+        poses[..., 3:] /= np.maximum(np.linalg.norm(poses[..., 3:], axis=2), 1.0)[..., None]
+        if count == 400:
+            poses[:] = poses[rng.integers(0, 4, count)] + 0.001 * rng.uniform(size=(count, 1, 1))
+        expected = []
+        for row, (cell, pose) in enumerate(zip(map(tuple, cells.tolist()), poses, strict=True)):
+            e = pose[:, 3:]
+            mark = np.hstack([pose[:, :3], 2.0 * arm * (e[:, :, None] * e[:, None]).reshape(3, 16)])
+            if all(np.abs(mark - other).max() >= 0.05 for _, other in before.get(cell, ())):
+                before.setdefault(cell, []).append((pose, mark))
+                expected.append(row)
+        assert known.add(cells @ [100, 1], cells, poses).tolist() == expected
+    assert len(known) == len(before) and 36 < sum(map(len, before.values())) < 441
+    cells, poses = known.in_order()
+    assert list(map(tuple, cells.tolist())) == sorted(before)
+    assert np.array_equal(poses, [before[cell][0][0] for cell in sorted(before)])
 
 
 def test_an_arm_that_moves_along_itself():
