@@ -14,13 +14,15 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory, pytestconfig):
+def site(tmp_path_factory, pytestconfig, alone):
     place = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", str(place)]
     if not pytestconfig.getoption("--long"):
         # Without a page of each module's text, which nothing here reads.
         command += ["-D", "extensions=myst_parser,sphinx.ext.autodoc,numpydoc"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    # Some of its pages are written into the checkout.
+    with alone():
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-4000:]
     return place
 

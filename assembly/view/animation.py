@@ -90,7 +90,7 @@ def animate(
     duration = positive("seconds", seconds)
     require_flag("loop", loop)
     said = items("captions", captions, "a string for each frame")
-    # An iterator is gone through once.
+    # An iterator can be read only once.
     shown = [*trajectory] if isinstance(trajectory, Iterator) else trajectory
     picture = film(scene, shown, direction, ellipsoids, style)
     frames = round(float(picture.times[-1])) + 1

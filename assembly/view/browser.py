@@ -23,14 +23,14 @@ from assembly.view.said_in_window import said_in_window
 from assembly.view.style import Style
 
 with warnings.catch_warnings():
-    # Of its own imports: a module of pyzmq that calls itself deprecated.
+    # Meshcat imports a deprecated module of pyzmq, which warns.
     warnings.simplefilter("ignore", DeprecationWarning)
     from meshcat import Visualizer
 
 __all__ = ["display", "show"]
 
 _running: list[Visualizer] = []
-# Windows of visualizers in which something moves.
+# Visualizers whose windows play a motion.
 _moving: WeakSet[Any] = WeakSet()
 
 
@@ -67,7 +67,7 @@ def display(
         target.window.send(_Sent(motion(picture, seconds, loop)))
         _moving.add(target.window)
     elif target.window in _moving:
-        # Else it would go on, unseen, and its slider would stay.
+        # Otherwise the last motion would go on unseen, and its slider would stay.
         target.window.send(_Sent(stillness()))
         _moving.discard(target.window)
     if open:

@@ -22,7 +22,7 @@ _MOST = 3
 
 def captions_text(captions: Sequence[str]) -> str:
     """What the play bar says at each frame, to stand behind the player."""
-    # An end of the script in a caption would be one.
+    # "</script>" in a caption would end the page's script.
     listed = dumps(list(captions)).replace("<", "\\u003c")
     return f'<script type="text/plain" class="with-viewer">captions.push(...{listed});</script>\n'
 

@@ -21,7 +21,7 @@ _MARKS: Mapping[Kind, Color] = {
     "touching": (1.00, 0.72, 0.10),
     "clear": (0.10, 0.60, 0.32),
 }
-# What is in bodies is to be seen.
+# Opacities of bodies that cross and of the others: what is inside bodies has to be visible.
 _SOLID, _FAINT = 0.45, 0.25
 
 

@@ -24,9 +24,9 @@ Command = dict[str, Any]
 ROOT = "/assembly"
 _CAMERA = "/Cameras/default/rotated/<object>"
 _LIGHT = "/Lights/FillLight/<object>"
-# From above to below.
+# Colors of the background at the top and at the bottom.
 _BACKGROUND = ((1.0, 1.0, 1.0), (0.87, 0.90, 0.94))
-# What changes less is not seen, nor kept by single precision.
+# Smaller changes are invisible, and lost in single precision.
 _MOTIONLESS = 1e-9
 # Color of edges.
 _EDGE = 0x23262D
@@ -59,7 +59,7 @@ def _line_geometry(lines: Lines, identifier: str) -> Command:
 
 
 def _material(item: Item, identifier: str) -> Command:
-    # Where vertices have colors, those are shone at with white.
+    # Colors of vertices are multiplied by the material's color, which has to be white then.
     colored = item.mesh.colors is not None
     red, green, blue = (round(255.0 * part) for part in ((1.0, 1.0, 1.0) if colored else item.color))
     material: Command = {
@@ -73,13 +73,13 @@ def _material(item: Item, identifier: str) -> Command:
     if colored:
         material["vertexColors"] = True
     if item.lines is not None:
-        # A little farther away than it is, so that lines on it are seen whole.
+        # Drawn slightly farther away than it is, so that it does not hide parts of the lines on it.
         material.update(polygonOffset=True, polygonOffsetFactor=1.0, polygonOffsetUnits=1.0)
     if item.in_front:
         # Transparent things are drawn last.
         material.update(transparent=True, opacity=0.85, depthTest=False)
     elif item.opacity < 1.0:
-        # The near side only, and nothing behind it is left out.
+        # Only the side toward the camera; what is behind it is drawn, too.
         material.update(transparent=True, opacity=item.opacity, depthWrite=False, side=0)
     return material
 
@@ -103,7 +103,7 @@ def _object(path: str, kind: str, geometry: Command, material: Command) -> Comma
 
 def path_of(item: Item) -> str:
     """Where the viewer has an item; also the identifier of its mesh."""
-    # The viewer splits at slashes, which a name may hold.
+    # The viewer splits paths at slashes, which names may contain.
     return "/".join([ROOT, *(part.replace("/", "\N{DIVISION SLASH}") for part in item.path)])
 
 
@@ -136,7 +136,7 @@ def commands(picture: Picture) -> Iterator[Command]:
     x, y, z = picture.eye.tolist()
     yield _property(_CAMERA, "position", [x, z, -y])
     yield _property(_CAMERA, "fov", FIELD_OF_VIEW)
-    # Over the left shoulder of whoever looks.
+    # The light is to the left of the camera and above it.
     left = np.array([y, -x, 0.0])
     light = picture.eye + 0.9 * left + [0.0, 0.0, 0.9 * np.linalg.norm(picture.eye)]
     yield _property(_LIGHT, "position", (10.0 * light).tolist())
@@ -163,7 +163,7 @@ def motion(picture: Picture, seconds: float, loop: bool) -> Command:
     times = picture.times * (seconds / picture.times[-1])
     animations = []
     for item in picture.items:
-        # The motion lasts as long where nothing moves.
+        # The first item has a track even if it stands still, so that the motion has its length.
         tracks = _tracks(item, times, always=item is picture.items[0])
         if tracks:
             animations.append({"path": path_of(item), "clip": {"fps": 1.0, "name": "motion", "tracks": tracks}})

@@ -161,7 +161,7 @@ def framed(points: Array, direction: Array) -> tuple[Place, float]:
     """Where to place points (n, 3) so that the eye sees them filling its view; and its distance."""
     toward = direction / np.linalg.norm(direction)
     right = np.cross([0.0, 0.0, 1.0], toward)
-    # Straight from above or below, x is to the right.
+    # Seen straight from above or below, x points to the right.
     right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-6 else np.array([1.0, 0.0, 0.0])
     axes = np.column_stack([right, np.cross(toward, right), toward])
     corner = points[0]
@@ -171,6 +171,6 @@ def framed(points: Array, direction: Array) -> tuple[Place, float]:
     radius = float(np.linalg.norm(seen, axis=1).max()) or 1.0
     half = np.tan(np.deg2rad(0.5 * FIELD_OF_VIEW))
     needed = seen[:, 2] + np.maximum(np.abs(seen[:, 0]) / _ASPECT, np.abs(seen[:, 1])) / half
-    # Not so near that a single point or a flat scene fills nothing and hides behind the eye.
+    # Never so near that a single point, or a flat scene, is at the camera or behind it.
     distance = max(_MARGIN * float(needed.max()) / radius, 1.2)
     return Place(corner + axes @ middle, 1.0 / radius), distance

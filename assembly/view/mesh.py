@@ -24,15 +24,15 @@ from assembly.view.outline import ANGLE, extent, turning
 __all__ = ["Mesh", "body_mesh", "face_mesh", "joined"]
 
 Array = NDArray[np.float64]
-# By so much larger cells are tried until a body's vertices are few enough.
+# Factor by which cells are made larger, again and again, until a body has few enough vertices.
 _COARSER = 1.2
-# Normals that differ by more on the two sides of a knot make an edge.
+# A knot is a sharp edge where the normals on its two sides differ by more.
 _CREASE = np.cos(np.deg2rad(1.0))
-# Normals that differ by more on the two sides of an edge of a mesh make one that is drawn.
+# An edge of a mesh is drawn where the normals on its two sides differ by more.
 _FEATURE = np.cos(np.deg2rad(10.0))
 # Vertices nearer to each other than this part of a mesh's size are at one place.
 _WELDED = 1e-6
-# How far inside a span, in parts of it, normals at its end are taken: the knot itself belongs to the next span.
+# Normals at the end of a span are taken this part of the span inside: the knot itself belongs to the next span.
 _INSIDE = 1e-9
 # Points nearer than this part of the surface's size are one point.
 _COINCIDENT = 1e-12
@@ -106,7 +106,7 @@ def _normals(face: Face, u: Array, v: Array) -> Array:
     try:
         return face.normal(u[:, None], v[None, :])
     except InputError:
-        # A corner without a normal; beside it there is one, and a picture cannot tell.
+        # A corner may have no normal; the one beside it looks the same.
         inward = [0.5 * (low + high) for low, high in face.surface.domain]
         u, v = (middle + (1.0 - 1e-6) * (t - middle) for middle, t in zip(inward, (u, v), strict=True))
         return face.normal(u[:, None], v[None, :])
@@ -140,7 +140,7 @@ def _rows(
     breaks: Array, degrees: Array, cells: NDArray[np.int64], creased: NDArray[np.bool_]
 ) -> tuple[Array, Array, list[int]]:
     """Parameters of points, parameters of their normals, and the rows that begin a cell; edges have two rows."""
-    # Cells of equal turning, but none a hundred times as long as another.
+    # Along each cell the surface turns by the same angle, but no cell is a hundred times as long as another.
     turned = degrees + 0.05 * degrees.mean(axis=1, keepdims=True) + 1e-9
     reached = np.cumsum(np.pad(turned, ((0, 0), (1, 0))), axis=1) / turned.sum(axis=1, keepdims=True)
     points: list[float] = []
@@ -159,10 +159,10 @@ def _rows(
     return np.array(points), np.array(normals), begins
 
 
-# Meshes of faces that were drawn before, which bodies may share, by what else they depend on; and how surfaces turn.
+# Caches, by face: meshes, by what else they depend on, and the angles by which surfaces turn. Bodies may share faces.
 _known: WeakKeyDictionary[Face, dict[tuple[float, ...], Mesh]] = WeakKeyDictionary()
 _turns: WeakKeyDictionary[Face, list[tuple[Array, NDArray[np.bool_]]]] = WeakKeyDictionary()
-# Distance of a trimmed face's facets, in parts of its body's extent: that alone would show in an outline.
+# Largest distance of facets from a trimmed face, in parts of its body's extent; it would be visible in an outline only.
 _TOLERANCE = 1e-3
 
 

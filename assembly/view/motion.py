@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 __all__ = ["aligned", "between", "quaternions", "rotations", "sample_times", "turned"]
 
 Array = NDArray[np.float64]
-# Between samples a browser interpolates positions along lines: chords of arcs of that many degrees.
+# Browsers interpolate positions along straight lines: samples are so close that a turn between two is at most this.
 _DEGREES = 5.0
 
 
@@ -63,13 +63,13 @@ def aligned(directions: Array) -> Array:
         along = way / length if length > 0.0 else axis
         cosine = float(axis @ along)
         if cosine < -0.999999:
-            # Over the x axis; there is no shortest way.
+            # Half a turn, about the x axis: every axis across would be as short.
             rotation = rotation @ np.diag([1.0, -1.0, -1.0])
             axis, cosine = rotation[:, 2], -cosine
         x, y, z = np.cross(axis, along)
         skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         x_axis = (np.eye(3) + skew + skew @ skew / (1.0 + cosine)) @ rotation[:, 0]
-        # Orthonormal anew: turns of nearly half a turn make rounding of the last one larger.
+        # Made orthonormal again: near half a turn the rounding of the last rotation is amplified.
         x_axis -= (x_axis @ along) * along
         x_axis /= np.linalg.norm(x_axis)
         rotation = np.column_stack([x_axis, np.cross(along, x_axis), along])

@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 __all__ = ["ANGLE", "Lines", "body_lines", "extent", "turning"]
 
 Array = NDArray[np.float64]
-# Degrees that boundaries turn from corner to corner, as meshes do; where there are many faces each is small.
+# Degrees by which boundaries, and meshes, turn from corner to corner; more where there are many faces, each small.
 ANGLE = 7.5
 _MANY, _COARSEST = 100, 2.0
-# In parts of the extent: distance of a chord from its arc, and points that are one.
+# In parts of the extent: largest distance of a chord from its arc, and of points that count as one.
 _TOLERANCE, _SAME = 1e-3, 1e-6
-# A boundary that is only to be measured.
+# The angle between chords [rad] of a boundary that is measured and not drawn.
 _COARSE = 0.25 * np.pi
 
-# Boundaries of faces that were drawn before, which bodies may share, by tolerance and angle; chords (k, 2, 3).
+# A cache: chords (k, 2, 3) of the boundaries of faces, by tolerance and angle. Bodies may share faces.
 _known: WeakKeyDictionary[Face, dict[tuple[float, float], Array]] = WeakKeyDictionary()
 
 
@@ -51,7 +51,7 @@ def _chords(face: Face, tolerance: float, angle: float) -> Array:
     found = _known.setdefault(face, {})
     if (tolerance, angle) not in found:
         chords = border(face, tolerance, angle).points
-        # A step along a pole stays where it is.
+        # Steps along a pole have no length.
         found[tolerance, angle] = chords[(chords[:, 0] != chords[:, 1]).any(axis=1)]
     return found[tolerance, angle]
 

@@ -239,5 +239,5 @@ def overlay(picture: Picture) -> str:
         "unit": style.unit,
         "on": on,
     }
-    # An end of the script in a name would be one.
+    # "</script>" in a name would end the page's script.
     return _OVERLAY.replace("@SAID@", dumps(told, allow_nan=False).replace("<", "\\u003c"))

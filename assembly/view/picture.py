@@ -45,10 +45,10 @@ __all__ = ["DIRECTION", "PENETRATING", "TOUCHING", "draw", "film"]
 
 Array = NDArray[np.float64]
 
-# From the scene to the eye: from the front, a little from the right and from above.
+# From the scene to the camera, which is in front, a little to the right and above.
 DIRECTION = (0.65, -1.0, 0.3)
 
-# A body that is named after a color has it; the others take the rest of the first nine in turn.
+# A body whose name is a color has that color; the others take turns with the rest of the first nine.
 _NAMED: dict[str, Color] = {
     "blue": (0.16, 0.42, 0.85),
     "orange": (0.95, 0.52, 0.12),
@@ -68,24 +68,24 @@ _GROUND: Color = (0.60, 0.62, 0.66)
 _GRAY = np.array(_GROUND)
 TOUCHING: Color = (1.00, 0.72, 0.10)
 PENETRATING: Color = (0.95, 0.05, 0.65)
-_WISH: Color = (0.16, 0.17, 0.20)
+_TARGET_COLOR: Color = (0.16, 0.17, 0.20)
 _ELLIPSOID: Color = (0.35, 0.20, 0.80)
-# Names of contacts that a clearance finds: those of the bodies, and a number.
+# Names of contacts that a clearance finds: the bodies' names, and a number.
 _FOUND = re.compile(r"^clearance: (.*?)( \d+)?$")
-# How far a target may make the picture larger than its parts, in their radius: parts are what is to be seen.
+# Targets farther away than this, in radii of the scene, do not make the picture larger: parts would become too small.
 _FARTHEST = 1.5
 # Half the width of the cross at a target, in parts of the scene's radius.
 _ARM = 3.0 * MARK
 # The gap, in parts of the scene's radius, below which surfaces interpenetrate.
 _PENETRATION = -1e-9
-# Half the thickness of an ellipsoid that is flat, in parts of the scene's radius, and how much hides what is behind it.
+# Of ellipsoids: half the thickness of a flat one, in parts of the scene's radius, and the opacity.
 _THIN = 0.004
 _VEIL = 0.35
-# Vertices of a ball that is not small.
+# Number of vertices of a large ball.
 _SMOOTH = 2000
-# How much farther the eye is from a film, for the controls below.
+# The camera is farther from a motion by this factor, which leaves room for the controls below it.
 _ROOM = 1.15
-# Directions in which a body's outermost vertices stand for all when the frame of a film is looked for.
+# Number of directions: a motion is framed by the vertices that are outermost in one of them.
 _OUTLOOKS = 200
 
 
@@ -166,11 +166,11 @@ def _contact(pair: Pairs, place: Place, style: Style, name: str) -> Iterator[Ite
 def _target_items(name: str, body: str, target: Array, point: Array, radius: float) -> Iterator[Item]:
     """A cross at the target, a ball at the point (k, 3) that is drawn to it, and a line between them."""
     said = f"{name}, of a point of {body}"
-    yield Item(("targets", name, "target"), cross(_ARM, 0.3 * MARK), _WISH, target, said=said, label=name)
-    yield Item(("targets", name, "point"), ball(), _WISH, point, scale=np.full(3, radius), said=said)
+    yield Item(("targets", name, "target"), cross(_ARM, 0.3 * MARK), _TARGET_COLOR, target, said=said, label=name)
+    yield Item(("targets", name, "point"), ball(), _TARGET_COLOR, point, scale=np.full(3, radius), said=said)
     if np.linalg.norm(target - point, axis=1).max() > 2.0 * MARK:
         ends = np.broadcast_to(target, point.shape)
-        yield replace(line(("targets", name, "line"), point, ends, 0.25 * MARK, _WISH), said=said)
+        yield replace(line(("targets", name, "line"), point, ends, 0.25 * MARK, _TARGET_COLOR), said=said)
 
 
 def _ellipsoid(name: str, shape: Ellipsoids, place: Place) -> Iterator[Item]:
@@ -250,7 +250,7 @@ def _picture(
     items.extend(joint_items(scene, stations, place, size, style, values or {}))
     named = set()
     for pair in pairs:
-        # Of contacts that a clearance finds between two bodies, one has their name.
+        # Of several contacts that a clearance finds between two bodies, only the first has a label.
         label = _FOUND.sub(r"\1", pair.name)
         items.extend(_contact(pair, place, style, "" if label in named else label))
         named.add(label)

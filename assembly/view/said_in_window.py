@@ -87,6 +87,6 @@ def said_in_window(picture: Picture) -> Iterator[Command]:
     for arm, name, way in zip(arms, "xyz", np.eye(3), strict=True):
         yield from mesh_commands(arm)
         said = f"{name}  {style.length(length)}" if name == "x" and style.scale_bar else name
-        # What hangs below an arrow is in its axes, of which z is along it.
+        # Children of an arrow are placed in its axes, whose z axis is along the arrow.
         end = arm.rotation.T @ ((length * picture.scale + 0.06) * way)
         yield from _sprite(f"{ROOT}/axes/{name}/name", said, end, np.ones(3))

@@ -33,7 +33,7 @@ __all__ = [
 Array = NDArray[np.float64]
 Trajectory = ArrayLike | Sequence[Solution]
 
-# The 24 rotations that take coordinate axes to coordinate axes: ways to name the axes of an ellipsoid.
+# The 24 rotations that map coordinate axes to coordinate axes, that is the ways to number the axes of an ellipsoid.
 _NAMINGS = [
     naming
     for order in permutations(range(3))
@@ -138,7 +138,7 @@ def contact_series(solutions: Sequence[Solution], times: Array) -> list[Pairs]:
         finite = [k for k, pair in enumerate(pairs) if pair is not None and np.isfinite(pair.points).all()]
         if not finite:
             continue
-        # A frame without a pair borrows the place of the nearest that has one.
+        # A frame without a pair of points takes those of the nearest frame that has one.
         chosen = [pairs[min(finite, key=lambda other: abs(other - k))] for k in range(len(pairs))]
         known = [pair for pair in chosen if pair is not None]
         points = np.array([pair.points for pair in known])

@@ -45,7 +45,7 @@ MARK = 0.014
 _ROD = 0.014
 JOINT = 0.022
 _BACK, _FORTH = -0.07, 0.14
-# Links shorter than this part of the scene's radius have smaller rods and joints, but not smaller than that.
+# Links shorter than the first, in parts of the scene's radius, have thinner rods and joints, down to the second factor.
 _SHORT, _LEAST = 0.12, 0.15
 COLOR: Color = (0.20, 0.22, 0.27)
 # Points of a body that differ by less, in parts of their distance from its origin, are one.
@@ -150,7 +150,7 @@ def joint_items(
         in_front = hides and style.glyphs == "in front"
         gap = float(np.linalg.norm(b - a, axis=1).max())
         sine = np.linalg.norm(np.cross(turn_a[:, :, 2], turn_b[:, :, 2]), axis=1).max()
-        # Frames that are anywhere in one plane are not apart: there is nothing between their origins.
+        # Frames that slide in one plane do not hold each other by their origins: no rod is drawn between these.
         in_plane = _is_in_plane(joint) and float(np.abs(((b - a) * turn_a[:, :, 2]).sum(axis=1)).max()) <= size * MARK
         meets = bool(kinds & {COINCIDENT, SLIDE, DISTANCE, RADIUS})
         said = _said(joint, values, style)
@@ -160,7 +160,7 @@ def joint_items(
             parts.append(("axis", axis, a, turn_a, np.ones(3)))
         if gap > size * MARK and not in_plane:
             parts.append(("other ball", ball(), b, np.eye(3), thick))
-        # The second arrow of a hinge lies on the first.
+        # The second axis of a hinge would lie on the first.
         if kinds - {COINCIDENT, DISTANCE, RADIUS, SLIDE} and not (meets and sine < _PARALLEL):
             parts.append(("other axis", axis, b, turn_b, np.ones(3)))
         for what, mesh, position, rotation, scale in parts:

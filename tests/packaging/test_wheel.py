@@ -40,13 +40,15 @@ def run(*command: str | Path, folder: Path = ROOT, **variables: str) -> str:
 
 
 @pytest.fixture(scope="module", params=["native", "portable"])
-def built(request, tmp_path_factory) -> tuple[str, Path, str]:
+def built(request, tmp_path_factory, alone) -> tuple[str, Path, str]:
     """The kind of kernels, the wheel, and what the build said."""
     if not request.config.getoption("--long") and not all(is_built(item, request.param) for item in all_items()):
         pytest.skip(f"compiling all {request.param} kernels takes minutes; --long does, and so does a build before")
     folder = tmp_path_factory.mktemp("wheel")
     command = [sys.executable, "-m", "pip", "wheel", "-v", "--no-deps", "--no-build-isolation", "--wheel-dir", folder]
-    said = run(*command, ROOT, ASSEMBLY_KERNELS=request.param)
+    # It is built in the checkout.
+    with alone():
+        said = run(*command, ROOT, ASSEMBLY_KERNELS=request.param)
     (wheel,) = folder.iterdir()
     return request.param, wheel, said
 

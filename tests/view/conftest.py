@@ -35,7 +35,7 @@ def photo(browser, tmp_path):
 
 @pytest.fixture
 def balls():
-    """Three balls side by side, the first two touching, and a wish for the third."""
+    """Three balls side by side, the first two touching, and a target for the third."""
     red = asm.Body("red", asm.shapes.sphere(1.0), fixed=True)
     green = asm.Body("green", asm.shapes.sphere(1.0), position=(2.3, 0.0, 0.0))
     blue = asm.Body("blue", asm.shapes.sphere(1.0), position=(4.8, 0.5, 0.0))

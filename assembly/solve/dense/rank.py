@@ -19,13 +19,13 @@ from assembly.solve.loop.parameters import NEIGHBORHOOD
 __all__ = ["HELD", "SMALLEST", "Balanced", "centered", "orthonormal", "tolerance_at"]
 
 Array = NDArray[np.float64]
-# Of a pose that is exact to rounding.
+# The tolerance at a pose that is exact to rounding.
 SMALLEST = 1e-7
 # A violation that counts as none, lengths over the scene's size; where there is more, the pose is taken as it is.
 HELD = 1e-9
 # Within this factor of the tolerance the largest gap between singular values decides.
 NEAR = 10.0
-# A decomposition of so many rows or columns takes as long as nobody should wait unasked.
+# With so many rows or columns a decomposition takes so long that it runs in a thread, which can be interrupted.
 LARGE = 200
 
 

@@ -31,10 +31,10 @@ from assembly.solve.scene import Scene, Status
 __all__ = ["conflicting_sets", "conflicts_at"]
 
 Array = NDArray[np.float64]
-# A violation below this part of the largest carries nothing.
+# Constraints violated by less than this part of the largest violation are not taken for part of a conflict.
 IDLE = 1e-6
-# Scattered starts besides those about the pose, which may be stuck, and how many rounds of others a set is asked from
-# before it is named.
+# Numbers of scattered starts, since solves from starts near the pose may get stuck, and of rounds of further starts
+# from which a set is tried before it is called a conflict.
 SCATTERED, ROUNDS = 4, 8
 # What came to less than this part of a least violation, and to no end, may come to nothing.
 ENDED = 0.01
@@ -69,18 +69,20 @@ def conflicting_sets(snapshot: Snapshot, interruption: Interruption) -> list[tup
             break
         least = max(IDLE * violations.max(), LEAST)
         loaded = {k for k, value in zip(left, violations, strict=True) if value > least}
-        # Trims mean nothing without their contacts.
+        # A trim has no meaning without its contact.
         items = snapshot.scene.constraints
         contacts = {item.contact.name for item in (items[k] for k in loaded) if isinstance(item, TrimContact)}
         core = [k for k in left if k in loaded or items[k].name in contacts]
-        # What is violated and can hold was only stuck, at a pole of an angle say, and shows nothing of the others.
+        # If the violated constraints can hold by themselves, the solve was only stuck, at a pole of an angle say, which
+        # says nothing about the others.
         if len(core) < len(left) and attempt(core, starts) is None:
             break
         for k in list(core):
             without = [other for other in core if other != k]
             if without and attempt(without, starts) is not None:
                 core = without
-        # What can hold together is stuck at some places and not at others: few constraints are asked from many starts.
+        # Sets that can hold get stuck from some starts and not from others: the few constraints are tried from many
+        # starts.
         if attempt(core, more) is None:
             break
         found.append(tuple(core))
@@ -93,9 +95,9 @@ def conflicts_at(scene: Scene, packed: Packed, state: Array, fit: float) -> list
     try:
         rows = rows_of(packed, state)
     except NoPairError:
-        # Then values that were driven since are not told from those of the solve.
+        # Values driven since the solve cannot be told from those of the solve then.
         rows = None
-    # Where all that is violated is so by less, contacts or limits do not hold, or nothing is to disagree.
+    # If all violations are smaller, either contacts or limits do not hold, or no disagreement is allowed.
     off = float(state[packed.results_at + VIOLATION]) / packed.scale
     held = max(min(max(fit, HELD) if off > fit else HELD, PART * off), LEAST)
     there = state if rows is None else rows.state

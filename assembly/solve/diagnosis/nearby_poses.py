@@ -20,17 +20,18 @@ from assembly.solve.result import Result
 __all__ = ["finite_dof", "path"]
 
 Array = NDArray[np.float64]
-# How far bodies are moved to count degrees of freedom there, in sizes of the scene and radians.
+# How far bodies are moved, in sizes of the scene and radians, to count degrees of freedom at another pose.
 REACH = 0.02
-# Mixtures of free motions that are tried, and how far from one bodies may go, in parts of the way.
+# Number of mixtures of free motions that are tried, and how far bodies may be off such a motion, in parts of its
+# length.
 MIXTURES, ASTRAY = 2, 0.3
-# Bodies that are put back by more than the rest of this part of the way could not go there.
+# Bodies have followed a motion if they went at least this part of its length after they were put back.
 ARRIVED = 0.25
-# Toward a singular pose a solve slows down; with violations below this it tells where bodies went all the same.
+# Solves slow down near a singular pose; with violations below this they still tell where bodies went.
 ROUGH = 1e-6
-# What counts as a direction of its own among the ways that bodies went.
+# Singular values above this count as independent directions of motion.
 DISTINCT = 0.1
-# A longer step of a path is divided.
+# Longest step of a path; longer ones are divided.
 STEP = 0.05
 
 

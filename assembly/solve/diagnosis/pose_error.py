@@ -34,13 +34,14 @@ from assembly.solve.scene import Scene
 __all__ = ["pose_error"]
 
 Array = NDArray[np.float64]
-# Singular values from here on are large: second derivatives of a residual that counts as held change nothing there.
+# From this singular value on, second derivatives of a residual that counts as held do not matter.
 STIFF = 1e-3
 # Below these a singular value and a second derivative are zero; the latter are found by differences.
 NO_SLOPE, NO_CURVATURE = 1e-7, 1e-6
 # Step of the differences, in sizes of the scene and radians: rounding over it and its square are both below 1e-8.
 STEP = 1e-4
-# One-sided rows nearer than this count, in sizes of the scene; and the largest violation that says something.
+# One-sided rows this near to their bound count, in sizes of the scene; and the largest violation with which errors are
+# given.
 BINDING, FARTHEST_OFF = 1e-9, 1e-6
 
 

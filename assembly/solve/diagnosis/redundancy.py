@@ -21,7 +21,7 @@ from assembly.solve.interruption import Interruption
 
 __all__ = ["dependent_sets"]
 
-# Of orthonormal combinations, what counts as nothing: they are as exact as the pose.
+# Entries of orthonormal combinations that count as zero: combinations are only as exact as the pose.
 ABSENT = 1e-5
 
 
@@ -52,7 +52,7 @@ def dependent_sets(balanced: Balanced, owners: NDArray[np.int64], interruption: 
         grown = rank([*earlier, owner]) - rank(earlier)
         if grown < alone:
             needed = list(earlier)
-            # The last are tried first: the first that explain it stay.
+            # The last ones are tried first, so that the earliest rows that explain it remain.
             for other in reversed(earlier):
                 without = [k for k in needed if k != other]
                 if rank([*without, owner]) - rank(without) == grown:

@@ -45,18 +45,19 @@ from assembly.solve.scene import Status
 __all__ = ["Asked", "has_strayed", "status_of"]
 
 Array = NDArray[np.float64]
-# A solve that ends otherwise has an answer, or nothing to go on from.
+# Statuses from which a search for an unbounded motion begins: with others there is an answer, or no pose to begin at.
 OPEN = (Status.ITERATION_LIMIT, Status.STALLED, Status.INFEASIBLE)
-# Least way of a motion, in sizes of the scene.
+# Least length of a motion, in sizes of the scene.
 LEAST_WAY = 1.0
 # A motion goes on by ten to the powers up to this; where bodies turn, only as far as doubles count whole turns. On a
 # helix what it does as long as going around matters more than going away is not looked at.
 POWERS, TURNING_POWERS, FIRST_POWER = 40, 12, 4
 # Violations that count as held, and moves of bodies of a contact against each other, in parts of the way.
 HELD = 1e-6
-# The least part of the last fall, over a power of ten, that the next one must be.
+# Over each power of ten the objective has to fall by at least this part of its fall over the power before.
 STEADY = 0.5
-# A body that turned by less did not; what advances by less than this part of the least way goes around alone.
+# Radians below which a body counts as not turned; a helix with a smaller advance, in parts of the least length, is a
+# circle.
 LEAST_TURN, LEAST_ADVANCE = 1e-6, 1e-3
 
 
@@ -98,7 +99,7 @@ class Place:
         state = packed.new_state()
         state[: packed.contacts_at] = self.q.ravel()
         state[packed.contacts_at : packed.angles_at] = np.nan
-        # An angle that only a dexterity's input has, which no row was put back by, is on any turn.
+        # Angles that only inputs of a dexterity have belong to no row: any turn will do.
         state[packed.angles] = [self.angles.get(id(angle), 0.0) for angle in packed._angles]
         return state
 
@@ -263,7 +264,7 @@ def _goes_on(asked: Asked, motion: Motion, size: float) -> bool:
     """Whether a motion goes far enough, and the objective falls on it without end."""
     least = LEAST_WAY
     if isinstance(motion, Helix):
-        # It may have gone around for the most part.
+        # Most of its motion may have been around the axis.
         least *= LEAST_ADVANCE if motion.angles.any() else np.inf
     return motion.way > least * size and _falls(asked, motion)
 
@@ -326,7 +327,7 @@ def _falls(asked: Asked, motion: Motion) -> bool:
     for power in motion.powers:
         value = value_at(10.0**power)
         if value == np.inf and _is_past_doubles(asked, motion.at(10.0**power)):
-            # It fell faster and faster before.
+            # It counts if it fell faster and faster before it overflowed.
             first, middle, end = (value_at(part) for part in (-1.0, -0.5, 0.0))
             return fall > 0.0 or 0.0 < first - middle < middle - end
         if not value < last:

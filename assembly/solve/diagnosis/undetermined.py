@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["complaint"]
 
 Array = NDArray[np.float64]
-# Rates of motions of length one that count as none, and a part of a combination of inputs that does.
+# Rates of motions of length one, and parts of a combination of inputs, that count as zero.
 NO_MOTION, NO_PART = 1e-6, 1e-4
 
 

@@ -29,7 +29,7 @@ from assembly.solve.oracle.rows import Poses, RowFrames
 
 __all__ = ["Mechanism"]
 
-# What motions that nothing determines weigh.
+# Weight of motions that nothing determines.
 REST = 1e-13
 
 

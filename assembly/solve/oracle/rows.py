@@ -50,7 +50,8 @@ from assembly.solve.measure import JointRow, Near, measure, standing
 __all__ = ["Poses", "RowFrames", "Rows"]
 
 Array = NDArray[np.float64]
-# A start this near to where a row has no gradient is moved by so much: radians, and lengths over the scene's size.
+# Starts nearer than the first to where a row has no gradient are moved by the second: radians, or lengths over the
+# size.
 _FLAT, _NUDGE = 1e-3, 0.1
 _STEEP = cos(_FLAT)
 
@@ -248,7 +249,7 @@ class Rows:
         values = [row.residual(q, near) for row in self._joints]
         for item, places in self._expressions:
             (given,) = item.function.call([ca.DM(q[k]) for k in places])
-            # What has no value is violated without bound.
+            # An expression without a value counts as an infinite violation.
             numbers = np.nan_to_num(np.array(ca.densify(given)).ravel(), nan=-inf, posinf=inf, neginf=-inf)
             values += (numbers / item.scale).tolist()
         return np.array(values)

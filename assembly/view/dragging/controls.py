@@ -21,7 +21,7 @@ __all__ = ["Controls"]
 
 # Points of the graph, and seconds between them.
 POINTS, GRAPH_EVERY = 120, 0.2
-# Seconds for which a slider that somebody moved is left to them.
+# Seconds for which a slider that somebody has moved is not moved by the program.
 LEFT_ALONE = 1.0
 
 
@@ -89,7 +89,7 @@ class Controls:
         self._session.ask(call)
 
     def _slid(self, name: str, event: Any) -> None:
-        # Set by the program a slider tells nobody.
+        # A slider that the program sets calls no callback.
         if event.client is not None:
             self._slid_at[name] = perf_counter()
             self._session.ask(partial(self._session.slide, name, float(event.target.value), event.client.client_id))

@@ -96,7 +96,7 @@ def coordinate_of(scene: Assembly, name: str, freedom: Freedom) -> Coordinate | 
         if isinstance(each, Joint) and any(f"{each.name}.{free}" == name for free in each.freedoms)
     )
     kind = freedom.coordinate.kind
-    # Of axes that point against each other the angle counts the other way.
+    # With opposed axes the angle has the other sign.
     if freedom.value is not None or kind not in (SLIDE, TURN) or (kind == TURN and joint.axes != "aligned"):
         return None
     if all(body.fixed for body in joint.bodies):

@@ -53,7 +53,7 @@ def _server(host: str, port: int) -> ViserServer:
         raise ImportError(
             'the page needs viser, which is not installed; pip install "assembly-solver[live]"'
         ) from error
-    # It looks for a free port from the first one on, and would do so forever where a host is none of this machine.
+    # Viser tries port after port, and would do so without end for a host that is not an address of this machine.
     try:
         family, _, _, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, socket.SOCK_STREAM) as free:
@@ -63,11 +63,11 @@ def _server(host: str, port: int) -> ViserServer:
             f"host is {host!r}; expected an address of this machine, '127.0.0.1' for itself alone or '0.0.0.0' for "
             f"networks as well: {error}"
         ) from None
-    # It announces itself.
+    # Viser prints an announcement.
     with redirect_stdout(StringIO()):
         server = ViserServer(host=host, port=port, label="assembly", verbose=False)
     if port not in (0, server.get_port()):
-        # It takes the next free one; who sent somebody the address has to know.
+        # Viser takes the next free port; whoever gave others the address has to know.
         message = f"port {port} is in use; the page is at port {server.get_port()}"
         warnings.warn(message, stacklevel=3)
     return server

@@ -34,11 +34,11 @@ __all__ = ["Session", "Shown"]
 
 Array = NDArray[np.float64]
 log = logging.getLogger("assembly.view")
-# Poses that can be gone back to.
+# Number of poses that are kept for undo.
 MOST_UNDONE = 100
-# Seconds between looks at contacts, which take longer than a tick.
+# Seconds between two searches for the contacts to show, which take longer than a tick.
 CONTACTS_EVERY = 0.05
-# Seconds for which somebody reads what was refused, and after which a slider that says nothing more lets go.
+# Seconds for which a refusal is shown, and after which a slider that sends nothing more lets go.
 NOTICED, SLIDER_LEFT = 3.0, 0.6
 
 
@@ -94,7 +94,7 @@ class Session(threading.Thread):
         self._movable = [body for body in scene.bodies if not body.fixed]
         self._grips: list[Grip] = []
         self._drags = 0
-        # Until when what somebody was refused is said.
+        # Until when the last refusal is shown.
         self._noticed = 0.0
         self._undone: list[Array] = []
         self._records: list[_Record] | None = None
@@ -116,7 +116,7 @@ class Session(threading.Thread):
     def run(self) -> None:
         """Take calls and ticks until `stop`; sleep while nothing is held or played and nothing is asked for."""
         if self._movable:
-            # Whoever takes hold first need not wait for it.
+            # Made before anybody drags, so that the first drag need not wait for it.
             self._attempt(self._ready)
         due = perf_counter()
         while True:
@@ -202,7 +202,7 @@ class Session(threading.Thread):
             self._say(f"{body.name} is held in another window, that of browser {other.client}")
             return None
         self.release(client)
-        # It may raise: nothing is taken then.
+        # Where this raises, nothing was taken hold of.
         tracker = self._ready()
         hand = self._movable.index(body)
         tracker.hold(hand, follow, self._stiffness)

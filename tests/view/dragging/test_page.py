@@ -12,6 +12,7 @@ import pytest
 
 import assembly as asm
 from assembly.view.mesh import body_mesh
+from tests.view.chromium import Chromium, decoded
 
 pytest.importorskip("viser", reason="the page is viser's: extra `live`")
 # Seconds for a page to come up where a processor draws it that others use as well.
@@ -41,6 +42,38 @@ def on_screen(page, client, points):
     return focal * seen[:, :2] / seen[:, 2:] + 0.5 * np.array([camera.image_width, camera.image_height])
 
 
+def drag(page, client, browser, tab, body, inside):
+    """Have a scripted mouse take the lowest place of a body on the screen, so many pixels inside, and pull it aside.
+
+    The button stays down; returns where the mouse is. A page that is drawn slowly answers slowly: a mouse that lets go
+    before is answered by nothing, ever.
+    """
+    row = page.q[page._session.scene.bodies.index(body)]
+    corners = asm.Pose(row[:3], row[3:]).apply(body_mesh(body).vertices)
+    waits = (3.0 * 2.0 ** min(k, 4) for k in itertools.count())
+    ends = []
+
+    def grabbed():
+        pixels = on_screen(page, client, corners)
+        x, y = pixels[pixels[:, 1].argmax()] - (0.0, inside)
+        browser.mouse(tab, "mouseMoved", x, y, pressed=False)
+        browser.mouse(tab, "mousePressed", x, y)
+        for k in range(1, 16):
+            browser.mouse(tab, "mouseMoved", x + 4.0 * k, y - 2.0 * k)
+            time.sleep(0.03)
+        ends.append((x + 60.0, y - 30.0))
+        end = time.monotonic() + next(waits)
+        while page.shown.held != body.name and time.monotonic() < end:
+            time.sleep(0.05)
+        if page.shown.held != body.name:
+            # The page was not drawn yet.
+            browser.mouse(tab, "mouseReleased", *ends[-1])
+        return page.shown.held == body.name
+
+    wait_for(grabbed, 3.0 * PATIENCE)
+    return ends[-1]
+
+
 def test_a_mouse_drags_a_clip(browser, clips):
     start = clips.solve().q
     with (
@@ -49,29 +82,8 @@ def test_a_mouse_drags_a_clip(browser, clips):
     ):
         wait_for(lambda: page._server.get_clients())
         (client,) = page._server.get_clients().values()
-        row = page.q[1]
-        corners = asm.Pose(row[:3], row[3:]).apply(body_mesh(clips["green"]).vertices)
-        # A page that is drawn slowly answers slowly: a mouse that lets go before is answered by nothing, ever.
-        waits = (3.0 * 2.0 ** min(k, 4) for k in itertools.count())
-
-        def grabbed():
-            # The lower end of the clip, a little inside of its outline.
-            pixels = on_screen(page, client, corners)
-            x, y = pixels[pixels[:, 1].argmax()] - (0.0, 4.0)
-            browser.mouse(tab, "mouseMoved", x, y, pressed=False)
-            browser.mouse(tab, "mousePressed", x, y)
-            for k in range(1, 16):
-                browser.mouse(tab, "mouseMoved", x + 4.0 * k, y - 2.0 * k)
-                time.sleep(0.03)
-            end = time.monotonic() + next(waits)
-            while page.shown.held != "green" and time.monotonic() < end:
-                time.sleep(0.05)
-            if page.shown.held != "green":
-                # The page was not drawn yet.
-                browser.mouse(tab, "mouseReleased", x + 60.0, y - 30.0)
-            return page.shown.held == "green"
-
-        wait_for(grabbed, 3.0 * PATIENCE)
+        # The lower end of the clip, a little inside of its outline.
+        drag(page, client, browser, tab, clips["green"], 4.0)
         wait_for(lambda: np.abs(page.q[1] - start[1]).max() > 0.5)
         shown = page.shown
         assert shown.violation < 1e-9 and np.isfinite(shown.q).all()
@@ -82,6 +94,49 @@ def test_a_mouse_drags_a_clip(browser, clips):
     assert np.array_equal(moved[0], start[0]) and not np.array_equal(moved[1], start[1])
     checked = clips.solve(moved, max_iterations=0)
     assert checked.feasibility < 1e-9 and checked.crossings == ()
+
+
+def middle_of_red(chromium, tab, picture):
+    """Where the red pixels of a page are in the mean, (2,); NaN without any."""
+    chromium.shot(tab, picture)
+    red, green, blue = (decoded(picture)[:, :, k].astype(float) for k in range(3))
+    rows, columns = np.nonzero((red > 60.0) & (red > 2.0 * np.maximum(green, blue)))
+    return np.array([columns.mean(), rows.mean()]) if len(rows) > 100 else np.full(2, np.nan)
+
+
+def test_two_browsers_see_the_same_scene(browser, tmp_path):
+    """Two processes of Chromium: in one a mouse drags, and the picture of the other follows."""
+    floor = asm.Body("floor", asm.shapes.plane(6.0, 6.0), fixed=True)
+    ball = asm.Body("ball", asm.shapes.sphere(0.7), position=(-1.0, 0.0, 0.7))
+    ball.color = (0.9, 0.05, 0.05)
+    scene = asm.Assembly([floor, ball])
+    scene.constrain(asm.Contact(floor, ball))
+    other, picture = Chromium(tmp_path / "profile"), tmp_path / "picture.png"
+    try:
+        with asm.view.live(scene, port=0) as page:
+            address = page.url.replace("localhost", "127.0.0.1")
+            with browser.visited(address) as tab:
+                wait_for(lambda: page._server.get_clients())
+                (client,) = page._server.get_clients().values()
+                with other.visited(address) as second:
+                    wait_for(lambda: len(page._server.get_clients()) == 2)
+                    wait_for(lambda: np.isfinite(middle_of_red(other, second, picture)).all())
+                    before = middle_of_red(other, second, picture)
+                    end = drag(page, client, browser, tab, ball, 12.0)
+                    wait_for(lambda: page.q[1, 0] > -0.5 or abs(page.q[1, 1]) > 0.5)
+                    assert page.shown.holder == client.client_id and page.shown.violation < 1e-10
+                    browser.mouse(tab, "mouseReleased", *end)
+                    wait_for(lambda: page.shown.holder is None)
+                    wait_for(lambda: np.abs(middle_of_red(other, second, picture) - before).max() > 10.0)
+
+                    def are_one():
+                        # Pixels: both look from where the page begins.
+                        found = [middle_of_red(*each, picture) for each in ((browser, tab), (other, second))]
+                        return np.abs(found[0] - found[1]).max() < 1.0
+
+                    wait_for(are_one)
+    finally:
+        other.close()
 
 
 def test_a_browser_that_leaves_lets_go_and_others_go_on(browser):

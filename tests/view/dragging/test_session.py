@@ -7,9 +7,18 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.view.dragging import session as module
 from assembly.view.dragging.joint_values import freedoms_of, reach_of, set_value
 from assembly.view.dragging.pointer import LONGEST_INTERVAL, Pointer, between
 from assembly.view.dragging.session import Session
+
+
+@pytest.fixture(autouse=True)
+def no_haste(monkeypatch):
+    """Nothing is let go or forgotten because the machine is busy, and contacts are looked at in every tick."""
+    monkeypatch.setattr(module, "SLIDER_LEFT", 60.0)
+    monkeypatch.setattr(module, "NOTICED", 60.0)
+    monkeypatch.setattr(module, "CONTACTS_EVERY", 0.0)
 
 
 @pytest.fixture
@@ -259,7 +268,7 @@ def test_a_slider_is_a_hand(crank):
     for _ in range(40):
         session._tick()
     assert session.shown.values["hinge.angle"] == pytest.approx(2.0, abs=1e-9)
-    grip.pointer._since -= 10.0
+    grip.pointer._since -= 2.0 * module.SLIDER_LEFT
     session._tick()
     assert not session._grips and session.shown.status == "nothing is held"
     with pytest.raises(asm.errors.InputError, match="value is nan"):
