@@ -16,7 +16,8 @@ from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.features.solid_contact import TRACK, TRACKED_PAIR
 from assembly.proximity.manager.records import MEMORY_HEADER, PAIR_MEMORY, PLACE_MEMORY, PLACE_NUMBER, PLACE_PAIR
-from assembly.solve.clearance_proof import near_contacts, new_proof, opening_move
+from assembly.solve.clearance_proof import new_proof
+from assembly.solve.near_contacts import near_contacts, opening_move
 from assembly.solve.solution import Solution
 
 __all__ = ["ClearTicks", "WayLimits"]
