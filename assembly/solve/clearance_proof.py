@@ -6,7 +6,7 @@ than `touching`: the least move that opens the contacts that the solve has liste
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import side_faces
-from assembly.constraints.packing.corners import body_of
 from assembly.constraints.packing.scene import Packed
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
@@ -26,13 +25,12 @@ from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_p
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.deforming import smaller_answer
 from assembly.proximity.clearance.holder_first import holds_first
-from assembly.proximity.clearance.hulls.scene import answers_by_hulls
+from assembly.proximity.clearance.hulls.scene import answers_by_hulls, told_by_hulls
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof, stayed_answers
-from assembly.proximity.clearance.touching import filled_bore, left_open, move_apart, off_contacts
-from assembly.proximity.extrema.pairs import ContactPair
-from assembly.solve.contact_pairs import ContactRows, contact_pairs, listed_contacts, rows_of_contacts
+from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.loop.settings import ANY_POSE, FEASIBILITY
+from assembly.solve.near_contacts import NEAR, near_contacts, opening_move
 from assembly.solve.samples import PosedBodies, sampled
 from assembly.solve.scene import Status
 
@@ -47,11 +45,9 @@ __all__ = [
     "judge_end",
     "lent_proof",
     "named_answers",
-    "near_contacts",
     "new_proof",
     "nothing_known",
     "open_recognized",
-    "opening_move",
     "owned_pairs",
     "prove_end",
     "proven_by_hulls",
@@ -59,8 +55,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-# Contacts that are open by less than so many times how far a body may be moved are in its way.
-NEAR = 2.0
 # Moves that are tried for contacts without a row.
 TRIES = 3
 # Pairs of nodes that a look may take where bodies conform, or on the way from the last poses.
@@ -147,6 +141,16 @@ def proven_by_hulls(
     return answers_by_hulls(*proven_pairs(packed, bodies), q, touching)
 
 
+def _told_by_hulls(
+    packed: Packed, bodies: Sequence[Body], proof: ClearanceProof, q: Array, touching: float
+) -> dict[int, Answer]:
+    """The same of the pairs of which hulls tell it, by their numbers."""
+    if proof.has_wires:
+        return {}
+    told = enumerate(told_by_hulls(*proven_pairs(packed, bodies), q, touching))
+    return {k: answer for k, answer in told if answer is not None}
+
+
 def can_prove(packed: Packed) -> bool:
     """Whether a scene has a size at which a proof is possible; else rows alone keep bodies apart."""
     return LEAST_SIZE < packed.scale < 1.0 / LEAST_SIZE
@@ -189,11 +193,11 @@ def prove_end(solution: Solution) -> Sequence[PairAnswer]:
         stayed = _stayed_clear(packed, proof, solution.q, touching)
         if stayed is not None:
             return stayed
-        hulled = proven_by_hulls(packed, scene.bodies, proof, solution.q, touching)
-        if hulled is not None:
-            return named_answers(packed, hulled)
-        wedged = open_recognized(proof, solution.q, touching)
-        answers = _first_looks(proof, solution.q, touching, wedged)
+        told = _told_by_hulls(packed, scene.bodies, proof, solution.q, touching)
+        if len(told) == len(proof.pairs):
+            return named_answers(packed, list(told.values()))
+        wedged = open_recognized(proof, solution.q, touching, told)
+        answers = _first_looks(proof, solution.q, touching, wedged, told)
         _make_smaller(proof, solution.q, touching, answers, wedged)
         held = {k for k in wedged if conforms(proof, k, solution.q, touching)}
         left = [k for k, answer in enumerate(answers) if not is_proven(answer) or answer.depth > touching]
@@ -284,13 +288,15 @@ def _make_smaller(proof: ClearanceProof, q: Array, touching: float, answers: lis
             answers[k] = smaller
 
 
-def open_recognized(proof: ClearanceProof, q: Array, touching: float) -> set[int]:
+def open_recognized(proof: ClearanceProof, q: Array, touching: float, but: Container[int] = ()) -> set[int]:
     """Find what opens pairs that are recognized to touch, among the moves of a proof; the pairs that nothing opens.
 
-    What opened a pair at the last solve may do so here.
+    What opened a pair at the last solve may do so here. Some pairs may be left out.
     """
     wedged = set()
     for k in proof.near_pairs(q, touching):
+        if k in but:
+            continue
         # Wires that touch are slimmer instead.
         if proof.moves[k].any() or proof.is_of_wires(k):
             continue
@@ -307,13 +313,16 @@ def nothing_known() -> None:
     return None
 
 
-def _first_looks(proof: ClearanceProof, q: Array, touching: float, wedged: set[int]) -> list[Answer]:
+def _first_looks(
+    proof: ClearanceProof, q: Array, touching: float, wedged: set[int], told: dict[int, Answer]
+) -> list[Answer]:
     """What is proven of all pairs where their moves open them; of those that nothing opens, whether they cross.
 
-    No look can prove that bodies conform: it would spend its whole budget.
+    No look can prove that bodies conform: it would spend its whole budget. So would one at bodies that touch where
+    their moves do not open them, so that these looks take few pairs of nodes. What hulls have told of is not looked at.
     """
-    asked = [k for k in range(len(proof.pairs)) if k not in wedged]
-    answers = dict(zip(asked, proof.look(q, touching, proof.moves, which=asked), strict=True))
+    asked = [k for k in range(len(proof.pairs)) if k not in wedged and k not in told]
+    answers = told | dict(zip(asked, proof.look(q, touching, proof.moves, which=asked, budget=FEW), strict=True))
     answers |= dict(zip(wedged, proof.look(q, touching, which=list(wedged), budget=FEW), strict=True))
     return [answers[k] for k in range(len(proof.pairs))]
 
@@ -339,71 +348,3 @@ def _opened(proof: ClearanceProof, k: int, q: Array, near: Contacts | None, touc
         moves[k] = 0.0
         return answer
     return found[0]
-
-
-def _contacts(solution: Solution, rows: Sequence[tuple[int, int]]) -> Iterator[tuple[int, ContactPair, float]]:
-    """Contacts of a solution between bodies that clearances keep apart: the pair, the contact, -1 if it is turned."""
-    scene, sides = solution._scene, solution._packed.kept_pairs
-    for number, _, contact in listed_contacts(solution):
-        # Behind them are corners of contacts, of which nothing is proven.
-        if number < len(rows):
-            yield number, contact, 1.0 if scene.index(body_of(sides[number][0])) == rows[number][0] else -1.0
-    if not scene.contacts:
-        return
-    places = {pair: number for number, pair in enumerate(rows)}
-    found = contact_pairs(solution)
-    for item in scene.contacts:
-        f, g = (scene.index(body) for body in item.bodies)
-        if (f, g) in places:
-            yield places[f, g], found[item.name], 1.0
-        elif (g, f) in places:
-            yield places[g, f], found[item.name], -1.0
-
-
-def _near_rows(rows: ContactRows, proof: ClearanceProof, reach: float) -> dict[int, Contacts]:
-    """What `near_contacts` says of contacts that are rows."""
-    places = {pair: number for number, pair in enumerate(proof.pairs)}
-    near: dict[int, list[int]] = {}
-    turned = []
-    gaps, minimum = rows.gaps.tolist(), proof.minimum.tolist()
-    for k, (pair, (f, g)) in enumerate(zip(rows.pairs.tolist(), rows.bodies.tolist(), strict=True)):
-        # Behind the pairs of clearances are corners of contacts, of which nothing is proven.
-        number = places.get((f, g), places.get((g, f), -1)) if pair < 0 else pair
-        if 0 <= number < len(minimum) and gaps[k] - minimum[number] < reach:
-            near.setdefault(number, []).append(k)
-            # A proof may have the pair the other way round (`proven_pairs`).
-            if (f, g) != proof.pairs[number]:
-                turned.append(k)
-    normals, points = rows.normals.copy(), rows.points[:, 1].copy()
-    normals[turned], points[turned] = -normals[turned], rows.points[turned, 0]
-    return {
-        number: Contacts(normals[some], points[some], rows.gaps[some] - minimum[number])
-        for number, some in near.items()
-    }
-
-
-def near_contacts(solution: Solution, proof: ClearanceProof, reach: float) -> dict[int, Contacts]:
-    """The contacts of a solution that are open by less than a reach, by the number of their pair of bodies."""
-    rows = rows_of_contacts(solution)
-    if rows is not None:
-        return _near_rows(rows, proof, reach)
-    near: dict[int, list[tuple[Array, Array, float]]] = {}
-    for number, contact, sign in _contacts(solution, proof.pairs):
-        gap = contact.gap - float(proof.minimum[number])
-        if gap < reach:
-            near.setdefault(number, []).append((sign * contact.normal, contact.points[1 if sign > 0.0 else 0], gap))
-    return {number: Contacts(*(np.array(c) for c in zip(*found, strict=True))) for number, found in near.items()}
-
-
-def opening_move(proof: ClearanceProof, k: int, q: Array, contacts: Contacts | None, depth: float) -> Array:
-    """The least move (6) of the second body of pair k, by no more than a depth, that opens contacts; zero if none does.
-
-    Of those that are near it opens what is closed, and closes none.
-    """
-    if contacts is None or depth <= 0.0:
-        return np.zeros(6)
-    near = contacts.gaps < NEAR * depth
-    if not near.any():
-        return np.zeros(6)
-    move = move_apart(proof, k, q, Contacts(*(column[near] for column in contacts)), depth)
-    return np.zeros(6) if move is None else move

@@ -62,14 +62,17 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
         How much bodies may overlap and still count as touching, in parts of the scene's size.
     """
     q, asked = state[: packed.contacts_at].reshape(-1, 7), _asked(packed, state)
-    if packed.stood is not None and packed.stood[:2] == (asked, touching):
-        return packed.stood[2]
+    # Read once: other threads may solve the scene.
+    stood = packed.stood
+    if stood is not None and stood[:2] == (asked, touching):
+        return stood[2]
     # Hulls of faces prove most of it before there are cells, and of faces that lie on each other in less time.
     known = packed.proofs[-1] if packed.proofs else None
     hulled = proven_by_hulls(packed, bodies, known, q, touching * packed.scale)
     if hulled is not None:
-        packed.stood = asked, touching, named_answers(packed, hulled)
-        return packed.stood[2]
+        found = named_answers(packed, hulled)
+        packed.stood = asked, touching, found
+        return found
     with lent_proof(packed, bodies) as proof:
         proof.make_slimmer(touching * packed.scale)
         answers, conforming = _answers(proof, q, touching * packed.scale)
@@ -122,12 +125,13 @@ def prove_way(
     q, length = state[: packed.contacts_at].reshape(-1, 7), touching * packed.scale
     with lent_proof(packed, bodies) as proof:
         proof.make_slimmer(length)
+        if not may_jump:
+            # What is found is not to depend on what was solved before.
+            proof.begin_anew()
         if not (proof.is_at(last) or proof.stays_clear(last, length, proof.moves, QUICK, at_once=True)):
             if may_jump:
                 # Hulls may have told of the last poses: what opens faces that touch there is not known yet.
                 _answers(proof, last, length)
-            elif proof.moves.any():
-                proof.look(last, length, proof.moves)
             else:
                 proof.look_from(last, length)
         if proof.stays_clear(q, length, proof.moves, QUICK):

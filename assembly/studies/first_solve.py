@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import can_prove
 from assembly.solve.interruption import Interruption
-from assembly.solve.loop.settings import ALLOWED_OVERLAP, GATHER, NEVER
+from assembly.solve.loop.settings import ALLOWED_OVERLAP, COUNT, GATHER, NEVER
 from assembly.solve.second_order.leave import Outcome
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import prove_start, prove_way
@@ -74,7 +74,9 @@ class _FirstSolve:
         scene, rest = self.scene, (self.settings, self.starts, self.interruption)
         alone = rows_from_start(scene, self.q, *rest)
         prove = partial(prove_way, scene.packed(), scene.bodies, self.q)
-        found = self._clear_end(alone, partial(prove, may_jump=False))
+        # Whether a start that nothing has moved holds was asked before.
+        is_new = bool(scene.objectives) or alone.state[scene.packed().results_at + COUNT] > 0.0
+        found = self._clear_end(alone, partial(prove, may_jump=False)) if is_new else None
         if found is not None:
             found.seconds = perf_counter() - begin
             return found

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from assembly.constraints.model.clearance import Clearance
 from assembly.proximity.clearance.answers import Answer
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.solve.clearance_proof import near_contacts
 from assembly.solve.interruption import Interruption
+from assembly.solve.near_contacts import near_contacts
 from assembly.solve.solution import Solution
 from assembly.tracking.clear_ticks import ClearTicks
 

@@ -22,9 +22,10 @@ from assembly.constraints.packing.earlier import is_same_scene
 from assembly.errors import InputError
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
-from assembly.solve.clearance_proof import can_prove, lent_proof, near_contacts
+from assembly.solve.clearance_proof import can_prove, lent_proof
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import OUT_OF_TIME
+from assembly.solve.near_contacts import near_contacts
 from assembly.solve.options import Options
 from assembly.solve.scene import Status
 from assembly.solve.solution import Solution

@@ -8,8 +8,9 @@ import pytest
 import assembly as asm
 from assembly.kinematics.pose import rotation_of
 from assembly.proximity.clearance.answers import Verdict
-from assembly.solve import clearance_proof
-from assembly.solve.clearance_proof import lent_proof, near_contacts, new_proof, opening_move, prove_end
+from assembly.solve import near_contacts as contacts_nearby
+from assembly.solve.clearance_proof import lent_proof, new_proof, prove_end
+from assembly.solve.near_contacts import near_contacts, opening_move
 from tests.proximity.clearance.scenes import start_of
 from tests.validation.clearance_scenes import scene_of
 from tests.validation.crossing_judge import Motion, crossing_depth
@@ -66,7 +67,7 @@ def test_contacts_are_the_same_as_rows_and_one_by_one(given, monkeypatch):
     solution = found.solve(max_iterations=60)
     with lent_proof(found.packed(), found.bodies) as proof:
         rows = near_contacts(solution, proof, 10.0)
-        monkeypatch.setattr(clearance_proof, "rows_of_contacts", lambda _: None)
+        monkeypatch.setattr(contacts_nearby, "rows_of_contacts", lambda _: None)
         alone = near_contacts(solution, proof, 10.0)
     assert set(rows) == set(alone) and len(rows) >= 2
     for number, contacts in alone.items():

@@ -249,6 +249,12 @@ class ClearanceProof(BodyPairs):
         """From now on no way leads from the last poses."""
         self.fronts.pair.known = 0.0
 
+    def begin_anew(self) -> None:
+        """Have the next looks find all anew, and forget what opened contacts."""
+        self._begun[:] = False
+        self.moves[:] = 0.0
+        self.forget_poses()
+
     def _forget(self) -> None:
         """Forget cells where contacts that went along bodies have left too many."""
         if self.forest.is_large:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body
 from assembly.proximity.clearance.hulls.pair import ROUNDING, answer_by_hulls
 
-__all__ = ["answers_by_hulls"]
+__all__ = ["answers_by_hulls", "told_by_hulls"]
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,23 @@ def answers_by_hulls(
     q: Array,
     touching: float,
 ) -> list[Answer] | None:
-    """That all pairs are clear or touch, or None at the first of which hulls do not tell it.
+    """That all pairs are clear or touch, or None at the first of which hulls do not tell it; see `told_by_hulls`."""
+    found = []
+    for answer in told_by_hulls(shapes, pairs, minimum, q, touching):
+        if answer is None:
+            return None
+        found.append(answer)
+    return found
+
+
+def told_by_hulls(
+    shapes: Sequence[tuple[Face, ...]],
+    pairs: Sequence[tuple[int, int]],
+    minimum: Sequence[float],
+    q: Array,
+    touching: float,
+) -> Iterator[Answer | None]:
+    """Of one pair after the other that it is clear or touches, or None where hulls do not tell it.
 
     Parameters
     ----------
@@ -41,7 +57,7 @@ def answers_by_hulls(
         How far a point of a body may be taken to have the gap so large.
     """
     if not pairs:
-        return []
+        return
     hulls = {body: hulls_of_body(shapes[body]) for body in sorted({body for pair in pairs for body in pair})}
     turns = {body: rotation_matrix(q[body, 3:]) for body in hulls}
     middle, radius = np.zeros((len(q), 3)), np.zeros(len(q))
@@ -51,15 +67,10 @@ def answers_by_hulls(
     a, b = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
     apart = np.linalg.norm(middle[b] - middle[a], axis=1) - radius[a] - radius[b]
     apart -= ROUNDING * (float(np.abs(middle).max(initial=0.0)) + radius.max(initial=0.0))
-    found = []
     for k, (one, other) in enumerate(pairs):
         if apart[k] > minimum[k]:
-            found.append(Answer(Verdict.CLEAR, float(apart[k])))
+            yield Answer(Verdict.CLEAR, float(apart[k]))
             continue
         turn = turns[one].T @ turns[other]
         shift = (q[other, :3] - q[one, :3]) @ turns[one]
-        answer = answer_by_hulls(hulls[one], hulls[other].posed(turn, shift), float(minimum[k]), touching)
-        if answer is None:
-            return None
-        found.append(answer)
-    return found
+        yield answer_by_hulls(hulls[one], hulls[other].posed(turn, shift), float(minimum[k]), touching)
