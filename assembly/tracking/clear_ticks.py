@@ -18,7 +18,6 @@ from assembly.proximity.clearance.touching import off_contacts
 from assembly.proximity.features.solid_contact import TRACK, TRACKED_PAIR
 from assembly.proximity.manager.records import MEMORY_HEADER, PAIR_MEMORY, PLACE_MEMORY, PLACE_NUMBER, PLACE_PAIR
 from assembly.solve.clearance_proof import new_proof, nothing_known
-from assembly.solve.clearance_proof import new_proof
 from assembly.solve.near_contacts import near_contacts, opening_move
 from assembly.solve.solution import Solution
 
