@@ -16,7 +16,7 @@ from tests.view.chromium import Chromium, decoded
 
 pytest.importorskip("viser", reason="the page is viser's: extra `live`")
 # Seconds for a page to come up where a processor draws it that others use as well.
-PATIENCE = 120.0
+PATIENCE = 300.0
 EXAMPLE = Path(__file__).parents[3] / "examples" / "take_hold.py"
 
 
