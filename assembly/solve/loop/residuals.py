@@ -80,7 +80,7 @@ def place_rows(table, free, bases, one_sided):
 def record_of_blocks(table):
     """The part of the table that has it; empty where the scene has none."""
     header = header_at(table, 0)
-    return table[header.block_record : header.block_record + header.block_length]
+    return carve(table, header.block_record, (header.block_length,))
 
 
 @kernel(inner=True)
@@ -187,7 +187,7 @@ def size_of_shape(table, most, n):
     return integers, 13 * max(n, 36)
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def shape_of(table, most, n, blocks, integers, doubles):
     """Room for what `arrange` finds, for so many rows and unknowns: a `Structure`.
 
