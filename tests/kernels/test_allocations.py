@@ -57,8 +57,12 @@ def test_wires_at_folds_hold_none(held):
     scene = asm.Assembly([a, b])
     scene.constrain(asm.Contact(a, b))
     scene.minimize(asm.PointDistance(b.point(1, 0, 0), b.pose.apply((1, 0, 0)) + [2.0, 2.0, 1.0]))
-    assert scene.solve().success
+    solution = scene.solve()
+    assert solution.success
     assert held(lambda: scene.solve()) == [0, 0]
+    # By the gradient of the objective, and by second derivatives.
+    assert held(lambda: scene.solve(solution).wrenches) == [0, 0]
+    assert held(lambda: scene.solve(solution).second_order) == [0, 0]
 
 
 def test_bounds_of_a_formula_hold_none(held):

@@ -187,7 +187,7 @@ def size_of_shape(table, most, n):
     return integers, 13 * max(n, 36)
 
 
-@kernel(inline=True)
+@kernel(inline=True, allocates=True)
 def shape_of(table, most, n, blocks, integers, doubles):
     """Room for what `arrange` finds, for so many rows and unknowns: a `Structure`.
 
