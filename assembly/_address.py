@@ -14,9 +14,9 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils, config
-from numba.extending import intrinsic, overload
 
 from assembly._kernel.decorator import ENTRIES
+from assembly._written import written_by
 
 __all__ = ["address_of", "call_address", "callback_address", "clock_address"]
 
@@ -73,7 +73,6 @@ def clock_address() -> int:
 
 if not config.DISABLE_JIT:
 
-    @intrinsic
     def _call(_typing: Any, address: Any, arguments: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             kinds = [context.get_value_type(kind) for kind in signature.args[1]]
@@ -82,9 +81,4 @@ if not config.DISABLE_JIT:
 
         return types.int64(address, arguments), generate
 
-    def _called(address: Any, arguments: Any) -> Any:
-        return _call(address, arguments)
-
-    @overload(call_address)
-    def _call_address(address: Any, arguments: Any) -> Any:  # the same signature as the one above, as Numba asks
-        return _called
+    written_by(call_address, _call)

@@ -13,8 +13,9 @@ from typing import Any
 
 from numba import types
 from numba.core import cgutils, config
-from numba.extending import intrinsic, overload
 from numba.np.arrayobj import make_array, populate_array
+
+from assembly._written import written_by
 
 __all__ = ["carve", "uncounted"]
 
@@ -34,7 +35,6 @@ def uncounted(array: Any) -> Any:
 
 if not config.DISABLE_JIT:
 
-    @intrinsic
     def _carved(_typing: Any, block: Any, at: Any, shape: Any) -> Any:
         carved = types.Array(block.dtype, len(shape), "C")
 
@@ -59,14 +59,6 @@ if not config.DISABLE_JIT:
 
         return carved(block, types.intp, types.UniTuple(types.intp, len(shape))), generate
 
-    def _carve_it(block: Any, at: Any, shape: Any) -> Any:
-        return _carved(block, at, shape)
-
-    @overload(carve)
-    def _carve(block: Any, at: Any, shape: Any) -> Any:  # the same signature as the one above, as Numba asks
-        return _carve_it
-
-    @intrinsic
     def _uncounted(_typing: Any, array: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             source = make_array(signature.args[0])(context, builder, values[0])
@@ -76,9 +68,5 @@ if not config.DISABLE_JIT:
 
         return array(array), generate
 
-    def _uncount_it(array: Any) -> Any:
-        return _uncounted(array)
-
-    @overload(uncounted)
-    def _uncounted_array(array: Any) -> Any:  # the same signature as the one above, as Numba asks
-        return _uncount_it
+    written_by(carve, _carved)
+    written_by(uncounted, _uncounted)

@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 from numba.core import config, types
 from numba.core.errors import TypingError
-from numba.extending import intrinsic, overload
 from numba.np import numpy_support
 from numba.np.arrayobj import make_array
+
+from assembly._written import written_by
 
 __all__ = ["Store", "place_of", "record_dtype", "record_view", "rows_of", "size_of"]
 
@@ -72,7 +73,6 @@ def record_view(dtype: np.dtype[Any]) -> Callable[[Any, Any], Any]:
     if not config.DISABLE_JIT:
         kind = numpy_support.from_dtype(dtype)
 
-        @intrinsic
         def cast(_typing: Any, block: Any, at: Any) -> Any:
             if not isinstance(block, types.Array) or numpy_support.as_dtype(block.dtype) != item:
                 raise TypingError(complaint)
@@ -86,11 +86,6 @@ def record_view(dtype: np.dtype[Any]) -> Callable[[Any, Any], Any]:
 
             return kind(block, at), generate
 
-        def cast_it(block: Any, at: Any) -> Any:
-            return cast(block, at)
-
-        @overload(view, inline="never")
-        def _view(block: Any, at: Any) -> Any:  # the same signature as the one above, as Numba asks
-            return cast_it
+        written_by(view, cast)
 
     return view

@@ -13,6 +13,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
 from assembly._kernel.progress import counted, progress
+from assembly._kernel.translation import quick_translation
 
 __all__ = ["EntryCompiler", "InnerCompiler"]
 
@@ -30,7 +31,21 @@ class _NoEnvironment:
         return getattr(self._codegen, name)
 
 
-class _InnerLibrary(JITCodeLibrary):
+class _Library(JITCodeLibrary):
+    """A library whose functions are simplified one by one, by the same passes.
+
+    Numba makes a list of passes for every function, also for those that are declared alone, six of seven.
+    """
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+        passes, builder = self._codegen._function_pass_manager()
+        for function in module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
+
+
+class _InnerLibrary(_Library):
     """The code of a kernel that only kernels call: left as it is until an entry links it.
 
     Numba links every library with all it calls, optimizes it and makes machine code of it, once more at every level of
@@ -84,7 +99,7 @@ def _reached(library: Any) -> list[Any]:
     return [_OwnCode(called) if isinstance(called, _InnerLibrary) else called for called in found]
 
 
-class _EntryLibrary(JITCodeLibrary):
+class _EntryLibrary(_Library):
     """The code of an entry: what it calls is linked as its own ("internal"), which nothing else can reach.
 
     Numba links it as what other libraries may call, too ("linkonce_odr"): then LLVM can neither drop an argument that
@@ -128,7 +143,7 @@ class EntryCompiler(Compiler):
 
     def compile_extra(self, func: Any) -> Any:
         """Compile a function and all that it calls."""
-        with _nothing_else(), progress(func):
+        with _nothing_else(), quick_translation(), progress(func):
             return super().compile_extra(func)
 
 

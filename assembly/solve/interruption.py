@@ -170,5 +170,9 @@ class _CtrlC(Interruption):
         settings[ASK_ADDRESS] = 0.0
         return settings
 
+    def is_over(self) -> bool:
+        """As any other's, but that only an exception of a signal's handler can end it."""
+        return self._error is not None and super().is_over()
+
 
 CTRL_C = _CtrlC()

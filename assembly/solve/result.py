@@ -32,6 +32,7 @@ __all__ = ["Ended", "Iteration", "Result"]
 Array = NDArray[np.float64]
 # A constraint that is off by less than this part of the worst is not one of those that disagree.
 IDLE = 1e-3
+_new_tuple = tuple.__new__
 
 
 class Ended(NamedTuple):
@@ -61,6 +62,8 @@ class Result(ReadOnlyArrays):
     _is_sampled = False
     # How much bodies may overlap and still count as touching, in parts of the scene's size.
     _touching = Options.touching
+    _order: SecondOrder | None = None
+    _fit: Fit | None = None
     # What the objective asked for; flat contacts alone need it again, for the center of their pressure.
     _targets: Array | None = None
 
@@ -76,12 +79,15 @@ class Result(ReadOnlyArrays):
         fit: Fit | None = None,
     ) -> None:
         self._scene = scene
-        self._ended = Ended(packed, state)
+        # As `Ended(packed, state)`, which goes through a function of Python's.
+        self._ended = _new_tuple(Ended, (packed, state))
         self._rows = history
         self.status = status
         self.seconds = seconds
-        self._order = order
-        self._fit = fit
+        if order is not None:
+            self._order = order
+        if fit is not None:
+            self._fit = fit
         # What it was solved with: a solve that goes on from it may ask for the way.
         self._asked = packed.asked
         if scene.contacts:

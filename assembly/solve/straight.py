@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from assembly.constraints.model.constraint import structure_changes
 from assembly.constraints.packing.earlier import with_numbers_of
 from assembly.constraints.packing.scene import Packed
-from assembly.solve.attempts.attempts import run
 from assembly.solve.interruption import CTRL_C
-from assembly.solve.loop.settings import SOLVED
+from assembly.solve.loop.augmented_lagrangian import solve_program
+from assembly.solve.loop.settings import COUNT, SOLVED
 from assembly.solve.scene import Scene, Status
 from assembly.solve.scene_settings import scene_settings
 from assembly.solve.solution import Solution
@@ -49,16 +49,25 @@ def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, h
         return None
     if not packed.is_loop_alone or begun._fit is not None or packed.stamp != structure_changes():
         return None
-    if not packed.workspaces:
+    spare = packed.workspaces
+    try:
+        workspace = spare.pop()
+    except IndexError:
         # The loop is not there yet, or another thread is in it.
         return None
-    begin = perf_counter()
-    state = begun._ended.state.copy() if packed is earlier else with_numbers_of(packed, earlier, begun._ended.state)
-    packed.refresh()
-    packed.start_angles(state, True)
-    settings = scene_settings({}, CTRL_C, has_objective, True)
-    code, state, history = run(packed, CTRL_C, packed.rows_table, settings, state)
-    seconds = perf_counter() - begin
+    try:
+        begin = perf_counter()
+        state = begun._ended.state.copy() if packed is earlier else with_numbers_of(packed, earlier, begun._ended.state)
+        packed.refresh()
+        packed.start_angles(state, True)
+        settings = scene_settings({}, CTRL_C, has_objective, True)
+        table, pool, end_effectors = packed.rows_table, packed.rows_pool, packed.end_effectors
+        code = solve_program(table, pool, settings, state, *workspace, end_effectors)
+        # The next solve writes to the same memory.
+        history = workspace[0][: int(state[packed.results_at + COUNT]) + 1].copy()
+        seconds = perf_counter() - begin
+    finally:
+        spare.append(workspace)
     # What a signal's handler raised is raised here.
     if CTRL_C.is_over() or code != SOLVED:
         return None

@@ -83,7 +83,7 @@ def forget_factor(table, state):
     kept_header_at(state, header_at(table, 0).kept).factor = NO_FACTOR
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def kept_in(table, state):
     """What is kept in a state, as arrays in it."""
     header = header_at(table, 0)

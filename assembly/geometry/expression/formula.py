@@ -222,7 +222,7 @@ def formula_ranges(table, pool, lo, hi, out, workspace):
     return told
 
 
-@kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])", allocates=True)
 def arc_bounds(table, pool, lo, hi, out, workspace):
     """`arc_bound` of every interval [lo[i], hi[i]]; many at a time where plain doubles do."""
     store = Store(table, pool)

@@ -162,7 +162,7 @@ def arranged(found, structure, end_effectors):
     return Program(found.program.store, structure, found.program.lifted, found.program.tapes, end_effectors)
 
 
-@kernel(signatures="(i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], f8[:, ::1])")
+@kernel(signatures="(i8[::1], f8[::1], f8[::1], i8[::1], f8[::1], f8[:, ::1])", allocates=True)
 def rows_at(table, pool, state, free, residual, jacobian):
     """Evaluate all rows at a state. Returns a contact that has no pair there, or -1.
 

@@ -48,7 +48,6 @@ from assembly.solve.loop.workspace import Iterates, carve_all, memory_of, result
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], i8[::1], i8)",
         "(i8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], i8[::1], none)",
     ),
-    allocates=True,
 )
 def solve_program(table, pool, settings, state, history, doubles, integers, end_effectors):
     """Solve in place. State: q (n, 7) | tracked (k, TRACK) | multipliers (m) | residuals (m) | results | memory | kept.
@@ -71,6 +70,7 @@ def solve_program(table, pool, settings, state, history, doubles, integers, end_
         told=workspace.told,
         way=workspace.way,
         loop=loop_at(workspace.loop, 0),
+        room=workspace.room,
         tick=tick,
         watched=watched,
         any_pose=any_pose,
@@ -79,7 +79,7 @@ def solve_program(table, pool, settings, state, history, doubles, integers, end_
     return run(task, workspace, state, history)
 
 
-@kernel(inner=True, allocates=True)
+@kernel(inner=True)
 def run(task, workspace, state, history):
     """The steps of a solve."""
     program, loop = task.program, task.loop
@@ -126,7 +126,7 @@ def run(task, workspace, state, history):
     return tell(task, state, Iterates(current, trial, held), rows_in(loop, rows), system)
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def begin(task, workspace, state, current, trial):
     """The first iterate, with its contacts, and the rows there."""
     program, loop, limits = task.program, task.loop, task.limits
@@ -145,7 +145,7 @@ def begin(task, workspace, state, current, trial):
     return rows
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def tell(task, state, iterates, rows, system):
     """Write the end into the state and the results. The status."""
     loop, result = task.loop, task.result

@@ -25,10 +25,10 @@ from assembly.solve.loop.report import read_tracked
 from assembly.solve.loop.residuals import arrange
 from assembly.solve.loop.settings import ASSEMBLES, CONTACT_LOST, GATHERED, RUNNING, results_at, settings_at
 from assembly.solve.loop.way_back import begin_way, way_at
-from assembly.solve.loop.workspace import new_system, resized, results_of
+from assembly.solve.loop.workspace import carve_unknowns, resized, results_of
 
 
-@kernel(inner=True, allocates=True)
+@kernel(inner=True)
 def read_state(store, state, current, trial, rows):
     """Poses, tracked values and multipliers of a state, scaled."""
     units = pool_header_at(store.pool, 0)
@@ -82,7 +82,7 @@ def overlap_allowed(settings):
     return 0.0 if goes_on_from_last(settings) else settings_at(settings, 0).touching
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def find_contacts(program, settings, state, current, rows, n):
     """Find the contacts of the start and evaluate its rows, unless the last solve or tick left them in the state.
 
@@ -147,7 +147,7 @@ def put_together(program, current, rows):
     return evaluate(program, current.tracked, math.inf, current)
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def set_out(program, settings, state, current, rows, n):
     """Find contacts, evaluate rows, assemble scattered bodies where the settings ask for it.
 
@@ -180,9 +180,9 @@ def set_out(program, settings, state, current, rows, n):
     return status, np.int64(lost if folded else -1), folded
 
 
-@kernel(inner=True, allocates=True)
-def rearrange(program, count, rows, current):
-    """Rows and unknowns for other contacts or `count` lifted pairs.
+@kernel(inner=True)
+def rearrange(program, count, rows, current, room):
+    """Rows and unknowns for other contacts or `count` lifted pairs, with a system in `room`.
 
     Returns the rows, the system of a step, and which contact is lost at this point, or -1.
     """
@@ -196,7 +196,7 @@ def rearrange(program, count, rows, current):
     rows = resized(rows, header.rows + 4 * count)
     n = 6 * header.moving + 4 * count
     arrange(store.table, program.lifted.free, shape, rows.count, n)
-    system = new_system(n, count, shape.sparsity)
+    system = carve_unknowns(n, count, shape.sparsity, room)
     return rows, system, evaluate(program, current.tracked, math.inf, current)
 
 

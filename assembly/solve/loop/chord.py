@@ -195,7 +195,7 @@ def chord_steps(task, history, state, kept, current, trial, rows, system):
     return failed
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def go_on_by_chords(task, history, state, iterates, rows, system):
     """Steps with the factor that the last solve left, if any. Whether the two iterates were exchanged."""
     loop, limits, store = task.loop, task.limits, task.program.store

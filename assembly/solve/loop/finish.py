@@ -69,7 +69,7 @@ def return_to(program, held, rows, current, tick):
         place_clearance_rows(store.table, lifted, current, rows, False)
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def finish(program, settings, state, iterates, rows, system, at_end):
     """Write the end into the state; returns status, objective, violation and dual residual of the pose returned."""
     limits = settings_at(settings, 0)

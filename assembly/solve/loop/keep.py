@@ -50,7 +50,7 @@ def test_convexity(task, rows, system, dual):
     note_factor(task.results, rows, shape.one_sided, shift, dual, False)
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def leave(program, limits, state, point, rows, system, is_kept, is_solved):
     """Leave the rows of a point whose poses are in the state, if they are to be kept, and a factor of a solution."""
     store = program.store

@@ -81,9 +81,10 @@ loop_at = record_view(LOOP_STATE)
 LOOP = size_of(LOOP_STATE)
 
 # What does not change: the program, arrays and records of settings and results, workspace for poses in the user's
-# coordinates, the state of the way back (`way_back.py`), the record of the loop; whether it is a tick, has a contact
-# manager, accepts any pose at which rows hold, and leads failed solves back onto their rows.
-Task = namedtuple("Task", "program settings limits results result told way loop tick watched any_pose leads_back")
+# coordinates, the state of the way back (`way_back.py`), the record of the loop, room for the system of a step (in
+# `Workspace`); whether it is a tick, has a contact manager, accepts any pose at which rows hold, and leads failed
+# solves back onto their rows.
+Task = namedtuple("Task", "program settings limits results result told way loop room tick watched any_pose leads_back")
 
 
 @kernel(inline=True)

@@ -54,11 +54,11 @@ def observe(task, current, rows):
         loop.lifted = lift_folds(task.program.store, lifted, current, rows.active, LIFT_BELOW, loop.lost, lift_trims)
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def rearrange_rows(task, current, rows):
     """The rows and the system for other contacts or lifted pairs, with a penalty that begins anew."""
     loop = task.loop
-    rows, system, lost = rearrange(task.program, loop.lifted, rows, current)
+    rows, system, lost = rearrange(task.program, loop.lifted, rows, current, task.room)
     loop.rows, loop.lost = rows.count, lost
     loop.changed = 0
     if loop.iteration == 0 and lost < 0:

@@ -63,7 +63,7 @@ def is_as_returned(store, q, state):
     return True
 
 
-@kernel(inner=True, allocates=True)
+@kernel(inner=True)
 def read_tracked(table, state, tracked):
     """Tracked values of a state, which stand behind its poses, into those of a point."""
     header = header_at(table, 0)
@@ -72,7 +72,7 @@ def read_tracked(table, state, tracked):
         copy_tracked(kept, k, tracked)
 
 
-@kernel(inner=True, allocates=True)
+@kernel(inner=True)
 def write_tracked(table, tracked, state):
     """Tracked values of a point into a state."""
     header = header_at(table, 0)

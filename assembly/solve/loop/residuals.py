@@ -80,7 +80,7 @@ def place_rows(table, free, bases, one_sided):
 def record_of_blocks(table):
     """The part of the table that has it; empty where the scene has none."""
     header = header_at(table, 0)
-    return table[header.block_record : header.block_record + header.block_length]
+    return carve(table, header.block_record, (header.block_length,))
 
 
 @kernel(inner=True)

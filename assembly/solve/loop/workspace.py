@@ -39,23 +39,23 @@ System = namedtuple("System", "gradient directions hessian factor")
 # coordinates of lifted pairs, the last unknowns: 1 where one is held at the end of its patch (`ends.py`), else 0.
 Directions = namedtuple("Directions", "descent step straight ends")
 # All that a solve works in. `told`: workspace for poses in the user's coordinates (`chord.py`); `way`: what is known of
-# a way back (`way_back.py`).
-Workspace = namedtuple("Workspace", "program iterates rows told way loop system")
+# a way back (`way_back.py`); `room`: where the system is, with as much as it takes if all pairs are lifted.
+Workspace = namedtuple("Workspace", "program iterates rows told way loop system room")
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def resized(rows, count):
     """The same rows with another count of them."""
     return Rows(count, rows.mu, rows.y, rows.better_y, rows.active, rows.forces, rows.foreseen, rows.gram)
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def rows_in(loop, rows):
     """The rows with the loop's number of them and its penalty."""
     return Rows(loop.rows, loop.mu, rows.y, rows.better_y, rows.active, rows.forces, rows.foreseen, rows.gram)
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def penalized(rows, mu):
     """The rows with another penalty."""
     return Rows(rows.count, mu, rows.y, rows.better_y, rows.active, rows.forces, rows.foreseen, rows.gram)
@@ -73,7 +73,7 @@ def results_of(table, state):
     """The end of a state, behind poses, tracked values, multipliers and residuals."""
     header = header_at(table, 0)
     end = 7 * header.bodies + TRACK * header.tracked + 2 * header.rows
-    return state[end:]
+    return carve(state, end, (state.size - end,))
 
 
 @kernel(inline=True, allocates=True)
@@ -81,7 +81,7 @@ def memory_of(table, state):
     """What the contact manager remembers, behind the results."""
     header = header_at(table, 0)
     end = 7 * header.bodies + TRACK * header.tracked + 2 * header.rows + RESULTS
-    return state[end:]
+    return carve(state, end, (state.size - end,))
 
 
 @kernel(inline=True)
@@ -97,10 +97,10 @@ def workspace_needed(table):
     # Of pairs; of tapes; multipliers of least squares; the way back.
     doubles += 4 * pairs + (3 * VECTORS + VARIABLES) * VARIABLES
     doubles += table[tapes] + table[tapes + 1] + table[tapes + 2] + (most + 1) * most + WAY + LOOP
-    # Of unknowns, while no pair is at a fold.
-    blocks = header.block_record
+    # Of unknowns, with those of all pairs.
+    blocks, n = header.block_record, n + 4 * pairs
     layout = blocks_at(table, blocks)
-    doubles += 4 * n + (36 * (layout.blocks + layout.factored) if blocks > 0 else 2 * n * n)
+    doubles += 4 * n + 4 * pairs + (36 * (layout.blocks + layout.factored) if blocks > 0 else 2 * n * n)
     return doubles, integers + pairs + header.clearance_rows
 
 
@@ -111,7 +111,7 @@ def record_count(table):
     return header.contacts + header.joints + header.vector_trims
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def carve_points(table, most, doubles, integers):
     """The iterates, the rows (`most` at most), room for a guess of tracked values; where the doubles of these end."""
     header = header_at(table, 0)
@@ -136,7 +136,7 @@ def carve_points(table, most, doubles, integers):
     return Iterates(current, trial, held), rows, tracked[2], at
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def carve_pairs(table, guess, memory, doubles, at, integers):
     """What pairs need: which are free, the lengths of their coordinates, room for their derivatives; a guess of all.
 
@@ -154,7 +154,7 @@ def carve_pairs(table, guess, memory, doubles, at, integers):
     return LiftedPairs(free, lengths, vectors, values, guess, memory), at + VARIABLES * VARIABLES
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def carve_tapes(table, doubles, at):
     """What the instructions of expressions work in, and where it ends."""
     o = header_at(table, 0).tape_workspace
@@ -173,18 +173,18 @@ def sides_of(n, order):
     return (n, n), (n, n)
 
 
-@kernel(inline=True, allocates=True)
-def carve_unknowns(n, order, doubles, at):
-    """The system of a step of n unknowns, while no pair is lifted."""
+@kernel(inline=True)
+def carve_unknowns(n, lifted, order, room):
+    """The system of a step of n unknowns, of which the last 4 `lifted` are coordinates of lifted pairs."""
     hessian, factor = sides_of(n, order)
-    vectors = carve(doubles, at, (4, n))
-    end = at + 4 * n + hessian[0] * hessian[1]
-    matrices = carve(doubles, at + 4 * n, hessian), carve(doubles, end, factor)
-    directions = Directions(vectors[1], vectors[2], vectors[3], carve(doubles, at, (0,)))
-    return System(vectors[0], directions, matrices[0], matrices[1])
+    vectors, ends = carve(room, 0, (4, n)), carve(room, 4 * n, (4 * lifted,))
+    ends[:] = 0.0
+    at = 4 * n + 4 * lifted
+    matrices = carve(room, at, hessian), carve(room, at + hessian[0] * hessian[1], factor)
+    return System(vectors[0], Directions(vectors[1], vectors[2], vectors[3], ends), matrices[0], matrices[1])
 
 
-@kernel(inline=True, allocates=True)
+@kernel(inline=True)
 def carve_all(store, memory, end_effectors, doubles, integers):
     """All that a solve works in, as `workspace_needed` counts it; rows and unknowns are those without lifted pairs."""
     table = store.table
@@ -199,8 +199,10 @@ def carve_all(store, memory, end_effectors, doubles, integers):
     told = carve(doubles, at, (header.bodies, 7))
     at += 7 * header.bodies
     way, loop = carve(doubles, at, (WAY,)), carve(doubles, at + WAY, (LOOP,))
-    system = carve_unknowns(n, shape.sparsity, doubles, at + WAY + LOOP)
-    return Workspace(Program(store, shape, lifted, tapes, end_effectors), iterates, rows, told, way, loop, system)
+    at += WAY + LOOP
+    room = carve(doubles, at, (doubles.size - size_of_shape(table, most, n + 4 * pairs)[1] - at,))
+    system = carve_unknowns(n, 0, shape.sparsity, room)
+    return Workspace(Program(store, shape, lifted, tapes, end_effectors), iterates, rows, told, way, loop, system, room)
 
 
 @kernel(inline=True, allocates=True)

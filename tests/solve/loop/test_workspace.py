@@ -10,7 +10,8 @@ import pytest
 
 import assembly as asm
 from assembly._record import Store
-from assembly.solve.loop.workspace import carve_all, workspace_needed
+from assembly.constraints.program.records import header_at
+from assembly.solve.loop.workspace import carve_all, carve_unknowns, workspace_needed
 from benchmarks.running import example
 from tests.laws.trim_scenes import trim_scene
 
@@ -54,14 +55,19 @@ def dexterity():
     return example("dexterity_sweep").five_bar()[0]
 
 
+@pytest.mark.parametrize("lifts", [False, True])
 @pytest.mark.parametrize("scene", [contacts, joints, expressions, many, trims, dexterity])
-def test_nothing_stands_in_one_place(scene):
+def test_nothing_stands_in_one_place(scene, lifts):
     packed = scene().packed()
     table = packed.table
     sizes = workspace_needed(table)
     doubles, integers = np.zeros(sizes[0]), np.zeros(sizes[1], dtype=np.int64)
     space = carve_all(Store(table, packed.pool), np.empty(0), packed.end_effectors, doubles, integers)
-    lifted, shape, system = space.program.lifted, space.program.structure, space.system
+    lifted, shape = space.program.lifted, space.program.structure
+    header = header_at(table, 0)
+    pairs = header.contacts if lifts else 0
+    system = carve_unknowns(6 * header.moving + 4 * pairs, pairs, shape.sparsity, space.room)
+    assert [array.shape for array in space.system[2:]] == [array.shape for array in system[2:]] or lifts
     current, trial, held = space.iterates
     doubles[:], integers[:] = 0.0, 0
     used = [*current, *trial, *held[:3], *space.rows[2:], *space.program.tapes, space.way]
@@ -74,3 +80,6 @@ def test_nothing_stands_in_one_place(scene):
         array += 1
     assert doubles.max() == 1.0 and integers.max() == 1
     assert doubles.sum() == sum(array.size for array in used)
+    if lifts:
+        # With all pairs lifted the room is full.
+        assert space.room.min() == 1.0
