@@ -17,7 +17,17 @@ from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
 from assembly.tracking.trace import Trace
 
-__all__ = ["Followable", "Hand", "Hands", "SeveralHands", "Targets", "new_hands", "springs", "with_hands"]
+__all__ = [
+    "Followable",
+    "Hand",
+    "Hands",
+    "SeveralHands",
+    "Targets",
+    "are_same",
+    "new_hands",
+    "springs",
+    "with_hands",
+]
 
 Array = NDArray[np.float64]
 Followable: TypeAlias = Point | Frame | Body
@@ -49,6 +59,13 @@ def springs(follow: Followable | Sequence[Followable], stiffness: float | Sequen
             f"stiffness has {len(stiffness)} numbers; expected one, or one for each of {len(follow)} hands"
         )
     return [0.5 * positive(f"stiffness[{k}]", value) for k, value in enumerate(stiffness)]
+
+
+def are_same(targets: Targets, others: Targets) -> bool:
+    """Whether targets are the same numbers."""
+    if isinstance(targets, tuple):
+        return all(map(np.array_equal, targets, others))
+    return np.array_equal(targets, others)
 
 
 def _row_of(target: ArrayLike | Pose, size: int, far: float) -> Array | None:
