@@ -22,20 +22,20 @@ Three paper clips, threaded through each other and touching, with a clearance, f
 `examples/follow_the_hand.py` over and over again, a tick a millisecond of the hand, as fast as possible: what a tick
 takes is what Python waits for `tracker.step`. The wire's radius is 0.5 mm. Gaps anywhere are those of the center
 curves, found without the library from polynomials, at every hundredth tick; how far the hand is ahead is as well of
-these. A tick that is HELD found no further pose that holds and stays where it was. With a budget, 30 us of the compiled
-loop, what is not done then is left to the next tick: the first one is LATE, and stays where it was unless it got to a
-pose that holds. "The machine alone" is an empty loop in place of a tick, as long as the median tick. The long run is
-the same chain behind a hand that goes around a circle of 3 mm twice a second: lengths of quaternions at every hundredth
-tick, violations of the last tenth of all ticks against those of the first, and the memory of the process after all
-against that after a tenth. Linked rings are those of "Wires", without their contacts and with a clearance; linking
-numbers are Gauss's integrals. The manager's twelve rings make a chain; from call to call each moves and turns a little,
-a fiftieth of the wire's radius a step."""
+these. A tick that is HELD found no further pose that holds and stays where it was. With a budget, 30 us for the loop
+and the proof, what is not done then is left to the next tick: the first one is LATE, and stays where it was unless it
+got to a pose that is proven. "The machine alone" is an empty loop in place of a tick, as long as the median tick. The
+long run is the same chain behind a hand that goes around a circle of 3 mm twice a second: lengths of quaternions at
+every hundredth tick, violations of the last tenth of all ticks against those of the first, and the memory of the
+process after all against that after a tenth. Linked rings are those of "Wires", without their contacts and with a
+clearance; linking numbers are Gauss's integrals. The manager's twelve rings make a chain; from call to call each
+moves and turns a little, a fiftieth of the wire's radius a step."""
 
 Array = NDArray[np.float64]
 # Deepest crossing that counts as none, and the largest violation in parts of the wire's radius.
 CLEAR, HOLDS = 1e-9, 1e-9
 EVERY = 100
-# Seconds that the loop of a tick may take where there is a budget.
+# Seconds that a tick may take where there is a budget.
 BUDGET = 30e-6
 BACK = 1.5  # seconds from the end of the hand's trace to its begin
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from functools import cached_property
-from typing import NamedTuple
+from time import perf_counter_ns
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +15,21 @@ from assembly.constraints.packing.corners import body_of
 from assembly.constraints.packing.manager import is_of_surfaces
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
 from assembly.proximity.clearance.conforming import conforms
+from assembly.proximity.clearance.kept_looks import NEVER, Until, run_through
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.touching import off_contacts
 from assembly.proximity.features.solid_contact import TRACK, TRACKED_PAIR
 from assembly.proximity.manager.records import MEMORY_HEADER, PAIR_MEMORY, PLACE_MEMORY, PLACE_NUMBER, PLACE_PAIR
 from assembly.solve.clearance_proof import new_proof, nothing_known
+from assembly.solve.loop.settings import HISTORY
 from assembly.solve.near_contacts import near_contacts, opening_move
+from assembly.solve.scene import Scene, Status
 from assembly.solve.solution import Solution
 
-__all__ = ["ClearTicks", "WayLimits"]
+if TYPE_CHECKING:
+    from assembly.constraints.packing.scene import Packed
+
+__all__ = ["ClearTicks", "Standing", "WayLimits"]
 
 Array = NDArray[np.float64]
 # Pairs of nodes that a tick looks at for a pair of bodies: at first, where faces that come to touch have to be opened
@@ -51,12 +59,20 @@ class _Listed(NamedTuple):
     normals: Array
 
 
-class _Standing:
-    """Poses of the bodies of a solution, and the contacts that are near there, found when they are first needed."""
+class Standing:
+    """Poses of the bodies in a state, and the contacts that are near there, found when they are first needed.
 
-    def __init__(self, solution: Solution) -> None:
-        self.solution = solution
-        self.q = solution.q
+    Parameters
+    ----------
+    scene : Scene
+    packed : Packed
+    state : (k,)
+        Nobody writes to it.
+    """
+
+    def __init__(self, scene: Scene, packed: Packed, state: Array) -> None:
+        self.scene, self.packed, self._state = scene, packed, state
+        self.q = state[: packed.contacts_at].reshape(-1, 7)
         self._relative: dict[int, tuple[Array, Array]] = {}
         self._near: dict[int, Contacts] | None = None
         self._ways: dict[int, float] = {}
@@ -64,7 +80,8 @@ class _Standing:
     def near(self, proof: ClearanceProof) -> dict[int, Contacts]:
         """The contacts that are near, by the number of their pair."""
         if self._near is None:
-            self._near = near_contacts(self.solution, proof, NEAR * max(map(proof.size, range(len(proof.pairs)))))
+            solution = Solution(self.scene, self.packed, self._state, Status.SOLVED, 0.0, np.empty((0, HISTORY)))
+            self._near = near_contacts(solution, proof, NEAR * max(map(proof.size, range(len(proof.pairs)))))
         return self._near
 
     def relative(self, proof: ClearanceProof, k: int) -> tuple[Array, Array]:
@@ -76,7 +93,7 @@ class _Standing:
     @cached_property
     def listed(self) -> _Listed:
         """The contacts that are listed."""
-        packed, state = self.solution._packed, self.solution._state
+        packed, state = self.packed, self._state
         slots_at = packed.memory_at + MEMORY_HEADER + PAIR_MEMORY * len(packed.kept_pairs)
         slots = state[slots_at:][: PLACE_MEMORY * packed.clearance_rows].reshape(-1, PLACE_MEMORY)
         first = packed.contacts_at + TRACK * len(packed.contacts)
@@ -164,7 +181,9 @@ class ClearTicks:
         # A proof may have a pair the other way round.
         firsts = [first._scene.index(body_of(side)) for side, _ in pairs]
         self._turned = {k for k, one in enumerate(firsts) if one != proof.pairs[k][0]}
-        self._at = _Standing(first)
+        self._at = Standing(first._scene, first._packed, first._state)
+        # What is going on where its time was over.
+        self._going: Generator[None, None, bool] | None = None
         self._moves, self._opened = np.zeros((len(proof.pairs), 6)), list[int]()
         self.way_depth = 0.0
         self.unlisted, self.renewable, self.in_the_way = frozenset[int](), frozenset[int](), list[int]()
@@ -181,16 +200,61 @@ class ClearTicks:
     def holds(self, solution: Solution) -> bool:
         """Whether all pairs hold at the pose of a tick, and on the way there from the last one that did.
 
-        The solution is of a state that nobody writes to.
+        The solution is of a state that nobody writes to. It takes what time it takes.
         """
-        proof, touching = self._proof, self._touching
-        there, moves = _Standing(solution), self._moves
+        there = Standing(solution._scene, solution._packed, solution._state)
+        return run_through(self._proving(there))
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether the time of the last tick was over before it was known whether its pose holds."""
+        return self._going is not None
+
+    def hold_at(self, there: Standing, until: Until = NEVER) -> bool | None:
+        """As `holds`, of the poses of a tick; None where that is not known when the time is over.
+
+        Then `go_on` goes on with what is not known.
+
+        Parameters
+        ----------
+        there : Standing
+        until : (int, int)
+            The address of a clock, and the nanoseconds at which the time is over; (0, 0) for never.
+        """
+        self._going = self._proving(there)
+        return self.go_on(until)
+
+    def go_on(self, until: Until = NEVER) -> bool | None:
+        """Go on with what was not known when the time was over; see `hold_at`.
+
+        It makes progress that lasts, however little time it has.
+        """
+        assert self._going is not None
+        self._proof.until = until
+        try:
+            next(self._going)
+        except StopIteration as end:
+            self._going = None
+            return bool(end.value)
+        finally:
+            self._proof.until = NEVER
+        return None
+
+    def _pause(self) -> Generator[None, None, None]:
+        """Yield if the time is over."""
+        _, end = self._proof.until
+        if end and perf_counter_ns() > end:
+            yield
+
+    def _proving(self, there: Standing) -> Generator[None, None, bool]:
+        """Find out whether all pairs hold at a pose and on the way there; it yields where the time is over."""
+        proof, touching, moves = self._proof, self._touching, self._moves
         self.way_depth, self.in_the_way = 0.0, []
         rolling, last = self._rolling(there), proof.last_poses()
         answers: dict[int, Answer] = {}
         if not rolling:
             # Contacts stay for many ticks, and so does what opens them.
-            if proof.stays_clear(there.q, touching, moves, QUICK):
+            if (yield from proof.staying_clear(there.q, touching, moves, QUICK)):
                 self._at, self.proved, self.way_depth = there, True, proof.way_depth()
                 return True
             left = proof.not_clear()
@@ -198,21 +262,25 @@ class ClearTicks:
             # Where a long way may not go in by its square, one along flat faces still may do.
             rolling = [k for k in rolling if self._may_go_in(k, there, OPENED[0])]
             others = [k for k in range(len(proof.pairs)) if k not in rolling]
-            left = self._left_by(answers, others, there, moves, QUICK) + rolling
+            left = (yield from self._left_by(answers, others, there, moves, QUICK)) + rolling
         moves = moves.copy()
         for k in left:
             moves[k] = self._opening(there, k)
+            yield from self._pause()
         changed = [k for k in left if k not in rolling and (moves[k] != self._moves[k]).any()]
-        self._left_by(answers, changed, there, moves, QUICK)
-        if self._ask_rows(answers, left, there, moves):
+        yield from self._left_by(answers, changed, there, moves, QUICK)
+        if (yield from self._ask_rows(answers, left, there, moves)):
             proof.go_back(last)
             return False
         for part in OPENED:
             open_yet = [k for k in left if not (k in answers and is_proven(answers[k]))]
             may = [k for k in open_yet if self._may_go_in(k, there, part)]
-            answers.update(zip(may, self._rolled(there, moves, may, part), strict=True) if may else ())
+            if may:
+                found = yield from self._rolled(there, moves, may, part)
+                answers.update(zip(may, found, strict=True))
         # What is much, and not deep: it takes more where bodies touch, which are opened in less.
-        self._left_by(answers, [k for k in left if not (k in answers and is_proven(answers[k]))], there, moves, BUDGET)
+        open_yet = [k for k in left if not (k in answers and is_proven(answers[k]))]
+        yield from self._left_by(answers, open_yet, there, moves, BUDGET)
         self.doubtful = self._not_known(answers, there)
         if self.doubtful:
             self.in_the_way = list(self.doubtful)
@@ -220,11 +288,13 @@ class ClearTicks:
             return False
         self.proved = all(map(is_proven, answers.values()))
         self._at, self._moves = there, moves
-        self._leave_closed([k for k in left if moves[k].any() and proof.is_of_wires(k)])
+        yield from self._leave_closed([k for k in left if moves[k].any() and proof.is_of_wires(k)])
         self._opened = self._those_opened()
         return True
 
-    def _ask_rows(self, answers: dict[int, Answer], left: list[int], there: _Standing, moves: Array) -> bool:
+    def _ask_rows(
+        self, answers: dict[int, Answer], left: list[int], there: Standing, moves: Array
+    ) -> Generator[None, None, bool]:
         """Whether a tick is refused because of pairs that have no rows, or that may get others.
 
         Of the latter only if they are not clear at its pose, which another proof tells: this one goes on from the last
@@ -234,14 +304,15 @@ class ClearTicks:
         if not asked:
             return False
         if self._judge is None:
-            self._judge = new_proof(there.solution._packed, there.solution._scene.bodies)
-        found = self._judge.look(there.q, self._touching, moves, which=asked, budget=QUICK)
+            self._judge = new_proof(there.packed, there.scene.bodies)
+        self._judge.until = self._proof.until
+        found = yield from self._judge.looking(there.q, self._touching, moves, which=asked, budget=QUICK)
         self.in_the_way = [k for k, answer in zip(asked, found, strict=True) if answer.part < 1.0]
         refused = [k for k in asked if k in self.unlisted or k in self.in_the_way]
         self.doubtful = {k: answers.get(k, UNKNOWN) for k in refused}
         return bool(refused)
 
-    def _opening(self, there: _Standing, k: int) -> Array:
+    def _opening(self, there: Standing, k: int) -> Array:
         """The move (6) that opens pair k at the pose of a tick."""
         if k not in self.unlisted:
             return there.opened(self._proof, k, self._touching)
@@ -253,27 +324,29 @@ class ClearTicks:
         opened: list[int] = np.flatnonzero(self._moves.any(axis=1)).tolist()
         return opened
 
-    def _leave_closed(self, which: list[int]) -> None:
+    def _leave_closed(self, which: list[int]) -> Generator[None, None, None]:
         """Go on without moves that open pairs of wires, where these are proven to touch without."""
         if not which:
             return
         closed = self._moves.copy()
         closed[which] = 0.0
-        for k, answer in zip(which, self._proof.look(self._at.q, self._touching, closed, which=which), strict=True):
+        answers = yield from self._proof.looking(self._at.q, self._touching, closed, which=which)
+        for k, answer in zip(which, answers, strict=True):
             if is_proven(answer):
                 self._moves[k] = 0.0
             else:
-                self._proof.look(self._at.q, self._touching, self._moves, which=[k])
+                yield from self._proof.looking(self._at.q, self._touching, self._moves, which=[k])
 
     def _left_by(
-        self, answers: dict[int, Answer], which: list[int], there: _Standing, moves: Array, budget: int
-    ) -> list[int]:
+        self, answers: dict[int, Answer], which: list[int], there: Standing, moves: Array, budget: int
+    ) -> Generator[None, None, list[int]]:
         """Which of some pairs the straight way is not proven of within a budget; what is proven is added to answers."""
-        found = self._proof.look(there.q, self._touching, moves, which, swept=True, budget=budget) if which else []
-        answers.update(zip(which, found, strict=True))
+        if which:
+            found = yield from self._proof.looking(there.q, self._touching, moves, which, swept=True, budget=budget)
+            answers.update(zip(which, found, strict=True))
         return [k for k in which if not is_proven(answers[k])]
 
-    def _not_known(self, answers: dict[int, Answer], there: _Standing) -> dict[int, Answer]:
+    def _not_known(self, answers: dict[int, Answer], there: Standing) -> dict[int, Answer]:
         """The pairs that are not proven to be clear, or to touch, and whose faces do not lie on each other."""
         proof, q = self._proof, there.q
         return {
@@ -287,7 +360,7 @@ class ClearTicks:
             )
         }
 
-    def _rolling(self, there: _Standing) -> list[int]:
+    def _rolling(self, there: Standing) -> list[int]:
         """The pairs that touch and go so far that the straight way goes in by what counts beside what is touching."""
         proof, begin = self._proof, self._at
         found = []
@@ -300,7 +373,7 @@ class ClearTicks:
                 found.append(k)
         return found
 
-    def _turns(self, k: int, there: _Standing, angle: float) -> bool:
+    def _turns(self, k: int, there: Standing, angle: float) -> bool:
         """Whether normals of pair k may turn by more than an angle on the way to a pose, as either body sees them.
 
         Along flat faces, and on them, they do not turn, and no way goes in. It is not known where contacts come and go,
@@ -322,16 +395,18 @@ class ClearTicks:
             first, second = first.T, second.T
         return bool(((turned > angle) & (np.abs(other @ second - one @ first).max(axis=1) > angle)).any())
 
-    def _may_go_in(self, k: int, there: _Standing, part: float) -> bool:
+    def _may_go_in(self, k: int, there: Standing, part: float) -> bool:
         """Whether pair k may go in by a part of what it may if it touches all along."""
         return self._limits.depth == np.inf or self._roll_depth(k, there, part) <= self._limits.depth
 
-    def _roll_depth(self, k: int, there: _Standing, part: float) -> float:
+    def _roll_depth(self, k: int, there: Standing, part: float) -> float:
         """A part of what the way of pair k may go in if it touches all along."""
         way = there.way_length(self._proof, k, self._at.q)
         return max(part * ROLLED * way * way / self._proof.radius(k), ROOM * self._proof.size(k))
 
-    def _rolled(self, there: _Standing, moves: Array, which: list[int], part: float) -> list[Answer]:
+    def _rolled(
+        self, there: Standing, moves: Array, which: list[int], part: float
+    ) -> Generator[None, None, list[Answer]]:
         """What is proven of pairs that are opened on the way, by a part of what it may go in."""
         proof, begin = self._proof, self._at
         before, after = self._moves.copy(), moves.copy()
@@ -342,12 +417,14 @@ class ClearTicks:
                 move = standing.opened(proof, k, depth)
                 if move.any():
                     opened[k] = move
-        opened_at = dict(zip(which, proof.look(begin.q, self._touching, before, which=which, swept=True), strict=True))
-        known = [k for k in which if is_proven(opened_at[k])]
-        ways = proof.look(there.q, self._touching, after, which=known, swept=True) if known else []
-        known = [k for k, answer in zip(known, ways, strict=True) if is_proven(answer)]
+                yield from self._pause()
+        opened_at = yield from proof.looking(begin.q, self._touching, before, which=which, swept=True)
+        known = [k for k, answer in zip(which, opened_at, strict=True) if is_proven(answer)]
+        if known:
+            ways = yield from proof.looking(there.q, self._touching, after, which=known, swept=True)
+            known = [k for k, answer in zip(known, ways, strict=True) if is_proven(answer)]
         # Where the way is not known, a pose at its end that is clear is none that was come to.
-        ends = proof.look(there.q, self._touching, moves, which=which, swept=True)
+        ends = yield from proof.looking(there.q, self._touching, moves, which=which, swept=True)
         return [
             answer if k in known or not is_proven(answer) else Answer(Verdict.UNDECIDED)
             for k, answer in zip(which, ends, strict=True)

@@ -17,12 +17,19 @@ from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
 from assembly.tracking.trace import Trace
 
-__all__ = ["Followable", "Hand", "Hands", "SeveralHands", "SpringNumbers", "Targets"]
+__all__ = ["Followable", "Hand", "Hands", "SeveralHands", "SpringNumbers", "Targets", "are_same"]
 
 Array = NDArray[np.float64]
 Followable: TypeAlias = Point | Frame | Body | Freedom
 # Of one hand, or of each of several.
 Targets: TypeAlias = Array | tuple[Array, ...]
+
+
+def are_same(targets: Targets, others: Targets) -> bool:
+    """Whether targets are the same numbers."""
+    if isinstance(targets, tuple):
+        return all(map(np.array_equal, targets, others))
+    return np.array_equal(targets, others)
 
 
 def _row_of(target: ArrayLike | Pose, size: int, far: float) -> Array | None:

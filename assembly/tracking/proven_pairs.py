@@ -136,6 +136,11 @@ class ProvenPairs:
         self.settle(first)
 
     @property
+    def are_some(self) -> bool:
+        """Whether any pair may be without rows, or without updates of them."""
+        return bool(self._joined or self.fitting)
+
+    @property
     def has_no_rows(self) -> bool:
         """Whether no pair that clearances keep apart has rows, so that the contact manager has nothing to do."""
         return bool(self.unlisted) and len(self.unlisted) == len(self.packed.kept_pairs)

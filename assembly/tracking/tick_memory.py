@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from assembly.constraints.packing.renumbered import numbers_told
 from assembly.constraints.packing.scene import structure_of
 from assembly.constraints.program.records import CLOCK_AT, MANAGER_RECORD
 from assembly.kinematics.changes import changes
+from assembly.proximity.clearance.kept_looks import NEVER, Until
 from assembly.proximity.features.solid_contact import STAYS, TRACK
 from assembly.proximity.manager.records import (
     CLOCK,
@@ -27,15 +29,16 @@ from assembly.proximity.manager.records import (
 )
 from assembly.solve.attempts.attempts import new_workspace
 from assembly.solve.clearance_proof import can_prove
-from assembly.solve.loop.settings import CARRIES, HISTORY, RADIUS
+from assembly.solve.loop.settings import CARRIES, HISTORY, RADIUS, VIOLATION
 from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import is_for_proofs
 from assembly.tracking.clear_ticks import ClearTicks
 from assembly.tracking.fitting import fits_of
 from assembly.tracking.followed import Followed
-from assembly.tracking.hands import Hands
+from assembly.tracking.hands import Hands, Targets
 from assembly.tracking.proven_pairs import ProvenPairs, joined_pairs
+from assembly.tracking.tick import Step, TrackStatus
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -80,6 +83,7 @@ class TickMemory(InOneProcess):
     _settings: Array
     _budget: float | None
     _touching: float
+    _tolerance: float
 
     def _take_packed(self) -> None:
         """Go on with the scene as it is packed now."""
@@ -91,6 +95,8 @@ class TickMemory(InOneProcess):
     def _begin_at(self, first: Solution) -> None:
         """Have ticks go on from a solution of the packed scene."""
         packed, self._begun = self._packed, first.status
+        # Of a tick whose proof goes on: how it ended otherwise, its targets, and its state.
+        self._awaited: tuple[TrackStatus, Targets, Array] | None = None
         self._set_up(first._state)
         proves = packed.keeps_apart and can_prove(packed)
         self._clear = ClearTicks(first, self._touching * packed.scale) if proves else None
@@ -154,3 +160,40 @@ class TickMemory(InOneProcess):
 
     def _told(self) -> list[object]:
         return numbers_told(self._packed, self._inner.bodies, self._inner.constraints)
+
+    def _until(self, begin: float) -> Until:
+        """When the time of a tick is over that began at a time; what is not done is left to the next one only then."""
+        if self._budget is None or self._knobs[CARRIES] == 0.0:
+            return NEVER
+        return int(self._packed.table[CLOCK_AT]), int(1e9 * (begin + self._budget))
+
+    @property
+    def _stands(self) -> bool:
+        """Whether constraints hold at the pose of the last tick."""
+        return bool(self._before[self._packed.results_at + VIOLATION] <= self._tolerance)
+
+    def _late(self, row: Targets, begin: float) -> Step:
+        """The step of a tick whose time was over: the last pose stands."""
+        status = TrackStatus.LATE if self._stands else TrackStatus.VIOLATED
+        seconds = perf_counter() - begin
+        return Step(self._followed, self._before, status, row, self._seen, seconds, self._way_depth())
+
+    def _refused(self) -> tuple[TrackStatus, Array]:
+        """Go back to the last pose from one at which bodies are not known to be clear."""
+        self._pose[:] = self._before
+        # The contact that was crossed may not be listed: all pairs are searched again.
+        self._rows.list_again(self._state, [] if self._clear is None else self._clear.in_the_way)
+        self._rows.update_all()
+        forget_updates(self._packed, self._state)
+        return TrackStatus.HELD, self._pose.copy()
+
+    def _holds(self) -> Array:
+        """Go on from a pose at which all pairs hold; its state, which nobody writes to."""
+        self._rows.settle(self._pose)
+        return self._pose.copy()
+
+    def _way_depth(self) -> float | None:
+        """How deep the way to the last pose may go in; None where that is not proven."""
+        if self._clear is None:
+            return 0.0
+        return self._clear.way_depth if self._clear.proved else None

@@ -18,6 +18,7 @@ from assembly.errors import InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.changes import changes
 from assembly.kinematics.pose import Pose, pose_rows
+from assembly.proximity.clearance.kept_looks import Until
 from assembly.proximity.manager.records import EVENT_COUNT
 from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.parameters import ROUNDING
@@ -39,13 +40,13 @@ from assembly.solve.loop.settings import (
     VIOLATION,
 )
 from assembly.solve.options import Options
-from assembly.solve.scene import Status
 from assembly.solve.solution import Solution
-from assembly.tracking.hands import Followable, SeveralHands
+from assembly.tracking.clear_ticks import Standing
+from assembly.tracking.hands import Followable, SeveralHands, Targets, are_same
 from assembly.tracking.log import TrackLog
 from assembly.tracking.new_hands import new_hands, springs, with_hands
 from assembly.tracking.tick import Step, TrackStatus
-from assembly.tracking.tick_memory import TickMemory, forget_updates
+from assembly.tracking.tick_memory import TickMemory
 from assembly.tracking.trace import Trace
 
 __all__ = ["Tracker"]
@@ -53,6 +54,8 @@ __all__ = ["Tracker"]
 Array = NDArray[np.float64]
 # Steps of a tick may be bounded to this, in parts of the scene's size, after ticks that failed.
 SHORTEST_RADIUS = 1e-7
+# The part of a budget in which the loop may begin steps, where what it ends at has to be proven.
+LOOP_SHARE = 0.5
 # What the loop says of a tick whose pose holds.
 _STATUSES = {SOLVED: TrackStatus.FOLLOWED, OUT_OF_TIME: TrackStatus.LATE}
 _CODES = {status: k for k, status in enumerate(TrackStatus)}
@@ -109,9 +112,10 @@ class Tracker(TickMemory):
         Force over distance; one for each target, or one for all. Of a turn it is that of a spring which acts half the
         size of the turned body from its axis.
     budget : float, optional
-        Seconds after which the compiled loop of a tick begins no further step or update; the next tick continues with
-        what is not done. The proof under a `Clearance` is not counted. Without a budget a tick takes as long as it
-        needs.
+        Seconds after which a tick begins nothing further: no step or update of the compiled loop, and no part of the
+        proof under a `Clearance`. It is LATE then, at the last pose that is proven, and the next tick continues with
+        what is not done. Under a clearance the loop has the first half of it. Without a budget a tick takes as long as
+        it needs.
     iterations : int
         Number of steps after which a tick ends if the constraints hold; otherwise up to four times as many.
     tolerance : float
@@ -164,7 +168,8 @@ class Tracker(TickMemory):
         self._settings = _tick_settings(limit, iterations, second_order)
         self._budget = budget
         if budget is not None:
-            self._settings[BUDGET] = 1e9 * positive("budget", budget)
+            share = LOOP_SHARE if self._packed.keeps_apart else 1.0
+            self._settings[BUDGET] = share * 1e9 * positive("budget", budget)
             if self._packed.table[CLOCK_AT] == 0:
                 raise InputError("budget is given, but this interpreter has no clock for compiled code; expected None")
         self._begin_at(first)
@@ -208,6 +213,10 @@ class Tracker(TickMemory):
         if follow is not None and not isinstance(follow, (Point, Frame, Body, Freedom)):
             raise TypeError(f"follow is {follow!r}; expected a Point, a Frame, a Body, a joint's coordinate or None")
         held = None if follow is None else self._hands.can_hold(k, follow)
+        if self._awaited is not None:
+            # Whatever target it was, it was one of another spring.
+            status, _, ended = self._awaited
+            self._awaited = TrackStatus.LATE, (), ended
         self._hands = self._hands.holding(k, held, spring, self.q)
         self._followed = replace(self._followed, hands=self._hands)
 
@@ -269,36 +278,16 @@ class Tracker(TickMemory):
         if row is None:
             status = TrackStatus.CHANGED if changed else TrackStatus.BAD_TARGET
             return Step(self._followed, self._before, status, self._hands.where(), self._seen, perf_counter() - begin)
-        ended_with = self._moved_clear()
-        if ended_with is None:
-            # The next tick goes on from a pose that does not hold yet; here the last one stands.
-            status = TrackStatus.LATE if self._stands else TrackStatus.VIOLATED
-            return Step(self._followed, self._before, status, row, self._seen, perf_counter() - begin)
-        status = ended_with
-        # After a step that was too long the next ones are shorter, until they succeed.
-        radius = self._knobs[RADIUS]
-        if status is TrackStatus.HELD:
-            self._knobs[RADIUS] = max(0.25 * radius, SHORTEST_RADIUS)
-        elif radius < self._radius:
-            self._knobs[RADIUS] = min(4.0 * radius, self._radius)
-        seen = self._seen
-        if packed.clearance_rows:
-            self._seen = self._view[packed.memory_at + EVENT_COUNT]
-        # What steps keep nobody writes to.
-        self._before = self._pose.copy()
-        ended, followed = self._before, self._followed
-        if packed.is_crowded(self._before) and self._inner._crowding < MOST_CROWDING:
-            self._take_more_places()
-        way_depth = 0.0 if self._clear is None else self._clear.way_depth if self._clear.proved else None
-        return Step(followed, ended, status, row, seen, perf_counter() - begin, way_depth)
+        until = self._until(begin)
+        if self._clear is not None and self._clear.goes_on:
+            step = self._gone_on(row, begin, until)
+            if step is not None:
+                return step
+        ended_with = self._moved_clear(row, until)
+        return self._late(row, begin) if ended_with is None else self._ended(*ended_with, row, begin)
 
-    @property
-    def _stands(self) -> bool:
-        """Whether constraints hold at the pose of the last tick."""
-        return bool(self._before[self._packed.results_at + VIOLATION] <= self._tolerance)
-
-    def _moved_clear(self) -> TrackStatus | None:
-        """Run the loop, and prove where that led; None if it goes on in the next tick.
+    def _moved_clear(self, row: Targets, until: Until) -> tuple[TrackStatus, Array] | None:
+        """Run the loop, and prove where that led; None if the loop or the proof goes on in the next tick.
 
         Some pairs have no rows at first, or those of earlier ticks (`proven_pairs.py`). Where the proof refuses a pose,
         they get the rows of the last one, once, and the tick begins again.
@@ -306,22 +295,24 @@ class Tracker(TickMemory):
         begun_again = frozenset[int]()
         while True:
             status = self._moved()
-            if status is None or self._clear is None or status is TrackStatus.VIOLATED:
-                return status
+            if status is None:
+                # The next tick goes on from a pose that does not hold yet.
+                return None
+            ended = self._pose.copy()
+            if self._clear is None or status is TrackStatus.VIOLATED:
+                return status, ended
             self._clear.unlisted = self._rows.unlisted
             self._clear.renewable = self._rows.fitting - begun_again
-            there = Solution(self._scene, self._packed, self._pose.copy(), Status.SOLVED, 0.0, self._history)
-            if self._clear.holds(there):
-                self._rows.settle(self._pose)
-                return status
-            self._pose[:] = self._before
+            holds = self._clear.hold_at(Standing(self._scene, self._packed, ended), until)
+            if holds is None:
+                self._awaited = status, row, ended
+                return None
+            if holds:
+                return status, self._holds() if self._rows.are_some else ended
             again = self._rows.without_updates(self._clear.doubtful) & set(self._clear.in_the_way) - begun_again
             if self._budget is not None or not again:
-                # The contact that was crossed may not be listed: all pairs are searched again.
-                self._rows.list_again(self._state, self._clear.in_the_way)
-                self._rows.update_all()
-                forget_updates(self._packed, self._state)
-                return TrackStatus.HELD
+                return self._refused()
+            self._pose[:] = self._before
             self._rows.list_again(self._state, again)
             begun_again |= again
 
@@ -342,6 +333,43 @@ class Tracker(TickMemory):
                 return TrackStatus.HELD if self._stands else TrackStatus.VIOLATED
             return TrackStatus.VIOLATED
         return TrackStatus.HELD if view[at + LAST_FEASIBLE] == 1.0 else status
+
+    def _gone_on(self, row: Targets, begin: float, until: Until) -> Step | None:
+        """The step of a tick that goes on with a proof; None where there is time for the loop as well."""
+        assert self._clear is not None and self._awaited is not None
+        holds = self._clear.go_on(until)
+        if holds is None:
+            return self._late(row, begin)
+        status, asked, ended = self._awaited
+        self._awaited = None
+        if not holds:
+            status, ended = self._refused()
+        else:
+            ended = self._holds() if self._rows.are_some else ended
+            if not are_same(row, asked):
+                # It is as near as it can be to another target.
+                status = TrackStatus.LATE
+                if perf_counter() - begin < LOOP_SHARE * (self._budget or 0.0):
+                    self._before = ended
+                    return None
+        return self._ended(status, ended, row, begin)
+
+    def _ended(self, status: TrackStatus, ended: Array, row: Targets, begin: float) -> Step:
+        """The step of a tick that ended at a state (k,), which nobody writes to."""
+        packed = self._packed
+        # After a step that was too long the next ones are shorter, until they succeed.
+        radius = self._knobs[RADIUS]
+        if status is TrackStatus.HELD:
+            self._knobs[RADIUS] = max(0.25 * radius, SHORTEST_RADIUS)
+        elif radius < self._radius:
+            self._knobs[RADIUS] = min(4.0 * radius, self._radius)
+        seen = self._seen
+        if packed.clearance_rows:
+            self._seen = self._view[packed.memory_at + EVENT_COUNT]
+        self._before, followed = ended, self._followed
+        if packed.is_crowded(ended) and self._inner._crowding < MOST_CROWDING:
+            self._take_more_places()
+        return Step(followed, ended, status, row, seen, perf_counter() - begin, self._way_depth())
 
     def run(self, trace: Trace | Sequence[Trace], *, paced: bool = False, stride: int = 1) -> TrackLog:
         """Follow recorded motions, one tick per sample.

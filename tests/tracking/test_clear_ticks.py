@@ -52,11 +52,11 @@ def test_what_is_held_has_gone_back(monkeypatch):
     _, tracker = tracker_of(first, second, (0.0, 0.0, 1.5))
     before = tracker.step((0.0, 0.0, 1.3))
     assert before.status is TrackStatus.FOLLOWED
-    usual = ClearTicks.holds
-    monkeypatch.setattr(ClearTicks, "holds", lambda self, solution: False)
+    usual = ClearTicks.hold_at
+    monkeypatch.setattr(ClearTicks, "hold_at", lambda self, there, until: False)
     held = tracker.step((0.0, 0.0, 1.1))
     assert held.status is TrackStatus.HELD and held.q.tobytes() == before.q.tobytes()
-    monkeypatch.setattr(ClearTicks, "holds", usual)
+    monkeypatch.setattr(ClearTicks, "hold_at", usual)
     statuses = [tracker.step((0.0, 0.0, 1.1)).status for _ in range(12)]
     assert statuses[-1] is TrackStatus.FOLLOWED
 

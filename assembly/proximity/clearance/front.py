@@ -5,7 +5,9 @@ tells of all pairs at once. After that the gap along the same direction is asked
 hold, another direction is sought, and then the larger node is replaced by its children.
 
 A look writes the front that follows beside the one there is. It takes its place where the look ends clear; else all is
-as it was.
+as it was. It also does where the time of a look is over: its pairs then tell of the pose that is looked at, and the
+next look at that goes on with those that are not parted yet. Where another pose is looked at instead, b counts as
+having gone there and back.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from __future__ import annotations
 import math
 from collections import namedtuple
 
+from assembly._address import call_address
 from assembly._kernel import kernel
 from assembly.kinematics.motion import RelativePose
 from assembly.proximity.clearance.halve import put, vector
@@ -22,15 +25,19 @@ from assembly.proximity.clearance.records import (
     BY_SLEEVE,
     BY_SPINES,
     NODES_SIZE,
+    ON_ITS_WAY,
+    OPEN_YET,
     PARTED_SIZE,
+    TO_POSE,
     counts_at,
+    node_at,
     nodes_at,
     pair_proof_at,
     parted_at,
 )
 from assembly.proximity.clearance.sleeves import gap_of
 from assembly.proximity.clearance.spines import loss_on_way, spine_gap
-from assembly.proximity.clearance.way import sag_of, stays_apart
+from assembly.proximity.clearance.way import sag_of, stays_apart, way_of
 
 # What is kept of a pair of bodies. pair: a PAIR; counts: COUNTS; parted, nodes: rows of PARTED and NODES, the front;
 # next_parted, next_nodes: the one that follows; waiting, waiting_nodes: the queue of a look, a ring; work: (3, 64) to
@@ -38,10 +45,19 @@ from assembly.proximity.clearance.way import sag_of, stays_apart
 Front = namedtuple("Front", "pair counts parted nodes next_parted next_nodes waiting waiting_nodes work")
 # What a look asks for. needed: every gap has to be larger; touch: cells that cross by no more are no crossing;
 # resolution: pairs of cells that are smaller stay open; budget: so do all pairs of nodes
-# after so many; swept_budget: after so many a way is too long.
-Limits = namedtuple("Limits", "needed touch resolution budget swept_budget")
+# after so many; swept_budget: after so many a way is too long; clock, until: the address of what tells the time, and
+# when it is over (0: never) [ns].
+Limits = namedtuple("Limits", "needed touch resolution budget swept_budget clock until")
 # Two nodes, and what parts them.
 Parted = namedtuple("Parted", "a b how")
+# The time is asked after so many pairs of the front that are asked again.
+ASKED_AT_ONCE = 16
+
+
+@kernel(inline=True)
+def is_over(limits):
+    """Whether the time of a look is over."""
+    return limits.until > 0 and call_address(limits.clock, ()) > limits.until
 
 
 @kernel(inline=True)
@@ -59,7 +75,9 @@ def begin_front(front):
     counts = counts_at(front.counts, 0)
     write_pair(front.parted, front.nodes, 0, Parted(counts.root_a, counts.root_b, BY_PLANE), (0.0, 0.0, 0.0), -math.inf)
     counts.count = 1
-    pair_proof_at(front.pair, 0).soonest = -math.inf
+    pair = pair_proof_at(front.pair, 0)
+    pair.soonest = -math.inf
+    pair.underway = 0.0
 
 
 @kernel(inner=True)
@@ -105,18 +123,79 @@ def keep(front, nodes, n, expiry):
 
 
 @kernel(inner=True)
-def replace_front(front, pose, travelled):
-    """Put the front that follows in the place of the one there is, at a pose that becomes the last one."""
-    counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
+def take_next(front):
+    """Put the front that follows in the place of the one there is."""
+    counts = counts_at(front.counts, 0)
     for i in range(counts.next_count):
         for c in range(PARTED_SIZE):
             front.parted[i, c] = front.next_parted[i, c]
         for c in range(NODES_SIZE):
             front.nodes[i, c] = front.next_nodes[i, c]
     counts.count = counts.next_count
+
+
+@kernel(inner=True)
+def replace_front(front, pose, travelled):
+    """Put the front that follows in the place of the one there is, at a pose that becomes the last one."""
+    counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
+    take_next(front)
+    if counts.fresh == 0:
+        counts.fresh = counts.count
     pair.soonest = pair.next_soonest
     pair.travelled = travelled
     remember(front, pose)
+
+
+@kernel(inline=True)
+def aim_of(pair):
+    """The pose that a look whose time was over looks at."""
+    r, x = pair.aim_turn, pair.aim_shift
+    return RelativePose((r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]), (x[0], x[1], x[2]))
+
+
+@kernel(inner=True)
+def put_off(front, pose, swept, head, tail):
+    """Leave a look at a pose whose time is over: pairs of the queue go to the front, to be asked next time."""
+    counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
+    for i in range(head, tail):
+        at = i % len(front.waiting)
+        row = nodes_at(front.waiting_nodes, at)
+        keep(front, Parted(row.a, row.b, OPEN_YET), vector(parted_at(front.waiting, at).normal), -math.inf)
+    take_next(front)
+    counts.earlier += head
+    pair.soonest = -math.inf
+    pair.underway = ON_ITS_WAY if swept else TO_POSE
+    for k in range(9):
+        pair.aim_turn[k] = pose.rotation[k]
+    put(pair.aim_shift, pose.shift)
+
+
+@kernel(inner=True)
+def goes_on(front, pose, swept):
+    """Whether a look goes on with one whose time was over."""
+    pair = pair_proof_at(front.pair, 0)
+    if pair.underway != (ON_ITS_WAY if swept else TO_POSE):
+        return False
+    for k in range(9):
+        if pair.aim_turn[k] != pose.rotation[k]:
+            return False
+    for k in range(3):
+        if pair.aim_shift[k] != pose.shift[k]:
+            return False
+    return True
+
+
+@kernel(inner=True)
+def leave_off(forest, front):
+    """Give up a look whose time was over. Its front tells of where it looked: b has gone there and back."""
+    pair, counts = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
+    counts.earlier = 0
+    if pair.underway == 0.0:
+        return
+    root = node_at(forest.nodes, counts.root_b)
+    way = way_of(last_pose(front), aim_of(pair), vector(root.center), root.radius, False)
+    pair.travelled += 2.0 * way.moved
+    pair.underway = 0.0
 
 
 @kernel(inline=True)
@@ -173,18 +252,28 @@ def ask_spines_again(forest, front, way, needed, i):
 
 
 @kernel(inner=True)
-def ask_again(forest, front, way, needed):
-    """Ask the front at a new pose along its directions. Pairs that fail go to the queue; returns how many."""
+def ask_again(forest, front, way, limits):
+    """Ask the front at a new pose along its directions. Pairs that fail go to the queue.
+
+    Returns how many, and whether the time was over; what is not asked by then stays as it is.
+    """
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
-    travelled = pair.travelled + way.moved
+    travelled, needed, over = pair.travelled + way.moved, limits.needed, False
     counts.next_count = 0
     pair.next_soonest = math.inf
     tail = 0
     for i in range(counts.count):
         row, parted = nodes_at(front.nodes, i), parted_at(front.parted, i)
         nodes, n, expiry = Parted(row.a, row.b, row.how), vector(parted.normal), parted.expiry
-        if expiry <= travelled:
+        if nodes.how == OPEN_YET:
+            put_waiting(front, tail, Parted(row.a, row.b, BY_PLANE), n)
+            tail += 1
+            continue
+        if expiry <= travelled and not over:
             counts.asked += 1
+            # What is asked at every pose in any case is no progress.
+            if nodes.how != BY_BORE_B:
+                over = counts.asked % ASKED_AT_ONCE == 0 and is_over(limits)
             if nodes.how == BY_SPINES:
                 if not ask_spines_again(forest, front, way, needed, i):
                     put_waiting(front, tail, nodes, (0.0, 0.0, 0.0))
@@ -202,4 +291,4 @@ def ask_again(forest, front, way, needed):
                 tail += 1
                 continue
         keep(front, nodes, n, expiry)
-    return tail
+    return tail, over

@@ -5,28 +5,25 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
-from assembly._record import Store
-from assembly.geometry.vec import dot, matmul_t, matvec_t, quaternion_matrix, quaternion_product
-from assembly.kinematics.motion import RelativePose, exponential, rotation
 from assembly.proximity.clearance.directions import best_direction
 from assembly.proximity.clearance.front import (
-    Front,
     Limits,
     Parted,
+    aim_of,
     ask_again,
-    begin_front,
-    bring_back,
     expiry_of,
-    first_row,
+    goes_on,
+    is_over,
     keep,
     last_pose,
+    leave_off,
+    put_off,
     put_waiting,
     remember,
     replace_front,
     spines_stay_apart,
 )
 from assembly.proximity.clearance.halve import halve, put, vector
-from assembly.proximity.clearance.inside import FOREST
 from assembly.proximity.clearance.records import (
     BY_PLANE,
     BY_SLEEVE,
@@ -35,9 +32,10 @@ from assembly.proximity.clearance.records import (
     CROSSING,
     NO_ROOM,
     NONE,
+    ON_ITS_WAY,
     OPEN,
+    SPENT,
     UNSWEPT,
-    Forest,
     counts_at,
     links_at,
     node_at,
@@ -45,7 +43,7 @@ from assembly.proximity.clearance.records import (
     pair_proof_at,
     parted_at,
 )
-from assembly.proximity.clearance.separation import is_cell, is_round, is_wire, separation
+from assembly.proximity.clearance.separation import is_cell, is_round, is_wire
 from assembly.proximity.clearance.sleeves import best_bore, gap_of
 from assembly.proximity.clearance.spines import spine_gap
 from assembly.proximity.clearance.stab import crossing_of
@@ -56,6 +54,8 @@ from assembly.proximity.clearance.way import pose_at, sag_of, stays_apart, way_o
 SWEPT_BUDGET, SHORTEST = 1000, 1.0 / 256.0
 # What was found of two nodes: no cause to say they are apart, parted, or apart at both ends of a way too long to tell.
 NOT_PARTED, ARE_PARTED, NEED_SHORTER = 0, 1, 2
+# The time is asked after so many pairs that directions are sought for.
+SOUGHT_AT_ONCE = 8
 # How a pair of nodes was left: parted, to be replaced by children, open, or with it the look ends.
 DONE, DIVIDED, ENDED = 0, 1, 2
 
@@ -185,17 +185,20 @@ def seek(forest, front, way, limits, tail):
     """Seek what parts the pairs of the queue, of which there are `tail`."""
     counts = counts_at(front.counts, 0)
     room = min(len(front.waiting), len(front.nodes))
-    head = 0
+    head, earlier = 0, counts.earlier
     while head < tail:
         if counts.next_count + tail - head + 2 >= room:
             return NO_ROOM
+        if head % SOUGHT_AT_ONCE == SOUGHT_AT_ONCE - 1 and is_over(limits):
+            put_off(front, way.after, way.swept, head, tail)
+            return SPENT
         row = nodes_at(front.waiting_nodes, head % len(front.waiting))
         nodes = Parted(row.a, row.b, BY_PLANE)
         hint = vector(parted_at(front.waiting, head % len(front.waiting)).normal)
         head += 1
-        if way.swept and head > limits.swept_budget:
+        if way.swept and head + earlier > limits.swept_budget:
             return UNSWEPT
-        if head > limits.budget:
+        if head + earlier > limits.budget:
             counts.opened += 1
             keep(front, nodes, hint, -math.inf)
             continue
@@ -228,7 +231,10 @@ def look_only(forest, front, way, limits):
     The front and the last pose stay as they are; the front that follows is that of the end.
     """
     counts_at(front.counts, 0).opened = 0
-    tail = ask_again(forest, front, way, limits.needed)
+    tail, over = ask_again(forest, front, way, limits)
+    if over:
+        put_off(front, way.after, way.swept, 0, tail)
+        return SPENT
     return seek(forest, front, way, limits, tail)
 
 
@@ -236,6 +242,8 @@ def look_only(forest, front, way, limits):
 def look(forest, front, pose, limits, swept):
     """Look at a pose and, swept, at the way from the last one. Where both are clear, the pose becomes the last one."""
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
+    if not goes_on(front, pose, swept):
+        leave_off(forest, front)
     root = node_at(forest.nodes, counts.root_b)
     way = way_of(last_pose(front), pose, vector(root.center), root.radius, swept)
     travelled = pair.travelled + way.moved
@@ -246,6 +254,9 @@ def look(forest, front, pose, limits, swept):
     code = look_only(forest, front, way, limits)
     if code == CLEAR:
         replace_front(front, pose, travelled)
+        pair.underway = 0.0
+    elif code != SPENT:
+        leave_off(forest, front)
     return code
 
 
@@ -253,15 +264,23 @@ def look(forest, front, pose, limits, swept):
 def go_to(forest, front, pose, limits):
     """A look at a pose and at the way to it, which is taken in parts where it is too long for one look.
 
-    `part` of the pair's record tells how much of the way is clear. Where that is not all, the last pose stays the last.
+    `part` of the pair's record tells how much of the way is clear. Where that is not all, the last pose stays the last,
+    but where the time is over: then it is that up to which the way is clear, and the next call goes on from there.
     """
     pair = pair_proof_at(front.pair, 0)
     root = node_at(forest.nodes, counts_at(front.counts, 0).root_b)
     begin = last_pose(front)
     whole = way_of(begin, pose, vector(root.center), root.radius, True)
-    first = Limits(limits.needed, limits.touch, limits.resolution, limits.budget, SWEPT_BUDGET)
-    code = look(forest, front, pose, first, True)
-    done, step = 1.0 if code == CLEAR else 0.0, 0.5
+    first = Limits(
+        limits.needed, limits.touch, limits.resolution, limits.budget, SWEPT_BUDGET, limits.clock, limits.until
+    )
+    to, aim = 1.0, pose
+    if pair.underway == ON_ITS_WAY:
+        to, aim = pair.aim_part, aim_of(pair)
+    code = look(forest, front, aim, first, True)
+    done, step = 0.0, 0.5 * to
+    if code == CLEAR:
+        done, step = to, 2.0 * to
     while done < 1.0 and (code == CLEAR or code == UNSWEPT):
         to = min(done + step, 1.0)
         code = look(forest, front, pose if to == 1.0 else pose_at(whole, to), limits, True)
@@ -273,120 +292,10 @@ def go_to(forest, front, pose, limits):
             if step < SHORTEST:
                 break
     pair.part = done
+    if code == SPENT:
+        pair.aim_part = 1.0 if to == 1.0 else (to - done) / (1.0 - done)
+        return SPENT
     if code != CLEAR and done > 0.0:
         pair.travelled += done * whole.moved
         remember(front, begin)
     return code
-
-
-# What is to be done with a pair: at a pose, with a new front; on the way there, with one that is
-# made at the last pose.
-PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY, ON_WAY_ANEW, ON_WAY_AT_ONCE = 0, 1, 2, 3, 4, 5
-# A front that has grown by more than this factor and number is begun anew.
-GROWN, MANY = 2, 200
-# What rounding of poses and of sums of coordinates may do to a gap, in parts of these: some thirty roundings.
-ROUNDING = 4e-15
-
-
-@kernel(inner=True)
-def posed_with_move(q, a, b, move):
-    """The pose of body b, moved by a translation and a small rotation about its origin in world axes, seen from a."""
-    turn = quaternion_product(exponential((move[3], move[4], move[5])), (q[b, 3], q[b, 4], q[b, 5], q[b, 6]))
-    rotation_a, rotation_b = rotation(q, a), quaternion_matrix(turn[0], turn[1], turn[2], turn[3])
-    d = (q[b, 0] - q[a, 0] + move[0], q[b, 1] - q[a, 1] + move[1], q[b, 2] - q[a, 2] + move[2])
-    return RelativePose(matmul_t(rotation_a, rotation_b), matvec_t(rotation_a, d))
-
-
-@kernel(inner=True)
-def done_task(forest, front, pose, limits, task):
-    """Do what is to be done with a pair; how its look ended."""
-    pair, counts = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
-    if task == ON_WAY_ANEW:
-        kept = first_row(front)
-        begin_front(front)
-        if look(forest, front, last_pose(front), limits, False) == CLEAR:
-            counts.fresh = counts.count
-        else:
-            bring_back(front, kept)
-    if task == ON_WAY or task == ON_WAY_ANEW:
-        return go_to(forest, front, pose, limits)
-    if task == BEGUN_ANEW:
-        begin_front(front)
-    code = look(forest, front, pose, limits, task == ON_WAY_AT_ONCE)
-    if task == BEGUN_ANEW:
-        counts.fresh = counts.count
-    pair.part = 1.0 if code == CLEAR else 0.0
-    return code
-
-
-@kernel(inner=True)
-def look_at_pair(forest, front, q, move, task):
-    """Do what is to be done with a pair of bodies at poses q; how its look ended."""
-    pair, count = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
-    count.asked = 0
-    count.sought = 0
-    count.halved = 0
-    count.stabbed = 0
-    pair.way_depth = 0.0
-    pose = posed_with_move(q, count.body_a, count.body_b, move)
-    far = pair.far + math.sqrt(dot(pose.shift, pose.shift))
-    limits = Limits(pair.needed + ROUNDING * far, pair.touch, pair.resolution, count.budget, count.budget)
-    return done_task(forest, front, pose, limits, task)
-
-
-FRONTS = (
-    "Tuple((f8[:, ::1], i8[:, ::1], f8[:, :, ::1], i8[:, :, ::1], "
-    "f8[:, ::1], i8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1]))"
-)
-
-
-@kernel(signatures=f"({FOREST}, {FRONTS}, f8[:, ::1], f8[:, ::1], i8[::1], i8[::1])", allocates=True)
-def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes):
-    """Look at pairs of bodies at poses q (n, 7), each after a move (6) of its second body; how each look ended."""
-    table, pool, faces, links, tree_nodes, used = forest_arrays
-    forest = Forest(Store(table, pool), faces, links, tree_nodes, used)
-    pairs, counts, parted, nodes, next_parted, next_nodes, waiting, waiting_nodes, work = front_arrays
-    for k in range(len(tasks)):
-        if tasks[k] == PASSED_BY:
-            continue
-        front = Front(pairs[k], counts[k], parted[k], nodes[k], next_parted, next_nodes, waiting, waiting_nodes, work)
-        codes[k] = look_at_pair(forest, front, q, moves[k], tasks[k])
-
-
-@kernel(signatures=f"({FOREST}, {FRONTS}, f8[:, ::1], f8[:, ::1], f8, b1, i8[::1])", allocates=True)
-def stay_clear(forest_arrays, front_arrays, q, moves, touch, at_once, codes):
-    """Look at all pairs on the way to poses q (n, 7): how the first ended that is not known to stay clear, or CLEAR.
-
-    Where one was not clear at its last look, none is looked at: all end OPEN. Ways that are to be proven at once are
-    not taken in parts.
-    """
-    table, pool, faces, links, tree_nodes, used = forest_arrays
-    forest = Forest(Store(table, pool), faces, links, tree_nodes, used)
-    pairs, counts, parted, nodes, next_parted, next_nodes, waiting, waiting_nodes, work = front_arrays
-    for k in range(len(pairs)):
-        codes[k] = OPEN
-    for k in range(len(pairs)):
-        if pair_proof_at(pairs[k], 0).known != 1.0:
-            return OPEN
-    worst = CLEAR
-    for k in range(len(pairs)):
-        front = Front(pairs[k], counts[k], parted[k], nodes[k], next_parted, next_nodes, waiting, waiting_nodes, work)
-        pair, count = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
-        pair.touch = touch
-        task = ON_WAY_AT_ONCE if at_once else ON_WAY
-        if count.count > GROWN * count.fresh + MANY:
-            task = ON_WAY_ANEW
-        codes[k] = look_at_pair(forest, front, q, moves[k], task)
-        if worst == CLEAR:
-            worst = codes[k]
-    return worst
-
-
-@kernel(signatures=f"({FOREST}, UniTuple(i8, 2), f8[::1], f8[::1], f8[::1])")
-def gap_along(forest_arrays, nodes, turn, shift, normal):
-    """The gap of two nodes along a direction, b at a rotation (9) and a shift seen from a."""
-    table, pool, faces, links, tree_nodes, used = forest_arrays
-    forest = Forest(Store(table, pool), faces, links, tree_nodes, used)
-    rotation_b = (turn[0], turn[1], turn[2], turn[3], turn[4], turn[5], turn[6], turn[7], turn[8])
-    pose = RelativePose(rotation_b, (shift[0], shift[1], shift[2]))
-    return separation(forest, nodes[0], nodes[1], pose, (normal[0], normal[1], normal[2]))

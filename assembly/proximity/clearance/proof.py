@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,29 +11,16 @@ from assembly._record import rows_of
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_of
 from assembly.proximity.clearance.answers import Answer, Verdict
-from assembly.proximity.clearance.body_pairs import BodyPairs
-from assembly.proximity.clearance.forest import Fronts
 from assembly.proximity.clearance.inside import UNCLEAR, winding_of
-from assembly.proximity.clearance.look import (
-    AT_POSE,
-    BEGUN_ANEW,
-    GROWN,
-    MANY,
-    ON_WAY,
-    ON_WAY_ANEW,
-    PASSED_BY,
-    look_at_pairs,
-    stay_clear,
-)
+from assembly.proximity.clearance.kept_looks import KeptLooks, run_through
+from assembly.proximity.clearance.pair_looks import BEGUN_ANEW, ON_WAY
 from assembly.proximity.clearance.records import (
     BY_BORE_B,
     BY_PLANE,
     BY_SLEEVE,
     CLEAR,
     CROSSING,
-    NO_ROOM,
     NODES,
-    OPEN,
     PARTED,
 )
 
@@ -51,7 +38,7 @@ REMEMBERED = 4
 STACK = 4096
 
 
-class ClearanceProof(BodyPairs):
+class ClearanceProof(KeptLooks):
     """The proofs of pairs of bodies, kept from look to look.
 
     Parameters
@@ -71,13 +58,7 @@ class ClearanceProof(BodyPairs):
         minimum: Sequence[float],
     ) -> None:
         super().__init__(shapes, pairs, minimum)
-        local = [(self._number[a], self._number[b]) for a, b in pairs]
-        self.fronts = Fronts(self.forest, local, minimum)
-        self.fronts.counts.body_a, self.fronts.counts.body_b = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-        self._codes, self._stack = np.zeros(len(self.pairs), dtype=np.int64), np.zeros(STACK, dtype=np.int64)
-        self._begun = np.zeros(len(self.pairs), dtype=bool)
-        # Columns: to ask records for them by name takes longer than a tick.
-        self._turn, self._shift = self.fronts.pair.turn, self.fronts.pair.shift
+        self._stack = np.zeros(STACK, dtype=np.int64)
         self._way_depth, self._slimmer = self.fronts.pair.way_depth, self.fronts.pair.slimmer
         self._soonest, self._travelled = self.fronts.pair.soonest, self.fronts.pair.travelled
         self._needed = self.fronts.pair.needed
@@ -85,8 +66,6 @@ class ClearanceProof(BodyPairs):
         self._slimmest = np.array([self.radius(k) if self.is_of_wires(k) else 0.0 for k in range(len(self.pairs))])
         # What opened contacts at the last look of a solve.
         self.moves = np.zeros((len(self.pairs), 6))
-        # Poses of the last looks, where all pairs had them at the same ones.
-        self._at: bytes | None = None
         self._stood: dict[tuple[bytes, float], list[Answer]] = {}
 
     def as_they_stand(self, q: Array, touching: float) -> list[Answer]:
@@ -131,69 +110,30 @@ class ClearanceProof(BodyPairs):
         budget : int, optional
             Of each pair, the pairs of nodes after which it stays undecided, where that is not to be the usual number.
         """
+        return run_through(self.looking(q, touching, moves, which, swept, budget))
+
+    def looking(
+        self,
+        q: Array,
+        touching: float,
+        moves: Array | None = None,
+        which: Sequence[int] | None = None,
+        swept: bool = False,
+        budget: int | None = None,
+    ) -> Generator[None, None, list[Answer]]:
+        """As `look`, piece by piece: it yields whenever the time of `until` is over, and goes on when it is resumed."""
         rows = list(range(len(self.pairs)) if which is None else which)
         moved = np.zeros((len(self.pairs), 6)) if moves is None else np.ascontiguousarray(moves, dtype=float)
-        tasks = self._looked(q, touching, moved, rows, swept, budget)
+        tasks = yield from self._looked(q, touching, moved, rows, swept, budget)
         return [self._answer(k, q, moved[k], tasks[k] >= ON_WAY) for k in rows]
 
     def go_along(self, q: Array, touching: float, moves: Array, which: Sequence[int]) -> None:
         """As `look` with `swept`, of which nobody asks what is proven: the next look goes on from there."""
-        tasks = self._looked(q, touching, moves, which, True, None)
+        tasks = run_through(self._looked(q, touching, moves, which, True, None))
         for k in which:
             # Of a pair that is clear all the way nothing is left to be found out.
             if tasks[k] < ON_WAY or self._codes[k] != CLEAR:
                 self._answer(k, q, moves[k], tasks[k] >= ON_WAY)
-
-    def _looked(
-        self, q: Array, touching: float, moves: Array, rows: Sequence[int], swept: bool, budget: int | None
-    ) -> list[int]:
-        """Look at some pairs; what was asked of each."""
-        self._forget()
-        tasks = np.zeros(len(self.pairs), dtype=np.int64)
-        counts, pair = self.fronts.counts, self.fronts.pair
-        grown = counts.count > GROWN * counts.fresh + MANY
-        asked = np.where(grown | ~self._begun, BEGUN_ANEW, AT_POSE)
-        if swept:
-            asked = np.where(pair.known == 1.0, np.where(grown, ON_WAY_ANEW, ON_WAY), asked)
-        tasks[rows] = asked[rows]
-        self._run(q, touching, moves, tasks, budget)
-        self._begun[rows] = True
-        at = q.tobytes()
-        if len(rows) == len(self.pairs):
-            self._at = at
-        elif self._at != at:
-            self._at = None
-        told: list[int] = tasks.tolist()
-        return told
-
-    def stays_clear(
-        self, q: Array, touching: float, moves: Array, budget: int | None = None, at_once: bool = False
-    ) -> bool:
-        """Whether all pairs, all of which were clear at the last look, are so at poses and on the way there.
-
-        Where one is not, nothing is known: `look` tells what it is. The budget is as there. A way that is to be proven
-        at once is not taken in parts.
-        """
-        if budget is None:
-            return self._stay_clear(q, touching, moves, at_once)
-        counts = self.fronts.counts
-        usual, counts.budget = counts.budget.copy(), budget
-        clear = self._stay_clear(q, touching, moves, at_once)
-        counts.budget = usual
-        return clear
-
-    def _stay_clear(self, q: Array, touching: float, moves: Array, at_once: bool) -> bool:
-        self._forget()
-        self._at, at = None, np.array(q, dtype=float)
-        code = NO_ROOM
-        while code == NO_ROOM:
-            code = stay_clear(self.forest.arrays, self.fronts.arrays, at, moves, touching, at_once, self._codes)
-            if code == NO_ROOM and not self._grow():
-                return False
-        if code != CLEAR:
-            return False
-        self._at = at.tobytes()
-        return True
 
     def make_slimmer(self, depth: float) -> None:
         """From now on two wires may be in each other by a depth, and on ways by the square of their length as well.
@@ -208,7 +148,7 @@ class ClearanceProof(BodyPairs):
 
     def way_depth(self) -> float:
         """How far wires may be in each other on the ways of the last looks, at most."""
-        return float(self._way_depth.max(initial=0.0))
+        return max(self._way_depth.tolist(), default=0.0)
 
     def clear_answers(self, q: Array, moves: Array) -> list[Answer]:
         """What is proven of all pairs at poses (n, 7) at which they stayed clear, after moves (pairs, 6)."""
@@ -255,11 +195,6 @@ class ClearanceProof(BodyPairs):
         self.moves[:] = 0.0
         self.forget_poses()
 
-    def _forget(self) -> None:
-        """Forget cells where contacts that went along bodies have left too many."""
-        if self.forest.is_large:
-            self.forest.forget(self.fronts)
-
     def is_apart(self, k: int, q: Array, distance: float, budget: int, moves: Array | None = None) -> bool:
         """Whether it is proven, within a budget, that bodies of pair k are farther apart and none is in the other.
 
@@ -271,7 +206,8 @@ class ClearanceProof(BodyPairs):
         usual, budgets[k] = int(budgets[k]), budget
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         tasks[k] = BEGUN_ANEW
-        self._run(q, 0.0, np.zeros((len(self.pairs), 6)) if moves is None else moves, tasks)
+        moved = np.zeros((len(self.pairs), 6)) if moves is None else moves
+        run_through(self._look(q, 0.0, moved, tasks, None))
         found = self._codes[k] == CLEAR and self.nested(k) is False
         # Gaps of this front are those over another length.
         needed[k], budgets[k], self._begun[k], slimmer[k] = before, usual, False, depth
@@ -288,33 +224,6 @@ class ClearanceProof(BodyPairs):
             return None
         normal: Array = rows_of(PARTED, self.fronts.parted[k])[0].normal
         return rotation_of(q[self.pairs[k][0], 3:]) @ normal
-
-    def _grow(self) -> bool:
-        """Make more room for cells, or for fronts; False where there may be no more."""
-        return self.forest.grow() if self.forest.is_full else self.fronts.grow()
-
-    def _run(self, q: Array, touching: float, moves: Array, tasks: Table, budget: int | None = None) -> None:
-        usual = self.fronts.counts.budget.copy()
-        if budget is not None:
-            self.fronts.counts.budget = budget
-        self._look(q, touching, moves, tasks)
-        self.fronts.counts.budget = usual
-
-    def _look(self, q: Array, touching: float, moves: Array, tasks: Table) -> None:
-        """Look at pairs, and again with more room at those that had too little."""
-        self.fronts.pair.touch = touching
-        waiting, at = tasks.copy(), np.array(q, dtype=float)
-        while waiting.any():
-            look_at_pairs(self.forest.arrays, self.fronts.arrays, at, moves, waiting, self._codes)
-            short = (waiting != PASSED_BY) & (self._codes == NO_ROOM)
-            if not short.any():
-                return
-            if not self._grow():
-                self._codes[short] = OPEN
-                return
-            # What is in the front already stays there.
-            kept = np.where(waiting == BEGUN_ANEW, AT_POSE, waiting)
-            waiting = np.where(short, kept, PASSED_BY)
 
     def bound(self, k: int) -> float:
         """A lower bound of the distance of pair k at its last look, where that ended clear."""
@@ -370,18 +279,6 @@ class ClearanceProof(BodyPairs):
         links = rows_of(NODES, nodes)
         is_open &= links.how == BY_PLANE
         return rows[is_open], links[is_open]
-
-    def last_poses(self) -> tuple[Array, Array]:
-        """The rotations (pairs, 9) and shifts (pairs, 3) of second bodies at the last looks that ended clear."""
-        return self._turn.copy(), self._shift.copy()
-
-    def go_back(self, poses: tuple[Array, Array]) -> None:
-        """Make earlier poses, from which all ways were clear, the last ones again."""
-        pair, self._at = self.fronts.pair, None
-        for k, (turn, shift) in enumerate(zip(*poses, strict=True)):
-            now = pair.turn[k].reshape(3, 3).copy(), pair.shift[k].copy()
-            pair.travelled[k] += self.length_between(k, now, (turn.reshape(3, 3), shift))
-            pair.turn[k], pair.shift[k] = turn, shift
 
     def nested(self, k: int) -> bool | None:
         """Whether a body of pair k, just found clear, is within the other one; None where no ray tells.

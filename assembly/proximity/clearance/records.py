@@ -89,6 +89,10 @@ PAIR = record_dtype(
     far=1,  # the sum of the bodies' largest coordinates
     slimmer=1,  # by so much wires may be in each other: pieces of them that are parted by the distance of their spines
     way_depth=1,  # how far these may be in each other on the way of the last look, at most
+    underway=1,  # of a look whose time was over: TO_POSE, ON_ITS_WAY; else 0
+    aim_part=1,  # where it looks, as a part of the way that is still to be proven
+    aim_turn=9,  # and the pose there
+    aim_shift=3,
     guides=(GUIDES, 3),  # normals of contacts, from a to b, seen from a: directions that are tried as well; or zero
 )
 pair_proof_at = record_view(PAIR)
@@ -102,7 +106,8 @@ COUNTS = record_dtype(
     budget=1,  # pairs of nodes after so many stay open
     count=1,  # of pairs of nodes in the front
     next_count=1,  # and in the one that follows
-    fresh=1,  # how many there were when it was last begun
+    fresh=1,  # how many there were when it was last begun; 0: it is not done with that
+    earlier=1,  # of a look whose time was over, the pairs for which directions were sought until then
     opened=1,  # of pairs of cells that were left open
     asked=1,  # pairs whose gap was asked again along a kept direction
     sought=1,  # pairs for which directions were sought
@@ -123,12 +128,16 @@ NODES = record_dtype(
     "i8",
     a=1,
     b=1,
-    how=1,  # BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, BY_SLEEVE: what parts them
+    how=1,  # BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, BY_SLEEVE: what parts them; OPEN_YET
 )
 nodes_at = record_view(NODES)
 NODES_SIZE = size_of(NODES)
-# A plane between them; the bore of a wall of a in which b is, or the other way around; the distance of two spines; the
-# bore of a in which the part of b beside a is, in three ways (`sleeves.py`).
-BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, BY_SLEEVE = 0, 1, 2, 3, 4
-# How a look ends. UNSWEPT: the way is too long to be proven at once; NO_ROOM: memory is full, and has to be grown.
-CLEAR, CROSSING, OPEN, NO_ROOM, UNSWEPT = 0, 1, 2, 3, 4
+# A plane between them; the bore of a wall of a in which b is, or the other way around; the distance of two spines. Of
+# a look whose time was over: nothing yet. The bore of a in which the part of b beside a is, in three ways
+# (`sleeves.py`).
+BY_PLANE, BY_BORE_A, BY_BORE_B, BY_SPINES, OPEN_YET, BY_SLEEVE = 0, 1, 2, 3, 4, 5
+# How a look ends. UNSWEPT: the way is too long to be proven at once; NO_ROOM: memory is full, and has to be grown;
+# SPENT: the time is over, and the next call goes on.
+CLEAR, CROSSING, OPEN, NO_ROOM, UNSWEPT, SPENT = 0, 1, 2, 3, 4, 5
+# What a look whose time was over looks at: a pose alone, or the way there as well.
+TO_POSE, ON_ITS_WAY = 1.0, 2.0

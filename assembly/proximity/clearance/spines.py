@@ -15,8 +15,10 @@ at any point x, so that
 
     f >= f(x) + min over both pieces of grad f(x).(y - x),
 
-whatever x is. Newton's method seeks the x at which that is most; it proves nothing. Pieces for which f is not convex
-are halved like others.
+whatever x is. Newton's method seeks the x at which that is most; it proves nothing. Where wires lie along each other,
+and their curvatures fit, no pieces are short enough for f to be convex. With the least eigenvalue that the second
+derivatives may have anywhere, -e, f lies above its tangent plane less e |y - x|^2 / 2. As e goes to zero with the
+lengths of pieces there, that is of the third order in these. Pieces whose f_ss or f_tt may be negative are halved.
 
 Along a way every point of b goes on a chord, but for its sag. A point that is at least D from another one at both ends
 of a chord of length s is sqrt(D^2 - s^2 / 4) from it at least in between. So wires that touch at both ends of a way are
@@ -89,15 +91,16 @@ def squared_at(one, other, s, t):
 
 
 @kernel(inline=True)
-def is_convex(one, other):
-    """Whether half of the squared distance of points of two pieces is convex in their lengths.
+def least_curvature(one, other):
+    """A lower bound of all second derivatives of half of the squared distance of points of two pieces, or 0 if convex.
 
+    It is of the least eigenvalue; minus infinity where f_ss or f_tt may be negative.
     Each second derivative is off its value in the middles by no more than its own derivatives, times half lengths:
     those of d.c'' are d.c''' along c, of length |d| times the squared curvature, and -e'.c'' along e. Tangents turn by
     the angle of half a piece, so that the angle between two is less than in the middles by both of these at most.
     """
     if one.bend == 0.0 and other.bend == 0.0:
-        return True
+        return 0.0
     f = squared_at(one, other, 0.0, 0.0)
     farthest = math.sqrt(2.0 * f.f) + one.half + other.half
     turn, twist = one.bend * one.half, other.bend * other.half
@@ -107,7 +110,12 @@ def is_convex(one, other):
     st = 1.0
     if cosine < math.cos(turned):
         st = cosine * math.cos(turned) + math.sqrt(max(1.0 - cosine * cosine, 0.0)) * math.sin(turned)
-    return ss > 0.0 and tt > 0.0 and st * st <= ss * tt
+    if not (ss > 0.0 and tt > 0.0):
+        return -math.inf
+    if st * st <= ss * tt:
+        return 0.0
+    # That of the matrix of the least f_ss and f_tt and the largest f_st: no other one has a lesser eigenvalue.
+    return 0.5 * (ss + tt) - math.sqrt(0.25 * (ss - tt) ** 2 + st * st)
 
 
 @kernel(inline=True)
@@ -155,16 +163,19 @@ def next_places(f, one, other, s, t):
 def spine_distance(forest, a, b, pose, s, t):
     """A lower bound of the distance of the spines of two pieces of wires, and the places that it is from.
 
-    Minus infinity where half of its square is not convex. s, t: where it may be least.
+    Minus infinity where half of its square is too far from being convex. s, t: where it may be least.
     """
     one, other = piece_of(forest, a, IDENTITY), piece_of(forest, b, pose)
-    if not is_convex(one, other):
-        return -math.inf, 0.0, 0.0
+    concave = -0.5 * least_curvature(one, other)
     s, t = clamped(s, one.half), clamped(t, other.half)
+    # From the middles, what is lost on the way to the ends is least.
+    if not squared_at(one, other, s, t).f > concave * (one.half**2 + other.half**2):
+        return -math.inf, s, t
     best, at_s, at_t = -math.inf, s, t
     for _ in range(STEPS):
         f = squared_at(one, other, s, t)
         bound = f.f + lowest_change(f.s, s, one.half) + lowest_change(f.t, t, other.half)
+        bound -= concave * ((one.half + abs(s)) ** 2 + (other.half + abs(t)) ** 2)
         if bound > best:
             best, at_s, at_t = bound, s, t
         before_s, before_t = s, t

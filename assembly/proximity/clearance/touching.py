@@ -14,7 +14,7 @@ from assembly._record import rows_of
 from assembly.kinematics.pose import rotation_of
 from assembly.proximity.clearance.answers import Contacts
 from assembly.proximity.clearance.body_cells import BodyCells
-from assembly.proximity.clearance.look import gap_along
+from assembly.proximity.clearance.pair_looks import gap_along
 from assembly.proximity.clearance.parting import least_move
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.records import CELL_FACE, FLAT, GUIDES, LINKS, NODE, NONE

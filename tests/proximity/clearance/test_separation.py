@@ -17,7 +17,7 @@ from assembly.geometry.shapes.path import Path
 from assembly.kinematics.motion import RelativePose
 from assembly.proximity.clearance.directions import best_direction
 from assembly.proximity.clearance.front import Front, Parted
-from assembly.proximity.clearance.look import gap_along
+from assembly.proximity.clearance.pair_looks import gap_along
 from assembly.proximity.clearance.records import BY_BORE_A, BY_PLANE, Forest
 from assembly.proximity.clearance.separation import farthest_of_disc, room_in_bore, separation
 from assembly.proximity.clearance.sleeves import best_bore

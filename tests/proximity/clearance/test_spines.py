@@ -20,7 +20,7 @@ from assembly.proximity.clearance.front import Parted
 from assembly.proximity.clearance.records import BY_SPINES, NODE, NODES, WIRE
 from assembly.proximity.clearance.spines import (
     both_radii,
-    is_convex,
+    least_curvature,
     loss_on_way,
     piece_of,
     point_at,
@@ -115,24 +115,41 @@ def test_derivatives_of_the_squared_distance(cases):
         assert along_s[2] == pytest.approx(f.st, abs=1e-10) and along_t[1] == pytest.approx(f.st, abs=1e-10)
 
 
-def test_convex_is_convex(cases):
-    """The least eigenvalue of the second derivatives at samples of both pieces."""
-    convex = 0
+def test_second_derivatives_are_bounded(cases):
+    """The least eigenvalue of the second derivatives at samples of both pieces; some are convex, and some are not.
+
+    Of smaller pieces the bound is nearer to what it bounds.
+    """
+    convex, concave = 0, 0
     for _, forest, a, b, turn, shift in pairs(cases, 3):
         one, other = piece_of(forest, a, IDENTITY), piece_of(forest, b, relative(turn, shift))
-        if not is_convex(one, other):
-            continue
-        convex += 1
+        bound = least_curvature(one, other)
+        assert bound <= 0.0
+        convex, concave = convex + (bound == 0.0), concave + (-math.inf < bound < 0.0)
         for s in np.linspace(-one.half, one.half, 9):
             for t in np.linspace(-other.half, other.half, 9):
                 f = squared_at(one, other, s, t)
-                assert np.linalg.eigvalsh([[f.ss, f.st], [f.st, f.tt]])[0] >= -ROUNDING
-    assert convex > 40
+                assert np.linalg.eigvalsh([[f.ss, f.st], [f.st, f.tt]])[0] >= bound - ROUNDING
+    assert convex > 40 and concave > 10
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-5, 1e-7])
+def test_wires_that_bend_alike_are_parted_by_few_pieces(gap):
+    """Arcs about one center: half of their squared distance is convex nowhere, and has an eigenvalue of zero.
+
+    What is lost to that is of the third order in the lengths of pieces. Their number goes with the third root of the
+    gap: 24 to 28 over it; where pieces had to be parted by planes it was 40 to 190, and more than may be for 1e-7.
+    """
+    outer, inner = (asm.shapes.pipe(Path().arc(bend, 1.0, toward=(1, 0, 0)), 0.5) for bend in (3.75, 2.75 - gap))
+    proof = proof_of(faces_of(outer), faces_of(inner))
+    (answer,) = proof.look(poses(at(1.0 + gap, 0.0, 0.0)), 0.0)
+    assert answer.verdict is Verdict.CLEAR and 0.0 < answer.bound <= gap + ROUNDING
+    assert proof.fronts.counts.sought[0] < 35.0 * gap ** (-1.0 / 3.0)
 
 
 def test_distances_are_lower_bounds_and_exact(cases):
     """Beside samples of both pieces, and of those around the places that are told; chords are off by their sags."""
-    known = 0
+    known, bounded = 0, 0
     for _, forest, a, b, turn, shift in pairs(cases, 4):
         pose = relative(turn, shift)
         one, other = piece_of(forest, a, IDENTITY), piece_of(forest, b, pose)
@@ -143,11 +160,14 @@ def test_distances_are_lower_bounds_and_exact(cases):
         x, y = points_on(one, 60), points_on(other, 60)
         assert bound <= np.linalg.norm(x[:, None] - y, axis=-1).min() + ROUNDING
         assert abs(s) <= one.half and abs(t) <= other.half
+        if least_curvature(one, other) < 0.0:
+            bounded += 1
+            continue
         # From any start the same, and it is the distance of the points that are told.
         again, _, _ = spine_distance(forest, a, b, pose, one.half, -other.half)
         told = math.dist(point_at(one, s)[0], point_at(other, t)[0])
         assert bound == pytest.approx(again, abs=ROUNDING) and bound == pytest.approx(told, abs=ROUNDING)
-    assert known > 40
+    assert known - bounded > 40 and bounded > 5
 
 
 def test_ways_lose_no_more_than_is_told(cases):
