@@ -85,8 +85,9 @@ class TickMemory(InOneProcess):
     _touching: float
     _tolerance: float
 
-    def _take_packed(self) -> None:
-        """Go on with the scene as it is packed now."""
+    def _take_packed(self, first: Solution) -> None:
+        """Go on with the scene as it is packed once a solution has listed its contacts, which may need more places."""
+        _ = first._state
         self._packed: Packed = self._inner.packed()
         assert self._inner._scene is not None
         self._scene: Scene = self._inner._scene

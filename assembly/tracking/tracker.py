@@ -164,7 +164,7 @@ class Tracker(TickMemory):
         if first.disagreeing:
             # What rows disagree by depends on the pose.
             limit = max(limit, Options.fit)
-        self._take_packed()
+        self._take_packed(first)
         self._settings = _tick_settings(limit, iterations, second_order)
         self._budget = budget
         if budget is not None:
@@ -245,7 +245,7 @@ class Tracker(TickMemory):
             self._hands.pack(self._packed)
             self._hands.take_targets(before)
             raise
-        self._take_packed()
+        self._take_packed(first)
         self._settings[RADIUS] = self._radius
         self._begin_at(first)
         self._hands.take_targets(first.q)

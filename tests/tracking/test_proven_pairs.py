@@ -50,21 +50,28 @@ def test_a_crank_of_thick_links_follows(is_driven):
     assert step.solution.values["swing.angle"] == pytest.approx(CRANK.swing(angle), abs=1e-7)
 
 
-def arm_and_peg():
+def arm_and_peg(least=0.0):
     """An arm of 100 by 10 that turns about the origin, and a fixed peg of radius 5 at (80, 40) in its way."""
     base = asm.Body("base", asm.shapes.box(10, 10, 10), position=(0, 0, -15), fixed=True)
     peg = asm.Body("peg", asm.shapes.solid_cylinder(5, 30), position=(80, 40, 0), fixed=True)
     arm = asm.Body("arm", asm.shapes.box(100, 10, 10), position=(45, 0, 0))
     scene = asm.Assembly([base, peg, arm])
-    scene.constrain(asm.Revolute(base.frame((0, 0, 15)), arm.frame((-45, 0, 0)), "turn"), asm.Clearance())
+    scene.constrain(asm.Revolute(base.frame((0, 0, 15)), arm.frame((-45, 0, 0)), "turn"))
+    scene.constrain(asm.Clearance(minimum=least))
     return scene, arm
 
 
-def test_what_is_in_the_way_is_listed_while_it_pushes():
+def highest_angle(least=0.0):
+    """Where the arm's side is as far from the peg as it has to be."""
+    return np.arctan2(40.0, 80.0) - np.arcsin((10.0 + least) / np.hypot(80.0, 40.0))
+
+
+@pytest.mark.parametrize("least", [0.0, 1.0])
+def test_what_is_in_the_way_is_listed_while_it_pushes(least):
     """An arm that is pressed on a peg rests on it, where a line touches a circle, and leaves it again."""
-    scene, arm = arm_and_peg()
+    scene, arm = arm_and_peg(least)
     tracker = scene.tracker(arm.point(45, 0, 0))
-    most = np.arctan2(40.0, 80.0) - np.arcsin(10.0 / np.hypot(80.0, 40.0))
+    most = highest_angle(least)
     statuses, listed, highest = Counter(), [], -np.inf
     angles = np.r_[np.arange(0.0, 0.6, 0.02), np.arange(0.6, 0.0, -0.02)]
     for angle in angles:
@@ -79,6 +86,20 @@ def test_what_is_in_the_way_is_listed_while_it_pushes():
     assert highest == pytest.approx(most, abs=1e-9)
     assert not statuses[TrackStatus.HELD]
     assert listed[0] == 0 and max(listed) > 0 and listed[-1] == 0
+
+
+def test_a_budget_holds_the_tick_in_which_rows_are_found_wanting():
+    """Later ticks have them: the arm comes to rest on the peg however little time a tick has, and goes back."""
+    scene, arm = arm_and_peg()
+    tracker = scene.tracker(arm.point(45, 0, 0), budget=3e-5)
+    for angle in [*np.arange(0.0, 0.6, 0.02), *[0.6] * 40]:
+        step = tracker.step((90.0 * np.cos(angle), 90.0 * np.sin(angle), 0.0))
+        at = 2.0 * np.arctan2(step.q[2, 6], step.q[2, 3])
+        assert step.proved and at <= highest_angle() + 1e-10
+    assert at == pytest.approx(highest_angle(), abs=1e-9)
+    for _ in range(40):
+        step = tracker.step((90.0, 0.0, 0.0))
+    assert step.q[2] == pytest.approx((45.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), abs=1e-7)
 
 
 def test_two_trackers_of_one_scene_give_the_same():
