@@ -95,9 +95,10 @@ def read_step(
     """The solids of a STEP file, a body each.
 
     A part that the file's assembly uses several times becomes several bodies that share their faces. Geometry stays in
-    the part's own coordinates; the body's pose is its placement in the assembly. Names are those of the parts, with
-    "nut" followed by "nut 2"; faces have their names in the file, or "face 1", "face 2" in its order (always around
-    voids, whose names OCCT does not read). `body.color` and `face.color` are the file's, or None.
+    the part's own coordinates; the body's pose is its placement in the assembly. Where that mirrors or scales, the body
+    is an image of the part. Names are those of the parts, with "nut" followed by "nut 2"; faces have their names in the
+    file, or "face 1", "face 2" in its order (always around voids, whose names OCCT does not read). `body.color` and
+    `face.color` are the file's, or None.
 
     Planes, cylinders, cones, spheres, tori, swept surfaces and splines are exact rational surfaces, and so are their
     trims, up to curves around an axis that have no rational form (helices, intersections): those are followed to 1e-10
