@@ -211,7 +211,8 @@ class _FirstSolve:
         if apart is not None:
             ways.append(self._from(apart))
         if not is_solved and not self._is_done(ways):
-            ways += [self._from(poses) for poses in separated(self.scene, self.q, self.options, self.interruption)]
+            poses = separated(self.scene, self.q, self.options, self.interruption)
+            ways += [] if poses is None else [self._from(poses)]
         return ways
 
     def _from_parted_end(self, end: Solution) -> list[Solution]:

@@ -48,11 +48,11 @@ class _Crossing:
     nested: bool
 
 
-def separated(scene: Assembly, q: Array, options: Mapping[str, Any], interruption: Interruption) -> list[Array]:
-    """Where bodies that clearances keep apart touch and do not cross, near q, and a little farther apart; (n, 7) each.
+def separated(scene: Assembly, q: Array, options: Mapping[str, Any], interruption: Interruption) -> Array | None:
+    """Where bodies that clearances keep apart are a little farther apart than where they touch, near q; (n, 7).
 
-    All other constraints hold there, if that could be had. None where no bodies cross at q, and where the way apart is
-    not found.
+    All other constraints hold where they touch, if that could be had. None where no bodies cross at q, and where the
+    way apart is not found.
     """
     others = [item for item in scene.constraints if not isinstance(item, Clearance)]
     kept_apart = [
@@ -61,7 +61,7 @@ def separated(scene: Assembly, q: Array, options: Mapping[str, Any], interruptio
     rows = {body.name: row for row, body in enumerate(scene.bodies)}
     often: Counter[tuple[str, str]] = Counter()
     contacts: list[Contact] = []
-    poses: list[Array] = []
+    poses: Array | None = None
     touching = options.get("touching", Options.touching) * scene.packed().scale
     for _ in range(ROUNDS):
         found: list[_Crossing] = []
@@ -89,14 +89,12 @@ def separated(scene: Assembly, q: Array, options: Mapping[str, Any], interruptio
         helper._take_constraints([*others, *contacts])
         solution = helper._from_start(q, None, dict(options), interruption)
         if solution.success:
-            poses = [solution.q]
             q = solution.q.copy()
             q[:, :3] += FARTHER * (q - before)[:, :3]
         else:
-            poses = []
             often.update(dict.fromkeys(often, TRIES))
-        poses.append(q)
-    return []
+        poses = q
+    return None
 
 
 def _crossing(a: Body, b: Body, q: Array, rows: Mapping[str, int], touching: float) -> _Crossing | None:
