@@ -138,10 +138,9 @@ def prove_way(
             found = StayedClear(packed, *proof.clear_bounds(q, proof.moves))
             packed.stood = _asked(packed, state), touching, found
             return found
-        if not may_jump and not (proof.fronts.pair.known == 1.0).all():
+        if not may_jump:
             return None
-        unproven = _unproven_ways(proof, q, length)
-        if any(not may_jump or proof.way_length(k, last, q) > proof.radius(k) for k in unproven):
+        if any(proof.way_length(k, last, q) > proof.radius(k) for k in _unproven_ways(proof, q, length)):
             return None
     return prove_start(packed, bodies, state, touching)
 

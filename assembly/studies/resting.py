@@ -38,6 +38,7 @@ from assembly.solve.loop.settings import (
     FIT,
     GATHER,
     NEVER,
+    OBJECTIVE,
     SOLVED,
     STATIONARITY,
     UNSURE,
@@ -253,6 +254,9 @@ def _proven(
     if answers is None or interruption.is_over() or scene._scene is None:
         return None
     state[packed.results_at + DUAL] = there.stationarity
+    if not scene.objectives:
+        # The least move is that from where the solve began.
+        state[packed.results_at + OBJECTIVE] = there.objective / packed.unit
     fit = Fit(float(settings[FIT]))
     solution = Solution(scene._scene, packed, state, Status.SOLVED, 0.0, history, there.second_order, fit)
     solution._touching, solution._clear = touching, answers
