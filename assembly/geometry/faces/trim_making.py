@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from assembly._kernel import kernel
-from assembly._record import Store
+from assembly._record import Store, record_dtype, record_view, size_of
 from assembly.geometry.faces.crossing import find_crossing
 from assembly.geometry.faces.monotone import ROW, cut_all
 from assembly.geometry.faces.trim import winding
@@ -27,9 +27,18 @@ from assembly.geometry.splines.evaluate import CURVE_RECORD
 _EMPTY = 1e-15
 # Pieces for which there is room a Bezier point: eight a degree and span, of weights that are not far apart.
 PIECES_OF_POINT = 8
-# Where in a report: whether there is a table (1), not (0) or numbers are not finite (-1), pieces, extent, the largest
-# coordinate, two curves that cross or -1, where they do, then w on the left of every chain and on the right.
-DONE, PIECES, EXTENT, LARGEST, FIRST, SECOND, WHERE_U, WHERE_V, BESIDE = range(9)
+# What is told of a trim, before w beside its chains: on the left of every one, then on the right.
+REPORT = record_dtype(
+    "f8",
+    done=1,  # 1: there is a table; 0: this kernel makes none; -1: numbers are not finite
+    pieces=1,
+    extent=1,
+    largest=1,  # coordinate
+    curves=2,  # two that cross, -1: none
+    where=2,  # (u, v) where they do
+)
+report_at = record_view(REPORT)
+BESIDE = size_of(REPORT)
 
 
 @kernel(inner=True)
@@ -50,6 +59,37 @@ def _sort_pieces(bounds, order):
                 at -= gap
             order[at] = piece
         gap //= 3
+
+
+@kernel(inner=True, allocates=True)
+def _fill_table(table, pool, ints, doubles, limits, size):
+    """Fill table and pool from the parts of either; returns where they end."""
+    records, links, first = ints
+    values, bounds = doubles
+    trim = trim_at(table, 0)
+    trim.curves = records.shape[0]
+    trim.first = TRIM_RECORD
+    trim.all_pieces = links.shape[0]
+    trim.pieces = first[first.size - 1]
+    trim.piece_table = TRIM_RECORD + records.size
+    trim.piece_pool = values.size
+    trim.curve_pieces = TRIM_RECORD + records.size + links.size
+    trim.frame = values.size + bounds.size
+    trim.steps = 0
+    trim.step_pool = values.size + bounds.size + FRAME
+    table[trim.first : trim.piece_table] = records.ravel()
+    table[trim.piece_table : trim.curve_pieces] = links.ravel()
+    stop = trim.curve_pieces + first.size
+    table[trim.curve_pieces : stop] = first
+    pool[: values.size] = values
+    pool[values.size : values.size + bounds.size] = bounds.ravel()
+    frame = trim_frame_at(pool, trim.frame)
+    frame.low_u, frame.high_u, frame.low_v, frame.high_v = limits[0], limits[1], limits[2], limits[3]
+    frame.period_u, frame.period_v = 0.0, 0.0
+    frame.on = limits[5] * size
+    frame.bottom = 0.0
+    frame.extent = size
+    return stop, values.size + bounds.size + FRAME
 
 
 @kernel(
@@ -74,7 +114,7 @@ def lay_trim(curves, shape, chains, matrices, limits, table, pool, report):
     table, pool
         Room for `PIECES_OF_POINT` pieces a Bezier point.
     report
-        Filled.
+        Filled: a `REPORT`, and w beside chains.
 
     Returns
     -------
@@ -90,11 +130,11 @@ def lay_trim(curves, shape, chains, matrices, limits, table, pool, report):
     records = np.empty((shape.shape[0], CURVE_RECORD), dtype=np.int64)
     filled, used, finite = lay_bezier_tables(curves, shape, powers, limits[4], bezier, values, records)
     if not finite:
-        report[DONE] = -1.0
+        report_at(report, 0).done = -1.0
         return 0, 0
     rows = np.empty((PIECES_OF_POINT * (filled // 3), ROW))
     count = cut_all(bezier[:filled], values[:used], records, binomials, rows)
-    report[DONE] = 0.0
+    report_at(report, 0).done = 0.0
     if count > rows.shape[0]:
         return 0, 0
     links, bounds = np.empty((count, PIECE_INTS), dtype=np.int64), np.empty((count, PIECE_DOUBLES))
@@ -109,48 +149,28 @@ def lay_trim(curves, shape, chains, matrices, limits, table, pool, report):
     u, v = np.empty(sides), np.empty(sides)
     first = np.empty(shape.shape[0] + 1, dtype=np.int64)
     largest, _way = close_pieces(values[:used], links, bounds, chains, first, (1e-10 * size, limits[6]), u, v)
-    trim = trim_at(table, 0)
-    trim.curves = shape.shape[0]
-    trim.first = TRIM_RECORD
-    trim.all_pieces = count
-    trim.pieces = first[first.size - 1]
-    trim.piece_table = TRIM_RECORD + records.size
-    trim.piece_pool = used
-    trim.curve_pieces = TRIM_RECORD + records.size + links.size
-    trim.frame = used + bounds.size
-    trim.steps = 0
-    trim.step_pool = used + bounds.size + FRAME
-    table[TRIM_RECORD : trim.piece_table] = records.ravel()
-    table[trim.piece_table : trim.curve_pieces] = links.ravel()
-    stop = trim.curve_pieces + first.size
-    table[trim.curve_pieces : stop] = first
-    pool[:used] = values[:used]
-    pool[used : used + bounds.size] = bounds.ravel()
-    frame = trim_frame_at(pool, trim.frame)
-    frame.low_u, frame.high_u, frame.low_v, frame.high_v = limits[0], limits[1], limits[2], limits[3]
-    frame.period_u, frame.period_v = 0.0, 0.0
-    frame.on = limits[5] * size
-    frame.bottom = 0.0
-    frame.extent = size
-    beside = report[BESIDE : BESIDE + sides]
+    stop, end = _fill_table(table, pool, (records, links, first), (values[:used], bounds), limits, size)
+    trim, told = trim_at(table, 0), report_at(report, 0)
+    begin = BESIDE
+    beside = report[begin : begin + sides]
     for k in range(sides):
         beside[k], _on = winding(Store(table, pool), 0, u[k], v[k])
     # w is to be 1 where there is material.
     bottom = 1.0 - beside[0]
     beside += bottom
-    frame.bottom = bottom
-    report[PIECES], report[EXTENT], report[LARGEST] = count, size, largest
+    trim_frame_at(pool, trim.frame).bottom = bottom
+    told.pieces, told.extent, told.largest = count, size, largest
     order = np.empty(trim.pieces, dtype=np.int64)
     _sort_pieces(bounds, order)
     nearest = max(limits[7] * size, limits[6] * largest)
-    where = report[WHERE_U : WHERE_V + 1]
-    moves = np.zeros((order.size, 2))
-    a, b = find_crossing(table, pool, order, moves, nearest, False, where)
-    report[FIRST], report[SECOND] = -1.0, -1.0
+    where = np.zeros(2)
+    a, b = find_crossing(table, pool, order, np.zeros((order.size, 2)), nearest, False, where)
+    told.curves[0], told.curves[1] = -1.0, -1.0
+    told.where[0], told.where[1] = where[0], where[1]
     if a >= 0:
-        report[FIRST], report[SECOND] = piece_links_at(links, a).curve, piece_links_at(links, b).curve
-    report[DONE] = 1.0
-    return stop, used + bounds.size + FRAME
+        told.curves[0], told.curves[1] = piece_links_at(links, a).curve, piece_links_at(links, b).curve
+    told.done = 1.0
+    return stop, end
 
 
 @kernel(inner=True)
