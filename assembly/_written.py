@@ -2,7 +2,7 @@
 
 `numba.extending.intrinsic` makes such functions, but for kernels alone. One that Python calls as well, by its own
 definition, is an overload around an intrinsic, which Numba compiles for itself, with a wrapper for C, for each set of
-types: a hundred of them were an eighth of the loop's first compilation.
+types. Of the loop's 430 functions 96 were such.
 """
 
 from __future__ import annotations

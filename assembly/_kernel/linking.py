@@ -34,7 +34,7 @@ class _NoEnvironment:
 class _Library(JITCodeLibrary):
     """A library whose functions are simplified one by one, by the same passes.
 
-    Numba makes a list of passes for every function, also for those that are declared alone, six of seven.
+    Numba makes a list of passes for every function, and runs it over those that are declared alone as well.
     """
 
     def _optimize_functions(self, module: Any) -> None:

@@ -1,12 +1,12 @@
 """Parts of Numba's translator that take long for kernels of this package, in less time and with the same result.
 
-A kernel here is made of some 300 small ones, which take named tuples of arrays. Two thirds of its first compilation is
-Numba's own Python, from byte code to text for LLVM, and a part of that is spent on:
+A kernel here is made of some 300 small ones, which take named tuples of arrays. Three fifths of its first compilation
+are Numba's own Python, from byte code to text for LLVM, and a part of that is spent on:
 
 - names of some 6,000 letters, since Numba writes all types of arguments into the name of a function, down to the fields
   of records. Half of an entry's machine code on disk was such names;
 - lists of variables of instructions, found by asking for each value of each instruction what it is, in four ways;
-- flags of compilation compared by name, one property of 26 after the other, wherever a kernel is called.
+- flags of compilation compared by name, one property of 22 after the other, wherever a kernel is called.
 """
 
 from __future__ import annotations
