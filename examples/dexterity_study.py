@@ -4,8 +4,8 @@ A four-bar's rocker drives a second loop, whose floating link has the tip. The l
 grid. For each design two measures are computed: the manipulability of the tip (its speed for a crank that turns at a
 rate of one) and the transmission (the sine of the angle between coupler and rocker). The study is first run in another
 process, which is killed; what that has finished is in the folder "dexterity_study", and the study continues from there.
-Prints the results and writes dexterity_study.html, one of the best designs, and, if matplotlib is installed, maps of
-both measures, dexterity_map.png, and the designs on their Pareto front, dexterity_front.png.
+Prints the results and writes dexterity_study.html, one of the best designs, and, if matplotlib is installed,
+dexterity_study.png: maps of both measures, and the designs on their Pareto front.
 """
 
 from __future__ import annotations
@@ -95,11 +95,11 @@ def main(designs: int = 10_000) -> tuple[asm.Study, int]:
     if find_spec("matplotlib"):
         from matplotlib import pyplot
 
-        figure, axes = pyplot.subplots(1, 2, figsize=(11.0, 4.5), layout="constrained")
-        for each, name in zip(axes, found.measures, strict=True):
+        figure, axes = pyplot.subplots(1, 3, figsize=(15.0, 4.2), layout="constrained")
+        for each, name in zip(axes, found.measures, strict=False):
             found.plot(name, axes=each)
-        figure.savefig("dexterity_map.png", dpi=100)
-        found.plot("-speed", "-transmission").figure.savefig("dexterity_front.png", dpi=100)
+        found.plot("-speed", "-transmission", axes=axes[2])
+        figure.savefig("dexterity_study.png", dpi=64)
     return found, finished
 
 

@@ -3,11 +3,13 @@
 A pin of diameter 8 stands in a hole of 8.4 in a plate 12 thick, and tilts as far as the hole allows; its end is in the
 plane 20 above the plate. The position of the hole, its height and the height of the end scatter. Prints the range of
 the end due to play alone, and then the stack with play as a contribution of its own, without which the stack would be
-wrong. Writes pin_and_hole_stack.html, with the pin tilted to one side.
+wrong. Writes pin_and_hole_stack.html, with the pin tilted to one side, and pin_and_hole_stack.png, the stack with its
+contributions, where matplotlib is installed.
 """
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import NamedTuple
 
 import assembly as asm
@@ -42,6 +44,8 @@ def main() -> Stack:
     found = asm.tolerances(scene, solution, off, scatter, play=True)
     print(found)
     asm.view.save_html("pin_and_hole_stack.html", loose.most.scene, loose.most.solution)
+    if find_spec("matplotlib"):
+        found.plot().savefig("pin_and_hole_stack.png", dpi=80)
     return Stack(loose, found)
 
 

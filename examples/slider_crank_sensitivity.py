@@ -2,17 +2,19 @@
 
 The crank is driven to an angle; the positions of the hinges' frames on the bodies are the lengths of crank and rod.
 Prints the piston's position, its derivatives beside those of the closed form, and the effect of a longer crank: by the
-derivative, and solved with the new length. Writes slider_crank_sensitivity.html: open it in any browser.
+derivative, and solved with the new length. Writes slider_crank_sensitivity.html, to be opened in any browser, and,
+where matplotlib is installed, slider_crank_sensitivity.png: the piston all around, and its tangent at the angle.
 """
 
 from __future__ import annotations
+
+from importlib.util import find_spec
 
 import numpy as np
 
 import assembly as asm
 
-RADIUS, LENGTH, ANGLE = 2.0, 5.0, 0.7
-LONGER = 0.01
+RADIUS, LENGTH, ANGLE, LONGER = 2.0, 5.0, 0.7, 0.01
 
 
 def slider_crank() -> tuple[asm.Assembly, asm.Measure, list[asm.Parameter]]:
@@ -24,10 +26,9 @@ def slider_crank() -> tuple[asm.Assembly, asm.Measure, list[asm.Parameter]]:
     guide = asm.Prismatic(ground.frame(z=(1, 0, 0)), piston.frame(z=(1, 0, 0)), "guide")
     scene = asm.Assembly([ground, crank, rod, piston])
     scene.constrain(hinge, pin, wrist, guide)
-    angle = asm.Parameter(hinge, "angle", name="angle")
-    radius = asm.Parameter(pin.frame_a, "origin", "x", name="crank")
-    length = asm.Parameter(wrist.frame_a, "origin", "x", name="rod")
-    return scene, asm.Measure(guide, name="stroke"), [angle, radius, length]
+    places = {"crank": pin.frame_a, "rod": wrist.frame_a}
+    lengths = [asm.Parameter(frame, "origin", "x", name=name) for name, frame in places.items()]
+    return scene, asm.Measure(guide, name="stroke"), [asm.Parameter(hinge, "angle", name="angle"), *lengths]
 
 
 def closed_form() -> np.ndarray:
@@ -41,10 +42,13 @@ def main() -> tuple[asm.Sensitivity, np.ndarray, float, float]:
     scene, stroke, (angle, radius, length) = slider_crank()
     solution = scene.solve()
     d = asm.sensitivity(scene, solution, of=stroke, wrt=[angle, radius, length])
-    print(f"the piston is at {stroke.value(solution):.12f}")
-    print(d)
+    print(f"the piston is at {stroke.value(solution):.12f}", d, sep="\n")
     print("closed form:", *(f"{value:.8g}" for value in closed_form()))
     asm.view.save_html("slider_crank_sensitivity.html", scene, solution)
+    if find_spec("matplotlib"):
+        around = asm.study(scene, asm.grid({angle: np.linspace(0.0, 2.0 * np.pi, 121)}), stroke).plot()
+        around.axline((ANGLE, stroke.value(solution)), slope=d[stroke, angle], color="tab:red", linestyle="--")
+        around.figure.savefig("slider_crank_sensitivity.png", dpi=80)
     radius.value += LONGER
     moved = stroke.value(scene.solve(solution)) - stroke.value(solution)
     print(f"a crank longer by {LONGER}: {LONGER * d[stroke, radius]:.8f} by the derivative, {moved:.8f} solved anew")

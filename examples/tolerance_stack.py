@@ -38,7 +38,7 @@ def main() -> asm.Tolerances:
     print(found)
     asm.view.save_html("tolerance_stack.html", scene, solution)
     if find_spec("matplotlib"):
-        found.plot().savefig("tolerance_stack.png", dpi=100)
+        found.plot().savefig("tolerance_stack.png", dpi=80)
     return found
 
 

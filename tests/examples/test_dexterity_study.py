@@ -18,7 +18,7 @@ def test_designs(tmp_path, monkeypatch):
     run = run_example(
         "dexterity_study",
         tmp_path,
-        also=["dexterity_study", "dexterity_map.png", "dexterity_front.png"],
+        also=["dexterity_study", "dexterity_study.png"],
         main=lambda module: module.main(designs=400),
     )
     found, finished = run.result

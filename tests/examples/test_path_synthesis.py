@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tests.examples.running import run_example
 
 
 def test_lengths_are_found_again(tmp_path):
-    run = run_example("path_synthesis", tmp_path)
+    pytest.importorskip("matplotlib").use("Agg")
+    run = run_example("path_synthesis", tmp_path, also=["path_synthesis.png"])
     found, known = run.result
     assert found.success and not found.failures
     # Steps of Gauss and Newton from a tenth off: 1e-1, 1e-2, 1e-4, 1e-8, and what solves leave.

@@ -10,7 +10,8 @@ from tests.examples.running import run_example
 
 
 def test_figures(tmp_path):
-    run = run_example("pin_and_hole_stack", tmp_path)
+    pytest.importorskip("matplotlib").use("Agg")
+    run = run_example("pin_and_hole_stack", tmp_path, also=["pin_and_hole_stack.png"])
     loose, found = run.result
     # The pin's wall goes through the edges of the hole that are across: 8.4 cos a = 8 + 12 sin a.
     slope = tan(acos(8.0 / hypot(8.4, 12.0)) - atan2(12.0, 8.4))

@@ -13,7 +13,12 @@ EXACT = (-1.696392624895384, 0.593033361407271, 1.034951956465550)
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    return run_example("slider_crank_sensitivity", tmp_path_factory.mktemp("slider_crank_sensitivity"))
+    pytest.importorskip("matplotlib").use("Agg")
+    return run_example(
+        "slider_crank_sensitivity",
+        tmp_path_factory.mktemp("slider_crank_sensitivity"),
+        also=["slider_crank_sensitivity.png"],
+    )
 
 
 def test_derivatives_are_those_of_the_closed_form(run):
