@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import isfinite, pi
 from numbers import Real
 from typing import Any
@@ -103,16 +102,6 @@ class CoordinateHand(Hand):
     def rest(self, q: Array) -> None:
         """The same."""
         self.begin_anew(q)
-
-    def recorded(self, trace: Any) -> tuple[Array, Sequence[Any]]:
-        """Nothing is recorded of coordinates: raises."""
-        self.check_recorded()
-        return super().recorded(trace)
-
-    def check_recorded(self) -> None:
-        """Raise an InputError: a trace has points or poses."""
-        name = f"{self._distance.freedom.joint.name}.{self._distance.freedom.name}"
-        raise InputError(f"trace has points or poses; expected a call of step for each value of {name!r}")
 
     def wrench(self, q: Array, target: Array) -> Array:
         """What the joint's second body does to the spring, (6,): a force along the axis, or a torque about it."""

@@ -134,6 +134,7 @@ class Hand:
         """Times (k,) and targets of a recorded hand."""
         if not isinstance(trace, Trace):
             raise TypeError(f"trace is {trace!r}; expected a Trace")
+        self.check_recorded("trace", trace)
         return trace.times, list(trace.targets)
 
     def checked(self, target: Any) -> Array | None:
@@ -199,8 +200,11 @@ class Hand:
         if isinstance(held, Point):
             self.aim(self.read(Pose(q[self._place, :3], q[self._place, 3:]).apply(held.coordinates)))
 
-    def check_recorded(self) -> None:
-        """Raise an InputError where no trace has targets of this hand."""
+    def check_recorded(self, name: str, trace: Trace) -> None:
+        """Raise an InputError where a trace has targets of another kind than this hand takes."""
+        expected = {1: "numbers", 3: "points", 7: "poses"}[self._size]
+        if self._held is not None and trace.kind != expected:
+            raise InputError(f"{name} has {trace.kind}; expected {expected} for {self._held!r}")
 
     def wrenches(self, q: Array, targets: Targets) -> Array:
         """Force and torque of the spring on the hand, (1, 6), bodies at q (n, 7)."""
@@ -321,9 +325,8 @@ class SeveralHands:
             raise TypeError(f"trace is {trace!r}; expected a Trace for each of {len(self.terms)} hands")
         if len(trace) != len(self.terms):
             raise InputError(f"trace has {len(trace)} traces; expected one for each of {len(self.terms)} hands")
-        for hand in self._hands:
-            hand.check_recorded()
-        for k, each in enumerate(trace):
+        for k, (each, hand) in enumerate(zip(trace, self._hands, strict=True)):
+            hand.check_recorded(f"trace[{k}]", each)
             if not np.array_equal(each.times, trace[0].times):
                 raise InputError(f"trace[{k}] has other times than trace[0]; expected the same: resample them")
         return trace[0].times, list(zip(*(each.targets for each in trace), strict=True))

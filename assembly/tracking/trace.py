@@ -30,7 +30,13 @@ if TYPE_CHECKING:
 __all__ = ["Speed", "Trace"]
 
 Array = NDArray[np.float64]
-_COLUMNS = ("time", "x", "y", "z", "qw", "qx", "qy", "qz")
+# Entries of a target, what such targets are, and the heading of a table of them.
+_KINDS = {1: "numbers", 3: "points", 7: "poses"}
+_HEADINGS = {
+    1: ("time", "value"),
+    3: ("time", "x", "y", "z"),
+    7: ("time", "x", "y", "z", "qw", "qx", "qy", "qz"),
+}
 # Two traces meet where one ends and the other begins within this, relative to their largest coordinate; radians.
 _MEETING = 1e-9
 # Part of an interval by which rounding may make a duration shorter.
@@ -46,15 +52,17 @@ class Speed(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Trace(ReadOnlyArrays):
-    """A recorded motion of a target: points or poses at times.
+    """A recorded motion of a target: points, poses, or values of a joint coordinate, at times.
 
     Parameters
     ----------
     times : (k,)
         Increasing, in seconds; two at least.
-    targets : (k, 3) or (k, 7), or sequence of k Pose
-        Points, or rows x y z qw qx qy qz. Quaternions are normalized, and each is taken on the side of the one before:
-        q and -q are the same turn. From one to the next the shorter turn is meant.
+    targets : (k, 3), (k, 7) or (k,), or sequence of k Pose
+        Points, or rows x y z qw qx qy qz, or values of a joint coordinate. Quaternions are normalized, and each is
+        taken on the side of the one before: q and -q are the same turn. From one to the next the shorter turn is meant.
+        Values are taken as they are: an angle of 3.1 that is followed by -3.1 goes back through zero, and `np.unwrap`
+        makes such angles continuous.
 
     Raises
     ------
@@ -87,7 +95,7 @@ class Trace(ReadOnlyArrays):
 
         Parameters
         ----------
-        points : (k, 3) or (k, 7), or sequence of k Pose
+        points : (k, 3), (k, 7) or (k,), or sequence of k Pose
         times : (k,)
         rate : float
             Samples per second, slightly more if needed to have one at both ends.
@@ -110,14 +118,14 @@ class Trace(ReadOnlyArrays):
         Parameters
         ----------
         traces : sequence of Trace
-            All of points, or all of poses; one at least.
+            All of points, all of poses, or all of values; one at least.
         pause : float
             Seconds from the end of one to the begin of the next. With none, the next must begin where the one ends.
 
         Raises
         ------
         InputError
-            No traces, points beside poses, a negative pause, or none where two do not meet.
+            No traces, ones of different kinds, a negative pause, or none where two do not meet.
         """
         if not traces:
             raise InputError("traces is empty; expected one trace at least")
@@ -126,10 +134,8 @@ class Trace(ReadOnlyArrays):
             raise InputError(f"pause is {wait:g}; expected seconds, not below zero")
         times, targets = [traces[0].times], [traces[0].targets]
         for k, trace in enumerate(traces[1:], 1):
-            if trace.targets.shape[1] != targets[0].shape[1]:
-                kinds = {3: "points", 7: "poses"}
-                expected = kinds[targets[0].shape[1]]
-                raise InputError(f"traces[{k}] has {kinds[trace.targets.shape[1]]}; expected {expected} as traces[0]")
+            if trace.kind != traces[0].kind:
+                raise InputError(f"traces[{k}] has {trace.kind}; expected {traces[0].kind} as traces[0]")
             skip = 0
             if wait == 0.0:
                 _require_meeting(f"traces[{k}]", traces[k - 1], trace)
@@ -143,23 +149,38 @@ class Trace(ReadOnlyArrays):
         return self.concatenate([self, other], pause)
 
     @property
+    def kind(self) -> str:
+        """What the targets are: "points", "poses" or "numbers"."""
+        return _KINDS[_width(self.targets)]
+
+    @property
     def duration(self) -> float:
         """Seconds from the first sample to the last."""
         return float(self.times[-1] - self.times[0])
 
     @property
     def positions(self) -> Array:
-        """Points, or the origins of poses, (k, 3)."""
+        """Points, or the origins of poses, (k, 3).
+
+        Raises
+        ------
+        InputError
+            Targets that are numbers.
+        """
+        if self.targets.ndim == 1:
+            raise InputError("targets are numbers; expected points or poses")
         return self.targets[:, :3]
 
     @property
     def speed(self) -> Speed:
-        """Peak and median speed of the points, or of the origins of poses: lengths over seconds."""
-        return self._speed(np.linalg.norm(np.diff(self.positions, axis=0), axis=1))
+        """Peak and median speed of the points, of the origins of poses, or of the values, over seconds."""
+        return self._speed(np.linalg.norm(np.diff(_places(self.targets), axis=0), axis=1))
 
     @property
     def turning(self) -> Speed:
-        """Peak and median angular speed of poses, radians over seconds; zero for points."""
+        """Peak and median angular speed of poses, radians over seconds; zero for points and numbers."""
+        if self.kind != "poses":
+            return Speed(0.0, 0.0)
         e = self.targets[:, 3:]
         # |e - f| and |e + f| are twice the sine and twice the cosine of a quarter of the angle between them.
         sine, cosine = (np.linalg.norm(e[1:] - sign * e[:-1], axis=1) for sign in (1.0, -1.0))
@@ -182,14 +203,14 @@ class Trace(ReadOnlyArrays):
         return CubicSpline(self.times, self.targets, bc_type=ends)
 
     def at(self, t: ArrayLike) -> Array:
-        """Targets at times (...), (..., 3) or (..., 7); before the first sample the first, after the last the last."""
+        """Targets at times (...), (..., 3), (..., 7) or (...); before the first sample the first, later the last."""
         times = np.asarray(t)
         asked = real_array("t", t, times.shape)
         return self._evaluated(self._spline, asked)
 
     def _evaluated(self, spline: CubicSpline, times: Array) -> Array:
         rows: Array = spline(np.clip(times, self.times[0], self.times[-1]))
-        if rows.shape[-1] == 7:
+        if self.kind == "poses":
             rows[..., 3:] /= np.linalg.norm(rows[..., 3:], axis=-1, keepdims=True)
         return rows
 
@@ -211,7 +232,7 @@ class Trace(ReadOnlyArrays):
     def save(self, path: str | PathLike[str]) -> None:
         """Write a `.csv` file or a `.npz`, with every bit.
 
-        The heading of a `.csv` is time,x,y,z or time,x,y,z,qw,qx,qy,qz.
+        The heading of a `.csv` is time,x,y,z or time,x,y,z,qw,qx,qy,qz or time,value.
 
         Raises
         ------
@@ -223,7 +244,7 @@ class Trace(ReadOnlyArrays):
             np.savez(file, times=self.times, targets=self.targets)
             return
         rows = np.column_stack([self.times, self.targets])
-        lines = [",".join(_COLUMNS[: rows.shape[1]]), *(",".join(map(repr, row)) for row in rows.tolist())]
+        lines = [",".join(_HEADINGS[_width(self.targets)]), *(",".join(map(repr, row)) for row in rows.tolist())]
         file.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
     @classmethod
@@ -245,19 +266,28 @@ class Trace(ReadOnlyArrays):
             raise InputError(f"{file}: {error}") from None
 
     def __iter__(self) -> Iterator[tuple[float, Array]]:
-        """A time and a target, (3,) or (7,), after the other."""
+        """A time and a target, (3,), (7,) or a number, after the other."""
         return zip(self.times.tolist(), self.targets, strict=True)
 
     def __len__(self) -> int:
         return len(self.times)
 
     def __repr__(self) -> str:
-        kind = "poses" if self.targets.shape[1] == 7 else "points"
-        return f"Trace({len(self)} {kind} in {self.duration:g} s, speed up to {self.speed.peak:.3g}/s)"
+        return f"Trace({len(self)} {self.kind} in {self.duration:g} s, speed up to {self.speed.peak:.3g}/s)"
+
+
+def _width(targets: Array) -> int:
+    """How many numbers a target has."""
+    return 1 if targets.ndim == 1 else int(targets.shape[1])
+
+
+def _places(targets: Array) -> Array:
+    """Points and the origins of poses (k, 3), or values (k, 1)."""
+    return targets[:, None] if targets.ndim == 1 else targets[:, :3]
 
 
 def _target_rows(name: str, value: ArrayLike | Sequence[Pose], count: int) -> Array:
-    """Points (count, 3), or pose rows (count, 7) with unit quaternions, each on the side of the one before."""
+    """Points (count, 3), values (count,), or pose rows (count, 7), unit quaternions on the side of the one before."""
     given: ArrayLike = value  # type: ignore[assignment]  # poses become rows
     if isinstance(value, (list, tuple)) and any(isinstance(entry, Pose) for entry in value):
         given = [entry.q if isinstance(entry, Pose) else entry for entry in value]
@@ -265,10 +295,11 @@ def _target_rows(name: str, value: ArrayLike | Sequence[Pose], count: int) -> Ar
         shape = np.shape(given)
     except ValueError:
         raise InputError(f"{name} has rows of different lengths; expected points or poses") from None
-    if shape not in ((count, 3), (count, 7)):
-        raise InputError(f"{name} has shape {shape}; expected ({count}, 3) for points or ({count}, 7) for poses")
+    if shape not in ((count, 3), (count, 7), (count,)):
+        expected = f"({count}, 3) for points, ({count}, 7) for poses or ({count},) for numbers"
+        raise InputError(f"{name} has shape {shape}; expected {expected}")
     rows = real_array(name, given, shape)
-    if rows.shape[1] == 7:
+    if shape == (count, 7):
         norms = np.linalg.norm(rows[:, 3:], axis=1)
         far = ~(np.abs(norms - 1.0) <= UNIT_TOLERANCE)
         if far.any():
@@ -282,9 +313,10 @@ def _target_rows(name: str, value: ArrayLike | Sequence[Pose], count: int) -> Ar
 
 
 def _require_meeting(name: str, first: Trace, second: Trace) -> None:
-    end, begin = first.targets[-1], second.targets[0]
-    apart = float(np.linalg.norm(begin[:3] - end[:3]))
-    size = float(max(np.abs(first.positions).max(), np.abs(second.positions).max()))
+    before, after = _places(first.targets), _places(second.targets)
+    apart = float(np.linalg.norm(after[0] - before[-1]))
+    size = float(max(np.abs(before).max(), np.abs(after).max()))
+    end, begin = (row if first.kind == "poses" else np.empty(0) for row in (first.targets[-1], second.targets[0]))
     turn = 2.0 * float(min(np.linalg.norm(begin[3:] - end[3:]), np.linalg.norm(begin[3:] + end[3:])))
     if apart > _MEETING * size or turn > _MEETING:
         off = f"{apart:.3g} away" + (f", turned by {turn:.3g} rad," if turn > _MEETING else "")
@@ -312,8 +344,8 @@ def _table(file: Path) -> tuple[Array, Array]:
     except UnicodeDecodeError as error:
         raise InputError(f"{file} is no text: {error}; expected a table of numbers") from None
     heading, *rows = [[cell.strip(' "') for cell in line.split(",")] for line in lines] or [[""]]
-    if tuple(heading) not in (_COLUMNS[:4], _COLUMNS):
-        expected = f"{','.join(_COLUMNS[:4])} or {','.join(_COLUMNS)}"
+    if tuple(heading) not in _HEADINGS.values():
+        expected = " or ".join(",".join(_HEADINGS[width]) for width in (3, 7, 1))
         raise InputError(f"{file} line 1 is {','.join(heading)!r}; expected {expected}")
     values = []
     for k, row in enumerate(rows, 2):
@@ -327,4 +359,4 @@ def _table(file: Path) -> tuple[Array, Array]:
             came = f"{len(row)} value{'s' if len(row) > 1 else ''}"
             raise InputError(f"{file} line {k} has {came}; expected {','.join(heading)}")
     table = np.array(values, dtype=np.float64).reshape(-1, len(heading))
-    return table[:, 0], table[:, 1:]
+    return table[:, 0], table[:, 1] if len(heading) == 2 else table[:, 1:]

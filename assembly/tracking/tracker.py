@@ -377,7 +377,7 @@ class Tracker(TickMemory):
         Parameters
         ----------
         trace : Trace or sequence of Trace
-            For several targets one trace each, with the same times.
+            Of points, poses, or numbers for a coordinate. For several targets one trace each, with the same times.
         paced : bool
             Whether to wait for each sample's time by the clock, instead of going as fast as possible.
         stride : int
@@ -390,7 +390,7 @@ class Tracker(TickMemory):
         Raises
         ------
         InputError, TypeError
-            Not a trace for each target, or traces with times other than the first one's.
+            Not a trace for each target, one of another kind, or one with times other than the first one's.
         """
         bodies, budget = len(self._scene.bodies), self._budget
         times, targets = self._hands.recorded(trace)

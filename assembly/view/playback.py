@@ -91,7 +91,7 @@ def replay(
     frames : int
         At most; not more than the log has poses.
     hand : Trace, optional
-        What was followed: drawn as a dark, transparent ball with its axes.
+        What was followed, points or poses: drawn as a dark, transparent ball with its axes.
     loop, direction, title, open, visualizer, style
         As in `animate`.
 
@@ -110,6 +110,8 @@ def replay(
         raise TypeError(f"log is of type {type(log).__name__}; expected a TrackLog")
     if hand is not None and not isinstance(hand, Trace):
         raise TypeError(f"hand is {hand!r}; expected a Trace, or None")
+    if hand is not None and hand.kind == "numbers":
+        raise InputError("hand has numbers, which are at no place; expected a Trace of points or poses")
     pace = positive("speed", speed)
     most = integer("frames", frames, 2, 100_000)
     require_flag("loop", loop)

@@ -162,6 +162,35 @@ def test_hands_on_coordinates_let_go_and_take_hold_again():
         tracker.hold(1, angle)
 
 
+def test_recorded_coordinates_are_followed(tmp_path):
+    scene, hinge, way = arm_with_slide()
+    # More than a turn, which the numbers say.
+    angles = asm.Trace.through([0.0, 2.0, 7.0], [0.0, 0.1, 0.3], rate=200.0)
+    ways = asm.Trace.through([0.0, 1.2], [0.0, 0.3], rate=200.0)
+    for name, trace in (("angles.csv", angles), ("ways.npz", ways)):
+        trace.save(tmp_path / name)
+    recorded = [asm.Trace.load(tmp_path / name) for name in ("angles.csv", "ways.npz")]
+    tracker = scene.tracker([hinge.coordinate(), way.coordinate()])
+    log = tracker.run(recorded)
+    stepped = scene.tracker([hinge.coordinate(), way.coordinate()])
+    for pair in zip(angles.targets, ways.targets, strict=True):
+        step = stepped.step(pair)
+    assert np.array_equal(log.q[-1], step.q) and log.worst_violation < 1e-11
+    values = settled(tracker, [7.0, 1.2]).solution.values
+    assert np.cos(values["hinge.angle"] - 7.0) == pytest.approx(1.0, abs=1e-12)
+    assert values["way.slide"] == pytest.approx(1.2, abs=1e-9)
+    # A tracker of one coordinate takes one trace, as one of a point does.
+    alone = scene.tracker(hinge.coordinate())
+    alone.run(angles)
+    assert np.cos(alone.step(7.0).solution.values["hinge.angle"] - 7.0) == pytest.approx(1.0, abs=1e-6)
+    with pytest.raises(asm.errors.InputError, match="trace has points; expected numbers"):
+        alone.run(asm.Trace([0.0, 1.0], np.zeros((2, 3))))
+    with pytest.raises(asm.errors.InputError, match="trace has numbers; expected points for"):
+        scene.tracker(scene["block"].point(0, 0, 0)).run(ways)
+    with pytest.raises(asm.errors.InputError, match=r"trace\[1\] has points; expected poses for"):
+        scene.tracker([hinge.coordinate(), scene["block"]]).run([angles, asm.Trace(angles.times, np.zeros((61, 3)))])
+
+
 @pytest.mark.parametrize("target", [None, "here", np.nan, np.inf, True, 1e200, [0.1, 0.2], 1j])
 def test_what_is_no_number_moves_nothing(target):
     scene, hinge, way = arm_with_slide()
@@ -181,7 +210,7 @@ def test_what_no_hand_can_draw_is_refused():
     with pytest.raises(asm.errors.InputError, match="expected a coordinate"):
         hinge.coordinate("slide")
     tracker = scene.tracker([hinge.coordinate()])
-    with pytest.raises(asm.errors.InputError, match=r"'hinge\.angle'"):
+    with pytest.raises(asm.errors.InputError, match=r"trace\[0\] has points; expected numbers for .*hinge"):
         tracker.run([asm.Trace([0.0, 1.0], np.zeros((2, 3)))])
     hinge.angle = 0.3
     assert tracker.step([0.3]).status is TrackStatus.CHANGED

@@ -143,7 +143,7 @@ def test_a_motion_made_through_points_begins_and_ends_at_rest(width):
     np.testing.assert_allclose(odd.targets[-1], rows[-1], rtol=0, atol=1e-14)
     with pytest.raises(InputError, match="rate is 0; expected a positive number"):
         asm.Trace.through(rows, times, rate=0.0)
-    with pytest.raises(InputError, match=r"points has shape \(4, 2\); expected \(4, 3\) for points or \(4, 7\)"):
+    with pytest.raises(InputError, match=r"points has shape \(4, 2\); expected \(4, 3\) for points, \(4, 7\)"):
         asm.Trace.through(rows[:, :2], times)
 
 
@@ -191,18 +191,45 @@ def test_speeds():
     assert twist.speed == pytest.approx((4.0, 4.0), abs=1e-14)
 
 
+def test_values_of_a_coordinate():
+    t = np.array([0.0, 0.1, 0.25, 0.4, 0.7])
+    trace = asm.Trace(t, [0.0, 0.2, 3.1, -3.1, 7.0])
+    assert trace.kind == "numbers" and trace.targets.shape == (5,) and trace.at(0.3).shape == ()
+    assert asm.Trace(t, np.zeros((5, 3))).kind == "points"
+    np.testing.assert_allclose(trace.at(t), trace.targets, rtol=0, atol=1e-14)
+    # A spline keeps cubics, whatever turn an angle is on.
+    cubic = asm.Trace(t, t**3 - 4.0 * t)
+    s = np.linspace(0.0, 0.7, 50)
+    np.testing.assert_allclose(cubic.at(s), s**3 - 4.0 * s, rtol=0, atol=1e-14)
+    assert list(trace) == list(zip(t.tolist(), trace.targets.tolist(), strict=True))
+    assert trace.speed == pytest.approx((6.2 / 0.15, 10.1 / 0.3)) and trace.turning == (0.0, 0.0)
+    assert repr(trace) == "Trace(5 numbers in 0.7 s, speed up to 41.3/s)"
+    made = asm.Trace.through([0.0, 2.0], [0.0, 1.0], rate=100.0)
+    assert made.at(0.5) == pytest.approx(1.0, abs=1e-14) and len(made.resampled(10.0)) == 11
+    both = made.then(asm.Trace([0.0, 1.0], [2.0, 1.0]))
+    assert len(both) == 102 and both.targets[-1] == 1.0
+    with pytest.raises(InputError, match=r"traces\[1\] begins 2 away from where the one before ends"):
+        made.then(made)
+    with pytest.raises(InputError, match=r"traces\[1\] has points; expected numbers as traces\[0\]"):
+        made.then(asm.Trace([0.0, 1.0], np.zeros((2, 3))))
+    with pytest.raises(InputError, match="targets are numbers; expected points or poses"):
+        _ = made.positions
+    with pytest.raises(InputError, match=r"targets\[1\] is nan"):
+        asm.Trace([0.0, 1.0], [0.0, np.nan])
+
+
 @pytest.mark.parametrize("ending", ["csv", "npz"])
-@pytest.mark.parametrize("width", [3, 7])
+@pytest.mark.parametrize("width", [1, 3, 7])
 def test_files_keep_every_bit(tmp_path, ending, width):
     t = np.sort(RNG.uniform(0.0, 1e3, 50))
-    trace = asm.Trace(t, turns(t)[:, :width] * 1.0)
+    trace = asm.Trace(t, turns(t)[:, 0] if width == 1 else turns(t)[:, :width] * 1.0)
     path = tmp_path / f"hand.{ending}"
     trace.save(path)
     again = asm.Trace.load(str(path))
     assert (again.times == trace.times).all() and (again.targets == trace.targets).all()
     if ending == "csv":
         heading = path.read_text().splitlines()[0]
-        assert heading == ("time,x,y,z" if width == 3 else "time,x,y,z,qw,qx,qy,qz")
+        assert heading == {1: "time,value", 3: "time,x,y,z", 7: "time,x,y,z,qw,qx,qy,qz"}[width]
 
 
 def test_a_table_of_another_program(tmp_path):
@@ -215,7 +242,7 @@ def test_a_table_of_another_program(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "hand.csv line 1 is ''; expected time,x,y,z or time,x,y,z,qw,qx,qy,qz"),
+        ("", "hand.csv line 1 is ''; expected time,x,y,z or time,x,y,z,qw,qx,qy,qz or time,value"),
         ("t,x,y,z\n0,0,0,0\n", "hand.csv line 1 is 't,x,y,z'; expected time,x,y,z or"),
         ("time,x,y,z\n0,0,0,0\n1,2,3\n", "hand.csv line 3 has 3 values; expected time,x,y,z"),
         ("time,x,y,z\n0,0,0,0\n\n1,2,3,up\n", "hand.csv line 4: could not convert string to float: 'up'; expected"),
@@ -263,8 +290,8 @@ def test_files_that_are_no_traces(tmp_path):
         ([0.0, 1.0, 1.0], np.zeros((3, 3)), "times[2] is 1.0 after 1.0; expected increasing times"),
         ([0.0, np.inf], np.zeros((2, 3)), "times[1] is inf"),
         ("now", np.zeros((2, 3)), "times is 'now'; expected real numbers"),
-        ([0.0, 1.0], np.zeros((3, 3)), "targets has shape (3, 3); expected (2, 3) for points or (2, 7) for poses"),
-        ([0.0, 1.0], np.zeros((2, 4)), "targets has shape (2, 4); expected (2, 3) for points or (2, 7) for poses"),
+        ([0.0, 1.0], np.zeros((3, 3)), "targets has shape (3, 3); expected (2, 3) for points, (2, 7) for poses or"),
+        ([0.0, 1.0], np.zeros((2, 4)), "targets has shape (2, 4); expected (2, 3) for points, (2, 7) for poses or"),
         ([0.0, 1.0], [[0, 0, 0], [0, 0]], "targets has rows of different lengths"),
         ([0.0, 1.0], [asm.Pose(), (0, 0, 0)], "targets has rows of different lengths"),
         ([0.0, 1.0], [[0, 0, 0], [0, np.nan, 0]], "targets[1, 1] is nan"),

@@ -99,6 +99,8 @@ def test_the_hand_is_a_ball(monkeypatch, balls, log):
     points = asm.Trace(hand.times, hand.positions)
     again, _ = seen(monkeypatch, balls, log, frames=41, hand=points)
     assert len(again.items) == len(picture.items) == len(film(balls, log.q[:2]).items) + 4
+    with pytest.raises(InputError, match="hand has numbers"):
+        asm.view.replay(balls, log, hand=asm.Trace([0.0, 1.0], [0.0, 0.5]))
 
 
 # Where the viewer has put the balls, the clock and the events, at the frame in the address and after a click.
