@@ -62,9 +62,10 @@ def renumbered(
     `constraints` gives those that are packed, for who needs them.
     """
     things = set_since(packed.numbers)
-    if things is not None:
-        if packed.number_places is None:
-            packed.number_places = NumberPlaces(packed, bodies, constraints(), objectives)
+    if things is not None and packed.number_places is None and not any(body in things for body in bodies):
+        # Places are of no use where a body has other faces.
+        packed.number_places = NumberPlaces(packed, bodies, constraints(), objectives)
+    if things is not None and packed.number_places is not None:
         other = packed.number_places.renumbered(packed, things, bodies[0].pose.position)
         if other is not None:
             return other
