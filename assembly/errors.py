@@ -62,7 +62,6 @@ class UnknownNameError(InputError, KeyError):
 @lru_cache(1024)
 def _has_attribute(kind: Any, name: str) -> bool:
     """Whether a class, or one that it is made of, says that its objects have an attribute."""
-
     return any(name in one.__dict__ or name in one.__annotations__ for one in kind.__mro__[:-1])
 
 
