@@ -60,7 +60,7 @@ class UnknownNameError(InputError, KeyError):
 
 
 @lru_cache(1024)
-def _has_attribute(kind: type, name: str) -> bool:
+def _has_attribute(kind: Any, name: str) -> bool:
     """Whether a class, or one that it is made of, says that its objects have an attribute."""
     return any(name in one.__dict__ or name in one.__annotations__ for one in kind.__mro__[:-1])
 
@@ -69,7 +69,8 @@ class KnownSettings:
     """Has no attributes but those its classes say: one that is misspelled, or another class's, is no setting."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name[0] != "_" and not _has_attribute(type(self), name):
+        kind: Any = type(self)
+        if name[0] != "_" and not _has_attribute(kind, name):
             classes = type(self).__mro__
             said = {key: what for one in classes[-2::-1] for key, what in one.__dict__.items()}
             # A property that only reads has no setter.
