@@ -92,13 +92,18 @@ def test_a_budget_holds_the_tick_in_which_rows_are_found_wanting():
     """Later ticks have them: the arm comes to rest on the peg however little time a tick has, and goes back."""
     scene, arm = arm_and_peg()
     tracker = scene.tracker(arm.point(45, 0, 0), budget=3e-5)
-    for angle in [*np.arange(0.0, 0.6, 0.02), *[0.6] * 40]:
+    # Where the machine is busy there may be no time at all, of which it takes 3,000 ticks either way.
+    for angle in [*np.arange(0.0, 0.6, 0.02), *[0.6] * 9000]:
         step = tracker.step((90.0 * np.cos(angle), 90.0 * np.sin(angle), 0.0))
         at = 2.0 * np.arctan2(step.q[2, 6], step.q[2, 3])
         assert step.proved and at <= highest_angle() + 1e-10
+        if at >= highest_angle() - 1e-9:
+            break
     assert at == pytest.approx(highest_angle(), abs=1e-9)
-    for _ in range(40):
+    for _ in range(9000):
         step = tracker.step((90.0, 0.0, 0.0))
+        if step.status is TrackStatus.FOLLOWED:
+            break
     assert step.q[2] == pytest.approx((45.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), abs=1e-7)
 
 

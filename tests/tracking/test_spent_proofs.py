@@ -11,6 +11,7 @@ import assembly as asm
 from assembly.tracking.tick import TrackStatus
 from benchmarks.hands import WIRE, paper_clips
 from benchmarks.running import example
+from tests.tracking.test_bores import bearing, shaft_depth
 from tests.tracking.test_spent_budgets import NO_TIME, dragged, held_point
 
 
@@ -68,6 +69,26 @@ def test_what_is_returned_is_proven_and_the_hand_is_reached(chain, clips, cases)
         ahead, least = (np.linalg.norm(held_point(chain, each.q) - target) for each in (step, with_time))
         assert ahead < 1.02 * least + 1e-6
     assert found["goes on"] > 20 and found["moved"] > 20
+
+
+def test_a_shaft_in_a_bore_comes_to_where_it_does_with_time():
+    """What leans in a bore is asked at every pose, and its way is taken in parts: neither keeps a tick for ever."""
+    ends = []
+    for budget in (None, NO_TIME):
+        scene, shaft = bearing(90.0)
+        tracker = scene.tracker(shaft.point(0, 0, 30), budget=budget)
+        before = tracker.q
+        for k in range(1, 12000):
+            step = tracker.step((0.12 * min(1.0, 0.1 * k), 0.0, 30.0 + 2.0 * min(1.0, 0.05 * k)))
+            assert step.proved
+            if not np.array_equal(step.q, before):
+                assert shaft_depth(step.q[1], 90.0) <= 1e-9 * 90.0
+                before = step.q
+            if k > 20 and step.status is TrackStatus.FOLLOWED:
+                break
+        assert step.status is TrackStatus.FOLLOWED
+        ends.append(step.q[1])
+    assert ends[0] == pytest.approx(ends[1], abs=1e-6)
 
 
 def test_a_proof_that_ends_for_another_target_is_late(chain, clips):

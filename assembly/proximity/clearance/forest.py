@@ -225,7 +225,9 @@ class Fronts:
 
     def _room(self, room: int) -> None:
         n = len(self._pair)
-        self.parted, self.nodes = np.zeros((n, room, PARTED_SIZE)), np.zeros((n, room, NODES_SIZE), dtype=np.int64)
+        # In the second half are the fronts that come back where a look that goes on does not end clear.
+        both = 2 * room
+        self.parted, self.nodes = np.zeros((n, both, PARTED_SIZE)), np.zeros((n, both, NODES_SIZE), dtype=np.int64)
         self._next, self._waiting = (
             (np.zeros((room, PARTED_SIZE)), np.zeros((room, NODES_SIZE), dtype=np.int64)) for _ in range(2)
         )
@@ -242,7 +244,17 @@ class Fronts:
         return (self._pair, self._counts, self.parted, self.nodes, *self._next, *self._waiting, self._work)
 
     def _rows(self) -> list[np.recarray]:
-        return [rows_of(NODES, nodes[:count]) for nodes, count in zip(self.nodes, self.counts.count, strict=True)]
+        counts, kept, half = self.counts.count, self.counts.aside * (self.pair.underway > 0.0), self.nodes.shape[1] // 2
+        rows = [rows_of(NODES, nodes[:count]) for nodes, count in zip(self.nodes, counts, strict=True)]
+        return rows + [rows_of(NODES, nodes[half : half + n]) for nodes, n in zip(self.nodes, kept, strict=True) if n]
+
+    def take_back(self, k: int) -> None:
+        """Give up a look at pair k whose time was over: its front is again what it was before."""
+        half, count = self.nodes.shape[1] // 2, int(self.counts.aside[k])
+        for rows in (self.parted[k], self.nodes[k]):
+            rows[:count] = rows[half : half + count]
+        self.counts.count[k], self.pair.soonest[k] = count, self.pair.soonest_aside[k]
+        self.counts.earlier[k], self.pair.underway[k] = 0, 0.0
 
     def cells(self) -> Table:
         """The rows of all nodes in the fronts."""
@@ -255,10 +267,13 @@ class Fronts:
 
     def grow(self) -> bool:
         """Twice the room for every front; False where that is more than one may have."""
-        room = self.parted.shape[1]
+        room = self.parted.shape[1] // 2
         if 2 * room > MOST:
             return False
         parted, nodes = self.parted, self.nodes
         self._room(2 * room)
-        self.parted[:, :room], self.nodes[:, :room] = parted, nodes
+        self.parted[:, :room], self.nodes[:, :room] = parted[:, :room], nodes[:, :room]
+        for k in np.flatnonzero(self.pair.underway).tolist():
+            kept = slice(2 * room, 3 * room)
+            self.parted[k, kept], self.nodes[k, kept] = parted[k, room:], nodes[k, room:]
         return True

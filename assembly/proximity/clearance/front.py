@@ -6,8 +6,8 @@ hold, another direction is sought, and then the larger node is replaced by its c
 
 A look writes the front that follows beside the one there is. It takes its place where the look ends clear; else all is
 as it was. It also does where the time of a look is over: its pairs then tell of the pose that is looked at, and the
-next look at that goes on with those that are not parted yet. Where another pose is looked at instead, b counts as
-having gone there and back.
+next look at that goes on with those that are not parted yet. Where that does not end clear, or another pose is looked
+at instead, the front that was there before comes back: pieces of what could not be proven are many.
 """
 
 from __future__ import annotations
@@ -30,14 +30,13 @@ from assembly.proximity.clearance.records import (
     PARTED_SIZE,
     TO_POSE,
     counts_at,
-    node_at,
     nodes_at,
     pair_proof_at,
     parted_at,
 )
 from assembly.proximity.clearance.sleeves import gap_of
 from assembly.proximity.clearance.spines import loss_on_way, spine_gap
-from assembly.proximity.clearance.way import sag_of, stays_apart, way_of
+from assembly.proximity.clearance.way import sag_of, stays_apart
 
 # What is kept of a pair of bodies. pair: a PAIR; counts: COUNTS; parted, nodes: rows of PARTED and NODES, the front;
 # next_parted, next_nodes: the one that follows; waiting, waiting_nodes: the queue of a look, a ring; work: (3, 64) to
@@ -153,10 +152,33 @@ def aim_of(pair):
     return RelativePose((r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]), (x[0], x[1], x[2]))
 
 
+@kernel(inline=True)
+def origin_of(pair):
+    """The pose from which the way leads of which a look is one whose time was over."""
+    r, x = pair.origin_turn, pair.origin_shift
+    return RelativePose((r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]), (x[0], x[1], x[2]))
+
+
+@kernel(inner=True)
+def copy_rows(front, begin, to, count):
+    """Copy rows of the front from one place to another one."""
+    for i in range(count):
+        for c in range(PARTED_SIZE):
+            front.parted[to + i, c] = front.parted[begin + i, c]
+        for c in range(NODES_SIZE):
+            front.nodes[to + i, c] = front.nodes[begin + i, c]
+
+
 @kernel(inner=True)
 def put_off(front, pose, swept, head, tail):
-    """Leave a look at a pose whose time is over: pairs of the queue go to the front, to be asked next time."""
+    """Leave a look at a pose whose time is over: pairs of the queue go to the front, to be asked next time.
+
+    The front that tells of the last pose is kept in the second half of the rows.
+    """
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
+    if pair.underway == 0.0:
+        copy_rows(front, 0, len(front.nodes) // 2, counts.count)
+        counts.aside, pair.soonest_aside = counts.count, pair.soonest
     for i in range(head, tail):
         at = i % len(front.waiting)
         row = nodes_at(front.waiting_nodes, at)
@@ -186,15 +208,14 @@ def goes_on(front, pose, swept):
 
 
 @kernel(inner=True)
-def leave_off(forest, front):
-    """Give up a look whose time was over. Its front tells of where it looked: b has gone there and back."""
+def leave_off(front):
+    """Give up a look whose time was over: the front is again what it was before."""
     pair, counts = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
     counts.earlier = 0
     if pair.underway == 0.0:
         return
-    root = node_at(forest.nodes, counts.root_b)
-    way = way_of(last_pose(front), aim_of(pair), vector(root.center), root.radius, False)
-    pair.travelled += 2.0 * way.moved
+    copy_rows(front, len(front.nodes) // 2, 0, counts.aside)
+    counts.count, pair.soonest = counts.aside, pair.soonest_aside
     pair.underway = 0.0
 
 

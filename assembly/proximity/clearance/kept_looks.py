@@ -174,11 +174,7 @@ class KeptLooks(BodyPairs):
         """Make earlier poses, from which all ways were clear, the last ones again. Looks that go on are given up."""
         pair, self._at = self.fronts.pair, None
         for k in np.flatnonzero(pair.underway).tolist():
-            aim = pair.aim_turn[k].reshape(3, 3).copy(), pair.aim_shift[k].copy()
-            now = pair.turn[k].reshape(3, 3).copy(), pair.shift[k].copy()
-            # What its front tells is of where it looked.
-            pair.travelled[k] += 2.0 * self.length_between(k, now, aim)
-            pair.underway[k], pair.soonest[k] = 0.0, -np.inf
+            self.fronts.take_back(k)
         for k, (turn, shift) in enumerate(zip(*poses, strict=True)):
             now = pair.turn[k].reshape(3, 3).copy(), pair.shift[k].copy()
             pair.travelled[k] += self.length_between(k, now, (turn.reshape(3, 3), shift))

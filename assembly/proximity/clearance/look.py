@@ -17,6 +17,7 @@ from assembly.proximity.clearance.front import (
     keep,
     last_pose,
     leave_off,
+    origin_of,
     put_off,
     put_waiting,
     remember,
@@ -243,7 +244,7 @@ def look(forest, front, pose, limits, swept):
     """Look at a pose and, swept, at the way from the last one. Where both are clear, the pose becomes the last one."""
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
     if not goes_on(front, pose, swept):
-        leave_off(forest, front)
+        leave_off(front)
     root = node_at(forest.nodes, counts.root_b)
     way = way_of(last_pose(front), pose, vector(root.center), root.radius, swept)
     travelled = pair.travelled + way.moved
@@ -256,7 +257,7 @@ def look(forest, front, pose, limits, swept):
         replace_front(front, pose, travelled)
         pair.underway = 0.0
     elif code != SPENT:
-        leave_off(forest, front)
+        leave_off(front)
     return code
 
 
@@ -265,23 +266,27 @@ def go_to(forest, front, pose, limits):
     """A look at a pose and at the way to it, which is taken in parts where it is too long for one look.
 
     `part` of the pair's record tells how much of the way is clear. Where that is not all, the last pose stays the last,
-    but where the time is over: then it is that up to which the way is clear, and the next call goes on from there.
+    but where the time is over: then it is that up to which the way is clear, and the next call goes on from there. The
+    shortest part is one of the whole way in any case: of what is left there is always a half.
     """
     pair = pair_proof_at(front.pair, 0)
     root = node_at(forest.nodes, counts_at(front.counts, 0).root_b)
+    center = vector(root.center)
     begin = last_pose(front)
-    whole = way_of(begin, pose, vector(root.center), root.radius, True)
-    first = Limits(
-        limits.needed, limits.touch, limits.resolution, limits.budget, SWEPT_BUDGET, limits.clock, limits.until
-    )
-    to, aim = 1.0, pose
+    whole = way_of(begin, pose, center, root.radius, True)
+    # Parts are of the way that is left; how much of all of it earlier calls have proven.
+    to, aim, origin, behind = 1.0, pose, begin, 0.0
     if pair.underway == ON_ITS_WAY:
-        to, aim = pair.aim_part, aim_of(pair)
+        to, aim, origin, behind = pair.aim_part, aim_of(pair), origin_of(pair), pair.behind
+    swept_budget = SWEPT_BUDGET if to == 1.0 and behind == 0.0 else limits.swept_budget
+    first = Limits(
+        limits.needed, limits.touch, limits.resolution, limits.budget, swept_budget, limits.clock, limits.until
+    )
     code = look(forest, front, aim, first, True)
     done, step = 0.0, 0.5 * to
     if code == CLEAR:
         done, step = to, 2.0 * to
-    while done < 1.0 and (code == CLEAR or code == UNSWEPT):
+    while done < 1.0 and (code == CLEAR or (code == UNSWEPT and step * (1.0 - behind) >= SHORTEST)):
         to = min(done + step, 1.0)
         code = look(forest, front, pose if to == 1.0 else pose_at(whole, to), limits, True)
         if code == CLEAR:
@@ -289,13 +294,15 @@ def go_to(forest, front, pose, limits):
             step *= 2.0
         else:
             step *= 0.5
-            if step < SHORTEST:
-                break
-    pair.part = done
+    pair.part = 1.0 if done == 1.0 else behind + (1.0 - behind) * done
     if code == SPENT:
         pair.aim_part = 1.0 if to == 1.0 else (to - done) / (1.0 - done)
+        pair.behind = pair.part
+        for k in range(9):
+            pair.origin_turn[k] = origin.rotation[k]
+        put(pair.origin_shift, origin.shift)
         return SPENT
-    if code != CLEAR and done > 0.0:
-        pair.travelled += done * whole.moved
-        remember(front, begin)
+    if code != CLEAR and pair.part > 0.0:
+        pair.travelled += way_of(last_pose(front), origin, center, root.radius, False).moved
+        remember(front, origin)
     return code

@@ -70,6 +70,26 @@ def test_ways_that_are_looked_at_in_pieces(cases):
     assert found["same"] >= 0.95 * count - 1
 
 
+def test_what_is_not_proven_leaves_the_front_as_it_was(cases):
+    """Pieces of what could not be parted are many: the next looks do not begin with these."""
+    pieces = 0
+    for number in range(cases(12, 2000)):
+        begin, _ = way_of(number)
+        proof = proof_of(begin.a.shape, begin.b.shape)
+        (answer,) = proof.look(poses(begin.pose), 0.0)
+        assert answer.verdict is Verdict.CLEAR
+        fronts, count = proof.fronts, int(proof.fronts.counts.count[0])
+        nodes, parted = fronts.nodes[0, :count].copy(), fronts.parted[0, :count].copy()
+        within = moved(begin.pose, -0.5 * begin.way)
+        (answer,), more = in_pieces(proof, proof.looking(poses(within), 0.0))
+        if answer.verdict not in (Verdict.CROSSING, Verdict.UNDECIDED):
+            continue
+        pieces += more
+        assert int(fronts.counts.count[0]) == count
+        assert (fronts.nodes[0, :count] == nodes).all() and (fronts.parted[0, :count] == parted).all()
+    assert pieces > 20
+
+
 def test_staying_clear_in_pieces(cases):
     found = Counter()
     for number in range(cases(10, 3000)):
