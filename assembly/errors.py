@@ -9,6 +9,7 @@ import math
 import operator
 import warnings
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -58,12 +59,19 @@ class UnknownNameError(InputError, KeyError):
     __str__ = Exception.__str__
 
 
+@lru_cache(1024)
+def _has_attribute(kind: Any, name: str) -> bool:
+    """Whether a class, or one that it is made of, says that its objects have an attribute."""
+    return any(name in one.__dict__ or name in one.__annotations__ for one in kind.__mro__[:-1])
+
+
 class KnownSettings:
     """Has no attributes but those its classes say: one that is misspelled, or another class's, is no setting."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        classes = type(self).__mro__
-        if name[0] != "_" and not any(name in one.__dict__ or name in one.__annotations__ for one in classes[:-1]):
+        kind: Any = type(self)
+        if name[0] != "_" and not _has_attribute(kind, name):
+            classes = type(self).__mro__
             said = {key: what for one in classes[-2::-1] for key, what in one.__dict__.items()}
             # A property that only reads has no setter.
             known = sorted(k for k, p in said.items() if hasattr(p, "__set__") and getattr(p, "fset", p) is not None)
@@ -152,6 +160,8 @@ def renamed(new: str, value: Value, old: str, old_value: Value | None) -> Value:
 
 def number(name: str, value: Any) -> float:
     """A finite real number."""
+    if type(value) is float and math.isfinite(value):
+        return value
     try:
         if isinstance(value, (str, bytes, bool, np.bool_)):
             raise TypeError

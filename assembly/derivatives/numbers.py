@@ -13,7 +13,7 @@ from assembly.constraints.model.constraint import Constraint, Freedom
 from assembly.constraints.model.contact import Contact
 from assembly.constraints.model.contact_place import ContactPlace
 from assembly.constraints.model.objectives import FrameDistance, PointDistance
-from assembly.errors import InputError, check_coordinates
+from assembly.errors import FARTHEST, InputError, check_coordinates
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace, Frame
@@ -133,7 +133,8 @@ class FrameOrigin(FrameNumber):
 
     def set(self, value: float) -> None:
         """Set it."""
-        check_coordinates(AXES[self.axis], [value])
+        if not -FARTHEST <= value <= FARTHEST:
+            check_coordinates(AXES[self.axis], [value])
         origin = self.frame.origin.copy()
         origin[self.axis] = value
         self.frame._move(origin)

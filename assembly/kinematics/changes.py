@@ -46,7 +46,11 @@ def set_since(numbers: int) -> list[object] | None:
     """The things whose numbers were set since a count, without repetition; None where that is too long ago."""
     if not _before[0] <= numbers <= _counts[0][0]:
         return None
-    alive = (thing() for thing in _things[numbers - _before[0] :])
+    since = _things[numbers - _before[0] :]
+    if len(since) == 1:
+        only = since[0]()
+        return [] if only is None else [only]
+    alive = (thing() for thing in since)
     return list({id(thing): thing for thing in alive if thing is not None}.values())
 
 

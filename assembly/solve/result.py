@@ -222,11 +222,15 @@ class Result(ReadOnlyArrays):
         """One coordinate of one joint."""
         packed, state = self._ended
         coordinate = joint._coordinate_in(name, self._scene.axes.get(joint.name))
-        near = next((k for k, other in enumerate(packed._angles) if other is coordinate), None)
+        near = 0.0
+        for k, other in enumerate(packed._angles):
+            if other is coordinate:
+                near = float(state[packed.angles][k])
+                break
         pair = coordinate.frames
         places = self._scene.index(pair.frame_a.body), self._scene.index(pair.frame_b.body)
-        frames = standing(coordinate, self.q, places)
-        return measure(coordinate, frames, 0.0 if near is None else float(state[packed.angles][near]))
+        poses = state[: packed.contacts_at].reshape(-1, 7)
+        return measure(coordinate, standing(coordinate, poses, places), near)
 
     def _pool_as_solved(self) -> Array:
         """The pool with the objective as it was in this solve."""

@@ -49,18 +49,28 @@ def placement_of(location: Any, scale: float = 1.0) -> tuple[Pose, float]:
 
 
 def image_of(shape: Any, said: Callable[[Any], _Said], factor: float) -> tuple[Any, Callable[[Any], _Said]]:
-    """A shape scaled about its origin, and what is said of it and of its faces."""
-    if factor == 1.0:
+    """A shape scaled about its origin, and what is said of it and of its faces.
+
+    Where its own location in the part mirrors or scales, its image is what stands there: OCCT leaves faces of a shape
+    that is mirrored by its location with their sides as they were.
+    """
+    own = shape.Location().Transformation()
+    is_rigid = abs(own.ScaleFactor() - 1.0) <= _RIGID
+    if factor == 1.0 and is_rigid:
         return shape, said
     o = occt()
     transform = o.gp_Trsf()
     transform.SetScale(o.gp_Pnt(0.0, 0.0, 0.0), factor)
-    made = o.BRepBuilderAPI_Transform(shape, transform, True).Shape()
+    source = shape
+    if not is_rigid:
+        source = shape.Located(o.TopLoc_Location())
+        transform.Multiply(own)
+    made = o.BRepBuilderAPI_Transform(source, transform, True).Shape()
     images = o.ShapeMap()
     originals = []
     # Faces of an image are in the order of those of the shape.
-    for face, own in zip([made, *parts(made, o.TopAbs_FACE)], [shape, *parts(shape, o.TopAbs_FACE)], strict=True):
+    for face, its in zip([made, *parts(made, o.TopAbs_FACE)], [shape, *parts(shape, o.TopAbs_FACE)], strict=True):
         if not images.FindIndex(face):
             images.Add(face)
-            originals.append(own)
+            originals.append(its)
     return made, lambda one: said(originals[images.FindIndex(one) - 1])

@@ -113,7 +113,9 @@ def put_together(
 
     def solve() -> There | None:
         if alone.code == SOLVED:
-            return There(alone.state[: packed.contacts_at].reshape(-1, 7).copy(), alone)
+            # Attempts that needed more slots for contacts have packed the scene anew, and its states have other places.
+            is_packed_so = scene.packed() is packed
+            return There(alone.state[: packed.contacts_at].reshape(-1, 7).copy(), alone if is_packed_so else None)
         solution = scene._part(False, True)._from_start(q, starts, options, interruption)
         return There(solution.q.copy(), None) if solution.success else None
 

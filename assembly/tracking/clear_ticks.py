@@ -185,7 +185,7 @@ class ClearTicks:
         # What is going on where its time was over.
         self._going: Generator[None, None, bool] | None = None
         self._moves, self._opened = np.zeros((len(proof.pairs), 6)), list[int]()
-        self.way_depth = 0.0
+        self.way_depth, self._deepest = 0.0, 0.0
         self.unlisted, self.renewable, self.in_the_way = frozenset[int](), frozenset[int](), list[int]()
         answers = dict(enumerate(proof.look(first.q, touching)))
         left = [k for k, answer in answers.items() if not is_proven(answer)]
@@ -230,15 +230,21 @@ class ClearTicks:
         It makes progress that lasts, however little time it has.
         """
         assert self._going is not None
-        self._proof.until = until
+        self._take_time(until)
         try:
             next(self._going)
         except StopIteration as end:
             self._going = None
             return bool(end.value)
         finally:
-            self._proof.until = NEVER
+            self._take_time(NEVER)
         return None
+
+    def _take_time(self, until: Until) -> None:
+        """Have looks of both proofs end when a time is over, those as well that go on."""
+        self._proof.until = until
+        if self._judge is not None:
+            self._judge.until = until
 
     def _pause(self) -> Generator[None, None, None]:
         """Yield if the time is over."""
@@ -249,7 +255,7 @@ class ClearTicks:
     def _proving(self, there: Standing) -> Generator[None, None, bool]:
         """Find out whether all pairs hold at a pose and on the way there; it yields where the time is over."""
         proof, touching, moves = self._proof, self._touching, self._moves
-        self.way_depth, self.in_the_way = 0.0, []
+        self._deepest, self.in_the_way = 0.0, []
         rolling, last = self._rolling(there), proof.last_poses()
         answers: dict[int, Answer] = {}
         if not rolling:
@@ -288,6 +294,7 @@ class ClearTicks:
             return False
         self.proved = all(map(is_proven, answers.values()))
         self._at, self._moves = there, moves
+        self.way_depth = max(self._deepest, proof.way_depth())
         yield from self._leave_closed([k for k in left if moves[k].any() and proof.is_of_wires(k)])
         self._opened = self._those_opened()
         return True
@@ -305,7 +312,7 @@ class ClearTicks:
             return False
         if self._judge is None:
             self._judge = new_proof(there.packed, there.scene.bodies)
-        self._judge.until = self._proof.until
+            self._judge.until = self._proof.until
         found = yield from self._judge.looking(there.q, self._touching, moves, which=asked, budget=QUICK)
         self.in_the_way = [k for k, answer in zip(asked, found, strict=True) if answer.part < 1.0]
         refused = [k for k in asked if k in self.unlisted or k in self.in_the_way]
@@ -412,7 +419,7 @@ class ClearTicks:
         before, after = self._moves.copy(), moves.copy()
         for k in which:
             depth = self._roll_depth(k, there, part)
-            self.way_depth = max(self.way_depth, depth)
+            self._deepest = max(self._deepest, depth)
             for standing, opened in ((begin, before), (there, after)):
                 move = standing.opened(proof, k, depth)
                 if move.any():

@@ -176,8 +176,11 @@ class TickMemory(InOneProcess):
     def _late(self, row: Targets, begin: float) -> Step:
         """The step of a tick whose time was over: the last pose stands."""
         status = TrackStatus.LATE if self._stands else TrackStatus.VIOLATED
-        seconds = perf_counter() - begin
-        return Step(self._followed, self._before, status, row, self._seen, seconds, self._way_depth())
+        seen, packed = self._seen, self._packed
+        if packed.clearance_rows:
+            # A proof that ended in this tick may have led to it: the next ones do not tell its events again.
+            self._seen = float(self._before[packed.memory_at + EVENT_COUNT])
+        return Step(self._followed, self._before, status, row, seen, perf_counter() - begin, self._way_depth())
 
     def _refused(self) -> tuple[TrackStatus, Array]:
         """Go back to the last pose from one at which bodies are not known to be clear."""

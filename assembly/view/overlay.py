@@ -208,9 +208,12 @@ def legend_rows(picture: Picture) -> list[tuple[str, str, str]]:
         (("contacts", PENETRATING), "contact, surfaces interpenetrate"),
     )
     rows += [(_hex(key[1]), text, "glyph") for key, text in glyphs if key in there]
-    for kind, text in (("targets", "target"), ("ellipsoids", "ellipsoid")):
-        colors = list(dict.fromkeys(item.color for item in picture.items if item.kind == kind))
-        rows += [(_hex(color), text, "glyph") for color in colors]
+    # Targets and ellipsoids of one color are one row; those that are called something else are that.
+    others = [item for item in picture.items if item.kind in ("targets", "ellipsoids") and item.said]
+    kinds = {"targets": "target", "ellipsoids": "ellipsoid"}
+    words = [kinds[item.kind] if item.kind == "targets" or item.said == item.path[1] else item.said for item in others]
+    marks = dict.fromkeys((item.color, word) for item, word in zip(others, words, strict=True))
+    rows += [(_hex(color), word, "glyph") for color, word in marks]
     places = {
         item.color: item.said.rpartition(": ")[2] for item in picture.items if item.kind == "places" and item.said
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from html import escape
 from os import PathLike
 from typing import TYPE_CHECKING
@@ -124,6 +125,9 @@ def replay(
     rows = poses_at(log.q, np.interp(times, recorded, np.arange(float(len(recorded)))))
     balls = [] if hand is None else _balls(scene, hand.at(times))
     picture = film(scene, rows, direction, balls, style)
+    # What is under the mouse, and in the legend, is no ellipsoid of somebody's.
+    named = (replace(item, said="hand") if item.kind == "ellipsoids" and item.said else item for item in picture.items)
+    picture = replace(picture, items=tuple(named))
     span = float(times[-1] - times[0])
     return present(picture, path, span / pace, loop, title, open, visualizer, _panel(log, times))
 

@@ -90,7 +90,8 @@ def test_the_size_may_change_with_every_frame():
         assert packed.asked_units == built.asked_units and packed._reads == [
             (*mine[:1], *each[1:]) for mine, each in zip(packed._reads, built._reads, strict=True)
         ]
-        assert np.array_equal(packed._standing_units, built._standing_units)
+        assert [unit for *_, unit in packed._values] == [unit for *_, unit in built._values]
+        assert np.array_equal(packed._standing_lengths, built._standing_lengths)
         sizes.append(packed.scale)
     assert len(set(sizes)) > 10
     assert scene.packed().number_places._rescaled.is_possible

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly._record import Store
 from assembly.constraints.packing import written_scene as packing
 from assembly.constraints.packing.elimination_order import block_record
 from assembly.constraints.program import records as layout
@@ -16,7 +17,18 @@ from assembly.constraints.program.block_factor import (
     greatest_diagonal,
     substitute_blocks,
 )
-from assembly.constraints.program.hessian_blocks import BLOCKS, COUNT, FACTORED, FIRST, block_row
+from assembly.constraints.program.hessian_blocks import (
+    BLOCKS,
+    COUNT,
+    FACTORED,
+    FIRST,
+    block_row,
+    choose_storage,
+    is_blocked,
+)
+from assembly.constraints.program.records import header_at
+from assembly.solve.attempts.attempts import new_workspace
+from assembly.solve.loop.workspace import carve_all, carve_unknowns
 from tests.laws.loop_point import LoopPoint
 
 
@@ -174,6 +186,29 @@ def test_solves_by_blocks_end_where_dense_ones_do(monkeypatch, reach):
     assert blocked.iterations == dense.iterations
     # Steps differ by rounding alone; the objective's minimum is flat.
     np.testing.assert_allclose(blocked.q, dense.q, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("few", [100, 1])
+def test_a_workspace_has_room_for_the_system_of_every_count_of_lifted_pairs(monkeypatch, few):
+    """The loop checks no end of its blocks of memory; in Python a part that goes beyond an end has no such shape."""
+    monkeypatch.setattr(packing, "FEW", few)
+    chained = asm.Assembly([asm.Body(f"{k}", None, (k, 0.0, 0.0), fixed=k == 0) for k in range(4)])
+    chained.constrain(asm.Distance(chained.bodies[0].point(0, 0, 0), chained.bodies[1].point(0, 0, 0), 1.5))
+    for scene in (mixed_scene(np.random.default_rng(1)), rings(3)[0], chained):
+        packed = scene.packed()
+        table = packed.rows_table
+        _, doubles, integers = new_workspace(packed)
+        workspace = carve_all(Store(table, packed.rows_pool), np.empty(0), None, doubles, integers)
+        header, order = header_at(table, 0), workspace.program.structure.sparsity
+        assert is_blocked(order) == (few == 1)
+        for lifted in range(header.contacts + 1):
+            n = 6 * header.moving + 4 * lifted
+            choose_storage(order, n)
+            system = carve_unknowns(n, lifted, order, workspace.room)
+            assert is_blocked(order) == (few == 1 and lifted == 0)
+        # That of all pairs ends where the room does.
+        used = system.factor.ctypes.data + system.factor.nbytes
+        assert used == workspace.room.ctypes.data + workspace.room.nbytes
 
 
 def test_a_scene_of_many_bodies_has_blocks_and_few_bodies_none():

@@ -111,6 +111,30 @@ def test_a_unit_scales_lengths_and_parameters_of_length(name):
             assert np.linalg.norm(mine) == pytest.approx(np.linalg.norm(other) / (25.4 if spline else 1.0), rel=1e-12)
 
 
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("is_periodic", [False, True])
+def test_profiles_whose_knots_are_not_clamped_turn_into_what_they_bound(degree, is_periodic):
+    corners = [(2, 0, 0), (3, 0, 1), (2, 0, 2), (4, 0, 3), (3, 0, 4)]
+    count = len(corners) + 1 + (0 if is_periodic else degree)
+    poles, knots, times = O.Points(1, len(corners)), O.Reals(1, count), O.Integers(1, count)
+    for k, corner in enumerate(corners, 1):
+        poles.SetValue(k, O.gp_Pnt(*map(float, corner)))
+    for k in range(count):
+        knots.SetValue(k + 1, float(k))
+        times.SetValue(k + 1, 1)
+    curve = O.Geom_BSplineCurve(poles, knots, times, degree, is_periodic)
+    low, high = curve.FirstParameter(), curve.LastParameter()
+    turned = O.Geom_SurfaceOfRevolution(curve, O.gp_Ax1(O.gp_Pnt(0, 0, 0), O.gp_Dir(0, 0, 1)))
+    made = patch(turned, (0.0, 1.0, low, high))
+    # Once around the profile, not once along its knots.
+    assert made.surface.domain[1] == (low, high)
+    assert made.periods[1] == (high - low if is_periodic else 0.0)
+    for v in np.linspace(low, high, 7):
+        wanted = turned.Value(0.3, float(v))
+        found = made.surface.evaluate(float(made.u(np.array([0.3]))[0]), v)
+        np.testing.assert_allclose(found, [wanted.X(), wanted.Y(), wanted.Z()], rtol=0, atol=1e-14)
+
+
 def test_what_has_no_end_is_unreadable():
     face = O.BRepBuilderAPI_MakeFace(O.gp_Pln()).Face()
     with pytest.raises(Unreadable, match="no boundary, and its surface is unbounded"):

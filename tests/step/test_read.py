@@ -269,6 +269,40 @@ def test_mirrored_solids_in_memory_are_images():
     np.testing.assert_allclose(place, [center.X(), center.Y(), center.Z()], rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize("factor", [-1.0, -1.5, 2.0])
+@pytest.mark.parametrize("inside", [False, True])
+def test_solids_that_a_part_mirrors_or_scales_are_images(factor, inside):
+    """As BREP files have them: the location is not the part's, but that of a solid in it."""
+    transform, outer = O.gp_Trsf(), O.gp_Trsf()
+    transform.SetScale(O.gp_Pnt(1, 2, 3), factor)
+    if inside:
+        outer.SetMirror(O.gp_Ax2(O.gp_Pnt(0, 1, 0), O.gp_Dir(2, 1, 1)))
+    compound, build = O.TopoDS_Compound(), O.BRep_Builder()
+    build.MakeCompound(compound)
+    for location in (O.gp_Trsf(), transform):
+        build.Add(compound, wedge().Located(O.TopLoc_Location(location), False))
+    file = File()
+    part, root = file.part(compound, "pair"), file.group("all")
+    file.shapes.AddComponent(root, part, O.TopLoc_Location(outer))
+    own, other = list(bodies.solids_in(O.XCAFDoc_ShapeTool.GetShape_s(part)))
+    for solid, name in ((own, "own top"), (other, "image's top")):
+        file.named(file.shapes.AddSubShape(part, faces(solid)[-1]), name)
+    file.shapes.UpdateAssemblies()
+    (own, image), told = bodies.bodies_in(bodies.Source(Path("pair.step"), file.document, 12), 1.0, True)
+    assert not told
+    assert own.faces[-1].name == "own top" and image.faces[-1].name == "image's top"
+    # Closed, and with normals that lead out of it: another volume would be refused.
+    assert image.volume == pytest.approx(abs(factor) ** 3 * own.volume, rel=1e-12)
+    wanted = wedge_center().Transformed(outer.Multiplied(transform))
+    place = image.pose.matrix[:3] @ np.append(image.center_of_mass, 1.0)
+    np.testing.assert_allclose(place, [wanted.X(), wanted.Y(), wanted.Z()], rtol=0, atol=1e-11)
+
+
+def wedge_center():
+    (alone,) = asm.cad.from_occt(wedge())
+    return O.gp_Pnt(*map(float, alone.center_of_mass))
+
+
 def test_placements_without_volume_are_refused():
     class Flat:
         def Transformation(self):

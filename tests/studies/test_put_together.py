@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from assembly.solve.interruption import CTRL_C, Interruption
+from assembly.studies.first_solve import _FirstSolve
 from assembly.studies.put_together import put_together
 from assembly.studies.unhindered import rows_from_start
 from tests.studies.machined import bolt, disturbed, turned_part
@@ -287,3 +288,19 @@ def test_the_three_lugs_of_a_hinge_are_joined_by_a_pin_that_is_drawn_in():
     assert solution.objective == pytest.approx(4 * 2.0**2, rel=1e-9)
     assert solution.pose("leaf").position == pytest.approx([0.0, -18.0, 11.0], abs=1e-6)
     assert solution.pose("pin").position[2] == pytest.approx(27.0, abs=1e-6)
+
+
+def test_slots_added_before_parts_are_put_together_do_no_harm():
+    """Parts are put together last where topology is kept; attempts before may have packed the scene with more slots."""
+    scene = linked(0.5)
+    settings, q = scene._settings({}, CTRL_C, warm=False), np.array(scene.q)
+    way = _FirstSolve(scene, q, settings, None, {}, CTRL_C)
+    together = asked(scene)
+    assert together.keeps_topology and together.is_asked
+    before = scene.packed()
+    assert scene._pack_with_more_places().results_at > before.results_at
+    (solution,) = way._put_together(together)
+    assert solution.success and solution.put_together and solution.proved
+    assert solution.pose("b").position == pytest.approx([1.0, 0.0, 0.5], abs=HOLDS)
+    assert solution.feasibility < HOLDS
+    assert solution.objective == pytest.approx(0.25, abs=HOLDS)  # the square of the way

@@ -102,17 +102,22 @@ class Chromium:
         self._ask("Target.closeTarget", targetId=target)
 
     @contextmanager
-    def visited(self, url: str, width: int = 640, height: int = 400) -> Iterator[str]:
-        """The session of a page of a server of this machine, in real time."""
-        target = self._ask("Target.createTarget", url="about:blank")["targetId"]
+    def visited(self, url: str, width: int = 640, height: int = 400, scale: float = 0.5) -> Iterator[str]:
+        """The session of a page of a server of this machine, in real time, for somebody of whom no page knows yet.
+
+        The page is laid out in width x height pixels and drawn in so many times fewer, each way: a picture costs its
+        pixels. What the mouse is told is in pixels of the layout.
+        """
+        person = self._ask("Target.createBrowserContext")["browserContextId"]
+        target = self._ask("Target.createTarget", url="about:blank", browserContextId=person)["targetId"]
         session = self._ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        size = {"width": width, "height": height, "deviceScaleFactor": 1.0, "mobile": False}
+        size = {"width": width, "height": height, "deviceScaleFactor": scale, "mobile": False}
         self._ask("Emulation.setDeviceMetricsOverride", session, **size)
         self._ask("Page.enable", session)
         self._ask("Page.navigate", session, url=url)
         self._wait("Page.loadEventFired")
         yield session
-        self._ask("Target.closeTarget", targetId=target)
+        self._ask("Target.disposeBrowserContext", browserContextId=person)
 
     def mouse(self, session: str, kind: str, x: float, y: float, pressed: bool = True) -> None:
         """Send a page an event of the left button: "mousePressed", "mouseMoved" or "mouseReleased"."""
@@ -121,7 +126,7 @@ class Chromium:
 
     def shot(self, session: str, picture: Path) -> None:
         """Write a PNG of a page that is open."""
-        found = self._ask("Page.captureScreenshot", session, format="png")
+        found = self._ask("Page.captureScreenshot", session, format="png", optimizeForSpeed=True)
         picture.write_bytes(base64.b64decode(found["data"]))
 
     def _wait(self, event: str) -> None:

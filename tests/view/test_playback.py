@@ -14,6 +14,7 @@ import pytest
 import assembly as asm
 from assembly.errors import InputError
 from assembly.tracking.log import LoggedEvent
+from assembly.view.overlay import legend_rows
 from assembly.view.picture import film
 from tests.view.test_page import drawn
 
@@ -96,6 +97,7 @@ def test_the_hand_is_a_ball(monkeypatch, balls, log):
     np.testing.assert_allclose(((ball.position - red.position) / red.scale)[whole], expected[:, :3], atol=1e-12)
     angle = 2.0 * np.arctan2(expected[:, 6], expected[:, 3])
     np.testing.assert_allclose(np.arctan2(*ball.rotation[whole][:, 1::-1, 0].T), angle, atol=1e-12)
+    assert ball.said == "hand" and [text for _, text, _ in legend_rows(picture)][-2:] == ["target", "hand"]
     points = asm.Trace(hand.times, hand.positions)
     again, _ = seen(monkeypatch, balls, log, frames=41, hand=points)
     assert len(again.items) == len(picture.items) == len(film(balls, log.q[:2]).items) + 4

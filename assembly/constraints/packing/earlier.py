@@ -68,7 +68,7 @@ def with_numbers_of(packed: Packed, earlier: Packed, state: Array) -> Array:
     if packed.unit != earlier.unit or packed.scale != earlier.scale:
         multipliers = taken[packed.multipliers_at : packed.residuals_at]
         multipliers *= earlier.unit / packed.unit
-        multipliers[packed.lengths] *= packed.scale / earlier.scale
+        np.multiply(multipliers, packed.scale / earlier.scale, out=multipliers, where=packed.lengths)
     return taken
 
 

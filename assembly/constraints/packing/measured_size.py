@@ -85,8 +85,11 @@ class MeasuredSize:
     def _take_longest(self) -> None:
         """The longest diagonal of the boxes; of those that are as long within rounding the bits decide."""
         self._near = near = (1.0 - ROUNDING) * max(self._rough)
-        alike = zip(self._boxes, self._rough, strict=True)
-        self._on_bodies = max([_diagonal(box) for box, about in alike if about >= near])
+        longest = 0.0
+        for box, about in zip(self._boxes, self._rough, strict=True):
+            if about >= near:
+                longest = max(longest, _diagonal(box))
+        self._on_bodies = longest
 
     def size(self) -> float | None:
         """The size now; None where it rests on values and places in the world, or is out of range: measure in full."""
@@ -110,6 +113,10 @@ def _box(marks: Sequence[Sequence[float]]) -> tuple[float, float, float]:
     """The sides of the box around marks."""
     if len(marks) < 2:
         return 0.0, 0.0, 0.0
+    if len(marks) == 2:
+        # A link between two joints.
+        (a, b, c), (u, v, w) = marks
+        return abs(u - a), abs(v - b), abs(w - c)
     xs, ys, zs = zip(*marks, strict=True)
     return max(xs) - min(xs), max(ys) - min(ys), max(zs) - min(zs)
 

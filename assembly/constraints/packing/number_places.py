@@ -59,7 +59,9 @@ class NumberPlaces:
         self._numbers = numbers_set()
         self.size: float | None = None
         self._size = MeasuredSize(bodies, constraints, objectives)
-        self._rescaled = RescaledNumbers(packed, bodies, objectives)
+        # Made when the size is another one for the first time.
+        self._rescaled: RescaledNumbers | None = None
+        self._packed_of = bodies, objectives
         # Frames whose origins were set since `_rescaled` took them.
         self._stale: set[int] = set()
         self._bodies = {id(body) for body in bodies}
@@ -156,6 +158,9 @@ class NumberPlaces:
 
     def _of_size(self, packed: Packed, size: float, frames: Sequence[int], is_next: bool) -> Packed | None:
         """The scene with another size, and numbers of frames; None where it has lengths that are not of frames."""
+        if self._rescaled is None:
+            self._rescaled = RescaledNumbers(packed, *self._packed_of)
+            self._stale.clear()
         if not self._rescaled.is_possible:
             return None
         for key in self._stale:

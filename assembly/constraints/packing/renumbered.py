@@ -62,9 +62,10 @@ def renumbered(
     `constraints` gives those that are packed, for who needs them.
     """
     things = set_since(packed.numbers)
-    if things is not None:
-        if packed.number_places is None:
-            packed.number_places = NumberPlaces(packed, bodies, constraints(), objectives)
+    if things is not None and packed.number_places is None and not any(body in things for body in bodies):
+        # Places are of no use where a body has other faces.
+        packed.number_places = NumberPlaces(packed, bodies, constraints(), objectives)
+    if things is not None and packed.number_places is not None:
         other = packed.number_places.renumbered(packed, things, bodies[0].pose.position)
         if other is not None:
             return other
@@ -107,16 +108,11 @@ def _compared(
         block[:, 0] = np.array([frame.origin for frame in frames]) / scale
         block[:, 1:] = np.array([frame.axes for frame in frames]).transpose(0, 2, 1)
     if scale != packed.scale:
-        values = []
-        for equation, place, _ in packed._values:
-            (_, first), *others = equation.terms
-            unit = 1.0 if first.is_angle else scale
-            for factor, second in others:
+        # `other` has the scale of now.
+        for equation, place, unit in other._values:
+            for factor, second in equation.terms[1:]:
                 pool[place - 1] = factor * (1.0 if second.is_angle else scale) / unit
             pool[place] = 0.0
-            values.append((equation, place, unit))
-        other._keep_values(values)
-        other._standing_units = np.array([1.0 if item.is_angle else scale for item in packed._turned.told])
     writer = _PoolWriter(packed, scale)
     terms = TermPacking(cast(SceneWriter, writer), packed.row_numbers, bodies, other.reference, other.unit)
     for sign, term in goals:

@@ -57,17 +57,19 @@ class RescaledNumbers:
             if body.size
         ]
         self._frames = [frame for pair in packed._frames for frame in (pair.frame_a, pair.frame_b)]
-        self._origins = np.array([frame.origin for frame in self._frames]).reshape(-1, 3)
-        values = packed._values
-        self._values = [(equation, at, equation.terms[0][1].is_angle) for equation, at, _ in values]
-        self._places = np.array([at for _, at, _ in values], dtype=np.int64)
+        # Lengths are origins of frames, and values, which are none until they are read. Their places in the pool:
+        count, values = 3 * len(self._frames), packed._valued
+        starts = packed.frames_at + FRAME * np.arange(len(self._frames), dtype=np.int64)
+        of_values = np.array([at for _, at in values], dtype=np.int64)
+        self._places = np.concatenate([np.add.outer(starts, np.arange(3)).ravel(), of_values])
+        self._lengths = np.zeros(len(self._places))
+        self._origins = self._lengths[:count].reshape(-1, 3)
+        self._origins[:] = np.array([frame.origin for frame in self._frames]).reshape(-1, 3)
         self._factors = [
-            (at - 1, factor, other.is_angle, is_angle)
-            for equation, at, is_angle in self._values
+            (at - 1, factor, other.is_angle, equation.terms[0][1].is_angle)
+            for equation, at in values
             for factor, other in equation.terms[1:]
         ]
-        self._told = np.array([item.is_angle for item in packed._turned.told], dtype=bool)
-        self._tells_lengths = not self._told.all()
 
     def has_moved(self, which: Iterable[int], frame: Frame) -> None:
         """Take the origin of a frame that was placed anew, by its numbers among the frames."""
@@ -91,14 +93,9 @@ class RescaledNumbers:
         other.has_size, other._has_no_extent = True, False
         pool = other.rows_pool
         pool[layout.SCALE], pool[layout.OBJECTIVE_UNIT] = size, unit
-        block = pool[other.frames_at :][: FRAME * len(self._frames)].reshape(-1, FRAME)
-        np.divide(self._origins, size, out=block[:, :3])
+        pool[self._places] = self._lengths / size
         for at, factor, is_angle, of_angle in self._factors:
             pool[at] = factor * (1.0 if is_angle else size) / (1.0 if of_angle else size)
-        pool[self._places] = 0.0
-        other._keep_units([(equation, at, 1.0 if is_angle else size) for equation, at, is_angle in self._values])
-        if self._tells_lengths:
-            other._standing_units = np.where(self._told, 1.0, size)
         for at, body in self._shaped:
             pool[at] = (0.5 * body.size / size) ** 2
         if size < packed.scale:

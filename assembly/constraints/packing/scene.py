@@ -243,7 +243,7 @@ class Packed(WrittenScene):
                 coordinates_at(
                     self.rows_table, self.rows_pool, scaled, self._standing, np.empty((1, JOINT_FRAMES)), values
                 )
-            values *= self._standing_units
+            values[self._standing_lengths] *= self.scale
             return values
 
         self._turned.start(pool, state[self.angles], warm, measure)
@@ -279,11 +279,11 @@ class Packed(WrittenScene):
     def value_rows(self) -> NDArray[np.int64]:
         """The rows of joints and couplings, which have a value each."""
         first = int((self.pairs >= 0).sum())
-        return np.arange(first, first + len(self._values))
+        return np.arange(first, first + len(self._valued))
 
     def move_values(self, change: Array) -> None:
         """Add a change (m,) to the values of joints' and couplings' rows, until the next `refresh`."""
-        self.pool[[at for _, at, _ in self._values]] += change[self.value_rows]
+        self.pool[[at for _, at in self._valued]] += change[self.value_rows]
 
     def refresh(self) -> None:
         """Write what may have changed since the last solve: values and targets."""
@@ -291,9 +291,9 @@ class Packed(WrittenScene):
         x, y, z = self._reference
         asked: Asked = []
         self.asked = asked
-        for owner, name, sign, at, unit, is_length in self._reads:
+        for owner, name, sign, at, is_length in self._reads:
             current = sign * float(getattr(owner, name))
-            value = current / unit
+            value = current / scale if is_length else current
             if is_length and not -FARTHEST <= value <= FARTHEST:
                 check_reach(f"a value of {owner!r}", abs(current), scale)
             asked.append(current)

@@ -84,7 +84,7 @@ class SceneWriter(Writer):
         """Offset of the record of a face; one that is known is written no more."""
         key = (id(face.surface), face.reversed)
         if key not in known:
-            record, pool = Face(face.surface.transformed(scale=1.0 / self.scale), reversed=face.reversed).packed()
+            record, pool = Face(face.surface.scaled(1.0 / self.scale), reversed=face.reversed).packed()
             record = record.copy()
             record[list(OFFSETS)] += self.pool_at
             assert record.size == SURFACE_RECORD

@@ -138,7 +138,7 @@ class WrittenScene(ManagerLast, SceneContents):
         self._standing = np.array(
             [(self._frames[item.frames], item.kind, item.component) for item in told], dtype=np.int64
         ).reshape(-1, 3)
-        self._standing_units = np.array([1.0 if item.is_angle else self.scale for item in told])
+        self._standing_lengths = np.array([not item.is_angle for item in told], dtype=bool)
         if self.clearance_rows:
             given = list(zip(self.contacts, self.sides, self.whole, strict=True))
             watched = WatchedPairs(self.kept, self.pairs_of_kept, self.places, given)
@@ -187,21 +187,25 @@ class WrittenScene(ManagerLast, SceneContents):
         self.spans = [by_owner[first:last] for first, last in pairwise(ends)]
 
     def _keep_values(self, values: list[tuple[Equation, int, float]]) -> None:
-        """Keep the equations of rows that have a value, where it is in the pool, and its unit."""
-        self._values = values
-        self._sourced = [k for k, (equation, _, _) in enumerate(values) if equation.source is not None]
-        self._sources = [values[k] for k in self._sourced]
-        # What every solve reads of them: where a value is kept, where it goes, its unit, whether it is a length.
-        self._reads = [
-            (*equation.place(), at, unit, not equation.terms[0][1].is_angle) for equation, at, unit in self._sources
-        ]
+        """Keep the equations of rows that have a value, and where it is in the pool."""
+        self._valued = [(equation, at) for equation, at, _ in values]
+        sourced = [(equation, at) for equation, at in self._valued if equation.source is not None]
+        # What every solve reads of them: where a value is kept, where it goes, whether it is a length.
+        self._reads = [(*equation.place(), at, not equation.terms[0][1].is_angle) for equation, at in sourced]
 
-    def _keep_units(self, values: list[tuple[Equation, int, float]]) -> None:
-        """Keep the same equations in the same places, with other units."""
-        self._values = values
-        self._sources = sources = [values[k] for k in self._sourced]
-        reads = zip(self._reads, sources, strict=True)
-        self._reads = [(*before[:4], unit, before[5]) for before, (_, _, unit) in reads]
+    @property
+    def _values(self) -> list[tuple[Equation, int, float]]:
+        """The equations of rows that have a value, where it is in the pool, and its unit: of a length the scene's size.
+
+        Made where it is asked for: a study solves scenes of many sizes, and looks at few of their values.
+        """
+        scale = self.scale
+        return [(equation, at, 1.0 if equation.terms[0][1].is_angle else scale) for equation, at in self._valued]
+
+    @property
+    def _sources(self) -> list[tuple[Equation, int, float]]:
+        """Those of them that may be set between solves."""
+        return [value for value in self._values if value[0].source is not None]
 
     def _take_addresses(self) -> None:
         """Where the kernels are that only contacts, trims, clearances, expressions or many bodies ask for."""

@@ -151,6 +151,8 @@ def _check_bounds(sheet: _Sheet, table: TrimTable, names: Sequence[str]) -> None
                 "loop, none inside another, and rings with material on their left"
             )
     domain, closed, poles = sheet
+    if not (poles or any(closed)) and table.beyond[0][0] != 0.0:
+        raise InputError(f"a hole goes around {names[0]}, with material outside of it; expected holes inside it")
     for axis, (bit_low, bit_high) in ((1, (4, 8)), (0, (1, 2))):
         if closed[axis] or not closed[1 - axis]:
             continue

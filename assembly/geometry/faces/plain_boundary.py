@@ -64,6 +64,9 @@ def plain_boundary(
     if (table.left != 1.0).any() or (table.right != 0.0).any():
         return None
     loops = [Loop.known(row, box[4]) for row, box in zip(rows, measured, strict=True)]
+    # A hole that runs counterclockwise would bound a second piece, beside the face or inside another hole.
+    if holes and (loops[0].is_clockwise or not all(loop.is_clockwise for loop in loops[1:])):
+        return None
     return loops, curves, ranges, table
 
 

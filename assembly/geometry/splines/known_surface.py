@@ -20,12 +20,13 @@ def known_surface(
     """A surface of arrays that are its own from now on.
 
     Shapes, the order of knots and the signs of weights are not looked at. Where numbers are not finite, or a side of
-    the domain has no length, `NurbsSurface` says so.
+    the domain has no length, `NurbsSurface` says so. It also makes those of knots that are not clamped, whose domain
+    is shorter than their row, as profiles of files may have them.
 
     Parameters
     ----------
     points : (n, m, 3)
-    knots : of u and of v, clamped
+    knots : of u and of v
     degree : of u and of v
     weights : (n, m), optional
         Ones by default.
@@ -35,7 +36,7 @@ def known_surface(
         weights = np.ones(points.shape[:2])
     # A sum may overflow: that is seen where all is checked.
     finite = isfinite(sum(points.ravel().tolist()) + sum(row_u) + sum(row_v))
-    if not (finite and row_u[0] < row_u[-1] and row_v[0] < row_v[-1]):
+    if not (finite and _is_clamped(row_u, degree[0]) and _is_clamped(row_v, degree[1])):
         return NurbsSurface(points, knots, degree, weights)
     made = object.__new__(NurbsSurface)
     for array in (points, weights, *knots):
@@ -43,3 +44,8 @@ def known_surface(
     made.control_points, made.knots, made.degree, made.weights = points, knots, degree, weights
     made.name, made.domain = None, ((row_u[0], row_u[-1]), (row_v[0], row_v[-1]))
     return made
+
+
+def _is_clamped(row: list[float], degree: int) -> bool:
+    """Whether a row of knots begins and ends with as many equal ones as it takes, and has a length."""
+    return row[0] == row[degree] < row[-1 - degree] == row[-1]

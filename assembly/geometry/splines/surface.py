@@ -34,6 +34,8 @@ _QUANTITIES = (1, 3, 6)
 _POLE = 1e-8
 # How far a net of two by two points may be from a parallelogram, in parts of its largest coordinate.
 _LINEAR = 1e-13
+# Attributes that are kept for the next one who asks, and are no part of copies.
+_MADE_AGAIN = ("_whole_face", "_scaled")
 
 
 def _pair(name: str, value: Any) -> tuple[Any, Any]:
@@ -110,8 +112,8 @@ class NurbsSurface(FoundAgain, ReadOnlyArrays):
         return f"NurbsSurface({label}{n} x {m} control points, degree {self.degree}, domain {domain})"
 
     def __getstate__(self) -> dict[str, Any]:
-        # All of it as a face (`whole_face`) is made again.
-        return {name: value for name, value in super().__getstate__().items() if name != "_whole_face"}
+        # All of it as a face (`whole_face`), and it in another unit, are made again.
+        return {name: value for name, value in super().__getstate__().items() if name not in _MADE_AGAIN}
 
     @cached_property
     def size(self) -> float:
@@ -298,6 +300,16 @@ class NurbsSurface(FoundAgain, ReadOnlyArrays):
         moved.degree, moved.knots, moved.weights = self.degree, self.knots, self.weights
         moved.name, moved.domain = self.name, self.domain
         return moved
+
+    def scaled(self, scale: float) -> NurbsSurface:
+        """The surface times a scale; the last one is kept, with what is known of it.
+
+        Scenes are packed again in a unit that they had because of other surfaces.
+        """
+        kept: tuple[float, NurbsSurface] | None = self.__dict__.get("_scaled")
+        if kept is None or kept[0] != scale:
+            kept = self.__dict__["_scaled"] = scale, self.transformed(scale=scale)
+        return kept[1]
 
     @cached_property
     def _tables(self) -> tuple[NDArray[np.int64], Array]:

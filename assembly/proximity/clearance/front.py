@@ -199,13 +199,19 @@ def leave_off(forest, front):
 
 
 @kernel(inline=True)
-def expiry_of(nodes, travelled, gap):
-    """Until points of b have gone so far in all, two nodes are parted for certain.
+def is_asked_always(nodes):
+    """Whether the gap of two nodes is asked at every pose, whatever it was at the last one.
 
-    Points of a are seen from b in a bore of which the root's radius tells nothing: they are asked every time. So is
-    what leans in a bore, which is nearer by more than it goes.
+    Points of a are seen from b in a bore of which the root's radius tells nothing. What leans in a bore is nearer by
+    more than it goes.
     """
-    return -math.inf if nodes.how == BY_BORE_B or nodes.how >= BY_SLEEVE else travelled + gap
+    return nodes.how == BY_BORE_B or nodes.how >= BY_SLEEVE
+
+
+@kernel(inline=True)
+def expiry_of(nodes, travelled, gap):
+    """Until points of b have gone so far in all, two nodes are parted for certain."""
+    return -math.inf if is_asked_always(nodes) else travelled + gap
 
 
 @kernel(inner=True)
@@ -272,7 +278,7 @@ def ask_again(forest, front, way, limits):
         if expiry <= travelled and not over:
             counts.asked += 1
             # What is asked at every pose in any case is no progress.
-            if nodes.how != BY_BORE_B:
+            if not is_asked_always(nodes):
                 over = counts.asked % ASKED_AT_ONCE == 0 and is_over(limits)
             if nodes.how == BY_SPINES:
                 if not ask_spines_again(forest, front, way, needed, i):

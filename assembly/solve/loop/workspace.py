@@ -97,10 +97,10 @@ def workspace_needed(table):
     # Of pairs; of tapes; multipliers of least squares; the way back.
     doubles += 4 * pairs + (3 * VECTORS + VARIABLES) * VARIABLES
     doubles += table[tapes] + table[tapes + 1] + table[tapes + 2] + (most + 1) * most + WAY + LOOP
-    # Of unknowns, with those of all pairs.
-    blocks, n = header.block_record, n + 4 * pairs
-    layout = blocks_at(table, blocks)
-    doubles += 4 * n + 4 * pairs + (36 * (layout.blocks + layout.factored) if blocks > 0 else 2 * n * n)
+    # Of unknowns, with those of all pairs: where one is lifted, no Hessian is kept by blocks (`choose_storage`).
+    n, blocks = n + 4 * pairs, blocks_at(table, header.block_record)
+    by_blocks = header.block_record > 0 and pairs == 0
+    doubles += 4 * n + 4 * pairs + (36 * (blocks.blocks + blocks.factored) if by_blocks else 2 * n * n)
     return doubles, integers + pairs + header.clearance_rows
 
 

@@ -266,7 +266,7 @@ class Rows:
                 continue
             for (_, coordinate), places in zip(row.equation.terms, row.places, strict=True):
                 frames, kind = standing(coordinate, q, places), coordinate.kind
-                a, z_b = np.array(frames.a), np.array(frames.b[2])
+                a, z_b = np.array([frames.a(k) for k in range(3)]), np.array(frames.b(2))
                 cosine = float(a[2] @ z_b)
                 # The only dot product of joints is that of the z axes.
                 turns = cosine < -_STEEP if kind == SWING else kind in (DOT, ANGLE) and abs(cosine) > _STEEP

@@ -51,3 +51,15 @@ def test_bad_arguments_are_named(arguments, text):
     surface, name, reversed_ = arguments
     with pytest.raises(TypeError, match=text):
         Face(shapes.sphere(1.0) if surface is None else surface, name=name, reversed=reversed_)
+
+
+def test_a_surface_in_a_unit_is_kept_and_is_no_part_of_copies():
+    surface = shapes.sphere(2.0)
+    size = len(pickle.dumps(surface))
+    half = surface.scaled(0.5)
+    assert surface.scaled(0.5) is half and surface.scaled(0.25) is not half
+    assert np.array_equal(half.control_points, surface.transformed(scale=0.5).control_points)
+    assert all(
+        np.array_equal(*both) for both in zip(half.packed(), surface.transformed(scale=0.5).packed(), strict=True)
+    )
+    assert len(pickle.dumps(surface)) == size

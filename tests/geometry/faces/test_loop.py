@@ -125,6 +125,11 @@ SPIKE = polygon((0, 0), (2, 0), (3, 0), (2, 0), (1, 1))
         (circle((0, 0), 3), [circle((0.9, 0), 1), circle((-0.9, 0), 1)], r"holes\[1\] crosses or touches holes\[0\]"),
         (circle((0, 0), 1), [circle((2.5, 0), 1)], r"holes\[0\] does not bound one face"),
         (circle((0, 0), 4), [circle((0, 0), 2), circle((0, 0), 1)], r"holes\[1\] does not bound one face"),
+        # In lists, as files have them, and run so that each has material on its left.
+        ([circle((0, 0), 1)], [[circle((2.5, 0), 1)]], r"holes\[0\] does not bound one face"),
+        ([circle((0, 0), 4)], [[circle((0, 0), 2).reversed()], [circle((0, 0), 1)]], r"holes\[1\] does not"),
+        ([circle((0, 0), 1).reversed()], [[circle((0, 0), 4)]], "a hole goes around outer"),
+        (circle((0, 0), 1), [circle((0, 0), 4)], "a hole goes around outer"),
         (circle((4.5, 0), 1), [], r"outer leaves the domain: curve 0 has u from 3\.5 to 5\.5"),
         (polygon((0, 0), (1, 0), (0, 1))[:2], [], "outer is open"),
         (segment((-1, 0), (1, 0)), [], "outer is open: a gap of 2"),

@@ -12,7 +12,7 @@ import pytest
 
 import assembly as asm
 from assembly.view.mesh import body_mesh
-from tests.view.chromium import Chromium, decoded
+from tests.view.chromium import decoded
 
 pytest.importorskip("viser", reason="the page is viser's: extra `live`")
 # Seconds for a page to come up where a processor draws it that others use as well.
@@ -25,11 +25,11 @@ def clips():
     return runpy.run_path(str(EXAMPLE))["two_clips"]()
 
 
-def wait_for(what, patience=PATIENCE):
+def wait_for(what, patience=PATIENCE, every=0.05):
     end = time.monotonic() + patience
     while not what():
         assert time.monotonic() < end, "it did not come"
-        time.sleep(0.05)
+        time.sleep(every)
 
 
 def on_screen(page, client, points):
@@ -97,46 +97,44 @@ def test_a_mouse_drags_a_clip(browser, clips):
 
 
 def middle_of_red(chromium, tab, picture):
-    """Where the red pixels of a page are in the mean, (2,); NaN without any."""
+    """Where the red pixels of a page are in the mean, (2,); NaN without any. The orange of a notice is none."""
     chromium.shot(tab, picture)
     red, green, blue = (decoded(picture)[:, :, k].astype(float) for k in range(3))
-    rows, columns = np.nonzero((red > 60.0) & (red > 2.0 * np.maximum(green, blue)))
+    rows, columns = np.nonzero((red > 60.0) & (red > 3.0 * np.maximum(green, blue)))
     return np.array([columns.mean(), rows.mean()]) if len(rows) > 100 else np.full(2, np.nan)
 
 
 def test_two_browsers_see_the_same_scene(browser, tmp_path):
-    """Two processes of Chromium: in one a mouse drags, and the picture of the other follows."""
+    """Two people's browsers: in one a mouse drags, and the picture of the other follows."""
     floor = asm.Body("floor", asm.shapes.plane(6.0, 6.0), fixed=True)
     ball = asm.Body("ball", asm.shapes.sphere(0.7), position=(-1.0, 0.0, 0.7))
     ball.color = (0.9, 0.05, 0.05)
     scene = asm.Assembly([floor, ball])
     scene.constrain(asm.Contact(floor, ball))
-    other, picture = Chromium(tmp_path / "profile"), tmp_path / "picture.png"
-    try:
-        with asm.view.live(scene, port=0) as page:
-            address = page.url.replace("localhost", "127.0.0.1")
-            with browser.visited(address) as tab:
-                wait_for(lambda: page._server.get_clients())
-                (client,) = page._server.get_clients().values()
-                with other.visited(address) as second:
-                    wait_for(lambda: len(page._server.get_clients()) == 2)
-                    wait_for(lambda: np.isfinite(middle_of_red(other, second, picture)).all())
-                    before = middle_of_red(other, second, picture)
-                    end = drag(page, client, browser, tab, ball, 12.0)
-                    wait_for(lambda: page.q[1, 0] > -0.5 or abs(page.q[1, 1]) > 0.5)
-                    assert page.shown.holder == client.client_id and page.shown.violation < 1e-10
-                    browser.mouse(tab, "mouseReleased", *end)
-                    wait_for(lambda: page.shown.holder is None)
-                    wait_for(lambda: np.abs(middle_of_red(other, second, picture) - before).max() > 10.0)
+    picture = tmp_path / "picture.png"
+    with asm.view.live(scene, port=0) as page:
+        address = page.url.replace("localhost", "127.0.0.1")
+        # So wide that the ball goes neither behind the panel nor behind the notice of a browser without a GPU.
+        with browser.visited(address, width=800) as tab:
+            wait_for(lambda: page._server.get_clients())
+            (client,) = page._server.get_clients().values()
+            with browser.visited(address, width=800) as second:
+                wait_for(lambda: len(page._server.get_clients()) == 2)
+                wait_for(lambda: np.isfinite(middle_of_red(browser, second, picture)).all(), every=0.5)
+                before = middle_of_red(browser, second, picture)
+                end = drag(page, client, browser, tab, ball, 12.0)
+                wait_for(lambda: page.q[1, 0] > -0.5 or abs(page.q[1, 1]) > 0.5)
+                assert page.shown.holder == client.client_id and page.shown.violation < 1e-10
+                browser.mouse(tab, "mouseReleased", *end)
+                wait_for(lambda: page.shown.holder is None)
+                wait_for(lambda: middle_of_red(browser, second, picture)[0] > before[0] + 10.0, every=0.5)
 
-                    def are_one():
-                        # Pixels: both look from where the page begins.
-                        found = [middle_of_red(*each, picture) for each in ((browser, tab), (other, second))]
-                        return np.abs(found[0] - found[1]).max() < 1.0
+                def are_one():
+                    # Pixels: both look from where the page begins.
+                    found = [middle_of_red(browser, each, picture) for each in (tab, second)]
+                    return np.abs(found[0] - found[1]).max() < 1.0
 
-                    wait_for(are_one)
-    finally:
-        other.close()
+                wait_for(are_one, every=0.5)
 
 
 def test_a_browser_that_leaves_lets_go_and_others_go_on(browser):
