@@ -160,7 +160,8 @@ def judge_end(solution: Solution, settings: NDArray[np.float64], interruption: I
     """Set a solution under clearances to STALLED if its bodies are not known to be clear.
 
     Without an objective, if the loop ended because of a crossing, a pose at which rows hold is a solution if all is
-    proven.
+    proven. Nor is INFEASIBLE said of a pose that holds: where bodies cross at a contradiction, the loop returns to the
+    last pose that held.
     """
     if solution._is_lost or (interruption.is_over() and not solution.success):
         return
@@ -170,12 +171,11 @@ def judge_end(solution: Solution, settings: NDArray[np.float64], interruption: I
     if solution.success and not (stayed or all(pair.holds for pair in solution._clear)):
         solution.status = Status.STALLED
     elif (
-        solution.status is Status.STALLED
-        and settings[ANY_POSE] == 1.0
-        and all(pair.proved for pair in solution._clear)
+        solution.status in (Status.STALLED, Status.INFEASIBLE)
         and solution.feasibility <= settings[FEASIBILITY] * solution._packed.scale
     ):
-        solution.status = Status.SOLVED
+        is_solution = settings[ANY_POSE] == 1.0 and all(pair.proved for pair in solution._clear)
+        solution.status = Status.SOLVED if is_solution else Status.STALLED
     solution.seconds += perf_counter() - begin
 
 

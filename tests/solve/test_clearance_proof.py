@@ -9,7 +9,8 @@ import assembly as asm
 from assembly.kinematics.pose import rotation_of
 from assembly.proximity.clearance.answers import Verdict
 from assembly.solve import near_contacts as contacts_nearby
-from assembly.solve.clearance_proof import lent_proof, new_proof, prove_end
+from assembly.solve.clearance_proof import judge_end, lent_proof, new_proof, prove_end
+from assembly.solve.interruption import Interruption
 from assembly.solve.near_contacts import near_contacts, opening_move
 from tests.proximity.clearance.scenes import start_of
 from tests.validation.clearance_scenes import scene_of
@@ -41,6 +42,32 @@ def test_a_start_within_another_body_is_stalled_where_nothing_may_move():
     assert "plate and part (ENCLOSED)" in solution.message
     # It is no nearer to the walls than that.
     assert 0.5 < solution.violations["gap"] <= 1.1 + 1e-12
+
+
+@pytest.mark.parametrize("place, status", [((2.0, 0.0, 0.0), "STALLED"), ((0.8, 0.1, 0.2), "INFEASIBLE")])
+def test_only_of_a_pose_that_violates_something_is_said_that_it_violates_it_least(place, status):
+    """The loop's verdict may be of another pose than the one that it returns."""
+    found = scene(BALL, place)
+    found.minimize(asm.PointDistance(found["part"].point(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)))
+    solution = found.solve(max_iterations=0)
+    solution.status = asm.Status.INFEASIBLE
+    interruption = Interruption(None, None)
+    judge_end(solution, found._settings({}, interruption, warm=False), interruption)
+    assert solution.status.name == status
+
+
+def test_a_tight_pin_that_is_drawn_out_of_its_bore_is_not_called_infeasible_where_it_stands():
+    """It was, at its start, which holds: the loop had gone to where the pin wedges, and came back."""
+    plate = asm.Body("plate", asm.shapes.plate(3.0, 3.0, 4.0, [(0.0, 0.0, 0.5)]), fixed=True)
+    lean = np.array([0.9999999639132022, 0.0001054936435254, -0.00024707222701596, 0.0])
+    start = (0.0, 0.0, -0.8161681157298062)
+    pin = asm.Body("pin", asm.shapes.solid_cylinder(0.4999, 0.2), start, lean / np.linalg.norm(lean))
+    found = asm.Assembly([plate, pin])
+    found.constrain(asm.Clearance())
+    found.minimize(asm.PointDistance(pin.point(0.0, 0.0, 1.1), (0.572, -0.163, -0.429)))
+    solution = found.solve()
+    # No contradiction is claimed where nothing is violated; that it is SOLVED is not required of this start.
+    assert solution.feasibility < 1e-9 and solution.status is not asm.Status.INFEASIBLE
 
 
 @pytest.mark.parametrize("place", [(2.0, 0.0, 0.0), (0.8, 0.1, 0.2), (1.0, 0.0, 0.0), (0.1, 0.1, 0.1)])
