@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.clearance.overlapped import are_in_each_other
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.solve.clearance_proof import can_prove, lent_proof, open_recognized
 from assembly.solve.interruption import Interruption
@@ -108,7 +110,11 @@ def put_together(
         return None
     with lent_proof(packed, scene.bodies) as proof:
         touching = settings.touching * packed.scale
-        is_clear = not any(is_stuck(answer, touching) for answer in proof.as_they_stand(q, touching))
+        answers = proof.as_they_stand(q, touching)
+        open_yet = [k for k, answer in enumerate(answers) if answer.verdict is Verdict.UNDECIDED]
+        is_clear = not any(is_stuck(answer, touching) for answer in answers)
+        # Equal bodies in one place have the same surfaces, of which no two cross.
+        is_clear = is_clear and not any(are_in_each_other(proof, k, q, touching) for k in open_yet)
         sides = _sides(proof, q)
 
     def solve() -> There | None:
