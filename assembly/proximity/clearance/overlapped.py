@@ -1,4 +1,4 @@
-"""Bodies that overlap behind flat faces by less than samples detect, or whose surfaces are the same.
+"""Bodies that overlap behind flat faces, by less than samples detect.
 
 Two flat faces that look at each other from inside do not tell that bodies cross: they may be far sides of thin parts,
 or belong to bodies that are beside each other there. A ball between both planes that is inside of both bodies does.
@@ -6,7 +6,6 @@ or belong to bodies that are beside each other there. A ball between both planes
 
 from __future__ import annotations
 
-import itertools
 from functools import lru_cache
 
 import numpy as np
@@ -21,19 +20,13 @@ from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.features.body_distance import DistanceStatus, distance
 from assembly.proximity.manifolds.flat_manifolds import flat_manifolds
 
-__all__ = ["are_in_each_other", "overlap_answer"]
+__all__ = ["overlap_answer"]
 
 Array = NDArray[np.float64]
 # [size of the bodies] Flat faces that are deeper in each other are seen by samples.
 _DEEPEST = 1e-3
 # The ball's radius, over the distance of both planes.
 _PART = 0.25
-# [size of the bodies] The least radius of a ball that is looked for where boxes overlap.
-_LEAST = 1e-7
-# Where in the overlap of two boxes a ball may be inside of both bodies, in parts of its sides: in the middle, and
-# around it, where bodies with holes have material.
-_AROUND = itertools.product((0.25, 0.75), repeat=3)
-_PLACES = np.array([(0.5, 0.5, 0.5), *_AROUND, (0.1, 0.5, 0.5), (0.9, 0.5, 0.5)])
 _IDENTITY = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
@@ -58,31 +51,6 @@ def overlap_answer(proof: ClearanceProof, k: int, q: Array, touching: float) -> 
         if all(_has_inside(faces, q[body], point, _PART * depth) for faces, body in zip(shapes, numbers, strict=True)):
             return Answer(Verdict.CROSSING, depth=depth, place=point)
     return None
-
-
-def are_in_each_other(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
-    """Whether bodies of pair k cross at poses q (n, 7), by a ball inside of both where the boxes around them overlap.
-
-    That is known also of bodies whose surfaces are the same, as of two equal pins in one place: where they lie on each
-    other no two cross. False where none of a few balls is inside of both.
-    """
-    numbers = proof.pairs[k]
-    shapes = proof.faces[numbers[0]], proof.faces[numbers[1]]
-    boxes = np.array([_box(faces, q[body]) for faces, body in zip(shapes, numbers, strict=True)])
-    low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
-    radius = max(2.0 * touching, _LEAST * proof.size(k))
-    if (high - low).min() <= 2.0 * radius or not all(solid_of(faces).is_closed for faces in shapes):
-        return False
-    sides = list(zip(shapes, q[list(numbers)], strict=True))
-    points = low + _PLACES * (high - low)
-    return any(all(_has_inside(faces, row, point, radius) for faces, row in sides) for point in points)
-
-
-def _box(faces: tuple[Face, ...], row: Array) -> Array:
-    """The corners (2, 3) of a box around a body at a pose."""
-    points = np.concatenate([face.surface.control_points.reshape(-1, 3) for face in faces])
-    points = points @ rotation_matrix(row[3:]).T + row[:3]
-    return np.array([points.min(axis=0), points.max(axis=0)])
 
 
 def _has_inside(faces: tuple[Face, ...], row: Array, point: Array, radius: float) -> bool:
