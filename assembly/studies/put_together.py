@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.proximity.brep.solid import solid_of
+from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.solve.clearance_proof import can_prove, lent_proof, open_recognized
 from assembly.solve.interruption import Interruption
@@ -87,6 +89,17 @@ def _sides(proof: ClearanceProof, q: Array, moves: Array | None = None) -> list[
     return [proof.plane_between(k, q, moves) for k in range(len(proof.pairs))]
 
 
+def _are_in_one_place(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
+    """Whether the bodies of pair k are equal, and in one place, as pins that all stand at the origin.
+
+    Then they are in each other, which no proof says: their surfaces are the same, and do not cross.
+    """
+    a, b = proof.pairs[k]
+    turn, shift = proof.relative(k, q)
+    off = float(np.linalg.norm(shift)) + proof.size(k) * float(np.linalg.norm(turn - np.eye(3)))
+    return proof.faces[a] is proof.faces[b] and off <= touching and solid_of(proof.faces[a]).is_closed
+
+
 def put_together(
     scene: Assembly,
     q: Array,
@@ -108,7 +121,10 @@ def put_together(
         return None
     with lent_proof(packed, scene.bodies) as proof:
         touching = settings.touching * packed.scale
-        is_clear = not any(is_stuck(answer, touching) for answer in proof.as_they_stand(q, touching))
+        answers = proof.as_they_stand(q, touching)
+        open_yet = [k for k, answer in enumerate(answers) if answer.verdict is Verdict.UNDECIDED]
+        is_clear = not any(is_stuck(answer, touching) for answer in answers)
+        is_clear = is_clear and not any(_are_in_one_place(proof, k, q, touching) for k in open_yet)
         sides = _sides(proof, q)
 
     def solve() -> There | None:

@@ -57,6 +57,18 @@ def test_removed_is_as_never_there():
         case.scene.remove("none")
 
 
+def test_a_term_of_the_objective_that_is_removed_draws_no_more():
+    ball = asm.Body("ball")
+    scene = asm.Assembly([ball])
+    goal, other = (asm.PointDistance(ball.point(0, 0, 0), to) for to in ((1.0, 0.0, 0.0), (0.0, 2.0, 0.0)))
+    scene.minimize(goal, other)
+    assert np.allclose(scene.solve().pose(ball).position, (0.5, 1.0, 0.0), rtol=0, atol=1e-12)
+    assert scene.remove(goal) is goal and scene.objectives == ((1.0, other),)
+    assert np.allclose(scene.solve().pose(ball).position, (0.0, 2.0, 0.0), rtol=0, atol=1e-12)
+    with pytest.raises(asm.errors.InputError, match="constraint is PointDistance.*expected one of the assembly: none"):
+        scene.remove(goal)
+
+
 def test_a_body_that_becomes_fixed_stays_and_its_joints_to_ground_ask_for_nothing():
     case = slider_crank()
     scene, crank = case.scene, case.scene.bodies[1]

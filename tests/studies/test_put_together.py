@@ -304,3 +304,15 @@ def test_slots_added_before_parts_are_put_together_do_no_harm():
     assert solution.pose("b").position == pytest.approx([1.0, 0.0, 0.5], abs=HOLDS)
     assert solution.feasibility < HOLDS
     assert solution.objective == pytest.approx(0.25, abs=HOLDS)  # the square of the way
+
+
+def test_equal_bodies_in_one_place_are_in_each_other_and_put_together_first():
+    """Their surfaces are the same, and do not cross."""
+    plate = asm.Body("plate", asm.shapes.plate(20, 20, 4, [(0, 0, 3)]), fixed=True)
+    pegs = [asm.Body(f"peg {k}", asm.shapes.solid_cylinder(2, 6)) for k in range(2)]
+    scene = asm.Assembly([plate, *pegs])
+    scene.constrain(asm.Fixed(plate, pegs[0]), asm.Fixed(plate.frame((14, 0, 0)), pegs[1], "beside"), asm.Clearance())
+    assert not asked(scene).keeps_topology
+    solution = scene.solve()
+    assert solution.success and solution.put_together and solution.proved
+    assert solution.pose(pegs[1]).position == pytest.approx([14.0, 0.0, 0.0], abs=HOLDS)

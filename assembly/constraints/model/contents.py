@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from operator import is_
-from typing import Self
+from typing import Self, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from assembly.kinematics.pose import Pose
 __all__ = ["Contents"]
 
 Array = NDArray[np.float64]
+Item = TypeVar("Item", bound=Constraint | Objective)
 
 
 class Contents:
@@ -168,8 +169,14 @@ class Contents:
             self._taken.add(constraint.name)
         self._has_changed()
 
-    def remove(self, constraint: Constraint | str) -> Constraint:
-        """Take a constraint, or the one of that name, out of the assembly, and return it.
+    @overload
+    def remove(self, constraint: str) -> Constraint: ...
+    @overload
+    def remove(self, constraint: Item) -> Item: ...
+    def remove(self, constraint: Constraint | Objective | str) -> Constraint | Objective:
+        """Take a constraint, the one of that name, or a term of the objective out of the assembly, and return it.
+
+        What is both is taken out of the constraints, and out of the objective by another call.
 
         Raises
         ------
@@ -180,8 +187,13 @@ class Contents:
             if item is constraint or (isinstance(constraint, str) and item.name == constraint):
                 break
         else:
+            kept = [(sign, term) for sign, term in self._objectives if term is not constraint]
+            if isinstance(constraint, Objective) and len(kept) < len(self._objectives):
+                self._objectives[:] = kept
+                self._has_changed()
+                return constraint
             known = ", ".join(repr(item.name) for item in self._constraints) or "none"
-            raise InputError(f"constraint is {constraint!r}; expected one of the assembly: {known}")
+            raise InputError(f"constraint is {constraint!r}; expected one of the assembly: {known}, or a term")
         for other in (*self._constraints, *(term for _, term in self._objectives)):
             if isinstance(other, (TrimContact, ContactPlace)) and other.contact is item:
                 raise InputError(
