@@ -75,6 +75,124 @@ def borrowed(trees: list[ast.Module]) -> list[str]:
     return wrong
 
 
+def record_views(trees: list[ast.Module]) -> set[str]:
+    """Names of functions that `record_view` makes, and of kernels that return what one of them reads."""
+    found = {"carve", "uncounted"} | {
+        target.id
+        for tree in trees
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call) and name_of(node.value) == "record_view"
+        for target in node.targets
+        if isinstance(target, ast.Name)
+    }
+    returned = [
+        (function.name, name_of(node.value))
+        for function in functions_of(trees)
+        for node in ast.walk(function)
+        if isinstance(node, ast.Return) and isinstance(node.value, ast.Call)
+    ]
+    while True:
+        more = {name for name, called in returned if called in found}
+        if more <= found:
+            return found
+        found |= more
+
+
+def assigned(function: ast.FunctionDef) -> list[tuple[ast.expr, ast.expr]]:
+    """Targets and values of a function's assignments, those of tuples one by one."""
+    pairs = []
+    for node in ast.walk(function):
+        if isinstance(node, ast.Assign):
+            target, value = node.targets[-1], node.value
+            if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+                pairs += list(zip(target.elts, value.elts, strict=True))
+            else:
+                pairs.append((target, value))
+    return pairs
+
+
+def root_of(node: ast.expr) -> str:
+    """The variable of `name.field[...]`."""
+    while isinstance(node, (ast.Attribute, ast.Subscript)):
+        node = node.value
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def outliving(trees: list[ast.Module]) -> list[str]:
+    """Records and carved arrays that a kernel uses after the last use of what it made, and they are in."""
+    views, wrong = record_views(trees), []
+    functions = functions_of(trees)
+    makers = {each.name for each in functions if "allocates=True" in ast.unparse(each.decorator_list[0])}
+    for function in functions:
+        if function.name not in makers:
+            continue
+        pairs = assigned(function)
+        last: dict[str, int] = {}
+        for node in ast.walk(function):
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+                last[node.id] = max(last.get(node.id, 0), node.lineno)
+        own: set[str] = set()
+        while True:
+            # What is made here, and tuples of that.
+            more = {
+                part.id
+                for target, value in pairs
+                if is_made(value)
+                or (
+                    isinstance(value, ast.Call)
+                    and name_of(value) not in views
+                    and (name_of(value) in makers or any(is_made(x) or root_of(x) in own for x in value.args))
+                )
+                for part in ast.walk(target)
+                if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)
+            }
+            if more <= own:
+                break
+            own |= more
+        for target, value in pairs:
+            if isinstance(target, ast.Name) and isinstance(value, ast.Call) and name_of(value) in views:
+                block = root_of(value.args[0])
+                if block in own and last.get(target.id, 0) > last[block]:
+                    wrong.append(f"{function.name}: {target.id} of {block}")
+    return wrong
+
+
+def test_no_kernel_uses_a_record_of_a_block_that_it_made_and_uses_no_more():
+    """Numba frees an array after its last use; a record is an address in it."""
+    assert {"search_state_at", "frame_at", "segment_at", "cell_in"} <= record_views(list(SOURCES.values()))
+    assert outliving(list(SOURCES.values())) == []
+
+
+@pytest.mark.parametrize(
+    ("body", "wrong"),
+    [
+        ("block = np.zeros(9)\n    a = record_at(block, 0)\n    return a.one", ["outer: a of block"]),
+        ("block, n = np.zeros(9), 1\n    a, b = record_at(block, 0), n\n    use(block)\n    return a.one",
+         ["outer: a of block"]),
+        ("all = Search(table, np.zeros(9))\n    a = first_in(all)\n    use(all)\n    return a.one",
+         ["outer: a of all"]),
+        ("block = np.zeros(9)\n    all = Search(block)\n    a = first_in(all)\n    use(all)\n    return a.one",
+         ["outer: a of all"]),
+        ("block = np.zeros(9)\n    a = record_at(block, 0)\n    a.one = 1.0\n    return use(block)", []),
+        # The caller holds it.
+        ("a = record_at(table, 0)\n    return a.one", []),
+    ],
+)  # fmt: skip
+def test_the_check_sees_records_that_outlive_their_block(body, wrong):
+    text = f"""
+record_at = record_view(RECORD)
+
+@kernel(inline=True)
+def first_in(search):
+    return record_at(search.block, 0)
+
+@kernel(inner=True, allocates=True)
+def outer(table, doubles):
+    {body}
+"""
+    assert outliving([ast.parse(text)]) == wrong
+
+
 def test_no_kernel_carves_from_a_block_of_its_own():
     names = carving(functions_of(list(SOURCES.values())))
     assert {"carve", "shape_of", "carve_all", "carve_points"} <= names

@@ -307,6 +307,15 @@ def branch(search, bound, i, j):
 advance = kernel(inner=True)(best_first(search_state_at, node_bound, search_ended, branch, floor=-math.inf))
 
 
+@kernel(inner=True)
+def pair_known(search, status):
+    """What a search with this status has found. Its state is read here, while the caller holds the array."""
+    best = search_state_at(search.state, 0)
+    codes = (int(best.feature_f), int(best.feature_g))
+    x = (best.parameters[0], best.parameters[1], best.parameters[2], best.parameters[3])
+    return ShellSearch(status, codes, x, best.gap, best.lower, int(best.effort))
+
+
 @kernel(inner=True, allocates=True)
 def nearest_of_shells(store, shells, pose, size, rough):
     """The nearest points of two shells, g seen from f, or any that are farther by a part of that, `rough`, at most."""
@@ -326,6 +335,4 @@ def nearest_of_shells(store, shells, pose, size, rough):
     if status == UNPROVEN and best.feature_f < 0.0:
         # Out of room before any point inside the trims: where the search began.
         keep_pair(search, i, j, middles(trees, i, j), math.inf)
-    codes = (int(best.feature_f), int(best.feature_g))
-    x = (best.parameters[0], best.parameters[1], best.parameters[2], best.parameters[3])
-    return ShellSearch(status, codes, x, best.gap, best.lower, int(best.effort))
+    return pair_known(search, status)

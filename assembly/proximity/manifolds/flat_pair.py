@@ -259,9 +259,10 @@ def flat_rows(frame_a, segments_a, frame_b, segments_b, turn, shift, tolerance, 
     facing = -dot(n, other)
     if facing < FACING:
         return 0, np.inf
+    # Read before the last use of the array that it is in, which is freed then.
+    lift = (scale(-1.0 / facing, other), triple(b.origin))
     seen = np.empty((len(segments_b), SEGMENT_SIZE))
     write_seen(frame_a, posed, segments_b, seen)
-    lift = (scale(-1.0 / facing, other), triple(b.origin))
     regions = (segments_a, seen)
     found, points = np.empty((len(rows), ROW_SIZE)), np.empty((len(rows) + 2, 2))
     count = put_corners(regions, frame_a, lift, tolerance, found, points)

@@ -9,26 +9,10 @@ from assembly.proximity.manifolds.clip import cross_segments, is_within
 from assembly.proximity.manifolds.records import SEGMENT_SIZE, segment_at
 
 
-@kernel(signatures="(f8[:, ::1], f8[::1], f8, i8[::1])", allocates=True)
-def line_span(segments, line, tolerance, borders):
-    """From where to where a line is in a region, in parts of its length: the outermost of its points there.
-
-    Parameters
-    ----------
-    segments : (n, SEGMENT_SIZE)
-    line : (4,)
-        Both ends, in the coordinates of the plane.
-    tolerance : float
-        What is no farther from a border is in the region.
-    borders : (2,)
-        Where the numbers of segments are written that the line ends at; -1 where it ends by itself.
-
-    Returns
-    -------
-    low, high : float
-        The first is more where nothing of the line is in the region.
-    """
-    one, points = np.zeros((1, SEGMENT_SIZE)), np.empty((2, 2))
+@kernel(inner=True)
+def span_within(segments, line, tolerance, borders, room):
+    """The same as `line_span`, with what it works in, which outlives the record of it here."""
+    one, points = room
     s = segment_at(one, 0)
     s.begin[0], s.begin[1], s.end[0], s.end[1] = line[0], line[1], line[2], line[3]
     dx, dy = line[2] - line[0], line[3] - line[1]
@@ -49,3 +33,25 @@ def line_span(segments, line, tolerance, borders):
                 high = part
                 borders[1] = k
     return low, high
+
+
+@kernel(signatures="(f8[:, ::1], f8[::1], f8, i8[::1])", allocates=True)
+def line_span(segments, line, tolerance, borders):
+    """From where to where a line is in a region, in parts of its length: the outermost of its points there.
+
+    Parameters
+    ----------
+    segments : (n, SEGMENT_SIZE)
+    line : (4,)
+        Both ends, in the coordinates of the plane.
+    tolerance : float
+        What is no farther from a border is in the region.
+    borders : (2,)
+        Where the numbers of segments are written that the line ends at; -1 where it ends by itself.
+
+    Returns
+    -------
+    low, high : float
+        The first is more where nothing of the line is in the region.
+    """
+    return span_within(segments, line, tolerance, borders, (np.zeros((1, SEGMENT_SIZE)), np.empty((2, 2))))
