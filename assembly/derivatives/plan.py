@@ -149,7 +149,7 @@ class Plan:
         measured = self._measured(packed, places)
         limits, self._figures = len(self._figures), [*self._figures, TOUCHING, PUSHING, UNBALANCED, FREE]
         self._numbers = np.array(self._figures)
-        # The scale of the scene that was derived last, and the figures for it but for frames that were turned or placed.
+        # The scale of the scene that was derived last, and the figures for it; those of moved frames are read anew.
         self._scaled = (0.0, self._numbers)
         # For every number of the state with probes its place in the state without them. Probes come after the bodies,
         # each at the pose of its host.
