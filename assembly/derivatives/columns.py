@@ -305,7 +305,7 @@ def differences(problem: Problem, parameter: Parameter, figures: Figures) -> Arr
 
 
 def _half(problem: Problem, parameter: Parameter, middle: float, way: float, figures: Figures) -> Array:
-    """What figures are more with the number one way from its middle than the other way."""
+    """The difference of figures between the number at `middle + way` and at `middle - way`."""
     shape = problem.here.residual.shape, problem.here.gradient.shape
     found = []
     for value in (middle + way, middle - way):

@@ -22,11 +22,11 @@ __all__ = ["Moves", "System", "one_sided_moves", "solve_system"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-# Singular values of rows of length one that count as none; curvatures over the largest that do.
+# Singular values of normalized rows that are less count as zero; so do curvatures, relative to the largest one.
 DEPENDENT, FLAT = 1e-7, 1e-8
-# What rows that repeat each other may ask for differently, over what is asked, and still agree.
+# Redundant rows agree where what they ask for differs by no more than this part of it.
 AGREE = 1e-7
-# Rows without a force, all of whose combinations are tried where there is no metric; what they may be broken by.
+# Without a metric all combinations of up to so many rows without a force are tried; violations up to WITHIN are none.
 MOST_OPEN, WITHIN = 10, 1e-9
 
 
@@ -187,7 +187,7 @@ def _held_by_least_distance(
     rates = sign * (system.jacobian[rows] @ solve_system(alone, held).steps[:, 0] + system.rows_by[rows, k])
     across = system.jacobian[rows] @ metric
     lengths = np.sqrt((across**2).sum(axis=1))
-    # What held rows leave no way to change is as it is; what is broken by rounding is not.
+    # Rows that no step within the held rows changes must hold already, to rounding.
     stays = lengths <= DEPENDENT * np.maximum(1.0, np.abs(system.jacobian[rows]).max(axis=1, initial=0.0))
     if (rates[stays] < -WITHIN).any():
         return None

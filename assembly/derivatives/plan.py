@@ -149,10 +149,10 @@ class Plan:
         measured = self._measured(packed, places)
         limits, self._figures = len(self._figures), [*self._figures, TOUCHING, PUSHING, UNBALANCED, FREE]
         self._numbers = np.array(self._figures)
-        # Figures as they are unless frames were turned or placed anew, with the scale that they are for.
+        # The scale of the scene that was derived last, and the figures for it; those of moved frames are read anew.
         self._scaled = (0.0, self._numbers)
-        # Of every number of a state with probes, which stand where their bodies do behind these, its place in that
-        # without.
+        # For every number of the state with probes its place in the state without them. Probes come after the bodies,
+        # each at the pose of its host.
         numbers, bodies_end = np.arange(state.size), packed.contacts_at
         on_probes = numbers[:bodies_end].reshape(-1, 7)[self._hosts].ravel()
         self._gathered = np.concatenate((numbers[:bodies_end], on_probes, numbers[bodies_end:]))
@@ -160,8 +160,8 @@ class Plan:
         self._plan = self._written(packed, entries, measured, limits)
         m, e, n, p = packed.rows, len(coordinates), self._unknowns, len(self._parameters)
         k = len(self._measures)
-        # Where in what is written equations end, rates, steps and forces, and what is told of measures and of the
-        # objective.
+        # Ends of the sections that are written: equations, rates, steps and forces, what is told of measures, and of
+        # the objective.
         at = (m + e) * (n + p) + n * n + n * p + p + k * (n + p) + n + 1
         self._shapes = (k, p), (n + m, p)
         self._ends = at, at + k * p, at + (k + n + m) * p, at + (k + n + m) * p + k, at + (k + n + m + 1) * p + k

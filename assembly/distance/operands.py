@@ -77,7 +77,7 @@ def coordinates(point: Any, d: int) -> tuple[float, float, float] | None:
 
 
 def share_a_point(a: Any, b: Any) -> bool:
-    """Whether two shapes have a point in common that both are given by: an end, a corner, or all of them."""
+    """Whether two shapes are one, or have a control point in common that both pass through, as an end of curves."""
     if a is b:
         return True
     if isinstance(a, NurbsSurface) or isinstance(b, NurbsSurface):

@@ -1,9 +1,8 @@
 """The answers of the kernels for spline curves, points and surfaces, as objects.
 
-Spline curves are searched by halves of Bezier pieces (`distance/curves/search.py`, `point_curve.py`), capsules first
-where a
-clearance is asked (`capsules.py`), surfaces by patches (`distance/patches/search.py`). A curve given by a formula
-against a surface is searched there, too.
+Spline curves are searched by halving Bezier pieces (`distance/curves/search.py`, `point_curve.py`), with capsules
+before that if a clearance is asked about (`capsules.py`); surfaces are searched by patches
+(`distance/patches/search.py`), also against a curve that is given by a formula.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from assembly.step.tree import Color, Part, free_labels, leaves
 
 __all__ = ["Source", "bodies_in", "read_shape", "solids_in", "solids_of", "unique"]
 
-# A deviation [mm] below which a face is what the file says: OCCT takes nearer points for one.
+# Deviations below this [mm] are not reported: OCCT takes points that are nearer to each other for one.
 EXACT = 1e-7
 
 
@@ -38,9 +38,9 @@ class Shape:
 class Source:
     """A file as a document of OCCT, in millimeters, with the number of its faces.
 
-    `absent` are files that it refers to and that are not there; of a damaged file what is whole is in the document.
-    `names` are those of its bodies in their order, where the document has them not. `advance` hears of faces that were
-    read.
+    `absent` has the names of missing files that it refers to. The document of a damaged file holds its undamaged
+    entities. `names` are those of the bodies, in order, if the document does not have them. `advance` is called with
+    numbers of faces that were read.
     """
 
     file: Path
@@ -137,7 +137,7 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
                 except Unreadable as reason:
                     missing.append(f"{leaf.name!r}: {reason}")
                     continue
-                # Images of a part are parts of their own; how many faces a file has is known of parts.
+                # A scaled or mirrored image is read as another part, but the file's number of faces has it only once.
                 key = entry.ToCString(), factor
                 if key not in read:
                     original = Part(leaf.label)
@@ -158,7 +158,7 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
                         body.color = leaf.color or shape.color
                         bodies.append(body)
     lost = [f"{count - built} of {count} faces, of which OCCT makes nothing"] if built < count else []
-    # Those of a file that is not damaged are of no shape.
+    # Faces that an undamaged file has beyond those of its bodies belong to no shape: nothing is missing.
     if strict and (missing or (lost and source.damaged)):
         raise StepError(
             f"path is {str(file)!r}; {_listed('not read', missing + lost)}; pass strict=False to read the rest"

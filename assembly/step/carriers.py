@@ -1,7 +1,8 @@
 """Surfaces as OCCT has them: planes, cylinders, cones, spheres, tori, extrusions and revolutions as such.
 
-OCCT's parameters of those are lengths and angles. Where each of ours is a function of one of theirs, that is found
-along two lines of the surface and proven on a grid; where it is not, the surface is written as a B-spline, with ours.
+OCCT's parameters of these surfaces are lengths and angles. If each of them is a function of one of our parameters, the
+two functions are found along two lines of the surface and checked on a grid of points. Otherwise the surface is written
+as a B-spline, which has our parameters.
 """
 
 from __future__ import annotations
@@ -39,13 +40,13 @@ class Carrier:
     maps : two functions
         From our u, and from our v, to one of its parameters.
     swapped : bool
-        Its first parameter comes of our v.
+        Whether OCCT's first parameter is a function of our v, and not of our u.
     turned : bool
-        Its normal is against ours.
+        Whether OCCT's normal is opposite to ours.
     plane : (3, 3) or None
         Origin, x and y of a plane, whose parameters are lengths along these; it has no maps.
     is_own : bool
-        Its parameters are ours.
+        Whether OCCT's parameters are ours.
     """
 
     geometry: Any

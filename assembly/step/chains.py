@@ -59,7 +59,7 @@ def chained(edges: list[Edge], patch: Patch) -> tuple[list[Edge], float]:
             by = _whole(rows[-1].corners[1], edge.corners[0], periods)
             rows.append(edge.shifted(by) if any(by) else edge)
     corners = [edge.corners for edge in rows]
-    # A ring closes up to a period, and so does its joint.
+    # A boundary that runs around a closed surface ends whole periods from where it begins.
     ring = _whole(corners[0][0], corners[-1][1], periods)
     # Joint k is where edge k begins.
     before = [(u + 0.0, v + 0.0) for _, (u, v) in corners[-1:] + corners[:-1]]
@@ -85,7 +85,11 @@ def _whole(to: Pair, at: Pair, periods: Pair) -> Pair:
 
 
 def _joint(last: Edge, edge: Edge, before: Pair, after: Pair) -> Pair:
-    """Where two edges meet: at the end of the one that is not loose; else what is level in one of both keeps it."""
+    """Where two edges meet.
+
+    If one of them alone is loose, at the end of the other one. Else in the middle between both ends, except that an
+    edge with a constant u or v keeps that coordinate.
+    """
     if last.loose != edge.loose:
         return before if edge.loose else after
     u, v = (

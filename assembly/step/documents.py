@@ -49,9 +49,9 @@ def checked_unit(unit: str, name: str = "unit") -> float:
 def document_of(path: str, folder: str | None = None) -> tuple[Any, int, list[str]]:
     """The file as a document of OCCT, in millimeters, the number of its faces, and files that it needs and are missing.
 
-    Entities that OCCT cannot load may end the process when it makes shapes of them, or some later time, and text that
-    is no STEP file's may hold up its parser for good: a file that has such is refused, unless there is a folder. Then
-    OCCT is given what is whole of the text, from there.
+    OCCT may crash, at once or later, where it makes shapes of entities that it could not load, and its parser may never
+    end on text that is not a STEP file's. So a damaged file is refused, unless a folder is given: then the undamaged
+    statements are written to a file in that folder, which OCCT reads instead.
     """
     # OCCT looks for files that this one refers to beside it only by a whole path.
     file = Path(path).absolute()
@@ -67,7 +67,7 @@ def document_of(path: str, folder: str | None = None) -> tuple[Any, int, list[st
 
 
 def _whole(path: str, text: bytes, folder: str | None, name: Path = Path("whole.step")) -> str:
-    """Where what is whole of a text is: in the folder, by a name."""
+    """The path at which a text's undamaged statements are: in the folder, by a name."""
     fault = first_fault(text)
     if folder is None:
         if fault is None:
@@ -82,9 +82,9 @@ def _whole(path: str, text: bytes, folder: str | None, name: Path = Path("whole.
 
 
 def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
-    """`document_of` a file that has the form of one, and is, or is made of, the one at the path."""
+    """`document_of` a file that has the syntax of one: the file at the path, or its undamaged statements."""
     o = occt()
-    # Settings exist once there is a reader.
+    # OCCT has its settings only after a reader was made.
     reader = o.STEPCAFControl_Reader()
     auto = o.XCAFDoc_ShapeTool.AutoNaming_s()
     try:
@@ -117,7 +117,7 @@ def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
 def _counted(reader: Any) -> tuple[int, int, int]:
     """Numbers of entities that OCCT could not load, those that shapes are made of and those of style, and of faces.
 
-    OCCT asks nothing of those of style where it is to make no colors.
+    OCCT does not read those of style if it is told to make no colors.
     """
     model = reader.Reader().WS().Model()
     everything = range(1, model.NbEntities() + 1)
@@ -147,7 +147,7 @@ def _is_flat(placement: Any) -> bool:
 
 
 def _is_bare(on_surface: Any) -> bool:
-    """Whether a curve on a surface has something else in place of its curve: OCCT would take it for one."""
+    """Whether what a curve on a surface refers to as its curve is none, which OCCT would use as if it were one."""
     there = on_surface.ReferenceToCurve()
     return there is not None and (there.NbItems() < 1 or not isinstance(there.ItemsValue(1), occt().StepGeom_Curve))
 

@@ -22,7 +22,7 @@ __all__ = ["Edges", "Known", "Laid"]
 
 # OCCT stands for "unbounded" with numbers beyond this one.
 _FAR = 1e50
-# What a file may forgive at most, over the size of the part: a tolerance of a meter makes no faces meet.
+# Tolerances of files count up to this part of the part's size: one of a meter does not make all faces meet.
 _FORGIVEN = 1e-2
 
 

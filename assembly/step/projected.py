@@ -34,7 +34,7 @@ _OFF = 1e-10
 _FOLLOWED = 1e-10
 # Places of a stretch at which a curve is compared with its edge.
 _PLACES = 9
-# Those at which it is asked whether it leaves its edge at all.
+# Places of a whole curve at which it is first asked whether it leaves its edge anywhere (`strays`).
 _LOOKS = 33
 
 
@@ -173,7 +173,7 @@ class _Edge:
     def off(self, t: Array) -> float:
         """How far the curve on the surface is from where the projection is, across the curve, at most.
 
-        What the curve is ahead or behind on its way does not count.
+        Differences along the curve do not count.
         """
         given = self.own.given(t)
         there = self._from(t, given)
@@ -232,7 +232,7 @@ def is_loose(edge: Any) -> bool:
 def strays(space: Space | None, own: Side, tolerance: float) -> bool:
     """Whether the curve on a surface that is given for an edge leaves it by more than its tolerance somewhere.
 
-    Points of both at one parameter are compared, and only half as many again of the tolerance counts.
+    Points of both are compared at the same parameters; more than one and a half tolerances between them counts.
     """
     if space is None:
         return False

@@ -27,14 +27,14 @@ __all__ = ["read_step"]
 
 _LOG = logging.getLogger("assembly.step")
 
-# Seconds that a damaged file may take, kernels that are compiled for the first time included; and those that OCCT may
-# take of them, of any file and a megabyte of text: fifty times as much as of clean ones. It is OCCT that may not end.
+# Seconds that reading a damaged file may take, with kernels compiled for the first time. OCCT may not end on such a
+# file: it gets so many of them for any file, and so many more a megabyte of text, fifty times what clean files take.
 PATIENCE = 240.0
 FOR_OCCT = (6.0, 20.0)
 # Exit codes from which on Windows means a crash; elsewhere they are negative.
 ENDED = 0xC0000000
-# What is raised in this one is raised again in the process that asked. It ends without OCCT's taking anything down.
-# Arrays that come back as bytes beside the rest are read-only, as those of bodies are.
+# The script of the other process. What is raised in it is raised again in the process that asked. It ends without
+# running OCCT's destructors. Arrays come back as separate bytes, and so are read-only, as those of bodies are.
 _APART = """
 import faulthandler, os, pickle, sys
 from assembly.step.occt import occt

@@ -32,7 +32,7 @@ Pair = tuple[float, float]
 FOLLOWED = 1e-10
 # Curves that leave a coordinate line by less, over the side of the domain, run along it.
 LEVEL = 1e-9
-# Legs of a control polygon, over a move of its end, along which the move is spread where the first leg is shorter.
+# A move of an end is spread over the first legs of the control polygon that together are this many times as long.
 GENTLE = 10.0
 
 
@@ -118,10 +118,10 @@ class Edge(NamedTuple):
 
 
 def _move_end(points: Array, to: Array) -> None:
-    """Move the first control point, homogeneous in (u, v), and as many after it as a move by a share of a leg takes.
+    """Move the first control point, homogeneous in (u, v), and some after it by a share of the move.
 
-    A move that is longer than the first leg would turn the curve back: what it leaves to the others falls evenly along
-    their legs, as those add up to `GENTLE` moves.
+    Moving the first one alone by more than its leg would turn the curve back. The share falls evenly along the control
+    polygon, from one at the end to zero where `GENTLE` moves are passed.
     """
     plane = points[:, :2] / points[:, 2:]
     move = to - plane[0]
@@ -169,7 +169,7 @@ def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: floa
 
 
 class _Draft(NamedTuple):
-    """An edge whose ends are in OCCT's (u, v) yet where it is level or a line."""
+    """An edge that is not finished: if it is level or a line, its ends are still in OCCT's (u, v)."""
 
     curve: Spline | Segment
     level: tuple[bool, bool]

@@ -66,7 +66,7 @@ def _packed_curves(curves: Any) -> tuple[NDArray[np.int64], Array, int, int]:
     points = curves
     fits = type(points) is np.ndarray and points.ndim == 3 and points.dtype == np.float64
     if not fits or not np.isfinite(points).all():
-        # What it takes a large array apart for is to say what is wrong with it.
+        # This goes through all entries to find the first wrong one: slow for a large array, so only if there is one.
         points = real_array("curves", curves, ("n", "k", "d"))
     n, k, d = points.shape
     if d not in (2, 3) or k < 2:

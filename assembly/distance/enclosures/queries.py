@@ -57,7 +57,7 @@ class Operand(NamedTuple):
     workspace: int
 
 
-# Under these names a curve keeps its center, and what it was packed to about it and about another one.
+# Attributes in which a curve keeps its center, and itself packed about that center and about another one.
 _CENTER, _KEY = "_enclosure_center", "_enclosure_operands"
 _ORIGIN = np.zeros(3)
 
@@ -249,7 +249,7 @@ def packed_operand(what: str, value: Any, center: Array = _ORIGIN) -> Operand:
 
 
 def _is_plain(points: Array) -> bool:
-    """Whether nothing is to be said against an array of doubles."""
+    """Whether an array of doubles has finite points of two or three coordinates, so that nothing else is checked."""
     return points.size > 0 and points.shape[-1] in (2, 3) and all(map(isfinite, points.ravel().tolist()))
 
 

@@ -21,8 +21,8 @@ __all__ = ["LoopSide", "Stretch", "loop_sides"]
 Array = NDArray[np.float64]
 # Pieces smaller than this part of the loop's size have no direction of their own.
 NO_LENGTH = 1e-14
-# Parts of its longest length that an extension is tried in, and how much nearer than its own end another point of the
-# side may be to it: the rounding of distances.
+# An extension is tried in so many lengths. A point of its side counts as nearer than the side's own end only if it is
+# nearer by more than this part, the rounding of distances.
 PARTS, NEARER = 32, 1e-9
 # Points of every piece that tell how near a side is to its own extensions.
 SAMPLES = 17

@@ -25,9 +25,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 # Parts of a curve, and the fewest of a span, at whose middles the curvature is taken.
 _PARTS, _LEAST = 64, 4
-# What part of the tolerance chords are meant to keep to: what is measured in the end is a little more or less.
+# Chords are planned for this part of the tolerance, since their measured distances differ a little from the plan.
 _AIM = 0.85
-# A chord in excess of a whole number by less is not worth another; the measurement has the last word.
+# A number of chords is rounded down if it exceeds a whole number by less than this; the measurement decides later.
 SPARE = 0.02
 # Tangents that differ by more [rad] on the two sides of a knot make a corner.
 _KINK = 1e-3

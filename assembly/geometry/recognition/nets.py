@@ -24,8 +24,8 @@ _PLACES = np.array([0.1, 0.5, 0.9])
 _FEW = 3
 # Where the normal is shorter than this part of the longest one, rounding decides on its direction.
 _SHORT = 1e-9
-# Exact is what is off by no more than this part of a size, and what coordinates tell: some 4,000 roundings of makers
-# and of moves, and a millionth of what two different shapes of a drawing are apart.
+# A shape is exact if it is off by no more than this part of its size plus the rounding of its coordinates. That is
+# some 4,000 roundings of those who made and moved it, and a millionth of what different shapes of a drawing differ by.
 _EXACT = 1e-12
 _COORDINATES = 256.0 * UNIT
 
