@@ -24,6 +24,7 @@ from assembly.proximity.clearance.records import (
     BY_PLANE,
     BY_SLEEVE,
     BY_SPINES,
+    LEFT_OPEN,
     NODES_SIZE,
     ON_ITS_WAY,
     OPEN_YET,
@@ -292,6 +293,11 @@ def ask_again(forest, front, way, limits):
     for i in range(counts.count):
         row, parted = nodes_at(front.nodes, i), parted_at(front.parted, i)
         nodes, n, expiry = Parted(row.a, row.b, row.how), vector(parted.normal), parted.expiry
+        if nodes.how == LEFT_OPEN:
+            # By the look that goes on.
+            counts.opened += 1
+            keep(front, nodes, n, expiry)
+            continue
         if nodes.how == OPEN_YET:
             put_waiting(front, tail, Parted(row.a, row.b, BY_PLANE), n)
             tail += 1

@@ -31,6 +31,7 @@ from assembly.proximity.clearance.records import (
     BY_SPINES,
     CLEAR,
     CROSSING,
+    LEFT_OPEN,
     NO_ROOM,
     NONE,
     ON_ITS_WAY,
@@ -201,7 +202,7 @@ def seek(forest, front, way, limits, tail):
             return UNSWEPT
         if head + earlier > limits.budget:
             counts.opened += 1
-            keep(front, nodes, hint, -math.inf)
+            keep(front, Parted(nodes.a, nodes.b, LEFT_OPEN), hint, -math.inf)
             continue
         counts.sought += 1
         parted, n, gaps, overlap = part_nodes(forest, front, way, nodes, hint, limits.needed)
@@ -217,7 +218,7 @@ def seek(forest, front, way, limits, tail):
         small = extent(forest, nodes.a) + extent(forest, nodes.b) < limits.resolution
         if cells and small:
             counts.opened += 1
-            keep(front, nodes, n, -math.inf)
+            keep(front, Parted(nodes.a, nodes.b, LEFT_OPEN), n, -math.inf)
             continue
         if not divide(forest, front, nodes, n, tail, max(way.sag - gaps[1], 0.0)):
             return NO_ROOM

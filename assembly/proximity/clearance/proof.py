@@ -20,6 +20,7 @@ from assembly.proximity.clearance.records import (
     BY_SLEEVE,
     CLEAR,
     CROSSING,
+    LEFT_OPEN,
     NODES,
     PARTED,
 )
@@ -277,7 +278,7 @@ class ClearanceProof(KeptLooks):
         rows = rows_of(PARTED, parted)
         is_open = rows.expiry == -np.inf
         links = rows_of(NODES, nodes)
-        is_open &= links.how == BY_PLANE
+        is_open &= links.how == LEFT_OPEN
         return rows[is_open], links[is_open]
 
     def nested(self, k: int) -> bool | None:
