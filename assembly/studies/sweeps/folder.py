@@ -123,7 +123,7 @@ class Folder:
         for key in manifest:
             if before.get(key) != manifest[key]:
                 raise InputError(
-                    f"folder {str(self.path)!r} is of a study with another {key}: {_shown(before.get(key))} there, "
+                    f"folder {str(self.path)!r} is of a study that differs in its {key}: {_shown(before.get(key))} there, "
                     f"{_shown(manifest[key])} here; expected the same, or another folder"
                 )
 
