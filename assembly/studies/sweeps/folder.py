@@ -123,8 +123,9 @@ class Folder:
         for key in manifest:
             if before.get(key) != manifest[key]:
                 raise InputError(
-                    f"folder {str(self.path)!r} is of a study with another {key}: {_shown(before.get(key))} there, "
-                    f"{_shown(manifest[key])} here; expected the same, or another folder"
+                    f"folder {str(self.path)!r} is of a study that differs in its {key}: "
+                    f"{_shown(before.get(key))} there, {_shown(manifest[key])} here; "
+                    "expected the same, or another folder"
                 )
 
     def _put(self, name: str, text: str) -> None:

@@ -44,13 +44,13 @@ def test_a_folder_is_of_one_study(tmp_path):
     scene, (angle, crank, _), out = four_bar()
     plan = asm.grid({angle: [0.6, 0.7], crank: [1.5]})
     asm.study(scene, plan, out, folder=tmp_path)
-    with pytest.raises(InputError, match="is of a study with another values"):
+    with pytest.raises(InputError, match="is of a study that differs in its values"):
         asm.study(scene, asm.grid({angle: [0.6, 0.8], crank: [1.5]}), out, folder=tmp_path)
-    with pytest.raises(InputError, match="is of a study with another measures"):
+    with pytest.raises(InputError, match="is of a study that differs in its measures"):
         asm.study(scene, plan, asm.Measure(scene.bodies[2], "x", name="out"), folder=tmp_path)
     other, parameters, measure = four_bar()
     parameters[2].value = 4.1
-    with pytest.raises(InputError, match="is of a study with another scene"):
+    with pytest.raises(InputError, match="is of a study that differs in its scene"):
         asm.study(other, asm.grid({parameters[0]: [0.6, 0.7], parameters[1]: [1.5]}), measure, folder=tmp_path)
     same, parameters, measure = four_bar()
     asm.study(same, asm.grid({parameters[0]: [0.6, 0.7], parameters[1]: [1.5]}), measure, folder=tmp_path)
