@@ -10,6 +10,8 @@ import operator
 import warnings
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from os import PathLike, fspath
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -27,6 +29,7 @@ __all__ = [
     "check_options",
     "checked_color",
     "extent",
+    "file_path",
     "integer",
     "is_masked",
     "items",
@@ -202,6 +205,14 @@ def extent(name: str, value: Any) -> float:
     if not 1e-100 <= result <= 1e100:
         raise InputError(f"{name} is {result:g}; expected a length from 1e-100 to 1e+100")
     return result
+
+
+def file_path(name: str, value: str | PathLike[str]) -> Path:
+    """The path of a file."""
+    try:
+        return Path(fspath(value))
+    except TypeError:
+        raise TypeError(f"{name} is {_shown(value)}; expected the path of a file, a str or a PathLike") from None
 
 
 def items(name: str, value: Any, expected: str) -> tuple[Any, ...]:

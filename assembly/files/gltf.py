@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib import import_module
 from math import sqrt
-from os import PathLike, fspath
-from pathlib import Path
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.errors import InputError, positive
+from assembly.errors import InputError, file_path, positive
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
 from assembly.step.documents import checked_unit
@@ -63,7 +62,7 @@ def write_gltf(
     ImportError
         Without pygltflib, of the extra `meshes`.
     """
-    target = Path(fspath(path))
+    target = file_path("path", path)
     if target.suffix.lower() != ".glb":
         raise InputError(f"path is {str(target)!r}; expected a name that ends in .glb")
     scale = 1e-3 * checked_unit(unit)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from assembly.errors import InputError
+from assembly.errors import InputError, file_path
 from assembly.files.stl import the_trimesh
 from assembly.kinematics.picture_mesh import PictureMesh
 from assembly.step.documents import checked_unit
@@ -49,7 +49,7 @@ def read_picture(path: str | PathLike[str], *, unit: str = "mm", file_unit: str 
     """
     wanted = checked_unit(unit)
     given = None if file_unit is None else checked_unit(file_unit, "file_unit")
-    picture, said = picture_of(Path(fspath(path)))
+    picture, said = picture_of(file_path("path", path))
     return picture.moved((given or said or wanted) / wanted * np.eye(3), np.zeros(3))
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from importlib import import_module
-from os import PathLike, fspath
-from pathlib import Path
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.errors import InputError
+from assembly.errors import InputError, file_path
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
 from assembly.step.placed import placed_bodies
@@ -42,7 +41,7 @@ def write_stl(path: str | PathLike[str], what: Assembly | Solution | Body | Sequ
     ImportError
         Without trimesh, of the extra `meshes`.
     """
-    target = Path(fspath(path))
+    target = file_path("path", path)
     if target.suffix.lower() != ".stl":
         raise InputError(f"path is {str(target)!r}; expected a name that ends in .stl")
     placed = [(body, pose.matrix[:3, :3], pose.position) for body, pose in placed_bodies(what)]

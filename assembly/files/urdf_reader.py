@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from assembly.constraints.model.couplings import Coupling, Gear, Linear, RackPinion
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.joints import Fixed, Planar, Prismatic, Revolute
-from assembly.errors import AssemblyError
+from assembly.errors import AssemblyError, file_path
 from assembly.files.robot import Inertial, Robot, UrdfError, UrdfWarning, yourdfpy
 from assembly.files.urdf_shapes import LinkPictures, link_faces, origin_of
 from assembly.kinematics.body import Body
@@ -60,14 +60,15 @@ def read_urdf(path: str | PathLike[str], *, unit: str = "mm") -> Robot:
         file's folder and those above it, `package://` names without the package as well.
     """
     scale = _METER / checked_unit(unit)
-    robot = _parsed(fspath(path))
-    reader = _Reader(robot, scale, LinkPictures(robot, Path(fspath(path)), scale))
+    file = file_path("path", path)
+    robot = _parsed(str(file))
+    reader = _Reader(robot, scale, LinkPictures(robot, file, scale))
     try:
         made = reader.robot()
     except AssemblyError as error:
-        raise UrdfError(f"path is {fspath(path)!r}; {error}") from None
+        raise UrdfError(f"path is {str(file)!r}; {error}") from None
     if reader.pictures.lost:
-        warnings.warn(f"{fspath(path)}: {'; '.join(reader.pictures.lost)}; left out", UrdfWarning, 2)
+        warnings.warn(f"{file}: {'; '.join(reader.pictures.lost)}; left out", UrdfWarning, 2)
     return made
 
 

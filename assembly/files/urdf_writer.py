@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -18,7 +18,7 @@ from assembly.constraints.model.couplings import Gear, Linear, RackPinion
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.joints import Fixed, Planar, Prismatic, Revolute
 from assembly.constraints.model.mates import Insert
-from assembly.errors import InputError, positive
+from assembly.errors import InputError, file_path, positive
 from assembly.files.primitives import Primitive, primitives_of
 from assembly.files.robot import Inertial, Robot, UrdfError
 from assembly.files.stl import stl_bytes
@@ -96,7 +96,7 @@ def write_urdf(
     UrdfError
         What is no tree, or has constraints that no robot has; nothing is written then.
     """
-    target = Path(fspath(path))
+    target = file_path("path", path)
     if not isinstance(what, (Robot, Assembly)):
         raise TypeError(f"what is {what!r}; expected a Robot or an Assembly")
     if target.suffix.lower() not in (".urdf", ".xml"):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from assembly.errors import InputError
+from assembly.errors import InputError, file_path
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
 from assembly.step.bodies import Source, bodies_in
@@ -139,14 +139,14 @@ def write_brep(
 
 
 def _there(path: str | PathLike[str]) -> Path:
-    file = Path(fspath(path))
+    file = file_path("path", path)
     if not file.is_file():
         raise FileNotFoundError(f"path is {str(file)!r}; {'a folder' if file.is_dir() else 'no such file'}")
     return file
 
 
 def _named(path: str | PathLike[str], suffixes: tuple[str, str]) -> Path:
-    file = Path(fspath(path))
+    file = file_path("path", path)
     if file.suffix.lower() not in suffixes:
         raise InputError(f"path is {str(file)!r}; expected a name that ends in {' or '.join(suffixes)}")
     return file

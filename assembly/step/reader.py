@@ -9,7 +9,7 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Callable
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -17,7 +17,7 @@ from time import perf_counter
 import numpy as np
 
 from assembly._progress import Progress, checked_progress, watched
-from assembly.errors import InputError
+from assembly.errors import InputError, file_path
 from assembly.kinematics.body import Body
 from assembly.step.bodies import Source, bodies_in
 from assembly.step.documents import Damaged, Malformed, StepError, StepWarning, checked_unit, document_of
@@ -146,7 +146,7 @@ def read_step(
     if not isinstance(strict, (bool, np.bool_)):
         raise InputError(f"strict is {strict!r}; expected True or False")
     checked_progress(progress)
-    file = Path(fspath(path))
+    file = file_path("path", path)
     if not file.is_file():
         raise FileNotFoundError(f"path is {str(file)!r}; {'a folder' if file.is_dir() else 'no such file'}")
     damage = ""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from assembly.errors import AssemblyError
+from assembly.errors import AssemblyError, file_path
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.solve.solution import Solution
@@ -124,7 +124,7 @@ def write_step(
     """
     scale = checked_unit(unit)
     placed_bodies(what)  # bad bodies first
-    file = Path(fspath(path))
+    file = file_path("path", path)
     other = _OTHERS.get(file.suffix.lower())
     if other is not None:
         raise StepError(f"path is {str(file)!r}, a name of {other[0]} files; expected .step or .stp; {other[1]}")

@@ -211,7 +211,7 @@ class Study(ReadOnlyArrays):
         for message, count in [item for item in said.most_common(SHOWN) if item[0]]:
             lines.append(f"  {count} x {message}")
         if self.interrupted:
-            lines.append("  interrupted; with a folder= the same call goes on from here")
+            lines.append("  interrupted; the same call goes on from here if it has a folder=")
         return "\n".join(lines)
 
     def _counts(self) -> str:
