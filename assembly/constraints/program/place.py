@@ -238,8 +238,8 @@ def place_term(store, term, bases, lifted, point, order, gradient, hessian):
 def place_terms(scene, pairs, bases, at, order, gradient, hessian):
     """The terms of an objective that are places; their sum is written to the first number of `pairs.variables`.
 
-    From order 1 on, their gradients and the upper triangles of their Hessians are added. `pairs` and `at` have the parts
-    of `LiftedPairs` and of an `Iterate`.
+    From order 1 on, gradients and the upper triangles of Hessians are added. `pairs` and `at` have the parts of
+    `LiftedPairs` and of an `Iterate`.
     """
     table, pool = scene
     free, lengths, vectors, variables, guess, memory = pairs

@@ -126,7 +126,7 @@ def goes_on(y_side, y_other, corner, least):
 
 @kernel(inner=True)
 def chosen_sides(store, row, before, found, at):
-    """The `Corner` of a contact `at` (u, v), projected to `found` on the loop; `before` is the one of the last iterate."""
+    """The `Corner` of a contact `at` (u, v), projected to `found` on the loop; `before` is that of the last iterate."""
     sides = loop_sides_at(store.table, row.sides)
     near = nearest_side(store, sides, found)
     other = other_side(before.corner)
