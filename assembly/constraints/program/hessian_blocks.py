@@ -7,8 +7,7 @@ solve costs more than the arithmetic. So scenes of many bodies have a record of 
 
 A block has the orientation that it has in the upper triangle in the order of the unknowns. Block e is in the six rows
 from 6 e on of an array of six columns. Where lifted pairs have unknowns of their own, the matrix is dense within an
-envelope, as in a small scene
-(`constraints/program/envelope.py`).
+envelope, as in a small scene (`constraints/program/envelope.py`).
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ AXES_B = place_of(JOINT_FRAMES, "axes_b")
 APART = place_of(JOINT_FRAMES, "apart")
 RECORD = size_of(JOINT_FRAMES)
 
-# A vector shorter than this is rounding error, and so is its direction.
+# A vector shorter than this [over the size of the scene, if a length] is rounding error, and so is its direction.
 UNDEFINED = 1e-12
 # The same for the distance from an axis. It is below a solve's tolerance, so that a ball that is drawn onto the axis of
 # a funnel, where it touches all around, gets there. Roundings of coordinates of size one are a hundredth of it.
