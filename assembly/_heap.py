@@ -7,12 +7,12 @@ import numpy as np
 from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 
-# A pair of pieces that waits.
+# An entry of the queue: a pair of pieces still to be examined.
 WAITING_PAIR = record_dtype(
     "f8",
     bound=1,  # lower bound of its distance [length]
-    tie=1,  # of equal bounds the one with the least of this goes first
-    a=1,  # numbers of the pieces
+    tie=1,  # where bounds are equal, the lesser of these goes first
+    a=1,  # numbers of the two pieces
     b=1,
 )
 waiting_pair_at = record_view(WAITING_PAIR)
@@ -41,7 +41,7 @@ def goes_before(pair, bound, tie):
 
 @kernel(inner=True)
 def push(heap, count, bound, tie, a, b):
-    """Add a pair to a heap of `count`. Of equal ones the newest goes first: down to pieces, whose points bound it."""
+    """Add a pair to a heap of `count` pairs. Of equal pairs the newest goes first, so that the search goes deeper."""
     k = count
     while k > 0:
         parent = (k - 1) >> 1
@@ -54,7 +54,7 @@ def push(heap, count, bound, tie, a, b):
 
 @kernel(inner=True)
 def drop_first(heap, count):
-    """Take the first pair off a heap of `count`: the last one goes down from its place."""
+    """Remove the first pair of a heap of `count` pairs: the last one takes its place and sinks."""
     count -= 1
     last = waiting_pair_at(heap, PAIR * count)
     bound, tie, a, b = last.bound, last.tie, last.a, last.b

@@ -28,14 +28,14 @@ class Entry:
     compiled
         Numba's object, which is called.
     signatures
-        The types of arguments for which the package calls it.
+        The argument types with which the package calls it, one string per signature.
     """
 
     compiled: Any
     signatures: tuple[str, ...]
 
     def argument_types(self) -> list[tuple[Any, ...]]:
-        """Numba's types of arguments, a tuple a signature."""
+        """The argument types as Numba objects, one tuple per signature."""
         return [normalize_signature(signature)[0] for signature in self.signatures]
 
 
@@ -57,28 +57,28 @@ def kernel(
     Parameters
     ----------
     signatures
-        Of an entry: the types of arguments for which the package calls it, a string each, as Numba writes them:
-        ``"(f8[::1], i8)"`` for a vector of doubles and an integer. They are what is compiled ahead. A call with other
-        types is compiled when it comes, and in this package it is a fault.
+        For an entry: the argument types with which the package calls it, one string per signature in Numba's notation,
+        as ``"(f8[::1], i8)"`` for a vector of doubles and an integer. These signatures are compiled ahead of time. A
+        call with other types is compiled when it occurs; within this package such a call is a fault.
     inline
         Copied into its callers by LLVM: for small helpers. From Python it runs as plain Python.
     inner
-        Called by kernels alone, and not copied: no entry from Python and no cache entry, which saves a quarter
-        of its compile time. From Python it runs as plain Python.
+        Called by other kernels only, and not copied into them: it has no entry from Python and no cache entry, which
+        saves a quarter of its compile time. From Python it runs as plain Python.
     exact
         No fused multiply-add: for code whose rounding is part of a proof.
     allocates
-        Whether a kernel makes arrays. One that does not counts no references to those it is given, which its caller
-        holds: the atomic counts of nested calls cost more than their work.
+        Whether a kernel creates arrays. One that does not is compiled without reference counts: its caller holds the
+        arrays that it is given, and atomic counts in nested calls cost more than the work itself.
 
     Notes
     -----
-    A kernel outside this package (a test's, a user's) is compiled in every process: what it depends on is not known.
+    A kernel outside this package (a test's, a user's) is compiled in every process: its dependencies are not known.
     """
     if function is None:
         return lambda f: kernel(f, signatures=signatures, inline=inline, inner=inner, exact=exact, allocates=allocates)
-    # All that a kernel called by another would take over from that one is set: what is compiled once, for whoever calls
-    # it first, is the same for all.
+    # Every setting that a kernel would inherit from its caller is set here: a kernel is compiled once, for its first
+    # caller, and must be the same for all callers.
     settings: dict[str, Any] = {
         "fastmath": False if exact else {"contract"},
         "error_model": "numpy",

@@ -1,4 +1,4 @@
-"""All derivatives of a solution in one call: its equations, the rows that hold, the step, and how measures change."""
+"""All derivatives of a solution in one call: its equations, the active rows, the steps, and how measures change."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from assembly._record import record_dtype, record_view, size_of
 from assembly.derivatives.least_steps import least_steps
 from assembly.derivatives.linearized import linearize, plan_at
 
-# What decides which rows hold, among the figures of a plan.
+# The limits, among the figures of a plan, that decide which rows are active.
 LIMITS = record_dtype(
     "f8",
-    touching=1,  # a row at its bound is off by no more
-    pushing=1,  # a multiplier that is stronger pushes
-    unbalanced=1,  # slopes that are larger are no stationary point
-    free=1,  # what free motions change by more is undetermined
+    touching=1,  # a one-sided row whose residual is at most this in size is at its bound
+    pushing=1,  # a larger force (multiplier) pushes
+    unbalanced=1,  # where a slope of the Lagrangian is larger, the point is not stationary
+    free=1,  # a measure that free motions change by more (over its largest slope, at least 1) is undetermined
 )
 limits_at = record_view(LIMITS)
 LIMITS_SIZE = size_of(LIMITS)
@@ -24,7 +24,7 @@ LIMITS_SIZE = size_of(LIMITS)
 
 @kernel(inner=True)
 def list_held(plan, table, limits, seen, held):
-    """List the rows that hold, of residuals and forces; how many, or -1: one is at its bound without a force."""
+    """List the active rows, by residuals and forces. Returns how many, or -1: one is at its bound without a force."""
     residual, forces = seen
     count = 0
     for r in range(plan.rows):
@@ -40,7 +40,7 @@ def list_held(plan, table, limits, seen, held):
 
 @kernel(inner=True)
 def write_rates(slopes, own, steps, rates):
-    """How measures (k,) change with parameters: by the step, and by what parameters add."""
+    """Write how measures (k,) change with parameters: through the steps, and directly (`own`)."""
     for i in range(rates.shape[0]):
         for r in range(rates.shape[1]):
             rates[i, r] = own[i, r]
@@ -56,7 +56,7 @@ def write_rates(slopes, own, steps, rates):
 
 @kernel(inner=True)
 def write_loose(slopes, free, motions, limit, loose):
-    """Write 1 for measures that one of the free motions (n, motions first) changes."""
+    """Write 1 for measures that one of the free motions changes, the first `motions` columns of `free` (n, n)."""
     for i in range(slopes.shape[0]):
         most, largest = 0.0, 1.0
         for j in range(slopes.shape[1]):
@@ -74,7 +74,7 @@ def write_loose(slopes, free, motions, limit, loose):
     allocates=True,
 )
 def derive(table, pool, state, figures, forces, evaluated, out):
-    """Write all derivatives of a solution; returns the rank of the rows that hold, or -1: it goes the general way.
+    """Write all derivatives of a solution. Returns the rank of the active rows, or -1: the general method is needed.
 
     Parameters
     ----------

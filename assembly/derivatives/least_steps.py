@@ -1,9 +1,9 @@
-"""The step that rows and an objective ask for, a unit of each parameter: `kkt.solve_system` where all is clear.
+"""The step that rows and an objective ask for per unit of each parameter: a fast `kkt.solve_system` for clear cases.
 
-Rows of length one, J = P^T L Q^T with rows chosen by their lengths (LQ with pivots, by reflections): what rows ask for
-is forward substitution, what they leave free the last columns of Q, and forces are back substitution. Rows that repeat
-each other share a force by a second factorization. The rank, and the curvature along what is left, are clear where no
-pivot is near its threshold; else nothing is said, and singular values decide.
+The rows are scaled to length one and factorized as J = P^T L Q^T, with pivoting by row length and Householder
+reflections. The step that rows ask for follows by forward substitution, the last columns of Q are the free motions, and
+forces follow by back substitution. Dependent rows share a force by a second factorization. The rank, and the curvature
+along free motions, are clear where no pivot is near its threshold; else no answer is given and singular values decide.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import numpy as np
 
 from assembly._kernel import kernel
 
-# Pivots of rows of length one: below the first they count as none, above the second they count; between nobody knows.
+# Pivots of rows of length one: at most NONE they count as zero, from SOME on as nonzero; between, the rank is unclear.
 NONE, SOME = 1e-9, 1e-5
-# Pivots of the curvature along free motions, over the largest entry of the Hessian: those above are no doubt.
+# Pivots of the curvature along free motions, over the largest entry of the Hessian: those above are surely positive.
 CURVED = 1e-6
-# What rows that repeat each other may ask for differently, over what is asked, and still agree.
+# Relative difference up to which the demands of dependent rows agree.
 AGREE = 1e-7
 
 
@@ -40,9 +40,9 @@ def reflect(v, beta, rows, first, along):
 
 @kernel(inner=True)
 def reflect_on(v, beta, columns, k, along, squares):
-    """Reflect the columns behind the k-th; squared lengths of what they have behind that entry are written on the way.
+    """Reflect the columns behind the k-th, and write the squared lengths of their parts below entry k.
 
-    They are added up anew every time: what is left of a row that others span is a rounding of its length.
+    These are summed anew every time: what is left of a dependent row is only the rounding of its length.
     """
     count = columns.shape[1]
     for i in range(k + 1, count):
@@ -73,10 +73,10 @@ def write_squares(columns, squares):
 
 @kernel(inner=True)
 def factorize_rows(upper, reflections, order, choose, room):
-    """L Q^T of rows, the columns of `upper` (n, r), in place, so that it becomes L^T. Returns the rank, or -1.
+    """Factorize rows, the columns of `upper` (n, r), as L Q^T in place: `upper` becomes L^T. Returns the rank, or -1.
 
-    Reflections (r, n) have their factors in the last column. With `choose` the row that has most left comes next, and
-    what has next to nothing left ends it. Rows stand in columns, so that sums run over all of them side by side.
+    The last column of `reflections` has their factors. With `choose` the row with the longest remainder comes next, and
+    the factorization ends where that is negligible. Rows are stored as columns so that sums run over all side by side.
     """
     n, r = upper.shape
     along, squares = room
@@ -116,7 +116,7 @@ def factorize_rows(upper, reflections, order, choose, room):
 
 @kernel(inner=True)
 def reflect_back(reflections, rank, rows, along):
-    """Q times rows (n, p); `along` is room for one of them."""
+    """Q times `rows` (n, p), in place; `along` is scratch for one row."""
     n = rows.shape[0]
     for k in range(rank - 1, -1, -1):
         reflect(reflections[k], reflections[k, n], rows, k, along)
@@ -124,7 +124,7 @@ def reflect_back(reflections, rank, rows, along):
 
 @kernel(inner=True)
 def forward_rows(upper, rank, rows):
-    """L^-1 of the first rows, in place, of L^T."""
+    """Multiply the first `rank` rows by L^-1 in place; `upper` is L^T."""
     for i in range(rank):
         for j in range(i):
             factor = upper[j, i]
@@ -137,7 +137,7 @@ def forward_rows(upper, rank, rows):
 
 @kernel(inner=True)
 def backward_rows(upper, rank, rows):
-    """L^-T of the first rows, in place."""
+    """Multiply the first `rank` rows by L^-T in place; `upper` is L^T."""
     for i in range(rank - 1, -1, -1):
         for j in range(i + 1, rank):
             factor = upper[i, j]
@@ -164,7 +164,7 @@ def lacking_slopes(hessian, slopes_by, steps, out):
 
 @kernel(inner=True, allocates=True)
 def add_free_steps(hessian, free, lacking, steps):
-    """Add the steps along free motions (n, d) that balance what is lacking; whether the curvature is no doubt."""
+    """Add the steps along free motions (n, d) that balance `lacking`. Returns whether curvature is surely positive."""
     n, d = free.shape
     count = steps.shape[1]
     form, across, amounts = np.zeros((d, d)), np.zeros((n, d)), np.zeros((d, count))
@@ -192,7 +192,7 @@ def add_free_steps(hessian, free, lacking, steps):
                 form[a, a] = math.sqrt(total)
             else:
                 return False
-        # What is above the diagonal is the factor; what is below is read no more in this column.
+        # The factor is above the diagonal; what is below it in this column is not read again.
     forward_rows(form, d, amounts)
     backward_rows(form, d, amounts)
     for i in range(n):
@@ -205,7 +205,7 @@ def add_free_steps(hessian, free, lacking, steps):
 
 @kernel(inner=True, allocates=True)
 def least_forces(upper, rank, pulls, forces, along):
-    """The least forces (r, p) of rows of length one that pull as much; of pulls the first are in the rows' basis."""
+    """The least forces (r, p) of rows of length one that balance `pulls`, whose first rows are in the rows' basis."""
     r, count = forces.shape
     for i in range(r):
         for k in range(count):
@@ -213,7 +213,7 @@ def least_forces(upper, rank, pulls, forces, along):
     if rank == r:
         backward_rows(upper, rank, forces)
         return
-    # Rows that repeat each other share a force: their transpose has rank rows, which are independent.
+    # Dependent rows share a force: the transpose of L has `rank` rows, which are independent.
     across, reflections, order = np.zeros((r, rank)), np.zeros((rank, r + 1)), np.empty(rank, np.int64)
     for j in range(r):
         for i in range(rank):
@@ -225,7 +225,7 @@ def least_forces(upper, rank, pulls, forces, along):
 
 @kernel(inner=True, allocates=True)
 def scale_rows(jacobian, scales, upper):
-    """Rows (r, n) of length one as columns, and what they are scaled by; whether it is clear which are none."""
+    """Write rows (r, n), scaled to length one, as columns, and the scales. Returns whether zero rows are clear."""
     r, n = jacobian.shape
     for i in range(r):
         for j in range(n):
@@ -244,14 +244,14 @@ def scale_rows(jacobian, scales, upper):
 
 @kernel(inner=True, allocates=True)
 def least_steps(jacobian, hessian, rows_by, slopes_by, steps, forces, free):
-    """Write what `kkt.Moves` has; returns the rank and how many parameters contradict, or (-1, 0): it is not clear.
+    """Write the parts of `kkt.Moves`. Returns the rank and the number of contradicting parameters; (-1, 0) if unclear.
 
     Parameters
     ----------
     jacobian, hessian, rows_by, slopes_by : (r, n), (n, n), (r, p), (n, p)
-        Rows that hold, and what a unit of each parameter adds.
+        Active rows, the Hessian, and what a unit of each parameter adds to rows and slopes.
     steps, forces : (n, p), (r, p)
-        Written; a step is no number where rows contradict each other. Forces that nobody asks for are (0, p).
+        Written; a step has a NaN where rows contradict each other. Where forces are not needed, they are (0, p).
     free : (n, n)
         Written; the first n - rank columns count.
     """

@@ -1,8 +1,8 @@
 """A solution as linear equations: what a unit of each parameter adds to rows and slopes, and how measures change.
 
-Of an evaluated scene whose frames stand on probes (`derivatives/probed.py`), reduced to the twists of the bodies that
-move. Formulas are those of docs/sensitivity.md; numbers that make faces are not among them, and are differenced
-(`derivatives/columns.py`).
+They are made from an evaluated scene whose frames stand on probes (`derivatives/probed.py`), and reduced to the twists
+of the moving bodies. The formulas are those of docs/sensitivity.md. They do not cover parameters of the shape of faces,
+for which finite differences are used (`derivatives/columns.py`).
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ PLAN = record_dtype(
     bodies=1,
     probes=1,
     rows=1,
-    coordinates=1,  # rows behind these, of coordinates that are measured
+    coordinates=1,  # further rows, behind those: coordinates that are measured
     unknowns=1,
-    implicit=1,  # 1: the least move is what is asked for
+    implicit=1,  # 1: the least motion is asked for
     blocks=1,  # of every body the place of its block of unknowns, or -1
     hosts=1,  # of every probe its body
     entries=1,
@@ -55,7 +55,7 @@ ENTRY = record_dtype(
 )
 entry_at = record_view(ENTRY)
 ENTRY_SIZE = size_of(ENTRY)
-# What is measured. Of a distance there are two of these, the second one is the other end.
+# What is measured. A distance has two records, the second one for its other end.
 COORDINATE, GAP, PLACE, DISTANCE, END = range(5)
 MEASURE = record_dtype(
     "i8",
@@ -73,7 +73,7 @@ MEASURE_SIZE = size_of(MEASURE)
 
 @kernel(inner=True)
 def reduce_rows(plan, table, rows, out):
-    """Rows (m, all columns) to the columns of moving bodies, with which their frames go."""
+    """Add the columns of rows to those of moving bodies; the columns of a probe go to its body."""
     for b in range(plan.bodies + plan.probes):
         body = b if b < plan.bodies else table[plan.hosts + b - plan.bodies]
         block = table[plan.blocks + body]
@@ -86,7 +86,7 @@ def reduce_rows(plan, table, rows, out):
 
 @kernel(inner=True)
 def reduce_hessian(plan, table, hessian, out):
-    """The same on both sides of a Hessian."""
+    """Reduce rows and columns of a Hessian as `reduce_rows` does."""
     count = plan.bodies + plan.probes
     for a in range(count):
         first = table[plan.blocks + (a if a < plan.bodies else table[plan.hosts + a - plan.bodies])]
@@ -103,7 +103,7 @@ def reduce_hessian(plan, table, hessian, out):
 
 @kernel(inner=True)
 def write_twist(entry, pool, turn, figures, scale, twist):
-    """The twist (6,) of a frame a unit of a number of it, about its body's origin, lengths over the scene's size."""
+    """The twist (6,) of a frame per unit of its parameter, about its body's origin, lengths over the scene's size."""
     for i in range(3):
         twist[i] = turn[i, entry.axis] / scale
         twist[3 + i] = 0.0
@@ -150,7 +150,7 @@ def add_frame(plan, table, entry, twist, seen, out):
         pull[k] = gradient[first + k]
         for i in range(m):
             pull[k] += forces[i] * jacobian[i, first + k]
-    # A turn of the body comes after the frame's twist, which the second derivative has half before and half after.
+    # The body turns after the frame's twist; the second derivative takes it as half before and half after.
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         off = pull[j] * twist[k] - pull[k] * twist[j] + 0.5 * (pull[3 + j] * twist[3 + k] - pull[3 + k] * twist[3 + j])
@@ -192,7 +192,7 @@ def write_turns(plan, state, turns):
 
 @kernel(inner=True, allocates=True)
 def add_parameters(plan, table, given, seen, out):
-    """Go through what parameters add."""
+    """Add the effect of every parameter on rows, slopes and the value."""
     pool, state, figures, turns = given
     scale, twist = pool_header_at(pool, 0).scale, np.zeros(6)
     for e in range(plan.entry_count):
@@ -208,7 +208,7 @@ def add_parameters(plan, table, given, seen, out):
 
 @kernel(inner=True, allocates=True)
 def add_place(plan, table, measure, way, given, out):
-    """Add what a place that goes along a way changes by: slopes, and what parameters of its frame add."""
+    """Add how a place moves in the direction `way`: its slopes, and what parameters of its frame add."""
     pool, _, figures, turns = given
     slopes, own = out
     scale, turn, i = pool_header_at(pool, 0).scale, turns[measure.body], measure.number
@@ -232,7 +232,7 @@ def add_place(plan, table, measure, way, given, out):
 
 @kernel(inner=True)
 def write_way(table, at, measure, given, way):
-    """The unit vector from the one end of a distance to the other, (3,); whether there is one."""
+    """Write the unit vector (3,) from one end of a distance to the other. Returns whether there is one."""
     _, state, figures, turns = given
     end = measure_at(table, at + MEASURE_SIZE)
     square = 0.0
@@ -249,7 +249,7 @@ def write_way(table, at, measure, given, way):
 
 @kernel(inner=True, allocates=True)
 def add_measures(plan, table, given, out):
-    """Go through what is measured; whether every distance has a way."""
+    """Add all measures. Returns whether every distance has a direction (is not zero)."""
     slopes, own, rows, rows_by, coordinates_by = out
     way = np.zeros(3)
     for e in range(plan.measure_count):
@@ -266,7 +266,7 @@ def add_measures(plan, table, given, out):
                 slopes[i, j] = rows[measure.row, j]
             for r in range(plan.parameters):
                 own[i, r] = rows_by[measure.row, r]
-            # The row is the gap less the least one, which is a parameter perhaps.
+            # The row is the gap less the least gap, which may be a parameter.
             for other in range(plan.entry_count):
                 entry = entry_at(table, plan.entries + ENTRY_SIZE * other)
                 if entry.kind == ROW and entry.at == measure.row:
@@ -287,7 +287,7 @@ def add_measures(plan, table, given, out):
 
 @kernel(inner=True, allocates=True)
 def linearize(table, pool, state, figures, forces, evaluated, out):
-    """Write the equations of a solution; whether they are finite, and every distance has a way.
+    """Write the equations of a solution. Returns whether they are finite and no measured distance is zero.
 
     Parameters
     ----------

@@ -4,9 +4,10 @@ Row i of the factor is a panel: its blocks side by side, each column by column, 
 to each other and all strides are known to the compiler. It is made from the Hessian's row and from the rows k above
 that reach column i,
 
-    U_i.  =  U_ii^-T (H_i. - sum_k U_ki^T U_k.),
+    U_i.  =  U_ii^-T (H_i. - sum_k U_ki^T U_k.).
 
-whose blocks from column i on stand next to one another; so do most of those that they meet in panel i.
+In panel k the blocks from column i on are contiguous; so are most of the blocks of panel i that they are subtracted
+from.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def greatest_diagonal(lagrangian, blocks):
 
 @kernel(inner=True)
 def place_panel(lagrangian, blocks, i, shift, panels, o, count, positions):
-    """Row i of the Hessian + shift I into the panel of so many blocks at o; where its columns stand, into positions."""
+    """Write row i of the Hessian + shift I to the panel of `count` blocks at o; its columns' places to `positions`."""
     layout = blocks_at(blocks, 0)
     first = blocks[layout.panel + i]
     for p in range(count):
@@ -59,7 +60,7 @@ def place_panel(lagrangian, blocks, i, shift, panels, o, count, positions):
 
 @kernel(inline=True)
 def turn_block(panels, factor, turned):
-    """The transposed block at `factor` into `turned`."""
+    """Write the transpose of the block at `factor` to `turned`."""
     for r in range(6):
         for c in range(6):
             turned[6 * r + c] = panels[factor + 6 * c + r]
@@ -67,9 +68,9 @@ def turn_block(panels, factor, turned):
 
 @kernel(inner=True)
 def subtract_blocks(panels, at, turned, source, count):
-    """The blocks from `at` on -= the block that is `turned` times those from `source` on, so many.
+    """Subtract the block `turned` times the `count` blocks from `source` on from the blocks from `at` on.
 
-    Columns of six as four lanes twice, which share two.
+    A column of six numbers is handled as two vectors of four lanes, which overlap in two numbers.
     """
     a0, b0 = load_lanes(turned, 0), load_lanes(turned, 2)
     a1, b1 = load_lanes(turned, 6), load_lanes(turned, 8)
@@ -106,7 +107,7 @@ def subtract_blocks(panels, at, turned, source, count):
 
 @kernel(inline=True)
 def solve_column(panels, o, c, count):
-    """The first numbers at c.. multiplied by U^-T, so many; U is the block at o with its diagonal inverted."""
+    """Multiply the first `count` numbers at c by U^-T; U is the block at o, whose diagonal is stored inverted."""
     for r in range(count):
         s = panels[c + r]
         for l in range(r):
@@ -133,9 +134,9 @@ def finish_panel(panels, o, count):
 
 @kernel(signatures="(f8[:, ::1], i8[::1], f8, f8[::1], i8[::1], f8[::1])")
 def factorize_blocks(lagrangian, blocks, shift, panels, positions, turned):
-    """The factor U of lagrangian + shift I = U^T U into the panels, diagonals inverted. Returns 1, or 0: there is none.
+    """Write U of lagrangian + shift I = U^T U to the panels, its diagonal inverted. Returns 1, or 0 if there is none.
 
-    Called by its address, as few scenes are large.
+    Called by its address, because only few scenes are large enough to need it.
     """
     layout = blocks_at(blocks, 0)
     for i in range(layout.count):
@@ -149,7 +150,7 @@ def factorize_blocks(lagrangian, blocks, shift, panels, positions, turned):
             end = blocks[layout.panel + k + 1]
             turn_block(panels, 36 * p, turned)
             while p < end:
-                # As many blocks at once as are neighbors in both.
+                # Take together the blocks that are contiguous in both panels.
                 at = positions[blocks[layout.across + p]]
                 run = 1
                 while p + run < end and positions[blocks[layout.across + p + run]] == at + 36 * run:
@@ -215,7 +216,7 @@ def substitute_blocks(blocks, panels, b, x):
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], i8)")
 def solve_blocks(blocks, panels, b, x, half):
-    """Solve U^T U x = b in place of b; if `half` is 1, U^T x = b, in the order of the factor. By its address, too."""
+    """Solve U^T U x = b; if `half` is 1, U^T x = b in the order of the factor. x replaces b. Called by its address."""
     if half == 0:
         substitute_blocks(blocks, panels, b, x)
         return 0

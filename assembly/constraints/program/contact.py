@@ -1,9 +1,8 @@
-"""Rows of contacts: each pair is predicted for the poses, and its gap is the row. `constraints/program/records.py` has
-the layout.
+"""Rows of contacts: each pair is predicted for the poses, and its gap less the least gap is the residual.
 
-A contact of two surfaces is a pair of points with a common normal, one of solids the closest features of both
-(`proximity/features/solid_contact.py`). Rows of a clearance are contacts as well, of what its contact
-manager has listed.
+`constraints/program/records.py` has the layout. A contact of two surfaces is a pair of points with a common normal; a
+contact of two solids is the pair of their closest features (`proximity/features/solid_contact.py`). The rows of a
+clearance are contacts as well: the active contacts of its contact manager.
 """
 
 from __future__ import annotations
@@ -30,12 +29,12 @@ from assembly.proximity.features.solid_contact import (
     write_record,
 )
 
-# A clearance's contact of solids that are hardly in each other may be given up where its pair ends: then MAY_GO - k
-# stands for what it holds on to, k. One that ends where they touch, which rounding decides, is as good as open. What is
-# within TOUCHING of the least gap touches.
+# A clearance's contact of solids that penetrate by less than HARDLY may be given up where its pair ends: its field
+# `stays`, k, is then stored as MAY_GO - k. Solids within TOUCHING of the least gap touch: a pair that ends there counts
+# as open, because rounding decides whether it is.
 MAY_GO, HARDLY, TOUCHING = -1.0, 1e-3, 1e-9
-# A clearance's row that is open by more than the last needs its pair again after motions of this part of its gap, or of
-# this part of how far bodies may go where contacts may be born: from farther away Newton's method may find another one.
+# The row of a clearance that is open by more than FAR needs its pair again after motions of UNSEEN times its gap, or of
+# ASTRAY times the curvature-limited motion bound if less: from farther away Newton's method may find another pair.
 UNSEEN, ASTRAY, FAR = 0.5, 0.15, 1e-5
 # Beside the statuses of `solve_pair`: the pair that was found does not continue the one that was tracked.
 OTHER_SIDE = 4
@@ -71,8 +70,8 @@ def facing_of(store, g, relative, frame, x):
 def predict_point(store, surface, u, v, du, dv):
     """Parameters after rates (du, dv), inside the domain.
 
-    Where a pole is nearer than they lead, that is along the tangent plane: a point that passes a pole goes around it,
-    in coordinates, in no time, and rates of these lead elsewhere.
+    Where a pole is nearer than the step is long, the step is made in the tangent plane: the parameters of a point that
+    passes a pole change almost at once, and to extrapolate their rates leads elsewhere.
     """
     if surface_at(store.table, surface).poles != 0:
         _p, su, sv, _suu, _suv, _svv = surface_point(store.table, store.pool, surface, u, v)
@@ -88,9 +87,9 @@ def predict_point(store, surface, u, v, du, dv):
 
 @kernel(inner=True)
 def predict_pair(store, r, tracked, guess):
-    """Make of guess[r], coordinates that run on from tracked[r] by their rates, where the pair is expected.
+    """Turn guess[r], parameters extrapolated from tracked[r] by their rates, into a start for Newton's method.
 
-    A prediction may run over the end of a patch; Newton starts inside. What becomes of edges is up to switching.
+    A prediction beyond the end of a patch is moved inside. Contacts of solids are left to feature switching.
     """
     contact = contact_of(store.table, r)
     if contact.shell_f >= 0:
@@ -105,9 +104,9 @@ def predict_pair(store, r, tracked, guess):
 def track_contact(store, q, start, patience, records, k):
     """Newton on the pair of one row from start[k]; fills its record.
 
-    A pair that is followed keeps what its outward normals are to each other: no way leads from opposed ones to equal
-    ones, as from the near side of a ball to the far side. Newton's method may come to either.
-    Returns status, parameters, how they face each other (`FACING`), the points' signed distance.
+    A tracked pair keeps the sense of its outward normals, opposed or equal: no continuous motion leads from one to the
+    other, as from the near side of a ball to the far side. But Newton's method may converge to either.
+    Returns status, parameters, the sense of the normals (`FACING`), the signed distance of the points.
     """
     pair = tracked_at(start, k)
     contact = contact_of(store.table, k)
@@ -132,7 +131,7 @@ def track_contact(store, q, start, patience, records, k):
 
 @kernel(inner=True)
 def start_row(store, q, tracked, r):
-    """The pair of the surfaces of a row wherever it is, into tracked[r]. A status."""
+    """Find the pair of the surfaces of row r from a global start and write it to tracked[r]. Returns a status."""
     contact = contact_of(store.table, r)
     surfaces = (contact.surface_f, contact.surface_g)
     bodies = (contact.body_f, contact.body_g)
@@ -156,9 +155,9 @@ def restart_contact(store, q, tracked, records, k):
 
 @kernel(inner=True)
 def search_row(store, q, tracked, r, crossing):
-    """The closest features of the solids of a row wherever they are, into tracked[r]. Whether there are any.
+    """Search all features of the solids of row r for the closest ones, into tracked[r]. Returns whether there are any.
 
-    Solids that are in each other have some if `crossing`, which takes a thousand times as long.
+    Solids that penetrate have some only if `crossing`, which takes a thousand times as long.
     """
     header = header_at(store.table, 0)
     contact = contact_of(store.table, r)
@@ -170,7 +169,7 @@ def search_row(store, q, tracked, r, crossing):
 
 @kernel(inner=True)
 def track_row(store, q, start, patience, records, tracked, r):
-    """The features of the solids of a row from start[r] on, into tracked[r] and record r. A status."""
+    """Track the features of the solids of row r from start[r], into tracked[r] and record r. Returns a status."""
     contact = contact_of(store.table, r)
     shells = (contact.shell_f, contact.shell_g)
     bodies = (contact.body_f, contact.body_g)
@@ -187,7 +186,7 @@ def is_clearance_row(table, r):
 
 @kernel(inline=True)
 def least_gap(store, r, tracked):
-    """The least gap of row r, less by what the bodies were in each other where the solve began and still touched."""
+    """The least gap of row r, reduced by how far the gap of touching bodies was below it where the solve began."""
     return store.pool[contact_of(store.table, r).minimum] - tracked_at(tracked, r).allowed
 
 
@@ -199,7 +198,7 @@ def is_of_solids(table, r):
 
 @kernel(inline=True)
 def may_go(table, r, residual):
-    """Whether row r is a clearance's of solids that are hardly in each other: there, its pair may end."""
+    """Whether row r is a clearance's, of solids that penetrate by less than HARDLY: its pair may then end."""
     return is_clearance_row(table, r) and is_of_solids(table, r) and residual[r] > -HARDLY
 
 
@@ -215,7 +214,7 @@ def hold_all(table, tracked):
 
 @kernel(inline=True)
 def copy_tracked(start, r, tracked):
-    """All that is tracked of a row, also what its kind has no use for: nothing is to depend on what was in memory."""
+    """Copy all tracked values of a row, also those that its kind does not use: nothing may depend on old memory."""
     for i in range(TRACK):
         tracked[r, i] = start[r, i]
 
@@ -233,11 +232,11 @@ def idle_row(r, gap, point):
 
 @kernel(inner=True)
 def lost_clearance_row(store, r, start, point, past, goes):
-    """Row r of a clearance whose pair was lost: idle, if its gap would be open, or it is a corner `past` its face.
+    """Make row r of a clearance, whose pair was lost, idle where that is allowed. Returns whether it is.
 
-    Solids need only touch. Or if it `goes`, though it is not open: one that ends where bodies are in each other would
-    hold every step. One that is lost already stays as it is. What the neighborhood holds now is for the next update
-    to find.
+    It is allowed where its last gap is open (for solids: down to -TOUCHING), where it is a corner `past` its face,
+    where it was lost before, or where it `goes`: a pair that ends where bodies penetrate would block every step. The
+    contact manager's next update finds the contacts that are there now.
     """
     least = least_gap(store, r, start)
     gap = tracked_at(start, r).gap - least
@@ -251,7 +250,7 @@ def lost_clearance_row(store, r, start, point, past, goes):
         return False
     idle_row(r, gap, point)
     tracked_at(point.tracked, r).gap = gap + least
-    # Nothing moves it: its pair is not known.
+    # Its gradient is zero, because its pair is not known.
     for i in range(RATES, RECORD):
         point.records[r, i] = 0.0
     for i in range(FREE_COLUMN):
@@ -262,7 +261,7 @@ def lost_clearance_row(store, r, start, point, past, goes):
 
 @kernel(inline=True)
 def write_gap_row(store, r, point):
-    """Row r, of contact r, from its record: the gap less the least one, and its gradient over the twists."""
+    """Row r, of contact r, from its record: the gap less the least gap, and its gradient over the twists."""
     tracked, records, residual, jacobian = point.tracked, point.records, point.residual, point.jacobian
     derivatives = derivatives_at(records, r)
     residual[r] = derivatives.gap - least_gap(store, r, tracked)
@@ -278,9 +277,9 @@ def write_gap_row(store, r, point):
 def solids_row(store, r, start, patience, point):
     """Row r, of a contact of solids. Returns whether its pair was found.
 
-    Where the pair that is tracked is lost, or an edge is farthest there, the closest one there is takes over, if the
-    row is one-sided or a step may end anywhere: the loop shortens steps as long as it can. A clearance has a contact
-    manager for that.
+    Where the tracked pair is lost, or its surfaces cross there, the closest pair of all takes over if the last gap is
+    above HARDLY in size, the row is one-sided or `patience` is infinite; else the loop shortens the step. A clearance
+    leaves this to its contact manager.
     """
     pair = tracked_at(start, r)
     q, tracked, records = point.q, point.tracked, point.records
@@ -315,9 +314,9 @@ def solids_row(store, r, start, patience, point):
 def row_of_pair(store, r, start, patience, point):
     """Row r, of contact r, by its pair. Returns whether it was found.
 
-    A contact is carried from `start` to its extremal pair, by steps that turn no normal by more than `patience`. A
-    one-sided row that loses its pair takes the nearest one there is, and so does any whose bodies may stand anywhere by
-    now, if what is found from the pair before is on another side of a body.
+    Newton's method leads from `start` to the extremal pair, by steps that turn no normal by more than `patience`. A
+    one-sided row that loses its pair takes the nearest pair of all. So does any row if `patience` is infinite and the
+    method ends on another side of a body.
     """
     q, tracked, records = point.q, point.tracked, point.records
     derivatives = derivatives_at(records, r)
@@ -331,7 +330,7 @@ def row_of_pair(store, r, start, patience, point):
             return False
         if is_clearance_row(store.table, r):
             return lost_clearance_row(store, r, start, point, False, False)
-        # A one-sided contact is of the nearest pair, whichever that is now.
+        # A one-sided contact takes the nearest pair, whichever it is now.
         held = status == LEFT_PATCH and distance > 0.0
         status, x, facing = restart_contact(store, q, tracked, records, r)
         if status != CONVERGED and status != SINGULAR:
@@ -371,11 +370,11 @@ def contact_row(store, r, start, patience, point):
     if not row_of_pair(store, r, start, patience, point):
         return False
     tracks = not math.isnan(tracked[r, 0])
-    # Features of solids switch as they move: their rows are followed.
+    # Features of solids switch as the solids move, so their rows get no slack.
     open_far = is_clearance_row(store.table, r) and contact.shell_f < 0 and residual[r] > FAR
     contact_record.slack = 0.0
     if tracks and open_far:
-        # How far they may go is behind the least gap.
+        # The curvature-limited motion bound stands behind the least gap in the pool.
         contact_record.slack = min(UNSEEN * residual[r], ASTRAY * store.pool[contact.minimum + 1])
     return True
 
@@ -387,7 +386,7 @@ def contact_row(store, r, start, patience, point):
     )
 )
 def contact_rows(scene, start, patience, free, at):
-    """All rows of contacts but those of free pairs, and their gradients. Returns one whose pair was lost, or -1.
+    """All rows of contacts but those of lifted pairs, and their gradients. Returns a row whose pair was lost, or -1.
 
     `scene` and `at` have the parts of a `Store` and of an `Iterate`.
     """

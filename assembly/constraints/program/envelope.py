@@ -1,6 +1,6 @@
 """Where the Hessian of the Lagrangian has entries, and where its factor has them.
 
-Unknowns are numbered bodies first, six each, then four of every pair at a fold. Row i of the upper triangle reaches to
+Unknowns are numbered bodies first, six each, then four of every lifted pair. Row i of the upper triangle reaches to
 last[i] among the bodies (or, of a pair's own unknowns, to the end of its four); a pair's blocks with its two bodies are
 listed apart, in `folds`. Factorized in that order, one such pair would fill the rows of all later bodies. So in the
 factor the unknowns of a pair stand behind the later one of its bodies: unknown i is number place[i] there, and row p
@@ -8,11 +8,11 @@ of the factor reaches to ends[p].
 
     order = Sparsity(places (last, place, ends), folds, scratch, blocks)
 
-`folds` (pairs + 1, 2) holds the unknowns of the two bodies, negative for a fixed one, and in its last row how many
-pairs there are, and whether all this is put aside for blocks (`constraints/program/hessian_blocks.py`). Of scratch
-there is one row of n, or
-thirteen of 36 at least where there are blocks. Few arrays, because every one costs each call some nanoseconds. Where
-dexterities couple everything, no pair is listed, and last tells all.
+`folds` (pairs + 1, 2) holds the first unknowns of the two bodies, negative for a fixed one, and in its last row the
+number of pairs, and 1 if blocks are used instead of all this (`constraints/program/hessian_blocks.py`). `scratch` has
+one row of n numbers, or where there are blocks thirteen rows of at least 36. There are few arrays, because each costs
+every call some nanoseconds. Where dexterities couple all bodies, no pair is listed and `last` alone says where entries
+are.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from assembly.constraints.program.hessian_blocks import blocks_at, is_blocked
 
 @kernel(inline=True)
 def listed_folds(order):
-    """How many pairs at folds have their unknowns placed."""
+    """The number of lifted pairs that `folds` lists."""
     folds = order.folds
     return folds[folds.shape[0] - 1, 0]
 
 
 @kernel(inner=True)
 def clear_upper(order, n, hessian):
-    """Zeros wherever the Hessian has entries."""
+    """Set the entries of the Hessian to zero."""
     if is_blocked(order):
         for i in range(6 * blocks_at(order.blocks, 0).blocks):
             for j in range(6):
@@ -84,7 +84,7 @@ def place_upper(hessian, n, order, shift, matrix):
 
 @kernel(inner=True)
 def close_envelope(last, n):
-    """No row reaches less far than the one before."""
+    """Let no row end before the row above it."""
     for i in range(1, n):
         last[i] = max(last[i], last[i - 1])
 
@@ -96,7 +96,7 @@ def place_folds(n, order):
     last, place, ends = places[0], places[1], places[2]
     count = listed_folds(order)
     first = n - 4 * count
-    # How many pairs stand before each body: first how many stand right behind it.
+    # Count the pairs that stand before each body; to this end, first those right behind each body.
     for i in range(n):
         ends[i] = 0
     ahead = 0

@@ -1,11 +1,9 @@
-"""The rows of a packed scene evaluated, with their first derivatives; `constraints/program/records.py` says what stands
-where.
+"""Evaluation of the rows of a packed scene and their first derivatives.
 
 A row of a joint is c_1 coordinate_1 + c_2 coordinate_2 - value (`constraints/program/primitives.py`), a row of a trim
-the signed distance
-of a contact to a loop (`proximity/features/trim_distance.py`); rows of a tape are the values of a user's expression
-(`geometry/expression/tape.py`).
-Rows of contacts are in `constraints/program/contact.py`, second derivatives in `row_terms.py`.
+is the signed distance of a contact to a loop (`proximity/features/trim_distance.py`), and rows of a tape are the values
+of a user's expression (`geometry/expression/tape.py`). Rows of contacts are in `constraints/program/contact.py`, second
+derivatives in `row_terms.py`, and the layout of the records in `constraints/program/records.py`.
 """
 
 from __future__ import annotations
@@ -32,7 +30,7 @@ from assembly.constraints.program.tapes import tape_rows
 
 @kernel(inner=True)
 def coordinate_row(asked, k, factor, start, point, r, column):
-    """Factor times a coordinate by record k, its gradient into row r from `column` on; its angle is tracked."""
+    """Return `factor` times a coordinate of record k, write its gradient to row r from `column`, track its angle."""
     angle = asked.angle
     near = start[angle, 0] if angle >= 0 else 0.0
     found = coordinate(asked.kind, asked.component, point.records, k, near)
@@ -62,7 +60,7 @@ def joint_row(store, r, start, point):
 def evaluate(program, start, patience, point):
     """Evaluate all rows at the point's poses. Returns the contact whose pair was lost, or -1.
 
-    `start` are the tracked values to begin from. Of `point`, an `Iterate`, all but the poses is written.
+    `start` has the tracked values to begin from. All of `point`, an `Iterate`, is written except its poses.
     """
     store, lifted = program.store, program.lifted
     header = header_at(store.table, 0)
@@ -75,7 +73,7 @@ def evaluate(program, start, patience, point):
         if lost >= 0:
             return lost
     for k in range(pairs, header.tracked):
-        # Of an angle that no row has, only an input of a dexterity, and of sides of loops this is all that is known.
+        # No row updates an angle that only a dexterity uses, nor the sides of loops: their values are copied.
         copy_tracked(start, k, point.tracked)
     if header.trims > 0:
         call_address(header.trim_rows_address, (store, lifted, point))

@@ -1,13 +1,13 @@
-"""The Hessian of the Lagrangian of a large scene, kept by blocks of six by six: a body, or two that meet in a row.
+"""The Hessian of the Lagrangian of a large scene, in blocks of six by six: for a body, or two with a common row.
 
 An n x n matrix of thousands of unknowns is almost all zeros, and memory that is touched for the first time in every
 solve costs more than the arithmetic. So scenes of many bodies have a record of blocks
 (`constraints/packing/elimination_order.py`), whose rows stand in the order of the factor: a header
 (`BLOCK_HEADER_RECORD`) and the lists that it names.
 
-A block is turned as the upper triangle of the unknowns has it, block e in rows 6 e.. of an array of six columns.
-Where a pair at a fold has unknowns of its own, everything is dense in an envelope as in a small scene
-(`constraints/program/envelope.py`).
+A block has the orientation that it has in the upper triangle in the order of the unknowns. Block e is in the six rows
+from 6 e on of an array of six columns. Where lifted pairs have unknowns of their own, the matrix is dense within an
+envelope, as in a small scene (`constraints/program/envelope.py`).
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ BLOCK_HEADER_RECORD = record_dtype(
     blocks=1,  # of the Hessian
     factored=1,  # blocks of the factor
     place=1,  # (N) row of the body whose twist is number k among the unknowns
-    first=1,  # (N + 1) of every row its first block of the Hessian; that is the one on the diagonal
-    column=1,  # (blocks) of a block; not before its row
-    position=1,  # (blocks) where it stands in its row of the factor, twice, plus one where it goes there transposed
-    panel=1,  # (N + 1) rows of the factor: of every one its first block
-    across=1,  # (factored) their columns, ascending
-    meeting=1,  # (N + 1) of every column the first of the rows above that have it
+    first=1,  # (N + 1) first block of every row of the Hessian, the one on the diagonal
+    column=1,  # (blocks) column of a block, not before its row
+    position=1,  # (blocks) twice a block's place in its row of the factor, plus one if it is transposed there
+    panel=1,  # (N + 1) first block of every row of the factor
+    across=1,  # (factored) columns of the factor's blocks, ascending within a row
+    meeting=1,  # (N + 1) for every column: where its list of the rows above that have a block in it begins
     meeting_row=1,  # these rows
-    meeting_at=1,  # at which place of its row each has the column
+    meeting_at=1,  # the place of that block in each of these rows
     factorize_address=1,  # kernel that makes the factor
     solve_address=1,  # kernel that solves by it
 )
@@ -60,7 +60,7 @@ def is_blocked(order):
 
 @kernel(inline=True)
 def choose_storage(order, n):
-    """By blocks, if the scene has a record of them and all n unknowns are bodies'."""
+    """Choose blocks if the scene has a record of them and all n unknowns are of bodies."""
     folds, blocks = order.folds, order.blocks
     by_blocks = blocks.size > 0 and n == 6 * blocks_at(blocks, 0).count
     folds[folds.shape[0] - 1, 1] = 1 if by_blocks else 0
@@ -68,7 +68,7 @@ def choose_storage(order, n):
 
 @kernel(inner=True)
 def block_row(blocks, at, other):
-    """Row of the array of blocks where that of the unknowns at.. and other.. begins."""
+    """First row in the array of blocks of the block of the unknowns from `at` on and from `other` on."""
     layout = blocks_at(blocks, 0)
     p = blocks[layout.place + at // 6]
     q = blocks[layout.place + other // 6]
@@ -89,7 +89,7 @@ def spot(order, at, other):
 
 @kernel(inner=True)
 def clear_patch(order, f, g):
-    """Zeros for the terms of two bodies; where their twists, at f.. and g.. (negative: fixed), stand in the patch."""
+    """Clear the patch for the terms of two bodies. Returns where their twists f, g stand in it (negative: fixed)."""
     patch = order.scratch[1:]
     for i in range(12):
         for j in range(12):

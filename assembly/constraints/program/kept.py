@@ -1,8 +1,8 @@
 """What a solve or a tick leaves for the next one, which begins at the same poses: rows, derivatives, a factor.
 
-It stands at the end of a state, in the order of `Kept`, and is no part of what a solution means: it is used where the
-poses are the same to the last bit, and without it the next solve evaluates its rows anew. Of what rows are made only
-the values of joints may be others by then.
+These data stand at the end of a state, in the order of `Kept`, and are no part of what a solution means. They are used
+where the poses are the same to the last bit; without them the next solve evaluates its rows anew. Of what rows are made
+from, only the values of joints may have changed in between.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ KEPT_HEADER = record_dtype(
 )
 kept_header_at = record_view(KEPT_HEADER)
 HEADER = size_of(KEPT_HEADER)
-# [unknowns] Of scenes with more than these no factor is kept: it takes longer to copy than to make, and solutions are
+# [unknowns] In scenes with more unknowns no factor is kept: to copy it takes longer than to make it, and solutions are
 # large. Doubled: solutions of larger scenes take four times the memory. Chosen.
 MOST_KEPT = 60
 NO_FACTOR, EARLIER_FACTOR, NEW_FACTOR = 0.0, 1.0, 2.0
-# Where the header is; of every body its pose, as in the state; of every tracked angle its value; of every row the value
-# it has subtracted, its residual, and its weight in the factor (0: it did not count); of every contact of a clearance
-# its number. Of these poses the records of contacts, joints and vector trims, and the Jacobian without the columns of
-# lifted pairs. Of these poses or others close by the Cholesky factor of a step's matrix, its upper triangle row by row,
-# and the Jacobian that is in it.
+# `header`: where the header is. `poses`: of every body, as in the state. `angles`: of every tracked angle its value.
+# `values`, `residual`, `weights`: of every row the value that it subtracts, its residual, and its weight in the factor
+# (0: it did not count). `numbers`: of every contact its clearance number. At these poses: the records of `contacts`,
+# `joints` and vector `trims`, and the `jacobian` without the columns of lifted pairs. At these poses or others close
+# by: `factor`, the Cholesky factor of a step's matrix, its upper triangle row by row, and the Jacobian that is in it.
 Kept = namedtuple(
     "Kept",
     "header poses angles values residual weights numbers contacts joints trims jacobian factor_jacobian factor",
@@ -55,7 +55,7 @@ Kept = namedtuple(
 
 @kernel(inline=True)
 def kept_size(table):
-    """How many doubles a state has for it."""
+    """The number of doubles that `Kept` takes in a state."""
     header = header_at(table, 0)
     n, columns = kept_unknowns(table), FREE_COLUMN + 6 * header.extra
     records = (header.contacts + header.vector_trims) * CONTACT_RECORD + header.joints * JOINT_FRAMES
@@ -73,13 +73,13 @@ def kept_unknowns(table):
 
 @kernel(inline=True)
 def has_place(table, state):
-    """Whether a state has a place for it; that of a tick's result has not."""
+    """Whether a state has a place for `Kept`; the state of a tick's result has none."""
     return state.size >= header_at(table, 0).kept + kept_size(table)
 
 
 @kernel(inline=True)
 def forget_factor(table, state):
-    """No factor is kept in a state any more, which has a place for one."""
+    """Drop the factor that is kept in a state, which must have a place for one."""
     kept_header_at(state, header_at(table, 0).kept).factor = NO_FACTOR
 
 
@@ -128,7 +128,7 @@ def kept_in(table, state):
 
 @kernel(inline=True)
 def value_of(store, r):
-    """What row r has subtracted and may be given anew between solves."""
+    """The value that row r subtracts, which may change between solves."""
     row = header_at(store.table, 0).row_table + ROW * r
     return (
         store.pool[joint_row_at(store.table, row).parameters + 2] if row_at(store.table, row).kind == JOINT_ROW else 0.0
@@ -137,7 +137,7 @@ def value_of(store, r):
 
 @kernel(inner=True)
 def has_followed(table, kept, at, tracked):
-    """Whether a coordinate is an angle at its pole, where it is what the state has, and that is another one now."""
+    """Whether a coordinate is an angle at its pole, where it takes the state's value, and that value has changed."""
     asked, contacts = coordinate_at(table, at), header_at(table, 0).contacts
     if asked.angle < 0 or kept.angles[asked.angle - contacts] == tracked[asked.angle, 0]:
         return False
@@ -148,7 +148,7 @@ def has_followed(table, kept, at, tracked):
 
 @kernel(inner=True)
 def is_of(store, state, kept, tracked):
-    """Whether the rows that are kept are those of the poses, the contacts and the turns of angles in a state."""
+    """Whether the kept rows belong to the poses, the contacts and the revolution counts of angles in a state."""
     header = header_at(store.table, 0)
     left = kept_header_at(state, kept.header)
     if left.has_rows != 1.0 or left.version != pool_header_at(store.pool, 0).version:
@@ -204,7 +204,7 @@ def take_jacobian(source, jacobian):
 
 @kernel(inner=True)
 def keep_jacobian(jacobian, out):
-    """The way back."""
+    """Keep an iterate's Jacobian without the columns of lifted pairs: the inverse of `take_jacobian`."""
     lifted = EXTRA_COLUMN - FREE_COLUMN
     for r in range(out.shape[0]):
         for i in range(FREE_COLUMN):
@@ -246,7 +246,7 @@ def take_rows(store, state, kept, point):
     for k in range(header.contacts, header.tracked):
         point.tracked[k, 0] = kept.angles[k - header.contacts]
     for r in range(header.rows):
-        # The same bits, if the value is the same.
+        # Where the value has not changed, this gives the same bits.
         point.residual[r] = kept.residual[r] + (kept.values[r] - value_of(store, r))
     take_jacobian(kept.jacobian, point.jacobian)
     for r in range(header.contacts):

@@ -1,4 +1,4 @@
-"""Rows of contacts whose coordinates are unknowns (`proximity/extrema/lifted_pair.py`), and what they add to a Hessian.
+"""Rows of lifted pairs, whose coordinates are unknowns (`proximity/extrema/lifted_pair.py`), and their Hessian terms.
 
 Both kernels are called by their addresses.
 """
@@ -33,9 +33,9 @@ def lifted_pair(table, tracked, lengths, r):
     )
 )
 def free_row(scene, r, start, lifted, point):
-    """Row r, of a contact at the coordinates in start[r]; its four rows of tangency follow the rows of the program.
+    """Row r, of a lifted pair at the coordinates in start[r]; all rows of tangency follow the rows of the program.
 
-    The last two have the parts of `LiftedPairs` and of an `Iterate`.
+    `lifted` and `point` have the parts of `LiftedPairs` and of an `Iterate`.
     """
     table, pool = scene
     store = Store(table, pool)
@@ -60,7 +60,7 @@ def free_row(scene, r, start, lifted, point):
     )
 )
 def free_terms(scene, r, lifted, point, y, weights, hessian):
-    """As `add_row_terms`, for the row of a free pair and its rows of tangency."""
+    """As `add_row_terms`, for the row of a lifted pair and its four rows of tangency."""
     table, pool = scene
     free, lengths, vectors, block, _guess, _memory = lifted
     q, tracked, _records, _residual, jacobian = point

@@ -28,11 +28,11 @@ TERM_RECORD = record_dtype(
     kind=1,  # POINT_DISTANCE, ...
     body=1,  # -1: none
     parameters=1,  # where these are in the pool
-    tape=1,  # where the record of its tape is, or of its dexterity
+    tape=1,  # where the record of its tape or dexterity is
     follows=1,  # 1: a posture whose reference is the start of each solve
     contact=1,  # of a place: the contact that is drawn to it
     side=1,  # of a place: on the face of f (0) or of g (1)
-    rows=1,  # of a place: 2 of a point, 1 of a line
+    rows=1,  # of a place: 2 for a point, 1 for a line
 )
 term_at = record_view(TERM_RECORD)
 TERM = size_of(TERM_RECORD)
@@ -73,7 +73,7 @@ def three_at(array, o):
 
 @kernel(inner=True)
 def point_distance(pool, o, q, body, s, order, gradient, hessian):
-    """Value of weight |p - target|^2; from order 1 on its derivatives are added at s, the place of the body's twist."""
+    """Value of weight |p - target|^2; from order 1 on, add its derivatives at s, where the body's twist begins."""
     term = point_distance_at(pool, o)
     weight = term.weight
     p = matvec(rotation(q, body), (term.point[0], term.point[1], term.point[2]))
@@ -126,7 +126,7 @@ def posture(pool, o, q, body, s, order, gradient, hessian):
 
 @kernel(inner=True)
 def potential(pool, o, q, body, s, order, gradient, hessian):
-    """-force . p, with p = x + R a: its gradient is -force and force x R a, its Hessian in turns is that of R a."""
+    """-force . p, with p = x + R a: its gradient is (-force, force x R a); its Hessian in rotations is that of R a."""
     term = potential_at(pool, o)
     force = (term.force[0], term.force[1], term.force[2])
     arm = matvec(rotation(q, body), (term.point[0], term.point[1], term.point[2]))
@@ -152,7 +152,7 @@ def tape_term(store, term, q, order, workspace, entries, gradient, hessian):
     inputs, outputs, work = workspace
     weight = store.pool[term_record.parameters]
     size = pool_header_at(store.pool, 0).scale
-    # A term's tape has the record of a row's tape, one value.
+    # The tape of a term has the same record as the tape of a row, and one value.
     tape = term_record.tape
     expression = tape_at(store.table, tape)
     end = place_tape(store, tape, q, inputs)
@@ -196,7 +196,7 @@ def body_term(pool, term, q, order, s, gradient, hessian):
 
 @kernel(inner=True)
 def recenter(store, q):
-    """Postures that have no reference of their own from where their bodies are now."""
+    """Set the reference of postures that have none of their own to the present poses of their bodies."""
     header = header_at(store.table, 0)
     for t in range(header.terms):
         term = term_at(store.table, header.term_table + TERM * t)
@@ -212,7 +212,7 @@ def recenter(store, q):
 def objective(store, q, order, workspace, entries, gradient, hessian):
     """Value of the objective. From order 1 on the gradient and the upper triangle of the Hessian are overwritten.
 
-    `entries` says where the Hessian has any (`constraints/program/envelope.py`).
+    `entries`, a `Sparsity`, says where the Hessian has entries (`constraints/program/envelope.py`).
     """
     header = header_at(store.table, 0)
     if order > 0:

@@ -1,21 +1,21 @@
 """Places on faces that contacts are drawn to, or kept at: in lengths, by the contact's own coordinates.
 
-With d the difference of the contact's coordinates on a face from the target's, over closed directions the shorter way,
+Let d be the contact's coordinates on a face less those of the target, the shorter way around in closed directions. Then
 
     e = J d,    J^T J = the first fundamental form at the target,
 
-are the rows of a point; of a line of one coordinate there is one, the difference times the surface's mean stretch
-across the line. An objective is w |e|^2. So the derivatives are those of the coordinates u: unknowns where the
-contact's pair is lifted, and else by the contact velocity formulation,
+are the two rows of a point. A line of constant coordinate has one row, the difference of that coordinate times the
+surface's mean stretch across the line. An objective is w |e|^2. The derivatives follow from those of the coordinates
+u: these are unknowns where the contact's pair is lifted; else, by the contact velocity formulation,
 
     e_q = J u_q,
 
-and the second derivative of g.u is that of g.u + y.F, with F the four rows of tangency (`lifted_pair.py`), which hold
-where u is, and y such that F_u^T y = -g:
+and the second derivative of g.u is that of g.u + y.F. Here F are the four rows of tangency (`lifted_pair.py`), which
+are zero at u, and y is such that F_u^T y = -g:
 
     (g.u)_qq = [I u_q^T] (y.F)_(q,u)(q,u) [I; u_q],     F_u u_q = -F_q.
 
-The loop calls `place_terms` by its address, rows of trims and their second derivatives call the others.
+The loop calls `place_terms` by its address; rows of trims and their second derivatives call the other kernels.
 """
 
 from __future__ import annotations
@@ -40,20 +40,21 @@ from assembly.proximity.extrema.rates import derivatives_at
 PLACE_FIELDS = record_dtype(
     "f8",
     weight=1,  # of the square, in an objective
-    target=2,  # coordinates; of a line the one it has not is any
+    target=2,  # coordinates; for a line only one of them counts
     period=2,  # of the coordinates; 0: not closed
-    stretch=4,  # J by rows, lengths over the scene's size; of a line the first row counts
+    stretch=4,  # J by rows [over the size of the scene]; for a line only the first row counts
 )
 place_at = record_view(PLACE_FIELDS)
-# Of which contact, and on which of its sides, 0 or 1, the place is that stands at `at` in the pool.
+# The place at `at` in the pool, the contact that it belongs to, and the contact's side on which it is, 0 or 1.
 OwnPlace = namedtuple("OwnPlace", "at contact side")
-# Pivots below this part of the largest entry: the pair is at a fold, or at a pole, and u has no second derivative.
+# Pivots below this part of the largest entry count as zero: the pair is degenerate or at a pole, and u has no second
+# derivative.
 REGULAR = 1e-11
 
 
 @kernel(inline=True)
 def away(place, i, value):
-    """The difference of coordinate i from the target's."""
+    """Coordinate i less the target's, the shorter way around if it is closed."""
     d = value - place.target[i]
     period = place.period[i]
     return d - period * math.floor(d / period + 0.5) if period > 0.0 else d
@@ -61,7 +62,7 @@ def away(place, i, value):
 
 @kernel(inline=True)
 def place_error(store, at, i, u, v):
-    """Row i of a place: a length."""
+    """Row i of a place: a length over the size of the scene."""
     place = place_at(store.pool, at)
     value = 0.0
     # A line has no difference along itself.
@@ -93,7 +94,7 @@ def add_place_rates(store, own, i, lifted, point, jacobian, r):
 
 @kernel(inner=True)
 def solve_four(m, b):
-    """Solve m x = b for all columns of b in place, by rows of greatest pivots; False where m is singular. m is lost."""
+    """Solve m x = b for all columns of b in place, with row pivoting; False where m is singular. m is overwritten."""
     largest = 0.0
     for value in m.flat:
         if not math.isfinite(value):
@@ -126,7 +127,7 @@ def solve_four(m, b):
 
 @kernel(inner=True)
 def pair_of(store, k, tracked):
-    """Contact k as a lifted pair, its coordinates counted by the lengths of the tangents where they are."""
+    """Contact k as a lifted pair, its coordinates scaled by the lengths of the tangents at the pair."""
     contact = contact_of(store.table, k)
     x = (tracked[k, 0], tracked[k, 1], tracked[k, 2], tracked[k, 3])
     f = surface_point(store.table, store.pool, contact.surface_f, x[0], x[1])
@@ -149,7 +150,7 @@ def pair_of(store, k, tracked):
 def add_coordinate_curvature(store, own, slopes, lifted, bases, point, hessian):
     """Upper triangle of hessian += second derivative of slopes . coordinates in the poses, of an `OwnPlace`.
 
-    Zero where they are unknowns. Left out where it has none: at folds and poles.
+    Nothing is added where the coordinates are unknowns, nor at degenerate pairs and poles, where it does not exist.
     """
     k, side = own.contact, own.side
     slope_u, slope_v = slopes
@@ -235,9 +236,9 @@ def place_term(store, term, bases, lifted, point, order, gradient, hessian):
     allocates=True,
 )
 def place_terms(scene, pairs, bases, at, order, gradient, hessian):
-    """The terms of an objective that are places; their sum is left in the first number of `pairs.variables`.
+    """The terms of an objective that are places; their sum is written to the first number of `pairs.variables`.
 
-    From order 1 on gradients and upper triangles of Hessians are added. `pairs` and `at` have the parts of
+    From order 1 on, gradients and the upper triangles of Hessians are added. `pairs` and `at` have the parts of
     `LiftedPairs` and of an `Iterate`.
     """
     table, pool = scene

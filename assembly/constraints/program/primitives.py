@@ -10,10 +10,10 @@
     ANGLE             theta
     RADIUS            |d - (z_a.d) z_a|, how far the origin of b is from the z axis of a
 
-Turns u (with f) and v (with g) change u.v by (w_g - w_f).(v x u). So a coordinate of angles has the gradient (-h, h)
-in the angular velocities, and its second derivative is K in (f, f) and (g, g) and [h]x / 2 - K in (f, g), with a
-symmetric K that for u.v is sym(u v^T) - u.v I. Where a direction is undefined there is a choice of it, and
-curvatures are those a little apart: values and derivatives are finite everywhere.
+For u fixed to f and v fixed to g, the rate of u.v is (w_g - w_f).(v x u). So an angular coordinate has the gradient
+(-h, h) in the angular velocities, and its second derivative is K in (f, f) and (g, g) and [h]x / 2 - K in (f, g), with
+a symmetric K that for u.v is sym(u v^T) - u.v I. Where a direction is undefined, one is chosen, and curvatures are
+limited to those a little away from there: values and derivatives are finite everywhere.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from assembly.proximity.extrema.rates import load_row, put_row
 COINCIDENT, SLIDE, DISTANCE, DOT, SWING, TURN, AZIMUTH, ANGLE, RADIUS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 # A coordinate's value, and n, arm_f, arm_g, h of its gradient -(n, arm_f x n + h), (n, arm_g x n + h).
 Coordinate = namedtuple("Coordinate", "value n arm_f arm_g h")
-# What `swing` says of a SWING; its names are those of the formulas there, `rate` is phi', `second` phi'' u.z_b.
+# What `swing` returns; the names are those of the formulas there, `rate` is phi', `second` is phi'' u.z_b.
 Swing = namedtuple("Swing", "value u hu p phi j m rate second")
-# h, and K = sym(a b^T) + sym(c d^T) - t I, of a coordinate of angles.
+# h, and K = sym(a b^T) + sym(c d^T) - t I, of an angular coordinate.
 TurningForm = namedtuple("TurningForm", "h a b c d t")
 # A joint's frames in the pool: p_a, x_a, y_a, z_a, p_b, x_b, y_b, z_b, each in the axes of its body.
 FRAMES = 24
@@ -53,17 +53,17 @@ AXES_B = place_of(JOINT_FRAMES, "axes_b")
 APART = place_of(JOINT_FRAMES, "apart")
 RECORD = size_of(JOINT_FRAMES)
 
-# A vector shorter than this is rounding, and so is its direction.
+# A vector shorter than this [over the size of the scene, if a length] is rounding error, and so is its direction.
 UNDEFINED = 1e-12
-# The same across an axis: less than a tolerance of a solve, so that a ball that is drawn onto the axis of a funnel, to
-# where it touches all around, comes there. Roundings of coordinates of size one are a hundredth of it.
+# The same for the distance from an axis. It is below a solve's tolerance, so that a ball that is drawn onto the axis of
+# a funnel, where it touches all around, gets there. Roundings of coordinates of size one are a hundredth of it.
 ON_AXIS = 1e-14
 # The least distance, and sine of an angle, by which the curvatures of DISTANCE, RADIUS and ANGLE are divided.
 LEAST_DIVISOR = 1e-6
 # The same for SWING where the axes are opposed: its gradient grows there, too.
 OPPOSED = 1e-3
-# The slope of TURN is no steeper than where |z_a + z_b| is this, that of AZIMUTH than where the sine of v to z_a is.
-# Neither has curvature nearer to its pole. At the pole, but for rounding, they have no value and keep the last one.
+# The slope of TURN is limited to that where |z_a + z_b| is this, the slope of AZIMUTH to that where the sine between v
+# and z_a is. Nearer to its pole neither has curvature. At the pole, to rounding, each is undefined and keeps its value.
 POLE = 1e-6
 # SWING is a series in 1 - cos(theta) below this.
 SERIES = 1e-3
@@ -109,7 +109,7 @@ def radial_direction(records, k):
     d = load_row(records, k, APART)
     axis = load_row(records, k, AXES_A)
     side = load_row(records, k, AXES_A + 3)
-    # By the two slides across: what d has along the axis may be longer by far.
+    # From the two components across the axis: the component of d along it may be longer by far.
     x = dot(axis, d)
     y = dot(side, d)
     length = math.sqrt(x * x + y * y)
@@ -174,7 +174,7 @@ def unwrap(angle, near):
 
 @kernel(inner=True)
 def coordinate(kind, component, records, k, near):
-    """A coordinate and its gradient. A TURN or an AZIMUTH is the one within pi of `near`."""
+    """A coordinate and its gradient. Of the values of a TURN or an AZIMUTH it is the one within pi of `near`."""
     value = near
     n = ZERO
     d = ZERO
@@ -219,7 +219,7 @@ def coordinate(kind, component, records, k, near):
         c, s, h = tilt(records, k)
         value = math.atan2(s, c)
     elif kind == RADIUS:
-        # The slide along a direction that turns with f.
+        # As SLIDE, along the radial direction, which turns with f.
         value, n = radial_direction(records, k)
         d = load_row(records, k, APART)
     else:
@@ -310,7 +310,7 @@ def add_slope(hessian, a, b, r, t, n, w):
 
 @kernel(inner=True)
 def add_around(records, k, y, hessian, f, g):
-    """The part of the second derivative of RADIUS that its direction has: the square of the slide around the axis."""
+    """The part of RADIUS's second derivative from its changing direction: the square of the rate around the axis."""
     length, n = radial_direction(records, k)
     around = cross(load_row(records, k, AXES_A + 6), n)
     arm_f = add(load_row(records, k, ARM_A), load_row(records, k, APART))
@@ -373,7 +373,7 @@ def add_point_terms(kind, component, records, k, y, hessian, f, g):
 
 @kernel(inline=True)
 def turning_form(kind, component, records, k):
-    """The second derivative of a coordinate of angles."""
+    """The second derivative of an angular coordinate."""
     z = load_row(records, k, AXES_A + 6)
     a = ZERO
     b = ZERO

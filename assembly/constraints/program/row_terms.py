@@ -1,8 +1,8 @@
-"""What rows add to a Hessian: second derivative of y . rows, weighted squares of their gradients; dense, or by blocks.
+"""What rows add to a Hessian, dense or in blocks: second derivative of y . rows, weighted squares of their gradients.
 
-Whose columns a row has is in `bases` (`solve/loop/residuals.py`), the blocks of large scenes in
-`constraints/program/hessian_blocks.py`. A free pair
-(`proximity/extrema/lifted_pair.py`) brings unknowns of its own and four rows of tangency.
+`bases` has the unknowns that the columns of a row belong to (`solve/loop/residuals.py`); the blocks of large scenes are
+in `constraints/program/hessian_blocks.py`. A lifted pair (`proximity/extrema/lifted_pair.py`) has unknowns of its own
+and four rows of tangency.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from assembly.proximity.extrema.rates import add_gap_terms
 
 @kernel(inline=True)
 def column_of(b):
-    """First column of block b of a row: twists of f and g, coordinates of a free pair, further twists."""
+    """First column of block b of a row: twists of f and g, coordinates of a lifted pair, further twists."""
     return 6 * b if b <= 2 else EXTRA_COLUMN + 6 * (b - 3)
 
 
 @kernel(inline=True)
 def width(b):
-    """How many columns block b has."""
+    """The number of columns of block b."""
     return 4 if b == 2 else 6
 
 
 @kernel(inner=True)
 def add_gram(bases, jacobian, r, weight, hessian):
-    """Upper triangle of hessian += weight J_r^T J_r, for row r of two bodies and more."""
+    """Upper triangle of hessian += weight J_r^T J_r, for a row r of two or more bodies."""
     for b in range(bases.shape[1]):
         at = bases[r, b]
         if at < 0:
@@ -61,7 +61,7 @@ def add_gram(bases, jacobian, r, weight, hessian):
 
 @kernel(inner=True)
 def add_gram_blocks(blocks, bases, jacobian, r, weight, hessian):
-    """As `add_gram`, for a Hessian by blocks; no pair has unknowns of its own."""
+    """As `add_gram`, for a Hessian in blocks, where no pair is lifted."""
     for b in range(bases.shape[1]):
         at = bases[r, b]
         if at < 0:
@@ -81,7 +81,7 @@ def add_gram_blocks(blocks, bases, jacobian, r, weight, hessian):
 
 @kernel(inline=True)
 def add_square(order, bases, jacobian, r, weight, hessian):
-    """Upper triangle of hessian += weight J_r^T J_r, however it is kept."""
+    """Upper triangle of hessian += weight J_r^T J_r, for a Hessian dense or in blocks."""
     if is_blocked(order):
         add_gram_blocks(order.blocks, bases, jacobian, r, weight, hessian)
     else:
@@ -90,7 +90,7 @@ def add_square(order, bases, jacobian, r, weight, hessian):
 
 @kernel(inner=True)
 def add_coordinate(asked, records, k, y, order, hessian, f, g):
-    """As `add_coordinate_hessian`, however the Hessian is kept."""
+    """As `add_coordinate_hessian`, for a Hessian dense or in blocks."""
     if is_blocked(order):
         at_f, at_g = clear_patch(order, f, g)
         add_coordinate_hessian(asked.kind, asked.component, records, k, y, order.scratch[1:], at_f, at_g)
@@ -103,7 +103,7 @@ def add_coordinate(asked, records, k, y, order, hessian, f, g):
 def add_row_terms(program, point, y, weights, hessian):
     """Upper triangle of hessian += second derivative of y . rows + J^T diag(weights) J.
 
-    The rows of tangency of a free pair go with its row.
+    The row of a lifted pair adds the terms of its rows of tangency as well.
     """
     store, lifted = program.store, program.lifted
     header = header_at(store.table, 0)

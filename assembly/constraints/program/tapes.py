@@ -1,7 +1,7 @@
 """Rows of users' expressions: their tapes (`geometry/expression/tape.py`) run at poses, with first and second
 derivatives.
 
-What runs a tape is large, and called by its address.
+The kernel that runs a tape is large and therefore called by its address.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from assembly.geometry.expression.tape import run_tape
 
 @kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
 def run_scene_tape(table, pool, o, x, work, y):
-    """`run_tape`, for who calls it by its address."""
+    """`run_tape`, to be called by its address."""
     run_tape(Store(table, pool), o, x, work, y)
     return 0
 
 
 @kernel(inner=True)
 def place_tape(store, tape, q, workspace):
-    """The poses of a tape's bodies, in the user's units, to the front of its room. Returns where its inputs end."""
+    """Write the poses of a tape's bodies, in the user's units, to its inputs. Returns where these poses end."""
     units = pool_header_at(store.pool, 0)
     expression = tape_at(store.table, tape)
     size = units.scale
@@ -40,7 +40,7 @@ def place_tape(store, tape, q, workspace):
 
 @kernel(inner=True)
 def tape_rows(store, tape, workspace, point):
-    """All rows of a tape; a value or a slope that is not finite is an infinite violation, of one side too."""
+    """All rows of a tape. A value or slope that is not finite makes the row infinitely violated, one-sided rows too."""
     header = header_at(store.table, 0)
     expression = tape_at(store.table, tape)
     inputs, outputs, work = workspace

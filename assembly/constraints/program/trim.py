@@ -1,20 +1,19 @@
-"""Rows of trims: where on its face a contact stands to a loop.
+"""Rows of trims: how a contact lies on its face relative to a loop.
 
-"signed": s, the signed distance in (u, v) (`proximity/features/trim_distance.py`), s_q = n.u_q. The forms of paper 001,
-section
-3.4, take the point c(t) of the loop's own extremum against the other surface, whose rate t_q is that of a surface and
-a curve (appendix A, corrected):
+The form "signed" is s, the signed distance in (u, v) (`proximity/features/trim_distance.py`), with s_q = n.u_q. The
+forms of paper 001, section 3.4, take the point c(t) of the loop's own extremum against the other surface; the rate t_q
+is that of the extremum of a surface and a curve (appendix A, corrected):
 
     "parametric"  u - c            u_q - c' t_q
     "cartesian"   f(u) - f(c)      f_u u_q - f_u c' t_q
     "between"     g(u_g) - f(c)    g_q - f_u c' t_q,
 
-in the axes of the face's body, where f(u) and f(c) have no rates of their own. At a solution they depend on one
-another (the loop's extremum is then the contact's), each a multiple of s; so are their second derivatives taken to
-be. Off the loop the vector u - c = s n has two independent rates, n s_q and s n_q, of which the second forbids what the
-loop allows, to slide along it: the closer to the loop, the larger the multiplier that says so. So the first two forms
-count by their signed length, one row that is zero where the vector is. The third contains the gap and has no such sign.
-A row of a loop with corners is of one of its sides (`trim_sides.py`).
+in the axes of the face's body, where f(u) and f(c) have no rates of their own. At a solution the components depend on
+one another (the loop's extremum is then the contact's): each is a multiple of s, and so its second derivative is taken
+to be. Off the loop the vector u - c = s n has two independent rates, n s_q and s n_q. The second would forbid sliding
+along the loop, which is allowed, with a multiplier that grows toward the loop. So the first two forms use their signed
+length, one row that is zero where the vector is. The third contains the gap and has no such sign.
+With a loop that has corners, a row belongs to one of the loop's sides (`trim_sides.py`).
 The loop of a solve calls `trim_rows` and `trim_terms` by their addresses.
 """
 
@@ -75,14 +74,14 @@ def trim_of(table, r):
 
 @kernel(inner=True)
 def clear(jacobian, r):
-    """Zeros for the twists and the coordinates of row r."""
+    """Clear row r, its columns of twists and of coordinates."""
     for j in range(FREE_COLUMN + 4):
         jacobian[r, j] = 0.0
 
 
 @kernel(inner=True)
 def add_coordinate_rate(lifted, records, k, i, factor, jacobian, r):
-    """Row r += factor times the derivative of coordinate i of contact k: an unknown, or by the contact velocity."""
+    """Row r += factor times the derivative of coordinate i of contact k: as an unknown, or by the contact velocity."""
     if lifted.free[k] >= 0:
         jacobian_row_at(jacobian, r).lifted[i] += factor / lifted.lengths[k, i]
     else:
@@ -226,7 +225,7 @@ def vector_rows(store, first, lifted, point):
     du = matvec(away, du)
     dv = matvec(away, dv)
     free = lifted.free[k] >= 0
-    # Seen from the side of the loop the other point is p + beta n.
+    # In the axes of the body with the loop, the other point is p + beta n.
     toward = (0.0, 0.0, 0.0)
     if form == BETWEEN and not free:
         n = (derivatives.normal[0], derivatives.normal[1], derivatives.normal[2])
@@ -250,7 +249,7 @@ def vector_rows(store, first, lifted, point):
             residual[r] = dot(axis, arm) - c[l]
             slope = along[l]
             if not free:
-                # The other side's own coordinates have no rates at its poles.
+                # Not by the coordinates of the other surface: they have no rates at its poles.
                 add_coordinate_rate(lifted, records, k, o, pu[l], jacobian, r)
                 add_coordinate_rate(lifted, records, k, o + 1, pv[l], jacobian, r)
                 for j in range(FREE_COLUMN):
@@ -269,10 +268,10 @@ def vector_rows(store, first, lifted, point):
 
 @kernel(inner=True)
 def signed_length(store, first, count, side, lifted, point):
-    """One row of a vector's rows: its length, positive on the right side of the loop. The others become zero.
+    """Replace the rows of a vector by one, its length, positive on the right side of the loop. The others become zero.
 
-    The length is smooth through zero, but its gradient is 0 / 0 there: as all columns of the rows are then along one
-    line, that of the greatest stands for the direction, and the signed distance says which way is positive.
+    The signed length is smooth through zero, but its gradient is 0 / 0 there. All columns of the rows are parallel
+    there: the longest one gives the direction, and the signed distance says which way is positive.
     """
     residual = point.residual
     jacobian = point.jacobian
@@ -375,9 +374,9 @@ def trim_rows(scene, pairs, at):
 def trim_terms(scene, r, pairs, bases, point, y, hessian):
     """Upper triangle of hessian += y (second derivative of row r).
 
-    Of a place, exactly. Of a signed row of a free contact that is all; else what the change of u_q adds is left out. A
-    vector's row counts as the signed distance, times what its gradient has of that one's: at a solution all else in it
-    is the gap's.
+    It is exact for a place and for a signed row of a lifted pair; else the term of the change of u_q is left out. The
+    row of a vector is treated as the signed distance times the part that its gradient has of the distance's gradient:
+    at a solution the rest of it is a multiple of the gap's gradient.
     """
     table, pool = scene
     free, lengths, vectors, variables, guess, memory = pairs

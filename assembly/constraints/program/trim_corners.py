@@ -1,13 +1,13 @@
-"""Which sides of a loop the rows of its trim are of, chosen at an iterate: see `trim_sides.py`.
+"""The choice, at an iterate, of the sides of a loop that the rows of its trim belong to (see `trim_sides.py`).
 
-One-sided rows are of the side that is nearest, and of its neighbor at the corner next to the contact, where that is
-convex from the contact's side. There both rows hold, and it is for their multipliers which of them push.
+One-sided rows belong to the nearest side, and to its neighbor at the corner next to the contact, where that corner is
+convex from the contact's side. There both rows hold, and their multipliers decide which of them push.
 
 A contact "on" a loop keeps its side. At a corner its multipliers y_0 and y_1 tell what the objective gains along the
 two sides: nothing along this one as long as y_1 pushes, and nothing along the other one as long as turn y_0 <= 0, which
-would be its multiplier there. So a corner is a solution if both are so. Where y_1 pushes and turn y_0 > 0, the contact
-goes on along the other side, whose row the equation becomes: the two change slots. It is nearest to another side only
-where it was far from its own.
+would be its multiplier there. A corner is a solution if both hold. Where y_1 pushes and turn y_0 > 0, the contact goes
+on along the other side, whose row becomes the equation: the two sides exchange slots. Another side becomes the nearest
+one only where the contact was far from its own.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from assembly.geometry.faces.trim_nearest import trim_nearest
 from assembly.geometry.faces.trim_pieces import trim_at, trim_frame_at
 from assembly.proximity.features.trim_distance import trim_distance
 
-# A distance in (u, v) is another one if it differs by more than this part of the loop's extent: the rounding of nearest
-# points. Only rows that are far from binding are left out by it.
+# Distances in (u, v) count as different if they differ by more than this part of the loop's extent: the rounding of
+# nearest points. Only rows that are far from being active are left out because of it.
 DIFFERENT = 1e-9
-# The sides of a trim's rows: the number of that of slot 0 (-1: not known yet); the corner, which is the number of the
-# other side plus one, positive where the loop turns left, and zero where there is none.
+# The sides of a trim's rows. `side`: the number of the side in slot 0 (-1: not known yet). `corner`: the number of the
+# side in slot 1 plus one, positive where the loop turns left and negative where it turns right; 0 without a corner.
 Corner = namedtuple("Corner", "side corner")
 
 
@@ -50,7 +50,7 @@ def other_side(corner):
 
 @kernel(inner=True)
 def foot_on(store, loop, u, v):
-    """The `TrimFoot` of a point on all of a loop, or on a side."""
+    """The `TrimFoot` (projection) of a point on a whole loop, or on a side of it."""
     return trim_nearest(store, loop, 0, trim_at(store.table, loop).curves, u, v)
 
 
@@ -69,10 +69,10 @@ def nearest_side(store, sides, foot):
 
 @kernel(inner=True)
 def corner_next_to(store, row, sides, number, at, distance):
-    """The corner that a contact on side `number` is next to, if a row of the other side says something there.
+    """The corner that a contact on side `number` is next to, if the row of the other side is valid there; else 0.
 
-    `at` is the contact in (u, v), `distance` that from the loop, positive inside. A side ends at another corner, too,
-    beyond which its extension says nothing: within what is kept no side next to the nearest one is nearer than that.
+    `at` is the contact in (u, v), `distance` its distance from the loop, positive inside. The other side ends at
+    another corner, beyond which its extension is not valid: in the kept region none is nearer than the nearest side.
     """
     side = side_number(store.table, sides, number)
     foot = foot_on(store, side.loop, at[0], at[1])
@@ -90,17 +90,17 @@ def corner_next_to(store, row, sides, number, at, distance):
         if kept * distance >= 0.0 and kept * foot_on(store, other, at[0], at[1]).distance < kept * distance - near:
             return 0
     elif low <= foot.t <= high and turn * foot_on(store, other, foot.u, foot.v).distance < -near:
-        # The loop itself would break it.
+        # The loop itself violates the row of the other side there.
         return 0
     return turn * (neighbor + 1)
 
 
 @kernel(inner=True, allocates=True)
 def side_multiplier(store, r, lifted, point, y):
-    """The multiplier of the signed row of slot 0 that pushes as the rows of its trim do, from r on.
+    """The multiplier with which the signed row of slot 0 pushes as the rows of its trim do, from r on.
 
-    A length is a positive multiple of the signed distance; its multiplier stands for that one's. Components that
-    contain the gap are a combination of both, which is found by their gradients over the twists of a tracked pair.
+    A length is a positive multiple of the signed distance, so its own multiplier serves. Components that contain the
+    gap combine the signed distance and the gap; their gradients over the twists of a tracked pair tell the shares.
     """
     row = trim_of(store.table, r)
     if row.form == SIGNED or row.by_length == 1:
@@ -126,7 +126,7 @@ def goes_on(y_side, y_other, corner, least):
 
 @kernel(inner=True)
 def chosen_sides(store, row, before, found, at):
-    """The `Corner` at (u, v) whose projection on the loop is `found`, after another one at the iterate before."""
+    """The `Corner` of a contact `at` (u, v), projected to `found` on the loop; `before` is that of the last iterate."""
     sides = loop_sides_at(store.table, row.sides)
     near = nearest_side(store, sides, found)
     other = other_side(before.corner)
@@ -140,7 +140,7 @@ def chosen_sides(store, row, before, found, at):
         and side == other
         and other_side(corner) == before.side
     ):
-        # The same two rows.
+        # The same two sides in exchanged slots: they stay where they are.
         return before
     return Corner(side, corner)
 
@@ -149,7 +149,7 @@ def chosen_sides(store, row, before, found, at):
 def move_multipliers(row, r, y_side, before, after, y):
     """Give the rows of a trim, from r on, the multipliers that their sides had in other slots, and none to new sides.
 
-    `y_side` is what the signed row of slot 0 pushed with.
+    `y_side` is the multiplier with which the signed row of slot 0 pushed.
     """
     second = r + row.count
     two_sided = row.one_sided == 0
@@ -176,10 +176,10 @@ def move_multipliers(row, r, y_side, before, after, y):
     allocates=True,
 )
 def trim_sides(scene, pairs, at, least, y, proposed):
-    """Choose the sides that rows of trims are of, into the tracked values. Returns how many trims have others now.
+    """Choose the sides of rows of trims and write them to the tracked values. Returns how many trims changed sides.
 
-    Of those the multipliers `y` and those `proposed` go with their sides. At a corner the proposed ones tell whether
-    the contact goes on along its other side, if they are above `least`.
+    For these, the multipliers `y` and `proposed` move with their sides. At a corner, proposed multipliers above `least`
+    in size tell whether the contact goes on along its other side.
     """
     table, pool = scene
     free, lengths, vectors, variables, guess, memory = pairs
@@ -192,7 +192,7 @@ def trim_sides(scene, pairs, at, least, y, proposed):
         row = trim_of(table, r)
         k, o = row.contact, 2 * row.side
         if row.sides < 0 or row.slot == 1 or (r > header.contacts and trim_of(table, r - 1).sides == row.sides):
-            # Without corners, or one of the further rows of a trim.
+            # The loop has no corners, or this is not the first row of its trim.
             continue
         if not (math.isfinite(tracked[k, o]) and math.isfinite(tracked[k, o + 1])):
             continue

@@ -1,18 +1,18 @@
-"""Which side of its loop a row of a trim is of, where the loop has corners.
+"""The side of its loop that a row of a trim belongs to, where the loop has corners.
 
-The distance from a loop is smooth but for its corners. A loop that has some is cut there into sides, each of which goes
-on straight beyond its ends (`geometry/faces/loop_sides.py`), and a trim of it has one more row. Its rows are of two
-slots: slot 0 has the side that the contact is on, in the form of the trim, slot 1 the one that this meets at the corner
-next to the contact, by its signed distance, one-sided:
+The distance from a loop is smooth except at corners. A loop with corners is cut there into sides, each of which goes on
+straight beyond its ends (`geometry/faces/loop_sides.py`), and a trim of it has one more row. Its rows have two slots.
+Slot 0 has the side that the contact is on, in the form of the trim. Slot 1 has the side that meets it at the corner
+next to the contact, as a one-sided row of its signed distance:
 
     keep "on":                         s_0 = 0,           turn s_1 >= 0,
     keep "inside", convex corner:      s_0 >= 0,          s_1 >= 0,
     keep "outside", reflex corner:    -s_0 >= 0,         -s_1 >= 0,
 
 with `turn` 1 where the loop turns left and -1 where it turns right. So the rows of a solve are smooth near a corner,
-and which of them push there is the active set of an inequality as any other. Elsewhere slot 1 has none and is idle, and
-a one-sided slot 0 is of the whole loop: around a corner that is reflex from the side of the contact it is the distance
-from a point. Sides are tracked values: they stay along a step, and are chosen anew between steps (`trim_corners.py`).
+and which of them push there is decided as for any active set. Away from corners slot 1 has no side and is idle, and a
+one-sided slot 0 belongs to the whole loop: around a corner that is reflex from the contact's side, its distance is that
+from a point. Sides are tracked values: they stay during a step and are chosen anew between steps (`trim_corners.py`).
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from collections import namedtuple
 from assembly._kernel import kernel
 from assembly.constraints.program.records import FREE_COLUMN, SIDE, header_at, loop_sides_at, side_at
 
-# What a row of a trim is of: a loop (-1: none, the row is idle), its curves as edges, the factor of its distance.
+# What a row of a trim refers to: a loop (-1: none, the row is idle), its curves as edges, the factor of its distance.
 TrimPlace = namedtuple("TrimPlace", "loop edges factor")
-# What an idle row leaves open, over the size: any positive number.
+# Residual of an idle row [over the size of the scene]: any positive number would do.
 OPEN = 1.0
 
 
 @kernel(inline=True)
 def side_number(table, sides, number):
-    """Side `number` of a loop, a record."""
+    """The record of side `number` of a loop."""
     return side_at(table, sides.sides + SIDE * number)
 
 

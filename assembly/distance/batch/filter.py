@@ -1,18 +1,18 @@
 """Which of many Bezier pieces come nearer than a clearance to which of many convex hulls, in one call.
 
-A piece lies in the hull of its Bezier points, so that with a unit n any
+A piece lies in the convex hull of its Bezier points, so that every unit vector n gives a lower bound,
 
-    distance >= min over the obstacle of n.b - max over the Bezier points of n.p
+    distance >= min over the obstacle of n.b - max over the Bezier points of n.p.
 
-proves. A few points of a curve come first, in the plane against a polygon inside the obstacle: x is inside where it is
-left of every edge of a closed polygon of its vertices, whatever their order. Then boxes and fixed directions, which
-tell most of the others apart, then a direction by GJK; what nothing parts is halved by de Casteljau's algorithm, and
-ends of halves are points of the curve: one within the clearance is an answer too. A piece shorter than the tolerance,
-or than its rounding, of which halves are no shorter, stays undecided, which counts as near.
+In the plane, a few points of the curve are first tested against a polygon inside the obstacle: x is inside where it is
+left of every edge of a closed polygon of the obstacle's vertices, whatever their order. Then boxes and fixed directions
+separate most of the other pairs, then a direction found by GJK. A piece that no direction separates is halved by de
+Casteljau's algorithm. The ends of halves are points of the curve: one within the clearance proves the pair near. A
+piece shorter than the tolerance, or than its rounding error, stays undecided, which counts as near.
 
-Halving is n sums, each off by half a unit: 50 depths of it, by which no piece of a polynomial is longer than its
-rounding, are off by 25 n units 2^-52 of the largest number, of both X and w where there are weights, and 128 depths by
-what (64 n + 64) pays for.
+One halving is n sums, each with an error of half a unit 2^-52 of the largest number. After 50 halvings no piece of a
+polynomial is longer than its rounding error: their error is 25 n units, for both X and w where there are weights. The
+error bound of (64 n + 64) units suffices for 128 halvings.
 
 """
 
@@ -31,14 +31,14 @@ from assembly.geometry.vec import dot
 
 # Of a pair: proven apart, a point within the clearance, open at the tolerance.
 APART, NEAR, OPEN = 0, 1, 2
-# Pieces that wait at once.
+# The most pieces that wait on the stack.
 DEPTH = 40
-# Hulls. places: where the vertices of each begin, and how many; boxes: their corners; supports: along directions that
-# all have in common; polygons: inside of them, in the plane.
+# Convex hulls. places: where the vertices of each begin, and how many; boxes: their corners; supports: support values
+# along `directions`, the same for all hulls; polygons: polygons inside the hulls, in the plane.
 Obstacles = namedtuple("Obstacles", "places vertices boxes directions supports polygons")
-# Bezier pieces that wait, homogeneous, of which points in space are looked at; off: how far these may be off.
+# stack: waiting Bezier pieces, homogeneous; points: Bezier points in space of the current piece; off: error bound.
 WaitingPieces = namedtuple("WaitingPieces", "stack degree rational points off")
-# Points of a curve that are looked at first, and pieces that are parted by fixed directions alone.
+# Points of a curve that are tested first, and pieces of a pair that are tested before GJK is used.
 _LOOKS, _PIECES = 15, 4
 
 
@@ -71,7 +71,7 @@ def from_center(points, o, boxes, j):
 
 @kernel(inner=True, exact=True)
 def in_polygon(x, y, obstacles, polygons, j, off):
-    """Whether a point of the plane, known up to `off`, is left of every edge of the polygon of an obstacle."""
+    """Whether a point of the plane, with errors up to `off`, is left of every edge of the polygon of an obstacle."""
     edges = polygons[j, 0]
     if edges < 3:
         return False
@@ -93,7 +93,7 @@ def in_polygon(x, y, obstacles, polygons, j, off):
 
 @kernel(inner=True, allocates=True)
 def inner_polygons(full, hulls, obstacles, directions):
-    """Of every obstacle in the plane the number, then the places, of its farthest vertices along the directions."""
+    """For every obstacle in the plane: the number, then the places, of its farthest vertices along the directions."""
     polygons = np.zeros((hulls.shape[0], directions.shape[0] + 1), dtype=np.int64)
     if full == 3:
         for j in range(hulls.shape[0]):
@@ -111,7 +111,7 @@ def inner_polygons(full, hulls, obstacles, directions):
 
 @kernel(inner=True)
 def fill_basis(degree, basis):
-    """Bernstein polynomials at the points that are looked at first, a row each."""
+    """Bernstein polynomials at the parameters that are tested first, one row each."""
     for m in range(_LOOKS):
         t = (m + 1) / (_LOOKS + 1)
         binomial = 1.0
@@ -122,7 +122,7 @@ def fill_basis(degree, basis):
 
 @kernel(inner=True, exact=True)
 def look(points, degree, basis, looks):
-    """Points of a piece that is not rational, to the rows of looks."""
+    """Write points of a piece that is not rational to the rows of `looks`."""
     for m in range(_LOOKS):
         x = 0.0
         y = 0.0
@@ -139,7 +139,7 @@ def look(points, degree, basis, looks):
 
 @kernel(inner=True, exact=True)
 def look_is_near(looks, hulls, j, off):
-    """Whether one of the points that are looked at is proven inside an obstacle of the plane."""
+    """Whether one of the tested points is proven inside an obstacle of the plane."""
     boxes = hulls.boxes
     for m in range(_LOOKS):
         x = looks[3 * m]
@@ -158,7 +158,7 @@ def hull_of(hulls, j):
 
 @kernel(inline=True)
 def is_beyond(points, o, count, hulls, j, reach):
-    """Whether boxes or one of the fixed directions tell points from an obstacle."""
+    """Whether boxes or a fixed direction prove points farther than the reach from an obstacle."""
     return boxes_apart(points, o, count, hulls.boxes, j, reach) or parted(
         points, o, count, hulls.directions, hulls.supports, j, reach
     )
@@ -166,7 +166,7 @@ def is_beyond(points, o, count, hulls, j, reach):
 
 @kernel(inner=True, exact=True)
 def end_is_near(full, points, o, hulls, j, clearance, off, g):
-    """Whether a point of the curve is within the clearance of a hull, rounding against it."""
+    """Whether a point of the curve is proven within the clearance of a hull, with all rounding errors counted."""
     reach = up(clearance + off)
     if is_beyond(points, o, 1, hulls, j, reach):
         return False
@@ -264,7 +264,7 @@ def piece_is_near(full, curve, hulls, j, clearance, tolerance, g):
 
 @kernel(inner=True, allocates=True)
 def fixed_directions(full):
-    """Unit vectors around: 24 in the plane, 26 in space, rounded."""
+    """Unit vectors all around: 24 in the plane, 26 in space, rounded."""
     if full == 3:
         n = np.zeros((24, 3))
         for k in range(24):
@@ -285,7 +285,7 @@ def fixed_directions(full):
 
 @kernel(inner=True, exact=True)
 def parted(points, o, count, directions, supports, j, reach):
-    """Whether one of the directions parts points from a hull."""
+    """Whether one of the directions proves points farther than the reach from a hull."""
     most = 0.0
     for i in range(o, o + 3 * count):
         most = max(most, abs(points[i]))

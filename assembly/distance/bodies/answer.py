@@ -19,7 +19,7 @@ from assembly.kinematics.motion import position, rotation
 
 @kernel(inline=True)
 def cosine_to_normal(patch, way, j, at):
-    """Cosine of a unit vector and the outward normal of a patch, whose derivatives are rows `at` and `at` + 1 of J."""
+    """Cosine between a unit vector and the outward normal of a patch whose tangents are rows `at` and `at` + 1 of J."""
     if patch.curve != NONE:
         return 0.0
     o = 3 * at
@@ -30,7 +30,7 @@ def cosine_to_normal(patch, way, j, at):
 
 @kernel(inner=True)
 def write_facing(search):
-    """How the nearest points known face each other."""
+    """Write the cosines between the outward normals at the nearest known points and the way to the other point."""
     state, work = body_search_at(search.state, 0), patch_work_at(search.w, 0)
     patch_a, patch_b = patch_of(search.a, int(state.patches[0])), patch_of(search.b, int(state.patches[1]))
     for i in range(4):
@@ -46,14 +46,14 @@ def write_facing(search):
 
 @kernel(inline=True)
 def is_in_box(head, point):
-    """Whether a point, from the center of a body, is in its box."""
+    """1.0 if a point, relative to the center of a body, is in its box, else 0.0."""
     half = head.half
     return 1.0 if abs(point[0]) <= half[0] and abs(point[1]) <= half[1] and abs(point[2]) <= half[2] else 0.0
 
 
 @kernel(inline=True)
 def write_points(search, q):
-    """The nearest points known in world axes, and which of them are in the box of the other body."""
+    """Write the nearest known points in world coordinates, and which of them are in the box of the other body."""
     state, center = body_search_at(search.state, 0), body_head_at(search.a.pool, 0).center
     for i in range(0, 6, 3):
         own = (state.points[i] + center[0], state.points[i + 1] + center[1], state.points[i + 2] + center[2])

@@ -8,7 +8,7 @@ from assembly._lanes import load_lanes, store_lanes
 
 @kernel(inline=True)
 def span_after(knots, count, span):
-    """The next span of the domain that is not empty; none if it is `count`."""
+    """The next span of the domain that is not empty, or `count` if there is none."""
     span += 1
     while span < count and not knots[span + 1] > knots[span]:
         span += 1
@@ -19,8 +19,8 @@ def span_after(knots, count, span):
 def write_line(source, target, knots, degree, span):
     """Bezier points of a line of control points on one span.
 
-    `source` and `target`: the block, where the line begins in it, and how far apart its points are; behind the block
-    `target` writes to there is room for work.
+    `source` and `target`: an array, where the line begins in it, and the stride of its points. The end of the array of
+    `target` is scratch.
     """
     points, first, step = source
     out, begin, stride = target
@@ -43,8 +43,8 @@ def write_line(source, target, knots, degree, span):
 def write_nets(points, knots, shape, rows, nets):
     """Bezier points of the patches of a surface, spans of u before those of v, rows of u within.
 
-    `points`: (n_u, n_v, 4) homogeneous; `shape`: n_u, n_v and the degrees; `rows`: room for the spans of u by n_v, and
-    for a line; behind the nets is room for a line as well.
+    `points`: (n_u, n_v, 4) homogeneous; `shape`: n_u, n_v and the degrees; `rows`: workspace for the Bezier points of
+    all spans of u by n_v. `rows` and `nets` have scratch for one line at their ends.
     """
     count_u, count_v, p, q = shape
     span, at = span_after(knots[0], count_u, p - 1), 0

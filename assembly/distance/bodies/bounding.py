@@ -1,4 +1,4 @@
-"""The bound of two parts of patches: in several directions, by their planes, trims and only minimum, in this order."""
+"""The lower bound of two parts of patches: by planes, several directions, trims and a proven single minimum."""
 
 from __future__ import annotations
 
@@ -29,9 +29,10 @@ from assembly.distance.bodies.trims import nearest_is_elsewhere
 from assembly.distance.patches.pair import patch_work_at
 from assembly.geometry.vec import dot, matvec, neg, sub
 
-# A proof of one minimum is tried where the halvings of both nodes are a multiple: it costs more than a bound.
+# A proof of one minimum is tried where the halvings of both nodes add up to a multiple of this: it costs more than a
+# bound.
 _PROOF_EVERY = 3
-# Directions that differ by less are one.
+# Directions that differ by less count as the same.
 _SAME_WAY = 1e-6
 
 
@@ -50,7 +51,7 @@ def bound_along(search, i, j, n):
 
 @kernel(inline=True)
 def keep_way(search, bound, n):
-    """Remember the bound of the pair in hand in a direction, and the direction if no better one is known."""
+    """Record a bound of the pair in hand, and its direction n if none has given a better one."""
     state = body_search_at(search.state, 0)
     state.key = max(state.key, bound)
     if bound > state.tried:
@@ -60,8 +61,8 @@ def keep_way(search, bound, n):
 
 @kernel(inner=True)
 def bound_by_ways(search, i, j, way):
-    """Lower bound of a pair of parts of patches, by up to three directions: that of the nearest points known, that of
-    the pair that it is a part of, and that of the models' nearest places. The best one is KEY_WAY then.
+    """Lower bound of a pair of parts of patches, by up to three directions: that of the nearest known points, that of
+    its parent pair, and that of the models' nearest points. The best one is kept as `key_way`.
     """
     pair, state = pair_work_at(search.pair, 0), body_search_at(search.state, 0)
     common = (state.way[0], state.way[1], state.way[2])
@@ -71,7 +72,7 @@ def bound_by_ways(search, i, j, way):
         if bound >= state.limit:
             return
     else:
-        # Along straight parts the last digits of the direction count, which one that waited has lost.
+        # Between straight parts the last digits of the direction count, which a packed direction has lost.
         way = common
     bound = bound_along(search, i, j, way)
     keep_way(search, bound, way)
@@ -79,7 +80,7 @@ def bound_by_ways(search, i, j, way):
         return
     near = along_normals(pair, way)
     if near.size < 0.9 * state.upper and 16.0 * state.descents <= 64.0 + state.popped:
-        # Points nearer than any that are known may be here.
+        # Points nearer than all known ones may be here.
         place_at_models(search)
         descend_from_nodes(search, i, j)
     if near.turned > 1e-3:
@@ -90,7 +91,7 @@ def bound_by_ways(search, i, j, way):
 
 @kernel(inline=True)
 def bound_along_normal(search, i, j, n):
-    """The bound of the control points along the normal of a plane, on the side on which the middles are."""
+    """The bound by the control points along the normal of a plane, oriented from b's middle to a's."""
     pair, a, b, pose = pair_work_at(search.pair, 0), search.a, search.b, search.pose
     between = sub(sub(node_of(a, i).middle, pose.shift), matvec(pose.turn, node_of(b, j).middle))
     if dot(n, between) < 0.0:
@@ -101,7 +102,7 @@ def bound_along_normal(search, i, j, n):
 
 @kernel(inner=True)
 def bound_by_planes(search, i, j):
-    """Lower bound of a pair of which one is plane: no way that leads from one point of it to another one need tell."""
+    """Lower bound of a pair of which one part is plane, along its normal: directions between points may miss it."""
     a, b = search.a, search.b
     at_a, at_b = links_of(a, i).spine, links_of(b, j).spine
     if at_a != NONE and spine_at(a.pool, at_a).kind == PLANE:
@@ -112,10 +113,10 @@ def bound_by_planes(search, i, j):
 
 @kernel(inner=True)
 def prove_pair(search, i, j):
-    """A bound by the only minimum of a pair, where it is proven to be that; -inf elsewhere. Its models are loaded.
+    """A bound by the minimum of a pair that is proven to have only one; else -inf. The models of the pair are loaded.
 
-    First in the direction in which the pair was bounded; then, if that gives one minimum which is not high enough, in
-    the direction of the nearest points on the pair themselves.
+    It is tried in the direction in which the pair was bounded; then, if that gives one minimum that is not high enough,
+    in the direction between the nearest points of the pair.
     """
     pair, state, work = (
         pair_work_at(search.pair, 0),
@@ -168,6 +169,6 @@ def bound_patches(search, i, j, bound):
         if trimmed and nearest_is_elsewhere(pair, a, i, b, j, errors.slack):
             state.key = math.inf
         elif proves and may_have_one_minimum(pair, a, i, b, j, state.upper, errors.slope) >= 0.0:
-            # The question is in line: most pairs fail it, and a call costs more.
+            # This test is inlined: most pairs fail it, and a call of `prove_pair` costs more.
             state.key = max(state.key, prove_pair(search, i, j))
     return state.key

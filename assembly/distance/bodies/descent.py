@@ -1,7 +1,7 @@
-"""What a search over two bodies keeps, and its descents to nearby points.
+"""The state of a search over two bodies, and its descents to nearby points.
 
-A descent is Newton's method for |D|^2, held in the unit squares of two patches. Nothing of it is part of a proof: what
-comes out is a pair of points, whose distance is an upper bound.
+A descent is Newton's method for |D|^2, confined to the unit squares of two patches. It is no part of a proof: its
+result is a pair of points, whose distance is an upper bound.
 """
 
 from __future__ import annotations
@@ -33,34 +33,34 @@ from assembly.geometry.faces.trim import trim_side
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import dot, matvec, matvec_t, sub
 
-# What rounding can do to this pair of bodies at this pose. slack: of sums of coordinates; point: of the difference of
+# Bounds of the rounding errors of two bodies at this pose. slack: of sums of coordinates; point: of the difference of
 # two evaluated points; slope: of an evaluated first derivative; step: bounds closer than this are equal.
 BodyErrors = namedtuple("BodyErrors", "slack point slope step")
 # a, b: trees; heap: pairs of nodes; state, pair, w: blocks of BODY_SEARCH, PAIR_WORK and PATCH_WORK, basis functions
 # behind the latter; room: for describing nodes; question: what is asked.
 BodySearch = namedtuple("BodySearch", "a b pose heap state pair w room errors question")
-# tolerance, clearance: below zero the distance itself is asked for [length]; budget: pairs that may be looked at.
+# tolerance, clearance [length]: a clearance below zero asks for the distance itself; budget: the most pairs to examine.
 BodyQuestion = namedtuple("BodyQuestion", "tolerance clearance budget")
 BODY_SEARCH = record_dtype(
     "f8",
-    limit=1,  # pairs of at least this bound are let go [length]
-    let_go=1,  # the least bound of those that were
+    limit=1,  # pairs with at least this bound are discarded [length]
+    let_go=1,  # the least bound of the discarded pairs [length]
     lower=1,  # proven bounds of the distance [length]
     upper=1,
-    patches=2,  # numbers of the patches on which the nearest points known are
-    places=4,  # where these are in the unit squares of the patches
-    points=6,  # these, seen from a's center, in a's axes
-    world=6,  # these in world axes
-    facing=2,  # cosine of the way to the other point and the outward normal, of a and of b; 0 on a boundary curve
+    patches=2,  # numbers of the patches that have the nearest known points
+    places=4,  # coordinates of these points in the unit squares of the patches
+    points=6,  # these points, from a's center, in a's axes [length]
+    world=6,  # these points in world coordinates [length]
+    facing=2,  # of a and of b: cosine between outward normal and way to the other point; 0 on a boundary curve
     boxed=2,  # 1: the nearest point of b is in the box of a; that of a in the box of b
-    way=3,  # unit vector from the one of b to the one of a
-    pairs=1,  # pairs of nodes that were looked at
-    popped=1,  # those that were taken from the heap
+    way=3,  # unit vector from the nearest known point of b to that of a
+    pairs=1,  # pairs of nodes examined
+    popped=1,  # pairs taken from the heap
     descents=1,
-    next_descent=1,  # how many are popped when the next descent is due
+    next_descent=1,  # value of `popped` at which the next descent is due
     key=1,  # bound of the pair in hand
     tried=1,  # the best bound that a direction gave of the pair in hand
-    key_way=3,  # the direction that gave that, or the pair that this one is a part of
+    key_way=3,  # the direction that gave it; before that, the direction of the parent pair
     on_a=3,  # points in hand, from a's center and in a's axes
     on_b=3,
 )
@@ -152,7 +152,7 @@ def _step_from(query, _place, at):
     load_hessian(w, 4)
     newton_direction(w, 4)
     step = work.step
-    # A flat valley has steps without end: none is longer than the unit squares are.
+    # Steps along a flat valley may be unbounded: they are limited to the length of the unit squares.
     longest = max(1.0, max(max(abs(step[0]), abs(step[1])), max(abs(step[2]), abs(step[3]))))
     fall = 0.0
     way = 0.0
@@ -183,7 +183,7 @@ _descend = kernel(inner=True)(damped_newton(_look, _step_from, _move, steps=_STE
 
 @kernel(inner=True)
 def descend(search, i, j):
-    """From PLACE to a local minimum on two nodes, whose points are loaded then; their distance."""
+    """Descend from PLACE to a local minimum on two nodes and load its points. Returns their distance."""
     work = patch_work_at(search.w, 0)
     x = work.place
     start = (_moved(x[0], 0.0), _moved(x[1], 0.0), _moved(x[2], 0.0), _moved(x[3], 0.0))
@@ -235,7 +235,7 @@ def descend_on_patches(search, patch_a, patch_b):
 
 @kernel(inline=True)
 def place_on_patches(search, i, j):
-    """PLACE of two nodes as that of their whole patches."""
+    """Convert PLACE from coordinates of two nodes to those of their whole patches."""
     x = patch_work_at(search.w, 0).place
     node = node_of(search.a, i)
     x[0] = node.low_u + x[0] * (node.high_u - node.low_u)
@@ -262,7 +262,7 @@ def is_on_side(x, y):
 
 @kernel(inner=True)
 def cross_sides(search, of_a):
-    """Down from the nearest points known to patches of a or b that may begin where the one of it ends."""
+    """Descend from the nearest known points to patches of a or b that may continue a patch beyond its side."""
     state, x = body_search_at(search.state, 0), patch_work_at(search.w, 0).place
     side = 0 if of_a else 1
     at = 2 * side
@@ -285,10 +285,10 @@ def cross_sides(search, of_a):
 
 @kernel(inner=True)
 def descend_across_sides(search):
-    """On to neighbors of patches on elementary surfaces, until the distance of these is reached or none is nearer.
+    """Descend to neighbors of patches on elementary surfaces, until the distance of these is reached or none is nearer.
 
-    Where that is the distance of the bodies, it ends the search as soon as its points are known, and no pair is nearer
-    than another one before: all would be looked at.
+    Where that is the distance of the bodies, the search ends as soon as points at this distance are known. Until then
+    no pair has a better bound than another, and all would be examined.
     """
     a, b, state = search.a, search.b, body_search_at(search.state, 0)
     for _ in range(_CROSSINGS):
@@ -306,7 +306,7 @@ def descend_across_sides(search):
 
 @kernel(inner=True)
 def nearest_boundary(tree, face, point):
-    """The part of the boundary of a face whose ball is nearest to a point, from the center of the body; its patch."""
+    """The patch of the boundary of a face whose ball is nearest to a point, relative to the center of the body."""
     best, least = NONE, math.inf
     for k in range(int(body_head_at(tree.pool, 0).patches)):
         patch = patch_of(tree, k)
@@ -321,7 +321,7 @@ def nearest_boundary(tree, face, point):
 
 @kernel(inner=True)
 def descend_on_boundary(search, patch_a, patch_b):
-    """From the places in hand, of two whole patches, to a local minimum on the boundary of what is trimmed."""
+    """Descend from PLACE of two whole patches to a local minimum, on the boundary where a place is outside its face."""
     a, b, state, x = search.a, search.b, body_search_at(search.state, 0), patch_work_at(search.w, 0).place
     on_b = matvec_t(search.pose.turn, sub(state.on_b, search.pose.shift))
     if patch_of(a, patch_a).trim != NONE and not is_on_face(a, patch_a, x[0], x[1]):
@@ -337,7 +337,7 @@ def descend_on_boundary(search, patch_a, patch_b):
 def descend_from_nodes(search, i, j):
     """A local minimum of the whole patches of two nodes, from PLACE of these.
 
-    Where it may be outside of their faces, and is not the nearest known, one on their boundary and one on the nodes.
+    If a face is trimmed and no nearer points were found, descend on the boundary as well, and on the nodes themselves.
     """
     state, x = body_search_at(search.state, 0), patch_work_at(search.w, 0).place
     patch_a, patch_b = links_of(search.a, i).patch, links_of(search.b, j).patch
@@ -356,6 +356,6 @@ def descend_from_nodes(search, i, j):
 
 @kernel(inline=True)
 def place_at_models(search):
-    """PLACE where the quadratic of the pair is least."""
+    """Set PLACE to where the quadratic of the pair is least."""
     for k in range(4):
         patch_work_at(search.w, 0).place[k] = pair_work_at(search.pair, 0).z[k] + 0.5

@@ -1,7 +1,7 @@
 """Directions in which a pair of nodes is bounded (`pair.py`).
 
-The direction is everything: near contact the way between two points of a long pair may be any, and its parts, which
-begin with their parent's direction, would get nowhere.
+The quality of a bound depends on its direction. Near contact the direction between two points of a long pair may be any
+at all, and its halves, which begin with the direction of their parent, would not get better bounds.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from collections import namedtuple
 from assembly._kernel import kernel
 from assembly.distance.bodies.pair import flat_size
 
-# Where the models of a pair are nearest: how far they are apart, how much the way there is turned from the direction of
-# the frame, that way, and whether the other way may be as good.
+# Where the models of a pair are nearest. size: their distance; turned: how much the direction there differs from the
+# frame's; way: this direction; against: whether the opposite direction may be as good.
 Nearby = namedtuple("Nearby", "size turned way against")
-# A direction is a place on an octahedron: two numbers of this many steps in one double.
+# A direction is packed as a point on an octahedron: two coordinates of this many steps each in one double.
 _STEPS = 2.0**25
 
 
 @kernel(inline=True)
 def packed_way(n):
-    """A unit vector as one number, to some 1e-7: a place on the octahedron |x| + |y| + |z| = 1, unfolded."""
+    """A unit vector as one number, to about 1e-7: its point on the unfolded octahedron |x| + |y| + |z| = 1."""
     s = 1.0 / (abs(n[0]) + abs(n[1]) + abs(n[2]))
     x, y = n[0] * s, n[1] * s
     if n[2] < 0.0:
@@ -44,7 +44,7 @@ def unpacked_way(number):
 
 @kernel(inline=True)
 def unit_normal(pair, i):
-    """The normal of a surface at its middle, in the frame, on the side of the direction; zero of a curve."""
+    """The unit normal of a surface at its middle, in the frame, on the side of its direction; zero for a curve."""
     j = pair.j
     o = 3 * i
     x = j[o + 1] * j[o + 5] - j[o + 2] * j[o + 4]
@@ -56,7 +56,7 @@ def unit_normal(pair, i):
 
 @kernel(inline=True)
 def along_normals(pair, way):
-    """Where the models are nearest. Of a pair that is long against its distance the way is along its normals."""
+    """Where the models are nearest. If the pair is longer than its distance, the way is taken along its normals."""
     z, d, j, k, f = pair.z, pair.d, pair.j, pair.k, pair.frame
     v0, v1, v2 = d[0], d[1], d[2]
     for i in range(4):
@@ -77,7 +77,7 @@ def along_normals(pair, way):
     if size < long:
         p, q = unit_normal(pair, 0), unit_normal(pair, 2)
         if min(p[2], q[2]) > 0.3:
-            # On the side of the direction; but where the way between the places leads to the other one, that may be it.
+            # Normals are on the frame's side; where the nearest points are the other way, that side may be right.
             against = v2 < -0.5 * size
             v0, v1, v2 = p[0] + q[0], p[1] + q[1], p[2] + q[2]
     length = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)

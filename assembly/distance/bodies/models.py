@@ -1,8 +1,8 @@
 """Models of nodes: a quadratic at the middle of a patch, and a proven bound of its error.
 
-w (S - model) is a polynomial of degree (p + 2, q + 2). A quotient of two Bernstein forms is at most the largest
-quotient of their coefficients: its coefficients over the least weight bound |S - model|, and those of its derivatives,
-with the rule for quotients, the doubts of the first and second derivatives.
+The residual w (S - model) is a polynomial of degree (p + 2, q + 2). A quotient of two Bernstein forms is at most the
+largest quotient of their coefficients. So the residual's coefficients over the least weight bound |S - model|, and
+those of its derivatives give, by the quotient rule, the error bounds ("doubts") of the first and second derivatives.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from assembly.distance.bodies.nodes import links_of, node_of, patch_of
 from assembly.distance.bodies.records import ALL, BENDS, MIDDLE, MODEL, NODE, SLOPES, body_head_at
 from assembly.geometry.splines.bezier_pieces import UNIT
 
-# Where in the room for work the coefficients of the residual begin, behind those of the quadratic.
+# Where the coefficients of the residual begin in the workspace, behind those of the quadratic.
 RESIDUAL = 36
 _GROW = 1.0 + 1e-12
 
 
 @kernel(inline=True)
 def length_at(nodes, at):
-    """Length of the vector at a place."""
+    """Length of the vector at nodes[at]."""
     return math.sqrt(nodes[at] * nodes[at] + nodes[at + 1] * nodes[at + 1] + nodes[at + 2] * nodes[at + 2])
 
 
 @kernel(inner=True)
 def write_model(tree, k):
-    """Middle, slopes and bends of the patch at node k."""
+    """Write the middle, slopes and bends (first and second derivatives) of the patch at node k."""
     links, pool = links_of(tree, k), tree.pool
     patch = patch_of(tree, links.patch)
     m, n = patch.degree_u + 1, patch.degree_v + 1
@@ -67,7 +67,7 @@ def write_model(tree, k):
 
 @kernel(inner=True)
 def load_residual(tree, k, room):
-    """Bernstein coefficients of w (S - model) of degree (p + 2, q + 2), and of w beside them."""
+    """Write the Bernstein coefficients of w (S - model), of degree (p + 2, q + 2), and those of w beside them."""
     node, links = node_of(tree, k), links_of(tree, k)
     patch = patch_of(tree, links.patch)
     p, q = patch.degree_u, patch.degree_v
@@ -99,11 +99,11 @@ def load_residual(tree, k, room):
 
 @kernel(inner=True)
 def largest_differences(room, shape, k, l):
-    """The largest difference of orders k and l, k + l <= 2, of the residual: of its vectors, and of its weights."""
+    """The largest difference of order (k, l), k + l <= 2, of the residual's coefficients, and that of its weights."""
     rows, columns = shape
     most = 0.0
     heaviest = 0.0
-    # The steps from a point to the two between which the first and the second difference are.
+    # Strides to the neighbors with which the first and the second difference are taken.
     first = 4 * columns if k > 0 else 4
     second = 4 if l > 0 else 4 * columns
     for i in range(rows - k):
@@ -123,7 +123,7 @@ def largest_differences(room, shape, k, l):
 
 @kernel(inline=True)
 def weights_of(tree, k, patch):
-    """The least weight of a node's control points, below all weights of its points, and the quotient of the largest."""
+    """The least weight of a node's control points, below all its weights; the largest weight over the least."""
     least, heaviest = math.inf, 0.0
     at = links_of(tree, k).net + 3
     for i in range((patch.degree_u + 1) * (patch.degree_v + 1)):
@@ -134,16 +134,16 @@ def weights_of(tree, k, patch):
 
 @kernel(inline=True)
 def rounding_of(tree, k, ratio):
-    """How far a coefficient of the residual, over the least weight, may be off; of a difference of order m, 2^m times.
+    """Rounding error bound of a residual coefficient over the least weight; of a difference of order m, 2^m times this.
 
-    It is a sum of nine terms, whose factors are positive and one in sum, whatever the degrees.
+    A coefficient is a sum of nine terms, whose factors are positive and add up to one, whatever the degrees.
     """
     return 64.0 * UNIT * ratio * (node_of(tree, k).extent + body_head_at(tree.pool, 0).reach)
 
 
 @kernel(inner=True)
 def describe_model(tree, k, room):
-    """Slopes, bends and the doubt of points."""
+    """Compute the model of a node and its error bound, `point_doubt`."""
     write_model(tree, k)
     node, links = node_of(tree, k), links_of(tree, k)
     patch = patch_of(tree, links.patch)
@@ -160,7 +160,7 @@ def describe_model(tree, k, room):
 
 @kernel(inner=True)
 def describe_changes(tree, k, room):
-    """Doubts of the first and second derivatives; the model is there."""
+    """Compute the error bounds of the first and second derivatives of a node whose model is known."""
     load_residual(tree, k, room)
     node, links, head = node_of(tree, k), links_of(tree, k), body_head_at(tree.pool, 0)
     patch = patch_of(tree, links.patch)
@@ -182,7 +182,7 @@ def describe_changes(tree, k, room):
     e2vv = dvv * vv + 4.0 * n * n * rough
     e2uv = duv * uv + 4.0 * m * n * rough
     if head.rational > 0.0:
-        # Of a quotient X / w: (X / w)_u = (X_u - w_u (X / w)) / w, and once more.
+        # The quotient rule, (X / w)_u = (X_u - w_u (X / w)) / w, and the same again for second derivatives.
         tiny = 64.0 * UNIT * ratio
         wu = du * weight_u + m * tiny
         wv = dv * weight_v + n * tiny
@@ -198,7 +198,7 @@ def describe_changes(tree, k, room):
 
 @kernel(inline=True)
 def describe_node(tree, k, much, room):
-    """Compute of a node what is not there yet; k is no group."""
+    """Compute what a node lacks of MODEL or ALL, if `much` asks for it; node k must not be a group."""
     links = links_of(tree, k)
     if links.known < MODEL <= much:
         describe_model(tree, k, room)

@@ -59,15 +59,15 @@ def node_size(tree, k):
 
 @kernel(inline=True)
 def net_size(patch):
-    """Doubles of the control points of a node: rows of four, and their places."""
+    """Number of doubles of a node's control points: rows (w x, w y, w z, w), then their points in space."""
     return 7 * (patch.degree_u + 1) * (patch.degree_v + 1)
 
 
 @kernel(inner=True)
 def longest_row(nets, hull, count, steps, rows):
-    """The largest sum of steps along a row of control points: longer than that row's curve.
+    """The length of the longest row of control points; no curve of a row is longer than its control polygon.
 
-    `steps`, `rows`: how many in a row and how many rows, and how far apart their points are.
+    `steps`, `rows`: the number of steps in a row and of rows, each with its stride.
     """
     longest = 0.0
     for r in range(rows[0]):
@@ -85,7 +85,7 @@ def longest_row(nets, hull, count, steps, rows):
 
 @kernel(inner=True)
 def describe_ball(tree, k):
-    """Middle, places of the control points and ball of the patch at node k, from its net; how long its sides are."""
+    """Write the middle, points of the hull, ball and side lengths of the patch at node k, from its control net."""
     links, node, nets = links_of(tree, k), node_of(tree, k), tree.nets
     patch = patch_of(tree, links.patch)
     rows, columns = patch.degree_u + 1, patch.degree_v + 1
@@ -109,7 +109,7 @@ def describe_ball(tree, k):
         nets[hull + i], nets[hull + count + i], nets[hull + 2 * count + i] = px, py, pz
         far = max(far, (px - x) * (px - x) + (py - y) * (py - y) + (pz - z) * (pz - z))
     node.radius = math.sqrt(far) + 16.0 * UNIT * body_head_at(tree.pool, 0).reach
-    # Only the order of halvings depends on these.
+    # These lengths only decide what is halved next; no bound depends on them.
     node.length_u = longest_row(nets, hull, count, (rows - 1, columns), (columns, 1))
     node.length_v = longest_row(nets, hull, count, (columns - 1, 1), (rows, columns))
     links.known = BALL
@@ -135,7 +135,7 @@ def halve_net(nets, source, halves, counts, along_u):
 
 @kernel(inner=True)
 def has_room(tree, k):
-    """Whether the halves of node k can be made."""
+    """Whether the arrays have room for the halves of node k."""
     state = tree_state_at(tree.links, 0)
     if (state.nodes + 2) * NODE > tree.nodes.size:
         return False
@@ -144,7 +144,7 @@ def has_room(tree, k):
 
 @kernel(inner=True)
 def halves_of(tree, k):
-    """The first of the two halves of node k, which are made across its longer side if they are not there."""
+    """The first of the two halves of node k; if they do not exist yet, its longer side is halved."""
     links, node = links_of(tree, k), node_of(tree, k)
     if links.halves != NONE:
         return links.halves
@@ -207,7 +207,7 @@ def sort_along(tree, spare, order, ends, axis):
 
 @kernel(inner=True)
 def describe_group(tree, k, spare, order, ends):
-    """Ball of the patches order[begin:end] at node k, which are sorted along the longest side of its box."""
+    """Write the ball of patches order[begin:end] to node k; sort the patches along the longest side of their box."""
     begin, end = ends
     node, links = node_of(tree, k), links_of(tree, k)
     longest, axis = -1.0, 0
@@ -237,16 +237,16 @@ def describe_group(tree, k, spare, order, ends):
 
 @kernel(signatures="(UniTuple(i8[::1], 2), UniTuple(f8[::1], 3), i8[::1])")
 def plant_tree(ints, doubles, order):
-    """Nodes of all patches, whose nets are there, under a tree of groups: node 0 is its root.
+    """Make nodes of all patches, whose control nets are given, under a tree of groups with root 0.
 
-    `ints`: table and links; `doubles`: pool, nodes and nets; `order` (5 n) is for work.
-    A group is cut where its patches, in order along the longer side of the box of their middles, are half.
+    `ints`: table and links; `doubles`: pool, nodes and nets; `order` (5 n) is scratch.
+    A group is split at the median of its patches, sorted along the longest side of the box of their middles.
     """
     tree = BodyTree(ints[0], doubles[0], ints[1], doubles[1], doubles[2])
     count = order.size // 5
     begin, end = count, 3 * count
     error = body_head_at(tree.pool, 0).error
-    # Described in the last places first, and moved to where the groups want them.
+    # Nodes of patches are first made at the end of the array, and then moved to their places in the tree.
     spare = tree.nodes.size // NODE - count
     for i in range(count):
         links, node = links_of(tree, spare + i), node_of(tree, spare + i)

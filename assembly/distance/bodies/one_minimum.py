@@ -1,8 +1,9 @@
 """Pairs of nodes on which Phi (`pair.py`) is proven to have one minimum, and the bound that this gives.
 
 V bounds how much the Hessian of Phi changes on the pair. Where the slope in a variable keeps its sign, Phi is least at
-an end of that one, whatever the others are. In the others the Hessian, scaled to a diagonal of ones, less the largest
-row sum of V and a margin m, is positive definite. Then from any place x
+an end of that variable's range, whatever the others are: the variable is held there. The proof is that in the other
+variables the Hessian, scaled to a unit diagonal, less the largest row sum of V and a margin m, is positive definite.
+Then from any place x
 
     Phi >= Phi(x) + sum of the least g_i d + m H_ii d^2 / 2.
 """
@@ -31,8 +32,8 @@ from assembly.distance.patches.pair import patch_work_at
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import dot
 
-# The margin: where it is small, more pairs have one minimum, and fewer of these are let go for it. After so many
-# halvings of both nodes surfaces nearly fit into each other, and a small one is all there is.
+# The margin. If it is smaller, more pairs are proven to have one minimum, but fewer of these are discarded by the bound
+# that follows. After _HALVINGS of both nodes surfaces nearly conform, and only a small margin is possible.
 _MARGIN, _LEAST_MARGIN, _HALVINGS = 0.05, 1e-4, 27
 _STEPS = 3
 _GROW = 1.0 + 1e-12
@@ -95,7 +96,7 @@ def load_change(pair, a, i, b, j, tension):
 
 @kernel(inline=True)
 def hold_variables(pair, doubt):
-    """Which variables are least at an end of theirs whatever the others are."""
+    """Find the variables in which Phi is least at an end of their range, whatever the others are."""
     for i in range(4):
         turn = doubt
         for m in range(4):
@@ -159,7 +160,7 @@ def has_one_with(pair, a, i, b, j, tension, doubt):
 
 @kernel(inline=True)
 def is_any_held(pair):
-    """Whether Phi is known to be least at an end of a variable."""
+    """Whether any variable is held at an end of its range."""
     return pair.held[0] != 0.0 or pair.held[1] != 0.0 or pair.held[2] != 0.0 or pair.held[3] != 0.0
 
 
@@ -167,8 +168,8 @@ def is_any_held(pair):
 def may_have_one_minimum(pair, a, i, b, j, upper, doubt):
     """The tension with which a pair has one minimum, models loaded; -1 where none is known. `doubt` of a slope.
 
-    A tension with which Phi is convex in all variables is best. Where there is none, as at the rim of a hole beside a
-    pin, more of it may make Phi convex in those that are not held.
+    A tension with which Phi is convex in all variables is best. Where there is none, as at the edge of a hole beside a
+    pin, more tension may make Phi convex in the variables that are not held.
     """
     halvings = links_of(a, i).depth + links_of(b, j).depth
     pair.margin = _MARGIN if halvings < _HALVINGS else _LEAST_MARGIN
@@ -186,8 +187,8 @@ def may_have_one_minimum(pair, a, i, b, j, upper, doubt):
 def bound_by_tangent(search, tension):
     """Lower bound of Phi on a pair that has one minimum, from the places in hand, which are on it.
 
-    Phi is computed there; what it may still fall its slope and the margin tell. Leaves in the pair the linear part
-    of a quadratic whose least place is nearer to the minimum.
+    Phi is computed there; its slope and the margin bound how far it may still fall. The linear part of a quadratic
+    whose minimum is nearer to that of Phi is left in the pair.
     """
     pair, work, errors = pair_work_at(search.pair, 0), patch_work_at(search.w, 0), search.errors
     f, d, j = pair.frame, work.d, work.j
@@ -211,7 +212,7 @@ def bound_by_tangent(search, tension):
         if pair.held[i] == 0.0:
             least += least_change(slope, doubt, pair.margin * pair.hessian[5 * i], x, 1.0 - x) * _GROW
         elif x != (0.0 if pair.held[i] < 0.0 else 1.0):
-            # Monotone in this variable: least at an end, which must be where the place is.
+            # Phi is monotone in this variable, so the place must be at the end where Phi is least.
             return -math.inf
     return least
 
