@@ -57,7 +57,8 @@ def local_point(kind, table, pool, span, t, workspace):
 def hull_point(full, points, count, x, g):
     """Nearest point of a hull, how many vertices carry it, whether x is inside, and how far the point may be off it.
 
-    It is a vertex and parts of the differences to the others: off by half a unit of itself and some of those.
+    The point is a vertex plus parts of the differences to the others: its error is half a unit in the last place of
+    itself plus some units of those parts.
     """
     v = (x[0] - points[0], x[1] - points[1], x[2] - points[2])
     simplex = simplex_at(g, 0)
@@ -103,13 +104,13 @@ def held(x, step, bounds):
 
 @kernel(inline=True)
 def is_free(x, slope, bounds):
-    """Whether a parameter may move: its bounds leave it a way, and the slope does not push it out of them."""
+    """Whether a parameter may move: its bounds differ, and the slope does not push it out of them."""
     return bounds[1] > bounds[0] and not ((x <= bounds[0] and slope > 0.0) or (x >= bounds[1] and slope < 0.0))
 
 
 @kernel(inline=True)
 def step_length(slope, curvature, square):
-    """A step in one parameter; where it is not convex, as if the curve were straight."""
+    """Newton's step in one parameter; a Gauss-Newton step where the curvature is too small or negative."""
     return -slope / (curvature if curvature > 1e-8 * square else square + 1e-300)
 
 
