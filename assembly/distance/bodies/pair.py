@@ -114,7 +114,7 @@ def load_frame(pair, turn, n):
 
 @kernel(inline=True)
 def load_rows(matrix, source, target, count, at):
-    """Vectors of a node turned by a matrix, to rows from `at`."""
+    """Write a node's vectors, multiplied by a matrix, to the rows of `target` from `at`."""
     for i in range(count):
         x, y, z = source[3 * i], source[3 * i + 1], source[3 * i + 2]
         for r in range(3):

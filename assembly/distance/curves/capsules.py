@@ -183,7 +183,7 @@ def _extent(tree, o):
 
 @kernel(signatures="(f8[::1], f8[::1], f8)", allocates=True, exact=True)
 def compare_curves(a, b, clearance):
-    """Whether two curves are proven farther apart than a clearance, or proven not to be; else OPEN."""
+    """FARTHER if two curves are proven farther apart than a clearance, NEARER if proven not to be, else OPEN."""
     head_a, head_b = capsule_head_at(a, 0), capsule_head_at(b, 0)
     shift = difference(head_b.origin, head_a.origin, (0.0, 0.0, 0.0))
     slack = 16.0 * UNIT * (head_a.extent + head_b.extent + length(shift)) + 1e-150

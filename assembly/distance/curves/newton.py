@@ -66,7 +66,6 @@ def newton_step(gx, gy, p, q, r, x, y):
     most = abs(middle) + spread
     least = middle - spread
     if least < 1e-10 * most:
-        # Downhill along the gradient's own curvature where that is known, else as if the curvature were the largest.
         p += 1e-3 * most - least
         r += 1e-3 * most - least
     det = p * r - q * q

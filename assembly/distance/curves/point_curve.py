@@ -6,9 +6,9 @@ On a span, with Y(x) = X(x) - w(x) p in Bernstein form of degree n,
 
 so that min q_k / v_k <= |C - p|^2 <= the value at any x. |X|^2, w X and w^2 are tables of the curve: a point costs
 q_k = (|X|^2)_k - 2 p.(w X)_k + |p|^2 v_k. Newton's method finds a local minimum x*; where q - |D|^2 v, D = C(x*) - p,
-is proven convex, it is the only one. Elsewhere the interval is cut there: q - |D|^2 v has a double root at x*, so that
-on both sides the coefficients near x* are as large as its value, and the others soon are. The form and its rounding
-errors are in `distance/curves/squared_distance.py`.
+is proven convex, it is the only one. Elsewhere the interval is cut at x*: q - |D|^2 v has a double root there, so that
+on both sides the two q_k / v_k next to x* are |D|^2, and after a few more cuts no other one is less. The form and its
+rounding errors are in `distance/curves/squared_distance.py`.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def span_distance(query, span, upper, let_go, bounded):
             let_go = min(let_go, least)
             o -= stride
             continue
-        # From the least coefficient; at an end the cut is in the middle, where its own minimum is not.
+        # Newton's method starts where the least coefficient is; if it ends near an end, the cut is in the middle.
         point = seen_at(query, span, low + (high - low) * k / (m - 1.0))
         # Bounds alone may answer a question about a clearance.
         early = query.clearance >= 0.0 and looks < _EARLY and length(point.place) > 8.0 * query.clearance

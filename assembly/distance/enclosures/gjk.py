@@ -161,7 +161,7 @@ def nearest_on_simplex(g, count, full):
         for j in range(i):
             e = sub(vertex(g, j), p)
             if full == 3:
-                # In the plane only whether the origin is inside matters: three turns of one sense.
+                # In the plane a triangle counts only if the origin is inside: all barycentric coordinates are positive.
                 turn = d[0] * e[1] - d[1] * e[0]
                 left = d[1] * p[0] - d[0] * p[1]
                 right = e[0] * p[1] - e[1] * p[0]

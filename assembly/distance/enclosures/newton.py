@@ -1,4 +1,4 @@
-"""Newton's method on |a(s) - b(t)|^2 / 2 inside bounds of the parameters: for good upper bounds, proves nothing."""
+"""Newton's method on |a(s) - b(t)|^2 / 2 within bounds of s and t: it finds good upper bounds and proves nothing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from assembly.geometry.vec import blend, dot, sub
 
 _ROUNDS = 24
 PlaceQuery = namedtuple("PlaceQuery", "search place bounds_s bounds_t")
-# |r|^2, r = a - b, the derivatives of both, and the part of a' across the feature of a hull that carries b.
+# |r|^2, r = a - b, the derivatives of both, and the part of a' orthogonal to the feature of a hull that carries b.
 PlacePoints = namedtuple("PlacePoints", "merit r a1 a2 b1 b2 c1")
 
 
@@ -80,7 +80,7 @@ def hull_point(full, points, count, x, g):
 
 @kernel(inline=True)
 def across(v, kept, full, g):
-    """The part of v across the feature that carries a nearest point."""
+    """The part of v orthogonal to the feature (vertex, edge or face) that carries a nearest point."""
     if kept == 1:
         return v
     e = sub(on_b(g, 1), on_b(g, 0))

@@ -78,8 +78,8 @@ SEARCH_ROOM = record_dtype(
     state=STATE,  # a `SEARCH_STATE`
     values=18,  # of the first curve at a parameter: pairs of C, C', C''
     other_values=18,  # of the second
-    across=PIECE,  # a piece as seen across a feature of a hull
-    rows=9,  # three, orthonormal or zero, that span what is across the feature
+    across=PIECE,  # a piece projected on the orthogonal complement of a hull's feature
+    rows=9,  # three, orthonormal or zero, that span this complement
 )
 search_room_at = record_view(SEARCH_ROOM)
 VALUES = place_of(SEARCH_ROOM, "values")

@@ -136,7 +136,10 @@ def unit_across(e, n):
 
 @kernel(inner=True, exact=True)
 def feature_rows(full, points, feature, n):
-    """Rows n (nine numbers) across a feature: a vertex, an edge or a face of the hull, `feature` its vertices."""
+    """Rows n (nine numbers) that span the orthogonal complement of a feature: a vertex, an edge or a face of the hull.
+
+    `feature`: numbers of its vertices, -1 behind them. False where it is degenerate.
+    """
     for k in range(9):
         n[k] = 0.0
     if feature[1] < 0:
@@ -177,7 +180,7 @@ def turned(x, o, n, row, v):
 
 @kernel(inner=True, exact=True)
 def across_feature(xa, oa, points, count, feature, n, y):
-    """The piece as seen across a feature of the hull, to the record y; returns a certificate.
+    """Write the piece, projected on the complement of a hull's feature, to the record y; returns a certificate.
 
     For any x let r = N'N (x - v), v of the feature. With r / |r| as the direction the distance of x to the hull is at
     least |N (x - v)| less the largest (r / |r|).(z - v) over its vertices z: this largest, over the piece, is what is
@@ -222,7 +225,7 @@ def across_feature(xa, oa, points, count, feature, n, y):
 
 @kernel(inner=True, exact=True)
 def turn_values(x, o, n, row, v, y, p):
-    """A row of values (nine pairs) as seen across a feature."""
+    """Project values (nine pairs) at x[o:] on a row of n, C relative to v, and write them to y[p:]."""
     none = (0.0, 0.0, 0.0)
     y[p + 2 * row], y[p + 2 * row + 1] = turned(x, o, n, row, v)
     y[p + 6 + 2 * row], y[p + 7 + 2 * row] = turned(x, o + 6, n, row, none)

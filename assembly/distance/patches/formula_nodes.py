@@ -184,7 +184,7 @@ def describe_formula(curve, short, nodes, o, x):
             e1 = NONE
     node.speed_u = bounded(speed)
     node.speed_v = dot
-    # Products of h and the sums with rows are rounded, too.
+    # Magnitudes whose parts bound the rounding of products with h and of the sums in the rows.
     size = 0.0
     begin = weighted_point_at(nodes, o + ROWS)
     inner = weighted_point_at(nodes, o + ROWS + WEIGHTED)
