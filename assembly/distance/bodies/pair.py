@@ -1,22 +1,23 @@
 """Lower bounds of the distance of two nodes of posed bodies.
 
 D(z) = a - b with z = (u_a, v_a, u_b, v_b), each in [-1/2, 1/2] on the pair. For a unit vector n let P be the projection
-along n. The bound of everything here, for any n and any tension t >= 0:
+along n. Every bound here follows from one statement, for any n and any tension t >= 0 [1/length]:
 
     if  Phi(z) = n.D + t |P D|^2 >= m  on the pair,  then  |D| >= min(m, 1 / (2 t)).
 
 Proof: let p = |P D|^2 and 0 <= m <= 1 / (2 t). Either n.D >= m - t p >= 0, so that
 |D|^2 >= (m - t p)^2 + p >= m^2 + p (1 - 2 m t) >= m^2; or t p > m, so that |D|^2 >= p > m / t >= 2 m^2.
 
-With t = 0 this is the slab between two planes; with t = 1 / (2 |D|) it curves like the distance itself. Unlike the
-square of the distance its curvature in the surfaces' common directions does not fade with the gap.
+With t = 0, m is the width of the slab between two planes; with t = 1 / (2 |D|), Phi curves like the distance itself.
+Unlike that of the squared distance, its curvature in the surfaces' common tangent directions does not vanish with the
+gap.
 
-All is written in a frame whose third axis is n. With the models of both nodes,
-D = d + sum J_i z_i + sum K_ij z_i z_j / 2 + e with |e| <= E0, and Phi is at least a quadratic less
+All vectors are in a frame whose third axis is n. With the models of both nodes,
+D = d + sum J_i z_i + sum K_ij z_i z_j / 2 + e with |e| <= E0, and Phi is at least its quadratic part in z minus
 
     E0 + t (sum_ijk |PJ_i.PK_jk| / 8 + 2 E0 max |P (D - e)|).
 
-Roundings are counted from above, and each bound is lessened by at least twice of them.
+Each bound is lowered by at least twice an upper bound of its rounding errors.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ from assembly.distance.bodies.nodes import links_of, net_size, node_of, patch_of
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import dot, matvec, matvec_t
 
-# b seen from a, both about their own centers: a point x of b is at turn x + shift. rounding: of the shift.
+# Pose of b relative to a, each about its own center: a point x of b lies at turn x + shift. rounding: error of the
+# shift [length].
 BodyPose = namedtuple("BodyPose", "turn shift rounding")
 # The models of two nodes in the frame of a direction, and the quadratic below Phi. One of degree 0 has no J and K.
 PAIR_WORK = record_dtype(
@@ -46,13 +48,14 @@ PAIR_WORK = record_dtype(
     z=4,  # where the quadratic is least on the pair
     row=4,  # half the sum of a row of |PK|
     change=16,  # how much the Hessian may change on the pair
-    held=4,  # -1 and 1: least at the low or the high end, whatever the others are
+    held=4,  # -1 or 1: Phi is least at the low or the high end of this parameter, whatever the others are
     alone=2,  # 1: the node of a, of b is a curve, and has no second parameter
     margin=1,  # the part of the diagonal of the Hessian that a proof of one minimum leaves
 )
-# A tension, the value of the quadratic with it, and whether that is convex.
+# A tension, the value of its quadratic at the middles, and whether that quadratic is convex.
 Tense = namedtuple("Tense", "tension value convex")
-# The tension is at most these parts of the curvatures of the surfaces.
+# The tension is at most these multiples of the largest curvature of the surfaces; the second where the first does not
+# make the quadratic convex.
 STIFFNESS, STIFFER = 4.0, 64.0
 pair_work_at = record_view(PAIR_WORK)
 PAIR_DOUBLES = size_of(PAIR_WORK)
@@ -95,7 +98,7 @@ def hull_bound(pair, a, i, b, j, pose, slack):
 
 @kernel(inline=True)
 def load_frame(pair, turn, n):
-    """A frame whose third axis is a unit vector (Duff et al. 2017), and as b's vectors need it."""
+    """Load a frame whose third axis is the unit vector n (Duff et al. 2017), and -frame turn for the vectors of b."""
     sign = math.copysign(1.0, n[2])
     x = -1.0 / (sign + n[2])
     y = n[0] * n[1] * x
@@ -111,7 +114,7 @@ def load_frame(pair, turn, n):
 
 @kernel(inline=True)
 def load_rows(matrix, source, target, count, at):
-    """Vectors of a node turned by a matrix, to rows from `at`."""
+    """Write a node's vectors, multiplied by a matrix, to the rows of `target` from `at`."""
     for i in range(count):
         x, y, z = source[3 * i], source[3 * i + 1], source[3 * i + 2]
         for r in range(3):
@@ -159,7 +162,7 @@ def bend_part(pair, o, tension):
 def load_quadratic(pair, tension):
     """Value, gradient and Hessian of the quadratic of Phi at the middles; the value.
 
-    Of a curve's second parameter nothing depends: the Hessian has a one there, which holds it where it is.
+    Nothing depends on the second parameter of a curve: a one on the Hessian's diagonal keeps that parameter in place.
     """
     d, j, h = pair.d, pair.j, pair.hessian
     twice = 2.0 * tension
@@ -204,7 +207,7 @@ def is_definite(pair):
 
 @kernel(inline=True)
 def tension_at_most(pair, upper, stiffness):
-    """1 / (2 U), which curves Phi like the distance itself, or a multiple of the surfaces' own curvatures if less."""
+    """The smaller of 1 / (2 U), with which Phi curves like the distance, and a multiple of the surfaces' curvature."""
     most = 0.0
     k = pair.k
     for side in range(2):
@@ -220,8 +223,8 @@ def tension_at_most(pair, upper, stiffness):
 def load_tense(pair, upper):
     """Load the quadratic with a tension that outweighs the curvatures; more of it where that makes it convex.
 
-    A surface that lies in another one of nearly its own curvature needs as many times the curvature as this is larger
-    than the difference.
+    Where a surface lies in another one of nearly the same curvature k, and their curvatures differ by dk, the tension
+    has to be about k / dk times k.
     """
     tension = tension_at_most(pair, upper, STIFFNESS)
     value = load_quadratic(pair, tension)
@@ -239,7 +242,7 @@ def load_tense(pair, upper):
 
 @kernel(inline=True)
 def sweep(pair, raised):
-    """From z towards the least of g.z + z'(H + raised) z / 2 on the box, one variable after the other."""
+    """Coordinate descent from z on g.z + z'(H + raised) z / 2 over the box."""
     h, g, z = pair.hessian, pair.gradient, pair.z
     i0 = 1.0 / max(h[0] + raised, 1e-300)
     i1 = 1.0 / max(h[5] + raised, 1e-300)
@@ -259,7 +262,10 @@ def sweep(pair, raised):
 
 @kernel(inline=True)
 def indefinite_part(pair, tension):
-    """The largest row sum of what is in the Hessian beside 2 t PJ_i.PJ_j: without it no direction is negative."""
+    """The largest absolute row sum of the Hessian without its positive semidefinite part 2 t PJ_i.PJ_j.
+
+    Added to the diagonal it makes the Hessian positive semidefinite.
+    """
     worst = 0.0
     for side in range(2):
         o = 3 * side
@@ -270,10 +276,10 @@ def indefinite_part(pair, tension):
 
 @kernel(inline=True)
 def least_of_quadratic(pair, tense):
-    """A lower bound of the quadratic on the box, near its least value; `pair.z` is near the place.
+    """A lower bound of the quadratic on the box, near its least value; `pair.z` is left near the minimizer.
 
     Where H is not positive definite, a raise s that makes it so is added to its diagonal and s |z|^2 / 2 subtracted
-    again. A convex function is nowhere below its tangent plane, so that of any place will do.
+    again. A convex function is nowhere below a tangent plane, so the tangent plane at any z gives a bound.
     """
     h, g, z = pair.hessian, pair.gradient, pair.z
     raised = 0.0 if tense.convex else indefinite_part(pair, tense.tension)

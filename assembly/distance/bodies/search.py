@@ -1,8 +1,8 @@
 """Certified distance of two posed bodies: best-first branch and bound over pairs of nodes of their trees.
 
-U is the distance of the nearest points known; a pair is let go once its bound is within the tolerance of U, or its only
-minimum is known. The least bound of all pairs that wait and that were let go is a lower bound at any time, so that a
-search may end whenever its caller likes. Halves that it makes stay with the bodies.
+U is the distance of the nearest points known; a pair is let go (pruned) once its bound is within the tolerance of U, or
+once its only minimum is known. The least bound of all pairs, waiting or let go, is a lower bound of the distance at any
+time, so the caller may stop a search at any time. The halves of nodes that a search makes are kept with the bodies.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import add, matvec, sub
 from assembly.kinematics.motion import relative_pose, rotation
 
-# Halvings after which a node is let go.
+# A node of this many halvings is not halved again.
 DEEPEST = 50
 _START_DEPTH = 3
-# Pairs taken from the heap before the first descent from one; the next ones come after more and more.
+# Pairs taken from the heap before the first descent from one; the intervals between later descents grow.
 _FIRST_DESCENT = 16.0
-# A group is split before a part of a patch that is not so many times as long.
+# A group is halved before a part of a patch that is less than this many times as long.
 _GROUP_WEIGHT = 2.0
 
 
 @kernel(inline=True)
 def errors_of(a, b, pose, question):
-    """Sums of coordinates, evaluated points and derivatives: parts of the sizes, by the degrees."""
+    """Rounding errors of coordinate sums, evaluated points and derivatives, from the bodies' sizes and degrees."""
     head_a, head_b = body_head_at(a.pool, 0), body_head_at(b.pool, 0)
     slack = 64.0 * UNIT * (head_a.reach + head_b.reach + norm(pose.shift)) + pose.rounding + 1e-150
     point = slack
@@ -59,7 +59,7 @@ def errors_of(a, b, pose, question):
         m * (4.0 * m + 12.0) * head_a.reach * head_a.weight_ratio**2,
         n * (4.0 * n + 12.0) * head_b.reach * head_b.weight_ratio**2,
     )
-    # What halving costs, and the least doubt of a model: bounds come no nearer to each other than that.
+    # Rounding of halving and of the models: the bounds of a pair come no closer to each other than this.
     rough = 120.0 * (head_a.degree + 2.0) * UNIT * head_a.reach + 120.0 * (head_b.degree + 2.0) * UNIT * head_b.reach
     step = max(0.999 * question.tolerance, 4.0 * (point + head_a.error + head_b.error) + rough)
     return BodyErrors(slack, point, 8.0 * UNIT * slope, step)
@@ -83,7 +83,7 @@ def pair_bound(search, i, j):
         else:
             bound = bound_patches(search, i, j, bound)
     tie = packed_way((state.key_way[0], state.key_way[1], state.key_way[2]))
-    # The other pairs of the same two nodes begin as this one did.
+    # The next halves of the same pair start from the same bound and direction as these.
     state.key = key
     state.key_way[0], state.key_way[1], state.key_way[2] = way
     return bound, tie
@@ -91,7 +91,7 @@ def pair_bound(search, i, j):
 
 @kernel(inline=True)
 def search_ended(search, top, left):
-    """What the search ends with; -1: not yet. The direction of the pair that is next is taken from its tie."""
+    """The status with which the search ends; -1: it goes on, and the next pair's direction is unpacked from its tie."""
     state = body_search_at(search.state, 0)
     state.lower = max(min(top, state.upper), 0.0)
     status = ended(search.question, state.upper, search.errors.step, max(top, 0.0), left, state.pairs)
@@ -108,7 +108,7 @@ def search_ended(search, top, left):
 
 @kernel(inline=True)
 def size_to_split(tree, k):
-    """How long a node counts: a group has a ball alone, and others are not cut down to its size for that."""
+    """Size by which the node to halve is chosen: a group, bounded by its ball alone, counts more than a patch."""
     return node_size(tree, k) * (_GROUP_WEIGHT if is_group(tree, k) else 1.0)
 
 
@@ -118,7 +118,7 @@ def branch(search, key, i, j):
     a, b, state = search.a, search.b, body_search_at(search.state, 0)
     state.popped += 1.0
     if state.popped >= state.next_descent and not (is_group(a, i) or is_group(b, j)):
-        # Bounds wait for a nearer pair of points: look where they are least.
+        # A smaller U prunes more pairs: descend from the pair of the least bound.
         state.next_descent += _FIRST_DESCENT + state.popped / 16.0
         x = patch_work_at(search.w, 0).place
         x[0] = x[1] = x[2] = x[3] = 0.5
@@ -152,7 +152,7 @@ def middles_apart(search, i, j):
 
 @kernel(inner=True)
 def start_from_nearest_middles(search):
-    """Down both trees to the halves whose middles are nearest, then down the slope."""
+    """Descend both trees to the halves whose middles are nearest, then minimize the distance from these."""
     a, b = search.a, search.b
     i = j = 0
     while True:
@@ -176,7 +176,7 @@ def start_from_nearest_middles(search):
 
 @kernel(inner=True)
 def start_from_corners(search):
-    """Points of patches all of which are of the faces: there are some, for the boundary of a trimmed face is."""
+    """Descend from corners of untrimmed patches; there are some, as boundary curves of trimmed faces are patches."""
     state, x = body_search_at(search.state, 0), patch_work_at(search.w, 0).place
     for i in range(int(body_head_at(search.a.pool, 0).patches)):
         for j in range(int(body_head_at(search.b.pool, 0).patches)):
@@ -189,7 +189,7 @@ def start_from_corners(search):
 
 @kernel(inline=True)
 def relative_pose_of(a, b, q):
-    """b seen from a, both about their centers, from two poses."""
+    """The pose of b relative to a, each about its own center, from the poses of both."""
     turn_a = rotation(q, 0)
     relative = relative_pose(q, 0, turn_a, 1, rotation(q, 1))
     center_a, center_b = body_head_at(a.pool, 0).center, body_head_at(b.pool, 0).center
@@ -200,7 +200,7 @@ def relative_pose_of(a, b, q):
 
 @kernel(inner=True)
 def start(search):
-    """First points of both bodies, and all that is kept of a search."""
+    """Reset the state of the search, and find first points of both bodies."""
     state = body_search_at(search.state, 0)
     state.upper = state.limit = state.let_go = math.inf
     state.lower = state.pairs = state.popped = state.descents = state.key = 0.0
@@ -220,8 +220,8 @@ _TREE = "Tuple((i8[::1], f8[::1], i8[::1], f8[::1], f8[::1]))"
 def search_bodies(a, b, q, asked, heap, work, left):
     """Bounds of the distance of two bodies at poses q (2, 7) into BODY_SEARCH; a status, and how many pairs wait.
 
-    `asked`: a BodyQuestion; `work`: state, pair, w and room; `left`: how many pairs wait, where a search goes on;
-    below zero where it starts.
+    `asked`: a BodyQuestion; `work`: the arrays state, pair, w and room of a BodySearch; `left`: how many pairs wait
+    when an earlier search is continued, below zero for a new one.
     """
     tree_a, tree_b = BodyTree(*a), BodyTree(*b)
     pose = relative_pose_of(tree_a, tree_b, q)

@@ -2,11 +2,10 @@
 
 Patches of spheres, cylinders, tori and planes, and lines and circles among boundary curves, lie on surfaces whose
 distance has a closed form where they share a center or an axis, or their axes are parallel. There the nearest points
-are not single ones, and bounds of parts of the patches come to no end; that of the whole surfaces is the distance
-itself.
+are not isolated, and halving the patches would never end; the bound of the whole surfaces is the distance itself.
 
-Where axes are not parallel, or do not coincide where they should, the second surface is turned about its center and
-moved until they are or do; a point of it within h of the center moves by at most 1.5 h s, with s the sine of the angle.
+Where axes are not parallel, the second surface is turned about its center until they are, and where they have to
+coincide it is then moved. Turning moves a point within h of the center by at most 1.5 h s, s the sine of the angle.
 """
 
 from __future__ import annotations
@@ -19,11 +18,12 @@ from assembly.distance.bodies.records import spine_at
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import add, cross, dot, matvec, sub
 
-# Kinds, in the order in which a pair of them is looked at.
+# Kinds; of a pair of surfaces, the one of the lower kind comes first.
 SPHERE, CYLINDER, TORUS, PLANE = 1.0, 2.0, 3.0, 4.0
 # An elementary surface, seen from a; see records.SPINE.
 Spine = namedtuple("Spine", "kind center axis radius major half")
-# Where a second one is against a first: along its axis, across it, and how far its points may be off.
+# The center of a second surface relative to the first one's, along and across the first one's axis, and how far turning
+# the second one moves its points [length].
 Coaxial = namedtuple("Coaxial", "along beside off")
 
 
@@ -93,13 +93,13 @@ def of_plane(s, plane):
 
 @kernel(inline=True)
 def of_planes(s, t):
-    """Two planes, of the second one what is within its half of the center."""
+    """Two planes; of the second one, only points within `half` of its center count."""
     return abs(dot(s.axis, sub(t.center, s.center))) - t.half * norm(cross(s.axis, t.axis))
 
 
 @kernel(inline=True)
 def turned_parallel(s, t):
-    """Where t is against s once it is turned about its center until their axes are parallel."""
+    """The center of t relative to s, and how far points of t move as it is turned until the axes are parallel."""
     along, beside = offset_from(s, t.center)
     size = math.hypot(t.half + t.radius, t.major)
     return Coaxial(along, beside, 1.5 * size * norm(cross(s.axis, t.axis)))

@@ -1,16 +1,17 @@
 """Trimmed faces: which part of a face a node is in, and where the boundary need not be considered.
 
-The boundary is cut into pieces that run one way in u and in v (`geometry/faces/trim_pieces.py`), so that a box of
-parameters is met by a piece where the part of it beside the box is. A box that no piece meets is inside or outside as a
-whole.
+The boundary is cut into pieces that are monotone in u and in v (`geometry/faces/trim_pieces.py`). Whether a piece meets
+a box of parameters follows from two of its points: the ends of its part within the box's range of one parameter. A box
+that no piece meets is inside or outside as a whole.
 
 The nearest points of a trimmed face are inside it, where the distance has no slope along the face, or on its boundary,
 whose curves are patches of the body as well. So a part of the face through which the boundary passes is let go where
-the distance falls everywhere on it, along u or v, towards a side that is within the patch: where the face ends before,
-the boundary's curve is nearer.
+the distance falls everywhere on it, along u or v, towards a side that is within the patch: where the face ends before
+that side, its boundary curve is nearer.
 
-On a flat face the way between nearest points inside it is along the normal. Parts of it are let go with all parts of
-the other body that are beside them, seen along the normal, whether the boundary passes through them or not.
+On a flat face the segment from a nearest point inside it to the other body is along the normal. So a pair of a part of
+the face and a part of the other body is let go where, seen along the normal, the two do not overlap, whether the
+boundary passes through the part or not.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ from assembly.geometry.faces.trim_pieces import links_of as piece_links
 from assembly.geometry.splines.bezier_pieces import UNIT
 from assembly.geometry.vec import add, dot, matvec, matvec_t, neg, scale, sub
 
-# The boundary is known to some multiple of what is on it.
+# A box counts as met by the boundary within this multiple of the distance `on` of its trim.
 _GRAIN = 4.0
 
 
 @kernel(inline=True)
 def _along(bounds, major, low, high, grain):
-    """The part of a piece beside the box along its major axis: its ends there; none if low > high."""
+    """The ends, along its major axis, of a piece's part within the box's range; none if the first is larger."""
     return max(low[major] - grain, bounds.box[2 * major]), min(high[major] + grain, bounds.box[2 * major + 1])
 
 
@@ -124,7 +125,8 @@ def space_dot(x, i, y, k):
 def falls_to_side(pair, a, i, b, j, of_a, slack):
     """Whether |D| falls everywhere on a pair along u or v of one node towards a side of it within its patch.
 
-    D.J_m is off its value at the middles by at most sum_l |J_l.J_m| / 2 + far (k_m + E1) + (sum |K| / 8 + E0) |J_m|.
+    D.J_m differs from its value at the middles by at most
+    sum_l |J_l.J_m| / 2 + far (k_m + E1) + (sum |K| / 8 + E0) |J_m|.
     """
     d, jacobian, k = pair.d, pair.j, pair.k
     own = node_of(a, i) if of_a else node_of(b, j)
@@ -154,7 +156,7 @@ def falls_to_side(pair, a, i, b, j, of_a, slack):
 
 @kernel(inner=True)
 def nearest_is_elsewhere(pair, a, i, b, j, slack):
-    """Whether trims prove that the nearest points are not on a pair. Its models are loaded and fully described."""
+    """Whether trims prove that the nearest points are not on a pair of described nodes; needs `load_models`."""
     if place_node(a, i) == CUT and falls_to_side(pair, a, i, b, j, True, slack):
         return True
     return place_node(b, j) == CUT and falls_to_side(pair, a, i, b, j, False, slack)
@@ -183,11 +185,12 @@ def is_flat_inside(tree, k):
 def is_beside(flat, i, tree, j, place, slack):
     """Whether no point of node j is straight over a point of the flat node i: then none is nearest to its inside.
 
-    With S = P + u e1 + v e2 and w = alpha e1 + beta e2 of the middles' difference D, the way D* between nearest points
-    has D*.Su = D*.Sv = 0 inside the face, so that D*.w = 0. Su and Sv are off e1 and e2 by at most the twist of the
-    net, which is no parallelogram to the last digit, and twice what its points may be off.
+    With S = P + u e1 + v e2, let w = alpha e1 + beta e2 be the projection of the middles' difference D on the face's
+    plane. The difference D* of nearest points has D*.Su = D*.Sv = 0 inside the face, so that D*.w = 0. Su and Sv differ
+    from e1 and e2 by at most the twist of the net, which is a parallelogram only up to rounding, and twice the error of
+    its points.
 
-    `place`: turn and shift of the other node's body, seen from the flat one's.
+    `place`: turn and shift of the other node's body relative to the flat one's.
     """
     turn, shift = place
     links, node, other = links_of(flat, i), node_of(flat, i), node_of(tree, j)

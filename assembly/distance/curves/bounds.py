@@ -6,9 +6,9 @@ With D = a - b and the quadratic models of `distance/curves/nodes.py`, d and e i
     Q = |D0|^2 + 2 D0.(A1 d - B1 e) + (|A1|^2 + D0.A2) d^2 - 2 A1.B1 d e + (|B1|^2 - D0.B2) e^2,
     R = (|A1.A2| + |A1.B2| + |B1.A2| + |B1.B2|) / 8:
 
-|D0 + A1 d - B1 e + (A2 d^2 - B2 e^2) / 2|^2 is Q, a cubic that R bounds, and a square. The minimum of Q on the square
-is found among the inner one and those of the edges, and bounded by the tangent plane there. For any unit n, control
-points give |D| >= min n.P_a - max n.P_b.
+|D0 + A1 d - B1 e + (A2 d^2 - B2 e^2) / 2|^2 is the sum of Q, cubic terms of size at most R, and a square. The minimizer
+of Q on the square of (d, e) is its stationary point or lies on an edge; the tangent plane there gives the bound. For
+any unit n, control points give |D| >= min n.P_a - max n.P_b.
 
 F = |D|^2 / 2 has F_ss = |a'|^2 + D.a'', F_tt = |b'|^2 - D.b'', F_st = -a'.b'. Where their bounds over the box give
 F_ss F_tt > F_st^2, the Hessian is at least diag(lambda_a, lambda_b) with lambda = F_ii (1 - |F_st| / sqrt(F_ss F_tt)).
@@ -85,14 +85,14 @@ def boundary_minimum(c, g, h, p, q, r):
 
 @kernel(inline=True)
 def square_minimum(c, g, h, p, q, r):
-    """The same on all of the square: a value not above the least one but for rounding, and where it nearly is.
+    """As `boundary_minimum`, on all of the square: a value that exceeds the least one by rounding at most, and a place.
 
-    Along parallel lines the determinant is rounding, and the place that it gives is anywhere. A convex form is nowhere
-    below its tangent plane, so that of the place that was found is the bound.
+    For parallel lines the determinant is nothing but rounding, and the minimizer computed with it may be anywhere. A
+    convex form is nowhere below a tangent plane, so the tangent plane at the point found gives the bound.
     """
     if not (p > 0.0 and r > 0.0):
         return boundary_minimum(c, g, h, p, q, r)
-    # Products of the form's own numbers may leave the range of doubles.
+    # Without scaling, products of the coefficients may overflow or underflow.
     scale = 1.0 / max(p, r)
     sp = scale * p
     sq = scale * q
@@ -183,7 +183,7 @@ def hull_bound(a, b, shift, slack, x, y):
 def convexity(a, b, flat, shift):
     """Least curvatures (lambda_a, lambda_b) of F over the box of two nodes; zeros where it is not proven convex.
 
-    The second is of a point if it is `flat`.
+    `flat`: the second node is a point.
     """
     d0 = difference(a.a0, b.a0, shift)
     a1, a2 = three(a.a1, 0), three(a.a2, 0)
@@ -228,7 +228,7 @@ def convexity(a, b, flat, shift):
 
 @kernel(inline=True)
 def least_change(slope, error, curvature, back, ahead):
-    """Least g d + curvature d^2 / 2 for -back <= d <= ahead and any slope g within the error."""
+    """Least g d + curvature d^2 / 2 for -back <= d <= ahead and any g within `error` of `slope`."""
     least = 0.0
     g = slope - error
     if g < 0.0:

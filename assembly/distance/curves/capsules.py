@@ -1,10 +1,9 @@
-"""A curve's tree of capsules, for questions whose answer is far from the border.
+"""A curve's tree of capsules, which answers questions about a clearance that are not close calls.
 
-A node holds a part of the curve in the ball of radius r swept along a segment: r is the largest distance of a control
-point from it, and that distance is convex. A leaf is a
-Bezier piece that begins and ends where its segment does, so that the points of the segment nearest to the curve's are
-all of it: each has a point of the curve within r. For two
-leaves with segments |m| apart,
+A node encloses a part of the curve in a capsule: a segment, and all within r of it. r is the largest distance of a
+control point from the segment; as this distance is convex, no point of the part is farther. A leaf is a Bezier piece
+that begins and ends where its segment does, so that the projections of its points cover the segment: each point of the
+segment has a point of the curve within r. For two leaves with segments |m| apart,
 
     |m| - r_a - r_b <= distance <= |m| + r_a + r_b.
 
@@ -33,7 +32,7 @@ CAPSULE = record_dtype(
     "f8",
     position=3,  # the segment's middle [length]
     extent=3,  # from its first end to its last [length]
-    radius=1,  # below zero of a node of nothing [length]
+    radius=1,  # below zero: an empty node [length]
     spare=1,
 )
 capsule_at = record_view(CAPSULE)
@@ -82,7 +81,7 @@ def capsule_tree(record, pool):
             rows[base + j] = pool[source + j]
         count = 1
         while count < parts:
-            # From the last one, each into two places.
+            # From the last piece to the first, so that none is overwritten before it is halved.
             for k in range(count - 1, -1, -1):
                 _halve(rows, base + k * size, base + 2 * k * size, n)
             count *= 2
@@ -96,7 +95,7 @@ def capsule_tree(record, pool):
     head.extent = packed.reach
     for j in range(3):
         head.origin[j] = packed.center[j]
-    # Halvings (see `distance/curves/nodes.py`), the quotient, and the sums of a radius.
+    # Rounding of the halvings (see `distance/curves/nodes.py`), of the division by the weight, and of the radius.
     away = packed.error + (4.0 * n * halvings + 128.0) * UNIT * packed.reach
     low = slots
     width = 1
@@ -112,7 +111,7 @@ def capsule_tree(record, pool):
 
 @kernel(inner=True, exact=True)
 def _halve(rows, o, a, n):
-    """The piece at o as two at a: the right half in place, moved, and the left half of first points."""
+    """Halve the piece at o by de Casteljau's algorithm: the left half to a, the right half behind it."""
     size = 4 * (n + 1)
     b = a + size
     if b != o:
@@ -152,9 +151,10 @@ def _enclose(rows, first, last, tree, o, away):
 
 @kernel(inline=True, exact=True)
 def _segments(a, o, b, p, shift):
-    """Bounds of the distance of two segments: that of two points of them is the upper one.
+    """Bounds of the distance of two segments; the upper one is the distance of two of their points.
 
-    The lower one is a multiple of u of all that was summed below the least square (see `distance/curves/bounds.py`).
+    The square of the lower one is the least square found, minus a multiple of u of the magnitudes that were summed (see
+    `distance/curves/bounds.py`).
     """
     capsule = capsule_at(a, o)
     capsule_record = capsule_at(b, p)
@@ -183,7 +183,7 @@ def _extent(tree, o):
 
 @kernel(signatures="(f8[::1], f8[::1], f8)", allocates=True, exact=True)
 def compare_curves(a, b, clearance):
-    """Whether two curves are proven farther apart than a clearance, or proven not to be; else OPEN."""
+    """FARTHER if two curves are proven farther apart than a clearance, NEARER if proven not to be, else OPEN."""
     head_a, head_b = capsule_head_at(a, 0), capsule_head_at(b, 0)
     shift = difference(head_b.origin, head_a.origin, (0.0, 0.0, 0.0))
     slack = 16.0 * UNIT * (head_a.extent + head_b.extent + length(shift)) + 1e-150
@@ -218,7 +218,7 @@ def compare_curves(a, b, clearance):
 
 @kernel(signatures="(f8[::1], f8, f8, f8, f8)", allocates=True, exact=True)
 def compare_point(tree, x, y, z, clearance):
-    """The same of a curve and a point."""
+    """As `compare_curves`, for a curve and a point."""
     head = capsule_head_at(tree, 0)
     p = (x - head.origin[0], y - head.origin[1], z - head.origin[2])
     slack = 16.0 * UNIT * (head.extent + length(p)) + 1e-150
@@ -235,7 +235,7 @@ def compare_point(tree, x, y, z, clearance):
         u = three(tree, o + EXTENT)
         square = dot(u, u)
         t = dot(d, u)
-        # The place on the segment is rounded, which moves the distance by its square; four roundings of each term.
+        # The rounding of t changes the distance to second order only; each other term has four roundings.
         t = min(max(t / square, -0.5), 0.5) if square > 1e-280 else 0.0
         e = (d[0] - t * u[0], d[1] - t * u[1], d[2] - t * u[2])
         far = length(e)

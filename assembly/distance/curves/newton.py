@@ -1,9 +1,9 @@
-"""Newton's method for the nearest points of two Bezier pieces, held in the unit square.
+"""Newton's method for the nearest points of two Bezier pieces, with the parameters kept in the unit square.
 
     F(x, y) = |a(x) - b(y)|^2 / 2,  F_x = D.a', F_y = -D.b', F_xx = |a'|^2 + D.a'', F_yy = |b'|^2 - D.b'', F_xy = -a'.b'
 
 Where the Hessian is not positive definite its diagonal is raised until it is; steps that do not make F smaller are
-shortened. Nothing here is part of a proof: what was found is bounded afterwards.
+shortened. Nothing here is part of a proof: the points found are bounded afterwards.
 """
 
 from __future__ import annotations
@@ -66,7 +66,6 @@ def newton_step(gx, gy, p, q, r, x, y):
     most = abs(middle) + spread
     least = middle - spread
     if least < 1e-10 * most:
-        # Downhill along the gradient's own curvature where that is known, else as if the curvature were the largest.
         p += 1e-3 * most - least
         r += 1e-3 * most - least
     det = p * r - q * q

@@ -33,7 +33,7 @@ from assembly.geometry.splines.bezier_pieces import (
     bezier_head_at,
 )
 
-# A piece of a curve, its doubles. Behind them stand rows of (w x, w y, w z, w), then positions where weights differ.
+# The doubles of a piece of a curve. Rows of (w x, w y, w z, w) follow, then positions where weights differ.
 CURVE_NODE = record_dtype(
     "f8",
     box_center=3,  # [length]
@@ -45,7 +45,7 @@ CURVE_NODE = record_dtype(
     e1=1,
     e2=1,
     speed=1,  # the largest |C'| [length]
-    away=1,  # how far the piece may be from what it stands for [length]
+    away=1,  # how far the piece may be from the given curve's [length]
     begin=1,  # its interval on the span
     end=1,
 )
@@ -53,7 +53,7 @@ curve_node_at = record_view(CURVE_NODE)
 A1 = place_of(CURVE_NODE, "a1")
 AWAY = place_of(CURVE_NODE, "away")
 ROWS = size_of(CURVE_NODE)
-# The same piece, its integers.
+# The integers of the same piece.
 CURVE_NODE_LINKS = record_dtype(
     "i8",
     left=1,  # its halves; -1: not made yet
@@ -122,7 +122,7 @@ def start_nodes(tree):
 
 @kernel(inner=True, exact=True)
 def fill_spans(tree, k, first, last, tree_node):
-    """Node k for the spans [first, last); that of a single one is not described yet."""
+    """Fill node k for the spans [first, last); for a single span, `describe` has to follow."""
     curve = bezier_curve_at(tree.record, 0)
     nodes, pool = tree.nodes, tree.pool
     i = links_of(tree, k)
@@ -185,7 +185,7 @@ def halve(tree, k, left):
         c.last = i.last
         c.depth = i.depth + 1
         c.tree_node = i.tree_node
-    # de Casteljau at 1/2: the right half in place, the left half of first points.
+    # de Casteljau at 1/2: the rows of the copy become the right half, the first row of each step one of the left half.
     stride = node_stride(tree.record)
     rows, rows_a = stride * k + ROWS, stride * left + ROWS
     rows_b = rows_a + stride

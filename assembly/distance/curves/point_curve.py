@@ -6,9 +6,9 @@ On a span, with Y(x) = X(x) - w(x) p in Bernstein form of degree n,
 
 so that min q_k / v_k <= |C - p|^2 <= the value at any x. |X|^2, w X and w^2 are tables of the curve: a point costs
 q_k = (|X|^2)_k - 2 p.(w X)_k + |p|^2 v_k. Newton's method finds a local minimum x*; where q - |D|^2 v, D = C(x*) - p,
-is proven convex, it is the only one. Elsewhere the interval is cut there: q - |D|^2 v has a double root at x*, so that
-on both sides the coefficients near x* are as large as its value, and the others soon are. The form is in
-`distance/curves/squared_distance.py`, with its rounding.
+is proven convex, it is the only one. Elsewhere the interval is cut at x*: q - |D|^2 v has a double root there, so that
+on both sides the two q_k / v_k next to x* are |D|^2, and after a few more cuts no other one is less. The form and its
+rounding errors are in `distance/curves/squared_distance.py`.
 """
 
 from __future__ import annotations
@@ -46,16 +46,16 @@ from assembly.geometry.splines.evaluate import xyz
 from assembly.geometry.vec import sub
 
 _DEEPEST = 40
-# Intervals of a span before it is left to `curve_distance`: beside a point where the curve hardly moves, squares lose
-# too many digits.
+# Intervals of a span that are tried before the query is left to `curve_distance`: near a parameter at which the curve
+# hardly moves, squares lose too many digits.
 _PATIENCE = 64
 _EARLY = 6
 # Status of such a query, beside those of `distance/piece_search.py`.
 UNFINISHED = 6
 _NEAR_END = 1e-3
-# What is asked of a point and a curve. p: the point about the curve's center; reach: no point of the curve is farther
-# from it; error, away: how far an evaluated point, and the packed curve, may be off; step: bounds within this of each
-# other are one; work: intervals of a span.
+# A query of a point and a curve. p: the point about the curve's center; reach: no point of the curve is farther from p;
+# error, away: how far an evaluated point, and the packed curve, may be off; step: bounds that differ by no more than
+# this count as equal; work: intervals of a span.
 PointQuery = namedtuple("PointQuery", "record pool p reach error away step clearance budget work")
 # The same on an interval of a span.
 SpanQuery = namedtuple("SpanQuery", "query span interval")
@@ -77,7 +77,7 @@ def curve_at(record, pool, span, x):
 
 @kernel(inline=True, exact=True)
 def seen_at(query, span, x):
-    """A point of a span as it is seen from the point of the question."""
+    """A point of a span relative to the query's point."""
     c = curve_at(query.record, query.pool, span, x)
     return SpanPoint(x, c.weight, sub(c.place, query.p), c.first, c.second, c.weight_rate)
 
@@ -99,7 +99,7 @@ def minimize(query, span, low, high, x):
 
 @kernel(inline=True)
 def limit_of(query, upper):
-    """Parts of at least this distance are let go."""
+    """Parts of the curve whose bound is at least this are let go (pruned)."""
     limit = upper - query.step
     return min(limit, query.clearance + 2.0 * query.away) if query.clearance >= 0.0 else limit
 
@@ -134,7 +134,7 @@ def span_distance(query, span, upper, let_go, bounded):
             let_go = min(let_go, least)
             o -= stride
             continue
-        # From the least coefficient; at an end the cut is in the middle, where its own minimum is not.
+        # Newton's method starts where the least coefficient is; if it ends near an end, the cut is in the middle.
         point = seen_at(query, span, low + (high - low) * k / (m - 1.0))
         # Bounds alone may answer a question about a clearance.
         early = query.clearance >= 0.0 and looks < _EARLY and length(point.place) > 8.0 * query.clearance
@@ -276,7 +276,7 @@ def point_distance(record, pool, point, asked, out):
     """Bounds of the distance of a point and a packed curve; a clearance below zero asks for the distance itself."""
     question = Question(*asked)
     if question.clearance >= 0.0:
-        # Apart at once, by the box around all.
+        # The box around the whole curve may already prove it apart.
         head = bezier_head_at(pool, 0)
         p = about_center(head, point)
         far = math.sqrt(box_square(record, pool, 0, p)) * (1.0 - 8.0 * UNIT)

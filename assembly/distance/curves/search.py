@@ -6,7 +6,7 @@ method and
 
     F(x) >= F(x*) + sum_i min over the box of (g_i d_i + lambda_i d_i^2 / 2)
 
-bounds it for good. Anything else is halved, the longer piece first. `docs/proximity.md` has the argument in words.
+is the final bound of the pair. Of other pairs the longer piece is halved. `docs/proximity.md` explains the argument.
 """
 
 from __future__ import annotations
@@ -69,12 +69,12 @@ CURVE_ANSWER = record_dtype(
 curve_answer_at = record_view(CURVE_ANSWER)
 ANSWER = size_of(CURVE_ANSWER)
 # a, b: trees; heap: pairs of nodes; state, out: blocks of PIECE_SEARCH_STATE and CURVE_ANSWER; plane: whether a meeting
-# may be proven; shift: from the center of a to that of b; slack: of a difference of two points; error: of evaluated
-# ones; step: bounds within this of each other are one.
+# may be proven; shift: from the center of a to that of b; slack: rounding error of a difference of two points; error:
+# that of two evaluated points; step: bounds that differ by no more than this count as equal.
 CurveSearch = namedtuple("CurveSearch", "a b heap state out question plane shift slack error step")
 _DEEPEST = 48
 _ROOM = 64
-# Pairs for which a question that bounds alone may answer is not helped by Newton's method.
+# Before this many pairs, Newton's method is left out where bounds alone may answer a question about a clearance.
 _EARLY = 24
 
 
@@ -129,7 +129,7 @@ def proven_minimum(a, b, shift, error, curvatures, x, y):
 
 @kernel(inner=True)
 def keep(a, ka, b, kb, x, y, answer):
-    """Write nearest points that are known: the points at (x, y) of two pieces."""
+    """Write the points at (x, y) of two pieces as the nearest known."""
     answer.parameter_a = parameter(a, ka, x)
     answer.parameter_b = parameter(b, kb, y)
     u = node_point(piece_of(a, ka), x)
@@ -321,10 +321,10 @@ def curve_distance(ra, qa, rb, qb, asked, plane, out):
     a, b = new_tree(ra, qa), new_tree(rb, qb)
     head, other = bezier_head_at(qa, 0), bezier_head_at(qb, 0)
     shift = difference(other.center, head.center, (0.0, 0.0, 0.0))
-    # Of the sums that lead to a difference of two points; the last number is for what underflows.
+    # Rounding of the sums in a difference of two points; the last number covers underflow.
     slack = 8.0 * UNIT * (head.reach + other.reach + length(shift)) + 1e-150
     error = slack + evaluation_error(ra, qa) + evaluation_error(rb, qb)
-    # Nothing closer than this can be told apart.
+    # Bounds closer than this cannot be told apart.
     step = max(0.999 * question.tolerance, 8.0 * (error + head.error + other.error))
     heap, block = np.empty(_ROOM * PAIR), np.empty(STATE)
     answer = curve_answer_at(out, 0)

@@ -1,7 +1,7 @@
 """The square of the distance of a point and a span of a curve in Bernstein form: its coefficients, cuts and bounds.
 
-With the names of `distance/curves/point_curve.py`: an interval of a span has the coefficients of q and v, how far these
-may be off, and may be cut in two.
+In the notation of `distance/curves/point_curve.py`: an interval of a span holds the coefficients of q and v and bounds
+of their errors, and can be cut in two.
 
 Rounding. |(|X|^2)_k| <= REACH^2 v_k, as every X_i is at most w_i REACH: with M = REACH + |p| a coefficient has an error
 below (2 n + 16) u M^2 v_k, and one cut, 2 n convex combinations of three roundings each for q and for v, adds
@@ -71,7 +71,7 @@ def form_square(record, pool, span, p, reach, work):
     interval.low = 0.0
     interval.high = 1.0
     interval.cuts = 0.0
-    # Ends anew: Y_0.Y_0 and Y_0.Y_1 are the coefficients themselves.
+    # The two coefficients at each end are computed again, with smaller errors: they are Y_0.Y_0 and Y_0.Y_1.
     rows = curve.pieces + 4 * (n + 1) * span
     for end in range(2):
         i = rows + 4 * n * end
@@ -131,7 +131,7 @@ def cut(record, work, o, x, reach):
     low = o + SQUARE + m * (1 + rational)
     behind = interval_at(work, low)
     s = o + SQUARE
-    # The two coefficients at an end are combined with one another alone.
+    # A cut combines the two coefficients at an end with each other only.
     v = min(work[s + m], work[s + m + 1]) if rational == 1 else 1.0
     behind.error_low = interval.error_low + 4.0 * UNIT * (abs(work[s]) + abs(work[s + 1])) / v
     v = min(work[s + 2 * m - 1], work[s + 2 * m - 2]) if rational == 1 else 1.0
@@ -157,7 +157,7 @@ def cut(record, work, o, x, reach):
 
 @kernel(inner=True, exact=True)
 def mend(record, work, o, low, point, error, reach):
-    """The coefficients beside a cut anew, from the point there."""
+    """Compute the coefficients beside a cut again, from the point there."""
     w, dw = point.weight, point.weight_rate
     e, d = point.place, point.first
     curve = bezier_curve_at(record, 0)

@@ -1,4 +1,4 @@
-"""Convex sets that hold a piece of a curve, each by its support, and the records of pieces.
+"""Convex sets that enclose a piece of a curve, each given by its support function h, and the records of pieces.
 
     h(n) = max n.C(t),  t in [t0, t1],  |n| = 1        chi = C(t1) - C(t0),  L = t1 - t0,  f0, f1 = n.C at the ends
 
@@ -7,15 +7,16 @@
     taylor      h <= max over s of (1 - s) f0 + s f1 + q s (1 - s) / 2,   q = L^2 max(0, max -n.C'')
     box         h <= the support of the box of C
 
-with the width w = L int |C' - chi / L|^2 dt, which is what u^2 - |chi|^2 of lemma 1 is without its cancellation. Of a
-formula it is bounded by the least of L^4 max|C''|^2 / 12, (L^2 (|C''(m)| / sqrt 12 + L max|C'''| / sqrt 320))^2 (C' is
-C'(m) + C''(m) (t - m) and a rest, in the norm of the variance), (L max|C'|)^2 - |chi|^2 and the user's bound of the
-length squared less |chi|^2. For sets A and B and any unit n
+with the width w = L int |C' - chi / L|^2 dt, which is u^2 - |chi|^2 of lemma 1 without its cancellation. For a formula
+w is bounded by the least of L^4 max|C''|^2 / 12, (L^2 (|C''(m)| / sqrt 12 + L max|C'''| / sqrt 320))^2 (C' is
+C'(m) + C''(m) (t - m) and a rest, in the norm of the variance), (L max|C'|)^2 - |chi|^2, and the square of the user's
+bound of the length minus |chi|^2. For sets A and B and any unit n
 
     distance >= -h_A(n) - h_B(-n)
 
-which is the certificate; a good n only makes it large. Supports are taken from a reference point near A, so that they
-are as exact as differences; sums of three products err by 4 units of 2^-52 of their absolute sum, which is added.
+which is the certificate: it holds for every n, and a good n makes it large. Supports are relative to a reference point
+near A, so that they are as exact as differences; a sum of three products has an error of at most 4 units of 2^-52 of
+the sum of their magnitudes, which is added.
 """
 
 from __future__ import annotations
@@ -111,7 +112,7 @@ def point_values(kind, table, pool, span, t, workspace, out, o):
 
 @kernel(inline=True)
 def set_ranges(piece, workspace, at):
-    """The ranges of C and of its three derivatives, six numbers each, from room[at:]."""
+    """Copy the ranges of C and of its three derivatives, six numbers each, from workspace[at:]."""
     for k in range(6):
         piece.box[k] = workspace[at + k]
         piece.speed[k] = workspace[at + 6 + k]
@@ -121,7 +122,7 @@ def set_ranges(piece, workspace, at):
 
 @kernel(inner=True, exact=True)
 def fill_piece(kind, table, pool, workspace, x, o):
-    """All of the record at x[o:] from its interval, its ends with how far these may be off, and its Bezier piece."""
+    """Fill the record at x[o:], in which the interval, the ends with their errors and the smooth part are given."""
     piece = enclosed_piece_at(x, o)
     work = range_workspace_at(workspace, 0)
     t0 = piece.t0
@@ -172,7 +173,7 @@ def fill_piece(kind, table, pool, workspace, x, o):
 
 @kernel(inner=True, exact=True)
 def split_piece(kind, table, pool, workspace, x, o, p):
-    """Both halves of the piece at x[o:] to x[p:] and behind it. Returns whether doubles can tell the halves apart."""
+    """Write both halves of the piece at x[o:] to x[p:] and behind; False if no double lies inside its interval."""
     piece = enclosed_piece_at(x, o)
     t0 = piece.t0
     t1 = piece.t1
@@ -256,7 +257,7 @@ def piece_support(x, o, n, c, bound):
     slack = piece.off * _GROW + e0 + e1
     d = f1 - f0
     best = math.inf
-    # That of the box alone, which does not rest on points.
+    # The support of the box, which needs no evaluated points.
     boxed = math.inf
     if bound == AUTO or bound == ELLIPSOID:
         # Ends that are off by OFF change both the center and the chord; each by less than OFF in the sum below.
@@ -266,7 +267,7 @@ def piece_support(x, o, n, c, bound):
     if bound == AUTO or bound == TAYLOR:
         least = 0.0
         for k in range(3):
-            if n[k] == 0.0:  # times infinity it would be no number
+            if n[k] == 0.0:  # 0 times infinity is NaN
                 continue
             p = n[k] * piece.bend[2 * k]
             q = n[k] * piece.bend[2 * k + 1]
@@ -311,7 +312,7 @@ def separation_along(xa, oa, xb, ob, count_b, n, bound):
         high_b = hull_support(xb, ob, count_b, back, c)
     else:
         high_b = piece_support(xb, ob, back, c, bound)
-    # The direction is a unit one up to two units.
+    # n is of unit length up to two units in the last place.
     lower = down(-high_a - high_b) * (1.0 - 8.0 * EPSILON)
     return lower if lower > 0.0 else 0.0
 

@@ -5,8 +5,8 @@ of two foci p0, p1 and the width w = u^2 - |p1 - p0|^2,
 
     { x : |p0 - x| + |x - p1| <= u },     support  m + E n / (2 sqrt(n' E n)),   E = chi chi' + w I,  chi = p1 - p0,
 
-which needs no division by |chi| (w = 0: the segment; chi = 0: the ball). All this finds a direction alone. What
-is claimed of distances is proven elsewhere, from supports in that direction (`distance/enclosures/enclosure.py`).
+which needs no division by |chi| (w = 0: the segment; chi = 0: the ball). Nothing here is part of a proof: bounds of the
+distance are proven from supports along the direction found (`distance/enclosures/enclosure.py`).
 """
 
 from __future__ import annotations
@@ -35,12 +35,13 @@ SIMPLEX = record_dtype(
     "f8",
     vertices=(4, VERTEX),  # a `SIMPLEX_VERTEX` each
     weights=4,  # of the vertices, in the point nearest to the origin
-    point=4,  # of who looks for the nearest point of a hull: it is the set a
+    point=4,  # as set a: the point that is projected on a hull
 )
 simplex_at = record_view(SIMPLEX)
 POINT = place_of(SIMPLEX, "point")
 ROOM = size_of(SIMPLEX)
-# A set: the hull of `count` points from points[at], or of a width (else below zero) the ellipsoid of two.
+# A convex set: for width < 0 the hull of `count` points from points[at], else the ellipsoid of this width with the two
+# points there as its foci.
 ConvexSet = namedtuple("ConvexSet", "points at count width")
 _ROUNDS = 40
 # Nearer than this part of the farthest vertex counts as an overlap.
@@ -90,7 +91,7 @@ def on_b(g, k):
 
 @kernel(inline=True)
 def numbers_of(g):
-    """Which points of a hull the first three vertices of the simplex are, those beyond its count too."""
+    """Numbers of the points of a hull at the first three vertices of the simplex, used or not."""
     first, second, third = simplex_vertex_at(g, 0), simplex_vertex_at(g, VERTEX), simplex_vertex_at(g, 2 * VERTEX)
     return first.number, second.number, third.number
 
@@ -120,10 +121,10 @@ def move_vertex(g, source, target):
 
 @kernel(inner=True)
 def nearest_on_simplex(g, count, full):
-    """Keep the least face of the simplex that has its point nearest to the origin, by its newest vertex.
+    """Reduce the simplex to its smallest face that holds the newest vertex and the point nearest to the origin.
 
-    Returns the number of vertices kept, and the point. Every face with the newest vertex whose own nearest point is
-    inside it is looked at, so that no rounding can leave without an answer.
+    Returns the number of vertices kept, and the point. Every face with the newest vertex is tried whose own nearest
+    point is inside it, so that there is an answer whatever the rounding.
     """
     weight = simplex_at(g, 0).weights
     new = count - 1
@@ -160,7 +161,7 @@ def nearest_on_simplex(g, count, full):
         for j in range(i):
             e = sub(vertex(g, j), p)
             if full == 3:
-                # In the plane only whether the origin is inside matters: three turns of one sense.
+                # In the plane a triangle counts only if the origin is inside: all barycentric coordinates are positive.
                 turn = d[0] * e[1] - d[1] * e[0]
                 left = d[1] * p[0] - d[0] * p[1]
                 right = e[0] * p[1] - e[1] * p[0]
@@ -183,7 +184,7 @@ def nearest_on_simplex(g, count, full):
                     best, found, keep, weights = size, v, (i, j), (1.0 - s - r, s, r)
     if count == full and full == 4 and inside_tetrahedron(g):
         return 4, (0.0, 0.0, 0.0)
-    # The vertices kept to the front, in the order of their places.
+    # Move the vertices that are kept to the front, in their order.
     kept = 0
     order = (min(keep[0], keep[1]), max(keep[0], keep[1]))
     for k in range(2):
@@ -248,7 +249,7 @@ def gjk(full, first, second, v, limit, part, g):
         a, _i = support_point(first, (-v[0], -v[1], -v[2]))
         b, number = support_point(second, v)
         y = sub(a, b)
-        # All of a - b is at least this far along v.
+        # The least v.(a - b) over both sets.
         below = dot(v, y)
         if known and size - below <= part * size:
             break

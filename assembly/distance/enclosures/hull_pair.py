@@ -1,4 +1,4 @@
-"""The distance of two convex hulls, or that they meet, by their nearest points and one direction."""
+"""The distance of two convex hulls, or a proof that they meet, from their nearest points and one direction."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from assembly.geometry.vec import dot, sub
 
 @kernel(inner=True)
 def differences(g, count):
-    """Put the differences that a simplex is made of where points of a hull are looked for."""
+    """Copy the differences in a simplex to `on_b`, where `inside_proven` reads the vertices of a hull."""
     for k in range(count):
         v = simplex_vertex_at(g, VERTEX * k)
         for c in range(3):
@@ -41,7 +41,7 @@ def differences(g, count):
 
 @kernel(inner=True, allocates=True, exact=True)
 def overlap_proven(full, a, count_a, b, count_b, slack, g):
-    """Whether two hulls about a center are proven to meet: places around zero are inside of their difference.
+    """Whether two hulls about a center are proven to meet: points around zero are inside their Minkowski difference.
 
     See `surrounded` in `distance/enclosures/node.py`. Overwrites g.
     """
@@ -72,7 +72,7 @@ def overlap_proven(full, a, count_a, b, count_b, slack, g):
 
 @kernel(signatures="(i8, f8[::1], i8, f8[::1], i8, f8[::1])", allocates=True)
 def hull_distance(full, a, count_a, b, count_b, state):
-    """What `search` of `distance/enclosures/search.py` answers, of two hulls."""
+    """The answer of `search` in `distance/enclosures/search.py`, for two hulls."""
     best = search_state_at(state, 0)
     g = np.zeros(ROOM)
     center = np.empty(3)

@@ -1,4 +1,4 @@
-"""Newton's method on |a(s) - b(t)|^2 / 2 inside bounds of the parameters: for good upper bounds, proves nothing."""
+"""Newton's method on |a(s) - b(t)|^2 / 2 within bounds of s and t: it finds good upper bounds and proves nothing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from assembly.geometry.vec import blend, dot, sub
 
 _ROUNDS = 24
 PlaceQuery = namedtuple("PlaceQuery", "search place bounds_s bounds_t")
-# |r|^2, r = a - b, the derivatives of both, and the part of a' across the feature of a hull that carries b.
+# |r|^2, r = a - b, the derivatives of both, and the part of a' orthogonal to the feature of a hull that carries b.
 PlacePoints = namedtuple("PlacePoints", "merit r a1 a2 b1 b2 c1")
 
 
@@ -57,7 +57,8 @@ def local_point(kind, table, pool, span, t, workspace):
 def hull_point(full, points, count, x, g):
     """Nearest point of a hull, how many vertices carry it, whether x is inside, and how far the point may be off it.
 
-    It is a vertex and parts of the differences to the others: off by half a unit of itself and some of those.
+    The point is a vertex plus parts of the differences to the others: its error is half a unit in the last place of
+    itself plus some units of those parts.
     """
     v = (x[0] - points[0], x[1] - points[1], x[2] - points[2])
     simplex = simplex_at(g, 0)
@@ -79,7 +80,7 @@ def hull_point(full, points, count, x, g):
 
 @kernel(inline=True)
 def across(v, kept, full, g):
-    """The part of v across the feature that carries a nearest point."""
+    """The part of v orthogonal to the feature (vertex, edge or face) that carries a nearest point."""
     if kept == 1:
         return v
     e = sub(on_b(g, 1), on_b(g, 0))
@@ -103,13 +104,13 @@ def held(x, step, bounds):
 
 @kernel(inline=True)
 def is_free(x, slope, bounds):
-    """Whether a parameter may move: its bounds leave it a way, and the slope does not push it out of them."""
+    """Whether a parameter may move: its bounds differ, and the slope does not push it out of them."""
     return bounds[1] > bounds[0] and not ((x <= bounds[0] and slope > 0.0) or (x >= bounds[1] and slope < 0.0))
 
 
 @kernel(inline=True)
 def step_length(slope, curvature, square):
-    """A step in one parameter; where it is not convex, as if the curve were straight."""
+    """Newton's step in one parameter; a Gauss-Newton step where the curvature is too small or negative."""
     return -slope / (curvature if curvature > 1e-8 * square else square + 1e-300)
 
 

@@ -1,7 +1,8 @@
-"""What one pair of pieces tells: a lower bound of its distance, and points that may be the nearest known.
+"""The lower bound of the distance of one pair of pieces, and points on them that may be the nearest known.
 
-The bound is the best of a direction that parts the pieces (`distance/enclosures/enclosure.py`) and, with `polish`, of
-second derivatives (`taylor.py`) about the points that Newton's method found, so that an isolated minimum ends at once.
+The bound is that of a direction that separates the pieces (`distance/enclosures/enclosure.py`) or, with `polish` and
+where it is larger, that of second derivatives (`taylor.py`) about the points that Newton's method found: a pair that
+holds an isolated minimum need not be halved then.
 """
 
 from __future__ import annotations
@@ -52,9 +53,9 @@ SEARCH_STATE = record_dtype(
     count=1,  # of the pairs bounded
     slack=1,  # how far vertices of a hull may be off [length]
     lower=1,  # proven lower bound of the distance [length]
-    lowest=1,  # the same of the vertices as they are taken about the center
-    limit=1,  # pairs of at least this bound are let go
-    let_go=1,  # the least bound of those that were
+    lowest=1,  # the same, before `slack` is subtracted
+    limit=1,  # pairs whose bound is at least this are let go (pruned)
+    let_go=1,  # the least bound of the pairs that were let go
     off_a=1,  # how far points of the best known piece of a curve may be off
     off_b=1,
     used_a=1,  # pieces of the curves
@@ -71,29 +72,29 @@ MET = place_of(SEARCH_STATE, "met")
 COUNT = place_of(SEARCH_STATE, "count")
 STATE = size_of(SEARCH_STATE)
 LOWER = place_of(SEARCH_STATE, "lower")
-# It is the beginning of the room of a search.
+# The workspace of a search; it begins with the state.
 SEARCH_ROOM = record_dtype(
     "f8",
     state=STATE,  # a `SEARCH_STATE`
     values=18,  # of the first curve at a parameter: pairs of C, C', C''
     other_values=18,  # of the second
-    across=PIECE,  # a piece as seen across a feature of a hull
-    rows=9,  # three, orthonormal or zero, that span what is across the feature
+    across=PIECE,  # a piece projected on the orthogonal complement of a hull's feature
+    rows=9,  # three, orthonormal or zero, that span this complement
 )
 search_room_at = record_view(SEARCH_ROOM)
 VALUES = place_of(SEARCH_ROOM, "values")
 OTHER_VALUES = place_of(SEARCH_ROOM, "other_values")
 SCRATCH = size_of(SEARCH_ROOM)
-# A shape as a search reads it: its kind, table and pool, room for its evaluation, the first halves (-1: none yet) and
-# the records of its pieces, and the vertices of a hull, which are its pool; a curve has none.
+# A shape as a search reads it: its kind, table and pool (of a hull: its vertices), the workspace of its evaluation, the
+# first half of each piece (-1: none yet), the records of its pieces, and the number of vertices (of a curve: 0).
 EnclosedShape = namedtuple("EnclosedShape", "kind table pool workspace halves pieces count")
-# full: the dimension and one; a, b: shapes, a a curve; bound: kind of enclosure; state: a block of SEARCH_ROOM; spare:
-# two records of pieces, the first of a point that stands still if b is a hull; g: a simplex.
+# full: the dimension plus one; a, b: shapes, of which a is a curve; bound: kind of enclosure; state: a block of
+# SEARCH_ROOM; spare: two records of pieces, of which the first is a constant curve if b is a hull; g: a simplex.
 EnclosureSearch = namedtuple("EnclosureSearch", "full a b question bound heap state spare g")
 # Parameters on the smooth parts of two curves.
 PairPlace = namedtuple("PairPlace", "s span_a t span_b")
-# Corners of a triangle and of a tetrahedron around zero, turned so that nothing made by hand is parallel to them, and
-# the sizes of their copies about a point, as parts of the hull's.
+# Corners of a triangle and of a tetrahedron around zero, turned so that edges of modeled shapes are hardly ever
+# parallel to theirs, and the sizes of their copies about a point, as parts of the hull's size.
 _TRIANGLE = ((0.765, 0.644, 0.0), (-0.94, 0.34, 0.0), (0.175, -0.984, 0.0))
 _TETRAHEDRON = ((-0.787, -0.573, 0.229), (0.78, -0.582, -0.229), (0.232, 0.576, 0.784), (-0.226, 0.579, -0.784))
 NEAR_BY = (1e-4, 1e-8, 1e-12)
@@ -135,17 +136,17 @@ def corner_around(full, k, size):
 
 @kernel(inner=True, exact=True)
 def surrounded(full, points, count, x, off, g):
-    """Whether a point, known up to `off`, is proven inside a hull by places around it. Overwrites g.
+    """Whether a point, known up to `off`, is proven inside a hull, as points around it are. Overwrites g.
 
-    On a diagonal of the hull, as in the middle of a cube, a point is on the border of every simplex that the search for
-    the nearest point ends with. Places about it are not, and a convex set that holds them holds it.
+    A point on a diagonal of the hull, as the middle of a cube, is on the boundary of every simplex that GJK ends with.
+    Points around it are not, and a convex set that contains them contains it.
     """
     farthest = 0.0
     for i in range(count):
         d = sub((points[3 * i], points[3 * i + 1], points[3 * i + 2]), x)
         farthest = max(farthest, dot(d, d))
     farthest = math.sqrt(farthest)
-    # What the sums below are rounded by.
+    # Rounding of the sums below.
     off += 4.0 * EPSILON * (abs(x[0]) + abs(x[1]) + abs(x[2]) + farthest)
     for part in NEAR_BY:
         proven = 0
@@ -162,9 +163,9 @@ def surrounded(full, points, count, x, off, g):
 
 @kernel(inner=True, exact=True)
 def meet_points(search, a, off_a, b, off_b):
-    """Distance of two points, rounded up, or of a point and a hull with its nearest point and what carries it.
+    """Distance, rounded up, of two points, or of a point and a hull; the point of b, and how many vertices carry it.
 
-    A point that is proven inside the hull is noted.
+    Sets `met` where the point is proven inside the hull.
     """
     full, points, count, g = search.full, search.b.pool, search.b.count, search.g
     best = search_state_at(search.state, 0)
@@ -181,7 +182,7 @@ def meet_points(search, a, off_a, b, off_b):
         if surrounded(full, points, count, a, off_a, g):
             best.met = 1.0
             return 0.0, a, full
-        # For what carries the point.
+        # `surrounded` overwrote g: find the vertices that carry the point again.
         b, kept, _inside, off_b = hull_point(full, points, count, a, g)
     return up(distance * (1.0 + 8.0 * EPSILON) + off_a + off_b), b, kept
 
@@ -208,7 +209,7 @@ def middles(state, at):
 
 @kernel(inner=True, exact=True)
 def note_parameters(search, place):
-    """Values at two parameters to the state, and their points if they are nearer than the best."""
+    """Write values at two parameters to the state, and keep their points if they are nearer than the best."""
     a, b, state = search.a, search.b, search.state
     point_values(a.kind, a.table, a.pool, place.span_a, place.s, a.workspace, state, VALUES)
     if b.kind == HULL:
@@ -239,7 +240,7 @@ def domain_of(kind, pool):
 def hull_taylor(search, oa, kept, new, s):
     """Bound by second derivatives across the feature in g, whether that is convex, and whether no minimum is inside.
 
-    From the middle of the piece, or from `new` values at s in the state.
+    The expansion is about the middle of the piece or, if `new`, about the values at s that the state holds.
     """
     full, xa, points, state = search.full, search.a.pieces, search.b.pool, search.state
     numbers = numbers_of(search.g)
@@ -259,7 +260,7 @@ def hull_taylor(search, oa, kept, new, s):
     piece, still = enclosed_piece_at(y, 0), enclosed_piece_at(zero, 0)
     lower, convex = taylor_bound(piece, still, hessian, ValuesAt(y, MID, s), ValuesAt(zero, MID, 0.0))
     lower = lower * (1.0 - 32.0 * EPSILON) - worst
-    # Across a vertex the distance itself is seen; across others a lower bound of it, whose slope tells nothing.
+    # Across a vertex, F is of the distance itself; across others, of a lower bound of it, whose slope proves nothing.
     return max(lower, 0.0), convex, hessian.empty and worst == 0.0 and kept == 1
 
 
@@ -274,7 +275,7 @@ def middle_place(piece_a, piece_b, hull):
 
 @kernel(inner=True, exact=True)
 def parting_bound(search, oa, ob, first):
-    """Lower bound of the distance of two pieces by a direction that parts them."""
+    """Lower bound of the distance of two pieces along a direction that separates them, found by GJK."""
     full, a, b, bound, g = search.full, search.a, search.b, search.bound, search.g
     piece_a, piece_b = enclosed_piece_at(a.pieces, oa), enclosed_piece_at(b.pieces, ob)
     best = search_state_at(search.state, 0)
@@ -311,7 +312,7 @@ def bound_node(search, oa, ob):
     better = note(search.state, upper, place, on_a, on_b)
     if best.met > 0.0:
         return 0.0, upper
-    # Asked for a clearance, most searches end before a better point is worth its price.
+    # Most searches about a clearance end before Newton's method would pay for itself.
     if question.polish and better and (not question.clearance >= 0.0 or best.count > 8.0):
         s, t = newton(search, place, domain_of(a.kind, a.pool), domain_of(b.kind, b.pool))
         note_parameters(search, PairPlace(s, place.span_a, t, place.span_b))

@@ -7,11 +7,12 @@ the distance of the best points known. Then L <= distance <= U always, and a sea
     clearance   L > clearance (apart), or U <= clearance (not apart), or U - L <= tolerance (undecided)
     collision   L > 0 (disjoint), or a meeting is proven (hit), or U <= tolerance (undecided)
 
-or when doubles end: U - L is no more than some roundings of a point. Shapes are taken about a center; what this changes
-the vertices of a hull by is added to U and taken from L.
+or when doubles tell no more: U - L is within some rounding errors of a point. Shapes are taken about a center; the
+rounding of a hull's vertices by this is added to U and subtracted from L.
 
 Otherwise the longer piece of the node is halved. With `polish` a node is also bounded by second derivatives
-(`distance/enclosures/taylor.py`) about the points that Newton's method found, so that an isolated minimum ends at once.
+(`distance/enclosures/taylor.py`) about the points that Newton's method found: a node that holds an isolated minimum
+need not be halved then.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from assembly.geometry.splines.bezier_ranges import ranged_curve_at
 CONVERGED, SEPARATED, NOT_SEPARATED, HIT, DISJOINT, UNDECIDED, BUDGET_SPENT, ROUNDED = range(8)
 # The arrays are too small to go on.
 CROWDED = 8
-# Bounds of nodes before what points may be off is believed.
+# Pairs that are bounded before the errors of points may end a search as ROUNDED.
 LOOKS = 8
 # Pieces of a curve, and pairs of them, that there is room for at first, beside the smooth parts.
 _ROOM = 64
@@ -105,7 +106,7 @@ def about_center(points, count, center):
 
 @kernel(inline=True)
 def halves_a(piece_a, piece_b):
-    """Whether a is the piece to halve; one that cannot be bounded goes first, then the one longer in its parameter."""
+    """Whether to halve a: the longer piece or, if neither length is bounded, the longer parameter interval."""
     a, b = piece_a.length, piece_b.length
     if a == math.inf and b == math.inf:
         return piece_a.t1 - piece_a.t0 >= piece_b.t1 - piece_b.t0
@@ -114,10 +115,10 @@ def halves_a(piece_a, piece_b):
 
 @kernel(inline=True)
 def pair_bound(search, i, j):
-    """Lower bound of the distance of two pieces; of equal ones the pair whose middles are nearer goes first."""
+    """Lower bound of the distance of two pieces, and the distance of their middles, which orders equal bounds."""
     best = search_state_at(search.state, 0)
     lower, upper = bound_node(search, PIECE * i, PIECE * j)
-    # Of the best known pieces: a single point may be unlucky, at a joint of the formula.
+    # The least error over all pieces: that of a single point may be large, at a joint of the formula.
     best.off_a = min(best.off_a, enclosed_piece_at(search.a.pieces, PIECE * i).off)
     if search.b.kind != HULL:
         best.off_b = min(best.off_b, enclosed_piece_at(search.b.pieces, PIECE * j).off)
@@ -162,7 +163,7 @@ def search_ended(search, top, left):
 def first_half(shape, k, used):
     """The first half of piece k, made as piece `used` if need be; how many pieces there are then.
 
-    -1: it has none, as a hull, or as doubles end.
+    -1: it has none, because it is a hull or no double lies inside its interval.
     """
     if shape.kind == HULL:
         return -1, used
@@ -234,10 +235,10 @@ def roomier(shape, used):
     allocates=True,
 )
 def search(full, operand_a, operand_b, center, asked, bound, state):
-    """The search of the heading, for Python. `full` is the dimension and one; b may be a hull, a is a curve.
+    """The search of the heading, for Python. `full` is the dimension plus one; a is a curve, b may be a hull.
 
-    Operands are (kind, table, pool, numbers of room). Curves are given about the center, a hull is not; the points of
-    the answer are not, either. A clearance below zero asks for the distance. Returns why it ended.
+    Operands are (kind, table, pool, length of the workspace). Curves are given about the center; a hull, and the points
+    of the answer, are not. A clearance below zero asks for the distance. Returns why the search ended.
     """
     question = Question(*asked)
     a, used_a, _off = new_shape(operand_a, center)

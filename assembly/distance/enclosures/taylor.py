@@ -8,8 +8,8 @@ With m the largest |F_st| over the box and any sigma > 0, F_ss >= p, F_tt >= q t
     F(s, t) >= F(x) + F_s(x) ds + F_t(x) dt + ((p - m sigma) ds^2 + (q - m / sigma) dt^2) / 2
 
 about any x of the box, which is minimized a coordinate at a time. Where both coefficients are positive F is convex and
-its minimum over the box is the only one. A box over which F_s or F_t keeps a sign holds no minimum but at an end of
-the curve. All by intervals, rounded outward.
+its minimum over the box is the only one. Where F_s or F_t keeps its sign over a box, the box holds no minimum except at
+an end of the curve. All of this is interval arithmetic, rounded outward.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def taylor_bound(piece_a, piece_b, hessian, a, b):
 
 @kernel(inner=True, exact=True)
 def unit_across(e, n):
-    """Rows at n[0:9], orthonormal up to rounding, that span what is across the unit vector e in space."""
+    """Rows at n[0:9], orthonormal up to rounding, that span the plane orthogonal to the unit vector e in space."""
     if abs(e[0]) < 0.6:
         u = cross(e, (1.0, 0.0, 0.0))
     else:
@@ -136,7 +136,10 @@ def unit_across(e, n):
 
 @kernel(inner=True, exact=True)
 def feature_rows(full, points, feature, n):
-    """Rows n (nine numbers) across a feature: a vertex, an edge or a face of the hull, `feature` its vertices."""
+    """Rows n (nine numbers) that span the orthogonal complement of a feature: a vertex, an edge or a face of the hull.
+
+    `feature`: numbers of its vertices, -1 behind them. False where it is degenerate.
+    """
     for k in range(9):
         n[k] = 0.0
     if feature[1] < 0:
@@ -166,7 +169,7 @@ def feature_rows(full, points, feature, n):
 
 @kernel(inline=True)
 def turned(x, o, n, row, v):
-    """Interval of a row of n times three pairs at x[o:], less v before."""
+    """Interval of row.(X - v), with a row of n and the three pairs X at x[o:]."""
     total = (0.0, 0.0)
     for k in range(3):
         c = n[3 * row + k]
@@ -177,11 +180,11 @@ def turned(x, o, n, row, v):
 
 @kernel(inner=True, exact=True)
 def across_feature(xa, oa, points, count, feature, n, y):
-    """The piece as seen across a feature of the hull, to the record y; returns a certificate.
+    """Write the piece, projected on the complement of a hull's feature, to the record y; returns a certificate.
 
     For any x let r = N'N (x - v), v of the feature. With r / |r| as the direction the distance of x to the hull is at
     least |N (x - v)| less the largest (r / |r|).(z - v) over its vertices z: this largest, over the piece, is what is
-    returned; zero or a rounding where the feature is the nearest one for all of the piece.
+    returned; it is zero up to rounding where the feature is the nearest one to all of the piece.
     """
     seen = enclosed_piece_at(y, 0)
     piece = enclosed_piece_at(xa, oa)
@@ -222,7 +225,7 @@ def across_feature(xa, oa, points, count, feature, n, y):
 
 @kernel(inner=True, exact=True)
 def turn_values(x, o, n, row, v, y, p):
-    """A row of values (nine pairs) as seen across a feature."""
+    """Project values (nine pairs) at x[o:] on a row of n, C relative to v, and write them to y[p:]."""
     none = (0.0, 0.0, 0.0)
     y[p + 2 * row], y[p + 2 * row + 1] = turned(x, o, n, row, v)
     y[p + 6 + 2 * row], y[p + 7 + 2 * row] = turned(x, o + 6, n, row, none)
@@ -231,7 +234,7 @@ def turn_values(x, o, n, row, v, y, p):
 
 @kernel(inner=True, exact=True)
 def point_piece(points, o, x):
-    """The record of a point, as a curve that stands still."""
+    """Write the record of a point as a constant curve."""
     piece = enclosed_piece_at(x, 0)
     for k in range(PIECE):
         x[k] = 0.0
@@ -270,7 +273,7 @@ def crossing_proven(xa, oa, xb, ob):
     r1 = idifference(pair(xa, oa + MID, 1), pair(xb, ob + MID, 1))
     b0 = (-b0[1], -b0[0])
     b1 = (-b1[1], -b1[0])
-    # Rounded inward: the box is a little smaller than it says.
+    # X is taken a little smaller than the box, which covers the rounding of its half widths.
     h *= 0.999
     k *= 0.999
     inside = True

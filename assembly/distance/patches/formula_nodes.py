@@ -1,26 +1,26 @@
 """Pieces of a curve given by a formula as patches of degrees 2 and 0, for the search of `distance/patches/search.py`.
 
-What a patch search knows of a patch is its box and its quadratic model with a proven remainder
-(`distance/patches/nodes.py`). Of a
-formula both come from intervals: with the middle m of [t0, t1], h the width, t = m + h z and z in [-1/2, 1/2],
+A patch search uses the box of a patch and its quadratic model with a proven remainder (`distance/patches/nodes.py`).
+For a formula both come from interval arithmetic: with the middle m of [t0, t1], h the width, t = m + h z and z in
+[-1/2, 1/2],
 
     |C(t) - (A0 + J z + K z^2 / 2)| <= E0,    |h C' - (J + K z)| <= E1,    |h^2 C'' - K| <= E2
 
-hold with A0, J, K about C(m), h C'(m), h^2 C''(m) and, beside what these may be off by, for each the least of
+hold with A0, J and K the computed C(m), h C'(m) and h^2 C''(m). Beside the errors of these, each remainder is the least
+of
 
     third derivatives     E0 = s / 48,  E1 = s / 8,  E2 = s / 2,    s = h^3 sup |C'''|
     second derivatives    E0 = v / 8,   E1 = v / 2,  E2 = v,        v = h^2 sup |C'' - C''(m)|
     a kink, K = 0         E0 = r / 2,   E1 = r,                     r = h sup |C' - C'(m)|
     a vertical, J = 0     E0 = sup |C - C(m)|
 
-A remainder that is not known is NONE, a number that is too large for any proof and whose products do not overflow.
-The rows are the model's Bezier points. A curve is (table, pool, room) of `geometry/expression/formula.py`, about its
-center.
+An unknown remainder is NONE, a number too large for any proof, whose products still do not overflow. The rows are the
+model's Bezier points. A curve is (table, pool, workspace) of `geometry/expression/formula.py`, about its center.
 
-About a kink or a vertical bounds narrow with h alone, while as many patches as 1 / h come into question. So a piece
-without second derivatives is halved before any patch is, and one that is short against the tolerance, or has no double
-in its middle, is a dot: J = K = 0, its parameter none of the pair's, and what is proven of one of its points holds for
-all but for 2 E0.
+At a kink or a vertical tangent bounds improve only in proportion to h, while about 1 / h patches remain candidates. So
+a piece without second derivatives is halved before any patch is. One that is short against the tolerance, or has no
+double inside its interval, is a dot: J = K = 0, its parameter is not one of the pair's, and what is proven for one of
+its points holds for all of them up to 2 E0.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def set_interval(tree, k, t0, t1):
     node.low_v, node.high_v = 0.0, 1.0
     links.halves = -1
     links.patch = 0
-    # Where doubles have no middle there is nothing to halve.
+    # An interval with no double inside cannot be halved.
     links.depth = 0 if t0 < 0.5 * (t0 + t1) < t1 else DEEPEST
 
 
@@ -109,7 +109,7 @@ def known_middle(x, o, k):
 
 @kernel(inner=True, exact=True)
 def spread(x, o, m):
-    """Largest norm of what three pairs at x[o:] enclose less the middles of those at x[m:], rounded up."""
+    """Largest distance of a vector in the three pairs at x[o:] from the middles of those at x[m:], rounded up."""
     total = 0.0
     for k in range(3):
         c = known_middle(x, m, k)
@@ -120,7 +120,7 @@ def spread(x, o, m):
 
 @kernel(inline=True)
 def bounded(x):
-    """A bound, or NONE for one that is none."""
+    """A bound, or NONE where it is at least as large or not a number."""
     return x if x < NONE else NONE
 
 
@@ -184,7 +184,7 @@ def describe_formula(curve, short, nodes, o, x):
             e1 = NONE
     node.speed_u = bounded(speed)
     node.speed_v = dot
-    # Products of h and the sums with rows are rounded, too.
+    # Magnitudes whose parts bound the rounding of products with h and of the sums in the rows.
     size = 0.0
     begin = weighted_point_at(nodes, o + ROWS)
     inner = weighted_point_at(nodes, o + ROWS + WEIGHTED)
@@ -215,7 +215,8 @@ def describe_formula(curve, short, nodes, o, x):
 def formula_derivatives(curve, nodes, o, x, w):
     """Point of a piece at m + h (x - 1/2); derivatives by z at PATCH_J and PATCH_K.
 
-    To OFF how far the point and the first derivative may be off, and how far z can go back and ahead within the piece.
+    Writes to OFF the errors of the point and of the first derivative, and how far z can go back and ahead within the
+    piece.
     """
     work = patch_work_at(w, 0)
     node = patch_node_at(nodes, o)

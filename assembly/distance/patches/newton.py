@@ -1,9 +1,8 @@
-"""Newton's method for the nearest points of two patches, held in the unit cube, and what the point found proves.
+"""Newton's method for the nearest points of two patches, with the parameters kept in the unit cube; what these prove.
 
-A curve given by a formula takes the place of the second patch (`distance/patches/formula_nodes.py`): it is evaluated at
-its own
-parameter, by intervals, and what these leave open is part of the proof. `curve` is None elsewhere, and no kernel of
-formulas is compiled then.
+A curve given by a formula may take the place of the second patch (`distance/patches/formula_nodes.py`): it is evaluated
+at its own parameter by interval arithmetic, and the widths of the intervals enter the proof. Otherwise `curve` is None,
+and no kernel of formulas is compiled.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from assembly.distance.patches.pair import (
 )
 from assembly.geometry.splines.bezier_pieces import UNIT
 
-# What a place of two patches proves: bounds of the distance, the upper one that of its points, and these.
+# What a place in the unit cube proves: bounds of the distance, and its two points, whose distance is the upper one.
 PatchPoints = namedtuple("PatchPoints", "lower upper on_a on_b")
 PatchQuery = namedtuple("PatchQuery", "a b curve shift w")
 PatchMerit = namedtuple("PatchMerit", "merit")
@@ -42,7 +41,7 @@ _STEPS = 30
 
 @kernel(inner=True)
 def fill_basis(w, at, n, x):
-    """B_i^n and its first two derivatives at x, rows of n + 1 from `at`, by the triangle of sums of positive terms."""
+    """B_i^n and its first two derivatives at x, rows of n + 1 from `at`, by recurrence on the degree."""
     m = n + 1
     for i in range(3 * m):
         w[at + i] = 0.0
@@ -135,7 +134,7 @@ def load_points(a, b, curve, shift, w):
 
 @kernel(inner=True)
 def newton_direction(w, n):
-    """A step of Newton's method into STEP, variables held at the ends that the slope pushes them out of."""
+    """Write Newton's step to STEP; a variable at an end that the slope would push it past stays there."""
     work = patch_work_at(w, 0)
     size = 0.0
     for i in range(n):
@@ -222,8 +221,8 @@ def nearest_in_patches(a, b, curve, shift, w):
 def proven_in_patches(a, b, curve, shift, errors, curved, w):
     """Lower bound of the distance on a box, the distance at PLACE, and the points there.
 
-    `errors`: how far points and derivatives may be off. The Hessian is at least MARGIN times the diagonal in Z, if it
-    is proven curved.
+    `errors`: how far points and derivatives may be off. `curved`: the Hessian is proven to be at least MARGIN times the
+    diagonal that Z holds.
     """
     work = patch_work_at(w, 0)
     u, v = load_points(a, b, curve, shift, w)

@@ -9,8 +9,8 @@ differences of the net about the center of its box; for S = X / w from Leibniz' 
 
     m_kl w = |X_kl| + sum over (i, j) < (k, l) of C(k, i) C(l, j) |w_(k-i)(l-j)| m_ij.
 
-A curve is a patch of degree 0 in v, a point one of degree 0 in both; what is said of rounding there holds here with
-the sum of both degrees.
+A curve is a patch of degree 0 in v, a point one of degree 0 in both. The rounding analysis of that file holds here with
+the sum of both degrees as n.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ bezier_surface_at = record_view(BEZIER_SURFACE)
 PATCHES_U = place_of(BEZIER_SURFACE, "patches_u")
 PATCHES_V = place_of(BEZIER_SURFACE, "patches_v")
 PATCH_RECORD = size_of(BEZIER_SURFACE)
-# A patch, its doubles. Behind them stand rows of (w x, w y, w z, w), then positions where weights differ.
+# The doubles of a patch. Rows of (w x, w y, w z, w) follow, then positions where weights differ.
 PATCH_NODE = record_dtype(
     "f8",
     box_center=3,  # [length]
@@ -54,8 +54,8 @@ PATCH_NODE = record_dtype(
     e2=1,
     speed_u=1,  # the largest |S_u|; below zero in v: the piece counts as a point [length]
     speed_v=1,
-    away=1,  # how far the patch may be from what it stands for [length]
-    low_u=1,  # its box of parameters on the patch that it is of
+    away=1,  # how far the patch may be from the given surface's [length]
+    low_u=1,  # its box of parameters within the surface's patch; of a formula, its interval
     high_u=1,
     low_v=1,
     high_v=1,
@@ -72,11 +72,11 @@ LOW_U = place_of(PATCH_NODE, "low_u")
 HIGH_U = place_of(PATCH_NODE, "high_u")
 LOW_V = place_of(PATCH_NODE, "low_v")
 ROWS = size_of(PATCH_NODE)
-# The same patch, its integers.
+# The integers of the same patch.
 PATCH_NODE_LINKS = record_dtype(
     "i8",
     halves=1,  # the first of its two halves; -1: not made yet
-    patch=1,  # which patch of the surface it is of
+    patch=1,  # number of the surface's patch that it is a part of
     depth=1,  # halvings
 )
 patch_node_links_at = record_view(PATCH_NODE_LINKS)
@@ -250,7 +250,7 @@ def box_net(record, nodes, o, slack):
 
 @kernel(inline=True, exact=True)
 def derivative_bounds(record, nodes, o, least, ratio, m):
-    """Bounds of derivatives of a patch to m[4 k + l], those of w behind."""
+    """Write bounds of the derivatives of a patch to m[4 k + l], and of those of w / min w to m[16 + 4 k + l]."""
     patch = bezier_surface_at(record, 0)
     node = patch_node_at(nodes, o)
     p = patch.degree_u

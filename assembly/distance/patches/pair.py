@@ -44,11 +44,11 @@ PATCH_WORK = record_dtype(
     g=4,  # gradient
     z=4,  # a place in the models
     place=4,  # a place in the unit cube
-    step=4,  # of Newton
-    factor=16,  # of the matrix of a step
+    step=4,  # Newton's step
+    factor=16,  # Cholesky's factor of the matrix of that step
     patch_j=6,  # first derivatives of one patch
     patch_k=9,  # second derivatives of one patch
-    off=4,  # what a formula leaves open (`distance/patches/formula_nodes.py`)
+    off=4,  # errors of a formula and the range of its parameter (`distance/patches/formula_nodes.py`)
 )
 patch_work_at = record_view(PATCH_WORK)
 D = place_of(PATCH_WORK, "d")
@@ -92,7 +92,7 @@ def free_count(record):
 
 @kernel(inner=True, exact=True)
 def load_side(source, first, second, sign, n, at, w):
-    """J and K of one shape with n parameters as parameters at, at + 1, from where its own are."""
+    """Copy J and K of one shape with n parameters, times `sign`, from `source` to the pair's parameters from `at`."""
     work = patch_work_at(w, 0)
     for i in range(n):
         for c in range(3):
@@ -172,7 +172,7 @@ def slope_at(w, n, i, raised):
 
 @kernel(inner=True, exact=True)
 def patch_model_bound(a, b, slack, w):
-    """The bound of the quadratic models that `load_models` and `load_hessian` left; Z is near its place."""
+    """The bound of the quadratic models, after `load_models` and `load_hessian`; Z is left near the minimizer."""
     work = patch_work_at(w, 0)
     node_a, node_b = node_of(a), node_of(b)
     n = a.free + b.free
@@ -208,7 +208,7 @@ def patch_model_bound(a, b, slack, w):
     least = c
     for i in range(n):
         slope = slope_at(w, n, i, raised)
-        # The value at z, and from there the tangent plane's fall to the corner behind its slope.
+        # The value at z, from there the fall of the tangent plane to its lowest corner, and the raise at a corner.
         least += (slope + work.g[i]) * work.z[i] - 2.0 * slope * work.z[i] - abs(slope) - 0.25 * raised
     least -= 0.125 * cubic * (1.0 + 1e-12) + 512.0 * UNIT * size
     root = math.sqrt(least) * (1.0 - 8.0 * UNIT) if least > 0.0 else 0.0
@@ -231,7 +231,7 @@ def farthest(patch, x, y, z):
 
 @kernel(inner=True, exact=True)
 def patch_hull_bound(a, b, shift, slack, w):
-    """The bound of the control points in the direction between the points of the models at z, without bends."""
+    """The bound of the control points along the difference of the linear models at z."""
     work = patch_work_at(w, 0)
     n0 = work.d[0]
     n1 = work.d[1]
@@ -265,7 +265,7 @@ def patch_convexity(a, b, w):
         if not work.h[5 * i] > 0.0:
             return False
         far += 0.5 * size_at(w, J + 3 * i)
-        # Half the sum of a row of |K|, for now where a step will be.
+        # Half the sum of a row of |K|, kept in `step`, which is free here.
         row = 0.0
         for j in range(n):
             row += size_at(w, K + 3 * (4 * i + j))
