@@ -5,8 +5,8 @@ cell of the periods. Material is to the left of every piece. The winding number 
 
     w(u, v) = w(u, bottom) + sum of sign(u') over the pieces that pass between (u, bottom) and (u, v),
 
-and is 1 where there is material (the table is made so), 0 where there is none. Only for a point in the box of a piece
-has an equation to be solved; elsewhere two comparisons decide.
+and is 1 where there is material (the table is made so), 0 where there is none. An equation has to be solved only for
+a point in the box of a piece; elsewhere two comparisons decide.
 """
 
 from __future__ import annotations

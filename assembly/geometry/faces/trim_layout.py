@@ -11,7 +11,7 @@ from assembly._kernel import kernel
 from assembly.geometry.faces.trim_pieces import Piece, piece_bounds_at, piece_line, piece_links_at
 from assembly.geometry.splines.evaluate import spline_curve_at
 
-# The place on a piece, as a part of its interval, beside which w is sampled: loops often touch at the middle itself.
+# The part of a piece's interval beside which w is sampled: not its middle, beside which loops of one part often touch.
 _MIDDLE = 0.47
 
 
