@@ -1,6 +1,6 @@
 """What searches over pieces of curves and over patches share: the question, the trees of pieces, and when it is over.
 
-A tree of pieces grows as they are halved; shapes are packed about centers of their own.
+A tree of pieces grows as pieces are halved. Each shape is packed relative to a center of its own.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def is_answered(question, upper, step, bound):
 
 @kernel(inline=True)
 def is_full(tree, used, size):
-    """Whether a tree has no room for two more nodes of so many integers."""
+    """Whether a tree has no room for two more nodes of `size` integers each."""
     return (used + 2) * size > tree.ints.size
 
 

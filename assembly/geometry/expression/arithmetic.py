@@ -1,4 +1,4 @@
-"""A tape, whose inputs are the two ends of an interval, run on many intervals at once: they share its decoding.
+"""A tape, whose inputs are the two ends of an interval, run on many intervals at once to share its overhead.
 
 It runs on plain doubles, for the operations that `geometry/expression/rounding.py` bounds. Every result has a place
 of its own (`apart`), because LLVM vectorizes loops that do not overwrite their arguments.

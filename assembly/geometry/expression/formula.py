@@ -6,7 +6,8 @@
 C is relative to a center, which is zero except where distances are measured.
 
 A natural interval extension is too wide by about the width of its argument. The mean value form about the middle m
-with h = (t1 - t0) / 2, C in C(m) + [-h, h] C'([t0, t1]), is too wide by its square; the two are intersected.
+with h = (t1 - t0) / 2, C in C(m) + [-h, h] C'([t0, t1]), is too wide by about the square of that width. The two are
+intersected.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """User expressions as lists of instructions, and the machine that runs them.
 
-A tape computes y from x with one work array. In the table, from place o on, stand
+A tape computes y from x with one work array. From place o on, the table holds
 
     number of instructions, where its constants begin in the pool, size of the work array,
 
-then four integers an instruction: operation, where the result goes, and the places of two arguments
+then four integers per instruction: the operation, where the result goes, and the places of two arguments
 
     CONST    work[out] = constant a          INPUT    work[out] = x[a]
     others   work[out] = operation(work[a], work[b])

@@ -1,4 +1,4 @@
-"""Whether pieces of plane curves cross or touch: parts of pairs are halved until they are apart, or tiny: they meet.
+"""Whether pieces of plane curves cross or touch: they are halved until parts are apart, or too small to be told apart.
 
 A part of a piece over an interval of width h is within r = max |C''| h^2 / 8 of its chord and, being monotone in u
 and in v, inside the box of its two ends. Two parts are apart where their boxes are, or where their chords are
@@ -20,7 +20,7 @@ _CORNER = 1e-5
 # In a cusp, where both leave the corner along one tangent up to a sine of the second, the first is that distance:
 # there curves from files overlap by rounding, and at this distance they are apart by some 1e-8 of the size at most.
 _CUSP, _TANGENT = 1e-4, 1e-4
-# Near a corner two pieces may be this close: this factor times the squared distance from the corner, over the size.
+# Near a corner two pieces may come as close as this times the squared distance from the corner, over the size.
 _OPENING = 1e-3
 _BUDGET = 2_000_000
 

@@ -82,8 +82,8 @@ PIECE_BOUNDS = record_dtype(
 )
 piece_bounds_at = record_view(PIECE_BOUNDS)
 PIECE_DOUBLES = size_of(PIECE_BOUNDS)
-# Relative error of the least squared distance that is accepted: it bounds the work where the distance hardly changes,
-# as from the center of a circle.
+# Accepted relative error of the squared distance to the nearest point: it bounds the work where the distance hardly
+# changes, as from the center of a circle.
 LET_GO = 1e-10
 _ROUNDING = 4e-15
 # Intervals that a query may look at on one piece before it takes the nearest point found so far.
@@ -147,7 +147,7 @@ def piece_bend(pool, piece, t):
     return (lane(a, 0), lane(a, 1)), (lane(b, 0), lane(b, 1)), (lane(c, 0), lane(c, 1))
 
 
-# The question where a monotone piece has the coordinate `target` on `axis`. sense: -1 if it falls along the piece.
+# A query: where a monotone piece has the coordinate `target` on `axis`. sense: -1 if that falls along the piece.
 PieceCut = namedtuple("PieceCut", "pool piece axis target sense")
 # A point of the piece. slope: how far it is beyond the target, times sense; it rises along the piece, as the slope of
 # a convex function does. curvature: the rate of the slope.

@@ -1,6 +1,6 @@
 """Whether a rigid motion maps a surface into itself: planes, cylinders and so on have one, other surfaces none.
 
-A rotation, translation or screw motion that does so moves the surface's points p tangentially, normal to n:
+A rotation, translation or screw motion that does so moves the surface's points p at right angles to the normals n:
 
     n.(a x p + d) = (p x n).a + n.d = 0        for all points, with one a and one d, not both zero.
 

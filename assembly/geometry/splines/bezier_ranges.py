@@ -2,7 +2,7 @@
 
 Homogeneous points (w x, w y, w z, w) of a piece on s in [0, 1], and those of its first three derivatives, are
 restricted to [s0, s1] by de Casteljau's algorithm, used twice. Each coordinate of a polynomial there is between the
-least and the greatest of its Bezier points; for the quotient C = X / w,
+least and the greatest of its Bezier coefficients; for the quotient C = X / w,
 
     C' = (X' - C w') / w,    C'' = (X'' - 2 C' w' - C w'') / w,    C''' = (X''' - 3 C'' w' - 3 C' w'' - C w''') / w.
 

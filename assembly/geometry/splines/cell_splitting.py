@@ -60,7 +60,7 @@ def _measure(net, bounds):
             total += sqrt(x * x + y * y + z * z)
         long_v += total
     radius = sqrt(largest)
-    # Rounding of the coordinates and of the halving: the sphere must contain, not nearly contain.
+    # The margin covers rounding of the coordinates and of the halving: the sphere must contain the cell.
     bounds.radius = radius + 1e-14 * (radius + far)
     bounds.along_u = 1.0 if long_u / columns >= long_v / rows else 0.0
 

@@ -167,8 +167,8 @@ def pole_frame(store, r, edge, u, v):
     )
 
 
-# The question which spoke of a pole points along w in its tangent plane. sense: 1 if spokes turn counterclockwise
-# about n as their parameter rises, else -1.
+# A query: which spoke of a pole points along w in its tangent plane. sense: 1 if spokes turn counterclockwise about n
+# as their parameter rises, else -1.
 SpokeQuery = namedtuple("SpokeQuery", "store surface edge w n sense interval")
 SpokeTurn = namedtuple("SpokeTurn", "slope curvature")
 
