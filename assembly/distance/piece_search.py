@@ -1,6 +1,6 @@
 """What searches over pieces of curves and over patches share: the question, the trees of pieces, and when it is over.
 
-A tree of pieces grows as they are halved; shapes are packed about centers of their own.
+A tree of pieces grows as pieces are halved. Each shape is packed relative to a center of its own.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ PieceTree = namedtuple("PieceTree", "record pool ints nodes")
 # What a search keeps.
 PIECE_SEARCH_STATE = record_dtype(
     "f8",
-    limit=1,  # pairs of at least this bound are let go [length]
-    let_go=1,  # the least bound of those that were
+    limit=1,  # pairs of at least this bound are pruned [length]
+    let_go=1,  # the least bound of the pruned pairs [length]
     used_a=1,  # nodes of the trees
     used_b=1,
     met=1,  # 1: a meeting is proven
@@ -36,7 +36,7 @@ STATE = size_of(PIECE_SEARCH_STATE)
 
 @kernel(inline=True)
 def bound_to_beat(question, upper, step):
-    """Pairs of at least this bound are let go."""
+    """The limit: pairs whose lower bound is at least this are pruned."""
     limit = upper - step
     if question.clearance >= 0.0:
         limit = min(limit, question.clearance * (1.0 + 4.0 * UNIT) + 1e-300)
@@ -45,7 +45,7 @@ def bound_to_beat(question, upper, step):
 
 @kernel(inline=True)
 def ended(question, upper, step, top, left, bounded):
-    """What a search with `left` pairs in its heap ends with; -1: not yet."""
+    """The status with which a search with `left` pairs in its heap ends; -1: it goes on."""
     if question.clearance >= 0.0:
         if upper <= question.clearance:
             return NEAR
@@ -58,13 +58,13 @@ def ended(question, upper, step, top, left, bounded):
 
 @kernel(inline=True)
 def is_answered(question, upper, step, bound):
-    """Whether nothing below the bound can change the answer."""
+    """Whether pairs of at least this bound can no longer change the answer."""
     return bound >= upper - step or bound > question.clearance >= 0.0
 
 
 @kernel(inline=True)
 def is_full(tree, used, size):
-    """Whether a tree has no room for two more nodes of so many integers."""
+    """Whether a tree has no room for two more nodes of `size` integers each."""
     return (used + 2) * size > tree.ints.size
 
 
@@ -78,7 +78,7 @@ def crowded(search, left, size):
 
 @kernel(inner=True, allocates=True)
 def roomier(search, left, size):
-    """The trees and the heap of a search, larger where they are too small."""
+    """The trees and the heap of a search, copied to larger arrays where theirs are full."""
     state = search_state_at(search.state, 0)
     a, b, heap = search.a, search.b, search.heap
     if is_full(a, state.used_a, size):
@@ -92,7 +92,7 @@ def roomier(search, left, size):
 
 @kernel(inline=True)
 def in_span(pool, at, u):
-    """The parameter of a place from 0 to 1 on the span that begins at pool[at]; rounding does not lead out of it."""
+    """The parameter at the place u, from 0 to 1, of the span that begins at pool[at]; clamped to it after rounding."""
     low = pool[at]
     high = pool[at + 1]
     return min(max(low * (1.0 - u) + high * u, low), high)

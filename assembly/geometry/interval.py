@@ -6,8 +6,8 @@ An interval is a pair (lo, hi). Every operation of doubles errs by half a unit o
 
 for sums, differences, products, quotients and square roots (the relative term is twice the half unit, which pays for
 the roundings of down and up themselves; the absolute one is for numbers that underflow). Elementary functions are
-widened by 8 units: the libraries in use promise 4 or less. What is not a number, and what no bound is known of, is
-the whole line.
+widened by 8 units: the libraries in use promise 4 or less. A result that is NaN or has no known bound becomes the
+whole line.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from assembly._kernel import kernel
 EPSILON = 2.0**-52
 TINY = 1e-300
 LIBRARY = 8.0 * EPSILON
-# Beyond this a sine is not traced to its period.
+# The sine and cosine of larger arguments get the bounds -1 and 1.
 FAR = 1e8
 
 
@@ -90,7 +90,7 @@ def iquotient(a, b):
 
 @kernel(inline=True)
 def meet(a, b):
-    """What two intervals that enclose one number have in common; the first where rounding parts them."""
+    """The intersection of two intervals that enclose the same number; the first if rounding makes them disjoint."""
     lo = max(a[0], b[0])
     hi = min(a[1], b[1])
     if not (lo <= hi):
@@ -113,9 +113,9 @@ def reaches(lo, hi, first, period):
 
 @kernel(inline=True)
 def iwave(lo, hi, p, q, top):
-    """Bounds of a sine or cosine from its values p and q at the ends; `top` is where it is one.
+    """Bounds of a sine or cosine from its values p and q at the ends; `top` is where its value is one.
 
-    Near a turn, closer than 1e-7 of a period, the turn counts as inside.
+    An extremum closer than 1e-7 of a period to the interval counts as inside.
     """
     low = min(p, q)
     high = max(p, q)
@@ -125,7 +125,7 @@ def iwave(lo, hi, p, q, top):
         if reaches(lo, hi, top + math.pi, 2.0 * math.pi):
             low = -1.0
     elif hi != lo:
-        # Between the ends it is off its larger end by an eighth of the square of the width at most.
+        # Between its ends the function leaves its chord by at most an eighth of the square of the width.
         bend = 0.125 * (hi - lo) * (hi - lo)
         low -= bend
         high += bend
@@ -207,7 +207,7 @@ def middle_of(x, o, k):
 
 @kernel(inner=True, exact=True)
 def off_of(x, o):
-    """How far the middle of three pairs may be from what they enclose."""
+    """Upper bound of the distance from the middle of a box, three pairs, to any point in it."""
     a = x[o + 1] - x[o]
     b = x[o + 3] - x[o + 2]
     c = x[o + 5] - x[o + 4]
@@ -218,7 +218,7 @@ def off_of(x, o):
 
 @kernel(inner=True, exact=True)
 def most(x, o):
-    """Largest norm of what three pairs enclose."""
+    """Upper bound of the norm of a vector that three pairs enclose."""
     a = magnitude((x[o], x[o + 1]))
     b = magnitude((x[o + 2], x[o + 3]))
     c = magnitude((x[o + 4], x[o + 5]))

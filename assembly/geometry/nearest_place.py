@@ -1,6 +1,6 @@
-"""The place of a curve that is nearest to a point, by Newton's method in an interval: `damped_newton` with these steps.
+"""The parameter at which a curve is nearest to a point, by Newton's method in an interval: steps for `damped_newton`.
 
-A query has the field `interval`, an `Interval`; what is evaluated at a place x of the curve c has those of a `Sight`.
+A query has the field `interval`, an `Interval`; what is evaluated at a parameter x of the curve c is a `Sight`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from assembly.geometry.vec import dot
 _PROMISE = 1e-15
 # A curve counts as straight where the curvature of the squared distance is less than this part of its speed's square.
 _STRAIGHT = 1e-3
-# A step of more than this part of the interval that promises nothing is rounding, where the curve stands still.
+# A last step longer than this part of the interval, which promises no decrease, is not taken: it is rounding over a
+# vanishing speed.
 _LONG = 1e-3
 # Where a parameter may be: held at the ends, or wrapped round.
 Interval = namedtuple("Interval", "low high closed")
@@ -25,7 +26,7 @@ Sight = namedtuple("Sight", "merit slope curvature square")
 
 @kernel(inline=True)
 def sight_of(d, first, second):
-    """The `Sight` of a point by d and two derivatives; without the second it is as in Gauss and Newton's method."""
+    """The `Sight` of a point by d and two derivatives; with a second derivative of zero its step is Gauss-Newton's."""
     square = dot(first, first)
     return Sight(0.5 * dot(d, d), dot(d, first), square + dot(d, second), square)
 
@@ -42,7 +43,7 @@ def held_in(interval, x):
 @kernel(inline=True)
 def step_along(query, x, at):
     """Newton's step along a curve; where the squared distance is not convex, as if the curve were straight."""
-    # A whole turn would lead back.
+    # On a closed curve a step of a whole period would lead back.
     width = (0.5 if query.interval.closed else 1.0) * (query.interval.high - query.interval.low)
     curvature = at.curvature if at.curvature > _STRAIGHT * at.square else max(at.square, 1e-300)
     step = min(max(-at.slope / curvature, -width), width)
@@ -52,5 +53,5 @@ def step_along(query, x, at):
 
 @kernel(inline=True)
 def move_along(query, x, part, step):
-    """The place after a part of a step."""
+    """The parameter after a part of a step."""
     return held_in(query.interval, x + part * step)

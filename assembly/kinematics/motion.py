@@ -15,7 +15,7 @@ from assembly.geometry.vec import matmul_t, matvec, matvec_t, neg, quaternion_ma
 # The pose of a shape in the axes that a kernel works in, mostly those of another body: a rotation matrix by rows and
 # the place of the shape's origin.
 RelativePose = namedtuple("RelativePose", "rotation shift")
-# Of a shape in its own axes.
+# The pose of a shape in its own axes.
 IDENTITY = RelativePose((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
 
 

@@ -79,7 +79,7 @@ patch_answer_at = record_view(PATCH_ANSWER_RECORD)
 PATCH_ANSWER = size_of(PATCH_ANSWER_RECORD)
 # a, b: trees; curve: the one given by a formula that b stands for, or None; heap: pairs of nodes; state, out: blocks of
 # PIECE_SEARCH_STATE and PATCH_ANSWER_RECORD; shift: from the center of a to that of b; slack: of a difference of two
-# points; errors: of evaluated points and derivatives; step: bounds within this of each other are one; w, m: for work.
+# points; errors: of evaluated points and derivatives; step: bounds this close count as equal; w, m: scratch arrays.
 PatchSearch = namedtuple("PatchSearch", "a b curve heap state out question shift slack errors step w m")
 _ROOM = 512
 
@@ -110,7 +110,7 @@ def derivative_error(record, pool):
 
 @kernel(inline=True)
 def between(pool, at, low, high, x):
-    """The parameter of a place on a node of one direction."""
+    """The parameter, in one direction, of the place x from 0 to 1 across a node."""
     return in_span(pool, at, low + x * (high - low))
 
 
@@ -128,7 +128,7 @@ def parameters_at(curve, tree, k, x, y):
 
 @kernel(inline=True)
 def freedom(curve, tree, k):
-    """How many parameters a node has; one that counts as a point has none."""
+    """How many parameters a node has: none if it counts as a point."""
     if curve is not None:
         return 0 if is_dot(tree.nodes, patch_stride(tree.record) * k) else 1
     return free_count(tree.record)
@@ -136,15 +136,15 @@ def freedom(curve, tree, k):
 
 @kernel(inline=True)
 def remainder(curve, patch):
-    """How far a piece may be from its rows: those of a formula are its model's, which is not the curve."""
+    """How far a piece may be from what its rows describe: the rows of a formula describe a model, not the curve."""
     return 0.0 if curve is None else node_of(patch).e0
 
 
 @kernel(inner=True)
 def first_half(curve, tree, k, used, short, m):
-    """The first half of node k, made as node `used` if need be; how many nodes there are then.
+    """The first half of node k, and how many nodes there are; halves not yet made become nodes `used`, `used + 1`.
 
-    A piece of a formula below the radius `short` counts as a point.
+    A piece of a formula whose radius is below `short` counts as a point.
     """
     half = patch_links_of(tree, k).halves
     if half >= 0:
@@ -172,7 +172,7 @@ def compared(search, i, j):
 
 @kernel(inner=True)
 def keep_nearer(search, i, j, found):
-    """Keep nearest points that are known: at PLACE of two nodes."""
+    """Keep the points `found` as the nearest ones so far, with their parameters from `place` in nodes i and j."""
     place = patch_work_at(search.w, 0).place
     answer = patch_answer_at(search.out, 0)
     answer.upper = found.upper
@@ -207,7 +207,7 @@ def pair_bound(search, i, j):
 
 @kernel(inline=True)
 def search_ended(search, top, left):
-    """What the search ends with; -1: not yet."""
+    """The status with which the search ends; -1: it goes on."""
     answer = patch_answer_at(search.out, 0)
     answer.lower = max(min(top, answer.upper), 0.0)
     status = ended(search.question, answer.upper, search.step, top, left, answer.count)
@@ -216,7 +216,7 @@ def search_ended(search, top, left):
 
 @kernel(inline=True)
 def examine(search, key, i, j):
-    """Nearest points of two nodes by their models and Newton's method: their bound, and whether that is final."""
+    """Bound two nodes by their models and Newton's method, keep nearer points; the bound, and whether it is final."""
     a, b = compared(search, i, j)
     n = a.free + b.free
     w, curve, shift, error = search.w, search.curve, search.shift, search.errors[0]
@@ -241,7 +241,7 @@ def examine(search, key, i, j):
     if found.upper < answer.upper:
         keep_nearer(search, i, j, found)
     if proven:
-        # A dot's point stands for others: no patch, however small, comes nearer to the truth than that.
+        # The point of a dot stands for its whole piece: halving the patch brings the bounds no closer than this.
         doubt = 2.0 * remainder(curve, b) if b.free == 0 else 0.0
         key = max(key, found.lower - doubt)
         if found.upper - found.lower <= max(search.step, 16.0 * (error + away)) + doubt:
@@ -251,7 +251,7 @@ def examine(search, key, i, j):
 
 @kernel(inline=True)
 def branch(search, key, i, j):
-    """A bound of a pair, and the halves of its longer node with the other one; none where it is let go."""
+    """The bound of a pair, and the pairs from halving its longer node; none where the pair is pruned."""
     a, b = search.a, search.b
     state = search_state_at(search.state, 0)
     key, final = examine(search, key, i, j)
@@ -294,9 +294,9 @@ def new_tree(curve, record, pool, short, m):
 
 @kernel(inner=True)
 def start_pairs(search):
-    """All pairs of patches, by their boxes: these must do where there are many. How many wait."""
+    """Push all pairs of patches, bounded by their boxes alone since there may be many; how many are in the heap."""
     state = search_state_at(search.state, 0)
-    # The first corners are on both shapes.
+    # The first corner of each shape is on it: their distance is an upper bound.
     a, b = compared(search, 0, 0)
     found = proven_in_patches(a, b, search.curve, search.shift, search.errors, False, search.w)
     keep_nearer(search, 0, 0, found)
@@ -322,9 +322,10 @@ def start_pairs(search):
     allocates=True,
 )
 def patch_distance(ra, qa, rb, qb, curve, asked, out):
-    """Bounds of the distance of two packed shapes, the first no point; a clearance below zero asks for the distance.
+    """Bounds of the distance of two packed shapes, the first of which is not a point, to `out`; returns the status.
 
-    The second may stand for a curve given by a formula, which is None else.
+    A clearance below zero asks for the distance itself. The second shape may stand for a curve given by a formula,
+    `curve`, which is None otherwise.
     """
     question = Question(*asked)
     head, other = bezier_head_at(qa, 0), bezier_head_at(qb, 0)
@@ -338,7 +339,7 @@ def patch_distance(ra, qa, rb, qb, curve, asked, out):
     b, used_b = new_tree(curve, rb, qb, 0.125 * step, m)
     first, second = bezier_surface_at(ra, 0), bezier_surface_at(rb, 0)
     degree = max(max(first.degree_u, first.degree_v), max(second.degree_u, second.degree_v))
-    # K of parameters of different shapes stays zero.
+    # Entries of K for parameters of different shapes stay zero.
     w = np.zeros(BASIS + 6 * (degree + 1))
     heap, block = np.empty((used_a * used_b + _ROOM) * PAIR), np.empty(STATE)
     state = search_state_at(block, 0)

@@ -1,7 +1,7 @@
-"""A tape of two ends of an interval run on many intervals at a time, so that they share the cost of an instruction.
+"""A tape, whose inputs are the two ends of an interval, run on many intervals at once to share its overhead.
 
-Of plain doubles, for the operations that `geometry/expression/rounding.py` bounds, with a place for every result
-(`apart`): LLVM makes vectors of loops whose results are not written over their arguments.
+It runs on plain doubles, for the operations that `geometry/expression/rounding.py` bounds. Every result has a place
+of its own (`apart`), because LLVM vectorizes loops that do not overwrite their arguments.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ LANES = 64
 
 @kernel(inner=True, allocates=True)
 def lane_constants(store, o):
-    """Work of a tape, a row a result, with its constants in their places."""
+    """The work array of a tape, one row per result, with its constants filled in."""
     tape = tape_at(store.table, o)
     count = tape.count
     work = np.empty((count, LANES))
@@ -50,7 +50,7 @@ def lane_constants(store, o):
 
 @kernel(inner=True, exact=True)
 def run_lanes(table, o, lo, hi, first, work, out):
-    """Run the tape at table[o] on the intervals [lo, hi] from the first on, to out; infinite where it is no length."""
+    """Run the tape at table[o] on up to LANES intervals [lo, hi] from `first` on; infinity where no length results."""
     count = min(LANES, lo.size - first)
     for k in range(tape_at(table, o).count):
         p = o + HEAD + INSTRUCTION * k
@@ -63,7 +63,7 @@ def run_lanes(table, o, lo, hi, first, work, out):
             ends = lo if i == 0 else hi
             for m in range(count):
                 r[m] = ends[first + m]
-            # The rest of a last row is computed and not used.
+            # Lanes beyond the last interval are computed too, but not used.
             for m in range(count, LANES):
                 r[m] = ends[first]
             continue

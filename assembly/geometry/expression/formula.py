@@ -3,10 +3,11 @@
     [C, C', C'']            by doubles, or by intervals that enclose them, at t (three numbers each; z = 0 in the plane)
     [C, C', C'', C''']      by intervals that enclose them over [t0, t1]
 
-C is taken about a center, zero but for what measures distances.
+C is relative to a center, which is zero except where distances are measured.
 
-A natural interval extension is too wide by about the width of its argument. What the derivative tells over h = (t1 -
-t0) / 2 about the middle m, C in C(m) + [-h, h] C'([t0, t1]), is too wide by its square; the two are met.
+A natural interval extension is too wide by about the width of its argument. The mean value form about the middle m
+with h = (t1 - t0) / 2, C in C(m) + [-h, h] C'([t0, t1]), is too wide by about the square of that width. The two are
+intersected.
 """
 
 from __future__ import annotations
@@ -40,12 +41,12 @@ FORMULA_HEAD = record_dtype(
     "f8",
     domain=2,  # ends of the parameter
     error=1,  # how far C may be off [length]
-    center=3,  # that C is taken about [length]
+    center=3,  # subtracted from C [length]
 )
 formula_head_at = record_view(FORMULA_HEAD)
 CENTER = place_of(FORMULA_HEAD, "center")
 FORMULA_POOL = size_of(FORMULA_HEAD)
-# Room for a run; the work of the tape stands behind it.
+# Workspace of a run; the work array of the tape follows it.
 FORMULA_WORKSPACE = record_dtype(
     "f8",
     arguments=4,  # t, or ends of intervals
@@ -54,7 +55,7 @@ FORMULA_WORKSPACE = record_dtype(
 formula_workspace_at = record_view(FORMULA_WORKSPACE)
 RESULTS = place_of(FORMULA_WORKSPACE, "results")
 WORK_AT = size_of(FORMULA_WORKSPACE)
-# Numbers of C, C', C'' at a point, and of C, C', C'', C''' over an interval; what is written of an interval.
+# How many numbers C, C', C'' at a point are, and C, C', C'', C''' over an interval; the row written for an interval.
 _VALUES, _ORDERS = 9, 12
 FORMULA_RANGE = record_dtype(
     "f8",
@@ -73,7 +74,7 @@ def run(store, tape, workspace):
 
 @kernel(inline=True, exact=True)
 def bound(store, tape, workspace):
-    """Run a tape on the intervals in a workspace; what it tells of kinks and jumps."""
+    """Run a tape on the intervals in a workspace; returns SMOOTH, KINK or JUMP."""
     return run_bounds(store, tape, workspace, workspace[WORK_AT:], workspace[RESULTS:])
 
 
@@ -89,7 +90,7 @@ def formula_point(store, t, workspace):
 
 @kernel(inline=True)
 def forget(table, workspace, first, last):
-    """The whole line for orders of the results, as far as there are coordinates."""
+    """Set the results of orders first to last - 1 to the whole line, in every coordinate of the curve."""
     results = formula_workspace_at(workspace, 0).results
     for order in range(first, last):
         for k in range(formula_at(table, 0).dimension):
@@ -100,7 +101,10 @@ def forget(table, workspace, first, last):
 
 @kernel(inline=True)
 def finish_bounds(store, workspace, told, orders):
-    """Widen bounds of a run: of derivatives that do not exist, below `orders`; of C by its error, about the center."""
+    """Widen the bounds of a run: C by its error, derivatives below `orders` that may not exist to the whole line.
+
+    C is then taken relative to the center.
+    """
     head = formula_head_at(store.pool, 0)
     formula = formula_at(store.table, 0)
     if told >= KINK:
@@ -143,7 +147,7 @@ def range_bounds(store, lo, hi, workspace):
 
 @kernel(inline=True)
 def about_the_middle(middle, half, slope):
-    """Range of a function from its value in the middle and its slope; `half` is half the width, rounded up."""
+    """The mean value form: bounds of a function from its value at the middle and its slope; `half` is rounded up."""
     reach = half * magnitude(slope)
     lo, hi = widened(middle[0] - reach, middle[1] + reach, 2.220446049250313e-16)
     # A second rounding, of the product.
@@ -152,7 +156,7 @@ def about_the_middle(middle, half, slope):
 
 @kernel(inner=True, exact=True)
 def refine(values, o, half, m):
-    """Meet the ranges at values[o:] (twelve pairs) with what values at the middle, m (nine pairs from there), tell."""
+    """Intersect the ranges at values[o:] (twelve pairs) with mean value forms; values[m:] has the middle's (nine)."""
     for order in range(2, -1, -1):
         for k in range(3):
             at = o + 6 * order + 2 * k
@@ -166,7 +170,7 @@ def refine(values, o, half, m):
 
 @kernel(inner=True, exact=True)
 def arc_bound(store, lo, hi, workspace):
-    """Upper bound of the length of arc over [lo, hi] by the user's expression; infinite where it has no length."""
+    """Upper bound of the arc length over [lo, hi] by the user's expression; infinite where that gives none."""
     formula = formula_at(store.table, 0)
     results = formula_workspace_at(workspace, 0).results
     if formula.arc_tape == 0:
@@ -202,8 +206,8 @@ def formula_points(table, pool, t, out, workspace):
 def formula_ranges(table, pool, lo, hi, out, workspace):
     """Bounds over the intervals [lo[i], hi[i]] to out (n, 43).
 
-    Twelve pairs over the interval, nine pairs at its middle, and the user's bound of the length of arc. Returns what
-    the runs tell, the worst of it.
+    Twelve pairs over the interval, nine pairs at its middle, and the user's bound of the arc length. Returns the
+    worst of SMOOTH, KINK and JUMP over the intervals.
     """
     store = Store(table, pool)
     results = formula_workspace_at(workspace, 0).results
@@ -224,7 +228,7 @@ def formula_ranges(table, pool, lo, hi, out, workspace):
 
 @kernel(signatures="(i8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])", allocates=True)
 def arc_bounds(table, pool, lo, hi, out, workspace):
-    """`arc_bound` of every interval [lo[i], hi[i]]; many at a time where plain doubles do."""
+    """`arc_bound` of every interval [lo[i], hi[i]]; many at a time where plain doubles suffice."""
     store = Store(table, pool)
     formula = formula_at(table, 0)
     if formula.arc_tape != 0 and formula.arc_plain != 0:

@@ -1,17 +1,17 @@
 """User expressions as lists of instructions, and the machine that runs them.
 
-A tape computes y from x with one work array. In the table, from place o on, stand
+A tape computes y from x with one work array. From place o on, the table holds
 
     number of instructions, where its constants begin in the pool, size of the work array,
 
-then four integers an instruction: operation, where the result goes, and the places of two arguments
+then four integers per instruction: the operation, where the result goes, and the places of two arguments
 
     CONST    work[out] = constant a          INPUT    work[out] = x[a]
     others   work[out] = operation(work[a], work[b])
     OUTPUT   y[out] = work[a]
 
-Every result is that of CasADi's own machine (casadi/core/calculus.hpp), infinities, zeros' signs and NaN included, so
-no multiplication is fused with an addition here. As plain Python, numpy's functions warn of what they are given.
+Every result equals that of CasADi's own machine (casadi/core/calculus.hpp), with infinities, signs of zeros and NaN,
+so no multiplication is fused with an addition here. Run uncompiled, numpy's functions warn of invalid arguments.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def remainder(x, y):
 
 @kernel(inner=True, exact=True)
 def erfinv(x):
-    """CasADi's inverse of the error function: to 4e-6 below -0.7, which it does not polish, to 2e-15 elsewhere."""
+    """CasADi's inverse error function: good to 4e-6 below -0.7, where no Newton step follows, to 2e-15 elsewhere."""
     if x >= 1.0 or x <= -1.0:
         return math.copysign(math.inf, x) if x == 1.0 or x == -1.0 else math.nan
     if -0.7 <= x < 0.7:
@@ -176,14 +176,14 @@ def rare_operation(code, x, y):
 
 @kernel(inner=True, exact=True)
 def run_tape(store, o, x, work, y):
-    """Run the tape that begins at table[o]: y of x. All of y that the tape knows is written."""
+    """Run the tape that begins at table[o]: y from x. Entries of y without an OUTPUT instruction keep their values."""
     tape = tape_at(store.table, o)
     constants = np.uint64(tape.constants)
     begin = o + HEAD
     for k in range(begin, begin + INSTRUCTION * tape.count, INSTRUCTION):
         instruction = instruction_at(store.table, k)
         code = instruction.code
-        # Unsigned, because Numba tests a signed index for being counted from the end: a fifth of the time.
+        # Unsigned: Numba checks whether a signed index is negative, which takes a fifth of the time.
         out = np.uint64(instruction.out)
         a = np.uint64(instruction.a)
         b = np.uint64(instruction.b)

@@ -1,11 +1,11 @@
 """A tape run on intervals: bounds of an expression over an interval, rounded outward (`geometry/interval.py`).
 
-Where an argument leaves the domain of a root, a logarithm, an arc sine and their like, the part inside counts: an
-expression is taken to be defined on its domain, and its intervals are wider than its values. With no part inside it is
-the whole line.
+Where an argument leaves the domain of a square root, a logarithm, an arc sine and the like, only its part inside
+counts: the expression is assumed to be defined, and intervals are wider than true ranges. With no part inside, the
+result is the whole line.
 
-The machine also tells whether a kink (of abs, min, max ...) or a jump (of sign, floor, comparisons ...) may lie in
-the interval: derivatives of an expression, as CasADi makes them, know nothing of those.
+A run also returns whether a kink (of abs, min, max ...) or a jump (of sign, floor, comparisons ...) may lie in the
+interval: CasADi's derivatives of an expression ignore those.
 """
 
 from __future__ import annotations
@@ -94,15 +94,15 @@ from assembly.geometry.interval import (
     widened,
 )
 
-# What a run tells: no kink or jump inside, a kink, a jump.
+# What a run returns: no kink or jump inside, a possible kink, a possible jump.
 SMOOTH, KINK, JUMP = 0, 1, 2
-# Of CasADi's inverse error function, beside its own rounding.
+# Relative error allowed for CasADi's inverse error function, far above rounding.
 _ERFINV = 1e-5
 
 
 @kernel(inline=True)
 def truth(sure, possible):
-    """A comparison that certainly, possibly or never holds, and whether that is open."""
+    """Bounds of a comparison, as 0 or 1, from whether it surely holds and whether it possibly does."""
     return (1.0 if sure else 0.0), (1.0 if possible else 0.0)
 
 
@@ -114,7 +114,7 @@ def least_size(a):
 
 @kernel(inline=True, exact=True)
 def smooth_bounds(code, a, b):
-    """Bounds of an operation without kinks, by which part of them they are off, and what it tells of jumps."""
+    """Bounds of an operation without kinks, their relative error, and SMOOTH or JUMP."""
     told = SMOOTH
     lo, hi = -math.inf, math.inf
     part = LIBRARY
@@ -175,7 +175,7 @@ def smooth_bounds(code, a, b):
 
 @kernel(inline=True, exact=True)
 def kinked_bounds(code, a, b):
-    """Bounds of an operation with kinks or jumps that is no comparison, and what it tells of them."""
+    """Bounds of an operation with kinks or jumps that is not a comparison, and SMOOTH, KINK or JUMP."""
     told = SMOOTH
     lo, hi = -math.inf, math.inf
     if code == FABS:
@@ -204,7 +204,7 @@ def kinked_bounds(code, a, b):
         if a[0] <= b[1] and b[0] <= a[1]:
             told = KINK
     elif code == FLOOR or code == CEIL:
-        # Not those of `math`, which are integers and know no infinity.
+        # Not those of `math`, which return integers and fail at infinity.
         lo = np.floor(a[0]) if code == FLOOR else np.ceil(a[0])
         hi = np.floor(a[1]) if code == FLOOR else np.ceil(a[1])
         if lo != hi or a[0] == lo or a[1] == hi:
@@ -215,7 +215,7 @@ def kinked_bounds(code, a, b):
         if magnitude(a) < whole * divisor:
             lo, hi = a
         elif code == FMOD and b[0] == b[1] and same_quotient(a, b[0]):
-            # Doubles divide without a rounding here.
+            # The fmod of doubles is exact.
             lo, hi = np.fmod(a[0], b[0]), np.fmod(a[1], b[0])
         else:
             far = min(magnitude(a), magnitude(b))
@@ -226,7 +226,7 @@ def kinked_bounds(code, a, b):
 
 @kernel(inline=True)
 def compared(code, a, b):
-    """Bounds of a comparison, or of a choice by one, and what it tells of jumps."""
+    """Bounds of a comparison, or of a choice by one, and SMOOTH or JUMP."""
     told = SMOOTH
     no_a = a[0] == 0.0 and a[1] == 0.0
     no_b = b[0] == 0.0 and b[1] == 0.0
@@ -260,7 +260,7 @@ def compared(code, a, b):
 
 @kernel(inner=True, exact=True)
 def elementary(code, a, b):
-    """Bounds of one rare operation, and what it tells of kinks and jumps."""
+    """Bounds of one rare operation, and SMOOTH, KINK or JUMP."""
     if LT <= code <= IF_ELSE_ZERO:
         lo, hi, told = compared(code, a, b)
     elif FABS <= code <= REMAINDER:
@@ -276,7 +276,7 @@ def elementary(code, a, b):
 
 @kernel(inline=True)
 def same_quotient(a, b):
-    """Whether a / b has one integer part all over the interval a; below 1e15 two roundings do not hide it."""
+    """Whether a / b has the same integer part over the whole interval a; below 1e15 roundings do not hide it."""
     if b == 0.0 or not magnitude(a) < 1e15 * abs(b):
         return False
     low = np.floor((a[0] - np.fmod(a[0], b)) / b + 0.5)
@@ -301,7 +301,7 @@ def is_undefined(code, a, b, lo, hi):
 
 @kernel(inline=True)
 def chosen(code, a, b, lo, hi, told):
-    """Bounds of an operation that makes a value of one that is none: fmin(x, NaN) is x, and no comparison holds."""
+    """Bounds of an operation whose result is a number though an argument may be NaN: fmin(x, NaN) is x."""
     if code == FMIN or code == FMAX:
         return min(a[0], b[0]), max(a[1], b[1]), JUMP
     if LT <= code <= OR:
@@ -313,12 +313,12 @@ def chosen(code, a, b, lo, hi, told):
 
 @kernel(inner=True, exact=True)
 def run_bounds(store, o, x, work, y):
-    """Run the tape that begins at table[o] on intervals: pairs (lo, hi) in x, work and y. Returns what it tells."""
+    """Run the tape that begins at table[o] on intervals, pairs (lo, hi) in x, work and y; SMOOTH, KINK or JUMP."""
     tape = tape_at(store.table, o)
     constants = np.uint64(tape.constants)
     begin = o + HEAD
     told = SMOOTH
-    # Whether some value so far may be none.
+    # Whether some value so far may be undefined (NaN).
     undefined = False
     for k in range(begin, begin + INSTRUCTION * tape.count, INSTRUCTION):
         instruction = instruction_at(store.table, k)

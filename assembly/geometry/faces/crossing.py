@@ -1,8 +1,8 @@
-"""Whether pieces of plane curves cross or touch: pairs of pieces are halved until they are apart, or too small to be.
+"""Whether pieces of plane curves cross or touch: they are halved until parts are apart, or too small to be told apart.
 
-A part of a piece over an interval of width h is within r = max |C''| h^2 / 8 of its chord, and, as it runs one way in
-u and in v, inside the box of its two ends. Two parts are apart where their boxes are, or where their chords are
-farther apart than both r together.
+A part of a piece over an interval of width h is within r = max |C''| h^2 / 8 of its chord and, being monotone in u
+and in v, inside the box of its two ends. Two parts are apart where their boxes are, or where their chords are
+farther apart than the sum of their r.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.geometry.faces.trim_pieces import bounds_of, links_of, piece_line, piece_of, trim_at, trim_frame_at
 
-# Around a corner that two pieces share, as a part of the size, they are not compared.
+# Within this distance of a corner that two pieces share they are not compared (a part of the size).
 _CORNER = 1e-5
-# The same where they leave it along one tangent, with a sine of less than the second: in a cusp curves of files go into
-# each other by what rounding makes of them, and so far from the corner they are apart by some 1e-8 of the size at most.
+# In a cusp, where both leave the corner along one tangent up to a sine of the second, the first is that distance:
+# there curves from files overlap by rounding, and at this distance they are apart by some 1e-8 of the size at most.
 _CUSP, _TANGENT = 1e-4, 1e-4
-# Near it they may be as near to one another as this part of the square of their distance from it.
+# Near a corner two pieces may come as close as this times the squared distance from the corner, over the size.
 _OPENING = 1e-3
 _BUDGET = 2_000_000
 
@@ -64,8 +64,8 @@ def _segments(a, b, c, d):
 # A piece that is compared. start, end: its ends; shift: moves its curve into the cell; move: moves it by whole periods;
 # bound: on its second derivative.
 MovedPiece = namedtuple("MovedPiece", "piece start end shift move bound")
-# Corners that two pieces share: how many there are, and where, twice where there is one; how far around them the two
-# are not compared.
+# Corners that two pieces share. count: how many; first, second: where, both the same if there is one; around_first,
+# around_second: within which distances of them the two pieces are not compared.
 Corners = namedtuple("Corners", "count first second around_first around_second")
 
 
@@ -85,7 +85,7 @@ def _moved(store, trim, k, move):
 
 @kernel(inner=True)
 def _place(pool, moved, t):
-    """The point of a piece at a parameter; its ends are as the table has them."""
+    """The point of a piece at a parameter; at its ends, the points that the table has."""
     move = moved.move
     if t <= moved.piece.t0:
         return moved.start[0] + move[0], moved.start[1] + move[1]
@@ -97,7 +97,7 @@ def _place(pool, moved, t):
 
 @kernel(inner=True)
 def _follows(store, trim, a, b, most):
-    """Whether b comes after a, at once or after a stretch of no more than a length."""
+    """Whether piece b follows piece a, with pieces of a length of at most `most` between them."""
     length = 0.0
     k = links_of(store, trim, a).after
     while k >= 0:
@@ -134,9 +134,10 @@ def _is_cusp(pool, pair, ends):
 
 @kernel(inner=True)
 def _common(pool, pair, ends, tolerance, size):
-    """How far around an end, the last or the first one, of two pieces they are not compared; 0 if it is not common.
+    """The radius around a common end of two pieces within which they are not compared; 0 if these ends differ.
 
-    Also how long what is between the two may be. In a cusp a piece of a curve that is one by rounding may be there.
+    `ends` says of each piece whether its last end is meant. The second value is the length that pieces between the
+    two may have: in a cusp there may be a tiny piece that is due to rounding.
     """
     a, b = pair
     p, q = a.end if ends[0] else a.start, b.end if ends[1] else b.start
@@ -153,14 +154,14 @@ def _common(pool, pair, ends, tolerance, size):
 
 @kernel(inner=True)
 def _comes_after(store, trim, numbers, pair, tolerance, size):
-    """How far around the end of the first of two pieces they are not compared, if the second begins there; else 0."""
+    """The radius around the end of the first of two pieces without comparison, if the second begins there; else 0."""
     around, between = _common(store.pool, pair, (True, False), tolerance, size)
     return around if around > 0.0 and _follows(store, trim, numbers[0], numbers[1], between) else 0.0
 
 
 @kernel(inner=True)
 def _corners(store, trim, numbers, pair, tolerance, size):
-    """The Corners of a pair of pieces, whose numbers these are."""
+    """The Corners of a pair of pieces with these numbers: where one follows the other."""
     a, b = pair
     after = _comes_after(store, trim, numbers, pair, tolerance, size)
     before = _comes_after(store, trim, (numbers[1], numbers[0]), (b, a), tolerance, size)
@@ -214,7 +215,7 @@ def _gap(p, q, r, s):
 
 @kernel(inner=True)
 def _meet(pool, a, b, corners, tolerance, size, stack, budget):
-    """Whether two pieces meet beside a common corner, where, and what is left of the budget."""
+    """Whether two pieces meet elsewhere than at a common corner, where, and what is left of the budget."""
     stack[0, 0], stack[0, 1] = a.piece.t0, a.piece.t1
     stack[0, 2], stack[0, 3] = b.piece.t0, b.piece.t1
     top = 1
@@ -259,8 +260,8 @@ def find_crossing(table, pool, pieces, moves, tolerance, joined, where):
     """The first two pieces that cross, touch or overlap: their numbers, and the point in `where`; (-1, -1): none.
 
     `pieces` are numbers of pieces of the trim at the start of the table, in the order of their least u after each is
-    moved by its row of `moves` (whole periods). Two pieces may meet where one follows the other; if they are `joined`,
-    wherever ends of both are one place.
+    moved by its row of `moves` (whole periods). Two pieces may meet where one follows the other; if `joined`, wherever
+    two of their ends coincide.
     """
     store = Store(table, pool)
     record = trim_at(table, 0)

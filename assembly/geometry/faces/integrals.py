@@ -64,8 +64,9 @@ def _add_column(store, u, v, levels, rule, center, factor, out):
 def along_pieces(table, pool, rows, places, levels, rule, center, out):
     """Integrals of u' G over parts of pieces.
 
-    A row of `rows` holds t0, t1, the middle of the span, and what moves the curve into the cell, one of
-    `places` where its coefficients are and its degree; `levels` are the knots of v within the cell, with its ends.
+    A row of `rows` holds t0, t1, the middle of the span, and the shift in u and v that moves the curve into the cell.
+    A row of `places` holds where in the pool the coefficients are, and the degree. `levels` are the knots of v within
+    the cell, and the cell's two ends.
     """
     for k in range(rows.shape[0]):
         piece = Piece(places[k, 0], places[k, 1], rows[k, 2], rows[k, 0], rows[k, 1])

@@ -7,8 +7,8 @@ A span of a rational curve is C = N / w with Bezier points of N and w; the sign 
 whose Bernstein coefficients follow from products of Bernstein polynomials (Farouki & Rajan, "Algorithms for
 polynomials in Bernstein form", 1988). Its roots are where the curve is cut: each piece then stays in one octant of
 directions, its box is spanned by its two ends, and one of u and v changes along it at least as fast as the other.
-Where weights differ much along a piece, so does its speed, and bounds on its derivatives say little: it is halved until
-they do not.
+Where weights differ much along a piece, so does its speed, and bounds on its derivatives are loose: it is halved until
+its weights are similar.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from assembly.geometry.splines.evaluate import spline_curve_at
 
 # A row of pieces: curve, span, ends in the parameter, bounds on |C'|, |C''|, |C'''|.
 ROW = 7
-# Cuts nearer to one another, or to an end, than this part of a span are one.
+# Cuts closer than this part of a span to one another or to an end of the span are merged.
 NEAREST_CUTS = 1e-9
 # The largest quotient of two Bezier weights of a piece; shorter pieces than this part of a span are not halved.
 MOST_WEIGHTS, SHORTEST = 8.0, 1e-13
@@ -125,7 +125,7 @@ def _slopes(b, p, binomials, slopes):
             rational = True
     if rational:
         n = 2 * p - 1
-        # About the middle of the polygon: the numerator is the same, and less is lost in it.
+        # Relative to the middle of the control polygon: the numerator is the same, with less cancellation.
         cu = 0.0
         cv = 0.0
         for k in range(p + 1):
@@ -215,7 +215,7 @@ def _derivative_bounds(c, p):
 
 @kernel(inner=True)
 def _weights_differ(c, p):
-    """Whether weights of a piece are farther apart than bounds on its derivatives bear."""
+    """Whether the ratio of the largest to the least weight of a piece is above MOST_WEIGHTS."""
     least = c[0, 2]
     most = c[0, 2]
     for k in range(1, p + 1):
@@ -229,7 +229,7 @@ def cut_all(pieces, pool, records, binomials, rows):
     """Cut curves into pieces.
 
     `pieces` holds the homogeneous Bezier points (u w, v w, w) of all spans of all curves in order, `pool` and `records`
-    are those of the curves. Returns how many pieces there are; `rows` has the first of them.
+    are those of the curves. Returns how many pieces there are; `rows` gets as many of them as fit.
     """
     limit = 32
     b = np.empty((limit, 3))
@@ -255,7 +255,7 @@ def cut_all(pieces, pool, records, binomials, rows):
                 largest = 0.0
                 for k in range(n + 1):
                     largest = max(largest, abs(slopes[line, k]))
-                # Less is the rounding of a coordinate that stays what it is.
+                # A smaller slope is rounding of a coordinate that is constant.
                 if largest > 1e-14 * scale:
                     found = _roots(slopes[line], n, roots, found, stack, places, work)
             cuts = np.sort(roots[:found])

@@ -33,7 +33,7 @@ _ROUNDING = 4e-15
 
 @kernel(inner=True)
 def _on_surface(store, surface, u, v):
-    """The point and derivatives at parameters of any sheet; beyond an open end, those of the end."""
+    """The point and derivatives at parameters wrapped into the domain; beyond an open end, those at the end."""
     patch = surface_at(store.table, surface)
     x, _fits = into_domain(store.pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
     y, _fits = into_domain(store.pool, patch.breaks_v, patch.spans_v, patch.closed_v, v)
@@ -66,7 +66,7 @@ SpaceQuery = namedtuple("SpaceQuery", "store curve q")
 
 @kernel(inline=True)
 def _seen(query, t):
-    """The point of the question from a parameter of the piece."""
+    """The `Sight` of the query point from the curve point at t."""
     p, d, h = _on_curve(query.store, query.curve, t)
     return sight_of(sub(p, query.q), d, h)
 

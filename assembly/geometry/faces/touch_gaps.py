@@ -68,10 +68,10 @@ def nearest_place(curve, x, y, interval):
     " UniTuple(f8, 2), UniTuple(f8, 2))"
 )
 def gap_between(one, other, s, move, interval):
-    """From a point of one curve to the nearest of another one, which is moved, in an interval of that.
+    """The gap from the point at s of one curve to an interval of another curve, which is moved by `move`.
 
-    Returns the signed distance, positive to the left of the other curve, its parameter, whether that is inside the
-    interval, and the sine of the angle between both tangents.
+    Returns the signed distance, positive to the left of the other curve, the parameter of the nearest point on that
+    curve, whether it is inside the interval, and the sine of the angle between both tangents.
     """
     first, second = Traced(one[0], one[1], one[2], one[3]), Traced(other[0], other[1], other[2], other[3])
     point, along, _bend = _at(first, s)

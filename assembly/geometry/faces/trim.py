@@ -1,12 +1,12 @@
 """Which side of its boundary a point of a face is on.
 
 The boundary has been cut into pieces that run one way in u and in v (`geometry/faces/monotone.py`) and moved into one
-cell of the periods. Material is to the left of every piece. Below a point (u, v) the signed number of pieces,
+cell of the periods. Material is to the left of every piece. The winding number w counts signed pieces below (u, v),
 
     w(u, v) = w(u, bottom) + sum of sign(u') over the pieces that pass between (u, bottom) and (u, v),
 
-is 1 where there is material (the table is made so), 0 where there is none. A piece has to be solved for the point
-only inside its box. Everywhere else two comparisons decide.
+and is 1 where there is material (the table is made so), 0 where there is none. An equation has to be solved only for
+a point in the box of a piece; elsewhere two comparisons decide.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def _below(store, trim, k, u, v, tolerance):
         return sign_u if within else 0, False
     if v < low_v - tolerance:
         return 0, False
-    # The ends first: beyond them the curve is not the piece's.
+    # The ends first: the curve goes on beyond the ends of its piece.
     near = (u - bounds.start[0]) ** 2 + (v - bounds.start[1]) ** 2
     near = min(near, (u - bounds.end[0]) ** 2 + (v - bounds.end[1]) ** 2)
     if near <= tolerance * tolerance:
@@ -80,7 +80,7 @@ def winding(store, trim, u, v):
     tolerance = frame.on
     x = into_cell(u, frame.low_u, frame.high_u, frame.period_u)
     y = into_cell(v, frame.low_v, frame.high_v, frame.period_v)
-    # A pole edge is no boundary: its points belong to the face, with those just inside.
+    # A pole edge is not a boundary: its points belong to the face, as those just inside do.
     z = x
     extent = frame.high_u - frame.low_u
     if frame.period_u == 0.0 and 0.0 <= x - frame.high_u <= 1e-14 * extent:
@@ -125,6 +125,6 @@ def locate_points(table, pool, trim, u, v, side):
 
 @kernel(signatures="(i8[::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
 def windings(table, pool, trim, u, v, out):
-    """w at flat points, before the table knows what w at the bottom is."""
+    """w at flat points, for making a table: before w at the bottom is known."""
     for k in range(u.size):
         out[k], _on = winding(Store(table, pool), trim, u[k], v[k])

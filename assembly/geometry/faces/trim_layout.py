@@ -11,7 +11,7 @@ from assembly._kernel import kernel
 from assembly.geometry.faces.trim_pieces import Piece, piece_bounds_at, piece_line, piece_links_at
 from assembly.geometry.splines.evaluate import spline_curve_at
 
-# Where on a piece it is asked what is beside it: off its middle, above which loops of one part often touch.
+# The part of a piece's interval beside which w is sampled: not its middle, beside which loops of one part often touch.
 _MIDDLE = 0.47
 
 
@@ -26,8 +26,8 @@ def _place_on_curve(pool, link, bound, t):
 def lay_pieces(rows, records, pool, chains, links, bounds):
     """Fill the pieces that `cut_curves` found, in the order of their curves.
 
-    `chains` (n, 3) holds the first curve, the one behind the last one, and whether the chain closes; curves without a
-    chain are pole edges, and come last. Returns the extents in u and v of all ends.
+    `chains` (n, 3) holds the first curve, the one after the last, and whether the chain closes; curves without a chain
+    are pole edges, and come last. Returns the extents in u and v of all ends.
     """
     count = rows.shape[0]
     low_u = low_v = np.inf
@@ -82,7 +82,7 @@ def fill_pieces(rows, records, pool, chains, links, bounds):
 
 @kernel(signatures="(f8[:, ::1], i8, f8, f8)", exact=True)
 def move_pieces(bounds, axis, low, period):
-    """Move pieces that pass no border between cells into the cell that begins at `low`."""
+    """Move pieces that do not cross from one cell into the next into the cell that begins at `low`."""
     for k in range(bounds.shape[0]):
         bound = piece_bounds_at(bounds, k)
         cell = np.floor((0.5 * (bound.start[axis] + bound.end[axis]) - low) / period)
@@ -97,7 +97,7 @@ def move_pieces(bounds, axis, low, period):
 
 @kernel(inner=True, exact=True)
 def has_empty(bounds, noise):
-    """Whether a piece has no length but rounding, this part of the largest coordinate."""
+    """Whether a piece is no longer than rounding: `noise` times the largest coordinate."""
     largest = 0.0
     for k in range(bounds.shape[0]):
         bound = piece_bounds_at(bounds, k)
@@ -119,7 +119,7 @@ def any_empty(bounds, noise):
 
 @kernel(inner=True, exact=True)
 def link_ends(links, bounds, period_u, period_v):
-    """Let every piece begin exactly where the one before it ends, but for whole periods."""
+    """Let every piece begin exactly where the one before it ends, up to whole periods."""
     for k in range(bounds.shape[0]):
         before = piece_links_at(links, k).before
         if before < 0:
@@ -146,11 +146,11 @@ def _length(bounds, k):
 
 @kernel(inner=True, exact=True)
 def close_pieces(pool, links, bounds, chains, first, distances, u, v):
-    """Fill what follows from ends: boxes, signs of directions, the first piece of each curve, points beside chains.
+    """Fill what the ends of pieces imply: boxes, signs of directions, first pieces of curves, points beside chains.
 
     Points are to the left (the first half of `u` and `v`) and to the right of the longest piece of every chain, near
     its middle, at the distance distances[0], or at the part distances[1] of the largest coordinate if that is more.
-    Returns the largest coordinate of a piece of the boundary, and how far all pieces go in u together.
+    Returns the largest coordinate of a piece of the boundary, and the sum over all pieces of their change in u.
     """
     total = links.shape[0]
     largest = 0.0

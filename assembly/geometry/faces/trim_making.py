@@ -23,11 +23,11 @@ from assembly.geometry.faces.trim_pieces import (
 from assembly.geometry.splines.curve_tables import lay_bezier_tables
 from assembly.geometry.splines.evaluate import CURVE_RECORD
 
-# Pieces without length but rounding, as a part of the largest coordinate.
+# Pieces no longer than this part of the largest coordinate are rounding.
 _EMPTY = 1e-15
-# Pieces for which there is room a Bezier point: eight a degree and span, of weights that are not far apart.
+# Room for pieces per Bezier point: eight per degree and span are enough where weights do not differ much.
 PIECES_OF_POINT = 8
-# What is told of a trim, before w beside its chains: on the left of every one, then on the right.
+# What is reported of a trim; w beside its chains follows: on the left of every one, then on the right.
 REPORT = record_dtype(
     "f8",
     done=1,  # 1: there is a table; 0: this kernel makes none; -1: numbers are not finite
@@ -98,14 +98,14 @@ def _fill_table(table, pool, ints, doubles, limits, size):
     allocates=True,
 )
 def lay_trim(curves, shape, chains, matrices, limits, table, pool, report):
-    """Fill table and pool of the curves of a boundary, and a report, which tells where this kernel cannot.
+    """Fill table and pool from the curves of a boundary, and a report, which says whether this kernel could.
 
     Parameters
     ----------
     curves, shape
         As `curve_tables.bezier_tables` takes them.
     chains : (n, 3)
-        First curve, the one behind the last one, whether the chain closes.
+        First curve, the one after the last, whether the chain closes.
     matrices
         The powers that `curve_tables.bezier_tables` takes, and the binomials that `monotone.cut_curves` takes.
     limits
@@ -175,7 +175,7 @@ def lay_trim(curves, shape, chains, matrices, limits, table, pool, report):
 
 @kernel(inner=True)
 def _measure_loop(curves, shape, places, box):
-    """Fill least and most u, and v, of curves, and the size; whether they are clamped, long enough and head to tail."""
+    """Fill the box (u, v) and size of a loop; whether its curves are clamped, long enough and meet head to tail."""
     points, _weights, knots = curves
     begin, stop, point, knot, short = places
     box[0], box[1], box[2], box[3] = np.inf, -np.inf, np.inf, -np.inf
@@ -212,8 +212,8 @@ def _measure_loop(curves, shape, places, box):
 def measure_loops(curves, shape, loops, short, boxes):
     """Whether curves of loops are clamped, meet exactly head to tail, and none is shorter than a part of its loop.
 
-    `loops` (n, 3) tells the curves of each as `lay_trim` has it. A row of `boxes` becomes least and most u, least and
-    most v, and the size, of the control points.
+    `loops` (n, 3) are as the `chains` of `lay_trim`. A row of `boxes` is filled with least and greatest u, least and
+    greatest v, and the size, of the control points.
     """
     point, knot = 0, 0
     for loop in range(loops.shape[0]):

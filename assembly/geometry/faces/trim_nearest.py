@@ -1,9 +1,8 @@
 """Where the boundary of a face is nearest to a point, and which side of it the point is on there.
 
-The boundary is cut into monotone pieces (`geometry/faces/trim.py`). Nearest points are found by branch and bound over
-them
-(`geometry/faces/trim_pieces.py`): ends first, then what is between them, then copies one period away. At a corner the
-two directions tell the side, or the winding number where they do not.
+The boundary is cut into monotone pieces (`geometry/faces/trim.py`). Nearest points are found by branch and bound
+(`geometry/faces/trim_pieces.py`): first over the ends of pieces, then over whole pieces, both with copies one period
+away. At a corner the directions of its two pieces decide the side, or the winding number where they do not.
 """
 
 from __future__ import annotations
@@ -28,8 +27,8 @@ from assembly.geometry.faces.trim_pieces import (
 
 # Neighbors whose directions differ by less [rad] are one smooth curve.
 SMOOTH = 1e-6
-# A projection this near to the end of a piece is at the end if the point is beyond it by more than the second, both
-# parts of the boundary's size.
+# A projection nearer than the first to an end of its piece is moved to that end if the point is off the curve's normal
+# by more than the second; both are parts of the boundary's size.
 _AT_END, _BEYOND = 1e-9, 1e-13
 # Where the speed of a piece is less than this part of its largest, its direction is rounding.
 _SLOW = 1e-9
@@ -79,7 +78,7 @@ def _nearest_end(store, trim, span, q, best):
 
 @kernel(inner=True)
 def _nearest_inside(store, trim, span, q, best):
-    """The same for all points of pieces, those aside whose box is too far."""
+    """The same over all points of the pieces, except pieces whose box is too far."""
     piece = span[0]
     t = 0.0
     for k in range(span[0], span[1]):
@@ -119,7 +118,7 @@ def trim_nearest(store, trim, first, count, u, v):
     piece = span[0]
     t = bounds_of(store, record, piece).t0
     q = (qx, qy)
-    # Ends of pieces first: near ones spare the search of most others. Then the pieces; copies one period away last.
+    # Ends of pieces first: a near one prunes most pieces. In either pass copies one period away come last.
     for search in range(2):
         for copy_u in range(1 + 2 * copies_u):
             x = qx - (copy_u + 1) // 2 * (period_u if copy_u % 2 else -period_u)
@@ -145,9 +144,10 @@ def trim_nearest(store, trim, first, count, u, v):
 
 @kernel(inner=True)
 def _foot_on_piece(store, record, k, t, q):
-    """Where on piece k a projection is that was found at t: its parameter, the way from there, the direction, the end.
+    """Move a projection found at t on piece k to an end if it belongs there.
 
-    The end is -1 at the start, 1 at the end, 0 in between.
+    Returns its parameter, the vector from it to the point, the direction of the curve, and the end: -1 at the start,
+    1 at the end, 0 in between.
     """
     bounds = bounds_of(store, record, k)
     size = trim_frame_at(store.pool, record.frame).extent
@@ -160,7 +160,7 @@ def _foot_on_piece(store, record, k, t, q):
     unsure = speed <= _SLOW * bounds.bound_1
     far = max(_BEYOND * size, 4e-15 * (abs(q[0]) + abs(q[1])))
     if end == 0 and (unsure or abs(beyond) > far * speed):
-        # The way to the projection is not across the curve: is it an end, that rounding or a vanishing speed has left?
+        # The vector is not normal to the curve: the projection may be an end, missed by rounding or vanishing speed.
         first = t - bounds.t0 < bounds.t1 - t if unsure else beyond < 0.0
         ax = (bounds.start[0] if first else bounds.end[0]) - bounds.shift_u - x
         ay = (bounds.start[1] if first else bounds.end[1]) - bounds.shift_v - y
@@ -207,7 +207,7 @@ def _foot(store, trim, span, piece, t, point, q):
             dy /= length
     u, v = point[0] - ox, point[1] - oy
     if smooth:
-        # Across the curve, not along the tiny and noisy way to the projection.
+        # The normal of the curve, not the vector to the projection, which may be tiny and noisy.
         return TrimFoot(dx * oy - dy * ox, links.curve, t, u, v, -dy, dx)
     s = sign * distance
     if distance > 1e-13 * trim_frame_at(store.pool, record.frame).extent:

@@ -1,4 +1,4 @@
-"""Pieces of boundary curves that run one way in u and in v: where they pass a coordinate, and where they are nearest.
+"""Monotone pieces of boundary curves: where they pass a given u or v, and where they are nearest to a point.
 
 Nearest points are found by branch and bound. With F(t) = |C(t) - (u, v)|^2 / 2 around the middle m of an interval
 of half width h, and a bound L on |F'''|,
@@ -82,10 +82,11 @@ PIECE_BOUNDS = record_dtype(
 )
 piece_bounds_at = record_view(PIECE_BOUNDS)
 PIECE_DOUBLES = size_of(PIECE_BOUNDS)
-# Where the distance hardly changes, as from the center of a circle, this part of its square is let go.
+# Accepted relative error of the squared distance to the nearest point: it bounds the work where the distance hardly
+# changes, as from the center of a circle.
 LET_GO = 1e-10
 _ROUNDING = 4e-15
-# Intervals that a query may look at on one piece before its bounds are taken as they are.
+# Intervals that a query may look at on one piece before it takes the nearest point found so far.
 _BUDGET = 100_000
 
 
@@ -146,9 +147,10 @@ def piece_bend(pool, piece, t):
     return (lane(a, 0), lane(a, 1)), (lane(b, 0), lane(b, 1)), (lane(c, 0), lane(c, 1))
 
 
-# Where a piece that runs one way has a coordinate. sense: -1 where that falls along the piece.
+# A query: where a monotone piece has the coordinate `target` on `axis`. sense: -1 if that falls along the piece.
 PieceCut = namedtuple("PieceCut", "pool piece axis target sense")
-# A point of it; how far beyond the target that is, counted as it rises, is the slope of a convex function.
+# A point of the piece. slope: how far it is beyond the target, times sense; it rises along the piece, as the slope of
+# a convex function does. curvature: the rate of the slope.
 CutPoint = namedtuple("CutPoint", "slope curvature point direction")
 
 
@@ -164,7 +166,7 @@ _cut = kernel(inline=True)(bracketed_newton(_cut_point, inside=True, resolution=
 
 @kernel(inner=True)
 def piece_at(pool, piece, axis, target, start, end):
-    """The parameter at which a piece that runs one way has a coordinate, and its point and direction there."""
+    """The parameter at which a monotone piece has a coordinate, and its point and direction there."""
     low, high = piece.t0, piece.t1
     t = low + (high - low) * (target - start) / (end - start)
     t, found = _cut(PieceCut(pool, piece, axis, target, 1.0 if end > start else -1.0), low, high, t)
@@ -177,7 +179,7 @@ PieceQuery = namedtuple("PieceQuery", "pool piece q interval")
 
 @kernel(inline=True)
 def _seen(query, t):
-    """The point of the question from a parameter of the piece."""
+    """The `Sight` of the query point from the curve point at t."""
     (x, y), (dx, dy), (ddx, ddy) = piece_bend(query.pool, query.piece, t)
     ex = x - query.q[0]
     ey = y - query.q[1]
@@ -191,7 +193,7 @@ _nearest_from = kernel(inline=True)(damped_newton(_seen, step_along, move_along,
 
 @kernel(inline=True)
 def next_part(level, index, h):
-    """The part behind one that needs no more halving, of the parts that halvings make: its level, index and width."""
+    """The next part, in the order of a binary subdivision, after one that is done: its level, index and width."""
     index += 1
     while level > 0 and index % 2 == 0:
         index //= 2
@@ -204,7 +206,7 @@ def next_part(level, index, h):
 def nearest_on_piece(pool, piece, bounds, q, best):
     """Half the squared distance to q and the parameter of the nearest point of a piece, where it beats `best`.
 
-    The `bounds` are those on |C'|, |C''| and |C'''|. The second value is `t0 - 1` where it does not.
+    The `bounds` are those on |C'|, |C''| and |C'''|. The parameter is `t0 - 1` where no point beats `best`.
     """
     t0, t1 = piece.t0, piece.t1
     m1, m2, m3 = bounds
@@ -260,7 +262,7 @@ def nearest_on_piece(pool, piece, bounds, q, best):
 
 @kernel(inner=True)
 def polished(pool, piece, t, q):
-    """A parameter near that of a nearest point, brought to it by Newton's method as long as that goes downhill."""
+    """The parameter of a nearest point, from one near it, by Newton's method as long as the distance decreases."""
     return _nearest_from(PieceQuery(pool, piece, q, Interval(piece.t0, piece.t1, False)), t)[2]
 
 
@@ -274,7 +276,7 @@ def ends_of_pieces(pool, coefficients, degrees, middles, t, out):
 
 @kernel(signatures="(f8[::1], i8, i8, f8, UniTuple(f8, 2), i8, f8, UniTuple(f8, 2))")
 def cut_of_piece(pool, coefficients, degree, middle, interval, axis, target, ends):
-    """The parameter at which a piece has a coordinate, of which it has `ends`, and its point there."""
+    """The parameter at which a piece has a coordinate, whose values at its ends are `ends`, and its point there."""
     piece = Piece(coefficients, degree, middle, interval[0], interval[1])
     t, point, _direction = piece_at(pool, piece, axis, target, ends[0], ends[1])
     return t, point[0], point[1]

@@ -1,7 +1,7 @@
 """A kernel that finds the triangles on one side of a border.
 
-Triangles that share an edge which is no part of the border are joined; of every joined part the edges of the border
-tell on which side it is.
+Triangles that share an edge outside the border are joined into parts; the border edges of each part decide on which
+side it is.
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ def mark_inside(triangles, count, border, hull, keys, order, result):
     triangles : (m, 3)
         Edge 3 t + k leads from corner k of triangle t to the next.
     count : int
-        More than any number of a corner.
+        More than the largest number of a vertex.
     border, hull : (k, 2), (h, 2)
-        Directed edges with the inside on the left; with nothing inside on the right.
+        Directed edges: of the border, with the inside on their left; of the hull, with the outside on their right.
     keys, order : (3 m,)
-        a count + b of the edges from a to b, in order, and their numbers.
+        The sorted values of a count + b for the edges from a to b, and the numbers of those edges.
     result : (m,)
     """
     many = triangles.shape[0]
@@ -69,7 +69,7 @@ def mark_inside(triangles, count, border, hull, keys, order, result):
             if edge >= 0:
                 joined[edge] = 0
     for row in range(hull.shape[0]):
-        # An edge of the hull is passed from neither side.
+        # No triangles are joined across an edge of the hull.
         for way in range(2):
             edge = _edge_at(hull[row, way], hull[row, 1 - way], count, keys, order)
             if edge >= 0:
@@ -87,7 +87,7 @@ def mark_inside(triangles, count, border, hull, keys, order, result):
             if edge >= 0:
                 votes[_root_of(parent, edge // 3)] += 1 - 2 * way
     for row in range(hull.shape[0]):
-        # Right of the hull nothing is inside, whatever a border that runs along it says.
+        # Right of the hull everything is outside, even where a border along it says otherwise.
         edge = _edge_at(hull[row, 1], hull[row, 0], count, keys, order)
         if edge >= 0:
             votes[_root_of(parent, edge // 3)] -= 3 * many

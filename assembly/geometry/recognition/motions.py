@@ -1,12 +1,12 @@
-"""Whether a rigid motion takes a surface along itself: planes, cylinders and so on have one, other surfaces none.
+"""Whether a rigid motion maps a surface into itself: planes, cylinders and so on have one, other surfaces none.
 
-A turn, a slide or a screw that takes a surface along itself moves its points p along it, across its normals n:
+A rotation, translation or screw motion that does so moves the surface's points p at right angles to the normals n:
 
     n.(a x p + d) = (p x n).a + n.d = 0        for all points, with one a and one d, not both zero.
 
 So the rows (p x n, n) of samples of a plane, a cylinder, a cone, a sphere, a torus, an extrusion or a revolution have a
-rank of five or less. Where their sixth singular value is not small the surface is none of these. It is told from the
-squares of singular values, whose rounding hides what is below 1e-7 of the largest one.
+rank of five or less. Where their sixth singular value is not small the surface is none of these. The test uses the
+squares of singular values, in which rounding hides singular values below 1e-7 of the largest.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ GRAM = 36
 
 @kernel(inline=True)
 def homogeneous_at(pieces, begin, shape, along_u, along_v):
-    """Weighted sum of the rows (w x, w y, w z, w) of a net that begins at a place, factors along u times along v."""
+    """The sum of the rows (w x, w y, w z, w) of the net at pieces[begin:], times factors along u and along v."""
     x = y = z = w = 0.0
     at = begin
     for i in range(shape[0]):
@@ -83,7 +83,7 @@ _SAMPLES = "UniTuple(i8[::1], 2), UniTuple(f8[:, ::1], 4)"
 
 @kernel(signatures=f"(f8[::1], UniTuple(i8, 4), {_SAMPLES}, Tuple((UniTuple(f8, 3), f8)), f8, f8[::1])")
 def moves_nowhere(pieces, shape, chosen, basis, frame, loose, gram):
-    """Whether samples tell that no rigid motion takes a surface along itself.
+    """Whether samples show that no rigid motion maps a surface into itself.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def moves_nowhere(pieces, shape, chosen, basis, frame, loose, gram):
     frame : ((float, float, float), float)
         The middle of the surface, and one over its size.
     loose : float
-        The part of the largest singular value below which the sixth one counts as none; 1e-6 or more.
+        The part of the largest singular value below which the sixth one counts as zero; 1e-6 or more.
     gram : (GRAM,)
         For work.
     """

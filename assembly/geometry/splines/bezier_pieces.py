@@ -2,7 +2,7 @@
 
     C(x) = sum_i B_i^n(x) w_i P_i / sum_i B_i^n(x) w_i,    0 <= x <= 1 on every span,
 
-with B_i^n(x) = C(n, i) x^i (1 - x)^(n - i), about a center of the curve's own, so that an offset costs no digits.
+with B_i^n(x) = C(n, i) x^i (1 - x)^(n - i). Points are relative to a center of the curve: an offset costs no digits.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ BEZIER_HEAD = record_dtype(
     "f8",
     reach=1,  # the largest distance of a control point from the center [length]
     error=1,  # how far the packed curve may be from the one that was given [length]
-    center=3,  # that positions are taken about [length]
+    center=3,  # origin of the positions [length]
     weight_ratio=1,  # the largest quotient of two weights
 )
 bezier_head_at = record_view(BEZIER_HEAD)
@@ -71,7 +71,7 @@ def bezier_value(rows, o, pool, binomials, n, x):
 
 @kernel(inner=True)
 def bezier_derivatives(rows, o, pool, binomials, n, x):
-    """The same with the first and second derivative; n >= 1."""
+    """As `bezier_value`, with the first and second derivative; n >= 1."""
     b = binomials + n + 1
     c = b + n + 1
     p = load_lanes(rows, o + 4 * n)

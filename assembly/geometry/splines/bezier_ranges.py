@@ -1,18 +1,18 @@
 """A curve of Bezier pieces, as kernels read it: points, and bounds over a part of a piece.
 
 Homogeneous points (w x, w y, w z, w) of a piece on s in [0, 1], and those of its first three derivatives, are
-restricted to [s0, s1] by de Casteljau's algorithm twice. The values of a polynomial are between its least and its
-greatest Bezier point there; of the quotient C = X / w,
+restricted to [s0, s1] by de Casteljau's algorithm, used twice. Each coordinate of a polynomial there is between the
+least and the greatest of its Bezier coefficients; for the quotient C = X / w,
 
     C' = (X' - C w') / w,    C'' = (X'' - 2 C' w' - C w'') / w,    C''' = (X''' - 3 C'' w' - 3 C' w'' - C w''') / w.
 
-Weights are positive, so that of a part C is between the least and the greatest of its Bezier points X_i / w_i.
+Weights are positive, so C on a part is between the least and the greatest of its Bezier points X_i / w_i.
 
 Rounding: a step of de Casteljau is a mean of two numbers and errs by 3 units of 2^-53 of the larger; n steps, twice,
 and the means that made the piece from knots, by less than (16 n + 32) 2^-52 M with M the largest of the points.
 Sums of positive terms, as w, have relative errors of so many units, and X, each of whose points is at most w_i R, one
 of so many units of w R: X / w is off by parts of R, whatever the weights. The ends of a part are rounded, too; where
-weights differ much C moves far between two doubles, and the part is a few units longer.
+weights differ much C moves far between two doubles, so the part is taken a few units longer.
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ LARGEST = place_of(RANGED_CURVE, "largest")
 GRAM = place_of(RANGED_CURVE, "gram")
 BREAKS = place_of(RANGED_CURVE, "breaks")
 BEZIER_RECORD = size_of(RANGED_CURVE)
-# Room for bounds; Bezier points stand behind it.
+# Workspace of bounds; Bezier points follow it.
 RANGE_ROOM = record_dtype(
     "f8",
     ranges=24,  # of C, C', C'', C''' over a part: pairs
     middle=18,  # of C, C', C'' in its middle: pairs
     first=3,  # point at its begin [length]
     last=3,  # point at its end [length]
-    width=1,  # of its ellipsoid, squared length
+    width=1,  # of the part's ellipsoid [length squared]
     spare=3,
 )
 range_workspace_at = record_view(RANGE_ROOM)
@@ -77,7 +77,7 @@ largest_at = record_view(LARGEST_RECORD)
 
 @kernel(inner=True, exact=True)
 def restrict(pool, o, n, s0, s1, workspace, at):
-    """Bezier points of [s0, s1] of a polynomial of degree n, whose points begin at pool[o], to room[at:]."""
+    """Bezier points over [s0, s1] of a polynomial of degree n, whose points begin at pool[o], to workspace[at:]."""
     for k in range(4 * (n + 1)):
         workspace[at + k] = pool[o + k]
     if s1 < 1.0:
@@ -99,7 +99,7 @@ def restrict(pool, o, n, s0, s1, workspace, at):
 
 @kernel(inner=True, exact=True)
 def value(pool, o, n, s, workspace, at):
-    """Values of a polynomial at s to room[at:], four; with room for its points there."""
+    """The four values of a polynomial at s to workspace[at:], which has room for its n + 1 points."""
     for k in range(4 * (n + 1)):
         workspace[at + k] = pool[o + k]
     c = 1.0 - s
@@ -120,19 +120,19 @@ def piece_points(table, span, order):
 
 @kernel(inline=True)
 def error_of(store, order):
-    """How far values and Bezier points of a derivative may be off."""
+    """Error bound of the values and Bezier points of a derivative."""
     return units(store.table) * largest_at(store.pool, ranged_curve_at(store.table, 0).largest).orders[order]
 
 
 @kernel(inline=True)
 def units(table):
-    """Roundings of a value, as a part of the largest."""
+    """Bound of the rounding of a value, as a part of the largest value."""
     return (16.0 * ranged_curve_at(table, 0).degree + 32.0) * EPSILON
 
 
 @kernel(inner=True, exact=True)
 def project(store, free, count, workspace, at):
-    """Pairs of C and of w from homogeneous points at room[free:], to room[at:], eight numbers."""
+    """Pairs of C and of w from homogeneous points at workspace[free:], to workspace[at:], eight numbers."""
     part = units(store.table)
     off = 4.0 * part * largest_at(store.pool, ranged_curve_at(store.table, 0).largest).position
     for k in range(4):
@@ -151,9 +151,9 @@ def project(store, free, count, workspace, at):
 
 @kernel(inner=True, exact=True)
 def quotients(workspace, at, orders):
-    """Derivatives of C from pairs (lo, hi) of C, w and of X, w by order (eight numbers each) at room[at:], in place.
+    """Derivatives of C from pairs (lo, hi) of C, w and of X, w by order, eight numbers each at workspace[at:].
 
-    Six numbers an order are written to room[at + 6 order:], behind what is still to be read.
+    They are written in place, six numbers per order, to workspace[at + 6 order:], where nothing is left to be read.
     """
     w = (workspace[at + 6], workspace[at + 7])
     w1 = (workspace[at + 14], workspace[at + 15])
@@ -181,7 +181,7 @@ def quotients(workspace, at, orders):
 
 @kernel(inner=True, exact=True)
 def bezier_point_bounds(store, span, s, workspace, at):
-    """Intervals of C, C', C'' (by s) at s of a piece to room[at:], nine pairs; room behind them is used."""
+    """Intervals of C, C', C'' (by s) at s of a piece to workspace[at:], nine pairs; what follows them is scratch."""
     curve = ranged_curve_at(store.table, 0)
     free = at + 32
     for order in range(3):
@@ -207,7 +207,7 @@ def bezier_point_bounds(store, span, s, workspace, at):
 
 @kernel(inner=True, exact=True)
 def bezier_range_bounds(store, span, s0, s1, workspace):
-    """Intervals of C, C', C'', C''' (by s) over [s0, s1] of a piece to room, twelve pairs, and the width of an arc.
+    """Intervals of C, C', C'', C''' (by s) over [s0, s1] of a piece to a workspace, and the width of the arc.
 
     The width of a polynomial piece is (s1 - s0) int |C' - chi / (s1 - s0)|^2 ds by the closed form of its Bezier
     points, a quadratic form in differences and so free of cancellation; of a rational piece it is infinite here.
@@ -251,7 +251,7 @@ def bezier_range_bounds(store, span, s0, s1, workspace):
 
 @kernel(inner=True, exact=True)
 def gram_width(store, n, step, workspace, at, error):
-    """(step)^2 times the variance of C' from its Bezier points at room[at:], of degree n; rounded up."""
+    """The variance of C' times step^2, from its Bezier points at workspace[at:], of degree n; rounded up."""
     curve = ranged_curve_at(store.table, 0)
     total = 0.0
     off = 0.0

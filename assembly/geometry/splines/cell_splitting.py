@@ -1,7 +1,7 @@
 """Kernels that halve Bezier pieces of a surface into cells with bounding spheres, and put neighbors together.
 
-Rounding is that of the same sums one after the other, without fused multiply-adds: which half is the longer one, and
-which cell the larger, is decided between equals by the last bit.
+Sums are rounded one after the other, without fused multiply-adds: the last bit decides which of two equal directions
+is the longer one, and which of two equal cells the larger.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def _measure(net, bounds):
             total += sqrt(x * x + y * y + z * z)
         long_v += total
     radius = sqrt(largest)
-    # Rounding of the coordinates and of the halving: the sphere must contain, not nearly contain.
+    # The margin covers rounding of the coordinates and of the halving: the sphere must contain the cell.
     bounds.radius = radius + 1e-14 * (radius + far)
     bounds.along_u = 1.0 if long_u / columns >= long_v / rows else 0.0
 
@@ -99,7 +99,7 @@ def _halve(net, along_u, lower, upper):
 
 @kernel(inner=True, exact=True)
 def _sorted_by_radius(measured, count, share, most, order):
-    """Write the cells whose radii are a share of the largest at least, largest first, of equals the first; how many."""
+    """Write to `order` the cells of a radius of at least `share` times the largest, largest first; how many."""
     largest = 0.0
     for k in range(count):
         largest = max(largest, bounds_at(measured, k).radius)
@@ -140,7 +140,7 @@ def split_cells(nets, boxes, measured, count, share, order):
     ----------
     nets, boxes, measured : (2, n, p + 1, q + 1, 4), (2, n, 4), (2, n, BOUNDS_SIZE)
         Two buffers for n cells: control points, boxes in (u, v), and what is measured. The first `count` of the first
-        buffer are given, but for what is measured.
+        buffer are given; what is measured is filled here.
     count : int
     share : float
         A round halves the cells whose spheres are larger than this part of the largest.
@@ -189,23 +189,23 @@ def split_cells(nets, boxes, measured, count, share, order):
 
 @kernel(signatures="(f8[:,::1], i8, i8[::1], f8[::1])", exact=True)
 def put_neighbors_together(measured, group, order, along):
-    """An order in which cells that follow one another lie close together.
+    """Fill an order in which consecutive cells lie close together.
 
-    Ranges are halved at the median along the direction in which their centers spread most, a level at a time, down to
-    a group.
+    Ranges of cells are halved at the median along the axis in which their centers spread most, level by level, down
+    to the size of a group.
 
     Parameters
     ----------
     measured : (n, BOUNDS_SIZE)
     group : int
-        How many cells are in a row.
+        How many cells a group has.
     order : (group 2^levels,) of int
-        At least n places; the first n come back.
+        At least n places; the first n get the order.
     along : (group 2^levels,)
         Room for work.
     """
     count, size = measured.shape[0], order.size
-    # Padded to equal ranges by copies of the last cell, which are dropped in the end.
+    # Copies of the last cell make the ranges equal; they are dropped in the end.
     for k in range(size):
         order[k] = min(k, count - 1)
     while size > group:
@@ -224,7 +224,7 @@ def put_neighbors_together(measured, group, order, along):
 
 @kernel(inner=True, exact=True)
 def _sort_range(measured, order, along):
-    """Sort cells along the direction in which their centers spread most; equals stay in order."""
+    """Sort cells along the axis in which their centers spread most; equals stay in order."""
     axis, most = 0, -1.0
     for c in range(3):
         low = high = bounds_at(measured, order[0]).center[c]

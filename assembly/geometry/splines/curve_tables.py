@@ -61,7 +61,7 @@ def power_table(powers, bezier, at, width, pool, place):
 
 @kernel(inner=True)
 def closes(curve, bezier, begin, end, coincident):
-    """Whether a curve with the Bezier points bezier[begin:end] ends where it begins, but for a part of its size."""
+    """Whether a curve with the Bezier points bezier[begin:end] ends where it begins, up to a part of its size."""
     points = curve.points
     low_u = high_u = points[curve.point, 0]
     low_v = high_v = points[curve.point, 1]
@@ -137,7 +137,7 @@ def bezier_tables(curves, shape, powers, coincident, bezier, pool, records):
 
 @kernel(signatures="(f8[::1], i8[:, ::1], f8, f8, f8[::1], f8[::1])", allocates=True)
 def swept_area(pool, records, u, v, nodes, weights):
-    """The area that the way from (u, v) to a point sweeps as the point runs along curves."""
+    """The signed area that the segment from (u, v) to a point sweeps as the point runs along curves."""
     total = 0.0
     table = records.ravel()
     for curve in range(records.shape[0]):

@@ -62,7 +62,7 @@ CURVE_BREAKS = place_of(CURVE, "breaks")
 CURVE_COEFFICIENTS = place_of(CURVE, "coefficients")
 
 
-# So many spans are searched without a guess.
+# Up to this many spans are searched without a first guess.
 FEW_SPANS = 8
 
 
@@ -135,7 +135,7 @@ def _row(pool, o, degree, t):
 
 @kernel(inline=True)
 def _any_degree(pool, o, degree_u, degree_v, s, t):
-    """The same for any degree, Horner in u over Horner in v."""
+    """The homogeneous SurfaceJet of a piece of any degree: Horner's rule in u over Horner's rule in v."""
     stride = 4 * (degree_v + 1)
     p, pv, pvv = _row(pool, o + stride * degree_u, degree_v, t)
     d = 0.0 * p
@@ -203,7 +203,7 @@ def surface_point(table, pool, r, u, v):
 
 @kernel(inline=True)
 def into_domain(pool, breaks, count, closed, u):
-    """u itself, wrapped where the direction is closed; beyond the ends by rounding alone, the end.
+    """The parameter u, wrapped if the direction is closed; clamped if it is beyond an end by rounding alone.
 
     The second value is False where u is outside or not finite.
     """
@@ -308,7 +308,7 @@ def _row_third(pool, o, degree, t):
 
 @kernel(signatures="(i8[::1], f8[::1], i8, f8, f8)")
 def third_derivatives(table, pool, r, u, v):
-    """Suuu, Suuv, Suvv, Svvv as 3-tuples: what a pair at a fold needs and nothing else does."""
+    """Suuu, Suuv, Suvv, Svvv as 3-tuples: only a degenerate (singular) pair needs them."""
     patch = surface_at(table, r)
     iu = find_span(pool, patch.breaks_u, patch.spans_u, u)
     iv = find_span(pool, patch.breaks_v, patch.spans_v, v)

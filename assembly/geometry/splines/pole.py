@@ -21,7 +21,7 @@ from assembly.geometry.nearest_place import Interval, held_in
 from assembly.geometry.splines.evaluate import surface_at, surface_point
 from assembly.geometry.vec import add, blend, cross, dot, scale, sub
 
-# The polar chart is left for the pole's own within this part of the domain: its error is the third power.
+# Within this part of the domain a pole's own chart replaces its polar coordinates; the chart's error is of third order.
 CHART = 1e-6
 
 # A surface's tangent plane at a point of it, in its body's axes: [S_u S_v] = [x y] E.
@@ -167,14 +167,15 @@ def pole_frame(store, r, edge, u, v):
     )
 
 
-# The spoke of a pole that points along a way w in its tangent plane. sense: 1 where spokes turn about n as they should.
+# A query: which spoke of a pole points along w in its tangent plane. sense: 1 if spokes turn counterclockwise about n
+# as their parameter rises, else -1.
 SpokeQuery = namedtuple("SpokeQuery", "store surface edge w n sense interval")
 SpokeTurn = namedtuple("SpokeTurn", "slope curvature")
 
 
 @kernel(inline=True)
 def _spoke_turn(query, angle):
-    """(w x E).n, which rises where a spoke E comes past w, and its rate: a slope and a curvature."""
+    """As slope and curvature: (w x E).n times sense, which rises through zero where a spoke E passes w; its rate."""
     _p, e, turn, _bent = spoke(query.store, query.surface, query.edge, held_in(query.interval, angle))
     return SpokeTurn(-query.sense * dot(cross(e, query.w), query.n), -query.sense * dot(cross(turn, query.w), query.n))
 
@@ -184,7 +185,7 @@ _spoke_along = kernel(inner=True)(bracketed_newton(_spoke_turn, inside=False))
 
 @kernel(inner=True)
 def polar_step(store, r, edge, u, v, step):
-    """Parameters after a tangential step (body axes) from (u, v) near the pole of `edge`, over it if it leads there."""
+    """Parameters after a tangential step (body axes) from (u, v) near the pole of `edge`, which it may lead across."""
     across = 0 if edge <= 2 else 1
     lo, hi, _ = limits(store, r, across)
     other_lo, other_hi, closed = limits(store, r, 1 - across)
@@ -198,7 +199,7 @@ def polar_step(store, r, edge, u, v, step):
     reach = math.sqrt(dot(w, w))
     if not reach > 1e-300:
         return (lo if edge == 1 else hi, v) if edge <= 2 else (u, lo if edge == 4 else hi)
-    # The spoke that points along w is next to the best of a few.
+    # The spoke that points along w is close to the best of 16 samples.
     best = -2.0
     angle = along
     for k in range(16):

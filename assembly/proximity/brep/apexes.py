@@ -1,7 +1,7 @@
 """Apexes of cones: vertices without edges, poles of a face where it has no tangent plane.
 
-A pair of an apex has n.e <= 0 for all directions e in which its face leaves it, as one of another vertex has along its
-edges (`proximity/features/switching.py`).
+The normal n of a pair at an apex has n.e <= 0 for all directions e in which the face leaves the apex, as at another
+vertex for the directions of its edges (`proximity/features/switching.py`).
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from assembly.proximity.brep.records import (
     vertex_at,
 )
 
-# Sine of the angle by which a normal must lean over a face or along an edge before that takes over.
+# Sine of the angle by which a normal must lean toward a face or along an edge before the pair switches to that.
 LEAN = 1e-9
-# Of apexes: how near a pole is to one, how many spokes are looked at, how far from it a face begins, and how near to it
-# Newton's method gives up (parts of the domain).
+# Of apexes: how near a vertex and a pole must be to coincide, how many spokes are sampled, how far from the apex a face
+# takes over, and how near to it a failed Newton's method leads to the apex (the last two are parts of the domain).
 APEX, SPOKES, BESIDE, NEAR_APEX = 1e-9, 16, 1e-3, 0.02
 
 
@@ -53,7 +53,7 @@ def is_at(store, vertex, p):
 def from_apex(store, shell, vertex, code, n):
     """The face that takes over from the apex of a cone: code and (u, v) on the spoke along which the normal leans most.
 
-    Where it leans along none, the apex itself, `code`.
+    Where it leans along none, the given `code`, which is that of the apex.
     """
     vertex_record = vertex_at(store.table, vertex)
     best = LEAN
@@ -82,7 +82,7 @@ def from_apex(store, shell, vertex, code, n):
 
 @kernel(inner=True)
 def apex_near(store, shell, code, u, v):
-    """The apex of a cone next to a point of a face where Newton's method gave up; else the face itself."""
+    """The code of the apex of a cone near a point of a face where Newton's method gave up; else that of the face."""
     solid = shell_at(store.table, shell)
     if code >= solid.faces:
         return code
