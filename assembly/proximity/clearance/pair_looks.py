@@ -14,14 +14,14 @@ from assembly.proximity.clearance.look import go_to, look
 from assembly.proximity.clearance.records import CLEAR, OPEN, SPENT, Forest, counts_at, pair_proof_at
 from assembly.proximity.clearance.separation import separation
 
-# What is to be done with a pair: at a pose, with a new front; on the way there, with one that is
-# made at the last pose.
+# The task of a pair: none; to look at a pose; with a new front; at the way there; with a new front made at the last
+# pose; at the way in one look, not in parts.
 PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY, ON_WAY_ANEW, ON_WAY_AT_ONCE = 0, 1, 2, 3, 4, 5
-# Of all pairs: to go on with looks whose time was over.
+# The task of all pairs to go on with interrupted looks.
 GOING_ON = 6
 # A front that has grown by more than this factor and number is begun anew.
 GROWN, MANY = 2, 200
-# What rounding of poses and of sums of coordinates may do to a gap, in parts of these: some thirty roundings.
+# The error of a gap by rounding of poses and sums of coordinates, in parts of these: some thirty roundings.
 ROUNDING = 4e-15
 
 
@@ -36,7 +36,7 @@ def posed_with_move(q, a, b, move):
 
 @kernel(inner=True)
 def done_task(forest, front, pose, limits, task):
-    """Do what is to be done with a pair; how its look ended."""
+    """Do the task of a pair; returns how its look ended."""
     pair, counts = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
     if task == ON_WAY_ANEW:
         kept = first_row(front)
@@ -62,7 +62,7 @@ def done_task(forest, front, pose, limits, task):
 
 @kernel(inner=True)
 def look_at_pair(forest, front, q, move, task, time):
-    """Do what is to be done with a pair of bodies at poses q; how its look ended. time: a clock, and until when."""
+    """Do the task of a pair of bodies at poses q; returns how its look ended. time: a clock and a deadline."""
     pair, count = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
     count.asked = 0
     count.sought = 0
