@@ -54,7 +54,7 @@ def _length(points, at, count, step):
 
 @kernel(inner=True, exact=True)
 def _turn(units, at, count, step):
-    """The sum of the changes between successive unit vectors of a block; changes from or to zero vectors are omitted."""
+    """The sum of the changes between successive unit vectors of a block, without changes from or to zero vectors."""
     total = 0.0
     for k in range(1, count):
         a, b = _three(units, at + step * k), _three(units, at + step * (k - 1))

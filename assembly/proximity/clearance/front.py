@@ -1,6 +1,6 @@
 """The front of a pair of bodies: pairs of nodes that cover all pairs of points, each with what separates it.
 
-A pair of nodes is tested again only once points of body b have moved by its gap; the least of these lengths holds for
+A pair of nodes is tested again only after points of body b have moved by its gap; the least of these lengths holds for
 all pairs at once. Then the gap along the same direction is computed, in some nanoseconds. If it is too small, another
 direction is sought; if none is found, one of the nodes is replaced by its children.
 

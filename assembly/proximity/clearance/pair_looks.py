@@ -95,7 +95,7 @@ def is_grown(front):
 def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes, time):
     """Look at pairs of bodies at poses q (n, 7), each after a move (6) of its second body; how each look ended.
 
-    Where the time is over, which a clock's address and nanoseconds tell, all that is left ends SPENT.
+    time: a clock's address and the deadline [ns]; pairs that are left then end SPENT.
     """
     table, pool, faces, links, tree_nodes, used = forest_arrays
     forest = Forest(Store(table, pool), faces, links, tree_nodes, used)
@@ -116,11 +116,11 @@ def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes, time):
     allocates=True,
 )
 def stay_clear(forest_arrays, front_arrays, q, moves, touch, asked, codes, time):
-    """Look at all pairs on the way to poses q (n, 7): how the first ended that is not known to stay clear, or CLEAR.
+    """Look at all pairs on the way to poses q (n, 7): SPENT, the code of the first that did not end clear, or CLEAR.
 
-    Where one was not clear at its last look, none is looked at: all end OPEN. The task is ON_WAY, ON_WAY_AT_ONCE for
-    ways that are not to be taken in parts, or GOING_ON with those pairs that ended SPENT in a call whose time was over.
-    It is asked for with a budget for each pair; 0 for the usual one.
+    If a pair was not clear at its last look, none is looked at: all end OPEN. asked: the task, and a budget for each
+    pair (0: the usual one). The task is ON_WAY; ON_WAY_AT_ONCE for ways that are not to be taken in parts; or GOING_ON,
+    which continues the pairs that ended SPENT in a call whose time was over.
     """
     task, budget = asked
     table, pool, faces, links, tree_nodes, used = forest_arrays

@@ -67,7 +67,7 @@ def farthest_of_section(e, lean, radius):
 
 @kernel(inner=True)
 def sleeve_room(forest, wall, k, pose, how):
-    """How far the part of a cylinder, node k, beside a node with a bore is from that node; else negative.
+    """A lower bound of the distance of a cylinder, node k, from the node of a bore that it is in; else negative.
 
     `how` - BY_SLEEVE: 0 if both its ends are beyond the bore, 1 or 2 if the end along its axis, or the other, is asked.
     The pose is seen from the node with the bore.
