@@ -112,7 +112,7 @@ def is_halved_first(forest, a, b, short):
     """Whether a is halved, not b, if their gap is too small by `short`; and whether by length or by chord error.
 
     The larger node is halved. Of two cells that only their radii keep from being separated, it is the one with the
-    larger radius. A round node, which is exact, is not halved as long as the other one could be finer. Of two wires it
+    larger `reach`. A round node, which is exact, is not halved as long as the other one could be finer. Of two wires it
     is the longer piece: once both are short, the distance of their spines separates them.
     """
     if is_wire(forest, a) and is_wire(forest, b):
@@ -230,7 +230,7 @@ def seek(forest, front, way, limits, tail):
 def look_only(forest, front, way, limits):
     """Prove that all pairs of the front are clear by more than `needed` at the end of a way and, swept, all along it.
 
-    Within its time it leaves the present front and the last pose; the next front is that of the way's end.
+    Unless its time is over, the present front and the last pose stay as they are; the next front is that of the end.
     """
     counts_at(front.counts, 0).opened = 0
     tail, over = ask_again(forest, front, way, limits)

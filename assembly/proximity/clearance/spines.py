@@ -43,7 +43,7 @@ from assembly.proximity.clearance.separation import placed
 Piece = namedtuple("Piece", "middle ahead inward bend half")
 # At s of one piece and t of the other: f, its first and its second derivatives.
 Squared = namedtuple("Squared", "f s t ss tt st")
-# The steps that Newton's method takes from a start at the end of a piece.
+# The steps that Newton's method needs at most, from a start at the end of a piece.
 STEPS = 12
 # Newton's method ends where the bound is below f by no more than this part of f.
 CLOSE = 1e-14
@@ -210,7 +210,7 @@ def chord_of(forest, b, way):
     p, q = corner_of(node, 0), corner_of(node, 1)
     d = sub(placed(way.after, p), placed(way.before, p))
     e = sub(placed(way.after, q), placed(way.before, q))
-    # No point of the chord moves farther than both its ends; the arc is off the chord, which turns by the way's angle.
+    # No point of the chord moves farther than one of its ends; the arc is off the chord, and turns by the way's angle.
     turned = 2.0 * math.sqrt(2.0 * way.factor) * node.reach
     return math.sqrt(max(dot(d, d), dot(e, e))) + turned
 
