@@ -24,8 +24,8 @@ FACE_NETS_DTYPE = record_dtype(
     closed_v=1,
     points=1,  # where the homogeneous points are in the pool: spans of u before those of v, rows within
     normals=1,  # of the outward normal, times a positive function; zero at poles
-    slack=1,  # by how much each piece's normals may be off
-    poles=1,  # whether a piece has a pole (1.0): zeros among its normals are known to be
+    slack=1,  # bounds of the error of each piece's normals
+    poles=1,  # 1.0 if a piece has a pole: zeros among its normals are expected
     breaks_u=1,  # ends of the spans
     breaks_v=1,
     extent=1,  # the largest coordinate
@@ -45,7 +45,7 @@ CURVE_NET_DTYPE = record_dtype(
     spans=1,
     points=1,  # homogeneous points (degree + 1, 3) of every span in the pool
     breaks=1,
-    slack=1,  # by how much points may be off in u and v
+    slack=1,  # bounds of the error of points in u and in v
 )
 curve_net_at = record_view(CURVE_NET_DTYPE)
 CURVE_NET = size_of(CURVE_NET_DTYPE)
@@ -57,7 +57,7 @@ CUT = size_of(CUT_DTYPE)
 
 @kernel(inner=True)
 def write_blossom(degree, low_times, low, high, work, at):
-    """Weights of Bezier points in the blossom of `low_times` times low and the rest of the degree times high."""
+    """Weights of Bezier points in the blossom with `low_times` arguments low and all others high."""
     work[at] = 1.0
     for r in range(degree):
         x = low if r < low_times else high
@@ -71,7 +71,7 @@ def write_blossom(degree, low_times, low, high, work, at):
 def restrict_net(pool, first, shape, box, work, at):
     """Bezier points of a piece (rows, columns, components) over a box of its unit square, to a place of the workspace.
 
-    Behind them as many numbers more, and those of the longer side.
+    The workspace behind them needs room for as many numbers again, and for the weights of its longer side.
     """
     rows, columns, components = shape
     line = columns * components
@@ -99,8 +99,8 @@ def restrict_net(pool, first, shape, box, work, at):
 
 @kernel(inner=True, exact=True)
 def _blossom(block, line, ends, work, at):
-    """The blossom of numbers (place, count, stride) of a block: `ends` tells how often the lower end is an argument,
-    and both ends.
+    """The blossom of numbers (place, count, stride) of a block; `ends`: how many arguments are the lower end, and the
+    lower and the upper end.
     """
     first, count, stride = line
     low_times, low, high = ends
@@ -115,7 +115,7 @@ def _blossom(block, line, ends, work, at):
 
 @kernel(inner=True)
 def restrict_points(pool, first, shape, box, work, at):
-    """As `restrict_net` for homogeneous points (rows, columns), by repeated means: points in a plane stay in it."""
+    """As `restrict_net` for homogeneous points (rows, columns), by de Casteljau steps: points in a plane stay in it."""
     rows, columns = shape
     line = 4 * columns
     middle = at + rows * line
@@ -168,7 +168,7 @@ def _write_spans(pool, breaks, interval, out, at):
         begin, end = pool[first + span], pool[first + span + 1]
         cut = cut_at(out, at + CUT * (span - start))
         cut.span = span
-        # Beyond the ends of the domain the end spans go on.
+        # The first and the last span extend beyond the domain.
         cut.low = (low - begin) / (end - begin) if span == start else 0.0
         cut.high = (high - begin) / (end - begin) if span == stop else 1.0
     return stop - start + 1
@@ -178,7 +178,7 @@ def _write_spans(pool, breaks, interval, out, at):
 def write_cuts(pool, breaks, closed, interval, out, at):
     """Parts of spans that an interval of a parameter is cut into, at most two more than there are spans; their number.
 
-    In a closed direction it is wrapped; in an open one, reaching out, it includes the end.
+    In a closed direction the interval is wrapped; in an open one, if it is outside, it is extended to the nearer end.
     """
     first, spans = breaks
     begin, end = pool[first], pool[first + spans]
@@ -192,15 +192,15 @@ def write_cuts(pool, breaks, closed, interval, out, at):
         low, high = begin, end
     count = _write_spans(pool, breaks, (low, min(high, end)), out, at)
     if high > end:
-        # What is left below the seam; above it begins the other part.
+        # The rest of the interval is beyond the seam, from the low end of the domain on.
         count += _write_spans(pool, breaks, (begin, high - period), out, at + CUT * count)
     return count
 
 
 @kernel(inner=True)
 def write_box_cuts(pool, face, box, work):
-    """Parts in u and then those in v, from the workspace's beginning, of a box in (u, v): their numbers, and the place
-    behind both.
+    """Write the parts in u, then those in v, of a box in (u, v), from the workspace's beginning; returns both numbers
+    and the place behind the parts.
     """
     count_u = write_cuts(pool, (face.breaks_u, face.spans_u), face.closed_u == 1, (box[0], box[1]), work, 0)
     at = CUT * count_u

@@ -82,7 +82,7 @@ BorderQuery = namedtuple("BorderQuery", "store surface curve p interval")
 
 @kernel(inline=True)
 def _seen(query, t):
-    """The point of the question from a place of the curve; curvature is left out, as the point is next to the curve."""
+    """The query's point as seen from the curve at t; curvature is omitted, as the point is close to the curve."""
     at = on_surface(query.store, query.surface, query.curve, t)
     return sight_of(sub(at.point, query.p), at.tangent, (0.0, 0.0, 0.0))
 
@@ -103,7 +103,7 @@ def other_parameter(store, edge, t, p):
     """The parameter of an edge on its second face, at its point p with parameter t on the first."""
     edge_record = edge_at(store.table, edge)
     at = edge_record.map
-    # The map is of first order; its error is smaller than three steps can take away.
+    # The map is of first order; its error is small enough for three Gauss-Newton steps.
     s = store.pool[at] + store.pool[at + 1] * t
     return nearest_on_border(store, edge_record.surface_b, edge_record.curve_b, s, p)
 
@@ -140,7 +140,7 @@ def nearest_edge(store, shell, code, u, v):
     edge = solid.edge_table + EDGE_RECORD * number
     edge_record = edge_at(store.table, edge)
     if edge_record.curve != trim_record.first + CURVE_RECORD * k:
-        # The edge is measured on its other face.
+        # The edge has the parameter of its curve on the other face.
         on_edge = on_surface(store, face.surface, trim_record.first + CURVE_RECORD * k, t)
         p = on_edge.point
         at = edge_record.map

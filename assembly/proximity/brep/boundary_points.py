@@ -42,7 +42,7 @@ BoundaryQuery = namedtuple("BoundaryQuery", "store surface curve p interval")
 
 @kernel(inline=True)
 def _seen(query, t):
-    """The point of the question from a place of the curve, as in Gauss and Newton's method."""
+    """The query's point as seen from the curve at t, without curvature (Gauss-Newton)."""
     c, rate, _normal = _jet(query.store, query.surface, query.curve, t)
     return sight_of(sub(c, query.p), rate, (0.0, 0.0, 0.0))
 
@@ -78,8 +78,9 @@ def nearest_on_boundaries(store, boundaries, which, points, guess, close, out):
     `boundaries` are the surfaces and the curves, whether these are closed, where their samples (t, x, y, z) begin, and
     the samples.
 
-    The guess if it is right to `close`, else what Gauss and Newton's method comes to from there or from the nearest of
-    the curve's samples, quadratically for points on the curve. Distances are measured a step before the parameter.
+    A guess whose point is within `close` is kept; else the Gauss-Newton method starts there or at the curve's nearest
+    sample, whichever is nearer. It converges quadratically for points on the curve. The distance is that of the iterate
+    before the last step.
     """
     table, pool = store
     surfaces, curves, closed, begins, samples = boundaries

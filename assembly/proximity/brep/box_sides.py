@@ -1,4 +1,4 @@
-"""Where boxes in (u, v) are against the trims of faces: all inside, all outside, or neither."""
+"""Where boxes in (u, v) lie relative to the trims of faces: all inside, all outside, or neither."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ def _meets(low, high, other_low, other_high, period):
     """Whether two intervals meet, whole periods apart where there is one."""
     if period == 0.0:
         return low <= other_high and other_low <= high
-    # The second one is moved up by as few periods as take its end to the first one's beginning.
+    # Move the second one up by the fewest periods that bring its end to the first one's beginning, or beyond.
     return other_low + math.ceil((low - other_high) / period) * period <= high
 
 
 @kernel(inline=True)
 def _domain(pool, breaks, spans, closed):
-    """The low end of a direction, its period (0: none), and how far parameters may be off."""
+    """The low end of a direction, its period (0: none), and the rounding error of parameters."""
     low, high = pool[breaks], pool[breaks + spans]
     return low, high - low if closed == 1 else 0.0, _ROUNDING * max(abs(low), abs(high))
 

@@ -37,7 +37,7 @@ def _three(work, at):
 
 @kernel(inner=True, exact=True)
 def _write_rates(work, net, components, out):
-    """Derivatives over the unit square in u and in v, to two places; the largest of each."""
+    """Write the derivatives in u and in v over the unit square to two places; the length of the longest of each."""
     at, rows, columns = net
     most_u, most_v = 0.0, 0.0
     for i in range(rows):
@@ -59,7 +59,7 @@ def _write_rates(work, net, components, out):
 
 @kernel(inner=True, exact=True)
 def _write_cross(work, one, other, at):
-    """The cross product of two nets of vectors (place, rows, columns), times binomials all three."""
+    """Write the cross product of two nets of vectors (place, rows, columns); all three are multiplied by binomials."""
     a, m, n = one
     b, r, s = other
     rows, columns = m + r - 1, n + s - 1
@@ -80,9 +80,9 @@ def _write_cross(work, one, other, at):
 
 @kernel(inner=True, exact=True)
 def _add_product(work, one, other, sign, total):
-    """Add sign times the product of a net of numbers, times binomials, and one of vectors, times binomials as well.
+    """Add sign times the product of a net of numbers and a net of vectors, both already multiplied by binomials.
 
-    Behind the total there is room for as many numbers more.
+    The workspace behind the total needs room for as many numbers again.
     """
     a, m, n = one
     b, r, s = other
@@ -114,7 +114,7 @@ def _cross_of(work, one, other, at):
 
 @kernel(inner=True, exact=True)
 def _write_centered(pool, face, piece, work, at):
-    """A about the middle of a piece, where products are smaller, and behind it w; the largest of both, and |S|."""
+    """Write A about the middle of a piece, where products are smaller, then w; max |A|, max |w|, largest coordinate."""
     points = face.rows * face.columns
     first = face.points + 4 * points * piece
     most_a, most_w, extent = 0.0, 0.0, 0.0
@@ -184,7 +184,7 @@ def _write_piece(pool, face, piece, extent, work):
 
 @kernel(inner=True)
 def _clear_pole(pool, face, piece, edge):
-    """Take the normals of a piece at an edge that is a point, to the tolerance that makes it a pole, to be zero."""
+    """Set to zero the normals of a piece along an edge that is one point to the tolerance of poles."""
     rows, columns = face.normal_rows, face.normal_columns
     first = face.normals + 3 * rows * columns * piece
     pool[face.poles + piece] = 1.0
@@ -197,7 +197,7 @@ def _clear_pole(pool, face, piece, edge):
 
 @kernel(inner=True)
 def _write_boundary(table, pool, face, curves, parts, work):
-    """Boxes around the boundary curves of a face: each of their spans in parts, as many as there are boxes."""
+    """Write boxes around parts of the boundary curves of a face: every span is divided into equally many."""
     at = face.boundary
     for k in range(curves[0], curves[1]):
         curve = curve_net_at(table, curves[2] + CURVE_NET * k)
@@ -212,10 +212,10 @@ def _write_boundary(table, pool, face, curves, parts, work):
 
 @kernel(signatures="(i8[::1], f8[::1], i8[:, ::1], i8, i8, f8[::1])")
 def complete_nets(table, pool, curves, first_curve, parts, work):
-    """Normals, their slack, poles, extents and boxes around boundaries of all faces, of which row (n, 2) of `curves`
-    has the first boundary curve and the one behind the last.
+    """Write normals, their slack, poles, extents and boxes around boundaries of all faces.
 
-    Every boundary curve is in so many parts at least.
+    Row k of `curves` (n, 2) has the first boundary curve of face k and the one after its last. Every boundary curve is
+    divided into `parts` parts at least.
     """
     for number in range(len(curves)):
         face = face_nets_at(table, FACE_NETS * number)

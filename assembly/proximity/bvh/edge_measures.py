@@ -1,4 +1,4 @@
-"""What parts of edges are measured by: boxes in space, and cones around the normals of both faces along them."""
+"""Measures of parts of edges: boxes in space, and cones around the normals of both faces along them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ EDGE_PLACE_DTYPE = record_dtype(
 )
 edge_place_at = record_view(EDGE_PLACE_DTYPE)
 EDGE_PLACE = size_of(EDGE_PLACE_DTYPE)
-# What is told of it.
+# Its measures.
 EDGE_PART_DTYPE = record_dtype(
     "f8",
     low=3,  # box in space
@@ -60,7 +60,7 @@ EDGE_PART = size_of(EDGE_PART_DTYPE)
 
 @kernel(inner=True)
 def _add_cones(pool, face, box, count, cones, work):
-    """Write cones around the normals over a box in (u, v) behind `count` others, as far as there is room; how many."""
+    """Append cones around the normals over a box in (u, v) to `count` others; those without room are only counted."""
     count_u, count_v, at = write_box_cuts(pool, face, box, work)
     normals = face.normal_rows * face.normal_columns
     shape = face.normal_rows, face.normal_columns, 3
@@ -105,7 +105,7 @@ def _is_concave(axis_a, half_a, axis_b, half_b, along):
 
 @kernel(inner=True)
 def _measure_part(store, sides, place, part, cones, order, work):
-    """Measure a part of an edge; how many cones it took at a time."""
+    """Measure a part of an edge; returns the most cones that it needs at a time."""
     table, pool = store
     face, curve = face_nets_at(table, FACE_NETS * sides.face_a), curve_net_at(table, sides.curve_a)
     box = curve_box(pool, curve, (sides.span, place.low, place.high), work, 0)
@@ -140,8 +140,8 @@ def _measure_part(store, sides, place, part, cones, order, work):
 def measure_edge_parts(store, sides, places, cones, order, work, out):
     """Measure parts of edges, rows EDGE_SIDES and EDGE_PLACE, into rows EDGE_PART.
 
-    Returns how many cones (n, 4), in the order 0 to n - 1, there should be at least, two or more: where there are
-    fewer, it is to be done again.
+    `cones` (n, 4) has room for two cones or more; `order` is 0 to n - 1. Returns how many cones are needed: if that is
+    more than n, the measures are incomplete and have to be made again with more room.
     """
     most = 0
     for i in range(len(sides)):

@@ -1,13 +1,12 @@
 """Pairs of patches that may face each other, or of parts of spines, kept from update to update (a Verlet list).
 
-A descent of two trees (`proximity/bvh/tree.py`, `proximity/manager/centerlines/parts.py`) finds pairs for one pose. One
-that allows for a skin of
-poses finds all that any of them has, and not many more: what a look at one of these poses finds is sifted from the
-list. A list is a function of shapes and of the pose that it was made for, whoever asks; there are a few of them in the
-table, and pairs of bodies take turns.
+A descent of two trees (`proximity/bvh/tree.py`, `proximity/manager/centerlines/parts.py`) finds pairs for one pose. A
+descent that allows for a skin finds the pairs of all poses within the skin, and not many more; those of one of these
+poses are then selected from the list. A list depends only on the shapes and on the pose that it was made for. There are
+a few lists in the table, and pairs of bodies take turns.
 
-Lists are in the table, their lengths multiples of GRAIN: the pool is shared by all who solve a scene at the same time,
-and a table is one's own.
+Lists are in the table, with lengths as integer multiples of GRAIN: the pool is shared by all solvers of a scene, but
+each has a table of its own.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ NEIGHBOR_LIST = record_dtype(
     count=1,  # number of entries; -1: more than there is room for
     turn=4,  # the pose it is for: quaternion of the body that moves
     place=3,  # and the middle of its tree
-    skin=1,  # skin: how far that body may go from there
+    skin=1,  # how far that body may move from there
     margin=1,  # query margin
 )
 neighbor_list_at = record_view(NEIGHBOR_LIST)
@@ -41,7 +40,7 @@ ENTRY = size_of(NEIGHBORS)
 # Room for entries, and integers of a list.
 ROOM = 512
 LIST_INTS = ENTRIES + ENTRY * ROOM
-# Multiples of this are within it of what they stand for; a list is not made for what is farther away than FAR.
+# The unit of the lengths that a list stores as integers; and the distance beyond which no list is made.
 GRAIN, FAR = 2.0**-48, 1000.0
 
 
@@ -52,7 +51,7 @@ ListKey = namedtuple("ListKey", "at owner moving")
 
 @kernel(inner=True)
 def moved_since(store, key):
-    """How far the body that moves is at most from where it was when its list was made; infinite for another's."""
+    """A bound of how far the body has moved since its list was made; infinite if the list is another pair's."""
     neighbors = neighbor_list_at(store.table, key.at)
     moving = key.moving
     if neighbors.owner != key.owner:
@@ -72,7 +71,7 @@ def moved_since(store, key):
 
 @kernel(inner=True)
 def reaches(table, at, moved, margin):
-    """Whether the list at `at` has what is within a margin after so far a motion: 1; 0 if not; -1 if it had no room."""
+    """1 if the list at `at` has all pairs within a margin after a motion by `moved`; 0 if not; -1 if it had no room."""
     neighbors = neighbor_list_at(table, at)
     if moved > GRAIN * neighbors.skin:
         return 0
@@ -91,7 +90,7 @@ def can_be_listed(store, moving, margin):
 
 @kernel(inner=True)
 def write_list(store, key, margin, skin, found, count):
-    """Keep `count` pairs (k, 2), made for motions up to `skin`; none where there is no room. Whether there was."""
+    """Store `count` pairs (k, 2), found for motions up to `skin`; none if they do not fit. Whether they did."""
     moving = key.moving
     neighbors = neighbor_list_at(store.table, key.at)
     root = tree_node(store, moving.tree, 0)
@@ -101,7 +100,7 @@ def write_list(store, key, margin, skin, found, count):
         neighbors.turn[k] = np.int64(moving.quaternion[k] / GRAIN)
     for k in range(3):
         neighbors.place[k] = np.int64(middle[k] / GRAIN)
-    # Less by more than what the pose is rounded by, at a radius of FAR.
+    # Reduced by more than the rounding of the pose moves a point at a radius of FAR.
     neighbors.skin = np.int64((skin - 1e-10) / GRAIN)
     neighbors.margin = np.int64(margin / GRAIN)
     if count < 0 or count > ROOM or count > found.shape[0]:
@@ -117,7 +116,7 @@ def write_list(store, key, margin, skin, found, count):
 
 @kernel(inner=True)
 def listed_pairs(store, key, trees, pose, margin, skin, stack, candidates):
-    """What `pairs_within` finds, from the list of a `ListKey`, which is made anew where it does not reach.
+    """What `pairs_within` finds, from the list of a `ListKey`, which is made anew if it lacks some.
 
     The pose is that of g seen from f; a new list is for motions up to `skin`. -1 where there is no room for a list.
     """

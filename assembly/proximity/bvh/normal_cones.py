@@ -1,6 +1,7 @@
 """Cones of directions (a unit axis and a half angle) around vectors and around other cones, rounded outward.
 
-A circular cone of less than 90 degrees is convex: one around the Bezier vectors of a normal is one around the normal.
+A circular cone with a half angle of less than 90 degrees is convex: one that holds the Bezier vectors of a normal holds
+the normal.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from assembly._kernel import kernel
 
 # All directions.
 FULL = math.pi
-# Wider cones around vectors are not convex, or nearly so: nothing is known of combinations of the vectors.
+# Above this half angle [rad] a cone is not safely convex: it may not hold positive combinations of its vectors.
 CONVEX = 1.5
 # Rounding of a unit vector, of an angle and of a box, in parts of its extent.
 MARGIN = 1e-14
@@ -74,7 +75,7 @@ def cone_of_vectors(vectors, first, count, slack, vanish):
         a = _three(vectors, first + 3 * k)
         length = exact_length(a[0], a[1], a[2])
         if length > 0.0:
-            # How far the direction is off the axis, and how far the vector's own may be.
+            # The angle from the axis to the vector, and a bound of the error of the vector's direction.
             off = angle_between((a[0] / length, a[1] / length, a[2] / length), axis)
             half = max(half, off + math.asin(min(slack, length) / length))
     half += 2.0 * MARGIN

@@ -1,4 +1,4 @@
-"""What patches of faces are measured by: corners, boxes, normal cones, chord errors, lengths, turns and bulges.
+"""Measures of patches of faces: corners, boxes, normal cones, chord errors, lengths, turns and bulges.
 
 Over a patch with Bezier points A_ij, weights w_ij and the bilinear interpolant B of its corners, S - B = (A - w B) / w
 is no longer than the longest of the Bezier points of A - w B, each over its weight. B is off its two triangles by at
@@ -38,14 +38,14 @@ def _distance(a, b):
 
 @kernel(inline=True, exact=True)
 def _between(x, a, b):
-    """The point x of the way from one to another."""
+    """The point at fraction x of the way from a to b."""
     y = 1.0 - x
     return y * a[0] + x * b[0], y * a[1] + x * b[1], y * a[2] + x * b[2]
 
 
 @kernel(inner=True, exact=True)
 def _length(points, at, count, step):
-    """Of the polygon through points of a block so far apart in it."""
+    """The length of the polygon through points that stand `step` numbers apart in a block."""
     total = 0.0
     for k in range(1, count):
         total += _distance(_three(points, at + step * k), _three(points, at + step * (k - 1)))
@@ -54,7 +54,7 @@ def _length(points, at, count, step):
 
 @kernel(inner=True, exact=True)
 def _turn(units, at, count, step):
-    """How far directions of a block turn; those that are zero count for nothing."""
+    """The sum of the changes between successive unit vectors of a block, without changes from or to zero vectors."""
     total = 0.0
     for k in range(1, count):
         a, b = _three(units, at + step * k), _three(units, at + step * (k - 1))
@@ -76,13 +76,13 @@ def _bulge(points, at, count, step):
 
 @kernel(inner=True)
 def _raise_degree(work, rows, columns, source, target):
-    """Write homogeneous Bezier points one degree higher in u and in v; behind them as many numbers more."""
+    """Write homogeneous Bezier points one degree higher in u and in v; as many numbers behind them are scratch."""
     line = 4 * columns
     middle = target + 4 * (rows + 1) * (columns + 1)
     for i in range(rows + 1):
         for j in range(line):
             total = 0.0
-            # A point of the higher degree is between those of the lower one before and behind.
+            # A point of the higher degree is a weighted mean of two adjacent ones of the lower degree.
             for k in range(max(i - 1, 0), min(i + 1, rows)):
                 part = (rows - i) / rows if k == i else i / rows
                 total += part * work[source + line * k + j]
@@ -98,8 +98,8 @@ def _raise_degree(work, rows, columns, source, target):
 
 @kernel(inner=True, exact=True)
 def _times_square(work, weights, corners, at):
-    """Write Bezier points of the product of weights (place, rows, columns), times binomials, and the bilinear
-    interpolant of the corners about the first of them.
+    """Write Bezier points of the product of weights (place, rows, columns), which are multiplied by
+    binomials, and the bilinear interpolant of the corners relative to the first corner.
     """
     first, rows, columns = weights
     a, b, c, d = corners
@@ -145,7 +145,7 @@ def _chord_error(work, rows, columns, corners, at):
 
 @kernel(inner=True, exact=True)
 def _measure_points(face, work, pad, patch):
-    """What is told by the Bezier points of a patch, which begin the workspace."""
+    """Measure a patch by its Bezier points, which begin the workspace."""
     rows, columns = face.rows, face.columns
     count = rows * columns
     xyz = 4 * count
@@ -184,7 +184,7 @@ def _measure_points(face, work, pad, patch):
 
 @kernel(inner=True, exact=True)
 def _measure_normals(face, work, slack, vanish, patch):
-    """What is told by the Bezier points of a patch's normals, which begin the workspace; they become unit vectors."""
+    """Measure a patch by the Bezier points of its normals, which begin the workspace and are made unit vectors."""
     rows, columns = face.normal_rows, face.normal_columns
     axis, half = cone_of_vectors(work, 0, rows * columns, slack, vanish)
     patch.axis[0], patch.axis[1], patch.axis[2] = axis

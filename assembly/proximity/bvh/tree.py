@@ -1,8 +1,8 @@
 """Descent of two trees of boxes and normal cones: which of their elements may hold an extremal pair.
 
 An extremal pair has g - f = gap n, where n lies in the normal cone of f and -n in that of g (Johnson and Cohen,
-Spatialized normal cone hierarchies, 2001). Of two nodes with difference d of their centers and a reach for |gap| none
-holds a pair where
+Spatialized normal cone hierarchies, 2001). Two nodes, with a difference d of their centers and a reach for |gap|, hold
+no pair where
 
     the boxes are farther apart than the reach, by the planes along the axes of either,
     no n of the cone of f is within the cone of g turned around: angle(a_f, -a_g) > alpha_f + alpha_g,
@@ -112,7 +112,7 @@ def off_axis(d, dd, axis, c, s, r):
 
 @kernel(inner=True)
 def beside_cone(d, axis, c, s, ho, hp, rotation, slack):
-    """Whether two boxes, centers d apart, are so on one side of a double cone that no difference of theirs is in it.
+    """Whether two boxes, centers d apart, are beside a double cone: no difference of their points is in it.
 
     Of the planes that touch it, those towards d are tried. The boxes have half widths ho, and hp in turned axes.
     """
@@ -134,8 +134,8 @@ def beside_cone(d, axis, c, s, ho, hp, rotation, slack):
 
 # How one tree sees another one. rotation, shift: the pose of the other; bulk: the magnitudes of the rotation.
 View = namedtuple("View", "rotation shift bulk")
-# What is asked of a pair of nodes. reach: the most |gap|; slack: how far points may be off [length]; tilt: how far unit
-# vectors may.
+# The limits for a pair of nodes. reach: of |gap|; slack: of the error of points [length]; tilt: of the error of unit
+# vectors.
 Margin = namedtuple("Margin", "reach slack tilt")
 
 
@@ -156,7 +156,7 @@ def seen_from(view, node):
 def admits(node, other, seen, view, margin):
     """Whether a node of one tree and one of another, as the one sees it, may hold a pair.
 
-    What excludes most pairs for little comes first.
+    Cheap tests that exclude many pairs come first.
     """
     reach, slack, tilt = margin
     center, around, axis_p = seen
@@ -184,7 +184,7 @@ def admits(node, other, seen, view, margin):
 
 @kernel(inner=True)
 def facing(node, other, pose, slack):
-    """Whether leaves of f and of g, admitted, still may hold a pair when their boxes are looked at closer."""
+    """Whether leaves of f and of g that `admits` let pass may hold a pair, by closer tests of their boxes."""
     d = sub(add(matvec(pose.rotation, three_of(other.center)), pose.shift), three_of(node.center))
     ho = three_of(node.half)
     hp = three_of(other.half)
@@ -215,7 +215,7 @@ def node_of(store, tree, e):
 
 @kernel(inline=True)
 def rounding(store, trees, shift):
-    """By how much coordinates may be off."""
+    """A bound of the rounding error of coordinates."""
     f, g = tree_node(store, trees[0], 0), tree_node(store, trees[1], 0)
     size = f.radius + g.radius
     c = three_of(f.center)
@@ -232,7 +232,7 @@ def pairs_about(store, trees, pose, reach, ring, tilt, stack, out):
     and no unit vector farther than `tilt`: then the difference g - f of a pair's points is off by as much, and once
     more by what a cone, or the axes it is seen in, turned.
 
-    -1 where the stack (n, 2) is too short; more than `out` holds where `out` is: then what it holds are the first.
+    Returns -1 if the stack (n, 2) is too short, and a number above the length of `out` if that is: it has the first.
     """
     tree_f, tree_g = trees
     slack = ring + rounding(store, trees, pose.shift)
@@ -291,9 +291,9 @@ def pairs_within(store, trees, pose, reach, stack, out):
 
 @kernel(inner=True)
 def still_within(store, trees, pose, reach, listed, count, out):
-    """Which of the elements in a list, count of them from its place `listed` in the table, `pairs_within` would find.
+    """Those of `count` pairs of elements, listed in the table from `listed` on, that `pairs_within` would find.
 
-    As long as `out` holds them; their number.
+    They are written to `out` as far as they fit; returns how many there are.
     """
     slack = rounding(store, trees, pose.shift)
     margin = Margin(reach + slack, slack, TREE_ROUNDING)
@@ -363,7 +363,7 @@ def overlapping(store, trees, pose, stack, out):
 def least_distance(store, trees, pose, upper, stack):
     """A lower bound of the distance of two trees' elements, at most `upper`: that of their boxes.
 
-    A stack (n, 2) that is too short makes what is found lower, not wrong.
+    A stack (n, 2) that is too short makes the bound lower, not wrong.
     """
     tree_f, tree_g = trees
     slack = rounding(store, trees, pose.shift)
@@ -384,7 +384,7 @@ def least_distance(store, trees, pose, upper, stack):
         g = tree_node(store, tree_g, j)
         seen = seen_from(view, g)
         bound = box_distance(f, g, seen, view)
-        # What was found since the pair was put here may exclude it.
+        # A distance found since the pair was pushed may exclude it.
         if bound >= best:
             continue
         child_f = child_of(store, tree_f, i)
@@ -400,7 +400,7 @@ def least_distance(store, trees, pose, upper, stack):
             seen = seen_from(back, f)
             one = box_distance(tree_node(store, tree_g, child_g), f, seen, back)
             other = box_distance(tree_node(store, tree_g, child_g + 1), f, seen, back)
-        # The nearer one comes last, and is looked at first.
+        # The nearer child is pushed last, and so visited first.
         near = 0 if one <= other else 1
         for k in range(2):
             side = near if k == 1 else 1 - near

@@ -8,13 +8,13 @@ from assembly._kernel import kernel
 from assembly._record import record_dtype, record_view, size_of
 from assembly.proximity.bvh.normal_cones import FULL, cone_of_cones, exact_length
 
-# What nodes are made of, an element a row.
+# The elements below the nodes, one a row.
 LEAF_DTYPE = record_dtype(
     "f8",
     cone=4,  # axis and half angle of its normals
     low=3,  # box
     high=3,
-    points=(4, 3),  # corners: it is within a distance of their hull
+    points=(4, 3),  # corners: the element is within `beyond` of their hull
     beyond=1,  # that distance
     middle=3,  # of its box
 )

@@ -1,4 +1,4 @@
-"""Kernels that bound second derivatives of plane curves along chords, and tell to which side of these they bend.
+"""Kernels that bound second derivatives of plane curves over intervals, and tell to which side a curve bends.
 
 See `derivative_nets.py`.
 """
@@ -54,7 +54,7 @@ def _bound_bend(net, component, least):
 
 @kernel(inner=True, allocates=True)
 def _side(net, points):
-    """1, -1 or 0: whether a control polygon turns right only, left only, and by less than half a turn, or neither."""
+    """1 if a control polygon turns only right, -1 if only left, by less than half a turn in all; 0 otherwise."""
     most, left, right = 0.0, -np.inf, np.inf
     first_x = first_y = last_x = last_y = 0.0
     for k in range(points - 1):
@@ -84,13 +84,13 @@ def _polygon(pieces, at, ends, room, polygon):
     for k in range(pieces.shape[0]):
         width = at[k + 1] - at[k]
         low, high = part_of(begin, end, at[k], width)
-        # What is beyond a knot by rounding is not; an interval of no length is in the span where it is.
+        # Skip spans that the interval overlaps by rounding only; the last one is used where all others are skipped.
         is_beyond = (end - at[k]) / width <= WITHIN and k > 0 or (begin - at[k]) / width >= 1.0 - WITHIN
         if is_beyond and not (points == 0 and k == pieces.shape[0] - 1):
             continue
         write_restriction(rows - 1, low, high, binomials, matrix)
         _restrict(pieces[k], matrix, net)
-        # Where spans meet both have the same point.
+        # Spans share the point where they meet: it is written once.
         for i in range(0 if points == 0 else 1, rows):
             for c in range(3):
                 polygon[points, c] = net[i, c]
@@ -108,7 +108,7 @@ def bound_chords(pieces, at, t, second, hollow):
     t : (n, 2)
         The ends of the intervals, in any order.
     second, hollow : (n, 2), (n,)
-        Zeros at first: bounds of |c_u''| and |c_v''|, and the side to which the curve bends.
+        Zeros on entry; on return bounds of |c_u''| and |c_v''|, and the side to which the curve bends (`_side`).
     """
     spans, rows, _ = pieces.shape
     binomials, matrix, net = np.empty((rows, rows)), np.empty((rows, rows)), np.empty((rows, 3))

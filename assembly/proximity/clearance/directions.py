@@ -1,7 +1,8 @@
 """Directions that separate two nodes at a pose, or at both ends of a way at once.
 
-What one plane keeps apart at both ends of a way it keeps apart along the chord: the direction sought is that of the
-largest lesser gap of both. It is the one between a and the hull of b at both poses; those asked before cost less.
+A plane that separates two nodes at both ends of a way separates them along the chord. So the direction sought is the
+one whose smaller gap, of those at both ends, is largest: the direction between a and the hull of b at both poses.
+Directions that cost less are tried before it.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ from assembly.proximity.clearance.separation import (
     write_corners,
 )
 
-# The part of a distance to which directions between hulls are sought.
+# The relative accuracy of the distance to which GJK seeks the direction between hulls.
 ROUGHLY = 1e-3
-# A unit direction, and the gaps of two nodes along it at both ends of a way; infinite before where that is not asked.
+# A unit direction, and the gaps of two nodes along it at both ends of a way; `before` is infinite without a sweep.
 Direction = namedtuple("Direction", "n before after")
 
 
@@ -47,7 +48,7 @@ def along(forest, nodes, way, n):
 
 @kernel(inline=True)
 def better(forest, nodes, way, m, found):
-    """A direction that need not be of unit length, if its lesser gap is larger than that of one found."""
+    """The direction of m, which may have any length, if its lesser gap is larger than that of `found`; else `found`."""
     length = math.sqrt(dot(m, m))
     if not length > 0.0:
         return found
@@ -71,7 +72,7 @@ def of_boxes(forest, nodes, way, middle, found, enough):
 
 @kernel(inner=True)
 def of_hulls(forest, nodes, way, found, work):
-    """The better of one found and of that between node a and the hull of b at both poses; whether these overlap."""
+    """The better of `found` and the direction between a and the hull of b at both poses; whether the hulls overlap."""
     count_a = write_corners(forest, nodes.a, IDENTITY, work[0], 0)
     count_b = write_corners(forest, nodes.b, way.after, work[1], 0)
     if way.swept:
@@ -85,9 +86,9 @@ def of_hulls(forest, nodes, way, found, work):
 
 @kernel(inner=True)
 def of_normals(forest, front, nodes, way, found):
-    """The best of one found, of normals of contacts, and of normals of cells, either way.
+    """The best of `found`, of the normals of contacts, and of the normals of cells in both senses.
 
-    Of hulls that all but touch the nearest points do not tell a direction well enough.
+    Where hulls almost touch, their nearest points do not determine a direction well enough.
     """
     guides = pair_proof_at(front.pair, 0).guides
     for i in range(GUIDES):
@@ -102,7 +103,7 @@ def of_normals(forest, front, nodes, way, found):
 
 @kernel(inner=True)
 def best_direction(forest, front, nodes, way, hint, needed):
-    """A direction whose lesser gap is large, and whether hulls overlap. Stops at the first that is enough."""
+    """A direction with a large lesser gap, and whether hulls overlap. Stops at the first above `needed` and the sag."""
     enough = needed + way.sag
     found = Direction(hint, -math.inf, -math.inf)
     if dot(hint, hint) > 0.5:
@@ -122,6 +123,6 @@ def best_direction(forest, front, nodes, way, hint, needed):
     found, overlap = of_hulls(forest, nodes, way, found, front.work)
     if lesser(found) > enough:
         return found, False
-    # Wires are more than their spines.
+    # The corners of a wire are those of its spine: wires may overlap where these hulls do not.
     overlap = overlap or is_wire(forest, nodes.a) or is_wire(forest, nodes.b)
     return of_normals(forest, front, nodes, way, found), cells and overlap

@@ -1,13 +1,14 @@
 """The front of a pair of bodies: pairs of nodes that cover all pairs of points, each with what separates it.
 
-As long as points of body b have gone less than a gap, its pair need not be asked again; the least of these lengths
-tells of all pairs at once. After that the gap along the same direction is asked, some nanoseconds; where it does not
-hold, another direction is sought, and then the larger node is replaced by its children.
+A pair of nodes is tested again only after points of body b have moved by its gap; the least of these lengths holds for
+all pairs at once. Then the gap along the same direction is computed, in some nanoseconds. If it is too small, another
+direction is sought; if none is found, one of the nodes is replaced by its children.
 
-A look writes the front that follows beside the one there is. It takes its place where the look ends clear; else all is
-as it was. It also does where the time of a look is over: its pairs then tell of the pose that is looked at, and the
-next look at that goes on with those that are not parted yet. Where that does not end clear, or another pose is looked
-at instead, the front that was there before comes back: pieces of what could not be proven are many.
+A look writes the next front beside the present one. If the look ends clear, the next front replaces the present one;
+else nothing changes. If the time limit interrupts a look, the next front also replaces the present one: its pairs then
+describe the pose that is looked at, and the next look at that pose goes on with the pairs that are not separated yet.
+If that look does not end clear, or another pose is looked at instead, the front from before is restored, since the
+front of a failed proof has many small pieces.
 """
 
 from __future__ import annotations
@@ -39,24 +40,24 @@ from assembly.proximity.clearance.sleeves import gap_of
 from assembly.proximity.clearance.spines import loss_on_way, spine_gap
 from assembly.proximity.clearance.way import sag_of, stays_apart
 
-# What is kept of a pair of bodies. pair: a PAIR; counts: COUNTS; parted, nodes: rows of PARTED and NODES, the front;
-# next_parted, next_nodes: the one that follows; waiting, waiting_nodes: the queue of a look, a ring; work: (3, 64) to
-# work in.
+# The state of a pair of bodies. pair: a PAIR; counts: COUNTS; parted, nodes: rows of PARTED and NODES, the present
+# front; next_parted, next_nodes: the next front; waiting, waiting_nodes: the queue of a look, a ring buffer; work:
+# (3, 64), scratch memory.
 Front = namedtuple("Front", "pair counts parted nodes next_parted next_nodes waiting waiting_nodes work")
-# What a look asks for. needed: every gap has to be larger; touch: cells that cross by no more are no crossing;
-# resolution: pairs of cells that are smaller stay open; budget: so do all pairs of nodes
-# after so many; swept_budget: after so many a way is too long; clock, until: the address of what tells the time, and
-# when it is over (0: never) [ns].
+# The limits of a look. needed: every gap has to be larger; touch: cells that cross by no more do not count as crossing;
+# resolution: pairs of cells that are smaller stay open; budget: after so many pairs of nodes all others stay open;
+# swept_budget: after so many pairs a way counts as too long; clock, until: the address of a function that tells the
+# time, and the deadline (0: none) [ns].
 Limits = namedtuple("Limits", "needed touch resolution budget swept_budget clock until")
 # Two nodes, and what parts them.
 Parted = namedtuple("Parted", "a b how")
-# The time is asked after so many pairs of the front that are asked again.
+# The clock is read once for so many pairs of the front that are tested again.
 ASKED_AT_ONCE = 16
 
 
 @kernel(inline=True)
 def is_over(limits):
-    """Whether the time of a look is over."""
+    """Whether a look is past its deadline."""
     return limits.until > 0 and call_address(limits.clock, ()) > limits.until
 
 
@@ -82,7 +83,7 @@ def begin_front(front):
 
 @kernel(inner=True)
 def first_row(front):
-    """What a new front writes over: the first pair of nodes, the count, when the first gap is used up."""
+    """What `begin_front` overwrites: the first pair of nodes, the count, and the travel that uses up the first gap."""
     row, parted, counts = nodes_at(front.nodes, 0), parted_at(front.parted, 0), counts_at(front.counts, 0)
     kept = Parted(row.a, row.b, row.how), vector(parted.normal), parted.expiry
     return kept, counts.count, pair_proof_at(front.pair, 0).soonest
@@ -90,7 +91,7 @@ def first_row(front):
 
 @kernel(inner=True)
 def bring_back(front, kept):
-    """Put back what a new front wrote over."""
+    """Restore what `begin_front` overwrote."""
     (pair, n, expiry), count, soonest = kept
     write_pair(front.parted, front.nodes, 0, pair, n, expiry)
     counts_at(front.counts, 0).count = count
@@ -115,7 +116,7 @@ def remember(front, pose):
 
 @kernel(inner=True)
 def keep(front, nodes, n, expiry):
-    """Put a pair of nodes into the front that follows."""
+    """Append a pair of nodes to the next front."""
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
     write_pair(front.next_parted, front.next_nodes, counts.next_count, nodes, n, expiry)
     counts.next_count += 1
@@ -124,7 +125,7 @@ def keep(front, nodes, n, expiry):
 
 @kernel(inner=True)
 def take_next(front):
-    """Put the front that follows in the place of the one there is."""
+    """Replace the present front by the next one."""
     counts = counts_at(front.counts, 0)
     for i in range(counts.next_count):
         for c in range(PARTED_SIZE):
@@ -136,7 +137,7 @@ def take_next(front):
 
 @kernel(inner=True)
 def replace_front(front, pose, travelled):
-    """Put the front that follows in the place of the one there is, at a pose that becomes the last one."""
+    """Replace the present front by the next one, at a pose that becomes the last one."""
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
     take_next(front)
     if counts.fresh == 0:
@@ -148,14 +149,14 @@ def replace_front(front, pose, travelled):
 
 @kernel(inline=True)
 def aim_of(pair):
-    """The pose that a look whose time was over looks at."""
+    """The pose to which the interrupted look leads."""
     r, x = pair.aim_turn, pair.aim_shift
     return RelativePose((r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]), (x[0], x[1], x[2]))
 
 
 @kernel(inline=True)
 def origin_of(pair):
-    """The pose from which the way leads of which a look is one whose time was over."""
+    """The start of the whole way of which the interrupted look examined a part."""
     r, x = pair.origin_turn, pair.origin_shift
     return RelativePose((r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]), (x[0], x[1], x[2]))
 
@@ -172,9 +173,9 @@ def copy_rows(front, begin, to, count):
 
 @kernel(inner=True)
 def put_off(front, pose, swept, head, tail):
-    """Leave a look at a pose whose time is over: pairs of the queue go to the front, to be asked next time.
+    """Interrupt a look at its deadline: pairs of the queue go to the front, to be tested next time.
 
-    The front that tells of the last pose is kept in the second half of the rows.
+    The front of the last pose is saved in the second half of the rows.
     """
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
     if pair.underway == 0.0:
@@ -195,7 +196,7 @@ def put_off(front, pose, swept, head, tail):
 
 @kernel(inner=True)
 def goes_on(front, pose, swept):
-    """Whether a look goes on with one whose time was over."""
+    """Whether a look at a pose continues the interrupted one."""
     pair = pair_proof_at(front.pair, 0)
     if pair.underway != (ON_ITS_WAY if swept else TO_POSE):
         return False
@@ -210,7 +211,7 @@ def goes_on(front, pose, swept):
 
 @kernel(inner=True)
 def leave_off(front):
-    """Give up a look whose time was over: the front is again what it was before."""
+    """Give up an interrupted look: restore the front from before it."""
     pair, counts = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
     counts.earlier = 0
     if pair.underway == 0.0:
@@ -222,17 +223,17 @@ def leave_off(front):
 
 @kernel(inline=True)
 def is_asked_always(nodes):
-    """Whether the gap of two nodes is asked at every pose, whatever it was at the last one.
+    """Whether the gap of two nodes is computed at every pose, whatever it was at the last one.
 
-    Points of a are seen from b in a bore of which the root's radius tells nothing. What leans in a bore is nearer by
-    more than it goes.
+    With a bore of b, points of a move as seen from b, and the radius of b's root does not bound that motion. A shaft
+    that leans in a bore may approach its wall by more than its points move.
     """
     return nodes.how == BY_BORE_B or nodes.how >= BY_SLEEVE
 
 
 @kernel(inline=True)
 def expiry_of(nodes, travelled, gap):
-    """Until points of b have gone so far in all, two nodes are parted for certain."""
+    """The total travel of points of b up to which two nodes are certainly separated."""
     return -math.inf if is_asked_always(nodes) else travelled + gap
 
 
@@ -244,9 +245,10 @@ def put_waiting(front, at, nodes, n):
 
 @kernel(inner=True)
 def spines_stay_apart(forest, front, nodes, way, needed, gaps):
-    """Whether two pieces of wires are kept apart all the way by their spines, by gaps over what is needed at its ends.
+    """Whether the distance of their spines keeps two pieces of wires apart all the way.
 
-    They may be in each other by what wires may be slimmer, and then on the way by its loss as well; that is written.
+    gaps: by how much the gaps at both ends of the way exceed `needed`. Wires may overlap by `slimmer`, and on the way
+    by its loss as well; the deepest overlap is written to `way_depth`.
     """
     pair = pair_proof_at(front.pair, 0)
     lesser = min(gaps[0], gaps[1])
@@ -265,7 +267,7 @@ def spines_stay_apart(forest, front, nodes, way, needed, gaps):
 
 @kernel(inner=True)
 def ask_spines_again(forest, front, way, needed, i):
-    """Ask pair i of the front, parted by spines, at a new pose; whether it still is."""
+    """Whether the spines still separate pair i of the front at a new pose."""
     pair, row, parted = pair_proof_at(front.pair, 0), nodes_at(front.nodes, i), parted_at(front.parted, i)
     nodes, at = Parted(row.a, row.b, BY_SPINES), vector(parted.normal)
     gap, place = spine_gap(forest, nodes, way.after, at)
@@ -281,9 +283,9 @@ def ask_spines_again(forest, front, way, needed, i):
 
 @kernel(inner=True)
 def ask_again(forest, front, way, limits):
-    """Ask the front at a new pose along its directions. Pairs that fail go to the queue.
+    """Test the front at a new pose along its stored directions. Pairs that fail go to the queue.
 
-    Returns how many, and whether the time was over; what is not asked by then stays as it is.
+    Returns the length of the queue, and whether the deadline passed; pairs not tested by then stay as they are.
     """
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
     travelled, needed, over = pair.travelled + way.moved, limits.needed, False
@@ -294,7 +296,7 @@ def ask_again(forest, front, way, limits):
         row, parted = nodes_at(front.nodes, i), parted_at(front.parted, i)
         nodes, n, expiry = Parted(row.a, row.b, row.how), vector(parted.normal), parted.expiry
         if nodes.how == LEFT_OPEN:
-            # By the look that goes on.
+            # The interrupted look, which goes on, left this pair open.
             counts.opened += 1
             keep(front, nodes, n, expiry)
             continue
@@ -304,7 +306,7 @@ def ask_again(forest, front, way, limits):
             continue
         if expiry <= travelled and not over:
             counts.asked += 1
-            # What is asked at every pose in any case is no progress.
+            # Pairs that are tested at every pose are no progress: the clock is not read for them.
             if not is_asked_always(nodes):
                 over = counts.asked % ASKED_AT_ONCE == 0 and is_over(limits)
             if nodes.how == BY_SPINES:
@@ -313,7 +315,7 @@ def ask_again(forest, front, way, limits):
                     tail += 1
                 continue
             gap = gap_of(forest, nodes, way.after, n) - needed
-            # At the last pose the gap was this at least.
+            # expiry - travelled is a lower bound of the gap at the last pose.
             fine = stays_apart(forest, nodes, way, n, (expiry - pair.travelled, gap))
             if gap > 0.0 and not fine:
                 before = gap_of(forest, nodes, way.before, n) - needed

@@ -66,7 +66,7 @@ def sag_of_rim(node, e):
 
 @kernel(inner=True)
 def write_radii(links, node):
-    """The radii of a cell: what the surface may be off its corners' hull, and what it goes on beyond chords."""
+    """Write a cell's radii, from how far the surface may leave its corners' hull and boundary curves their chords."""
     node.disc = 0.0
     if links.form == WIRE:
         node.reach = arc_height(node) + node.pad
@@ -87,7 +87,7 @@ def write_radii(links, node):
     node.reach = bent + border + node.pad
     node.rho = node.pad
     if links.form == FLAT and bent == 0.0:
-        # What is beyond a chord is in the plane.
+        # What a flat face has beyond a chord lies in its plane.
         node.disc = beyond
     elif links.form == ROUNDED or links.form == FLAT:
         node.rho += bent + beyond
@@ -155,7 +155,7 @@ def point_on(store, surface, u, v):
 
 @kernel(inline=True)
 def into_period(store, surface, near, at):
-    """Parameters at a curve, moved by whole periods to where they are nearest to others."""
+    """The parameters `at`, moved by whole periods to where they are nearest to the parameters `near`."""
     patch = surface_at(store.table, surface)
     u, v = at
     if patch.closed_u != 0:
@@ -207,7 +207,7 @@ def uv_of(node, i):
 
 @kernel(inner=True)
 def held(links, node, e, part, p, q, r):
-    """Above 1: a part of edge e's curve with the ends p and q stays in the triangle p q r; see `rims.py`."""
+    """A ratio: if it is above 1, a part of edge e's curve with ends p and q is in the triangle p q r; see `rims.py`."""
     dt = part * (node.rim_t[e, 1] - node.rim_t[e, 0])
     if links.rim[e] == NONE or links.hollow[e] == -1 or dt == 0.0:
         return math.inf
@@ -221,7 +221,7 @@ def held(links, node, e, part, p, q, r):
 
 @kernel(inner=True)
 def held_after(links, node, i, m):
-    """The least of those of a triangle whose side i is halved at m."""
+    """The least ratio `held` of the curves of a triangle whose side i is halved at m."""
     j, k = (i + 1) % 3, (i + 2) % 3
     p, q, r = uv_of(node, i), uv_of(node, j), uv_of(node, k)
     halves = min(held(links, node, i, 0.5, p, m, r), held(links, node, i, 0.5, m, q, r))
@@ -230,9 +230,9 @@ def held_after(links, node, i, m):
 
 @kernel(inner=True)
 def best_side(forest, links, node, by_length):
-    """The side of a triangle to halve and its middle: the costliest after which curves stay in their triangles.
+    """The side of a triangle to halve, its middle, and how far boundary curves may then leave their triangles.
 
-    Also by how much others may then be cut off by curves.
+    It is the costliest side after which all curves stay in their triangles, or the one that comes nearest to that.
     """
     best, i = -1.0, 0
     most, j = -1.0, 0
@@ -312,7 +312,7 @@ def halve_wire(forest, k, n):
 
 @kernel(inner=True)
 def halve(forest, k, by_length):
-    """Give cell k two children; False where there is no room."""
+    """Give cell k two children; False if the tables are full."""
     n = forest.used[0]
     if n + 2 > len(forest.links):
         return False

@@ -1,7 +1,7 @@
-"""A kernel that halves the cells of a body again and again: first by parts of faces, then those of a part.
+"""A kernel that halves groups of a body's cells recursively: first by parts of faces, then within each part.
 
-Parts are halved at the median of their middles along the axis in which these spread most, cells of a part at the median
-along the direction in which their centers do.
+Parts are split at the median of their middles along the coordinate axis in which these extend most; cells of a part at
+the median of their centers along the principal axis of these.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ GROUP = record_dtype(
 )
 group_at = record_view(GROUP)
 GROUP_SIZE = size_of(GROUP)
-# Rotations that leave a symmetric matrix of three rows diagonal: it is so after six rounds of three.
+# Sweeps of Jacobi's method, of three rotations each: six leave a symmetric matrix (3, 3) diagonal to rounding.
 SWEEPS = 6
 
 
@@ -33,7 +33,7 @@ SWEEPS = 6
 def _write_longest(scatter, turn, way):
     """Write the unit eigenvector of the largest eigenvalue of a symmetric matrix (3, 3), which is made diagonal.
 
-    Its largest component is positive.
+    Its component of largest magnitude is made positive.
     """
     for i in range(3):
         for j in range(3):
@@ -148,7 +148,7 @@ def halve_groups(centers, part, many, order, groups):
     many : int
         The number of parts.
     order : (n,)
-        Room for the order in which cells of every group stand in a row.
+        Output: the cells, in an order in which those of every group are contiguous.
     groups : (2 n - 1, GROUP_SIZE)
     """
     count = part.size

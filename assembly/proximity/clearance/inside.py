@@ -1,9 +1,9 @@
 """Whether a point is inside a closed body: how often a ray leaves it, with signs, proven.
 
-Each cell's true patch is within `reach` of its facets, corner by corner on the straight way between both. If the
-ray's origin is farther than that from the facets, and the ray farther from their border, the ray crosses the patch as
-often as the facets, with signs. A cell that is not so clear is halved. The sum over all cells is 1 inside and 0
-outside. In a wire is what is nearer to its spine than its radius.
+Each cell's true patch is within `reach` of its facets, corner by corner on the straight way between both. If the ray's
+origin is farther than that from the facets, and the ray farther from their border, the ray crosses the patch as often
+as the facets, with signs. A cell that fails this test is halved. The sum over all cells is 1 inside and 0 outside. A
+point is in a wire if it is nearer to the wire's spine than its radius.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from assembly.proximity.clearance.records import NONE, WIRE, Forest, cell_face_a
 from assembly.proximity.clearance.stab import segments_apart, triangle_distance
 
 UNCLEAR = -99
-# The size of cells, in parts of the ray's length, below which they are not halved to tell.
+# Cells whose radius is below this part of the ray's length are not halved.
 SMALLEST = 1e-7
 # How many rays are tried from a point, and the ray's length in radii of the body.
 RAYS, LENGTH = 8, 2.1
@@ -46,7 +46,7 @@ def misses_box(node, ray):
 
 @kernel(inline=True)
 def crossings_of_triangle(signs, corners, direction):
-    """Signed crossings of a ray from the origin and a triangle, by the volumes over its sides as the ray sees them."""
+    """Signed crossings of a triangle by a ray from the origin; signs: direction . (p x q) of each side from p to q."""
     x, y, z = signs
     up = x > 0.0 and y > 0.0 and z > 0.0
     down = x < 0.0 and y < 0.0 and z < 0.0
@@ -123,7 +123,7 @@ def winding_along(forest, root, ray, stack):
 
 @kernel(inner=True)
 def winding(forest, root, p, stack):
-    """1 where a point is inside the body of a root, 0 where it is outside, UNCLEAR where no ray of several tells."""
+    """1 where a point is inside the body of a root, 0 where it is outside, UNCLEAR if none of several rays decides."""
     node = node_at(forest.nodes, root)
     out = sub(p, vector(node.center))
     length = math.sqrt(dot(out, out))
@@ -148,7 +148,7 @@ FOREST = "Tuple((i8[::1], f8[::1], i8[:, ::1], i8[:, ::1], f8[:, ::1], i8[::1]))
 
 @kernel(signatures=f"({FOREST}, i8, f8[:, ::1], i8[::1], i8[::1])")
 def winding_of(arrays, root, points, stack, out):
-    """`winding` of points (n, 3), until one tells; returns how many were asked."""
+    """`winding` of points (n, 3), up to the first that is decided; returns how many were tested."""
     table, pool, faces, links, nodes, used = arrays
     forest = Forest(Store(table, pool), faces, links, nodes, used)
     for k in range(len(points)):

@@ -51,12 +51,12 @@ from assembly.proximity.clearance.spines import spine_gap
 from assembly.proximity.clearance.stab import crossing_of
 from assembly.proximity.clearance.way import pose_at, sag_of, stays_apart, way_of
 
-# The most pairs that directions are sought for over a whole way: halving it is cheaper than more. The shortest part of
-# a way.
+# The most pairs for which directions are sought over a whole way: beyond that, halving it is cheaper. The shortest part
+# of a way.
 SWEPT_BUDGET, SHORTEST = 1000, 1.0 / 256.0
-# What was found of two nodes: no cause to say they are apart, parted, or apart at both ends of a way too long to tell.
+# What was found of two nodes: no proof, proven apart, or apart at both ends of a way too long to prove it in between.
 NOT_PARTED, ARE_PARTED, NEED_SHORTER = 0, 1, 2
-# The time is asked after so many pairs that directions are sought for.
+# The clock is read once for so many pairs for which directions are sought.
 SOUGHT_AT_ONCE = 8
 # How a pair of nodes was left: parted, to be replaced by children, open, or with it the look ends.
 DONE, DIVIDED, ENDED = 0, 1, 2
@@ -78,7 +78,7 @@ def part_wires(forest, front, way, nodes, needed):
 
 @kernel(inner=True)
 def part_nodes(forest, front, way, nodes, hint, needed):
-    """Seek what parts two nodes: what was found, the direction, gaps before and after, and whether hulls overlap."""
+    """Seek a proof that two nodes are apart: what was found, the direction, both gaps, and whether hulls overlap."""
     found, overlap = best_direction(forest, front, nodes, way, hint, needed)
     n, gaps = found.n, (found.before - needed, found.after - needed)
     travelled = pair_proof_at(front.pair, 0).travelled + way.moved
@@ -95,25 +95,25 @@ def part_nodes(forest, front, way, nodes, hint, needed):
             keep(front, inside, n, expiry_of(inside, travelled, room - needed))
             return ARE_PARTED, n, gaps, overlap
         if how >= BY_SLEEVE and at_start > 0.0:
-            # What is round is exact: smaller nodes tell no more.
+            # Round nodes are exact: smaller nodes prove no more.
             return NEED_SHORTER, n, gaps, overlap
     return NOT_PARTED, n, gaps, overlap
 
 
 @kernel(inline=True)
 def extent(forest, k):
-    """The radius of a ball around the corners of a cell, or around a node: halving makes no wire thinner."""
+    """The radius of a ball around a node; of a cell without its thickness, as halving makes no wire thinner."""
     node = node_at(forest.nodes, k)
     return node.radius - node.rho if is_cell(forest, k) else node.radius
 
 
 @kernel(inner=True)
 def is_halved_first(forest, a, b, short):
-    """Of two nodes whose gap is short by so much: whether a is halved, and whether by length or by chord error.
+    """Whether a is halved, not b, if their gap is too small by `short`; and whether by length or by chord error.
 
-    The larger one is. Of two cells that only their radii keep from being parted, the thicker; and what is round, and
-    exact, not as long as what is beside it could be finer. Of two wires the longer piece: their spines part them once
-    both are short.
+    The larger node is halved. Of two cells that only their radii keep from being separated, it is the one with the
+    larger `reach`. A round node, which is exact, is not halved as long as the other one could be finer. Of two wires it
+    is the longer piece: once both are short, the distance of their spines separates them.
     """
     if is_wire(forest, a) and is_wire(forest, b):
         return extent(forest, a) > extent(forest, b), True
@@ -128,7 +128,7 @@ def is_halved_first(forest, a, b, short):
         return True, False
     if round_a and not round_b and (not cell_b or other.reach >= 0.25 * short + 2.0 * other.pad):
         return False, False
-    # A cell is not halved for a box that is not yet taken apart.
+    # A box is replaced by its children before a cell is halved.
     if cell_a or cell_b:
         return cell_b, True
     return one.radius > other.radius, True
@@ -136,14 +136,14 @@ def is_halved_first(forest, a, b, short):
 
 @kernel(inline=True)
 def fineness(forest, k):
-    """How much smaller nodes than node k could still be."""
+    """How much tighter the nodes below node k could still be."""
     node = node_at(forest.nodes, k)
     return node.reach if is_cell(forest, k) else node.radius
 
 
 @kernel(inner=True)
 def is_too_long(forest, way, nodes, gaps):
-    """Whether nodes that are clear at the end of a way need a shorter one, rather than to be halved."""
+    """Whether nodes that are clear at the end of a way need a shorter way, rather than smaller nodes."""
     before, after = gaps
     if not way.swept or not after > 0.0:
         return False
@@ -171,7 +171,7 @@ def divide(forest, front, nodes, n, tail, short):
 
 @kernel(inner=True)
 def crosses(forest, front, nodes, pose, touch):
-    """Whether two cells are proven to cross by more than `touch`; where is written."""
+    """Whether two cells are proven to cross by more than `touch`; depth and place are written to the pair."""
     pair = pair_proof_at(front.pair, 0)
     counts_at(front.counts, 0).stabbed += 1
     depth, place = crossing_of(forest, nodes.a, nodes.b, pose, front.work)
@@ -230,7 +230,7 @@ def seek(forest, front, way, limits, tail):
 def look_only(forest, front, way, limits):
     """Prove that all pairs of the front are clear by more than `needed` at the end of a way and, swept, all along it.
 
-    The front and the last pose stay as they are; the front that follows is that of the end.
+    Unless its time is over, the present front and the last pose stay as they are; the next front is that of the end.
     """
     counts_at(front.counts, 0).opened = 0
     tail, over = ask_again(forest, front, way, limits)
@@ -266,16 +266,16 @@ def look(forest, front, pose, limits, swept):
 def go_to(forest, front, pose, limits):
     """A look at a pose and at the way to it, which is taken in parts where it is too long for one look.
 
-    `part` of the pair's record tells how much of the way is clear. Where that is not all, the last pose stays the last,
-    but where the time is over: then it is that up to which the way is clear, and the next call goes on from there. The
-    shortest part is one of the whole way in any case: of what is left there is always a half.
+    `part` of the pair's record is the part of the way that is proven clear. If it is not the whole way, the last pose
+    stays as it was; but if the time is over, it becomes the pose up to which the way is clear, and the next call goes
+    on from there. SHORTEST is a part of the whole way, not of the way that is left: that always has a half.
     """
     pair = pair_proof_at(front.pair, 0)
     root = node_at(forest.nodes, counts_at(front.counts, 0).root_b)
     center = vector(root.center)
     begin = last_pose(front)
     whole = way_of(begin, pose, center, root.radius, True)
-    # Parts are of the way that is left; how much of all of it earlier calls have proven.
+    # `to` and `done` are parts of the way that is left; `behind` is the part of the whole way proven by earlier calls.
     to, aim, origin, behind = 1.0, pose, begin, 0.0
     if pair.underway == ON_ITS_WAY:
         to, aim, origin, behind = pair.aim_part, aim_of(pair), origin_of(pair), pair.behind

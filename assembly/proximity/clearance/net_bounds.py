@@ -1,7 +1,7 @@
 """Kernels that bound derivatives of Bezier pieces over boxes of their parameters; see `derivative_nets.py`.
 
-Of a product of nets b_kl = sum of C(m, i) C(n, j) .. / C(m + .., k) C(n + .., l) the sums are made first, and divided
-where the net is done.
+The product of two nets is b_kl = sum of C(m, i) C(n, j) .. / C(m + .., k) C(n + .., l). The sums are accumulated
+first; the division follows once all terms are in.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ import numpy as np
 
 from assembly._kernel import kernel
 
-# Bounds over parts of a span that only rounding leaves are divided by their width: they are widened to this part of it.
+# Bounds are divided by the width of a part of a span: parts left by rounding only are widened to this fraction of it.
 NARROWEST = 1e-6
-# How far an interval may be beyond a span that it is in, in parts of the span; and what of a turn is rounding, in parts
-# of the longest way squared.
+# The overlap of an interval and a span, in parts of the span, and the turn of a control polygon, in parts of its
+# longest leg squared, that count as rounding.
 WITHIN, STRAIGHT = 1e-12, 1e-15
 
 
@@ -97,7 +97,7 @@ def _write_rate(net, direction, rate):
 
 @kernel(inner=True, allocates=True)
 def _add_product(scale, weights, vectors, binomials, total):
-    """Add to the sums of a product that of weights (m + 1, n + 1, 4), whose last column counts, with vectors."""
+    """Add to the sums of a product that of weights (m + 1, n + 1, 4), in the last column, with vectors."""
     m, n, p, q = weights.shape[0] - 1, weights.shape[1] - 1, vectors.shape[0] - 1, vectors.shape[1] - 1
     for k in range(m + 1):
         for l in range(n + 1):
@@ -129,7 +129,7 @@ def _divide(total, binomials):
 
 @kernel(inner=True, allocates=True)
 def _bound_second(net, rate, numerator, direction, binomials):
-    """The longest vector of w P_d - 2 w_d P, whose rates of w are the last column of `rate`."""
+    """The length of the longest vector of w P_d - 2 w_d P, where w_d is the last column of `rate`."""
     p, q = numerator.shape[0] - 1, numerator.shape[1] - 1
     in_u = direction == 0
     derivative = np.empty((p if in_u else p + 1, q + 1 if in_u else q, 3))
@@ -144,8 +144,7 @@ def _bound_second(net, rate, numerator, direction, binomials):
 def _bound_patch(net, binomials, bounds):
     """Bounds of |S_u|, |S_v|, |S_uu|, |S_uv|, |S_vv| over the unit square of one net, which is moved.
 
-    Products with weights are made though these may all be the same: nets of higher degrees are nearer to what they
-    bound.
+    Products with weights are formed even if all weights are equal: nets of higher degree give tighter bounds.
     """
     rows, columns = net.shape[0], net.shape[1]
     least = _center(net)
@@ -166,13 +165,13 @@ def _bound_patch(net, binomials, bounds):
 
 @kernel(inline=True)
 def part_of(low, high, begin, width):
-    """The part of a span that is in an interval, in parts of it; empty where the first is not the smaller."""
+    """The overlap of a span and an interval, in parts of the span; empty unless the first is the smaller one."""
     return min(max((low - begin) / width, 0.0), 1.0), min(max((high - begin) / width, 0.0), 1.0)
 
 
 @kernel(inline=True)
 def not_narrow(low, high):
-    """Parts of a span that are not all but empty."""
+    """The ends of a part of a span, widened to NARROWEST at least."""
     low = min(low, max(high - NARROWEST, 0.0))
     return low, max(high, low + NARROWEST)
 
@@ -189,7 +188,7 @@ def bound_surface(pieces, at_u, at_v, closed, boxes, found):
     boxes : (n, 4)
         Low and high u, low and high v.
     found : (n, 5)
-        Zeros at first: bounds of |S_u|, |S_v|, |S_uu|, |S_uv|, |S_vv|.
+        Zeros on entry; on return bounds of |S_u|, |S_v|, |S_uu|, |S_uv|, |S_vv|.
     """
     spans_u, spans_v, rows, columns, _ = pieces.shape
     binomials = np.empty((3 * max(rows, columns), 3 * max(rows, columns)))

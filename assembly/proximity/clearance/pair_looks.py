@@ -14,14 +14,14 @@ from assembly.proximity.clearance.look import go_to, look
 from assembly.proximity.clearance.records import CLEAR, OPEN, SPENT, Forest, counts_at, pair_proof_at
 from assembly.proximity.clearance.separation import separation
 
-# What is to be done with a pair: at a pose, with a new front; on the way there, with one that is
-# made at the last pose.
+# The task of a pair: none; to look at a pose; with a new front; at the way there; with a new front made at the last
+# pose; at the way in one look, not in parts.
 PASSED_BY, AT_POSE, BEGUN_ANEW, ON_WAY, ON_WAY_ANEW, ON_WAY_AT_ONCE = 0, 1, 2, 3, 4, 5
-# Of all pairs: to go on with looks whose time was over.
+# The task of all pairs to go on with interrupted looks.
 GOING_ON = 6
 # A front that has grown by more than this factor and number is begun anew.
 GROWN, MANY = 2, 200
-# What rounding of poses and of sums of coordinates may do to a gap, in parts of these: some thirty roundings.
+# The error of a gap by rounding of poses and sums of coordinates, in parts of these: some thirty roundings.
 ROUNDING = 4e-15
 
 
@@ -36,7 +36,7 @@ def posed_with_move(q, a, b, move):
 
 @kernel(inner=True)
 def done_task(forest, front, pose, limits, task):
-    """Do what is to be done with a pair; how its look ended."""
+    """Do the task of a pair; returns how its look ended."""
     pair, counts = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
     if task == ON_WAY_ANEW:
         kept = first_row(front)
@@ -62,7 +62,7 @@ def done_task(forest, front, pose, limits, task):
 
 @kernel(inner=True)
 def look_at_pair(forest, front, q, move, task, time):
-    """Do what is to be done with a pair of bodies at poses q; how its look ended. time: a clock, and until when."""
+    """Do the task of a pair of bodies at poses q; returns how its look ended. time: a clock and a deadline."""
     pair, count = pair_proof_at(front.pair, 0), counts_at(front.counts, 0)
     count.asked = 0
     count.sought = 0
@@ -95,7 +95,7 @@ def is_grown(front):
 def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes, time):
     """Look at pairs of bodies at poses q (n, 7), each after a move (6) of its second body; how each look ended.
 
-    Where the time is over, which a clock's address and nanoseconds tell, all that is left ends SPENT.
+    time: a clock's address and the deadline [ns]; pairs that are left then end SPENT.
     """
     table, pool, faces, links, tree_nodes, used = forest_arrays
     forest = Forest(Store(table, pool), faces, links, tree_nodes, used)
@@ -116,11 +116,11 @@ def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes, time):
     allocates=True,
 )
 def stay_clear(forest_arrays, front_arrays, q, moves, touch, asked, codes, time):
-    """Look at all pairs on the way to poses q (n, 7): how the first ended that is not known to stay clear, or CLEAR.
+    """Look at all pairs on the way to poses q (n, 7): SPENT, the code of the first that did not end clear, or CLEAR.
 
-    Where one was not clear at its last look, none is looked at: all end OPEN. The task is ON_WAY, ON_WAY_AT_ONCE for
-    ways that are not to be taken in parts, or GOING_ON with those pairs that ended SPENT in a call whose time was over.
-    It is asked for with a budget for each pair; 0 for the usual one.
+    If a pair was not clear at its last look, none is looked at: all end OPEN. asked: the task, and a budget for each
+    pair (0: the usual one). The task is ON_WAY; ON_WAY_AT_ONCE for ways that are not to be taken in parts; or GOING_ON,
+    which continues the pairs that ended SPENT in a call whose time was over.
     """
     task, budget = asked
     table, pool, faces, links, tree_nodes, used = forest_arrays

@@ -4,11 +4,10 @@ Everything is seen from body a: a point y of body b is at R y + t. A unit direct
 
     gap(n) = min over b of n.y - max over a of n.x
 
-is a lower bound of the distance of what the nodes stand for, whatever n is. What is within a distance d of the axis of
-a bore is farther than (bore - d) from its wall. So whatever finds directions needs no proof: only gaps have to be
-right.
+is a lower bound of the distance of the surfaces in both nodes, whatever n is. A point within a distance d of the axis
+of a bore is at least (bore - d) from its wall. So the search for directions needs no proof: only gaps have to be right.
 
-Both keep apart along a way as well: half spaces and solid cylinders are convex.
+Planes and bores separate nodes along a way as well, since half spaces and solid cylinders are convex.
 """
 
 from __future__ import annotations
@@ -75,7 +74,7 @@ def farthest_of_disc(d, axis, ruling, radius):
 
         |c + E y|^2 <= |c|^2 + m + c.E (m - E^2)^-1 E c,
 
-    with equality for one m, near which Newton's method on the slope by m ends (as for trust regions).
+    with equality for one m, to which Newton's method on the derivative by m converges (as for trust regions).
     """
     if dot(axis, axis) == 0.0:
         height, beside = dot(d, ruling), across(d, ruling)
@@ -106,7 +105,7 @@ def farthest_of_disc(d, axis, ruling, radius):
 def room_in_bore(forest, wall, k, pose, as_ball):
     """How far node k, at a pose seen from the wall's body, is from the wall of a bore in which it is; else negative.
 
-    With `as_ball` its disc is taken for a ball of the same radius: what it is at least, however its axis turns.
+    With `as_ball` its disc is replaced by a ball of the same radius: a lower bound, however its axis turns.
     """
     bore, node = node_at(forest.nodes, wall), node_at(forest.nodes, k)
     axis, spine = vector(bore.ruling), vector(bore.spine)
@@ -137,7 +136,7 @@ def put_point(out, i, x):
 
 @kernel(inner=True)
 def write_corners(forest, k, pose, out, first):
-    """Corners of a cell, of a box, or of the segment within what is round, seen from a, behind others; how many."""
+    """Write the corners of a cell or box, or the ends of a round node's axis, seen from a, at `first`; how many."""
     node = node_at(forest.nodes, k)
     if links_at(forest.links, k).face != NONE:
         for i in range(4):
@@ -161,7 +160,7 @@ def write_corners(forest, k, pose, out, first):
 
 @kernel(inline=True)
 def is_round(forest, k):
-    """Whether node k is the exact hull of what is round."""
+    """Whether node k is the exact hull of a round shape."""
     node = node_at(forest.nodes, k)
     return links_at(forest.links, k).face == NONE and (node.disc > 0.0 or node.rho > 0.0)
 
@@ -180,6 +179,6 @@ def is_cell(forest, k):
 
 @kernel(inline=True)
 def normal_of(forest, k):
-    """A unit normal of a cell; of one of a flat face that of the face, which its small corners do not tell as well."""
+    """A unit normal of a cell; in a flat face the face's, as a small cell's corners determine it less accurately."""
     node = node_at(forest.nodes, k)
     return vector(node.ruling) if links_at(forest.links, k).form == FLAT else vector(node.axes[2])

@@ -1,16 +1,16 @@
 """A shaft that is longer than its bore and leans in it: only what is within the bore's height is in the bore.
 
-What the node of a body stands for that has the bore lies farther from its axis than the bore's radius, and between two
-planes across the axis. So a cylinder of the other body is apart from it where its part between these planes is within
+The surface in the node that has the bore lies farther from the bore's axis than its radius, and between two planes
+across the axis. So a cylinder of the other body is apart from it if the cylinder's part between these planes is within
 the bore. Along every ruling the distance from the axis is convex: it is largest where the ruling crosses one of both
 planes, or ends. A plane at height z cuts the cylinder of radius r, whose axis leans by the vector s (the tangent of its
 angle, seen along the bore) and meets the plane at e, in an ellipse. Its support along a unit v across the axis is
 
     v.e + r sqrt(1 + (v.s)^2)
 
-and the largest value of that over v the largest distance D of a point of the section. Squared, that is a quadratic
-over the unit circle, for which any multiplier l gives an upper bound, and the best one the maximum itself (here by
-Newton's method). Of the distance of the bodies the room R - D is a lower bound, times the cosine of the angle.
+and the largest value of that over v is the largest distance D of a point of the section. Its square is a quadratic
+over the unit circle: any multiplier l gives an upper bound of it, and the best l, found by Newton's method, the maximum
+itself. The room R - D times the cosine of the angle is a lower bound of the distance of the bodies.
 
 Either end of the cylinder may be taken instead of the section beyond it: its disc is within a ball.
 """
@@ -30,7 +30,7 @@ __all__ = ["best_bore", "gap_of"]
 
 # The least cosine of the angle by which a shaft leans at a pose, and on a way from there (`sleeve_sag` in `way.py`).
 UPRIGHT, LEAST_COSINE = 0.98, 0.96
-# Steps of Newton's method: it begins near by, and three are exact to rounding.
+# Steps of Newton's method: it starts near the solution, and three are exact to rounding.
 STEPS = 3
 
 
@@ -67,7 +67,7 @@ def farthest_of_section(e, lean, radius):
 
 @kernel(inner=True)
 def sleeve_room(forest, wall, k, pose, how):
-    """How far the part of a cylinder, node k, beside a node with a bore is from that node; else negative.
+    """A lower bound of the distance of a cylinder, node k, from the node of a bore that it is in; else negative.
 
     `how` - BY_SLEEVE: 0 if both its ends are beyond the bore, 1 or 2 if the end along its axis, or the other, is asked.
     The pose is seen from the node with the bore.
@@ -99,7 +99,7 @@ def sleeve_room(forest, wall, k, pose, how):
 
 @kernel(inner=True)
 def best_sleeve(forest, a, b, pose):
-    """How node b, a cylinder, is best within the bore of node a, and the room there; BY_PLANE where that cannot be."""
+    """Which sleeve of node a leaves node b, a cylinder, the most room, and that room; BY_PLANE if there is none."""
     one, other = node_at(forest.nodes, a), node_at(forest.nodes, b)
     axis = vector(one.ruling)
     if not one.bore > 0.0 or dot(axis, axis) == 0.0 or not is_round(forest, b):

@@ -1,8 +1,8 @@
 """Pieces of two wires that are kept apart by the distance of their spines.
 
-Two round bodies that touch have no plane between them, and planes part ever smaller pieces of them only. What is within
-a radius of each of two curves is apart by the distance of the curves less both radii, exactly. The curves are lines and
-arcs here, by their lengths from the middle: c(s) and e(t). Half of their squared distance,
+Wires that touch may have no plane between them: planes separate only ever smaller pieces. The gap of two tubes is
+exactly the distance of their spines (center curves) less both radii. Spines are lines and arcs here, parameterized by
+arc length from the middle: c(s) and e(t). Half of their squared distance,
 
     f(s, t) = |d|^2 / 2,   d = c(s) - e(t),
 
@@ -15,14 +15,15 @@ at any point x, so that
 
     f >= f(x) + min over both pieces of grad f(x).(y - x),
 
-whatever x is. Newton's method seeks the x at which that is most; it proves nothing. Where wires lie along each other,
-and their curvatures fit, no pieces are short enough for f to be convex. With the least eigenvalue that the second
-derivatives may have anywhere, -e, f lies above its tangent plane less e |y - x|^2 / 2. As e goes to zero with the
-lengths of pieces there, that is of the third order in these. Pieces whose f_ss or f_tt may be negative are halved.
+whatever x is. Newton's method seeks the x with the largest bound; the proof does not depend on it. Where wires lie
+along each other, and their curvatures fit, no pieces are short enough for f to be convex. With the least eigenvalue
+that the second derivatives may have anywhere, -e, f lies above its tangent plane less e |y - x|^2 / 2. As e goes to
+zero with the lengths of pieces there, this loss is of third order in them. Pieces whose f_ss or f_tt may be negative
+are halved.
 
-Along a way every point of b goes on a chord, but for its sag. A point that is at least D from another one at both ends
-of a chord of length s is sqrt(D^2 - s^2 / 4) from it at least in between. So wires that touch at both ends of a way are
-in each other between by no more than what is quadratic in its length.
+Along a way every point of b moves along a chord, up to its sag. A point that is at least D from another one at both
+ends of a chord of length s is sqrt(D^2 - s^2 / 4) from it at least in between. So wires that touch at both ends of a
+way overlap in between by no more than a term that is quadratic in its length.
 """
 
 from __future__ import annotations
@@ -42,9 +43,9 @@ from assembly.proximity.clearance.separation import placed
 Piece = namedtuple("Piece", "middle ahead inward bend half")
 # At s of one piece and t of the other: f, its first and its second derivatives.
 Squared = namedtuple("Squared", "f s t ss tt st")
-# What Newton's method takes from a start at the end of a piece.
+# The steps that Newton's method needs at most, from a start at the end of a piece.
 STEPS = 12
-# It ends where the bound is off by no more than this part of f.
+# Newton's method ends where the bound is below f by no more than this part of f.
 CLOSE = 1e-14
 
 
@@ -94,8 +95,8 @@ def squared_at(one, other, s, t):
 def least_curvature(one, other):
     """A lower bound of all second derivatives of half of the squared distance of points of two pieces, or 0 if convex.
 
-    It is of the least eigenvalue; minus infinity where f_ss or f_tt may be negative.
-    Each second derivative is off its value in the middles by no more than its own derivatives, times half lengths:
+    Unless 0, it bounds the least eigenvalue; it is minus infinity where f_ss or f_tt may be negative.
+    Each second derivative differs from its value at the middles by at most its own derivatives times half lengths:
     those of d.c'' are d.c''' along c, of length |d| times the squared curvature, and -e'.c'' along e. Tangents turn by
     the angle of half a piece, so that the angle between two is less than in the middles by both of these at most.
     """
@@ -120,7 +121,7 @@ def least_curvature(one, other):
 
 @kernel(inline=True)
 def lowest_change(slope, at, half):
-    """The least that a slope adds from `at` to a place within half a length of the middle."""
+    """The least change of a linear function of this slope from `at` to any place within half a length of the middle."""
     return min(slope * (half - at), -slope * (half + at))
 
 
@@ -209,7 +210,7 @@ def chord_of(forest, b, way):
     p, q = corner_of(node, 0), corner_of(node, 1)
     d = sub(placed(way.after, p), placed(way.before, p))
     e = sub(placed(way.after, q), placed(way.before, q))
-    # Between the ends it is no more than there; an arc is off its chord, which turns by the angle of the way.
+    # No point of the chord moves farther than one of its ends; the arc is off the chord, and turns by the way's angle.
     turned = 2.0 * math.sqrt(2.0 * way.factor) * node.reach
     return math.sqrt(max(dot(d, d), dot(e, e))) + turned
 

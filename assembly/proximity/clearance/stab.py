@@ -48,14 +48,14 @@ def is_above(x, a, b, c, n):
 
 @kernel(inner=True)
 def stabbed(segment, thick, triangle, rho):
-    """By how much a segment stabs a triangle, beyond what both stand for, and at which part of it.
+    """By how much a segment stabs a triangle, beyond the margins of both, and at which fraction of the segment.
 
-    That is not positive where the segment does not. The true curve is within `thick` of the segment and has its ends;
-    the true patch is within rho of the triangle. On the straight way from segment and triangle to curve and patch the
-    ends never meet the patch, since they are farther than rho from the plane of the triangle, and the curve never meets
-    the border of the patch, from which the segment is farther than rho + thick. So the curve pierces the patch as often
-    as the segment does the triangle: once, and no move of one of them by less than the smaller of both margins undoes
-    it.
+    The first is not positive if the segment does not stab it. The true curve is within `thick` of the segment and has
+    its ends; the true patch is within rho of the triangle. Deform segment and triangle to curve and patch along
+    straight lines: the ends never meet the patch, since they are farther than rho from the plane of the triangle, and
+    the curve never meets the border of the patch, from which the segment is farther than rho + thick. So the curve
+    pierces the patch as often as the segment does the triangle: once, and no move of one of them by less than the
+    smaller of both margins undoes it.
     """
     p, q = segment
     a, b, c = triangle
@@ -93,7 +93,7 @@ def triangle_distance(p, a, b, c):
 def overlap_with_wire(forest, wire, other, spine, corners):
     """By how much a piece of a wire is in another cell, proven: two points are nearer than the radius, or both radii.
 
-    No translation by less parts them.
+    No shorter translation separates them.
     """
     node, second = node_at(forest.nodes, wire), node_at(forest.nodes, other)
     p, q = point(spine, 0), point(spine, 1)

@@ -5,9 +5,9 @@ straight line between its two places by no more than its distance from the axis 
 the height of the arc over its chord, here called its sag. What is convex and holds two points holds their chord: nodes
 that one plane, or one bore, keeps apart at both poses by more than the sag are apart all the way.
 
-The arc is across the axis of rotation, and so is what it is off its chord. So of a plane that is across the axis, as
-that on which links of a planar mechanism slide, the sag is zero; of another one it is that part of it that is along the
-plane's normal.
+The arc lies in a plane across the axis of rotation, and so does its sag. So the sag toward a plane across the axis,
+such as that on which links of a planar mechanism slide, is zero; toward another plane it is the part of the sag that is
+along the plane's normal.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from assembly.proximity.clearance.halve import corner_of, vector
 from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, BY_SLEEVE, node_at
 from assembly.proximity.clearance.separation import across, highest, is_round, is_wire, placed, room_in_bore
 
-# swept: whether the way is looked at, or its end alone. moved: the longest way of a point of b. sag: of any point;
+# swept: whether the way is looked at, or its end alone. moved: a bound of the travel of points of b. sag: of any point;
 # factor: of a point at distance 1 from the axis of rotation. axis, middle: of that, in axes of b (zero: it is not
 # known); lean: what the axis may be off. before, after: the poses.
 Way = namedtuple("Way", "swept moved sag factor axis lean middle before after")
 ROUNDED_UP = 1.0 + 1e-12
-# Below so small a sine of the angle its axis is lost in rounding, above so large an angle as well.
+# The axis of rotation is lost in rounding if twice the sine of the angle is below, or the angle [rad] above, these.
 LEAST_SINE, LARGEST_ANGLE = 1e-9, 3.0
 # What the axis may be off, as a part of distances; the sag of so small angles is far below that.
 AXIS_OFF = 1e-6
 # How far what leans in a sleeve may turn on a way [rad]: bounds of `sleeve_sag` rest on it.
 MOST_TURN = 0.05
-# What rounding does to the sine of the angle, of which the axis is a part: that of two matrices and of their product.
+# The rounding error of the rotation's skew part, whose direction is the axis: that of two matrices and their product.
 SINE_OFF = 1e-14
 
 
 @kernel(inner=True)
 def way_of(before, after, center, radius, swept):
-    """The way of a ball of b, its middle and its radius in axes of b, from pose to pose."""
+    """The way, from pose to pose, of a ball of b with a middle and a radius in axes of b."""
     square = 0.0
     for k in range(9):
         square += (after.rotation[k] - before.rotation[k]) ** 2
@@ -86,7 +86,7 @@ def sag_of(way, forest, b):
 
 @kernel(inner=True)
 def as_ball(forest, nodes, pose, n, gap):
-    """A gap, if the disc of what is round in node b were a ball: what it is at least, however its axis turns."""
+    """The gap if the disc of a round node b is replaced by a ball: a lower bound, however its axis turns."""
     node = node_at(forest.nodes, nodes.b)
     if node.disc == 0.0 or not is_round(forest, nodes.b):
         return gap
@@ -120,11 +120,11 @@ def part_along(way, n):
 
 @kernel(inner=True)
 def sleeve_sag(way, forest, a, b):
-    """By how much the room of node b in a sleeve of node a is less on the way than between its values at both ends.
+    """How far the room of node b in a sleeve of node a may fall, on the way, below the chord of its values at the ends.
 
-    With w the angle of the way, w1 the part of it by which b's axis goes, and dashes for derivatives along the way:
+    With w the angle of the way, w1 the part of it by which b's axis turns, and primes for derivatives along the way:
     |s'| <= 1.1 w1, |s''| <= 2 w w1, |e''| <= 1.3 |c''| + z |s''| + 2 |c'| |s'| for the center c of b at a height z from
-    the plane, and r sqrt(1 + (v.s)^2) has a second derivative up to 1.8 r w w1. Below an angle of 0.25.
+    the plane, and r sqrt(1 + (v.s)^2) has a second derivative up to 1.8 r w w1. These hold for angles below 0.25 rad.
     """
     wall, node = node_at(forest.nodes, a), node_at(forest.nodes, b)
     u, axis = vector(wall.ruling), vector(node.axes[0])
@@ -148,7 +148,7 @@ def sleeve_sag(way, forest, a, b):
 
 @kernel(inner=True)
 def stays_apart(forest, nodes, way, n, gaps):
-    """Whether two nodes are kept apart all the way by what keeps them apart at both poses, by gaps before and after.
+    """Whether what separates two nodes at both poses, by gaps before and after, separates them all the way.
 
     n is the direction of a plane.
     """

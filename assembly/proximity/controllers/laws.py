@@ -34,7 +34,7 @@ F = 0
 UNIT_FORM, COVARIANT_FORM, CONTRAVARIANT_FORM = 0, 1, 2
 # Statuses of a run.
 CLOSEST, ON_ITS_WAY, MEETING, IRREGULAR = 0, 1, 2, 3
-# What is written of a step.
+# The record of a step.
 STEP_ROW = record_dtype(
     "f8",
     parameters=4,  # (u_f, v_f, u_g, v_g) where it begins
@@ -67,7 +67,7 @@ ControlEnd = namedtuple(
     "ControlEnd",
     [
         "steps",  # at most
-        "tolerance",  # where nothing moves any more, at an error of at most so much [length]
+        "tolerance",  # once the target is at rest, at an error of at most so much [length]
         "meet",  # at a distance of at most so much the points meet [length]
     ],
 )
@@ -81,7 +81,7 @@ Target = namedtuple(
         "drift_g",  # the same seen from g
     ],
 )
-# What a law says of a state.
+# What a law computes from a state.
 ControlStep = namedtuple("ControlStep", ["rates", "distance", "error", "mode_f", "mode_g", "gain"])
 # A step without a given gain is halved at most so often.
 HALVINGS = 30
@@ -114,7 +114,7 @@ def saturate(end_u, end_v, psi, b, su, sv, form):
     held_u = end_u * ru > 0.0
     held_v = end_v * rv > 0.0
     if held_u and held_v:
-        # Both may be led out by a skewed B where only one descends: the slopes decide, one of which leads out.
+        # A skewed B may lead both parameters out where only one slope does: the slopes decide which one is held.
         held_u = end_u * psi[0] < 0.0
         held_v = end_v * psi[1] < 0.0
     if held_u and not held_v:
@@ -138,7 +138,7 @@ def second_form(s, d):
 
 @kernel(inline=True)
 def largest_eigenvalue(h, b, held_u, held_v):
-    """Largest eigenvalue of B H in size, over the parameters that are not held."""
+    """The largest absolute eigenvalue of B H over the parameters that are not held."""
     if held_u and held_v:
         return 0.0
     if held_u:
@@ -184,7 +184,7 @@ def without_held(h, held_u, held_v):
 
 @kernel(inner=True)
 def control_rates(store, g, placed, x, law, dt):
-    """The `ControlStep` of a `ControlLaw` at x, of a `Target`. With g < 0 that is the point `placed.shift`."""
+    """The `ControlStep` of a `ControlLaw` at x for a `Target`; with g < 0 the target is the point `placed.shift`."""
     turn, shift, form = placed.turn, placed.shift, law.form
     s = surface_point(store.table, store.pool, F, x[0], x[1])
     t = s
@@ -203,7 +203,7 @@ def control_rates(store, g, placed, x, law, dt):
     power = -(psi[0] * ru + psi[1] * rv)
     error = free_error(psi, s[1], s[2], held_u, held_v)
     zero = (0.0, 0.0, 0.0)
-    # Where D's curvature cancels that of the metric, H says nothing of larger steps: B I bounds the gain then.
+    # Where the curvature term of D cancels the metric in H, H does not limit larger steps: then B I bounds the gain.
     metric_f = largest_eigenvalue(second_form(s, zero), b, held_u, held_v)
     top = max(largest_eigenvalue(h, b, held_u, held_v), metric_f)
     rr = 0.0
@@ -265,7 +265,7 @@ def moved(store, g, x, rates, dt):
 
 @kernel(inner=True)
 def lowering(store, g, pose, x, step, dt):
-    """Parameters after a step that does not lead farther apart: a whole one, or the largest of its halves."""
+    """Parameters after a step that does not increase the distance: the whole step, or its first such halving."""
     y = x
     for _ in range(HALVINGS):
         y = moved(store, g, x, step.rates, dt)
@@ -284,7 +284,7 @@ def lowering(store, g, pose, x, step, dt):
 
 @kernel(inline=True)
 def target_pose(poses, k, g, point):
-    """The pose of the target seen from f at the poses of step k; of a point, its place is the shift."""
+    """The pose of the target seen from f at the poses of step k; for a point, the shift is its position."""
     k = min(k, poses.shape[0] - 1)
     pose = relative_pose(poses[k], 0, rotation(poses[k], 0), 1, rotation(poses[k], 1))
     if g < 0:
@@ -330,8 +330,7 @@ def run_control(store, target, poses, x, dt, law, end, out):
     """Euler steps of the controller from x, along poses (n, 2, 7), the last of which stays: status and steps.
 
     `target` is the record of its surface, or -1, and the point that it is then; `law` and `end` are the numbers of a
-    `ControlLaw` and a `ControlEnd`. Row k of `out` is the state after k steps; one with a single row gets the last
-    state.
+    `ControlLaw` and a `ControlEnd`. Row k of `out` is the state after k steps; a single row gets the last state.
     """
     table, pool = store
     scene = Store(table, pool)

@@ -1,4 +1,4 @@
-"""Where two features cross: Newton's method for d = 0 with least steps."""
+"""Where two features cross: Newton's method for d = 0 with steps of least length."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from assembly.kinematics.motion import IDENTITY
 from assembly.proximity.brep.records import EDGE, FACE
 from assembly.proximity.extrema.feature_jets import edge_advance, edge_jet, vertex_point
 
-# A distance below this part of the size is none; a step has to take away a tenth of it.
+# Points closer than this part of the size coincide; a step has to reduce the distance below this part of it.
 MET, FALL = 1e-13, 0.9
 CrossingQuery = namedtuple("CrossingQuery", "store f g pose size")
-# The distance of two points, the way from the first to the second, and the tangents of both features.
+# The distance of two points, the vector from the first to the second, and the tangents of both features.
 CrossingPoint = namedtuple("CrossingPoint", "merit d pu pv qu qv")
 
 
@@ -96,6 +96,6 @@ _nearest = kernel(inner=True)(damped_newton(_look, _least_step, _move, steps=12,
 
 @kernel(inner=True)
 def crossing_point(store, f, g, pose, x, size):
-    """Coordinates where d = 0 near x, by least steps, and whether they were found."""
+    """Coordinates where d = 0 near x, by steps of least length, and whether they were found."""
     x, at, _last = _nearest(CrossingQuery(store, f, g, pose, size), x)
     return x, at.merit <= MET * size

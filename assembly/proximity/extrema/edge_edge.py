@@ -1,8 +1,9 @@
 """Edges and vertices among themselves: Newton's method and the pair's frame.
 
-Two curves solve d.C_1' = d.C_2' = 0, d = C_2 - C_1: regular while their tangents are not parallel, even where they
-cross. The normal is across both tangents then, on the side of the one given; where only the distance tells, n = d / |d|
-and the gap is |d|. A parameter that a step would move beyond the end of its edge is held there, and the end is a point.
+Two curves solve d.C_1' = d.C_2' = 0, d = C_2 - C_1, which is regular while their tangents are not parallel, even where
+the curves cross. The normal is then across both tangents, on the side of the given normal; where only the distance
+determines it, n = d / |d| and the gap is |d|. A parameter that a step would move beyond the end of its edge is held
+there, and the end counts as a point.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ from assembly.proximity.extrema.pair_matrix import RANK, VANISHING, fold_of
 
 # Points closer than this part of the size coincide: their difference has no direction.
 COINCIDENT = 1e-13
-# Of lines at a larger angle the normal is across both, even where their points are hardly determined.
+# Above this sine of the angle between lines the normal is across both, even where their points are uncertain.
 NEARLY = 3e-8
 
 # A curve where a pair has a point of it, or a vertex, in the axes of body f.
@@ -91,7 +92,7 @@ def normal_between(d, t1, t2, curves, n, size, isolated):
     if curves:
         w = cross(t1, t2)
         sine = math.sqrt(dot(w, w))
-        # What has the smaller error. Along nearly parallel lines the points are uncertain, and with them d.
+        # Take the direction with the smaller error: along nearly parallel lines the points are uncertain, and so is d.
         if (sine * size > distance and sine > 1e-12) or (sine > NEARLY and not isolated):
             w = scale(1.0 / sine, w)
             toward = dot(w, n) if known else dot(w, d)
@@ -101,7 +102,7 @@ def normal_between(d, t1, t2, curves, n, size, isolated):
         if curves and known and dot(w, n) < 0.0:
             w = neg(w)
         return w, True
-    # Of a vertex there is no tangent: t1 + t2 is that of the edge, if there is one.
+    # The tangent of a vertex is zero: t1 + t2 is that of the edge, if there is one.
     return across(t1 if dot(t1, t1) > 0.5 else t2, n), False
 
 
@@ -133,7 +134,7 @@ def straight_frame(curve_f, curve_g, step, normal, size, regular):
     unit = max(max(abs(dot(n, curve_f.bent)), abs(dot(n, curve_g.bent))), 1.0 / size)
     f, rate_f = straight_side(tx, ty, n, curve_f, step.point_f, unit)
     g, rate_g = straight_side(tx, ty, n, curve_g, step.point_g, unit)
-    # Where points coincide their direction is the one given, or any.
+    # Where points coincide, the normal is the given one, or any.
     isolated = isolated and (sure or dot(normal, normal) > 0.25)
     return FeatureFrame(
         normal=n,
@@ -157,7 +158,7 @@ def straight_frame(curve_f, curve_g, step, normal, size, regular):
 
 @kernel(inner=True)
 def curve_step(store, f, g, x, curve_f, curve_g, limits):
-    """The `CurveStep` from x = (t_f, t_g), with those edges held beyond whose ends it would lead."""
+    """The `CurveStep` from x = (t_f, t_g); an edge is held at its end if the step would lead beyond it."""
     least = BEYOND * limits.size
     moves = limits.steps > 0
     d = sub(curve_g.point, curve_f.point)
@@ -165,7 +166,7 @@ def curve_step(store, f, g, x, curve_f, curve_g, limits):
     scope = 1.0 + math.sqrt(dot(d, d)) * (curve_f.bend + curve_g.bend)
     r1 = dot(d, t1)
     r2 = dot(d, t2)
-    # At the end of an edge, and the distance would be less beyond it.
+    # Hold an edge at its end if the distance would be less beyond it.
     point_f = f.kind == VERTEX or (moves and abs(r1) > least and edge_held(store, f.record, x[0], r1))
     point_g = g.kind == VERTEX or (moves and abs(r2) > least and edge_held(store, g.record, x[1], -r2))
     while True:
@@ -181,7 +182,7 @@ def curve_step(store, f, g, x, curve_f, curve_g, limits):
         i, fine = inverse(h, scope, FINE)
         s1 = i[0] * r1 - i[1] * r2
         s2 = i[2] * r1 - i[3] * r2
-        # Or a step leads beyond it.
+        # Hold it also if the step leads beyond its end.
         out_f = moves and not point_f and abs(s1) > least and edge_held(store, f.record, x[0], s1)
         out_g = moves and not point_g and abs(s2) > least and edge_held(store, g.record, x[1], s2)
         if not (out_f or out_g):
@@ -197,7 +198,7 @@ def solve_off_face(store, f, g, pose, x, normal, limits):
     at_f = f.kind == VERTEX
     at_g = g.kind == VERTEX
     if limits.steps > 0:
-        # A start carried along a step may be beyond an end, where a curve goes on and its edge does not.
+        # A predicted start may be beyond an end, where the curve goes on and the edge does not.
         x = (
             edge_advance(store, f.record, x[0], 0.0) if f.kind == EDGE else x[0],
             edge_advance(store, g.record, x[1], 0.0) if g.kind == EDGE else x[1],

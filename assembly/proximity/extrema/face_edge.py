@@ -4,12 +4,12 @@ A face S with normal n and a curve C, d = C - S, solve
 
     d.S_u = d.S_v = 0,   n.C_t = 0,
 
-which stays regular through touching and penetration; a face and a vertex the first two of these. Newton's step is
+which stays regular through touching and penetration; a face and a vertex solve the first two. Newton's step is
 taken in tangent lengths, as for two faces: H s = Y^T r1 - X^T r2 with the residual in place of the velocities of
 `proximity/extrema/feature_jets.py`.
 
 A parameter of the edge that a step would move beyond its end is held there: the pair is then that of the end point.
-Of a straight edge inclined to a plane no point is extremal: the end with the smaller gap is held.
+A straight edge inclined to a plane has no extremal point: the end with the smaller gap is held.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ from assembly.proximity.extrema.feature_jets import (
 )
 from assembly.proximity.extrema.pair_matrix import RANK, VANISHING, curvature_bound, fold_of, is_no_saddle
 
-# A curve is steep where the part of its tangent along a face is below this (squared, of its length squared).
+# A curve is steep where its tangent's part along the face, squared, is below this part of the tangent squared.
 STEEP = 1e-12
 
-# What Newton's method came to for a face and an edge, a vertex or a point, in the axes of the face.
+# The result of Newton's method for a face and an edge, a vertex or a point, in the axes of the face.
 FaceEdgePair = namedtuple(
     "FaceEdgePair",
     [
@@ -200,12 +200,12 @@ def step_on_face(store, other, t, over, edge, limits):
     moves = limits.steps > 0
     if other.kind != EDGE:
         return point_step(over, False, True)
-    # At the end of the edge, and the gap would be less beyond it.
+    # Hold the edge at its end if the gap would be less beyond it.
     leads_out = moves and (edge.steep or abs(edge.tilt) > BEYOND)
     if leads_out and edge_held(store, other.record, t, -edge.slope):
         return point_step(over, False, True)
     step = edge_step(store, other, over, edge, limits)
-    # Held too where the step leads beyond the end: the slope may be that of a face not solved yet.
+    # Hold it also if the step leads beyond the end: the slope may be that at a point of the face not yet solved.
     leads_out = moves and abs(step.dt) * edge.speed > BEYOND * limits.size
     if leads_out and edge_held(store, other.record, t, step.dt):
         return point_step(over, step.slides, True)
@@ -222,7 +222,7 @@ def face_edge_pair(status, x, over, edge, step, regular):
     is_point = step.is_point
     tilt = 0.0 if is_point else edge.tilt
     is_regular = regular and not (edge.steep and not is_point)
-    # Past a center of curvature the projection is no nearest point of the face; nor is the edge's where it bends away.
+    # Past a center of curvature the projection is no nearest point of the face; nor is the edge's if it bends away.
     nearest = is_point or (is_no_saddle(-fold) and k[0] + k[2] > 0.0 and k[0] * k[2] > k[1] * k[1])
     # Positive, as of two faces, where the pair is closest or deepest.
     fold = fold if is_point else -fold
@@ -254,7 +254,7 @@ def solve_on_face(store, face, other, pose, x, limits):
     size = limits.size
     is_edge = other.kind == EDGE
     if limits.steps > 0 and is_edge:
-        # A start carried along a step may be beyond an end, where the curve goes on and the edge does not.
+        # A predicted start may be beyond an end, where the curve goes on and the edge does not.
         x = (x[0], x[1], edge_advance(store, other.record, x[2], 0.0), x[3])
     previous = 1e300
     status = NOT_CONVERGED
@@ -266,7 +266,7 @@ def solve_on_face(store, face, other, pose, x, limits):
         edge = edge_over(own, ct, ctt) if is_edge else NO_EDGE
         regular = own.regular and (not is_edge or dot(ct, ct) > 1e-290)
         if not regular:
-            # An apex, a crease or a cusp: there is no tangent to go on.
+            # An apex, a crease or a cusp: there is no tangent to step along.
             step = point_step(over, False, not is_edge)
             break
         step = step_on_face(store, other, x[2], over, edge, limits)
@@ -314,7 +314,7 @@ def solve_on_face(store, face, other, pose, x, limits):
 
 @kernel(inline=True)
 def sided_frame(found, side):
-    """The `FeatureFrame` of a pair in the axes of the face, which is f; `side` -1: with n and y turned back."""
+    """The `FeatureFrame` of a pair in the axes of the face, which is f; `side` -1: with n and y reversed."""
     face, speed, unit = found.face, found.speed, found.unit
     e, a, r = face.rates, face.shape, found.residual
     c = (found.along[0], side * found.along[1])
@@ -353,7 +353,7 @@ def face_frame(found):
 
 @kernel(inner=True)
 def turned_frame(pose, found):
-    """The frame of a pair whose face is g, in the axes of f: n, y and with them the curvatures change their signs."""
+    """The frame of a pair whose face is g, in the axes of f: n, y and so the curvatures change sign."""
     frame = sided_frame(found, -1.0)
     return FeatureFrame(
         normal=matvec(pose.rotation, frame.normal),
