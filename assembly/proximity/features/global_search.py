@@ -9,8 +9,8 @@ first. A pair of cells is discarded when
   no extremum of these two features is in it,
 - it is small, and a known extremum is the only one in it: up to there relative curvature cannot change its sign,
 
-else Newton's method looks for an extremum from its middle, and the larger cell is cut. A feasible pair,
-an extremum or a sample inside the trims, lowers the least distance known. Bodies that cross are at distance zero; their
+else Newton's method looks for an extremum from its middle, and the larger cell is split. A feasible pair, an
+extremum or a sample inside the trims, lowers the least distance known. Bodies that cross are at distance zero; their
 crossing points are found by Newton's method for d = 0, and the search ends.
 """
 

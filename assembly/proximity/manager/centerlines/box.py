@@ -123,7 +123,7 @@ def beyond(slope, hessian, error, rate, h, k):
 def beyond_joints(part, low, high, d, sign, slack, least, bend):
     """The least of F_ss (sign -1) or F_tt (1) over a box and just beyond joints at its borders; the largest curvature.
 
-    d, in the axes of the part, multiplies the curvature vectors. Where no curvature jumps, the largest one is returned as -1.
+    d, in the axes of the part, multiplies the curvature vectors. The largest curvature is -1 where none jumps.
     """
     sharpest = -1.0
     half = part.half
