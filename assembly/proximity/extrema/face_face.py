@@ -45,16 +45,16 @@ POLE_TURN = 0.08
 CONVERGED, SINGULAR, LEFT_PATCH, NOT_CONVERGED = 0, 1, 2, 3
 # A parameterization counts as regular where |Su x Sv| is above this times |Su| |Sv|.
 POLE = 1e-9
-# Newton's steps: four or five near a solution, more while steps are cut; around a ring whose wire turns a normal by as
-# much as a step may, some 60 lead halfway.
+# The most steps of Newton's method. Near a solution four or five do, more while steps are shortened; around a ring,
+# where the curvature of its wire shortens every step, some 60 lead halfway: the second limit.
 LIMIT, AROUND = 40, 120
-# After so many steps a singular pair whose residual vanishes is one; for who searches it is where normals are as
-# parallel as this, in radians, above each other to as much of the size.
+# A singular pair whose residual vanishes is accepted after so many steps; in a search, once its normals are parallel to
+# the second [rad] and its points are above each other to the second times the size.
 PATIENCE, SETTLED = 12, 1e-12
 # The most, in radians, that a step may turn a normal.
 BEND = 0.5
-# Steps below this many radians that do not shrink any more are rounding; where the end of a patch held the last one,
-# below the second, and some roundings of coordinates.
+# Steps that no longer shrink are rounding where they turn normals by less than the first [rad]; where the end of a
+# patch held the last one, by less than the second plus the third times the points' coordinates over the size.
 STAGNANT, HELD_STILL, HELD_ROUNDING = 1e-7, 1e-12, 4e-15
 # A step that turns the normals by less leaves an error below rounding when a solve carries the frame along it.
 LAST_TURN = 2e-7
@@ -66,7 +66,7 @@ SeenFrame = namedtuple(
         "point",
         "rates",  # T^-1 (11, 12, 21, 22); zero at a pole
         "shape",  # shape operator (11, 12, 22) with respect to the other's normal
-        "tilt",  # its normal, scaled to one along the other's, less that: two numbers
+        "tilt",  # its normal, scaled to component one along the other's normal, minus the latter: two numbers
         "regular",  # whether there is a tangent plane, not orthogonal to the other's
     ],
 )
@@ -247,15 +247,15 @@ def pair_step(a, c, r, k, inverse, size):
 
 @kernel(inline=True)
 def step_of_other(a, c, k, h, step_f, step_g, size):
-    """A step of a pair of a continuum, without its part along the continuum on g: f makes that one, backwards.
+    """The step of a pair of a continuum, with its part along the continuum made by f, backwards, instead of by g.
 
-    Where an end of g is in the way the pair may go on along the continuum, to where both surfaces are. Along it H = 0,
-    so that f moved by s and g by K s, K = I + beta A, leave what the step solves as it is. Returns as `pair_step`.
+    Where an end of g stops the pair, it may still move along the continuum to where both surfaces are. Along it H = 0:
+    moves of f by s and of g by K s, K = I + beta A, leave the step's equations solved. Returns what `pair_step` does.
     """
     ax, ay = step_f
     bx, by = step_g
     if abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3]) <= FLAT / size:
-        # Two planes: all ways are along it.
+        # Two planes: every direction is along the continuum.
         ax, ay, bx, by = ax - bx, ay - by, 0.0, 0.0
     else:
         _v, w = null_ways(h)
@@ -303,14 +303,14 @@ def vanishes(r, size):
 
 @kernel(inline=True)
 def settled(c, r, size):
-    """Whether a pair is one as far as anything tells that is not rounding."""
+    """Whether a pair is extremal to within rounding."""
     s0, s1 = right_side(c, r)
     return abs(s0) + abs(s1) <= SETTLED and abs(r[0]) + abs(r[1]) <= SETTLED * size
 
 
 @kernel(inline=True)
 def stagnates(step, bend, previous, status, p, q, size):
-    """Whether a step that does not shrink any more is rounding: one that an end held does not shrink either."""
+    """Whether a step that no longer shrinks is rounding; the limit is smaller where an end held the last step."""
     least = STAGNANT
     if status == LEFT_PATCH:
         least = min(HELD_STILL + HELD_ROUNDING * math.sqrt(dot(p, p) + dot(q, q)) / size, least)
@@ -345,17 +345,17 @@ def solve_pair(store, surfaces, pose, x, size, turn, close, downhill):
     """Newton from x to the extremal pair of two surfaces: a `PairSolution`.
 
     `size` is the length against which steps are measured. A step that would turn a normal by more than `BEND` is
-    shortened, so that the iteration follows the surface; one that would turn it by more than `turn` says that x was not
-    near a pair at all. After a step that turns it by less than `close` the frame is carried along, not evaluated again:
-    what is left is of the order of close^2, and of close^3 in the gap. With `downhill` a start along a level valley is
-    led to its least, as a search asks; without, a pair that is followed stays where it is in a continuum.
+    shortened, so that the iteration follows the surface; one that would turn it by more than `turn` ends the iteration:
+    x was not near a pair. After a step that turns it by less than `close` the frame is updated, not evaluated again;
+    the error is of the order of close^2, and of close^3 in the gap. With `downhill`, as in a search, a start in a level
+    valley is led to the valley's least gap; without, as in tracking, a pair of a continuum stays where it is.
     """
     f, g = surfaces
     flat = FLAT / size
     previous = 1e300
     status = NOT_CONVERGED
     level = False
-    # Whether it is f that goes along a continuum, because an end of g is in the way; steps in a row that ends undid.
+    # Whether f moves along a continuum, because an end of g is in the way; and how many steps in a row the ends undid.
     by_other = False
     stills = 0
     iteration = 0
@@ -388,14 +388,14 @@ def solve_pair(store, surfaces, pose, x, size, turn, close, downhill):
             break
         ends = iteration >= (AROUND if level and status != LEFT_PATCH else LIMIT) or not step < 1e300 or bend > turn
         if not isolated and vanishes(r, size):
-            # Along the valley of a fold there is nothing to tell places apart; steps need not shrink.
+            # Along a level valley no point is better than another, so that steps need not shrink.
             if (ends or settled(c, r, size)) if downhill else iteration >= PATIENCE:
                 status = SINGULAR
                 break
         if ends:
             break
         previous = step
-        # Each surface by its own measure: a pebble turns while the hill beside it is crossed.
+        # Each surface limits its own step: a sharply curved one does not shorten the step on a nearly flat one.
         factor_f = bent_at_most(bend_f)
         factor_g = bent_at_most(bend_g)
         step_f = (factor_f * ax, factor_f * ay)
@@ -406,7 +406,7 @@ def solve_pair(store, surfaces, pose, x, size, turn, close, downhill):
             status = LEFT_PATCH
             still = abs(y[0] - x[0]) + abs(y[1] - x[1]) + abs(y[2] - x[2]) + abs(y[3] - x[3]) <= 1e-12 * way
             stills = stills + 1 if still else 0
-            # Held at the end of the patch and nothing else moves, nor the other surface's point: the pair has left.
+            # An end holds the step and no parameter of either surface moves: the pair has left the patch.
             if stills == 2 or (still and isolated):
                 break
             if not isolated:

@@ -9,7 +9,7 @@ each), they are (a, dn) = (X s, Y s) for some s in the plane:
 
     face     X = I,       Y = A             A the shape operator with respect to n
     edge     X = [t 0],   Y = [k t, l e]    t the tangent, e across it, k = -n.C_tt / |C_t|^2
-    vertex   X = 0,       Y = l I           l a curvature, so that all of Y is one over a length
+    vertex   X = 0,       Y = l I           l a curvature: all of Y has the unit 1 / length
 
 X^T Y is symmetric, so Y^T a - X^T dn = 0 says the same without s. With z = (z1, z2) of `proximity/extrema/rates.py` and
 the gap beta the motion of a pair of any two features is
@@ -48,9 +48,9 @@ from assembly.proximity.extrema.pair_matrix import RANK
 FINE = 1e-13
 # Residuals below this part of the size are rounding.
 RESIDUAL_ROUNDING = 2e-15
-# The same where the equations are singular: a step would be rounding over almost nothing.
+# The same where the equations are singular: there a step would be a rounding error divided by nearly zero.
 SLACK = 1e-13
-# A slope (or a length over the size) at the end of an edge that leads beyond it by less is rounding.
+# At the end of an edge, a slope (or a length over the size) that leads beyond it by less than this is rounding.
 BEYOND = 1e-12
 
 # How Newton's method goes on a pair of features.
@@ -58,8 +58,8 @@ NewtonLimits = namedtuple(
     "NewtonLimits",
     [
         "size",  # the length against which steps are measured
-        "turn",  # a step that would turn a normal or a tangent by more says that there is no pair near [rad]
-        "steps",  # at most; with none the pair is evaluated where it is
+        "turn",  # [rad] where a step would turn a normal or a tangent by more, no pair is near
+        "steps",  # at most so many; with 0 the pair is evaluated where it is
     ],
 )
 # What a feature asks of a contact normal: the two matrices X and Y above, entry by entry.
@@ -82,7 +82,7 @@ FeatureFrame = namedtuple(
         "residual",  # (r1x, r1y, r2x, r2y): lengths, then tilts
         "regular",  # whether both have a tangent here
         "isolated",  # whether the pair is no part of a continuum
-        "proper",  # whether two surfaces do not cross, an edge over a face is nearest here; true of other pairs
+        "proper",  # two faces: they do not cross; a face and an edge: the edge is nearest here; else True
         "fold",  # determinant over squared norm of the equations' matrix: zero where a pair ceases to be isolated
     ],
 )
@@ -141,7 +141,7 @@ def edge_held(store, edge, t, dt):
 
 @kernel(inner=True)
 def edge_stride(store, edge):
-    """How far in t a straight part may be passed at once: one span with ends is straight all along, others in part."""
+    """How far in t one step may go along a straight part: all of a single span with ends, else 1/16 of the edge."""
     lo, hi, endless = edge_limits(store, edge)
     return (
         hi - lo
@@ -171,7 +171,7 @@ def vertex_side(unit):
 def inverse(h, size, rank):
     """The inverse of a 2x2 matrix whose entries are up to `size`, and whether it is regular.
 
-    Where it is (nearly) singular the inverse is damped: the least step, which keeps the current pair of a continuum.
+    Where it is (nearly) singular the inverse is damped: it gives the least step, so that a pair of a continuum stays.
     """
     det = h[0] * h[3] - h[1] * h[2]
     norm = abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3])
@@ -220,7 +220,7 @@ def pair_response(f, g, beta, unit):
 
 @kernel(inner=True)
 def across(a, b):
-    """A unit vector orthogonal to the unit vector a (or to nothing, a = 0), along b as far as it may."""
+    """A unit vector orthogonal to the unit vector a (any, if a = 0), as close to the direction of b as possible."""
     w = sub(b, scale(dot(a, b), a))
     ww = dot(w, w)
     if ww > 1e-20 * dot(b, b) and ww > 1e-290:
@@ -241,7 +241,7 @@ def across(a, b):
 
 @kernel(inner=True)
 def other_jet(store, other, pose, t, s):
-    """Point, C_t, C_tt of an edge at t, or of a point (whose derivatives vanish), of a face at (t, s), moved."""
+    """Point, C_t, C_tt, moved by a pose: of an edge at t, or (with zero derivatives) of a vertex or a held point."""
     zero = (0.0, 0.0, 0.0)
     if other.kind == VERTEX:
         return add(matvec(pose.rotation, vertex_point(store, other.record)), pose.shift), zero, zero

@@ -49,7 +49,7 @@ def two_face_frame(frame, matrix):
 
 @kernel(inline=True)
 def conforms(frame, offset):
-    """Whether the relative curvature of a pair is rounding: two faces that are equally near all around it."""
+    """Whether the relative curvature of a pair is zero to rounding: both faces are equally near all around it."""
     f, g = frame.side_f, frame.side_g
     v11, v12, v21, v22 = offset
     # Y_g^T (X_f + beta Y_f) - X_g^T Y_f
@@ -81,18 +81,18 @@ def solve_features(store, f, g, pose, x, n, size, turn):
     Parameters
     ----------
     f, g
-        Each a `Feature`; EDGE_POINT or FACE_POINT of a point that stays where it is on one, over a face.
+        Each a `Feature`; EDGE_POINT or FACE_POINT for a point fixed on an edge or a face, over a face.
     pose
         The pose of body g seen from body f.
     x
-        (u_f, v_f, u_g, v_g); of an edge (t, 0), of a vertex (0, 0): what a feature has no use for is left alone.
+        (u_f, v_f, u_g, v_g); of an edge (t, 0), of a vertex (0, 0): coordinates that a feature lacks are unchanged.
     n
-        A unit normal to begin from, from f towards g, or zeros: it says on which side two edges are, and stands in for
-        the direction between points that coincide.
+        A unit normal from f towards g to begin with, or zeros. It tells on which side of each other two edges are, and
+        replaces the direction between points that coincide.
     size
         The length against which steps are measured.
     turn
-        A step that would turn a normal or a tangent by more says that x was not near a pair.
+        [rad] Where a step would turn a normal or a tangent by more, x was not near a pair.
 
     Returns
     -------
@@ -100,9 +100,9 @@ def solve_features(store, f, g, pose, x, n, size, turn):
         CONVERGED, SINGULAR, LEFT_PATCH (a parameter is held at an end; the frame is that of the edge's end point),
         NOT_CONVERGED.
     x
-        Its parameters.
+        The parameters of the pair.
     frame
-        Where it is (`proximity/extrema/feature_jets.py`).
+        Its `FeatureFrame` (`proximity/extrema/feature_jets.py`).
     """
     if f.kind == FACE and g.kind == FACE:
         found = solve_pair(store, (f.record, g.record), pose, x, size, turn, LAST_TURN, False)

@@ -1,4 +1,4 @@
-"""One pair of features for Python: where it is, and how it and its gap move with the two poses."""
+"""One pair of features for Python: where it is, and how it and its gap change with the two poses."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from assembly.proximity.extrema.rates import (
 
 # What is written of a pair, in world axes.
 _PLACED = {
-    "parameters": 4,  # (u_f, v_f, u_g, v_g); of an edge (t, 0), of a vertex what it was
+    "parameters": 4,  # (u_f, v_f, u_g, v_g); of an edge (t, 0), of a vertex unchanged
     "point_f": 3,  # [length]
     "point_g": 3,  # [length]
     "normal": 3,  # unit normal from f towards g
@@ -36,7 +36,7 @@ _PLACED = {
 PLACED_PAIR = record_dtype("f8", **_PLACED)
 placed_pair_at = record_view(PLACED_PAIR)
 PLACED = size_of(PLACED_PAIR)
-# And of one of two features.
+# The same for any two features, and what kind of extremum their pair is.
 FEATURE_PAIR = record_dtype(
     "f8",
     **_PLACED,
@@ -51,7 +51,7 @@ PAIR = size_of(FEATURE_PAIR)
 
 @kernel(inner=True)
 def write_pair(q, x, pf, pg, n, gap, out):
-    """A pair in the axes of body f at the poses q (2, 7) into `out`, the first numbers of a FEATURE_PAIR."""
+    """Write a pair, given in the axes of body f, at the poses q (2, 7) as a PLACED_PAIR at the start of `out`."""
     pair = placed_pair_at(out, 0)
     turn_f = rotation(q, 0)
     origin = position(q, 0)
@@ -75,7 +75,7 @@ def pose_of_second(q):
 
 @kernel(signatures="(i8[::1], f8[::1], UniTuple(i8, 2), f8[:, ::1], UniTuple(f8, 4), f8, f8[::1])")
 def find_pair(table, pool, surfaces, q, x, size, out):
-    """A pair of two surfaces, into a PLACED_PAIR: from x, or a global start where x is NaN. Returns the status."""
+    """Find a pair of two surfaces from x, by a global start where x is NaN; into a PLACED_PAIR. Returns the status."""
     store = Store(table, pool)
     pose = pose_of_second(q)
     if math.isnan(x[0]):
@@ -99,7 +99,7 @@ def find_descent(table, pool, surfaces, q, x, size, limit, out):
 
 @kernel(inline=True)
 def both_features(features):
-    """Two features of which kind and record are given."""
+    """Two `Feature` tuples, each from its kind and record."""
     (kind_f, f), (kind_g, g) = features
     return Feature(kind_f, f), Feature(kind_g, g)
 
@@ -141,7 +141,7 @@ def find_features(store, features, q, x, n, size, turn, out):
 def feature_derivatives(store, features, q, x, n, size, first, hessian):
     """d(parameters)/dq and d(gap)/dq in `first` (5, 14), the gap's Hessian over the twists in `hessian` (12, 12).
 
-    Rates of what a feature has no parameter for are zero, of polar coordinates at a pole NaN. Returns the pair's
+    Rates of parameters that a feature lacks are zero, of polar coordinates at a pole NaN. Returns the pair's
     residual (lengths over `size`, and tilts), infinite where a feature has no tangent, and whether it is isolated.
     """
     turn_f = rotation(q, 0)

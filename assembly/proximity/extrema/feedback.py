@@ -7,8 +7,8 @@ definite gain lowers |d|. Here the gain is (H + mu I)^-1 with a mu that makes it
     H = [[I + (d.n_f) A_f, -P_f^T P_g], [-P_g^T P_f, I - (d.n_g) A_g]],
 
 the second derivative of |d|^2 / 2, A the shape operators: steepest descent far away, Newton's method near a minimum.
-What would leave a patch is set to zero component by component before the step and clamped after it
-(`docs/controllers.md`), and a step is taken only if the points come closer.
+Components of a step that would leave a patch are set to zero before it, and the parameters are clamped after it
+(`docs/controllers.md`). A step is taken only if the points come closer.
 """
 
 from __future__ import annotations
@@ -37,19 +37,20 @@ from assembly.proximity.extrema.pair_matrix import FLAT, curvature_bound, pair_m
 CROSSED = 4
 # Newton's method takes over where a step turns the normals by less than this many radians.
 NEAR = 0.1
-# Newton's method is given up where a step would turn a normal by more: from points that are apart, or that meet.
+# [rad] Newton's method ends where a step would turn a normal by more: from points that are apart, or that meet.
 TURN_APART, TURN_MET = 0.5, 1.0
-# A root is that of the descent if no normal turned by more than the angle with this cosine on the way.
+# An extremum found by Newton's method belongs to the descent if no normal turned by more than the angle with this
+# cosine: from points that are apart, or that meet.
 SAME_APART, SAME_MET = 0.8, 0.5
 # Points nearer than this part of the size meet; steps shorter than it end the descent.
 MEET = 1e-10
 # Where the descent ends with points nearer than this part of the size, they would meet: surfaces that touch.
 TOUCH = 1e-5
-# What of a gradient is rounding, as a part of the size.
+# Gradients below this part of the size are rounding.
 GRADIENT_ROUNDING = 1e-13
-# A first damping, against curvatures of |d|^2 / 2, which are one for points that move along a plane.
+# The first damping, added to second derivatives of |d|^2 / 2, which are one for points that move on planes.
 DAMPING = 1e-2
-# The least damping, so that points that may slide without coming closer stay; one whose steps are too short to count.
+# The least damping, so that points that can slide without coming closer stay; the damping at which the descent ends.
 LEAST, STUCK = 1e-8, 1e9
 
 
@@ -76,8 +77,8 @@ FreeDirections = namedtuple("FreeDirections", "first second count")
 def free_directions(store, r, u, v, e, gradient, slack):
     """The `FreeDirections` of a point: an end of the patch may take one away or both.
 
-    e is E^-1 of `own_frame`, the gradient one over tangent lengths, `slack` what of it is rounding. Along an end
-    the direction is that of the end: S_v at an end of u.
+    e is E^-1 of `own_frame`; `gradient` is over tangent lengths, and `slack` is the part of it that is rounding. Along
+    an end the direction is that of the end: S_v at an end of u.
     """
     patch = surface_at(store.table, r)
     gx, gy = gradient
@@ -93,7 +94,7 @@ def free_directions(store, r, u, v, e, gradient, slack):
     scale_v = 1.0 if e[2] > 0.0 else -1.0
     vx = -scale_v * e[1]
     vy = scale_v * e[0]
-    # An end holds where descent leads out of it: at the low one where the gradient is positive.
+    # An end holds a point where descent leads out of the patch: at the low end where the gradient is positive.
     length = math.sqrt(vx * vx + vy * vy)
     held_u = end_u * gx < -slack
     held_v = end_v * (vx * gx + vy * gy) < -slack * length
@@ -118,7 +119,7 @@ def end_curvature(store, r, u, v, along_v, d):
 
 @kernel(inline=True)
 def reduced(k, shape, t):
-    """T^T (I + k A) T for the directions t, with one on the diagonal in the place of one that is taken away."""
+    """T^T (I + k A) T over the directions t; the diagonal entry of a direction that is taken away is one."""
     h11, h12, h22 = 1.0 + k * shape[0], k * shape[1], 1.0 + k * shape[2]
     x, y = t.first
     z, w = t.second
@@ -186,7 +187,7 @@ DescentModel = namedtuple(
         "h_g",
         "slope_f",  # gradient over those of f [length]
         "slope_g",
-        "bend_f",  # by how much a step turns the normal of f, over its length
+        "bend_f",  # bound of the turn of the normal of f, per length of a step
         "bend_g",
     ],
 )
@@ -237,8 +238,8 @@ def step_along(store, r, u, v, own, ways, step, factor):
 def finish_by_newton(store, surfaces, pose, x, size, reach):
     """Newton's method from x: whether it came to the extremum that the descent leads to, and the `PairSolution`.
 
-    That is one no farther apart than x, off by no more than `reach` on either surface; with reach = 0, where the
-    surfaces meet, one where they touch or, solids, are deepest in each other.
+    It is the descent's if its points are no farther apart than those at x, and within `reach` of them on either
+    surface; with reach = 0, where the surfaces meet, if the surfaces touch there or solids are deepest in each other.
     """
     f, g = surfaces
     start = pair_frame(store, f, g, pose, x)
@@ -266,7 +267,7 @@ def finish_by_newton(store, surfaces, pose, x, size, reach):
 
 @kernel(inline=True)
 def with_steps(found, count):
-    """What was found, after so many steps more."""
+    """A `PairSolution` with its steps counted from `count` on."""
     return PairSolution(found.status, found.parameters, count + found.steps, found.frame, found.matrix)
 
 
@@ -276,8 +277,8 @@ def descend_pair(store, surfaces, pose, x, size, limit):
 
     Returns a `PairSolution`, as `solve_pair` does. The points never move apart.
 
-    CONVERGED, SINGULAR: Newton's method finished, at the root the descent led to.
-    LEFT_PATCH: nearest at the end of a patch.
+    CONVERGED, SINGULAR: Newton's method finished, at the extremum that the descent led to.
+    LEFT_PATCH: the points are nearest at the end of a patch.
     CROSSED: the points met, and there is no pair of a shallow penetration beside them.
     NOT_CONVERGED: the steps were spent, there is no tangent plane to go on, or x is a maximum or a saddle.
     """
@@ -305,7 +306,7 @@ def descend_pair(store, surfaces, pose, x, size, limit):
             step = max(step_f, step_g)
             bend = max(step_f * model.bend_f, step_g * model.bend_g)
             if not held and bend < near and mu <= 1e-3 * first:
-                # `solve_pair` takes the rest; should it go elsewhere, the descent goes on to a nearer start.
+                # `solve_pair` takes the last steps; if it goes elsewhere, the descent goes on and tries it from nearer.
                 same, found = finish_by_newton(store, surfaces, pose, x, size, 8.0 * step + 1e-9 * size)
                 if same:
                     return with_steps(found, count)
@@ -318,7 +319,7 @@ def descend_pair(store, surfaces, pose, x, size, limit):
             y = (uf, vf, ug, vg)
             there = witness_points(store, surfaces, pose, y)
             count += 1
-            # What the slope alone would give over this step.
+            # The first-order change of |d|^2 / 2 over this step.
             slope = factor * (rf[0] * sf[0] + rf[1] * sf[1] + rg[0] * sg[0] + rg[1] * sg[1])
             if there.square < at.square + 2e-4 * slope or (there.square < at.square and (held or end_f or end_g)):
                 lower = True

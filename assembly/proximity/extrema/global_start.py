@@ -9,9 +9,9 @@ which prefers normals that oppose each other and leads to the deepest points whe
 such pairs, far enough from one another to belong to different extrema, Newton runs. Of what it finds, extrema with
 opposed outward normals (solids face each other) come first, then the smallest |gap|.
 
-Newton's method goes to any extremum, the far side of a ball as well. A pair farther apart than the samples it came from
-is not theirs, nor is, of coarse cells, one from which direct search, which knows no curvature and passes poles and
-edges, leads nearer: then Newton runs from where that ends.
+Newton's method goes to any extremum, also to one on the far side of a ball. A pair is rejected if it is farther apart
+than the samples it came from or, where cells are coarse, if direct search leads nearer from it. Direct search uses no
+derivatives and passes poles and edges; Newton then runs from where it ends.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def cell_samples(store, r, pose, samples):
 
 @kernel(inner=True)
 def best_samples(a, b, weight, nearest, score):
-    """For every sample of f the best sample of g: the nearest one, or with a weight the best aligned one too."""
+    """For every sample of f the best sample of g: the nearest one, or with a weight the best by alignment too."""
     for i in range(a.shape[0]):
         x = a[i, 0]
         y = a[i, 1]
@@ -121,7 +121,7 @@ def opposed(frame, rotation, store, g, x):
 
 @kernel(inner=True, allocates=True)
 def approach(store, f, g, pose, x):
-    """Parameters with a smaller distance, and it, by direct search: nine points of each surface around the best."""
+    """Parameters with a smaller distance, and that distance, by direct search over nine points of each surface."""
     patch = surface_at(store.table, f)
     other = surface_at(store.table, g)
     fu = 0.03125 * (store.pool[patch.breaks_u + patch.spans_u] - store.pool[patch.breaks_u])
@@ -149,7 +149,7 @@ def approach(store, f, g, pose, x):
                 if d < best:
                     best = d
                     x = (u, v, at[j, 0], at[j, 1])
-        # Closer by a little only: the valley is as wide as the steps.
+        # Little progress: the valley is no wider than the steps are long.
         if best > 0.998 * before:
             fu *= 0.5
             fv *= 0.5
@@ -251,7 +251,7 @@ def global_start(store, f, g, pose, size):
         near = is_near(found, limit)
         coarse = cell_f.radius + cell_g.radius > COARSE * extent
         if near and coarse and found.status != LEFT_PATCH and found.frame.gap > 0.0:
-            # Samples are far apart: an extremum that is no minimum is nearer than they are, and others nearer yet.
+            # Samples are far apart: an extremum nearer than they are need not be a minimum; others may be nearer still.
             start, limit = approach(store, f, g, pose, found.parameters)
             limit += 1e-12 * size
             near = found.frame.gap <= limit
@@ -271,7 +271,7 @@ def global_start(store, f, g, pose, size):
         i = next_candidate(store, f, a, nearest, score, i)
     weight = ALIGNMENT * extent * extent
     for _ in range(3):
-        # The surfaces overlap, or do not face each other; the deeper, the more the normals tell.
+        # The surfaces overlap, or do not face each other: the deeper the overlap, the more weight the normals need.
         if not crossing and best.rank == 0.0 and best.gap >= 0.0:
             break
         best_samples(a, b, weight, nearest, score)
@@ -294,7 +294,7 @@ def global_start(store, f, g, pose, size):
 
 @kernel(signatures="(i8[::1], f8[::1], UniTuple(i8, 2), UniTuple(i8, 2), f8[:, ::1], f8[:, ::1], i8)")
 def start_surfaces(table, pool, surfaces, bodies, q, tracked, r):
-    """A global start for surfaces of two bodies of a scene, into tracked[r]. A status."""
+    """A global start for surfaces of two bodies of a scene, into tracked[r]. Returns the status."""
     i, j = bodies
     pose = relative_pose(q, i, rotation(q, i), j, rotation(q, j))
     status, x, _gap = global_start(Store(table, pool), surfaces[0], surfaces[1], pose, 1.0)

@@ -1,6 +1,6 @@
-"""A pair whose coordinates are unknowns of their own.
+"""The lifted pair: an extremal pair whose coordinates are unknowns of the solve.
 
-As a function of the poses alone an extremal pair has an end: a fold, where it merges with another one and H is
+As a function of the poses alone an extremal pair vanishes at a fold, where it merges with another one and H is
 singular. With (u_f, v_f, u_g, v_g) as unknowns beside the twists, five rows stay smooth through it:
 
     beta = n.d,   d.f_u / s_1,   d.f_v / s_2,   n.g_u / s_3,   n.g_v / s_4,
@@ -9,7 +9,7 @@ d = g - f, n = N / |N|, N = f_u x f_v.
 
 The s_i are lengths fixed for a solve (|f_u| ... where it began), and the unknowns are s_i u_i, lengths too. Local
 variables, in this order: twist of f (6), twist of g (6), the four coordinates. Second derivatives of the rows
-take third derivatives of the surfaces; terms that vanish with the residuals are left out.
+need third derivatives of the surfaces; terms that vanish with the residuals are left out.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ Variations = namedtuple(
     ],
 )
 VECTORS = len(Variations._fields)
-# The vectors themselves, in world axes, of the points the `VectorJet`: of those, from their bodies' origins.
+# d, n and |N| themselves, in world axes, and the `VectorJet` of either point, seen from its body's origin.
 PairVectors = namedtuple("PairVectors", "d n length f g")
-# A vector that the coordinates of a surface move, with its derivatives in them, in world axes.
+# A vector that depends on the coordinates of a surface, with its derivatives by them, in world axes.
 VectorJet = namedtuple("VectorJet", "value u v uu uv vv")
 # A pair whose coordinates are unknowns. surfaces: their records; bodies: their rows in a configuration; x: the
 # coordinates; lengths: the s_i.
@@ -60,7 +60,7 @@ def point_jet(store, surface, turn, u, v):
 
 @kernel(inline=True)
 def tangent_jets(store, surface, turn, point, u, v):
-    """The `VectorJet` of either tangent at the point whose own one is given."""
+    """The `VectorJet` of S_u and that of S_v, at a point whose own `VectorJet` is given."""
     uuu, uuv, uvv, vvv = third_derivatives(store.table, store.pool, surface, u, v)
     uuv = matvec(turn, uuv)
     uvv = matvec(turn, uvv)
@@ -126,7 +126,7 @@ def moved_along(store, surface, tracked, was, r, i):
 
 @kernel(signatures="(i8[::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1], i8, f8)")
 def has_stayed(table, pool, f, g, tracked, was, r, most):
-    """Whether neither point of pair r went farther along its surface than so much."""
+    """Whether neither point of pair r moved by more than `most` on its surface."""
     store = Store(table, pool)
     stayed = moved_along(store, f, tracked, was, r, 0) <= most
     return 1 if stayed and moved_along(store, g, tracked, was, r, 2) <= most else 0
@@ -252,7 +252,7 @@ def free_hessian(store, pair, q, y, work, out):
         gvk = column(rates.g_v, k)
         nk = column(rates.unit, k)
         stretch = dot(n, column(rates.normal, k)) / length
-        # Everything that multiplies a variation l once: gathered, so that the inner loop is short.
+        # The factors of each variation l are summed here, so that the inner loop is short.
         with_d = add(scale(y[0], nk), blend(l1, fuk, l2, fvk))
         with_n = add(blend(y[0], dk, -y[0] * beta, nk), add(blend(l3, guk, l4, gvk), scale(-stretch, w)))
         with_fu = add(scale(l1, dk), cross(fvk, across))

@@ -12,19 +12,20 @@ from collections import namedtuple
 
 from assembly._kernel import kernel
 
-# H counts as singular below this ratio of its smallest singular value to its scale, and is not inverted as it is below
-# the second.
+# H counts as singular below the first ratio of its smallest singular value to its scale; below the second its inverse
+# is damped.
 RANK, WEAK = 1e-7, 1e-5
-# Along a valley -H counts as this part of the angle by which the pair is off, if it is less, and as this at least: what
-# the pair is off across it says nothing of where it is least, and below the second curvatures are rounding.
+# Added to |H| along a valley, over the scale of H: the first times the angle by which the pair is off [rad], at least
+# the second. An error across the valley says nothing about where along it the gap is least; below the second
+# curvatures are rounding.
 UNSURE, LEVEL = 0.1, 1e-10
 # Farther off than this, in radians, it is not known whether there is a valley.
 NEAR = 0.1
 # [1 / length, times the size] Curvatures below this are rounding: what is left of a plane's. Doubled: spheres twice as
 # large count as planes. Chosen.
 FLAT = 1e-9
-# [rad, length over the size] Where nothing is isolated, a residual below this is none. Doubled: points of a continuum
-# are twice as far off. Chosen.
+# [rad, length over the size] Where a pair is not isolated, a residual below this is zero. Doubled: points of a
+# continuum are twice as far off. Chosen.
 VANISHING = 1e-9
 # [det H over |H|^2] A pair this far on the wrong side of its fold may still be a minimum. Doubled: so may a saddle
 # twice as far. Chosen, above what rounding makes of H where its terms cancel.
@@ -35,7 +36,7 @@ CONTINUUM = 1e-6
 # [det H over |H|^2] A pair this far from a fold is the only one in its patches and those beside them, which turn by
 # half a radian at most. Doubled: more of them are searched. Chosen.
 ALONE = 0.05
-# A highest pair along a valley that bends by so many times as much is kept.
+# A pair of greatest gap along a valley is kept where H along the valley is more than so many times the damping.
 PLAIN = 10.0
 
 # How the normals of a pair part as it moves, with A and C the shape operators of its surfaces and beta the gap.
@@ -59,7 +60,7 @@ def fold_of(h, size):
 
 @kernel(inline=True)
 def is_no_saddle(fold):
-    """Whether surfaces do not cross beside a pair, by how far it is from a fold; at one nothing tells."""
+    """Whether surfaces do not cross beside a pair, by how far it is from a fold; True at the fold itself."""
     return fold > -FOLDED
 
 
@@ -124,13 +125,13 @@ def pair_matrix(a, c, beta, flat):
 
 @kernel(inline=True)
 def right_side(c, r):
-    """C r1 - r2, by which H turns the step: how far normals are from parallel above each other's points, in radians."""
+    """C r1 - r2, the right side of H a: how far the normals are from parallel at points above each other [rad]."""
     return c[0] * r[0] + c[1] * r[1] - r[2], c[1] * r[0] + c[2] * r[1] - r[3]
 
 
 @kernel(inline=True)
 def null_ways(h):
-    """Unit vectors v and w such that H w and v^T H are the least, as far as H is singular; v.w >= 0."""
+    """Unit null vectors w and v of H and H^T: H w and v^T H are zero where H is singular; v.w >= 0."""
     by_row = h[0] * h[0] + h[1] * h[1] >= h[2] * h[2] + h[3] * h[3]
     w = (-h[1], h[0]) if by_row else (-h[3], h[2])
     by_column = h[0] * h[0] + h[2] * h[2] >= h[1] * h[1] + h[3] * h[3]
@@ -144,9 +145,9 @@ def null_ways(h):
 def across_first(a, c, r, k, h, inverse, flat):
     """The inverse of H for a step from here, and whether it goes along a valley that is all but level.
 
-    There Newton's step is the quotient of two small numbers: until the pair is at the bottom either is mostly what it
-    is off across it, and beyond an inflection the step leads up. So -H is raised along the valley to its amount and a
-    part of what the pair is off: steps go across first, and then down. Near the solution they are Newton's.
+    There Newton's step is the quotient of two small numbers: until the pair is at the bottom, both are mostly due to
+    its error across the valley, and beyond an inflection the step leads up. So -H along the valley is replaced by |H|
+    plus a part of that error: steps go across first, and then down. Near the solution they are Newton's.
     """
     size = scale_of(a, c, k)
     norm = abs(h[0]) + abs(h[1]) + abs(h[2]) + abs(h[3])
@@ -166,7 +167,7 @@ def across_first(a, c, r, k, h, inverse, flat):
     b = (h[0] + more * v[0] * w[0], h[1] + more * v[0] * w[1], h[2] + more * v[1] * w[0], h[3] + more * v[1] * w[1])
     det = b[0] * b[3] - b[1] * b[2]
     if not det > 0.25 * damping * max(abs(b[0]), abs(b[3])):
-        # Too far from singular for these to be its axes.
+        # Too far from singular for v and w to be its null vectors.
         return damped_inverse(h, damping), True
     i = 1.0 / det
     return (i * b[3], -i * b[1], -i * b[2], i * b[0]), True

@@ -15,11 +15,11 @@ from assembly.proximity.extrema.singular import BESIDE
 # Steps down the slope of a gap.
 SLIDES = 24
 # The projection of a point on a surface. parameters: (u, v); distance: signed, positive outside; normal: outward unit
-# normal; settled: whether the steps came to it, a minimum of the distance.
+# normal; settled: whether the steps converged to a minimum of the distance.
 Projection = namedtuple("Projection", "parameters distance normal settled")
 ProjectionQuery = namedtuple("ProjectionQuery", "store surface y")
-# A place of the surface: the square of its distance, that along the outward normal, Newton's step from there, which is
-# never longer than what brings the tangent plane's projection, and whether it is next to a minimum.
+# A point of the surface. merit: its squared distance; distance: that along the outward normal; step: Newton's, or that
+# to the projection on the tangent plane where the distance is not convex; still, settled: stationary, and a minimum.
 ProjectionPoint = namedtuple("ProjectionPoint", "merit distance normal step still settled")
 
 
@@ -75,11 +75,11 @@ def projection_of(store, g, y, s, t):
 
 @kernel(inner=True)
 def slide_down(store, f, g, pose, start, stride, half):
-    """Parameters at which the gap is smaller than at the start: down its slope on f, the projection on g following.
+    """Descend along the slope of the gap on f, with the projection on g following, to a smaller gap.
 
-    And whether they are beside the start, within BESIDE times half widths on f; it goes no farther. Newton's method
-    goes to saddles of the gap as well; this does not. The first step is `stride` times the sine of the angle between
-    the normals; then steps are those of Barzilai and Borwein, halved where the gap grows.
+    Returns the parameters, and whether they are within BESIDE half widths of the start on f: beyond, the descent ends.
+    Newton's method goes to saddles of the gap as well; this does not. The first step is `stride` times the sine of the
+    angle between the normals; then steps are those of Barzilai and Borwein, quartered where the gap grows.
     """
     u, v, s, t = start
     p, su, sv, _uu, _uv, _vv = surface_point(store.table, store.pool, f, u, v)

@@ -28,7 +28,7 @@ GAP_DERIVATIVES = record_dtype(
     arm_f=3,  # from the origin of body f to the point of g [length]
     arm_g=3,  # from the origin of body g to the point of g [length]
     rates=(4, 4),  # map from z to rates of the parameters (u_f, v_f, u_g, v_g)
-    form=(4, 4),  # beta'' is z.(form z), but for terms of rotation
+    form=(4, 4),  # beta'' is z.(form z), apart from terms of rotation
     zed=(4, 12),  # z over the twists of f, then g
 )
 derivatives_at = record_view(GAP_DERIVATIVES)
@@ -215,7 +215,7 @@ def add_gap_terms(records, jacobian, r, factor, weight, out, f, g):
 
 @kernel(inline=True)
 def into_quaternions(row, q, out, r):
-    """A row over the twists of two bodies as row r of out, over (q_f, q_g)."""
+    """Convert a row over the twists of two bodies to one over (q_f, q_g), into row r of out."""
     for b in range(2):
         for k in range(3):
             out[r, 7 * b + k] = row[6 * b + k]

@@ -1,7 +1,7 @@
 """How far an extremal pair is from a fold, where two of them merge: det H over |H|^2, on both sides of knot lines.
 
 Across a knot line the curvature of a smooth surface may jump, as where a straight wire begins to bend: a pair that is
-alone by its own curvature may have another one beside it there.
+isolated by its own curvature may have another one beside it there.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from assembly.geometry.splines.evaluate import find_span, surface_at
 from assembly.proximity.extrema.face_face import pair_frame
 from assembly.proximity.extrema.pair_matrix import FLAT, fold_of, pair_matrix
 
-# So many half widths from the middle of a patch is beside it.
+# Parameters within so many half widths of the middle of a patch are beside it.
 BESIDE = 3.0
 
 
@@ -43,10 +43,7 @@ def beyond_knot(store, r, direction, x, most):
 
 @kernel(inner=True)
 def fold_beyond(store, posed, x, half):
-    """The least distance from a fold of a root with the curvatures beyond knot lines within BESIDE half widths.
-
-    Across them the curvature of a smooth surface may jump, as where a straight wire begins to bend.
-    """
+    """The least distance of an extremum from a fold, with curvatures beyond knot lines within BESIDE half widths."""
     f, g = posed.surfaces[0], posed.surfaces[1]
     y = (
         beyond_knot(store, f, 0, x[0], BESIDE * half[0]),

@@ -1,6 +1,6 @@
-"""A shell as a tree of balls that grows where a search looks: shell, features, groups of cells, cells, their parts.
+"""A B-rep body as a tree of balls that grows where a search goes: body, features, groups of cells, cells, their parts.
 
-A node is a row of doubles (`proximity/features/quadratic_model.py`) and a row of integers. The tree of the second shell
+A node is a row of doubles (`proximity/features/quadratic_model.py`) and a row of integers. The tree of the second body
 is grown in the axes of the first one.
 """
 
@@ -40,32 +40,32 @@ from assembly.proximity.features.quadratic_model import NODE, Box, face_model, m
 CELL_NODE = record_dtype(
     "i8",
     level=1,  # WHOLE, PART, GROUP or CELL
-    kind=1,  # its feature: FACE, EDGE or VERTEX,
-    feature=1,  # its number
-    record=1,  # and where its record is in the table
+    kind=1,  # of its feature: FACE, EDGE or VERTEX
+    feature=1,  # number of the feature
+    record=1,  # where the record of the feature is in the table
     child=1,  # its first child; -1: none yet
     children=1,  # how many
-    side=1,  # of a face's cell, where it is from the trim: UNKNOWN, INSIDE, OUTSIDE or MIXED_SIDE
+    side=1,  # of a face's cell, on which side of the trim it is: UNKNOWN, INSIDE, OUTSIDE or MIXED_SIDE
     has_model=1,  # 1: its quadratic model is made
 )
 cell_node_at = record_view(CELL_NODE)
 INFO = size_of(CELL_NODE)
 # Levels.
 WHOLE, PART, GROUP, CELL = 0, 1, 2, 3
-# Where a cell is: not asked, all of it inside, all of it outside, neither.
+# On which side of the trim a cell is: not tested yet, all of it inside, all of it outside, on both.
 UNKNOWN, INSIDE, OUTSIDE, MIXED_SIDE = 0, 1, 2, 3
-# Cells a group.
+# Cells per group.
 TOGETHER = 8
 # A box longer than this times its width is halved, not quartered.
 SLENDER = 1.5
-# Faces and edges of so many spans are looked at span by span; of more, by their cells.
+# Faces and edges of at most so many spans are split into spans, those of more into their cells.
 SPANS = 4
-# Room for parts of cells.
+# Memory for so many parts of cells.
 PARTS = 8192
 
 
 # A tree. shell: its record; pose: where it stands; nodes: a QUADRATIC_MODEL a row; info: a CELL_NODE a row; used: how
-# many nodes there are, one number; work: room for coefficients.
+# many nodes there are, one number; work: memory for coefficients.
 BallTree = namedtuple("BallTree", "shell pose nodes info used work")
 # The cells of a feature. kind: FACE, EDGE or VERTEX; record: where its record is in the table; count: how many cells;
 # pool: where they begin in the pool; stride: numbers of a cell; ball: where its ball is among them.
@@ -139,7 +139,7 @@ def set_box(model, u, v, half_u, half_v):
 
 @kernel(inner=True)
 def add_cell(tree, i, side, box):
-    """A new node: a cell of the feature of node i, over a box, within the ball of that one."""
+    """A new node: a cell of the feature of node i, over a box, with the ball of node i."""
     cell, parent = cell_in(tree, i), model_in(tree, i)
     new_node(tree, tree.used[0], CELL, cell.kind, cell.feature, cell.record).side = side
     model = model_in(tree, tree.used[0])
@@ -152,7 +152,7 @@ def add_cell(tree, i, side, box):
 
 @kernel(inline=True)
 def set_ball(model, center, reach):
-    """A ball that rounding is within."""
+    """Write a ball, its radius enlarged by rounding errors."""
     put(model.center, center)
     model.radius = reach + 4e-16 * (reach + abs(center[0]) + abs(center[1]) + abs(center[2]))
 
@@ -177,7 +177,7 @@ def ball_around(nodes, i, first, last):
 
 @kernel(inner=True)
 def used_cell(store, record, kind, c):
-    """Whether a cell is worth a look: not a face's outside of its trim."""
+    """Whether a cell is used: a face's cell outside the trim is not."""
     face = face_at(store.table, record)
     if kind != FACE or face.trim < 0:
         return True
@@ -186,7 +186,7 @@ def used_cell(store, record, kind, c):
 
 @kernel(inner=True, allocates=True)
 def plant(store, shell, pose):
-    """A `BallTree` of the nodes of a shell and of its features."""
+    """A new `BallTree` with the node of a B-rep body and those of its features."""
     most = workspace(store, shell)
     tree = BallTree(
         shell=shell,
@@ -210,7 +210,7 @@ def plant(store, shell, pose):
 
 @kernel(inner=True)
 def plant_feature(store, tree, k):
-    """The node of feature k, with the ball around its cells, and of a face or an edge the box of their parameters."""
+    """The node of feature k, with the ball around its cells and, for a face or an edge, the box of their parameters."""
     pose = tree.pose
     kind, record, cells, at, size, ball = feature_cells(store.table, tree.shell, k)
     model = model_in(tree, 1 + k)
@@ -264,7 +264,7 @@ def plant_feature(store, tree, k):
 
 @kernel(inner=True)
 def open_spans(store, tree, i):
-    """Pieces of one span each as cells of a feature that has few spans."""
+    """Make the cells of a feature that has few spans: one per span."""
     cell, model = cell_in(tree, i), model_in(tree, i)
     is_edge = cell.kind == EDGE
     face = face_at(store.table, cell.record)
@@ -307,7 +307,7 @@ def span_count(table, kind, record):
 
 @kernel(inner=True)
 def open_feature(store, tree, i):
-    """Groups and cells of a feature."""
+    """Make the groups and cells of a feature."""
     pose, cell = tree.pose, cell_in(tree, i)
     kind, record, cells, at, size, ball = feature_cells(store.table, tree.shell, cell.feature)
     used = 0
@@ -345,13 +345,13 @@ def open_feature(store, tree, i):
 
 @kernel(inline=True)
 def is_tree_full(tree):
-    """Whether there is no room for the parts of another cell."""
+    """Whether there is no memory for the parts of another cell."""
     return tree.used[0] + 160 > tree.nodes.shape[0]
 
 
 @kernel(inner=True)
 def give_model(store, tree, i):
-    """See to it that a cell has its model."""
+    """Make the model of a cell, unless it has one."""
     cell, model = cell_in(tree, i), model_in(tree, i)
     if cell.has_model == 1:
         return
@@ -367,7 +367,7 @@ def give_model(store, tree, i):
 
 @kernel(inner=True)
 def split_cell(tree, i):
-    """Two or four parts of a cell that has its model."""
+    """Make two or four parts of a cell that has its model."""
     cell, model = cell_in(tree, i), model_in(tree, i)
     uu = dot(model.linear_u, model.linear_u)
     vv = dot(model.linear_v, model.linear_v)
@@ -389,7 +389,7 @@ def split_cell(tree, i):
 
 @kernel(inner=True)
 def grow(store, tree, i):
-    """See to it that a node has children, cells yet without their models. Returns its CELL_NODE."""
+    """Make the children of a node, unless it has some; new cells have no models yet. Returns its CELL_NODE."""
     cell = cell_in(tree, i)
     if cell.child < 0 and cell.kind != VERTEX:
         if cell.level != PART:

@@ -1,13 +1,13 @@
-"""Shells with conforming faces that seem deep in each other and only touch: a peg in a bore of its own radius.
+"""B-rep bodies with conforming faces that seem deep in each other and only touch: a peg in a bore of its own radius.
 
-They have points in common all over a face, and the least way apart is as long as the peg. What tells that they touch
-is that the smaller one made smaller is free. With c the middle of the shell g and R how far it reaches from there,
+They have points in common all over a face, and the least move that parts them is as long as the peg. That they only
+touch is shown by shrinking one of them: then it is free. With c the middle of g and R how far g reaches from c,
 
     g' = c + (1 - t) (g - c)
 
-is no farther from g than t R, so that no point of g is deeper in f than that where g' is free of f; and f may be the
-one that shrinks, which is the same, seen from f, as g that grows about the middle of f. So flat faces, walls, balls in
-their seats are parted, which no move does for all of them at once.
+is no farther from g than t R, so that no point of g is deeper in f than t R if g' is free of f. Instead f may shrink,
+which seen from f is the same as g growing about the middle of f. Shrinking parts flat faces, walls and balls in their
+seats all at once, which no rigid move does.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from assembly.proximity.features.ball_tree import feature_cells, used_cell
 from assembly.proximity.features.global_search import CROSSING, FoundPair, nearest_of_shells
 from assembly.proximity.features.separating_normals import WAYS, FeaturePoint, add_ways, points_of, way_at
 
-# Points of shells that are deeper in each other than this part of the size tell a crossing from conforming faces.
+# Bodies deeper in each other than this part of the size cross; others may only touch along conforming faces.
 NEARLY = 1e-6
-# The nearest features of what was made smaller are looked for to this part of their distance: they are one of many.
+# Relative accuracy of the search for the nearest features of the shrunk body: many are equally near.
 ROUGH = 0.1
 
 
@@ -83,7 +83,7 @@ def grown(pose, about, factor):
 
 @kernel(inner=True)
 def leans(store, shell, at, turn, n, size, ways):
-    """How much the normals of a shell's faces at a `FeaturePoint` lean along n, all together."""
+    """The sum of n.m over the normals m of a body's faces at a `FeaturePoint`."""
     s = 0.0
     for k in range(add_ways(store, shell, at, turn, 1.0, size, ways, 0)):
         s += dot(n, way_at(ways, k))
@@ -123,8 +123,8 @@ def pair_from(store, shells, pose, codes, x, n, size):
 def conforming_pair(store, shells, pose, size):
     """The pair at which two shells that have points in common touch along conforming faces.
 
-    Made smaller, a shell within the other one's material is free as well: there normals do not oppose each other.
-    It is not deeper than `NEARLY` of the size.
+    A body inside the other one's material is free too when it shrinks: there normals do not oppose each other, and no
+    pair is found. The bodies are no deeper in each other than `NEARLY` times the size.
     """
     shell_f, shell_g = shells
     same = IDENTITY.rotation

@@ -33,7 +33,7 @@ from assembly.proximity.features.quadratic_model import (
 
 @kernel(inner=True)
 def curve_remainder(store, curve, box, quadratic, work):
-    """Bounds of |x|, |y|, |z| of what the quadratic leaves of a curve over one part of a span."""
+    """Bounds of |x|, |y|, |z| of the difference of a curve and its quadratic over a part of one span."""
     arc = spline_curve_at(store.table, curve)
     span = find_span(store.pool, arc.breaks, arc.spans, box.u)
     at = arc.breaks + span
@@ -102,7 +102,7 @@ def length(a):
 
 @kernel(inner=True)
 def edge_model(store, edge, pose, model, work):
-    """Fill in the model of an edge, whose interval stands in it already, moved by a pose."""
+    """Fill in the model of a part of an edge, moved by a pose; the model has its interval already."""
     edge_record = edge_at(store.table, edge)
     h = model.half_u
     curve = edge_record.curve
@@ -123,7 +123,7 @@ def edge_model(store, edge, pose, model, work):
     linear = blend(c1[0], su, c1[1], sv)
     bent = add(blend(c1[0] * c1[0], suu, 2.0 * c1[0] * c1[1], suv), scale(c1[1] * c1[1], svv))
     square = add(blend(c2[0], su, c2[1], sv), scale(0.5, bent))
-    # What is beyond first order in u and v, and all of it: a and b.
+    # Bounds of the terms of u and v beyond first order; and of all terms: a and b.
     more_u = abs(c2[0]) + left[0]
     more_v = abs(c2[1]) + left[1]
     a = abs(c1[0]) + more_u

@@ -1,16 +1,16 @@
-"""The nearest points of two shells over all their faces, edges and vertices, by branch and bound.
+"""The nearest points of two B-rep bodies over all their faces, edges and vertices, by branch and bound.
 
-Nearest points are an extremum of some pair of features inside both. Two trees of balls
-(`proximity/features/ball_tree.py`) are descended
-together, the pair of nodes with the least bound of its distance first. A pair of cells is given up when
+Nearest points are an extremum of some pair of features, inside the trims of both. Two trees of balls
+(`proximity/features/ball_tree.py`) are descended together, the pair of nodes with the least bound of its distance
+first. A pair of cells is discarded when
 
 - its bound (`proximity/features/quadratic_model.py`) is not below the least distance known,
 - no normal of one is parallel to one of the other, or the distance changes monotonically over one of them: then
   no extremum of these two features is in it,
-- it is small, and an extremum found is its own: relative curvature cannot change its sign as far as from there,
+- it is small, and a known extremum is the only one in it: up to there relative curvature cannot change its sign,
 
-else Newton's method looks for an extremum from its middle, and the larger cell is cut. What is known to be feasible,
-an extremum or a sample inside the trims, lowers the least distance. Shells that cross are at distance zero; their
+else Newton's method looks for an extremum from its middle, and the larger cell is split. A feasible pair, an
+extremum or a sample inside the trims, lowers the least distance known. Bodies that cross are at distance zero; their
 crossing points are found by Newton's method for d = 0, and the search ends.
 """
 
@@ -54,13 +54,13 @@ from assembly.proximity.features.region_tests import (
     side_of,
 )
 
-# What became of a search: apart, all other pairs excluded; shells cross; out of room, the best pair known.
+# Outcome of a search: bodies apart, all other pairs excluded; bodies cross; out of memory, the best pair known.
 APART, CROSSING, UNPROVEN = 0, 1, 2
 # Pairs of nodes that may wait at a time.
 WAITING = 65536
 # Extrema kept.
 EXTREMA = 256
-# Pairs of cells that are smaller, in parts of the size, are not cut: what they bound is the proof's end.
+# Pairs of cells smaller than this part of the size are not split further: their bounds are final.
 TINY = 2.5e-10
 # Newton's method is tried where normals turn by less.
 SMOOTH = 1.2
@@ -68,8 +68,8 @@ SMOOTH = 1.2
 # What a search keeps.
 SEARCH_STATE = record_dtype(
     "f8",
-    limit=1,  # pairs of at least this bound are let go [length]
-    let_go=1,  # the least bound of those, and of pairs too small to be cut [length]
+    limit=1,  # pairs with at least this bound are discarded [length]
+    let_go=1,  # the least bound of discarded pairs and of pairs too small to be split [length]
     lower=1,  # no points are nearer than this [length]
     gap=1,  # of the nearest pair known; infinite before there is one [length]
     parameters=4,  # its coordinates, (u, v) of f, then of g
@@ -78,18 +78,18 @@ SEARCH_STATE = record_dtype(
     crosses=1,  # 1: shells cross there
     effort=1,  # pairs looked at
     known=1,  # extrema found
-    place=1,  # row of the normal near that of the pair that is next; 0: only its balls bound it
+    place=1,  # row of the normal of the next pair; 0: only its balls bound it
     by_models=1,  # 1: pairs are bounded by their models, else by their balls
-    normal=3,  # where models begin to look for a bound
+    normal=3,  # the direction with which the search for a bound by models begins
     used=1,  # rows of normals that were ever used
-    free=1,  # the first row that was left, which begins with the next one; 0: none
+    free=1,  # first row of the list of free rows, each of which begins with the next one; 0: none
 )
 search_state_at = record_view(SEARCH_STATE)
 STATE = size_of(SEARCH_STATE)
-# A search. trees: of the shells; pose: of g; heap: of `assembly/_heap.py`; normals: a row a pair that waits and that
+# A search. trees: of the shells; pose: of g; heap: of `assembly/_heap.py`; normals: a row per waiting pair that
 # models bound; extrema: a KNOWN_EXTREMUM a row; state: a SEARCH_STATE.
 ShellTrees = namedtuple("ShellTrees", "store trees pose size rough heap normals extrema state")
-# Where Newton's method leads. curvature: the least of g relative to f; stretch: 1 over the least of f's metric K.
+# Where Newton's method leads. curvature: the least of g relative to f; stretch: 1 over the least eigenvalue of K of f.
 NearExtremum = namedtuple("NearExtremum", "status x gap curvature stretch")
 
 
@@ -114,7 +114,7 @@ def extremum_near(store, f, g, pose, x, n, size):
 
 @kernel(inner=True)
 def larger_first(trees, i, j):
-    """Whether to go down on the side of f: what is not a cell first, then what is larger."""
+    """Whether to split the node of f, not that of g: a node that is no cell first, then the larger one."""
     cell_f, cell_g = cell_in(trees[0], i), cell_in(trees[1], j)
     f, g = model_in(trees[0], i), model_in(trees[1], j)
     if (cell_f.level == CELL) != (cell_g.level == CELL):
@@ -122,7 +122,7 @@ def larger_first(trees, i, j):
     if cell_f.kind == VERTEX or cell_g.kind == VERTEX:
         return cell_g.kind == VERTEX
     if cell_f.level == CELL:
-        # What keeps the bound from the distance, or else the extent.
+        # By the remainder, which weakens the bound, and with less weight by the extent.
         return f.rest + 0.02 * f.radius >= g.rest + 0.02 * g.radius
     return f.radius >= g.radius
 
@@ -159,7 +159,7 @@ def are_feasible(store, trees, i, j, x):
 
 @kernel(inner=True)
 def nearest_cells(store, trees):
-    """Two cells, by going down where balls are nearest."""
+    """Two cells, by descending to the children whose centers are nearest."""
     i = 0
     j = 0
     while True:
@@ -239,7 +239,7 @@ def search_ended(search, top, left):
 
 @kernel(inner=True)
 def examine(search, bound, i, j, n, is_guess):
-    """See what is in a pair of cells, at a guess even if no extremum is. Whether something else may be."""
+    """Look for an extremum or a crossing in two cells, for a guess in any case. Returns whether more may be in them."""
     store, trees, extrema = search.store, search.trees, search.extrema
     state = search_state_at(search.state, 0)
     f, g = model_in(trees[0], i), model_in(trees[1], j)
@@ -318,7 +318,7 @@ def pair_known(search, status):
 
 @kernel(inner=True, allocates=True)
 def nearest_of_shells(store, shells, pose, size, rough):
-    """The nearest points of two shells, g seen from f, or any that are farther by a part of that, `rough`, at most."""
+    """The nearest points of two B-rep bodies, g seen from f, or points farther by the part `rough` at most."""
     trees = (plant(store, shells[0], IDENTITY), plant(store, shells[1], pose))
     # A node has no more parts than there are nodes, a cell at most four.
     heap = np.empty((WAITING + trees[0].nodes.shape[0] + trees[1].nodes.shape[0]) * PAIR)
@@ -333,6 +333,6 @@ def nearest_of_shells(store, shells, pose, size, rough):
     examine(search, -math.inf, i, j, (0.0, 0.0, 0.0), True)
     status, _left = advance(search, 0, Pairs(0, 1, 0, 1))
     if status == UNPROVEN and best.feature_f < 0.0:
-        # Out of room before any point inside the trims: where the search began.
+        # Out of memory before a point inside the trims was found: the pair at which the search began.
         keep_pair(search, i, j, middles(trees, i, j), math.inf)
     return pair_known(search, status)

@@ -1,6 +1,7 @@
-"""Features that a pair keeps, and points of them: they are not switched, whatever is closer beside them.
+"""Feature locks: a pair keeps its features, or points of them, whatever is closer beside them.
 
-So are corners over faces rows of a clearance, and points of edges and of valleys, where the closest pair jumps about.
+So corners over faces, and points of edges and of near-singular minima, can be rows of a clearance where the closest
+pair would jump.
 """
 
 from __future__ import annotations
@@ -27,15 +28,15 @@ from assembly.proximity.extrema.feature_pair import solve_features
 from assembly.proximity.features.region_tests import is_feasible
 from assembly.proximity.features.switching import between_edges, from_edge, from_vertex
 
-# How far a unit normal may lean over what is beside a feature that is held.
+# The most that a unit normal may lean, as a sine, over what is beside a locked feature.
 TILT = 0.3
-# What a pair holds on to: nothing, its features, or as well a point of its edge, of its face of f, of that of g.
+# What a pair keeps: nothing, its features, or also a point of its edge, of its face on f, of its face on g.
 NOTHING, FEATURES, POINT, HELD_F, HELD_G = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @kernel(inner=True)
 def lean_of(store, shell, feature, code, t, s, n):
-    """By how much a normal leans over what is beside an edge, a vertex or a point, at most; 0 for a face."""
+    """The most that a normal leans over what is beside an edge, a vertex or a point; 0 for a face."""
     kind = feature.kind
     if kind == FACE_POINT:
         cosine = dot(n, own_frame(store, feature.record, t, s).normal)
@@ -52,7 +53,7 @@ def lean_of(store, shell, feature, code, t, s, n):
 
 @kernel(inline=True)
 def held_feature(store, shell, code, held, own):
-    """A `Feature`; an EDGE_POINT or FACE_POINT where a point of it is held, of a face if `held` is `own`."""
+    """The `Feature` of a code; an EDGE_POINT of an edge held at a POINT, a FACE_POINT of a face if `held` is `own`."""
     kind, record = feature_of(store, shell, code)
     if kind == EDGE and held == POINT:
         kind = EDGE_POINT
@@ -65,8 +66,8 @@ def held_feature(store, shell, code, held, own):
 def hold_features(store, shells, pose, codes, x, n, turn, held):
     """Newton's method on two features that stay what they are: status, x, frame. Arguments as in `track_features`.
 
-    Where `held` is POINT, HELD_F or HELD_G, a point of one stays where it is on it, too. LEFT_PATCH where a point
-    on a face is past its boundary, one of an edge past its end, or the normal leans by more than TILT.
+    Where `held` is POINT, HELD_F or HELD_G, a point of one feature also stays where it is on it. LEFT_PATCH where a
+    point on a face is past its boundary, one of an edge past its end, or the normal leans by more than TILT.
     """
     (shell_f, shell_g), (code_f, code_g) = shells, codes
     f = held_feature(store, shell_f, code_f, held, HELD_F)

@@ -1,4 +1,4 @@
-"""The nearest features of two shells for Python, and tracking of them, one call each."""
+"""The nearest features of two B-rep bodies for Python, and tracking of them, one call each."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ LOWER = place_of(FEATURE_ANSWER, "lower")
 SWITCHES = place_of(FEATURE_ANSWER, "switches")
 PAIR = size_of(FEATURE_ANSWER)
 # Where no pair is nearer than the one found by more than this part of the size, it counts as the nearest one: in a
-# continuum, or beside an apex, a search has no room to prove more.
+# continuum, or beside an apex, a search runs out of memory before it proves more.
 PROVEN = 1e-9
 # Statuses of a tracked pair, beside those of a search.
 TRACKED, LOST = 4, 5
@@ -86,7 +86,7 @@ def find_nearest(table, pool, shells, q, size, codes, out):
     none = (0.0, 0.0, 0.0)
     found = FoundPair(True, nearest.codes, nearest.x, none, nearest.gap)
     if status == UNPROVEN:
-        # The search was over before it came to the nearest one; beside what it found there may be nearer ones.
+        # The search ended before it reached the nearest pair; beside the pair it found there may be a nearer one.
         beside = track_features(store, shells, pose, nearest.codes, nearest.x, none, size, math.inf)
         off = beside.frame.gap
         if (beside.status == CONVERGED or beside.status == SINGULAR) and nearest.lower <= abs(off) < abs(found.gap):
@@ -94,7 +94,7 @@ def find_nearest(table, pool, shells, q, size, codes, out):
         if abs(found.gap) - nearest.lower <= PROVEN * size:
             status = APART
     if status == APART and abs(found.gap) <= SEEMING_OVERLAP * size:
-        # Solids whose faces are flush have points in common before a search comes to where they cross.
+        # Where faces are flush, a search ends at common points of theirs before it reaches a point where solids cross.
         if overlap_at(store, shells, pose.rotation, found.codes, found.x, size, np.empty((WAYS, 3))):
             status = CROSSING
     write_features(store, shells, q, found, size, codes, out)
@@ -107,8 +107,8 @@ def find_nearest(table, pool, shells, q, size, codes, out):
 def find_deepest(table, pool, shells, q, size, codes, out):
     """The pair of two shells that cross at the features and coordinates in codes and out. Returns the status.
 
-    APART where they turn out to touch, and rounding said that they cross. Where what leads out is long it is seen
-    whether only conforming faces have points in common.
+    Returns APART where they only touch and seemed to cross by rounding. Where the pair is deep, or none is found, it is
+    tested whether only conforming faces have points in common.
     """
     store = Store(table, pool)
     pose = pose_of_second(q)
@@ -131,8 +131,8 @@ def follow_nearest(table, pool, shells, q, size, codes, out):
     x = answer_parameters(out)
     found = track_features(Store(table, pool), shells, pose_of_second(q), (codes[0], codes[1]), x, n, size, 1.0)
     status, frame = found.status, found.frame
-    # An edge may have become the farthest one of its neighborhood, surfaces may cross beside their points. In a
-    # continuum, of flush faces say, nothing tells.
+    # An edge may have become the farthest of its neighborhood, and surfaces may cross beside their points. In a
+    # continuum, as of flush faces, this cannot be decided.
     if not (status == SINGULAR or (status == CONVERGED and frame.proper)):
         return LOST
     codes[0], codes[1] = found.codes

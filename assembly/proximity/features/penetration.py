@@ -1,10 +1,10 @@
 """The pair of two B-rep bodies that cross: a way out, and where they are deepest in each other along it.
 
-Nearest points say nothing where shells cross: all crossing points are at distance zero. The pair wanted has normals
-that oppose each other and a negative gap. Two faces without boundaries have it by `global_start`. Of other shells, g is
-moved along normals of the faces that cross (`proximity/features/separating_normals.py`) until they are apart on one of
-them; from the nearest
-points there the pair is followed on the way back (`switching.py`), through touching, to a negative gap.
+Nearest points say nothing where bodies cross: all crossing points are at distance zero. The pair wanted has normals
+that oppose each other and a negative gap. For two faces without boundaries `global_start` finds it. Otherwise g is
+moved along normals of the faces that cross (`proximity/features/separating_normals.py`) until the bodies are apart;
+from the nearest points there the pair is followed on the way back (`switching.py`), through touching, to a negative
+gap.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ PENETRATING = 3
 FIRST, DOUBLINGS = 0.02, 7
 # Steps of the way back, and how often one may be halved.
 STEPS, HALVINGS = 12, 8
-# On the way out the nearest points are good to this part of their distance: of parallel faces all are nearest.
+# Relative accuracy of the nearest points on the way out: all points of parallel faces are equally near.
 ROUGH = 0.01
-# Shells that are apart by this part of the size may seem to cross: rounding says so of those that touch.
+# Bodies apart by less than this part of the size may seem to cross, by rounding.
 SEEMING_OVERLAP = 1e-12
 # A move by this part of the size parts what only touches.
 PARTED = 1e-6
@@ -87,7 +87,7 @@ def ways_out(store, shells, pose, codes, x, size, ways):
     f, g = points_of(codes, x)
     count = add_ways(store, shells[0], f, IDENTITY.rotation, 1.0, size, ways, 0)
     count = add_ways(store, shells[1], g, pose.rotation, -1.0, size, ways, count)
-    # Out of a corner it leads between the walls.
+    # The way out of a corner lies between the walls' normals.
     count = add_way(sum_of(ways, count), ways, count)
     # Flush bodies meet all along edges, also where another face leads out sooner.
     count = add_end_ways(store, shells[0], f, IDENTITY.rotation, 1.0, size, ways, count)
@@ -130,13 +130,13 @@ def deepest(store, shells, pose, codes, x, size):
                 if not back.found or not SEEMING_OVERLAP * size >= gap > best.gap:
                     continue
                 if gap < -reach:
-                    # The way back went off to another pair: it is not so far as that.
+                    # The way back led to another pair: the bodies are not deeper than they were moved.
                     if gap > other.gap:
                         other = back
                     continue
                 if gap >= -SEEMING_OVERLAP * size:
-                    # They touch here. If that is all, the least move parts them. Where they touch along a line or
-                    # all over a face a search so near may not come to its proof: that none is found has to do.
+                    # They touch here. If they only touch, the least move parts them. Where they touch along a line or
+                    # all over a face the search may not prove that; then it suffices that it finds no crossing.
                     place = add(pose.shift, scale(PARTED / reach * size, away))
                     parted = nearest_of_shells(store, shells, RelativePose(pose.rotation, place), size, ROUGH)
                     if parted.status == CROSSING:

@@ -1,4 +1,4 @@
-"""Boxes of features with a quadratic model that is off by no more than it says, and bounds of distances from them.
+"""Quadratic models of features over boxes, with bounds of their errors, and bounds of distances from them.
 
 Over a box of parameters, u = u0 + a s and v = v0 + b t with |s|, |t| <= 1, a surface is
 
@@ -10,7 +10,7 @@ direction n takes a few products, and
 
     n.(g0 - f0) - support_f(n) - support_g(-n) - e_f - e_g  <=  distance of the two boxes
 
-for every unit n: quadratically, towards each other convex ones cubically, close to it as boxes shrink.
+for every unit n. As boxes shrink the bound comes close quadratically; cubically if they are convex to each other.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ QUADRATIC_MODEL = record_dtype(
     center=3,  # of the sphere
     radius=1,
     normal=3,  # unit normal of the linear part
-    rest_n=1,  # what of e is along that normal
+    rest_n=1,  # the part of e along that normal
     curved=1,  # length of all terms but the linear ones
     bend=1,  # how much the normal turns over the box [rad]
     change=1,  # how much curvatures change over it
 )
 model_at = record_view(QUADRATIC_MODEL)
 NODE = size_of(QUADRATIC_MODEL)
-# Where weights vary by more than this over a box it has no model: e is infinite and its sphere is what bounds it.
+# A box whose least weight is below this part of the middle one has no model: e is infinite, its sphere bounds it.
 LEAST_WEIGHT = 0.1
 # Roundings of coordinates in points and coefficients.
 COEFFICIENT_ROUNDING = 1e-15
@@ -83,7 +83,7 @@ Remainder = namedtuple("Remainder", "rest rest_n sss sst stt ttt beyond")
 
 @kernel(inner=True)
 def load_piece(store, r, span, origin, work):
-    """The coefficients of a piece of a surface, coordinates from an origin, and weights, into work; the degrees."""
+    """Load the coefficients of a surface's piece, seen from an origin, and its weights into work; returns degrees."""
     patch = surface_at(store.table, r)
     nu = patch.degree_u
     nv = patch.degree_v
@@ -106,7 +106,7 @@ def load_piece(store, r, span, origin, work):
 
 @kernel(inner=True)
 def expand(work, degrees, box):
-    """Make powers of the piece in work those about the middle of a box, over its half widths.
+    """Expand the piece in work about the middle of a box, in units of its half widths.
 
     Returns its least weight over the box; 0 where weights vary by more than `LEAST_WEIGHT` allows.
     """
@@ -219,7 +219,7 @@ def remainder(store, r, span, box, quadratic, n, work):
 
 @kernel(inner=True)
 def face_model(store, r, pose, model, work):
-    """Fill in the model of a surface, whose box stands in it already, moved by a pose."""
+    """Fill in the model of a surface, moved by a pose; the model has its box already."""
     patch = surface_at(store.table, r)
     box = Box(model.u0, model.v0, model.half_u, model.half_v)
     s0, su, sv, suu, suv, svv = surface_point(store.table, store.pool, r, box.u, box.v)
@@ -299,7 +299,7 @@ def place_model(pose, quadratic, e, model):
     uv = dot(p, q)
     curved = math.sqrt(dot(l, l)) + math.sqrt(dot(m, m)) + math.sqrt(dot(k, k))
     model.curved = curved + e
-    # The parallelogram of the linear part reaches as far as its longer diagonal; or as the ball known.
+    # The linear part reaches as far as its parallelogram's longer diagonal; the ball known may be smaller.
     radius = math.sqrt(max(uu + vv + 2.0 * abs(uv), 0.0)) + curved + e
     d = sub(three_of(model.center), point)
     model.radius = min(radius, model.radius + math.sqrt(dot(d, d)))
@@ -323,7 +323,7 @@ def place_model(pose, quadratic, e, model):
 
 @kernel(inline=True)
 def crest(l, k):
-    """The most of l s + k s^2 over |s| <= 1."""
+    """The maximum of l s + k s^2 over |s| <= 1."""
     l = abs(l)
     if l < -2.0 * k:
         return -0.25 * l * l / k
@@ -332,7 +332,7 @@ def crest(l, k):
 
 @kernel(inline=True)
 def support(model, n):
-    """The most of n.(S - S0) over a node; n is a unit vector."""
+    """An upper bound of n.(S - S0) over a node; n is a unit vector."""
     lu = dot(n, model.linear_u)
     lv = dot(n, model.linear_v)
     ku = dot(n, model.square_u)
@@ -345,7 +345,7 @@ def support(model, n):
 
 @kernel(inner=True)
 def bound_along(f, g, n):
-    """A lower bound of the distance of what two models are of, from the unit direction n."""
+    """A lower bound of the distance of two modeled boxes, along the unit direction n."""
     apart = dot(n, sub(g.point, f.point))
     return apart - support(f, n) - support(g, neg(n))
 
@@ -358,14 +358,14 @@ def between_centers(f, g):
 
 @kernel(inline=True)
 def ball_bound(f, g):
-    """A lower bound of the distance of what two models are of, from their spheres."""
+    """A lower bound of the distance of two modeled boxes, from their spheres."""
     d = between_centers(f, g)
     return math.sqrt(dot(d, d)) - f.radius - g.radius
 
 
 @kernel(inner=True)
 def pair_bound(f, g, n, enough):
-    """The best bound found for two models and its direction, beginning with n (zero: none); done at `enough`."""
+    """The best bound found for two models and its direction, beginning with n (zero: none); it stops at `enough`."""
     best = ball_bound(f, g)
     if best >= enough or not f.rest + g.rest < math.inf:
         return best, n

@@ -1,8 +1,8 @@
 """What may be in a pair of cells: whether they are inside their trims, hold an extremum, or only one that is known.
 
 Where features are nearest, d = g - f is normal to both, so that d.S_u = d.S_v = 0 on a face and d.C_t = 0 on an edge.
-An extremum of two faces with relative curvature of least eigenvalue l > 0 is the only one as far as the curvatures of
-both change by less than l.
+An extremum of two faces whose relative curvature has the least eigenvalue l > 0 is the only one over the region where
+the curvatures of both change by less than l.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ from assembly.proximity.features.ball_tree import INSIDE, MIXED_SIDE, OUTSIDE, U
 
 # Boxes whose normals turn by less hold at most one extremum.
 TRUSTED = 0.05
-# Boxes that hold an extremum this many half widths from their middles still take it for their own.
+# A known extremum within so many half widths of the middles of boxes counts as theirs: of boxes whose normals hardly
+# turn, and of boxes whose curvatures hardly change.
 BESIDE = 1.5
 FAR = 6.0
 
 
 @kernel(inner=True)
 def is_feasible(store, kind, record, u, v):
-    """Whether a point of a feature is one of the shell."""
+    """Whether a point of a feature is a point of the body: for a face, inside the trim."""
     face = face_at(store.table, record)
     if kind != FACE or face.trim < 0:
         return True
@@ -37,7 +38,7 @@ def is_feasible(store, kind, record, u, v):
 
 @kernel(inner=True)
 def side_of(store, tree, i):
-    """Where a cell is from the trim of its face."""
+    """On which side of the trim of its face a cell is."""
     cell, model = cell_in(tree, i), model_in(tree, i)
     if cell.kind != FACE or cell.side != UNKNOWN:
         return cell.side
@@ -51,7 +52,7 @@ def side_of(store, tree, i):
 
 @kernel(inner=True)
 def grows(f, g, p, q, first, second, d):
-    """Whether d.S_u, p = S_u over half a box and q = S_v so, cannot vanish over what two models are of.
+    """Whether d.S_u cannot vanish over two modeled boxes; p and q are S_u and S_v of f, times half widths.
 
     `first` and `second` are half the derivatives of p along both directions.
     """
@@ -67,7 +68,7 @@ def grows(f, g, p, q, first, second, d):
 
 @kernel(inner=True)
 def monotone(f, kind, g, d):
-    """Whether d.S_u or d.S_v cannot vanish over the model of one feature, and any point of one of another."""
+    """Whether d.S_u or d.S_v cannot vanish anywhere on the box of f, for any point of the box of g."""
     if kind == VERTEX:
         return False
     if grows(f, g, f.linear_u, f.linear_v, f.square_u, f.mixed, d):
@@ -146,7 +147,7 @@ def periods(store, kind, record):
 
 @kernel(inner=True)
 def from_middle(store, tree, i, u, v):
-    """The most half widths that coordinates are from the middle of a cell."""
+    """How far coordinates are from the middle of a cell, in half widths: the larger of both directions."""
     cell, model = cell_in(tree, i), model_in(tree, i)
     period_u, period_v = periods(store, cell.kind, cell.record)
     return max(off_middle(u, model.u0, model.half_u, period_u), off_middle(v, model.v0, model.half_v, period_v))
@@ -167,7 +168,7 @@ KNOWN = size_of(KNOWN_EXTREMUM)
 
 @kernel(inner=True)
 def is_known(store, trees, i, j, extrema):
-    """Whether the only extremum that two cells may hold is a known one; half widths from the nearest one."""
+    """Whether the only extremum that two cells may hold is known; and half widths to the nearest known one."""
     f, g = model_in(trees[0], i), model_in(trees[1], j)
     feature_f, feature_g = cell_in(trees[0], i).feature, cell_in(trees[1], j).feature
     bend = max(f.bend, g.bend)

@@ -1,8 +1,8 @@
 """Directions in which two B-rep bodies may come apart where they meet: the normals of the faces there.
 
-At a point of a face that is its normal, of an edge, or on the border of a face, those of its two faces, of a vertex
-those of all faces around it; of g they are turned back. Where one direction leads into all of these faces at once, the
-solids overlap there.
+At a point of a face that is the face's normal; at a point of an edge, or of a face on its boundary, those of both
+faces there; at a vertex those of all faces around it. Normals of g are reversed. Where one direction leads into all of
+these faces at once, the solids overlap there.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from assembly.proximity.brep.records import (
 from assembly.proximity.extrema.crossing import tangents
 from assembly.proximity.extrema.feature_jets import edge_jet
 
-# Room for ways; cosine of the angle below which two are one.
+# The most directions kept; the cosine above which two of them count as one.
 WAYS, ALIKE = 32, 1.0 - 1e-9
-# A point of a face this near to its border, in parts of the size, is on it.
+# A point of a face nearer to its boundary than this part of the size is on it.
 BORDER = 1e-9
-# A direction leads into a face that leans from its normal by a cosine below minus this.
+# A direction leads into a face if its cosine with the face's outward normal is below minus this.
 INTO = 0.05
 
 
@@ -65,7 +65,7 @@ def sum_of(ways, count):
 
 @kernel(inner=True)
 def add_way(n, ways, count):
-    """Add a direction, if it is one and not among the ways yet; how many there are then."""
+    """Add a direction, unless it is zero or known, or memory is full. Returns how many there are then."""
     n = unit(n)
     if count == ways.shape[0] or not dot(n, n) > 0.5:
         return count
@@ -147,7 +147,7 @@ def add_end_ways(store, shell, at, turn, side, size, ways, count):
 
 @kernel(inner=True)
 def is_open(table, shell):
-    """Whether a shell has edges of one face: it has no inside."""
+    """Whether a body has edges with one face only, so that it has no inside."""
     solid = shell_at(table, shell)
     for k in range(solid.edges):
         if edge_at(table, solid.edge_table + EDGE_RECORD * k).face_b < 0:
@@ -159,7 +159,7 @@ def is_open(table, shell):
 def overlap_at(store, shells, turn, codes, x, size, ways):
     """Whether solids that meet at x of features f and g have insides in common there, as where faces are flush.
 
-    One direction is tried, against the sum of all normals. False is not certain, nor of what overlaps elsewhere.
+    Only the direction against the sum of all normals is tried: False proves nothing, nor does it tell of other places.
     """
     if is_open(store.table, shells[0]) or is_open(store.table, shells[1]):
         return False

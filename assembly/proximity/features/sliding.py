@@ -1,8 +1,8 @@
-"""Pairs of faces that are straight along each other and come to lean: down the slope, to the border that ends it.
+"""Pairs of faces that are straight along each other and begin to tilt: down the slope, to the boundary that ends it.
 
-Flat faces that lie parallel are nearest all over, and a face and a cylinder along a line; Newton's method has no step
-there once they lean. The height of g over the tangent plane of f falls along the way w that is the part of g's normal m
-along f, over m.n: all of it, if both are flat, or as much of it as goes along the valley.
+Parallel flat faces are nearest all over, and a flat face and a cylinder along a line; once they tilt, Newton's method
+has no step there. The height of g over the tangent plane of f falls along w, the tangential part of g's normal m over
+m.n: all of w if both are flat, otherwise its component along the valley.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from assembly.proximity.extrema.face_face import own_frame, pair_frame
 from assembly.proximity.extrema.feature_jets import edge_jet
 from assembly.proximity.extrema.pair_matrix import null_ways, pair_matrix
 
-# Relative curvature, over the size, below which faces are straight along each other; a slope that is none; the way,
-# over the size, that leads beyond every border.
+# Relative curvature, in 1 / size, below which faces are straight along each other; the slope below which there is none;
+# a distance, in sizes, that leads beyond every boundary.
 STRAIGHT, LEVEL, FAR = 1e-9, 1e-12, 1e3
 
 
 @kernel(inner=True)
 def border_ahead(store, shell, code, at, move, pose, way):
-    """The edge of a face at which parameters leave it that go far beyond its border.
+    """The edge of a face through which a motion of its parameters, far beyond its boundary, leaves it.
 
     `at` are (u, v), `move` what is added to them, `pose` how the body is turned and shifted.
 
     Returns
     -------
-    code, (t, 0), and how far that is along a unit way; infinitely far where the face has no border.
+    code, (t, 0), and how far that is along a unit way; infinitely far where the face has no boundary.
     """
     solid = shell_at(store.table, shell)
     if face_at(store.table, solid.face_table + FACE_RECORD * code).trim < 0:
@@ -49,9 +49,9 @@ def border_ahead(store, shell, code, at, move, pose, way):
 
 @kernel(inner=True)
 def slide_off(store, shells, pose, codes, x, size):
-    """Two faces that are straight along each other and lean: on to the border that ends the way down.
+    """Slide two faces that are straight along each other and tilted down the slope, to the boundary that ends it.
 
-    Returns whether there is such a way, the two features then, and the coordinates.
+    Returns whether there is such a boundary, the two features then, and the coordinates.
     """
     f = feature_at(store.table, shells[0], codes[0])
     g = feature_at(store.table, shells[1], codes[1])
@@ -77,7 +77,7 @@ def slide_off(store, shells, pose, codes, x, size):
     way = blend(wx / slope, tx, wy / slope, ty)
     wx *= FAR * size / slope
     wy *= FAR * size / slope
-    # Parameters of a flat face go with lengths, and those along a valley do.
+    # Parameters are linear in length on a flat face, and along a valley.
     on_f = (e[0] * wx + e[1] * wy, e[2] * wy)
     on_g = (t[0] * wx + t[1] * wy, t[2] * wx + t[3] * wy)
     edge_f, at_f, way_f = border_ahead(store, shells[0], codes[0], (x[0], x[1]), on_f, IDENTITY, way)

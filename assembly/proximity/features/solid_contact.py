@@ -1,6 +1,6 @@
 """A contact of two solids as a solve tracks it: the pair of features that is closest, its coordinates, its normal.
 
-A vertex contact, which need not be the closest one (`proximity/manager/vertex_contacts.py`), has its features for good.
+A vertex contact, which need not be the closest one (`proximity/manager/vertex_contacts.py`), keeps its features.
 
 The kernels here are large, and few scenes need them: loops call them by address (`_address.call_address`).
 """
@@ -33,7 +33,7 @@ TRACKED_PAIR = record_dtype(
     gap=1,  # signed distance [over the size of the scene]
     stays=1,  # what the pair stays with: a vertex contact need not be the closest one (`manager/vertex_contacts.py`)
     idle=1,  # of the end of a step: 1: its row stays open there for certain (`solve/loop/predict.py`)
-    allowed=1,  # its gap may be less than the least one by this, because it was where the solve began
+    allowed=1,  # by how much its gap may be below the least one, as it was where the solve began
     facing=1,  # of a pair of surfaces: 1: their outward normals oppose each other, -1: they agree, 0: not known yet
 )
 tracked_at = record_view(TRACKED_PAIR)
@@ -46,7 +46,7 @@ ALLOWED = place_of(TRACKED_PAIR, "allowed")
 FACING = place_of(TRACKED_PAIR, "facing")
 TRACK = size_of(TRACKED_PAIR)
 CONTACT_RECORD = RECORD + 3
-# The record of derivatives of a contact (`extrema/rates.py`), and what is behind it.
+# The record of derivatives of a contact (`extrema/rates.py`), and what follows it.
 CONTACT_DERIVATIVES = record_dtype(
     "f8",
     derivatives=RECORD,  # GAP_DERIVATIVES
@@ -56,7 +56,7 @@ CONTACT_DERIVATIVES = record_dtype(
 )
 contact_record_at = record_view(CONTACT_DERIVATIVES)
 SLACK = place_of(CONTACT_DERIVATIVES, "slack")
-# What `proper` is, beside 1 and 0, where the surfaces are equally near all around: then no point is that of a minimum.
+# The value of `proper` where the surfaces are equally near all around, so that no point is an isolated minimum.
 CONFORMING = 2.0
 
 
@@ -108,8 +108,8 @@ def track_contact(store, shells, pose, start, r, patience):
 def track_solids(store, shells, bodies, q, patience, rows, r):
     """Newton and switching from tracked values; fills record and tracked values. Returns the status.
 
-    Both bodies stand as q says; no step turns a normal by more than `patience`. `rows` are the tracked values to start
-    from, the records and the tracked values, of all of which row r is the pair's.
+    The poses of both bodies are in q; no step turns a normal by more than `patience` [rad]. `rows` are the tracked
+    values to start from, the records and the tracked values to fill; row r of each is the pair's.
     """
     table, pool = store
     start, records, tracked = rows
@@ -132,7 +132,7 @@ def track_solids(store, shells, bodies, q, patience, rows, r):
     allocates=True,
 )
 def search_solids(store, shells, bodies, q, searches, tracked, r):
-    """The closest features wherever they are, into tracked[r]. Returns 1, or 0 where there are none.
+    """Search for the closest features globally, and write them into tracked[r]. Returns 1, or 0 where there are none.
 
     `searches` are the addresses of `nearest_query.find_nearest` and `find_deepest`, the latter 0 where it is not
     wanted: then solids that cross have no pair.

@@ -9,7 +9,8 @@ contact normal from f towards g,
 
 and the same for g with -n. Where a condition fails, the feature it names takes over, and Newton's method goes on from
 the same point. The normal decides, not the distance, so that the conditions hold through touching and penetration too.
-Leaving an edge or a vertex asks for more than rounding, entering one does not: a pair on the border stays where it is.
+An edge or a vertex is left only where a condition fails by more than rounding, but entered at once: a pair between two
+features stays where it is.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ from assembly.proximity.extrema.face_face import LEFT_PATCH, NOT_CONVERGED, own_
 from assembly.proximity.extrema.feature_pair import solve_features
 from assembly.proximity.features.sliding import slide_off
 
-# Switches in a row that no motion of a pair needs.
+# The most switches in a row: no motion of a pair needs as many.
 ROUNDS = 64
 # Cosine between the normals before and after below which the pair is another one.
 ACROSS = 0.3
@@ -172,8 +173,8 @@ def track_features(store, shells, pose, codes, x, n, size, turn):
     """Newton's method on a pair of features, and switching until no other feature beside them is closer.
 
     Poses, `size` and `turn` as in `solve_pair`: g relative to f, everything in the axes of f. `n` is a normal near the
-    pair's, from f towards g, zero where unknown. Where features switch, `turn` bounds the way from feature to feature
-    no more; the normal at the end must not be across the one at the start, which would be the far side's.
+    pair's, from f towards g, zero where unknown. After a switch `turn` no longer bounds the steps;
+    instead the last normal must not be across the first one, as it would be on the far side.
 
     Returns a `FeatureTrack`: CONVERGED or SINGULAR where the pair is the closest one of its neighborhood, and neither
     solid is inside the other there.

@@ -4,8 +4,8 @@ With the projection c of u on the loop, n the unit normal there towards material
 
     s = n.(u - c),   s_u = n,   s_uu = -k / (1 - k s) (I - n n^T):
 
-the motion of the projection drops out of the gradient. Where the projection is a corner, s_uu = (I - n n^T) / s, as of
-a point.
+the motion of the projection drops out of the gradient. Where the projection is a corner, s_uu = (I - n n^T) / s, as for
+the distance from a point.
 """
 
 from __future__ import annotations

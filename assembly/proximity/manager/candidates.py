@@ -1,9 +1,7 @@
-"""Pairs of patches of two bodies that face each other: which are within the query margin of an update, and how near
-they are.
+"""Candidate pairs: patches of two bodies that face each other within the query margin, and how near they are.
 
 They are found by a descent of both trees (`proximity/bvh/tree.py`), or sifted from a list of an earlier one
-(`neighbor_list.py`). Where many are near, only the nearest are looked into; a bound on the others tells how far bodies
-may go.
+(`neighbor_list.py`). Where many are near, only the nearest are searched; a bound on the others limits the motion bound.
 """
 
 from __future__ import annotations
@@ -30,7 +28,7 @@ def element_ball(store, tree, e):
 
 @kernel(inline=True)
 def along_normal(f, g, axis_g, apart, n):
-    """How far a patch g is from a patch f along a unit normal n from f to g: their middles, and how thick they are.
+    """How far apart two patches are along a unit normal n from f to g: their middles' distance, and their thickness.
 
     A patch leaves its plane by no more than its radius times the sine of the angle by which its normals turn.
     """
@@ -45,8 +43,8 @@ def along_normal(f, g, axis_g, apart, n):
 def element_distance(posed, view, e, d):
     """About the least distance of two elements: that of their boxes, or along a normal of theirs.
 
-    Where they are in the wrong order along one by more than they are thick, the bodies are in each other, or these are
-    far sides: -inf. The normals are those of their middles, and the mean: a large flat patch is thin along its own.
+    It is -inf where g is behind f along one of them by more than their thickness: then the bodies cross, or these are
+    far sides. The normals are those of their middles, and the mean: a large flat patch is thin along its own.
     """
     f, g = node_of(posed.store, posed.trees[0], e), node_of(posed.store, posed.trees[1], d)
     seen = seen_from(view, g)
@@ -102,9 +100,9 @@ def candidate_pairs(manager, p, posed, moving, margin, stack, pairs):
 
 @kernel(inner=True)
 def near_enough(posed, least, margin, curved_bound, candidates):
-    """A distance within which so few of the pairs of patches are that each can be looked into; fills their distances.
+    """A distance within which few enough pairs of patches are that each can be searched; fills their distances.
 
-    What is within a part of the curvature-limited motion bound, or in the wrong order, is looked into in any case.
+    Pairs within a part of the curvature-limited motion bound, or in the wrong order, are searched in any case.
     """
     pairs, distances = candidates.pairs, candidates.distances
     view = view_of(posed.pose)

@@ -1,12 +1,12 @@
-"""What is known of two centerlines over a box, lengths s and t along a part of either.
+"""What is known of the distance of two centerlines over a box: intervals of the lengths s and t along a part of either.
 
 Two wires touch where the distance of their centerlines has a minimum: with d = g(t) - f(s) and F = |d|^2 / 2,
 
     F_s = -d.f',   F_t = d.g',   F_ss = 1 - d.f'',   F_st = -f'.g',   F_tt = 1 + d.g''
 
-(f', g' unit tangents, f'', g'' the curvature vectors). From the middle of a box, half widths h and k, these go no
-farther than pieces of constant curvature let them. So a box may be told to hold no point of F's slope zero, to hold one
-minimum at most (F convex), or none (F'' indefinite); and after which motion that may no longer be so.
+(f', g' unit tangents, f'', g'' the curvature vectors). Over a box of half widths h and k these differ from their
+values in the middle by no more than parts of constant curvature allow. So a box can be proven to hold no stationary
+point of F, one minimum at most (F convex), or none (F'' indefinite); and up to which motion that holds.
 
 A motion by m moves no point of one centerline by more than m, seen from the other, and turns its tangents by no more
 than m / rho.
@@ -36,9 +36,9 @@ PosedParts = namedtuple("PosedParts", "pool f g pose")
 Difference = namedtuple("Difference", "d tangent_f curvature_f tangent_g curvature_g")
 # The least and the largest of F_ss, F_tt and |F_st| over a box.
 Hessian = namedtuple("Hessian", "ss_low ss_high tt_low tt_high st_low st_high")
-# What a box is: nothing is known, no slope zero in it, F convex over it, F'' indefinite over it.
+# What a box is: nothing known, no stationary point in it, F convex over it, F'' indefinite over it.
 UNKNOWN, EMPTY, CONVEX, BARREN = 0, 1, 2, 3
-# Slopes, lengths and F'' are off by less; what is so near zero may be zero.
+# Rounding errors of slopes, lengths and F'' are below this; a value so near to zero may be zero.
 BOX_ROUNDING = 1e-13
 # Contacts of lines more parallel than this, in radians, stay where they are as the lines turn.
 PARALLEL = 1e-5
@@ -77,15 +77,15 @@ def difference_at(parts, s, t):
 
 @kernel(inline=True)
 def shape_of(hessian, kf, kg, rho, straight, is_open):
-    """Whether F is CONVEX or BARREN over a box, or UNKNOWN, by the ranges of F_ss, F_tt and |F_st|; for how long.
+    """Whether F is CONVEX or BARREN over a box, or UNKNOWN, by the ranges of F_ss, F_tt and |F_st|; up to which motion.
 
     A motion by m changes them by kf m, kg m and m / rho. A free end may have a minimum where F'' is indefinite.
     """
     ss_low, ss_high, tt_low, tt_high = hessian.ss_low, hessian.ss_high, hessian.tt_low, hessian.tt_high
     st_low, st_high = hessian.st_low, hessian.st_high
     if straight:
-        # F is convex wherever two lines are. Where these are all but parallel a motion takes its minimum anywhere, and
-        # a contact does not follow there.
+        # For two lines F is convex everywhere. Where they are all but parallel, a motion may take its minimum anywhere,
+        # and a contact does not follow there.
         sine = math.sqrt(max(1.0 - st_high * st_high, 0.0))
         return CONVEX, max(sine - PARALLEL, 0.0) * rho
     longest = TURNS * rho
@@ -99,14 +99,14 @@ def shape_of(hessian, kf, kg, rho, straight, is_open):
             return BARREN, min(max(-ss_high / (kf + 1e-300), -tt_high / (kg + 1e-300)), longest)
         det = st_low * st_low - ss_high * tt_high
         if det > BOX_ROUNDING:
-            # Entries that grow as they may: (ss + kf m) (tt + kg m) < (st - m / rho)^2.
+            # With the largest change of each entry: (ss + kf m) (tt + kg m) < (st - m / rho)^2.
             return BARREN, min(det / (kf * tt_high + kg * ss_high + kf * kg * longest + 2.0 * st_low / rho), longest)
     return UNKNOWN, 0.0
 
 
 @kernel(inline=True)
 def beyond(slope, hessian, error, rate, h, k):
-    """How long no point of slope zero is within h and k of the middle; not positive where one may be.
+    """The motion up to which no stationary point is within h and k of the middle; not positive where one may be.
 
     By F'' at the middle: x = -F''^-1 (F' + e), where e is no longer than `error` in either component, and a motion by m
     adds m times `rate`.
@@ -121,10 +121,9 @@ def beyond(slope, hessian, error, rate, h, k):
 
 @kernel(inline=True)
 def beyond_joints(part, low, high, d, sign, slack, least, bend):
-    """The least of F_ss (sign -1) or F_tt (1) over a box and what is just beyond joints at its borders, by curvature
-    vectors that d in the axes of the part is multiplied by.
+    """The least of F_ss (sign -1) or F_tt (1) over a box and just beyond joints at its borders; the largest curvature.
 
-    And the largest curvature there; -1 where no curvature jumps.
+    d, in the axes of the part, multiplies the curvature vectors. The largest curvature is -1 where none jumps.
     """
     sharpest = -1.0
     half = part.half
@@ -140,10 +139,10 @@ def beyond_joints(part, low, high, d, sign, slack, least, bend):
 
 @kernel(inline=True)
 def box_of(parts, box, open_ends, reach, rho):
-    """What a box, Lengths, of two parts is.
+    """Classify a box (`Lengths`) of two parts.
 
-    One that is beyond the reach is EMPTY, for longer than that. `open_ends` are where F_s, and F_t, may have any value
-    >= 0, and <= 0: whether the box is at a free end of f where it starts, or ends, and so of g.
+    One whose centerlines are farther apart than `reach` is EMPTY. `open_ends`: whether the box is at the free start or
+    end of f, or of g; there a minimum may have any slope >= 0 at a start, <= 0 at an end.
 
     Returns
     -------
@@ -177,7 +176,7 @@ def box_of(parts, box, open_ends, reach, rho):
     tt_low, tt_high = tt - vary_tt, tt + vary_tt
     st_low, st_high = max(abs(st) - vary_st, 0.0), min(abs(st) + vary_st, 1.0)
     hessian = Hessian(ss_low, ss_high, tt_low, tt_high, st_low, st_high)
-    # Slopes: where a free end lets one of any value of a sign be a minimum's, only the other sign excludes.
+    # Where a minimum at a free end may have any slope of one sign, only a slope of the other sign excludes one.
     slope = abs(a) - h * max(ss_high, -ss_low) - k * st_high - BOX_ROUNDING
     if (open_ends.start_f and a > 0.0) or (open_ends.end_f and a < 0.0):
         slope = -1.0
@@ -196,16 +195,16 @@ def box_of(parts, box, open_ends, reach, rho):
         error = (vary_ss * h + vary_st * k, vary_st * h + vary_tt * k)
         slope = max(slope, beyond((a, b), (ss, tt, st), error, first, h, k))
     if slope > 0.0:
-        # What comes into it from beside it is known there; it bears none while F keeps its shape.
+        # A minimum that enters the box is known in the box it comes from; none appears while F keeps its shape.
         return least, EMPTY, max(slope, margin)
     return least, what, margin
 
 
 @kernel(inline=True)
 def convex_beyond(parts, box, d, hessian, sway, rho):
-    """For how long F is convex just beyond a box over which it is, by its Hessian; infinite without joints.
+    """The motion up to which F is convex just beyond a box over which it is convex; infinite without joints.
 
-    Where the curvature jumps at a border of the box a minimum may be born and run into it, if F is not convex beyond.
+    Where the curvature jumps at a border of the box, a minimum may appear there and enter it if F is not convex beyond.
     """
     part_f, part_g = centerline_part_at(parts.pool, parts.f), centerline_part_at(parts.pool, parts.g)
     slack = 0.5 * (box.to_f - box.from_f) + 0.5 * (box.to_g - box.from_g)

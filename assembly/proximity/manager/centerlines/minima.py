@@ -6,7 +6,7 @@ F_t = 0 and F_tt > 0,
 
     phi(s) = F(s, t(s)),   phi' = F_s,   phi'' = F_ss - F_st^2 / F_tt,
 
-and minima are where phi' goes from below zero to above. However level the valley is, that is a sign.
+and minima are where phi' goes from below zero to above. That is a change of sign, however level the valley is.
 """
 
 from __future__ import annotations
@@ -24,32 +24,33 @@ STEPS, PROJECTIONS = 30, 13
 # Slopes of the distance below this count as zero at the borders of a box: the next box has the same point. Those of F
 # below the second are rounding.
 LEVEL, ROUNDED_SLOPE = 1e-10, 1e-16
-# A valley with no more slope than this at both ends is level: rounding tells where it has minima.
+# A valley with no more slope than this at both ends is level: there rounding decides where minima are.
 NOISE = 1e-14
-# A projection is one where a step toward it would be shorter than this; one that lowers F by less of it is rounding.
+# A projection has converged where the next step is shorter than the first; a step that lowers F by less than the
+# second, relative to F, is rounding.
 SHORT, PROMISE = 1e-12, 1e-15
 # Two PosedParts of which one is followed: side 0 if that is f, 1 g.
 Course = namedtuple("Course", "parts side")
 # F, its slopes on both centerlines and its second derivatives: x along the followed one, y along the other one.
 Slopes = namedtuple("Slopes", "merit x y xx yy xy")
 BoxQuery = namedtuple("BoxQuery", "course box")
-# The projection of x on the other centerline. A course with projections that are found from y on, or are `held` there.
-# A course whose projections come to an `end` of the other centerline; sense: -1 where F_y falls there.
+# Queries: for the projection of x on the other centerline; for the projections of a course, found from y on or `held`
+# at y; for where the projections of a course reach an `end` of the other centerline (sense: -1 where F_y falls there).
 FootQuery = namedtuple("FootQuery", "course x")
 CourseQuery = namedtuple("CourseQuery", "course held y")
 KinkQuery = namedtuple("KinkQuery", "course end sense")
 # phi' and phi'', the projection, and whether it is one. F_y at an end and its rate.
 Projected = namedtuple("Projected", "slope curvature foot found")
 SlopeAtEnd = namedtuple("SlopeAtEnd", "slope curvature")
-# Room for the minima of a thin box: both ends, and three in each of the pieces between these and two kinks.
+# Memory for the minima of a thin box: both ends, and three in each of the pieces between these and two kinks.
 MINIMA = 11
 
 
 @kernel(inline=True)
 def is_least(slope, far, at_ends):
-    """Whether a slope of F is that of a minimum: zero, or upward from a free end where it starts, or is reached.
+    """Whether a slope of F is that of a minimum: zero, positive at a free start, or negative at a free end.
 
-    F is the square of the distance, which is `far`: its own slope is as many times less.
+    `far` is the distance: the slope of F is that many times the slope of the distance.
     """
     return abs(slope) <= max(LEVEL * far, ROUNDED_SLOPE) or (at_ends[0] and slope > 0.0) or (at_ends[1] and slope < 0.0)
 
@@ -92,7 +93,7 @@ def _step_in_box(query, place, at):
         y = 0.0 if hold_t else -b / tt
     else:
         det = ss * tt - st * st
-        # Lines that are parallel as far as rounding tells: across the valley only.
+        # Lines that are parallel to rounding: the step goes across the valley only.
         i = 1.0 / det if det > 1e-14 else 0.0
         x = i * (st * b - tt * a) if i > 0.0 else 0.5 * (-a)
         y = i * (st * a - ss * b) if i > 0.0 else 0.5 * (-b)
@@ -111,11 +112,10 @@ _least_in_box = kernel(inner=True)(damped_newton(_slopes_in_box, _step_in_box, _
 
 @kernel(inner=True)
 def convex_minimum(parts, box, open_ends, s, t):
-    """The minimum of F over a box where it is convex, from (s, t): whether it is one of the curves; s, t; whether it is
-    the minimum over the box.
+    """The minimum of F over a box where F is convex, by Newton's method from (s, t).
 
-    It is none of the curves where the box alone ends it. Along a valley that is all but level steps may end before its
-    bottom.
+    Returns whether it is a minimum of the curves, not only of the box; s, t; and whether it is the minimum over the
+    box: along a valley that is all but level, steps may end before its bottom.
     """
     query = BoxQuery(Course(parts, 0), box)
     s, t = _least_in_box(query, (s, t))[2]
@@ -246,9 +246,9 @@ def piece_minima(course, held, left, right, y, ends, places, count):
 def near_singular_minima(parts, box, open_ends, places):
     """Minima of phi over a thin box: s and t of each into `places`, (MINIMA, 2).
 
-    That centerline is followed across which F is curved the most. Where projections come to a free end phi' has a kink.
-    Between kinks it may go through zero and back where it turns: over a thin box that is where the cubic does that has
-    its values and slopes at both ends.
+    The centerline is followed for which F is curved the most along the other one. Where projections reach a free end
+    phi' has a kink. Between kinks phi' may go through zero and back where it turns: over a thin box, where the cubic
+    with its values and slopes at both ends turns.
 
     Returns
     -------
@@ -292,7 +292,7 @@ def near_singular_minima(parts, box, open_ends, places):
             break
         x = new
         state += way
-    # What is beyond the box another one has.
+    # Minima beyond this box belong to another box.
     slack = 1e-6 * k
     kept = 0
     for m in range(count):
