@@ -1,11 +1,10 @@
 """Scattered bodies put together one after the other, so that the loop starts near where joints hold.
 
-Bodies are taken in an order (`constraints/packing/numbering.py`) in which each has joints with bodies that stand
-already. Each is moved by
-Levenberg and Marquardt's method until the rows it shares with those are as small as they get: exactly zero where the
-joints make a tree. Rows that close a loop are left to the loop of the solve. Where a driven angle stays far from its
-value, because it would have to go around the other way, the body is put where one of its joints holds, and then where
-all are as small as they get.
+Bodies are taken in an order (`constraints/packing/numbering.py`) in which each has joints with bodies that are already
+placed. Levenberg and Marquardt's method moves each body until the rows that it shares with those are as small as they
+get: exactly zero where the joints form a tree. Rows that close a kinematic loop are left to the solve. If a driven
+angle stays far from its value, because it would have to turn the other way around, the body is fitted to one of its
+joints alone, and from there to all of them.
 """
 
 from __future__ import annotations
