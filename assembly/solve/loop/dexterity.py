@@ -131,7 +131,7 @@ def end_effector_velocity(effector, v, out, column):
 
 @kernel(inner=True)
 def force_along(effector, w, column, i):
-    """Component i of T^T w, of the force or the moment on the end effector; w has a row a velocity that counts."""
+    """Component i of T^T w, of the force or the moment on the end effector; w has one row per velocity that counts."""
     if (effector.axes >> i) & 1 == 0:
         return 0.0
     return (effector.linear if i < 3 else effector.angular) * w[task_rows(effector.axes & ((1 << i) - 1)), column]
@@ -139,7 +139,7 @@ def force_along(effector, w, column, i):
 
 @kernel(inner=True)
 def force_and_moment(effector, w, column):
-    """Those of T^T w, on the end effector itself, with w a column over the velocities that count."""
+    """Force and moment of T^T w on the end effector itself, with w a column over the velocities that count."""
     force = (
         force_along(effector, w, column, 0),
         force_along(effector, w, column, 1),

@@ -26,7 +26,7 @@ WAY_RECORD = record_dtype(
     led_off=1,  # 1: the last step led farther off
     stills=1,  # whole steps in a row that changed nothing
     slow_steps=1,  # whole steps in a row that gained little
-    drags=1,  # steps of any length in a row that left what rows are off
+    drags=1,  # steps of any length in a row that left the violation as it was
     nearby=1,  # 1: steps that restore rows are no longer than a neighborhood
 )
 way_at = record_view(WAY_RECORD)
