@@ -68,7 +68,7 @@ def let_touch(table, current, touching):
 
 @kernel(inline=True)
 def goes_on_from_last(settings):
-    """Whether this is a tick, or a solve from a solution: it begins where the last one ended, with its pairs."""
+    """Whether this is a tick, or a solve from a solution: these begin at the end of the last one, with its pairs."""
     limits = settings_at(settings, 0)
     return limits.tick == 1.0 or limits.penalty <= limits.penalty_floor
 

@@ -5,9 +5,10 @@ With A and W the Jacobian and the weights (1 / mu) of the active rows at the pos
     (H + d I + A^T W A) dx = -(grad f + J^T y + A^T W c),        dy = W (A dx + c)
 
 is a step of the whole system of `augmented_lagrangian.py` with an older matrix (the chord method); the first one is the
-tangent predictor for changed values and targets. If the next step would not arrive, a factor is made anew, once. The
-iterate at which all holds is passed to the loop, which judges it as any other. If steps gain too little, an active row
-begins to pull, or a pair is near a fold, the loop begins at the start of the solve as if no step had been taken.
+tangent predictor for changed values and targets. If one more step would not reach the tolerances, the matrix is
+factorized anew, once. The iterate that reaches them is passed to the loop, which judges it as any other. If steps gain
+too little, an active row begins to pull, or a pair is near a fold, the loop begins at the start of the solve as if no
+step had been taken.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The time of a tick: when it is spent, and how the next tick goes on with what is not done.
+"""The time budget of a tick: when it is spent, and how the next tick continues unfinished work.
 
-A tick whose budget is spent where its pose does not hold, or where not everything that is near is known yet, leaves
-where it is (`CARRIED`): the tracker returns the last pose that held, and the next tick goes on from there. Each
-makes progress that lasts: a step of the loop, or the update of a pair of bodies.
+If the budget is spent while rows do not hold, or before every pair of bodies that is near was updated, the tick leaves
+its iterate to the next one (`CARRIED`), which continues from it; the tracker returns the last pose that held. Every
+tick makes progress that lasts: a step of the loop, or the update of a pair of bodies.
 """
 
 from __future__ import annotations

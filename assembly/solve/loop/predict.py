@@ -15,7 +15,7 @@ from assembly.solve.loop.residuals import times
 
 @kernel(inline=True)
 def longest_way(d, at, alpha, far):
-    """A bound of the motion along alpha d of a body's points that are not farther than `far` from its origin."""
+    """A bound on how far a body's points within a distance `far` of its origin move along alpha d."""
     if at < 0:
         return 0.0
     shift = math.sqrt(d[at] * d[at] + d[at + 1] * d[at + 1] + d[at + 2] * d[at + 2])

@@ -18,7 +18,7 @@ from assembly.solve.loop.violation import off_rows, off_tangency
 
 @kernel(inner=True)
 def log(history, iteration, figures):
-    """Write the figures of an iteration, if there is room for them."""
+    """Write the figures of an iteration, if the history has room for them."""
     if iteration < history.shape[0]:
         for k in range(HISTORY):
             history[iteration, k] = figures[k]

@@ -44,7 +44,7 @@ def first_unknown(table, body):
 
 @kernel(inner=True)
 def place_rows(table, free, bases, one_sided):
-    """Where each row's variables stand, and its side."""
+    """Write where each row's variables stand, and whether it is one-sided."""
     header = header_at(table, 0)
     for r in range(header.rows):
         row = header.row_table + ROW * r

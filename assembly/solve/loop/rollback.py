@@ -30,7 +30,7 @@ from assembly.solve.loop.workspace import rows_in
 def has_sunk(store, memory, residual):
     """Whether bodies overlap deeply, or without a contact that shows it.
 
-    For solids, rows lead out the way bodies came: corners stay on their faces.
+    For solids, rows lead bodies back out the way they came: corners stay on their faces.
     """
     header = header_at(store.table, 0)
     for k in range(header.clearance_rows):

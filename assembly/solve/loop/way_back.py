@@ -52,7 +52,7 @@ def way_back(program, current, trial, rows, system, progress, enough, tick):
 
 @kernel(inner=True)
 def begin_way(way):
-    """Rows have changed: what was counted of steps and violations is reset."""
+    """Reset the counts of steps and the least violation, because rows have changed."""
     progress = way_at(way, 0)
     progress.share = 1.0
     progress.lowest = math.inf

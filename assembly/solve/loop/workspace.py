@@ -63,7 +63,7 @@ def penalized(rows, mu):
 
 @kernel(inline=True, allocates=True)
 def new_rows(count, mu):
-    """Rows outside the loop, of which only the weights and the forces are asked for."""
+    """Newly allocated rows for use outside the loop, which needs only their weights and forces."""
     vectors = np.zeros((5, count))
     return Rows(count, mu, vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors)
 
@@ -186,7 +186,7 @@ def carve_unknowns(n, lifted, order, room):
 
 @kernel(inline=True)
 def carve_all(store, memory, end_effectors, doubles, integers):
-    """All that a solve works in, as `workspace_needed` counts it; rows and unknowns are those without lifted pairs."""
+    """Carve all that a solve works in, as `workspace_needed` counts it; rows and unknowns exclude lifted pairs."""
     table = store.table
     header = header_at(table, 0)
     pairs = header.contacts

@@ -1,4 +1,4 @@
-"""Rows of a batch, one solve after the other, without the interpreter."""
+"""Solve rows of a batch one after the other, without the interpreter."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ def closing_slopes(kind, component, frame_a, frame_b, record):
 
 @kernel(inline=True)
 def rate_of(record, place, column, body_moves, sign):
-    """The rate of a row for a unit rate of a coordinate that moves one of its bodies; `place`: the row's point there."""
+    """The rate of a row for a unit rate of a coordinate that moves one of its bodies; `place`: its point there."""
     if body_moves == 0:
         return 0.0
     turn = (column[6], column[7], column[8])
