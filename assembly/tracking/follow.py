@@ -45,8 +45,8 @@ from assembly.solve.loop.clearances import place_clearance_rows, update_around
 from assembly.solve.loop.contacts import is_near_fold
 from assembly.solve.loop.workspace import Rows
 
-# A correction by more than this part of the prediction, plus this part of the surface's domain, may have led to another
-# extremum; so may one as near as this to a fold (det H over |H|^2), where other extrema appear.
+# A contact may have come to another extremum if it is corrected by more than this part of the prediction plus this part
+# of the surface's domain, or if it is as near as this to a fold (det H over |H|^2), where other extrema appear.
 ASTRAY, SLACK, NEAR_FOLD = 0.5, 1e-3, 1e-3
 # How far the length of a quaternion may be from one.
 QUATERNION_SLACK = 1e-2

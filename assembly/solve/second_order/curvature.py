@@ -1,4 +1,4 @@
-"""Second derivatives of a scene at a state, and nearby poses at which rows hold: they tell what kind of end it is.
+"""Second derivatives of a scene at a state, and nearby poses at which rows hold: ends of solves are judged by these.
 
 Unknowns are those of the loop: twists of the moving bodies in the order of their blocks, lengths over the scene's
 size, then four coordinates of every contact whose pair is at a fold. Rows are those of the program, then four of
