@@ -1,6 +1,6 @@
-"""Projections of points of an edge on its surface, moved to where two surfaces cross: for `projected`.
+"""Projections of points of an edge onto its surface, and points moved to where two surfaces cross: for `projected`.
 
-Each point is taken by itself, so that what comes of it does not depend on the points that it is asked for with.
+Each point is computed alone: its result does not depend on the other points of the same call.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from assembly._record import Store
 from assembly.geometry.splines.evaluate import into_domain, surface_at, surface_lanes, xyz
 from assembly.geometry.vec import add, blend, cross, dot, scale, sub
 
-# Most steps of a projection, of which each gains digits, and the last one over the size, which is rounding's.
+# Most steps of a projection, and the length of a step, relative to the domain or the size, that is only rounding.
 _STEPS, _LAST = 30, 1e-13
-# A step over the side of the domain from which a projection is lost.
+# A projection is lost if it takes a step longer than this part of the side of the domain.
 _LOST = 0.25
-# Sine of the angle between two surfaces at which two thirds of the way to their intersection are gone; from 2.5 times
-# as much on all of it. No edge is moved by more than some 7 times what it is off.
+# At this sine of the angle between two surfaces a point is moved two thirds of the way to their intersection; from 2.5
+# times as much on, all of the way. No edge is moved by more than some 7 times what it is off.
 _CROSSING = 0.1
-# Parts of the way that are none.
+# A part of the way as small as this counts as none.
 _TANGENT = 1e-9
 # Least eigenvalue, relative, with which an intersection is solved for; the surfaces of smaller ones count as tangent.
 _DAMPED = 1e-6
 
-# A surface: as `NurbsSurface` has its tables, and its size [length].
+# A surface: its table and pool as in `NurbsSurface`, and its size [length].
 Ground = namedtuple("Ground", "table pool size")
 # Gauss-Newton's step toward a point's projection, how far above the surface the point is, and the unit normal there.
 _Approach = namedtuple("_Approach", "du dv height normal")
@@ -90,14 +90,14 @@ def _moved(ground, u, v, step):
 
 @kernel(inner=True)
 def _foot(ground, u, v, point):
-    """Parameters of the nearest point on the surface, and whether steps came to an end."""
+    """Parameters of the nearest point on the surface, and whether the steps converged."""
     (u0, u1), (v0, v1) = _ends(ground)
     far, before = np.inf, np.inf
     for _ in range(_STEPS):
         new_u, new_v = _moved(ground, u, v, _approach(ground, u, v, point))
         far = max(abs(new_u - u) / (u1 - u0), abs(new_v - v) / (v1 - v0))
         u, v = new_u, new_v
-        # The last steps are rounding's, whatever the coordinates.
+        # The last steps are rounding, whatever the coordinates are.
         if far <= _LAST or not far <= _LOST or (far <= 1e3 * _LAST and far >= 0.5 * before):
             break
         before = far
@@ -106,7 +106,7 @@ def _foot(ground, u, v, point):
 
 @kernel(inner=True)
 def _between(own, there, point, places):
-    """A point moved to both surfaces from parameters (u, v) on either, as far as these cross."""
+    """The point moved onto both surfaces, from parameters on each; all of the way only where they clearly cross."""
     u, v, s, t = places
     found = point
     share = 0.0
@@ -135,7 +135,7 @@ def _between(own, there, point, places):
 
 @kernel(signatures="(Tuple((i8[::1], f8[::1], f8)), f8[:, ::1], f8[:, ::1])")
 def move_to_feet(surface, points, places):
-    """Move parameters, a row each, to the nearest points of a surface; False where steps do not come to an end."""
+    """Move parameters, one row per point, to the nearest points of a surface; False if steps do not converge."""
     ground = Ground(surface[0], surface[1], surface[2])
     for k in range(points.shape[0]):
         u, v, ends = _foot(ground, places[k, 0], places[k, 1], (points[k, 0], points[k, 1], points[k, 2]))
@@ -147,14 +147,14 @@ def move_to_feet(surface, points, places):
 
 @kernel(signatures="(Tuple((i8[::1], f8[::1], f8)), Tuple((i8[::1], f8[::1], f8)), f8[:, ::1], f8[:, ::1])")
 def move_between(surface, beyond, points, places):
-    """Move points to where two surfaces cross, as far as they do.
+    """Move points to where two surfaces cross; points stay where the surfaces are tangent.
 
     Parameters
     ----------
     surface, beyond
         Each as table, pool and size.
     points : (n, 3)
-        Changed.
+        Changed in place.
     places : (n, 4)
         Parameters of both surfaces near each point.
     """

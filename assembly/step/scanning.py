@@ -1,8 +1,8 @@
-"""Whether a STEP file's text is surely whole, in one pass: what `syntax.first_fault` finds no fault in.
+"""Test in one pass whether a STEP file's text is certainly whole: `syntax.first_fault` would find no fault in it.
 
-Taken is less than that takes: what is not is looked at again there, by regular expressions that can say where and what
-is wrong. Functions move over a text, bytes with a few zeros behind them, from a place to the next; -1 stands for a text
-that is not taken.
+The test accepts less than `first_fault` does. A text that it rejects is examined again there, by regular expressions
+that can say where and what is wrong. Functions advance over a text, bytes followed by a few zeros, from one position to
+the next; -1 stands for a text that is rejected.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from assembly._kernel import kernel
 
-# Zeros behind a text: so far is looked ahead.
+# Zeros after a text: functions look ahead no farther than this.
 PADDING = 32
 _APOSTROPHE, _QUOTE, _HASH, _EQUALS, _SEMICOLON = (ord(mark) for mark in "'\"#=;")
 _OPEN, _CLOSE, _COMMA, _DOT, _SLASH, _STAR, _DOLLAR = (ord(mark) for mark in "(),./*$")
@@ -23,7 +23,7 @@ _SPACE, _TAB, _LINE, _RETURN = (ord(mark) for mark in " \t\n\r")
 _END = np.frombuffer(b"END-ISO-10303-21;", np.uint8).copy()
 _DIGITS = 9
 
-# What is collected of references: which statement has a number; which statement each is in, and its number.
+# References: the statement that has a number; for every reference, the statement that it is in, and its number.
 References = namedtuple("References", "statement owner number")
 
 
@@ -39,7 +39,7 @@ def _is_letter(c):
 
 @kernel(inner=True)
 def _after_blank(text, at, end):
-    """Behind white space, zeros and comments."""
+    """The position after white space, zeros and comments."""
     while at < end:
         c = text[at]
         if c == 0 or c == _SPACE or _TAB <= c <= _RETURN:
@@ -58,7 +58,7 @@ def _after_blank(text, at, end):
 
 @kernel(inner=True)
 def _after_string(text, at, end):
-    """Behind a string, which ends at an apostrophe before a comma or a parenthesis."""
+    """The position after a string, which ends at an apostrophe before a comma or a parenthesis."""
     at += 1
     while at < end:
         if text[at] == _APOSTROPHE:
@@ -80,7 +80,7 @@ def _after_digits(text, at):
 
 @kernel(inner=True)
 def _after_real(text, at):
-    """Behind a number; an exponent needs a point before it."""
+    """The position after a number; an exponent needs a point before it."""
     if text[at] == _PLUS or text[at] == _MINUS:
         at += 1
     whole = _after_digits(text, at)
@@ -101,7 +101,7 @@ def _after_real(text, at):
 
 @kernel(inner=True)
 def _after_name(text, at):
-    """Behind a keyword; where it began if there is none."""
+    """The position after a keyword; the same position if there is none."""
     k = at + 1 if text[at] == _BANG else at
     if not _is_letter(text[k]):
         return at
@@ -112,7 +112,7 @@ def _after_name(text, at):
 
 @kernel(inner=True)
 def _after_value(text, at, end):
-    """Behind a value that is no reference."""
+    """The position after a value that is no reference."""
     c = text[at]
     if c == _APOSTROPHE:
         return _after_string(text, at, end)
@@ -131,7 +131,7 @@ def _after_value(text, at, end):
 
 @kernel(inner=True)
 def _number(text, at):
-    """The number behind a hash, and the place behind that; -1 for a long one."""
+    """The number after a hash, and the position after it; the number is -1 if it has no digits or too many."""
     stop = _after_digits(text, at + 1)
     if not 1 <= stop - at - 1 <= _DIGITS:
         return -1, stop
@@ -143,7 +143,7 @@ def _number(text, at):
 
 @kernel(inner=True)
 def _after_items(text, at, end, references, counts):
-    """Behind the items of a statement, its parentheses all closed. counts: of statements and of references so far."""
+    """The position after the items of a statement, all parentheses closed. `counts`: statements, references so far."""
     depth = 0
     begin = at
     while at < end and text[at] != _SEMICOLON:
@@ -189,7 +189,7 @@ def _after_items(text, at, end, references, counts):
 
 @kernel(inner=True)
 def _after_statement(text, at, end, references, counts):
-    """Behind a statement that begins here."""
+    """The position after a statement that begins here."""
     if text[at] == _HASH:
         number, at = _number(text, at)
         while text[at] == _SPACE or text[at] == _TAB:
@@ -215,7 +215,7 @@ def _after_statement(text, at, end, references, counts):
 
 @kernel(inner=True, allocates=True)
 def _lead_on(references, statements, count):
-    """Whether every reference leads to a statement, and none back to its own."""
+    """Whether every reference leads to a statement, and no chain of references leads back to its own statement."""
     known = references.statement
     referred = np.zeros(statements, dtype=np.int64)
     first = np.zeros(statements + 1, dtype=np.int64)
@@ -225,7 +225,7 @@ def _lead_on(references, statements, count):
             return False
         referred[known[number]] += 1
         first[references.owner[k] + 1] += 1
-    # What nothing refers to is taken off until nothing is left. References are in the order of their statements.
+    # Statements that nothing refers to are removed until none is left. References are in the order of their statements.
     for s in range(statements):
         first[s + 1] += first[s]
     waiting = np.empty(statements, dtype=np.int64)
@@ -250,7 +250,7 @@ def _lead_on(references, statements, count):
 
 @kernel(signatures="(u1[::1],)", allocates=True)
 def is_whole(text):
-    """Whether all statements of a text have the form of one, up to its end, and its references lead to others."""
+    """Whether a text is a list of well-formed statements up to its end mark, and `_lead_on` accepts its references."""
     end = text.size - PADDING
     hashes = 0
     for k in range(end):

@@ -1,4 +1,4 @@
-"""Points of splines of files, in the parameters of our surfaces: tables filled and evaluated for `tracks`."""
+"""Points of the splines of a file, in the parameters of our surfaces: tables are filled and evaluated, for `tracks`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from assembly._kernel import kernel
 from assembly._record import Store
 from assembly.geometry.splines.evaluate import curve_lanes, spline_curve_at, xyz
 
-# Parts of half an arc below which a place is at an end of the arc.
+# A place nearer to an end of an arc than this part of half the arc is at that end.
 _AT_END = 1e-14
 # Most steps to a root; halving takes 53.
 _STEPS = 200
@@ -73,14 +73,14 @@ def fill_table(points, knots, powers, record, pool):
 
 @kernel(inner=True, exact=True)
 def _mapped(way, x):
-    """Our parameter of one of OCCT's, as `profiles.Turning` has it; `way` begins with 0 where it is kept."""
+    """Our parameter for one of OCCT's, as `profiles.Turning` has it; the same one if `way` begins with 0."""
     spans, low, high, radius = way[0], way[1], way[2], way[3]
     if spans == 0.0:
         return x
     step = (high - low) / spans
     k = math.floor((x - low) / step)
     s = math.tan(0.5 * (x - low - (k + 0.5) * step)) / math.tan(0.25 * step)
-    # The ends of an arc have one value, whichever arc they are computed from.
+    # An end that two arcs share has one value, whichever arc it is computed from.
     if s >= 1.0 - _AT_END:
         k += 1.0
     if abs(s) >= 1.0 - _AT_END:
@@ -102,9 +102,9 @@ def _point(record, pool, ways, t):
 
 @kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1])")
 def fill_points(record, pool, ways, t, out):
-    """Points at parameters of OCCT's, beyond the ends those of the ends.
+    """Points at parameters of OCCT's; parameters beyond an end of the curve give the point at that end.
 
-    `ways` (3, 4) are the maps of the parameter, of x and of y: the number of arcs, 0 where it is kept, the first and
+    `ways` (3, 4) are the maps of the parameter, of x and of y: the number of arcs (0: unchanged), the first and
     the last angle, and the length of a radian. `out` has two or three columns.
     """
     for k in range(t.size):
@@ -116,10 +116,10 @@ def fill_points(record, pool, ways, t, out):
 
 @kernel(signatures="(i8[::1], f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], f8[::1])")
 def find_crossings(record, pool, ways, axes, brackets, roots):
-    """Where coordinates of a curve take values, each between two places on either side: Chandrupatla's method.
+    """Parameters at which coordinates of a curve take given values, each in a bracket: Chandrupatla's method.
 
-    As `crossings` does for any function. `axes` tells the coordinates; a row of `brackets` is two parameters, what the
-    coordinate is above its value at these, and the value.
+    As `crossings` does for any function. `axes` says which coordinate (0: the first, 1: the second). A row of
+    `brackets` has two parameters, the coordinate minus the value at each of them, and the value.
     """
     for n in range(roots.size):
         x1, x2, f1, f2, wanted = brackets[n, 0], brackets[n, 1], brackets[n, 2], brackets[n, 3], brackets[n, 4]

@@ -1,4 +1,4 @@
-"""Nets of surfaces that turn about an axis, filled at once: for `surfaces`."""
+"""Control nets of surfaces of revolution, filled at once: for `surfaces`."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def fill_turned(profile, ring, origin, axis, near, net, weights):
     Parameters
     ----------
     profile : (n, 4)
-        Homogeneous.
+        Homogeneous control points.
     ring : (m, 3)
-        Of the arc of the unit circle that it turns by: cosine, sine, weight, homogeneous.
+        Homogeneous control points (cosine, sine, weight) of the arc of the unit circle that it turns by.
     origin, axis : (3,)
         A point of the axis, and its unit direction.
     near : float
-        Points of the profile that are nearer to the axis are on it: they are poles.
+        Points of the profile nearer to the axis than this are put on it: they become poles.
     net, weights : (m, n, 3), (m, n)
     """
     base, way = (origin[0], origin[1], origin[2]), (axis[0], axis[1], axis[2])

@@ -45,8 +45,8 @@ from assembly.solve.loop.clearances import place_clearance_rows, update_around
 from assembly.solve.loop.contacts import is_near_fold
 from assembly.solve.loop.workspace import Rows
 
-# A correction by more than this part of the prediction and of the surface's domain puts the root in doubt; so does a
-# root as near as this to a fold (det H over |H|^2), where others are born.
+# A contact may have come to another extremum if it is corrected by more than this part of the prediction plus this part
+# of the surface's domain, or if it is as near as this to a fold (det H over |H|^2), where other extrema appear.
 ASTRAY, SLACK, NEAR_FOLD = 0.5, 1e-3, 1e-3
 # How far the length of a quaternion may be from one.
 QUATERNION_SLACK = 1e-2
@@ -54,7 +54,7 @@ QUATERNION_SLACK = 1e-2
 
 @kernel(inner=True)
 def place_bodies(store, q, poses):
-    """Poses in the user's coordinates to scaled ones. Whether all are finite and the quaternions nearly unit."""
+    """Convert poses from the user's coordinates to scaled ones. Whether all are finite, quaternions nearly unit."""
     units = pool_header_at(store.pool, 0)
     for b in range(header_at(store.table, 0).bodies):
         square = 0.0
@@ -123,7 +123,7 @@ def part_of_domain(store, surface, u, v, s, t):
 
 @kernel(inner=True)
 def is_astray(store, r, before, guess, after):
-    """Whether a contact of two surfaces was corrected by so much that it may have come to another root."""
+    """Whether a contact of two surfaces was corrected by so much that it may have come to another extremum."""
     for side in range(2):
         i = 2 * side
         surface = surface_of(contact_of(store.table, r), side)
@@ -165,7 +165,7 @@ def make_due(table, memory, k):
 
 @kernel(inner=True)
 def doubt_twins(store, memory, k, records):
-    """Make a pair of bodies due where contact k came within the spheres of neglect of another one."""
+    """Make a pair of bodies due for an update where contact k is within the merge radius of another one of the pair."""
     header = header_at(store.table, 0)
     first = header.first_clearance_row
     places = memory_places(store.table, header.manager_record)[1]
@@ -185,12 +185,11 @@ def doubt_twins(store, memory, k, records):
     signatures=("(i8[::1], f8[::1], f8[:, ::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[:, ::1], 5), i8[::1], f8[::1])")
 )
 def follow(table, pool, q, last, room, free, memory):
-    """Bodies are at q (n, 7) in the user's coordinates: predict and correct the listed contacts, update, list what is
-    near.
+    """Follow the listed contacts to poses q (n, 7) in the user's coordinates, then update, which lists what is near.
 
     `last` are poses, tracked values and records of the last call, and become those of this one; `room` is for poses,
-    twists, two times tracked values, and two rows of numbers. Returns the number of events, or -1, and nothing has
-    changed, for poses that are not finite or whose quaternions are far from unit.
+    twists, two times tracked values, and two rows of numbers. Returns the number of events; or -1, with
+    nothing changed, if poses are not finite or their quaternions far from unit.
     """
     store = Store(table, pool)
     header = header_at(table, 0)

@@ -55,7 +55,7 @@ def read_state(store, state, current, trial, rows):
 
 @kernel(inner=True)
 def let_touch(table, current, touching):
-    """Let contacts of bodies that overlap by no more than `touching` keep their overlap: their rows hold."""
+    """Let bodies in contact that overlap by no more than `touching` keep their overlap: their residuals become 0."""
     for k in range(header_at(table, 0).contacts):
         pair = tracked_at(current.tracked, k)
         if is_clearance_row(table, k) or not current.residual[k] < 0.0:
@@ -68,27 +68,27 @@ def let_touch(table, current, touching):
 
 @kernel(inline=True)
 def goes_on_from_last(settings):
-    """Whether this is a tick, or a solve from a solution: it begins where the last one ended, with its pairs."""
+    """Whether this is a tick, or a solve from a solution: these begin at the end of the last one, with its pairs."""
     limits = settings_at(settings, 0)
     return limits.tick == 1.0 or limits.penalty <= limits.penalty_floor
 
 
 @kernel(inline=True)
 def overlap_allowed(settings):
-    """How much bodies of contacts may overlap at the start of this solve and keep the overlap.
+    """The largest overlap at the start of this solve that bodies in contact may keep.
 
-    A solve or a tick from the last one keeps the allowance of its pairs, and gets no additional one.
+    A solve or a tick that continues the last one keeps the overlap its pairs were allowed, and gets no more.
     """
     return 0.0 if goes_on_from_last(settings) else settings_at(settings, 0).touching
 
 
 @kernel(inline=True)
 def find_contacts(program, settings, state, current, rows, n):
-    """Find the contacts of the start and evaluate its rows, unless the last solve or tick left them in the state.
+    """Find the contacts at the start and evaluate the rows there, unless the last solve or tick left rows in the state.
 
-    Bodies of a contact or a clearance that overlap by no more than touching there may keep the overlap. Returns the
-    contact that has no pair, or -1, and whether the rows were evaluated. They are not where a contact has no pair to
-    start from, or where pairs are lifted, for which rows have to be rearranged first.
+    Bodies of a contact or a clearance that overlap there by no more than `touching` may keep the overlap. Returns the
+    contact that has no pair, or -1, and whether the rows were evaluated. They are not if a contact has no pair to start
+    from, or if pairs are lifted: then rows have to be rearranged first.
     """
     limits = settings_at(settings, 0)
     store, lifted = program.store, program.lifted
@@ -151,8 +151,8 @@ def put_together(program, current, rows):
 def set_out(program, settings, state, current, rows, n):
     """Find contacts, evaluate rows, assemble scattered bodies where the settings ask for it.
 
-    Returns CONTACT_LOST, GATHERED or RUNNING, the contact that is lost or -1, and whether that one is at a fold, to be
-    lifted.
+    Returns CONTACT_LOST, GATHERED or RUNNING; the contact that is lost at a fold and is to be lifted, or -1; and
+    whether there is one.
     """
     limits = settings_at(settings, 0)
     store, shape = program.store, program.structure
@@ -170,7 +170,7 @@ def set_out(program, settings, state, current, rows, n):
     if limits.gather > 0.0 and result.scatter == 1.0:
         lost = put_together(program, current, rows)
         if has_place(store.table, state):
-            # It belongs to the end of the last solve, but the bodies have been moved since.
+            # The factor belongs to the end of the last solve, but the bodies have been moved since.
             forget_factor(store.table, state)
         folded = False
         status = GATHERED if limits.gather == ASSEMBLES else RUNNING
@@ -182,9 +182,9 @@ def set_out(program, settings, state, current, rows, n):
 
 @kernel(inner=True)
 def rearrange(program, count, rows, current, room):
-    """Rows and unknowns for other contacts or `count` lifted pairs, with a system in `room`.
+    """Arrange rows and unknowns for changed contacts or `count` lifted pairs; carve the system of a step from `room`.
 
-    Returns the rows, the system of a step, and which contact is lost at this point, or -1.
+    Returns the rows, the system, and the contact that is lost at this point, or -1.
     """
     store, shape = program.store, program.structure
     header = header_at(store.table, 0)

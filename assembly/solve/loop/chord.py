@@ -1,13 +1,14 @@
 """The first steps of a solve from a solution: chord steps with the factor that the last solve left.
 
-With A and W the Jacobian and the weights (1 / mu) of the rows that count where the factor was made,
+With A and W the Jacobian and the weights (1 / mu) of the active rows at the pose where the factor was computed,
 
     (H + d I + A^T W A) dx = -(grad f + J^T y + A^T W c),        dy = W (A dx + c)
 
 is a step of the whole system of `augmented_lagrangian.py` with an older matrix (the chord method); the first one is the
-tangent predictor for changed values and targets. If the next step would not arrive, a factor is made anew, once. The
-iterate at which all holds is passed to the loop, which judges it as any other. If steps gain too little, an active row
-begins to pull, or a pair is near a fold, the loop begins at the start of the solve as if no step had been taken.
+tangent predictor for changed values and targets. If one more step would not reach the tolerances, the matrix is
+factorized anew, once. The iterate that reaches them is passed to the loop, which judges it as any other. If steps gain
+too little, an active row begins to pull, or a pair is near a fold, the loop begins at the start of the solve as if no
+step had been taken.
 """
 
 from __future__ import annotations
@@ -51,7 +52,10 @@ Chord = namedtuple("Chord", "steps swapped violation dual last_violation last_du
 
 @kernel(inner=True)
 def chord_step(shape, kept, point, rows, system):
-    """The step by the kept factor, from the Lagrangian's slope, which `dual_residual` left. Its largest component."""
+    """Compute the step by the kept factor from the Lagrangian's gradient, which `dual_residual` left in `descent`.
+
+    Returns the step's largest component.
+    """
     slope, step = system.directions.descent, system.directions.step
     for i in range(step.size):
         step[i] = -slope[i]
@@ -68,7 +72,7 @@ def chord_step(shape, kept, point, rows, system):
 
 @kernel(inner=True)
 def round_poses(store, q, told):
-    """Poses rounded to the user's coordinates, which go into `told`."""
+    """Round poses to what the user's coordinates can represent; these coordinates go into `told`."""
     units, header = pool_header_at(store.pool, 0), header_at(store.table, 0)
     for b in range(header.bodies):
         if store.table[header.unknown_blocks + b] >= 0:
@@ -119,7 +123,7 @@ def may_go(task, current, trial, step, is_first):
 
 @kernel(inner=True)
 def go_along(task, kept, iterates, rows, system, is_first):
-    """The iterate at the end of the step, with its rows and multipliers, into the trial one. Whether all is regular."""
+    """Write the iterate at the end of the step, with rows and multipliers, into `trial`. Whether all is regular."""
     program, (current, trial) = task.program, iterates
     store, shape, step, memory = program.store, program.structure, system.directions.step, program.lifted.memory
     if not may_go(task, current, trial, step, is_first):
@@ -144,9 +148,9 @@ def go_along(task, kept, iterates, rows, system, is_first):
 def wants_factor(task, count, arrived, violation, dual, last):
     """Whether a factor is to be made at an iterate, in place of an earlier solve's.
 
-    At the end of the steps it is for the next solve; a tick that arrived soon keeps its old factor. On the way it is
-    made if one more step with the old factor would not arrive. Newton's step leaves L e^2 / 2 of a distance e, a chord
-    step with the same matrix leaves L e of the remainder: twice the part that the step before has left.
+    At the end of the steps the new factor is for the next solve; a tick that arrived soon keeps its old one. On the way
+    a factor is made if one more step with the old one would not arrive. Newton's step leaves L e^2 / 2 of a distance e,
+    a chord step with the same matrix leaves L e of the remainder: twice the part that the step before has left.
     """
     if arrived:
         return not (task.tick and count <= FEW_STEPS)

@@ -42,7 +42,7 @@ def clear_clearance_rows(table):
 
 @kernel(inner=True)
 def forget_clearance_rows(table, memory):
-    """Begin again: no pair has been updated, and no contact has a place."""
+    """Reset the contact manager: no pair counts as updated, and no contact has a slot."""
     header = header_at(table, 0)
     record = header.manager_record
     pairs, places, _events = memory_places(table, record)
@@ -76,7 +76,7 @@ def place_clearance_rows(table, lifted, current, rows, begins):
             rows.y[r] = 0.0
             rows.better_y[r] = 0.0
         free[r] = -1
-        # Its row has not been evaluated yet.
+        # The row of the new contact has not been evaluated yet.
         contact_record.fold = 1.0
         contact_record.slack = 0.0
         current.residual[r] = 1.0
@@ -97,9 +97,9 @@ def place_clearance_rows(table, lifted, current, rows, begins):
 
 @kernel(inner=True)
 def update_around(store, memory, point, how):
-    """Update the contact manager at a point; whether rows changed.
+    """Update the contact manager at a point. Returns whether rows changed.
 
-    In a long one the caller is asked every 50 ms (SLICE) whether to go on. If not, this update and all later ones of
+    In a long update the caller is asked every 50 ms (SLICE) whether to go on. If not, this update and all later ones of
     the solve end at once, as with a spent budget (`is_cut` in `solve/loop/deadline.py`), and return True: which
     contacts there are is then unknown.
     """
@@ -123,7 +123,7 @@ def update_around(store, memory, point, how):
 
 @kernel(inner=True)
 def update_again(store, lifted, point, how):
-    """Update the contact manager at a point that is evaluated; whether rows changed.
+    """Update the contact manager at a point whose rows are evaluated. Returns whether rows changed.
 
     An update moves every contact onto its extremum. The coordinates of lifted pairs are unknowns of the solve, and
     their rows have been evaluated: their old values are put back. But where the extremum is farther away than the merge
@@ -164,7 +164,10 @@ def numbers_of(table, out):
 
 @kernel(inner=True)
 def go_back(table, memory, numbers):
-    """Keep the contacts that rows had with these numbers; where others came or went, every pair is updated again."""
+    """Keep only the contacts with these saved numbers.
+
+    If a row has another contact now, its slot is emptied, and every pair is to be updated again.
+    """
     header = header_at(table, 0)
     record = header.manager_record
     pairs, places, _events = memory_places(table, record)
@@ -181,7 +184,7 @@ def go_back(table, memory, numbers):
 
 @kernel(inner=True)
 def measure_pairs(store, memory, first, end, q):
-    """Measure what pairs from first to before `end` used of their motion bounds. Returns the largest known part."""
+    """Measure which part of its motion bound each pair, first to end - 1, uses at q. Returns the largest known part."""
     header = header_at(store.table, 0)
     record = header.manager_record
     most = call_address(header.parts_address, (store.table, store.pool, record, memory, first, end, q))
@@ -190,11 +193,11 @@ def measure_pairs(store, memory, first, end, q):
 
 @kernel(inner=True)
 def allowed_share(store, memory, current, trial, step, share):
-    """How much of a step the contact manager allows, at most `share`, and whether it is all of that.
+    """The share of a step that the contact manager allows, at most `share`, and whether this is all of `share`.
 
-    The poses at the end of the share go into the trial iterate. Every pair is left with the part of its motion bound
-    that this step would use, so that an update (MEASURED) can begin with the largest; except where the pair was updated
-    at these poses as far out as another update would search: then with the part used here.
+    The poses after `share` of the step go into the trial iterate. Every pair records the part of its motion bound that
+    this step would use, so that an update (MEASURED) can begin with the largest part. But if a pair was updated at the
+    current poses with as large a query margin as another update would take, it records the part used there.
     """
     move(store.table, current.q, step, share, trial.q)
     record = header_at(store.table, 0).manager_record
@@ -218,24 +221,24 @@ def allowed_share(store, memory, current, trial, step, share):
         flank = pair_at(store.table, manager.pair_table + PAIR_RECORD * p).minimum + 1
         most = min(store.pool[flank], lengths_at(store.pool, manager.lengths).largest_margin)
         if begin <= UNMOVED and o.margin >= min(o.cut_short, most):
-            # It was updated at this pose, as far out as another update would search.
+            # The pair was updated at this pose, with as large a query margin as another update would take.
             o.part = begin
     return share * allowed, False
 
 
 @kernel(inner=True)
 def is_too_far(store, memory, point):
-    """Whether the poses of a point are farther than the contact manager allows."""
+    """Whether the poses of a point exceed the motion bound of a pair."""
     pairs = manager_at(store.table, header_at(store.table, 0).manager_record).pairs
     return measure_pairs(store, memory, 0, pairs, point.q) > 1.0
 
 
 @kernel(inner=True)
 def ends_unseen(store, memory, before, after):
-    """Whether a clearance's contact of solids ends along a step that goes farther than it is open.
+    """Whether a clearance's contact of solids ends in a step that moves the bodies by more than its residual.
 
-    The contact that replaces it, where features meet, is not listed yet, and was no nearer: in such a step it could
-    pass through, and be found at the far side, or nowhere.
+    Where features meet, another contact replaces it, which is not listed yet and was no nearer. In such a step the
+    bodies could pass through each other there, and that contact be found on the far side, or not at all.
     """
     header = header_at(store.table, 0)
     record = header.manager_record

@@ -1,4 +1,4 @@
-"""The loop's contacts: where their pairs start, which get coordinates as unknowns, which sides of loops they are on."""
+"""The loop's contacts: where pairs start, which are lifted (their coordinates become unknowns), sides of trim loops."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from assembly.solve.loop.parameters import POLAR
 
 @kernel(inner=True)
 def lift_pair(store, k, contacts, free, lengths):
-    """Make the coordinates of contact k unknowns; False where they cannot be: at a pole, and of solids.
+    """Make the coordinates of contact k unknowns. False where this is not possible: at a pole, and for solids.
 
     The closest features of solids change from face to face, and coordinates on two fixed faces cannot follow that.
     """
@@ -46,14 +46,14 @@ def lift_pair(store, k, contacts, free, lengths):
 
 @kernel(inner=True)
 def start_contacts(store, q, contacts, free, lengths):
-    """Global starts for the contacts whose parameters are NaN. Returns a contact that found none, or -1.
+    """Find global starts of the contacts whose parameters are NaN. Returns a contact that has none, or -1.
 
     Where a pair does not exist yet (a face tilted against another), its coordinates become unknowns at once.
     """
     header = header_at(store.table, 0)
     for k in range(header.contacts):
         pair = tracked_at(contacts, k)
-        # Contacts lost by a clearance are found by its contact manager.
+        # Contacts that a clearance has lost are found again by its contact manager.
         idle = contact_of(store.table, k).body_f < 0 or is_clearance_row(store.table, k)
         if not math.isnan(contacts[k, 0]) or idle:
             continue
@@ -109,7 +109,7 @@ def lift_folds(store, lifted, point, active, below, lost, trims):
 def lifted_pairs_hold(store, q, contacts, free, tolerance):
     """Whether every lifted pair is extremal by the frames of tracked pairs, which handle poles.
 
-    Its own rows do not show it at a pole or an apex: there a tangent vanishes, and its row with it.
+    At a pole or an apex the pair's own rows do not show this: a tangent vanishes there, and so does its row.
     """
     header = header_at(store.table, 0)
     for k in range(header.contacts):
@@ -125,7 +125,7 @@ def lifted_pairs_hold(store, q, contacts, free, tolerance):
 
 @kernel(inner=True)
 def choose_sides(program, current, rows, least):
-    """Choose the sides of loops for the rows of trims at the iterate, and evaluate these. Whether some have changed.
+    """Choose the sides of trim loops for the trim rows at the iterate, and evaluate these. Whether a side changed.
 
     Proposed multipliers tell whether a contact moves on around a corner, if they are above `least`.
     """

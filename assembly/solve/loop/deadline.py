@@ -1,8 +1,8 @@
-"""The time of a tick: when it is spent, and how the next tick goes on with what is not done.
+"""The time budget of a tick: when it is spent, and how the next tick continues unfinished work.
 
-A tick whose budget is spent where its pose does not hold, or where not everything that is near is known yet, leaves
-where it is (`CARRIED`): the tracker returns the last pose that held, and the next tick goes on from there. Each
-makes progress that lasts: a step of the loop, or the update of a pair of bodies.
+If the budget is spent while rows do not hold, or before every pair of bodies that is near was updated, the tick leaves
+its iterate to the next one (`CARRIED`), which continues from it; the tracker returns the last pose that held. Every
+tick makes progress that lasts: a step of the loop, or the update of a pair of bodies.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from assembly.solve.loop.settings import results_at, settings_at
 
 @kernel(inline=True)
 def is_spent(table, settings, begin, part):
-    """Whether so much of a tick's budget is spent."""
+    """Whether this part of a tick's budget is spent."""
     limits = settings_at(settings, 0)
     return limits.budget > 0.0 and call_address(header_at(table, 0).clock_address, ()) - begin > part * limits.budget
 
 
 @kernel(inline=True)
 def is_cut(table, memory):
-    """Whether an update left out pairs that were due: then this call ends."""
+    """Whether an update ended before all pairs that were due were updated: then this call ends."""
     return header_at(table, 0).manager_record >= 0 and memory_header_at(memory, 0).deadline < 0.0
 
 
 @kernel(inner=True)
 def begin_tick(table, settings, results, memory):
-    """When this call began; how many steps it goes on from; how many updates there were before it.
+    """When this call began [ns]; how many steps the tick that it continues has made; how many updates came before.
 
-    These are infinitely many where there is no budget, or a tick has to make a step: then updates take their time.
-    Those of solves ask whether they are to go on (`solve/loop/clearances.py`).
+    The number of updates is infinite if there is no budget, or if a tick has to make a step: then updates are not cut
+    short. Updates of solves ask the caller whether to go on (`solve/loop/clearances.py`).
     """
     header = header_at(table, 0)
     state = memory_header_at(memory, 0)
@@ -64,9 +64,9 @@ def begin_tick(table, settings, results, memory):
 
 @kernel(inner=True)
 def may_end(table, settings, memory, clock, iteration, part):
-    """Whether a tick may leave the rest to the next one, and so much of its budget is spent.
+    """Whether a tick may leave the rest to the next one, and this part of its budget is spent or an update was cut.
 
-    What it is to go on from after a step is as good as at its begin; without one, there has to be an update.
+    After a step it may end; before its first step, only if it has updated a pair, so that every tick makes progress.
     """
     begin, updates = clock
     if settings_at(settings, 0).carries == 0.0:
@@ -78,7 +78,7 @@ def may_end(table, settings, memory, clock, iteration, part):
 
 @kernel(inline=True)
 def set_deadline(table, settings, memory, begin):
-    """After a step updates may end early."""
+    """After a step, let updates end when the part HALF of the budget is spent."""
     limits = settings_at(settings, 0)
     if limits.carries == 1.0 and header_at(table, 0).manager_record >= 0 and not is_cut(table, memory):
         memory_header_at(memory, 0).deadline = begin + HALF * limits.budget

@@ -1,10 +1,9 @@
 """Dexterity: what an end effector can do with its inputs, as a term of the objective with an exact gradient.
 
-Rows A that hold the mechanism, those of joints and contacts (drives and limits left out, see `Dexterity`), and rows B
-of the inputs: rates V of all unknowns, a column
-an input, make B V = 1 and change the rows as little as can be (`solve/loop/rates.py`). J = T V is the Jacobian of the
-end effector, whose velocity T v is. Of J a measure w is taken (`solve/linear_algebra/singular_values.py`), with
-W = dw / dJ. With
+Rows A hold the mechanism: those of joints and contacts, without drives and limits (see `Dexterity`). Rows B are those
+of the inputs. The rates V of all unknowns, one column per input, satisfy B V = 1 and change rows A as little as
+possible (`solve/loop/rates.py`). J = T V is the Jacobian of the end effector, whose velocity is T v, w is a measure of
+J (`solve/linear_algebra/singular_values.py`), and W = dw / dJ. With
 
     A^T A V + B^T Z = 0,   B V = 1,   A^T A P + B^T Y = T^T,   B P = 0,
 
@@ -38,19 +37,19 @@ from assembly.solve.loop.predict import predict_pairs
 from assembly.solve.loop.rates import rate_system, solve_rates
 from assembly.solve.loop.residuals import first_unknown, move, times
 
-# A term in the table; behind it a `BODY_COORDINATE` an input.
+# A term in the table, followed by one `BODY_COORDINATE` per input.
 DEXTERITY_TERM = record_dtype(
     "i8",
     measure=1,  # `singular_values.py`
     axes=1,  # which velocities count: bits, three of the linear one and then three of the angular one
     inputs=1,  # how many
-    held=1,  # where a list begins of the rows that hold the mechanism
+    held=1,  # where the list of the rows that hold the mechanism begins
     held_rows=1,  # how many there are
 )
 dexterity_at = record_view(DEXTERITY_TERM)
 INPUT_LIST, INPUT = size_of(DEXTERITY_TERM), size_of(BODY_COORDINATE)
 VELOCITIES = 6
-# Its parameters in the pool; behind them the factor of every input's unit.
+# The term's parameters in the pool, followed by the unit factor of every input.
 DEXTERITY_WEIGHTS = record_dtype(
     "f8",
     weight=1,  # of the term
@@ -132,7 +131,7 @@ def end_effector_velocity(effector, v, out, column):
 
 @kernel(inner=True)
 def force_along(effector, w, column, i):
-    """Component i of T^T w, of the force or the moment on the end effector; w has a row a velocity that counts."""
+    """Component i of T^T w, of the force or the moment on the end effector; w has one row per velocity that counts."""
     if (effector.axes >> i) & 1 == 0:
         return 0.0
     return (effector.linear if i < 3 else effector.angular) * w[task_rows(effector.axes & ((1 << i) - 1)), column]
@@ -140,7 +139,7 @@ def force_along(effector, w, column, i):
 
 @kernel(inner=True)
 def force_and_moment(effector, w, column):
-    """Those of T^T w, on the end effector itself, with w a column over the velocities that count."""
+    """Force and moment of T^T w on the end effector itself, with w a column over the velocities that count."""
     force = (
         force_along(effector, w, column, 0),
         force_along(effector, w, column, 1),
@@ -183,7 +182,7 @@ def add_end_effector_bend(effector, w, column, v, gradient):
 
 @kernel(inner=True, allocates=True)
 def used_rows(table, record, rows):
-    """The rows that hold the mechanism together: those of a term's list, and those of free pairs."""
+    """The rows that hold the mechanism together: those of a term's list, and those of lifted pairs."""
     header, term = header_at(table, 0), dexterity_at(table, record)
     lifted = max(rows - header.rows, 0)
     used = np.empty(term.held_rows + lifted, np.int64)
@@ -206,7 +205,7 @@ def row_rates(bases, jacobian, used, v):
 
 @kernel(inner=True)
 def largest_value(values):
-    """The largest absolute value; infinite if one is no number."""
+    """The largest absolute value; infinite if a value is NaN."""
     worst = 0.0
     for value in values.flat:
         if not abs(value) <= worst:
@@ -218,7 +217,7 @@ def largest_value(values):
 def end_effector_map(store, term, bases, rows, n, point, order):
     """The end effector's Jacobian in the user's units, at a point whose rows are evaluated.
 
-    What the end effector needs, and so whether its motion is open, is found from order 1 on.
+    The adjoint solutions P and Y, and with them whether the motion is OPEN, are computed from order 1 on.
     """
     term_record = term_at(store.table, term)
     residual = point.residual
@@ -240,7 +239,7 @@ def end_effector_map(store, term, bases, rows, n, point, order):
     outcome = DETERMINED if exists else DEPENDENT
     if exists:
         # Where rows do not hold, redundant ones contradict each other and idle motions move the end effector a
-        # little: singular values are off by up to the root of the residuals.
+        # little: singular values are off by up to the square root of the residuals.
         leeway = UNDETERMINED
         for l in range(used.size):
             leeway = max(leeway, 10.0 * math.sqrt(abs(residual[used[l]])))
@@ -320,7 +319,7 @@ def dexterity(program, term, count, point, order, gradient):
         return weight * value
     effector = end_effector(store, term_record, point.q)
     m, k = jacobian.shape
-    # Room for one combination at a time: p, y, A p as forces on all rows.
+    # Workspace for one combination at a time: p, y, A p as forces on all rows.
     pull = np.empty(n)
     turn = np.empty(k)
     forces = np.zeros(count)

@@ -111,9 +111,9 @@ def propose(shape, current, rows, straight, alpha):
 
 @kernel(inner=True)
 def leave_saddle(program, current, trial, number, system):
-    """A small move off a saddle of the violations, into the trial point; whether there was one.
+    """Move the trial point a little off a saddle of the violation. Returns whether it was moved.
 
-    For example, parallel axes that are to be perpendicular. `number` counts these moves.
+    Parallel axes that are to be perpendicular, for example, are at a saddle. `number` counts these moves.
     """
     store, step = program.store, system.directions.step
     n = step.size

@@ -1,10 +1,10 @@
 """Coordinates of lifted pairs that are at an end of their patch: unknowns with bounds.
 
 Where a pair is one of a continuum (a cylinder along a plane, two parallel shafts), its points may slide along it
-together, and one of them may come to the end of its patch. Newton's method knows of no end: half of every step would
-lead over it and be cut off, and the rows would close by half a step. A coordinate at its end over which the merit
-descends is therefore left out of the step, as in projected Newton methods (Bertsekas, "Projected Newton Methods for
-Optimization Problems with Simple Constraints", 1982); the other point goes all the way.
+together, and one of them may come to the end of its patch. Newton's method does not know the end: half of every step
+would lead beyond it and be cut off, and the rows would close by half a step. A coordinate at an end beyond which the
+merit decreases is therefore left out of the step, as in projected Newton methods (Bertsekas, "Projected Newton Methods
+for Optimization Problems with Simple Constraints", 1982); then the other point makes the whole move.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from assembly.solve.linear_algebra.factorize import solve_step
 
 @kernel(inner=True)
 def find_ends(program, current, directions):
-    """Mark the coordinates of lifted pairs that are at an end over which the merit descends."""
+    """Mark the coordinates of lifted pairs that are at an end beyond which the merit decreases."""
     store, bases = program.store, program.structure.bases
     ends, descent = directions.ends, directions.descent
     if ends.size == 0:

@@ -45,7 +45,7 @@ End = namedtuple("End", "status value violation dual feasible holds")
 
 @kernel(inner=True)
 def find_crossing(program, current, rows):
-    """Update all pairs if a solve failed; whether bodies cross, with or without a row that shows it."""
+    """Update all pairs after a solve failed. Returns whether bodies cross, with or without a row that shows it."""
     table, lifted = program.store.table, program.lifted
     update_around(program.store, lifted.memory, current, EVERYTHING)
     place_clearance_rows(table, lifted, current, rows, False)
@@ -71,7 +71,10 @@ def return_to(program, held, rows, current, tick):
 
 @kernel(inline=True)
 def finish(program, settings, state, iterates, rows, system, at_end):
-    """Write the end into the state; returns status, objective, violation and dual residual of the pose returned."""
+    """Write the end of the solve into the state.
+
+    Returns status, objective, violation and dual residual of the pose returned.
+    """
     limits = settings_at(settings, 0)
     store, lifted = program.store, program.lifted
     current, trial, held = iterates

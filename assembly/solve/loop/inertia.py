@@ -2,8 +2,8 @@
 
 With H the Hessian of the Lagrangian, J the rows that push and Z a basis of the motions that keep them, Z^T H Z has no
 eigenvalue below -d if H + J^T J / mu + d I has a Cholesky factor, whatever mu is (Debreu, Finsler). The last step of a
-solve has made one. One-sided rows at their bound with a zero multiplier must not be in J: they allow motions to one
-side, and J^T J / mu would add curvature to these.
+solve has computed such a factor. One-sided rows at their bound with a zero multiplier must not be in J: they allow
+motions to one side, and J^T J / mu would add curvature to these.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from assembly.solve.loop.parameters import CLEAR_SHIFT, IDLE, LEAST_SHIFT, NEAR,
 from assembly.solve.loop.settings import SOLVED, UNSURE, results_at, settings_at
 from assembly.solve.loop.workspace import penalized
 
-# What a factorization told: of negative curvature near an end, or nothing.
+# What a factorization shows: negative curvature near an end (DOWNWARD), or nothing (UNKNOWN).
 DOWNWARD, UNKNOWN = -2.0, -1.0
 # 2^31 - 1: squares of what is below it are integers of 64 bits.
 PRIME = 2147483647
@@ -28,8 +28,8 @@ PRIME = 2147483647
 def checksum_of_rows(count, one_sided, weights, least):
     """A checksum of the one-sided rows whose weight is above the least.
 
-    The sum of a polynomial of degree 16 in their numbers, modulo a prime. Of low powers many sets have the same sum
-    (3^2 + 4^2 = 5^2); that two sets have this one in common is a chance of one in 2^31.
+    The sum of a polynomial of degree 16 in their numbers, modulo a prime. With low powers many sets have the same sum
+    (3^2 + 4^2 = 5^2); with this polynomial the probability that two sets do is about one in 2^31.
     """
     total = 0.0
     for r in range(count):
@@ -43,7 +43,7 @@ def checksum_of_rows(count, one_sided, weights, least):
 
 @kernel(inner=True)
 def note_factor(results, rows, one_sided, shift, dual, restoring):
-    """Keep what the new factorization of a step of a solve told: whether it is convex.
+    """Record what the new factorization of a step of a solve shows: whether it is convex.
 
     `curved` becomes 1 plus the checksum of its one-sided rows if it is, DOWNWARD if it needed a shift of CLEAR_SHIFT
     although the dual residual, which bounds the shift tried first, was less, and UNKNOWN otherwise.
@@ -60,7 +60,7 @@ def note_factor(results, rows, one_sided, shift, dual, restoring):
 
 @kernel(inner=True)
 def told_convex(results, rows, one_sided, residual):
-    """Whether the last factorization had the rows that push at the end, and none that only touches."""
+    """Whether the last factorization was convex, with the rows that push at the end, and no row only touches there."""
     result = results_at(results, 0)
     if not result.curved > 0.0:
         return False
@@ -84,10 +84,10 @@ def test_convexity(program, current, rows, system, shift):
 
 @kernel(inline=True)
 def test_end(program, settings, results, status, current, rows, system):
-    """The status of a solve that is SOLVED: UNSURE where no factorization tells that no curvature is negative.
+    """The status of a solve that is SOLVED: UNSURE if no factorization shows that no curvature is negative.
 
-    Of a tick that is asked for it the result says whether its end is a minimum. A first solve that ends where it began
-    is UNSURE: what its end is may be decided by higher orders. Scenes without an objective are left as they are.
+    A tick keeps its status; its result says whether its end is a minimum. A first solve that ends where it began is
+    UNSURE: higher orders may decide whether its end is a minimum. Scenes without an objective keep their status.
     """
     result = results_at(results, 0)
     limits = settings_at(settings, 0)

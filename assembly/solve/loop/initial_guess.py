@@ -1,11 +1,10 @@
 """Scattered bodies put together one after the other, so that the loop starts near where joints hold.
 
-Bodies are taken in an order (`constraints/packing/numbering.py`) in which each has joints with bodies that stand
-already. Each is moved by
-Levenberg and Marquardt's method until the rows it shares with those are as small as they get: exactly zero where the
-joints make a tree. Rows that close a loop are left to the loop of the solve. Where a driven angle stays far from its
-value, because it would have to go around the other way, the body is put where one of its joints holds, and then where
-all are as small as they get.
+Bodies are taken in an order (`constraints/packing/numbering.py`) in which each has joints with bodies that are already
+placed. Levenberg and Marquardt's method moves each body until the rows that it shares with those are as small as they
+get: exactly zero where the joints form a tree. Rows that close a kinematic loop are left to the solve. If a driven
+angle stays far from its value, because it would have to turn the other way around, the body is fitted to one of its
+joints alone, and from there to all of them.
 """
 
 from __future__ import annotations
@@ -63,14 +62,14 @@ def place_joint(store, k, q, records):
 
 @kernel(inline=True)
 def is_of(table, row, joint):
-    """Whether a row is one of a joint alone; of any where `joint` is negative."""
+    """Whether a row belongs to this joint alone; true for every row if `joint` is negative."""
     joint_there = joint_row_at(table, row)
     return joint < 0 or (joint_there.joint == joint and joint_there.second < 0)
 
 
 @kernel(inner=True)
 def body_rows(store, placed, joint, point):
-    """Evaluate a body's rows, of a joint or of all (-1); half the sum of squares of what does not hold."""
+    """Evaluate a body's rows, of a joint or of all (-1). Returns half the sum of squares of those that do not hold."""
     q, records, residual = point.q, point.records, point.residual
     cost = 0.0
     for l in range(placed.first, placed.first + placed.count):
@@ -91,7 +90,7 @@ def body_rows(store, placed, joint, point):
 
 @kernel(inner=True)
 def follow_drives(store, placed, tracked):
-    """Let driven angles of a body's rows be near their values again."""
+    """Set the tracked angles of a body's driven rows to the values they are driven to."""
     for l in range(placed.first, placed.first + placed.count):
         row = header_at(store.table, 0).row_table + ROW * store.table[l]
         joint = joint_row_at(store.table, row)
@@ -102,7 +101,7 @@ def follow_drives(store, placed, tracked):
 
 @kernel(inner=True)
 def body_row(bases, jacobian, r, s, out):
-    """Row r of the Jacobian in the one body whose twist stands at s."""
+    """The part of row r of the Jacobian that belongs to the body whose twist begins at unknown s."""
     for i in range(6):
         out[i] = 0.0
     for b in range(bases.shape[1]):

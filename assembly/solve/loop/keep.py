@@ -24,9 +24,9 @@ from assembly.solve.loop.workspace import penalized
 
 @kernel(inner=True)
 def keep_factor(program, state, kept, point, rows, system):
-    """Make the factor of a step at a point, into the system, and keep it; whether there is one.
+    """Factorize the matrix of a step at a point, in the system, and keep the factor. Returns whether there is one.
 
-    The objective's Hessian is in the system, and the Lagrangian's afterwards.
+    The system has the Hessian of the objective before, and that of the Lagrangian afterwards.
     """
     shape, header = program.structure, kept_header_at(state, kept.header)
     header.factor = NO_FACTOR
@@ -44,7 +44,7 @@ def keep_factor(program, state, kept, point, rows, system):
 
 @kernel(inner=True)
 def test_convexity(task, rows, system, dual):
-    """Whether no curvature is negative where the Hessian of the Lagrangian was just made, into the results."""
+    """Write into the results whether the Lagrangian's Hessian, just computed, shows no negative curvature."""
     n, shape = system.gradient.size, task.program.structure
     shift = factorize_shifted(system.hessian, n, shape.sparsity, LEAST_SHIFT, system.factor)
     note_factor(task.results, rows, shape.one_sided, shift, dual, False)
@@ -52,7 +52,7 @@ def test_convexity(task, rows, system, dual):
 
 @kernel(inline=True)
 def leave(program, limits, state, point, rows, system, is_kept, is_solved):
-    """Leave the rows of a point whose poses are in the state, if they are to be kept, and a factor of a solution."""
+    """Keep the rows of a point whose poses are in the state, if `is_kept`, and the factor if it is a solution."""
     store = program.store
     if not has_place(store.table, state):
         return

@@ -1,7 +1,8 @@
 """The step and the line search on the augmented Lagrangian.
 
-A step that the rows' curvature spoils is bent, with the factorization at hand, before it is shortened: to where the
-rows hold, and if that is too far, to where the step's linear model leaves them (the second-order correction).
+Before a step that fails because of the rows' curvature is shortened, it is bent with the present factor (the
+second-order correction): to where the rows hold, and if that is too far, to the residuals that its linear model
+predicts.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ Line = namedtuple("Line", "slope longest lets_go is_free")
 def damped_step(program, system, trust):
     """The step of the system's factor, its shift raised until the step is not much longer than the radius.
 
-    Nor may a body turn by much more than a radian. Scaling the step instead would lose what its stiff directions gain,
+    Nor may a body turn by much more than a radian. Scaling the step instead would also shorten its stiff directions,
     which bring the rows to hold. The shift is raised only if `damps`: with contacts rows change fast along the step.
     Returns the shift, and the step's largest component and rotation.
     """
@@ -92,7 +93,7 @@ def goal(program, count, point, order, gradient, hessian):
 
 @kernel(inline=True)
 def rounding_of(rows, residual, gradient, size):
-    """The rounding of a merit of this size: its own, and that of poses of order one, by slopes and forces of rows."""
+    """The rounding of a merit of this size: its own, and that of poses of order one, times gradient and forces."""
     noise = 1e-14 * (size + 1e-300)
     for i in range(gradient.size):
         noise += 4e-16 * abs(gradient[i])

@@ -70,7 +70,7 @@ def predict_active_set(program, point, rows, system):
 
 @kernel(inner=True)
 def leave_out(shape, point, rows, system):
-    """Make no row active in the step that is idle here."""
+    """Make the rows inactive again that are active only by prediction."""
     for r in range(rows.count):
         if rows.foreseen[r] == 1.0:
             let_count(shape, r, False, point, rows, system)
@@ -210,9 +210,9 @@ def least_squares_multipliers(shape, point, rows, system, rounds, y):
 
 @kernel(inner=True)
 def exchange(shape, point, rows, system, y, most):
-    """Make one-sided rows that pull inactive, and those active that are near and would balance more, the last first.
+    """Make one-sided rows that pull inactive, and those active that are near their bound and would balance more.
 
-    `most` of them at most. Returns how many there are.
+    At most `most` rows are changed, the last ones first. Returns how many there are to change.
     """
     active, slope = rows.active, system.directions.descent
     write_slope(shape, point, rows, system, y)
@@ -273,7 +273,7 @@ def choose_multipliers(shape, point, rows, system, shortened, vectors, holds, go
     with vector trims (`vectors`), they are refined. Returns the dual residual.
     """
     dual = dual_residual(shape, point, rows, system, rows.better_y)
-    # Where they are as good as they should be, the old ones are not compared.
+    # If the proposed multipliers are good enough, the old ones are not compared.
     other = dual_residual(shape, point, rows, system, rows.y) if dual > good else math.inf
     if dual <= other:
         take_better(rows)
@@ -302,7 +302,7 @@ def forget_objective(order, rows, system):
 
 @kernel(inner=True)
 def strongest(values, count):
-    """The largest of the first so many, without its sign."""
+    """The largest absolute value among the first `count`."""
     most = 0.0
     for i in range(count):
         most = max(most, abs(values[i]))
@@ -311,7 +311,10 @@ def strongest(values, count):
 
 @kernel(inner=True)
 def multipliers_at(shape, point, rows, system):
-    """Multipliers of least squares at a point that may be no extremum, of rows that touch there. The dual residual."""
+    """Least-squares multipliers of the rows that touch at a point, which need not be an extremum.
+
+    Returns the dual residual.
+    """
     for r in range(rows.count):
         rows.active[r] = 1.0 if shape.one_sided[r] == 0 or point.residual[r] <= NEAR else 0.0
     pushing_multipliers(shape, point, rows, system, EXCHANGES, ROUNDS, rows.y)

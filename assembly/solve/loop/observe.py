@@ -47,7 +47,7 @@ def observe(task, current, rows):
         place_clearance_rows(table, lifted, current, rows, False)
     weigh_rows(rows, one_sided, current.residual)
     if loop.folded:
-        # Its row has not been evaluated yet.
+        # The row of the lost contact has not been evaluated yet.
         rows.active[loop.lost] = 1.0 / rows.mu
     if header_at(table, 0).contacts > 0:
         lift_trims = limits.lift_trims == 1.0
@@ -68,7 +68,7 @@ def rearrange_rows(task, current, rows):
     loop.mu = max(loop.mu, loop.floor)
     begin_way(task.way)
     if loop.folded:
-        # Perhaps another one is lost.
+        # Perhaps another contact is lost now.
         loop.folded = lost >= 0 and task.program.lifted.free[lost] < 0
         loop.lifts += 1
     return rows_in(loop, rows), system
@@ -82,7 +82,7 @@ def evaluate_iterate(task, history, current, rows, system):
     table = program.store.table
     header = header_at(table, 0)
     if loop.lost >= 0 and program.lifted.free[loop.lost] < 0:
-        # A pair is lost and cannot be lifted (an idle row, a pole): nothing moves any more.
+        # A pair is lost and cannot be lifted (an idle row, a pole): no further step is possible.
         task.result.culprit = float(loop.lost)
         loop.status = CONTACT_LOST if loop.folded else STALLED
     loop.lost = -1
@@ -112,7 +112,7 @@ def evaluate_iterate(task, history, current, rows, system):
         loop.over = 1
         return False
     if not math.isfinite(violation) or not math.isfinite(loop.value) or not math.isfinite(loop.dual):
-        # Only if the start is such; a step to such a pose is not taken.
+        # This happens only at the start: no step to such a pose is taken.
         loop.status = STALLED
         return False
     return True

@@ -15,7 +15,7 @@ from assembly.solve.loop.residuals import times
 
 @kernel(inline=True)
 def longest_way(d, at, alpha, far):
-    """A bound of the motion along alpha d of a body's points that are not farther than `far` from its origin."""
+    """A bound on how far a body's points within a distance `far` of its origin move along alpha d."""
     if at < 0:
         return 0.0
     shift = math.sqrt(d[at] * d[at] + d[at + 1] * d[at + 1] + d[at + 2] * d[at + 2])
@@ -27,7 +27,7 @@ def longest_way(d, at, alpha, far):
 def keep_open_row(store, bases, k, current, trial, d, alpha):
     """Keep the values of row k of a clearance if it is certainly open all along alpha d. Whether it is.
 
-    No gap changes by more than points of the two bodies move.
+    No gap changes by more than the points of one body and those of the other move, added.
     """
     left = contact_record_at(current.records, k).slack
     if not left > 0.0 or bases[k, 2] >= 0:
@@ -92,7 +92,7 @@ def predict_pairs(store, bases, lifted, current, trial, d, alpha):
 
 @kernel(inner=True)
 def keep_inside(store, k, out):
-    """Coordinates that are unknowns may pass the end of a patch."""
+    """Bring coordinates of a lifted pair back into the domains: as unknowns they may pass the end of a patch."""
     for side in range(2):
         i = 2 * side
         out[k, i], out[k, i + 1], _clamped = into_domain(

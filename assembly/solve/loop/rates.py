@@ -1,18 +1,18 @@
 """Rates of all unknowns for given rates of inputs: least squares under equations, in the envelope of the rows.
 
-Rows A say what must hold, rows B what the inputs are. Of all rates v with B v = h those that change the rows least
+Rows A are the constraints, rows B those of the inputs. Among all rates v with B v = h, those that change rows A least
 solve, with g = 0,
 
     A^T A v + B^T z = g,   B v = h.
 
-Where the rows hold and the inputs do not contradict them A v = 0. At other poses redundant rows contradict each other a
-little, and v is a compromise, as smooth as they are. With M = A^T A + B^T B + REST I, S = M^-1 B^T and G = B S,
+Where the rows hold and the inputs do not contradict them, A v = 0. At other poses redundant rows contradict each other
+a little, and v is a compromise, as smooth as they are. With M = A^T A + B^T B + REST I, S = M^-1 B^T and G = B S,
 
     x = M^-1 (g + B^T h),   z = G^-1 (B x - h),   v = x - S z.
 
-What REST and squared condition numbers spoil is mended by doing the same with what is left of g and h: corrected
-seminormal equations (Bjorck, Linear Algebra and its Applications 88, 1987). Motions that nothing determines stay at
-rest.
+Errors from REST and from the squared condition number are removed by solving again for the residuals of g and h:
+corrected seminormal equations (Bjorck, Linear Algebra and its Applications 88, 1987). Motions that nothing determines
+stay at rest.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def add_row_square(x, low, high, matrix, last):
 def rate_system(bases, jacobian, used, b):
     """The system of the rows of A in the list `used` and B (k, n).
 
-    Returns whether they exist: not where an input has no rates at all.
+    Returns whether the system exists, and the system. It does not exist if an input has no rates at all.
     """
     k, n = b.shape
     matrix = np.zeros((n, n))
@@ -103,9 +103,9 @@ def rate_system(bases, jacobian, used, b):
 
 @kernel(inner=True, allocates=True)
 def solve_rates(system, g, h, v, z):
-    """Solve for v (n,) and z (k,). Returns the largest part of g and h that is left.
+    """Solve for v (n,) and z (k,). Returns the largest component of the residuals of g and h.
 
-    What no pass takes off g pushes motions that nothing determines; their part of v is left out.
+    The part of g that no pass removes acts on motions that nothing determines; v is left without these motions.
     """
     bases, jacobian, used, b, matrix, last, s, gram, ends = system
     k, n = b.shape

@@ -18,7 +18,7 @@ from assembly.solve.loop.violation import off_rows, off_tangency
 
 @kernel(inner=True)
 def log(history, iteration, figures):
-    """Write the figures of an iteration, if there is room for them."""
+    """Write the figures of an iteration, if the history has room for them."""
     if iteration < history.shape[0]:
         for k in range(HISTORY):
             history[iteration, k] = figures[k]
@@ -26,7 +26,7 @@ def log(history, iteration, figures):
 
 @kernel(inner=True)
 def scaled_poses(store, state, q):
-    """Poses of a state as the program has them."""
+    """Write the poses of a state into q, in the scaled coordinates of the program."""
     units = pool_header_at(store.pool, 0)
     for b in range(header_at(store.table, 0).bodies):
         for k in range(3):
@@ -83,7 +83,7 @@ def write_tracked(table, tracked, state):
 
 @kernel(inner=True)
 def is_clear(table, residual):
-    """Whether no contact, given or of a clearance, is one of bodies in each other."""
+    """Whether bodies overlap by more than TOUCHING at no contact, given or of a clearance."""
     for r in range(header_at(table, 0).contacts):
         if residual[r] < -TOUCHING:
             return False
@@ -104,7 +104,7 @@ def keep_point(current, rows, held):
 
 @kernel(inner=True)
 def bring_back(held, rows, current):
-    """The point that `keep_point` copied."""
+    """Restore the point that `keep_point` copied."""
     for b in range(held.q.shape[0]):
         for k in range(7):
             current.q[b, k] = held.q[b, k]
@@ -150,7 +150,7 @@ def write_rows(table, current, y, lifted, lax, size, state):
         worst = residual[r]
         if r < header.contacts:
             if free[r] >= 0:
-                # What a free pair lacks to be extremal is a violation of its contact, too.
+                # How far a lifted pair is from extremal is a violation of its contact, too.
                 off = off_tangency(residual, jacobian, r, m + 4 * free[r], lax, lifted.variables)
                 if off > abs(worst):
                     worst = -off

@@ -1,6 +1,6 @@
 """What the loop does with rows: their places among the unknowns, products with the Jacobian, the merit.
 
-`bases` says where the variables of each row stand, negative for none: twist of f, twist of g, a free pair's
+`bases` says where the variables of each row stand, negative for none: twist of f, twist of g, a lifted pair's
 coordinates, then twists of further bodies.
 """
 
@@ -44,7 +44,7 @@ def first_unknown(table, body):
 
 @kernel(inner=True)
 def place_rows(table, free, bases, one_sided):
-    """Where each row's variables stand, and its side."""
+    """Write where each row's variables stand, and whether it is one-sided."""
     header = header_at(table, 0)
     for r in range(header.rows):
         row = header.row_table + ROW * r
@@ -78,7 +78,7 @@ def place_rows(table, free, bases, one_sided):
 
 @kernel(inline=True, allocates=True)
 def record_of_blocks(table):
-    """The part of the table that has it; empty where the scene has none."""
+    """The part of the table that has the record of Hessian blocks; empty if the scene has none."""
     header = header_at(table, 0)
     return carve(table, header.block_record, (header.block_length,))
 
@@ -189,10 +189,10 @@ def size_of_shape(table, most, n):
 
 @kernel(inline=True, allocates=True)
 def shape_of(table, most, n, blocks, integers, doubles):
-    """Room for what `arrange` finds, for so many rows and unknowns: a `Structure`.
+    """Carve a `Structure`, which `arrange` fills, for at most `most` rows and n unknowns.
 
-    `blocks` is the scene's record of them, `record_of_blocks`, or an empty one for a dense Hessian. The room is that of
-    the ends of two blocks of memory.
+    `blocks` is the scene's record of Hessian blocks (`record_of_blocks`), or an empty one for a dense Hessian. The
+    arrays are carved from the ends of `integers` and `doubles`.
     """
     header = header_at(table, 0)
     end, tail = size_of_shape(table, most, n)
@@ -291,7 +291,7 @@ def merit(residual, one_sided, rows):
 
 @kernel(inner=True)
 def move(table, q, d, alpha, out):
-    """Every moving body retracted by alpha d."""
+    """Write the poses of all moving bodies after the step alpha d (a retraction) into `out`."""
     header = header_at(table, 0)
     for b in range(header.bodies):
         s = 6 * table[header.unknown_blocks + b]
@@ -326,7 +326,7 @@ def largest_turn(store, tracked):
 
 @kernel(inner=True)
 def clear_row(bases, r, out):
-    """Zeros where row r has variables."""
+    """Set `out` to zero at the variables of row r."""
     for b in range(bases.shape[1]):
         at = bases[r, b]
         if at >= 0:

@@ -1,7 +1,7 @@
-"""The policy for rows that gain nothing: restoration of the rows alone, to see whether they can hold.
+"""The policy for a violation that does not decrease: restoration of the rows alone, to see whether they can hold.
 
-Restoring, steps minimize |c|^2 / 2: f = 0, y = 0, mu = 1. Where that is stationary and rows are off, they contradict
-each other nearby.
+Steps of a restoration minimize |c|^2 / 2: f = 0, y = 0, mu = 1. Where |c|^2 / 2 is stationary and rows do not hold,
+they contradict each other nearby.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from assembly.solve.loop.workspace import rows_in
 
 @kernel(inline=True)
 def choose_restoration(task, rows, system):
-    """Begin or end to restore rows. Whether the step goes on."""
+    """Begin or end a restoration of rows. Returns whether the step goes on."""
     loop = task.loop
     # At a pose where rows are dependent the least move only leads away: rows are restored until they hold.
     is_singular = task.any_pose and not task.watched and loop.entered < NEARLY_HELD
@@ -36,8 +36,8 @@ def choose_restoration(task, rows, system):
     if detect_standstill(task, rows):
         loop.check_at, loop.check_violation = loop.iteration, loop.violation
     if not loop.restoring and loop.iteration >= loop.check_at:
-        # The violation does not decrease: see whether rows can hold at all. A row that has just become active had no
-        # time.
+        # The violation does not decrease: see whether rows can hold at all. A row that has just become active has
+        # had no time to gain.
         least = TOUCHING if loop.check_violation <= loop.feasible else loop.feasible
         if loop.violation > max(least, 0.5 * loop.check_violation) and loop.restorations < RESTORATIONS:
             begin_restoration(loop)

@@ -6,8 +6,8 @@ they cross without a listed contact, no row says so. The solve goes back to the 
 its next steps are bounded by the loop's `leash`.
 
 A solve that makes no progress returns to such a pose, too, and begins again there. Which contacts are listed depends on
-the way it came: a contact that ends where bodies touch blocks every step, and steps that were cut again and again leave
-a short radius. A solve that begins there has neither.
+its path so far: a contact that ends where bodies touch blocks every step, and steps that were cut again and again leave
+a short radius. A solve that begins anew there has neither.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from assembly.solve.loop.workspace import rows_in
 def has_sunk(store, memory, residual):
     """Whether bodies overlap deeply, or without a contact that shows it.
 
-    For solids, rows lead out the way bodies came: corners stay on their faces.
+    For solids, rows lead bodies back out the way they came: corners stay on their faces.
     """
     header = header_at(store.table, 0)
     for k in range(header.clearance_rows):

@@ -35,10 +35,10 @@ def out_of_reach(violation):
 
 @kernel(inline=True)
 def count_standstill(way, settings, feasible, violation, left, dual, force, mu):
-    """Count whole steps in a row, at a stationary point, that left what rows are off. Whether no motion changes it.
+    """Count whole steps in a row at a stationary point that left the violation as it was. Whether no motion changes it.
 
     The multipliers y + c / mu of the next step leave the Lagrangian as stationary as y only where J^T c = 0. `force` is
-    the strongest one, which grows by every step, `left` the part of the violation that the last whole step left.
+    the largest multiplier, which grows with every step, `left` the part of the violation that the last whole step left.
     """
     progress = way_at(way, 0)
     nearly = (
@@ -51,10 +51,10 @@ def count_standstill(way, settings, feasible, violation, left, dual, force, mu):
 
 @kernel(inline=True)
 def count_drag(way, violation, before):
-    """Count steps in a row, long or short, that left what rows are off by a little. Whether there were enough.
+    """Count steps in a row, long or short, that left a small violation as it was. Whether there were enough.
 
-    A linkage with a freedom may be off by less and less along it, for as long as it moves: each step goes as far as
-    the rows' curvature lets it, and gains nothing. `before` is what rows were off a step ago.
+    The violation of a linkage that can move may decrease along that motion for as long as it moves: each step goes as
+    far as the rows' curvature lets it, and gains next to nothing. `before` is the violation a step ago.
     """
     progress = way_at(way, 0)
     by_little = TOUCHING < violation <= LITTLE
@@ -68,7 +68,10 @@ def count_drag(way, violation, before):
 
 @kernel(inline=True)
 def bound_nearby(way, violation, before):
-    """How long steps may be that restore rows, of which `count_drag` told; as long as steps gain nothing."""
+    """The largest length of steps that restore rows after `count_drag` found a drag; infinite otherwise.
+
+    The first step that gains ends the bound. `before` is the violation a step ago.
+    """
     progress = way_at(way, 0)
     if progress.nearby == 0.0:
         return math.inf
@@ -82,9 +85,9 @@ def bound_nearby(way, violation, before):
 
 @kernel(inline=True)
 def stays_off(way, feasible, steepest, violation, before):
-    """Whether what restored rows are off is what no motion nearby changes; `before` is what they were off a step ago.
+    """Whether no motion nearby changes the violation of restored rows; `before` is the violation a step ago.
 
-    Near a dead center |J^T c| falls faster than |c|, below its rounding in the end, but every step still gains.
+    Near a dead center |J^T c| decreases faster than |c|, in the end below its rounding, but every step still gains.
     """
     progress = way_at(way, 0)
     if progress.nearby == 1.0 and progress.drags >= NOT_NEARBY:
@@ -95,21 +98,22 @@ def stays_off(way, feasible, steepest, violation, before):
 
 @kernel(inline=True)
 def is_stuck(way):
-    """Whether the loop was found to stand still, and has not moved since but by restoring rows."""
+    """Whether the loop was found at a standstill, and has since taken only steps that restore rows."""
     return way_at(way, 0).stills == STUCK
 
 
 @kernel(inline=True)
 def contradicts(way, feasible, violation):
-    """Whether what restored rows are off tells of a contradiction; less does where the loop stood still."""
+    """Whether the violation of restored rows shows a contradiction; a smaller one does where the loop stood still."""
     return violation > (BEYOND_ROUNDING * feasible if is_stuck(way) else TOUCHING)
 
 
 @kernel(inline=True)
 def update_floor(way, floor, is_slow):
-    """Count slow steps by the floor of the penalty; the next floor, lower where they do not halve the violation.
+    """Count slow steps in a row at the floor of the penalty. Returns the next floor, lower after SLOW of them.
 
-    Rows whose slopes all but vanish, at a dead center say: only a harder penalty holds them.
+    A slow step does not halve the violation. Rows whose gradients almost vanish, for example at a dead center, are held
+    only by a harder penalty.
     """
     progress = way_at(way, 0)
     progress.slow_steps = progress.slow_steps + 1.0 if is_slow else 0.0

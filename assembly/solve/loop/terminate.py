@@ -25,7 +25,7 @@ def terminate(task, held, current, rows, system):
     loop, program = task.loop, task.program
     loop.sunk = task.watched and not task.tick and has_sunk(program.store, program.lifted.memory, current.residual)
     if loop.sunk and loop.iteration == loop.back_at:
-        # Bodies crossed there too, unnoticed: it is no pose to return to.
+        # Bodies crossed at that pose too, unnoticed: the solve must not return to it.
         loop.holds, loop.leash = 0, math.inf
     goes_back = must_roll_back(task)
     count_rounded_steps(loop, task.limits)
@@ -48,7 +48,7 @@ def terminate(task, held, current, rows, system):
 
 @kernel(inline=True)
 def count_rounded_steps(loop, limits):
-    """Count whole steps in a row at feasible iterates that do not reduce the slope: the remainder may be rounding."""
+    """Count whole steps in a row at feasible iterates that do not reduce the dual residual: it may be rounding."""
     most = max(GAIN * loop.last_dual, limits.stationarity)
     stands = loop.alpha * loop.cut == 1.0 and loop.dual > most and loop.violation <= loop.feasible
     loop.stood = loop.stood + 1 if stands else 0
@@ -112,9 +112,9 @@ def keep_what_holds(task, held, current, rows):
 
 @kernel(inline=True)
 def stop_at_limits(task, current):
-    """End where the steps or the time are over, or bodies go away; whether the loop ends so.
+    """End the loop if its steps or its time are used up, or bodies move away without bound. Returns whether it ends.
 
-    Some ends only lead back onto the rows from here.
+    In some cases it goes on instead, with steps that only lead back onto the rows.
     """
     loop, limits = task.loop, task.limits
     store = task.program.store

@@ -1,6 +1,6 @@
 """How far rows are from holding, with the tangency of lifted pairs counted in full, or by its effect on the gaps.
 
-A free pair's coordinates are unknowns; it is an extremum of the distance only where its rows of tangency t hold.
+A lifted pair's coordinates are unknowns; it is an extremum of the distance only where its rows of tangency t hold.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from assembly.solve.loop.residuals import violation_of
 
 @kernel(inner=True)
 def untouched(residual, jacobian, r, e, work):
-    """To first order, how the gap in row r changes where the rows of tangency, from e on, come to hold.
+    """The first-order change of the gap in row r when the rows of tangency, from e on, are brought to hold.
 
     The coordinates change by d = -T^-1 t, with t the residuals of the tangency and T their Jacobian in the coordinates.
     Infinite where T is singular.
@@ -61,7 +61,7 @@ def off_tangency(residual, jacobian, r, e, lax, work):
 
 @kernel(inner=True)
 def off_rows(table, lifted, one_sided, point, lax):
-    """The largest violation of rows and of the tangency of free pairs, which is counted as by `off_tangency`."""
+    """The largest violation of rows and of the tangency of lifted pairs, which `off_tangency` measures."""
     header = header_at(table, 0)
     free = lifted.free
     worst = violation_of(point.residual, one_sided, header.rows)

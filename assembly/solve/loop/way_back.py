@@ -26,7 +26,7 @@ WAY_RECORD = record_dtype(
     led_off=1,  # 1: the last step led farther off
     stills=1,  # whole steps in a row that changed nothing
     slow_steps=1,  # whole steps in a row that gained little
-    drags=1,  # steps of any length in a row that left what rows are off
+    drags=1,  # steps of any length in a row that left the violation as it was
     nearby=1,  # 1: steps that restore rows are no longer than a neighborhood
 )
 way_at = record_view(WAY_RECORD)
@@ -52,7 +52,7 @@ def way_back(program, current, trial, rows, system, progress, enough, tick):
 
 @kernel(inner=True)
 def begin_way(way):
-    """Rows have changed: what was counted of steps and violations is reset."""
+    """Reset the counts of steps and the least violation, because rows have changed."""
     progress = way_at(way, 0)
     progress.share = 1.0
     progress.lowest = math.inf

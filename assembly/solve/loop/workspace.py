@@ -24,11 +24,11 @@ from assembly.solve.loop.loop_state import LOOP
 from assembly.solve.loop.residuals import arrange, record_of_blocks, shape_of, size_of_shape
 from assembly.solve.loop.way_back import WAY
 
-# What a row has a number of: residuals at the current and the trial iterate, five fields of `Rows`, one of `Held`.
+# Numbers per row: residuals at the current and the trial iterate, five fields of `Rows`, one of `Held`.
 BY_ROW = 8
-# The rows: how many there are now, with lifted pairs; mu, whose inverse is the weight of one that counts. Of every row:
-# its multiplier, a better one, its weight (0: it does not count), what it pushes with, whether a step would break it
-# (1 or 0). `gram` is room for least squares of multipliers: J J^T, and a right side in its last row.
+# The rows: how many there are now, with those of lifted pairs; mu, whose inverse is the weight of an active row. For
+# every row: its multiplier, a proposed one, its weight (0: inactive), its force, whether it is active because a step
+# would break it (1 or 0). `gram` is workspace for least-squares multipliers: J J^T, and a right side in its last row.
 Rows = namedtuple("Rows", "count mu y better_y active forces foreseen gram")
 # The last feasible iterate: poses, tracked values, multipliers, and the numbers of the contacts that clearances had.
 Held = namedtuple("Held", "q tracked y numbers")
@@ -63,14 +63,14 @@ def penalized(rows, mu):
 
 @kernel(inline=True, allocates=True)
 def new_rows(count, mu):
-    """Rows outside the loop, of which only the weights and the forces are asked for."""
+    """Newly allocated rows for use outside the loop, which needs only their weights and forces."""
     vectors = np.zeros((5, count))
     return Rows(count, mu, vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors)
 
 
 @kernel(inline=True, allocates=True)
 def results_of(table, state):
-    """The end of a state, behind poses, tracked values, multipliers and residuals."""
+    """The results at the end of a state, after poses, tracked values, multipliers and residuals."""
     header = header_at(table, 0)
     end = 7 * header.bodies + TRACK * header.tracked + 2 * header.rows
     return carve(state, end, (state.size - end,))
@@ -138,9 +138,9 @@ def carve_points(table, most, doubles, integers):
 
 @kernel(inline=True)
 def carve_pairs(table, guess, memory, doubles, at, integers):
-    """What pairs need: which are free, the lengths of their coordinates, room for their derivatives; a guess of all.
+    """Carve what lifted pairs need: which pairs are lifted (none yet), lengths of coordinates, room for derivatives.
 
-    With what a contact manager of clearances remembers. No pair is free yet. And where it ends.
+    The guess of tracked values and the contact manager's memory are given. Also returns where the doubles of these end.
     """
     pairs = header_at(table, 0).contacts
     free = carve(integers, 0, (pairs,))
@@ -156,7 +156,7 @@ def carve_pairs(table, guess, memory, doubles, at, integers):
 
 @kernel(inline=True)
 def carve_tapes(table, doubles, at):
-    """What the instructions of expressions work in, and where it ends."""
+    """Carve the workspace for instructions of expressions. Also returns where its doubles end."""
     o = header_at(table, 0).tape_workspace
     inputs = carve(doubles, at, (table[o],))
     outputs = carve(doubles, at + table[o], (table[o + 1],))
@@ -186,7 +186,7 @@ def carve_unknowns(n, lifted, order, room):
 
 @kernel(inline=True)
 def carve_all(store, memory, end_effectors, doubles, integers):
-    """All that a solve works in, as `workspace_needed` counts it; rows and unknowns are those without lifted pairs."""
+    """Carve all that a solve works in, as `workspace_needed` counts it; rows and unknowns exclude lifted pairs."""
     table = store.table
     header = header_at(table, 0)
     pairs = header.contacts

@@ -1,9 +1,9 @@
-"""The second derivatives of a scene at a state, and poses beside it that hold: what ends are judged by.
+"""Second derivatives of a scene at a state, and nearby poses at which rows hold: ends of solves are judged by these.
 
 Unknowns are those of the loop: twists of the moving bodies in the order of their blocks, lengths over the scene's
 size, then four coordinates of every contact whose pair is at a fold. Rows are those of the program, then four of
-tangency a fold. All else that is asked of second order is done with these, outside
-(`solve/second_order/classification.py`).
+tangency a fold. What else is asked of second order is computed from these
+in `solve/second_order/classification.py`.
 """
 
 from __future__ import annotations
@@ -29,17 +29,18 @@ from assembly.solve.loop.residuals import add_row, arrange, move, record_of_bloc
 from assembly.solve.loop.violation import off_rows
 from assembly.solve.loop.workspace import new_rows, new_system
 
-# Rows that hold; so many steps lead back onto them, none longer than this.
+# Residuals of rows that hold, and that hold exactly; at most so many steps lead back onto them, none longer than this.
 HOLDS, EXACT, STEPS, LONGEST = 1e-11, 1e-14, 12, 1.0
-# Of large scenes the least curvature is found by so many inverse iterations, from the shift that a step tries first.
+# In large scenes the least curvature is found by so many inverse iterations, with the shift that a step tries first.
 ITERATIONS, LEAST_SHIFT = 60, 1e-8
-# The weight of rows in these steps, and of the steps' own squares; a step that gains less than this factor is the last.
+# The penalty of rows in these steps, whose inverse is their weight, and the weight of the steps' own squares. Once rows
+# hold, a step that leaves more than this part of the violation is the last.
 MU, SOFTNESS, GAIN = 1e-6, 1e-2, 0.1
 
 
 @kernel(inner=True, allocates=True)
 def write_curvature(store, state, forces, out, end_effectors, integers, doubles):
-    """The same as `curvature_at`, with what it works in."""
+    """Do what `curvature_at` does, in a given workspace."""
     header = header_at(store.table, 0)
     pairs = header.contacts
     free = np.empty(pairs, np.int64)
@@ -79,7 +80,7 @@ def write_curvature(store, state, forces, out, end_effectors, integers, doubles)
     allocates=True,
 )
 def curvature_at(table, pool, state, forces, out, end_effectors):
-    """Evaluate a state; tracked values found are written into it. Returns how many folds there are, or -1: no pair.
+    """Evaluate a state and write tracked values into it. Returns how many folds there are, or -1 if a pair is lost.
 
     With m rows and n unknowns, these included: out gets the objective's value, residuals (m), the objective's gradient
     (n), the rows' Jacobian (m, n), and the Hessian of objective + forces . rows (n, n). `end_effectors` is None where
@@ -95,7 +96,7 @@ def curvature_at(table, pool, state, forces, out, end_effectors):
 
 @kernel(inline=True)
 def is_at_most(values, limit):
-    """Whether no value is larger, without its sign, or no number."""
+    """Whether every absolute value is at most the limit; false if a value is NaN."""
     for value in values:
         if not abs(value) <= limit:
             return False
@@ -104,7 +105,7 @@ def is_at_most(values, limit):
 
 @kernel(inner=True, allocates=True)
 def walk_within(store, state, step, share, kept, residual, end_effectors, memory):
-    """The same as `walk`, with what it works in."""
+    """Do what `walk` does, in a given workspace."""
     header = header_at(store.table, 0)
     pairs = header.contacts
     free = np.empty(pairs, np.int64)
@@ -174,7 +175,7 @@ def walk(table, pool, state, step, share, kept, residual, end_effectors):
 
 @kernel(inner=True, allocates=True)
 def least_within(store, state, forces, active, direction, end_effectors, integers, doubles):
-    """The same as `least_curvature`, with what it works in."""
+    """Do what `least_curvature` does, in a given workspace."""
     header = header_at(store.table, 0)
     found = point_at(store, state, np.empty(header.contacts, np.int64))
     point = found.iterate
@@ -225,7 +226,7 @@ def least_within(store, state, forces, active, direction, end_effectors, integer
 def least_curvature(table, pool, state, forces, active, direction, end_effectors):
     """The least curvature of objective + forces . rows along motions that keep the rows; its direction is written.
 
-    `active` has the weight of every row that is to be kept, zero for others. No number where a contact is at a fold.
+    `active` has the weight of every row that is to be kept, zero for others. NaN if a contact is at a fold.
     """
     header = header_at(table, 0)
     integers, doubles = size_of_shape(table, header.rows, 6 * header.moving)

@@ -1,4 +1,4 @@
-"""Rows of a batch, one solve after the other, without the interpreter."""
+"""Solve rows of a batch one after the other, without the interpreter."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import namedtuple
 from assembly._address import call_address
 from assembly._kernel import kernel
 
-# What a thread solves with, of its own: the scene, and the memory of a solve (`solve/attempts/attempts.py`).
+# What each thread has for itself: its scene, and the memory of a solve (`solve/attempts/attempts.py`).
 Desk = namedtuple("Desk", "table pool state history doubles integers")
 # Where in the pool a row writes its numbers, (w,), and where in a state the turn of an angle begins at a number of the
 # pool, (d, 2); the numbers of all rows, (n, w).
@@ -24,8 +24,8 @@ _GIVEN = f"{_DESK}, f8[::1], {_WRITES}, f8[:, ::1], f8[:, ::1], UniTuple(i8, 3)"
 def solve_rows(desk, settings, writes, begun, ended, span, end_effectors):
     """Solve rows of a span: row k begins with the state in row k of `begun`, or in its only row.
 
-    What it ends with, up to the results of the loop, is row k of `ended`. Nothing passes from one row to the next.
-    Returns how many the loop itself solved.
+    The state that it ends with, up to the results of the loop, becomes row k of `ended`. Nothing passes from one row to
+    the next. Returns how many the loop itself solved.
     """
     table, pool, state, history, doubles, integers = desk
     places, turns, numbers = writes

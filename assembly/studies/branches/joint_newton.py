@@ -3,8 +3,8 @@
 A joint of the tree leads from the frame on its parent to that on its child by a motion M (a rotation by rows, then a
 shift), which holds whatever the coordinates are. A unit of coordinate k moves M to M exp(S_k), S_k constant in the
 moving frame: so all lower pairs are alike. Other rows c close loops. From coordinates near a branch,
-(J^T J + d I) step = -J^T c, with d = |c|^2 / 1000 that lets rows depend on each other, and vanishes at the end.
-Branches are sought by many starts: each costs 3 microseconds a step for an arm of six joints.
+(J^T J + d I) step = -J^T c, with d = |c|^2 / 1000, which allows for dependent rows and vanishes at the solution.
+Branches are sought from many starts: each costs 3 microseconds a step for an arm of six joints.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from assembly.constraints.program.primitives import COINCIDENT, SLIDE, SWING
 from assembly.geometry.vec import blend, cross, dot, quaternion_matrix, sub
 from assembly.kinematics.motion import exponential
 
-# Bodies, the first of a joint's coordinates, and how many it has.
+# A joint's bodies, the first of its coordinates, and how many it has.
 TREE_JOINT = record_dtype("i8", parent=1, child=1, first=1, count=1)
 # The frame on the parent, the body as seen from the frame on it, and S_k of each coordinate: shift, then turn.
 TREE_FRAMES = record_dtype("f8", before=12, after=12, twists=36)
@@ -27,9 +27,9 @@ CLOSING_ROW = record_dtype("i8", kind=1, component=1, body_a=1, body_b=1)
 CLOSING_FRAMES = record_dtype("f8", frame_a=12, frame_b=12, value=1)
 tree_joint_at, tree_frames_at = record_view(TREE_JOINT), record_view(TREE_FRAMES)
 closing_row_at, closing_frames_at = record_view(CLOSING_ROW), record_view(CLOSING_FRAMES)
-# Steps at most; what rows may be off at the end; coordinates change by no more than this in a step.
+# Most steps; the largest norm of the residuals at the end; the most that a coordinate changes by in a step.
 STEPS, CLOSED, LONGEST = 60, 1e-13, 0.7
-# The damping over the square of what rows are off by, and what is left of it at the end.
+# The damping over the sum of the squared residuals, and what is left of it at the end.
 DAMPING, LEAST = 1e-3, 1e-15
 # 1 + cosine of axes that are opposed but for rounding.
 OPPOSED = 1e-14
@@ -37,7 +37,7 @@ OPPOSED = 1e-14
 
 @kernel(inner=True)
 def composed(a, b, out):
-    """The pose b as seen from where pose a is seen from: out = a b; out is another array."""
+    """The product of two poses, out = a b; out must be another array."""
     for i in range(3):
         for j in range(3):
             out[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j]
@@ -46,7 +46,7 @@ def composed(a, b, out):
 
 @kernel(inline=True)
 def turned(a, x, y, z):
-    """A vector turned as a pose turns."""
+    """A vector rotated by the rotation of a pose."""
     return (
         a[0] * x + a[1] * y + a[2] * z,
         a[3] * x + a[4] * y + a[5] * z,
@@ -124,7 +124,7 @@ def closing_slopes(kind, component, frame_a, frame_b, record):
 
 @kernel(inline=True)
 def rate_of(record, place, column, body_moves, sign):
-    """What a unit of a coordinate adds to a row by one of its bodies, `place` being its point of the row there."""
+    """The rate of a row for a unit rate of a coordinate that moves one of its bodies; `place`: its point there."""
     if body_moves == 0:
         return 0.0
     turn = (column[6], column[7], column[8])
@@ -211,7 +211,7 @@ def close_loops(joints, frames, rows, row_frames, motions, poses, off):
     rows (m), row_frames (m) : CLOSING_ROW, CLOSING_FRAMES
     motions (s, e, 12) : in and out
     poses (s, n, 12) : of bodies that no joint carries in; of all others out
-    off (s) : out, what rows are off by; not finite where a start led nowhere
+    off (s) : out, the norm of the residuals; not finite where a start led nowhere
     """
     k = 0
     for e in range(joints.shape[0]):
