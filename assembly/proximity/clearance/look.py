@@ -58,8 +58,6 @@ SWEPT_BUDGET, SHORTEST = 1000, 1.0 / 256.0
 NOT_PARTED, ARE_PARTED, NEED_SHORTER = 0, 1, 2
 # The clock is read once for so many pairs for which directions are sought.
 SOUGHT_AT_ONCE = 8
-# How a pair of nodes was left: parted, to be replaced by children, open, or with it the look ends.
-DONE, DIVIDED, ENDED = 0, 1, 2
 
 
 @kernel(inner=True)
