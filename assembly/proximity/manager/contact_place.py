@@ -1,9 +1,10 @@
 """The place of a contact on two bodies: the region in which a least gap of these bodies does not apply.
 
-Around a contact's pair of points the bodies are nearer than any gap above zero. Its place is all that is reached from
-there between the two bodies without their gap rising to the least one: the corners of a face that lies on another face,
-the two minima into which the contact's minimum parts. What is near elsewhere, beyond a wider gap, is another place. A
-contact that is still open is taken as closed: what it will leave open by less than the least gap is in its place.
+Around a contact's pair of points the bodies are nearer to each other than any gap above zero. The place of the contact
+is the region between the bodies that can be reached from these points without the gap rising to the least gap: it holds
+the corners of a face that lies on another face, and both minima into which the contact's minimum splits. Where the
+bodies are near beyond a wider gap is another place. For a contact that is still open, the least gap is counted from the
+contact's own gap.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ from assembly.proximity.manager.overlap import DEPTH, next_near, patch_at, proje
 from assembly.proximity.manager.posed_pair import posed_pair
 from assembly.proximity.manager.records import ContactManager, lengths_of, pair_lengths_of, pair_of
 
-# A way from one pair to another one has so many strides, were it straight; so many it may have at most.
+# How many strides a path between two pairs of points takes if it is straight; and how many at most.
 STRIDES, LONGEST = 32, 96
-# How often a point is put between the bodies anew after a stride, and which part of a stride has to be gained.
+# How often a point is centered between the bodies after a stride; by which part of a stride it must come nearer.
 CENTERINGS, GAINED = 3, 0.05
 # A part of an edge and a point.
 EdgeQuery = namedtuple("EdgeQuery", "store edge y interval")
@@ -79,7 +80,7 @@ _nearest_from = kernel(inner=True)(damped_newton(_seen, step_along, move_along, 
 
 @kernel(inner=True)
 def point_on_edge(store, edge, low, high, y):
-    """The point of a part of an edge that Newton's method takes for the nearest one to y."""
+    """The point of a part of an edge nearest to y, as Newton's method finds it from the middle of the part."""
     query = EdgeQuery(store, edge, y, Interval(low, high, False))
     return edge_jet(store, edge, _nearest_from(query, 0.5 * (low + high))[2])[0]
 
@@ -117,7 +118,7 @@ def nearest_point(posed, side, y, distance, stack):
 
 @kernel(inner=True)
 def between_bodies(posed, c, distance, stack):
-    """The middle of the nearest points of both bodies to c, how far these are apart, and whether both are in reach."""
+    """The middle of both bodies' nearest points to c, how far these are apart, and whether both are near c."""
     p, found_f = nearest_point(posed, 0, c, distance, stack)
     q, found_g = nearest_point(posed, 1, seen_by_other(posed, 0, c), distance, stack)
     q = seen_by_other(posed, 1, q)
@@ -126,9 +127,9 @@ def between_bodies(posed, c, distance, stack):
 
 @kernel(inner=True)
 def leads_to(posed, begin, end, level, stack):
-    """Whether a way between the bodies leads from one point to another one, along which they are nearer than a level.
+    """Whether a path between the bodies joins two points, with gaps below a level all along.
 
-    It goes straight for the end, and after every stride back to where both bodies are equally far.
+    Each stride goes straight toward the end; then the point is centered between the bodies again.
     """
     left = distance_between(end, begin)
     stride = left / STRIDES
@@ -167,13 +168,14 @@ def contact_points(posed, given, tracked):
 def spread_place(posed, extrema, begin, limits, stack):
     """Mark the extrema in the place of a contact whose points have their middle at `begin`.
 
-    From extremum to extremum, the nearest first: each is tried from the nearest point that is known to be in the place.
-    The `limits` are the gap below which no extremum is taken, and the level below which gaps are.
+    The place grows from extremum to extremum, the nearest first: each is tried from the nearest point that is known to
+    be in the place. `limits` are the gap below which extrema are left out, and the level that gaps must stay below.
     """
     lowest, level = limits
     count = extrema.shape[0]
     middles = np.empty((count, 3))
-    # From how near an extremum was tried last, and from where it is to be tried next.
+    # The distance from which an extremum was last tried; its distance to the nearest point of the place, and that
+    # point.
     tried = np.full(count, math.inf)
     nearest = np.full(count, math.inf)
     source = np.empty((count, 3))
@@ -208,7 +210,7 @@ def spread_place(posed, extrema, begin, limits, stack):
 
 @kernel(inner=True)
 def mark(manager, p, q, tracked, extrema, stack):
-    """Mark the extrema of pair p that are a given contact's pair, or in its place; how many contacts have one."""
+    """Mark extrema of pair p at given contacts or in their places; how many of these contacts have points."""
     table = manager.store.table
     pair = pair_of(manager, p)
     posed = posed_pair(manager, p, q)
@@ -230,7 +232,7 @@ def mark(manager, p, q, tracked, extrema, stack):
             ):
                 extremum.place = OF_CONTACT
         gap = distance_between(a, b) if contact.gap > 0.0 else 0.0
-        # A contact that may stay open, and is by more than the least gap, excuses nothing that is nearer.
+        # A contact that may be open, and is by the least gap or more, excuses no gap below the least one.
         lowest = least if given.opens == 1 and gap >= least else -math.inf
         spread_place(posed, extrema, scale(0.5, add(a, b)), (lowest, gap + least), stack)
     return known

@@ -1,12 +1,12 @@
-"""Few points of a continuum of extrema are rows: of an edge that lies on a face, of a valley between two faces.
+"""Few points of a continuum of extrema become rows: of an edge that lies on a face, of a valley between two faces.
 
-Where an edge is equally near to a face all along, as two flush plates are along their rims, Newton's method finds as
-many extrema as it has starts. The gap is affine along a straight edge: its ends are corners, which have rows of their
-own, and what is between them is implied. Of a curved edge points are held that stay where they are on it, one for each
-40 degrees or so by which it turns; where it is tilted, the extremum is isolated, and a row beside them.
+Where an edge has the same distance from a face all along, as boundary edges of two flush plates have, Newton's method
+finds as many extrema as it has starts. Along a straight edge the gap is affine: both ends are corners with rows of
+their own, which imply all points between. On a curved edge a few points are held in place, one for each 40 degrees or
+so by which it turns; where the edge is tilted, its extremum is isolated and becomes a row beside these.
 
-A ball in a socket of its radius has no extremum at all, or any point is one. There points of the hollow face are held,
-as far apart in their normals as those of an edge.
+A ball in a socket of the same radius has no extremum, or one at any point. Points of the hollow face are held there,
+with normals as far apart as the tangents at held points of an edge.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from assembly.proximity.manager.extrema import NEW, ROOT, USELESS, extremum_at
 from assembly.proximity.manager.near_singular import across_near_singular
 from assembly.proximity.manager.near_singular_points import features_of, is_loose, is_next_in_near_singular
 
-# Cosine of the angle by which an edge turns from one of its points that are held to the next; a part of an edge is
-# straight that turns by less than this.
+# Cosine of the angle by which an edge turns from one held point to the next; a part of an edge that turns by less than
+# the second number [rad] is straight.
 NEXT, STRAIGHT = 0.75, 0.02
-# A bulge fills a hollow whose curvature is off by no more than this part.
+# A bulge fills a hollow if their Gaussian curvatures differ by no more than this part.
 ALIKE_BENT = 0.05
 # Rounding of gaps.
 SLACK = 1e-9
@@ -45,7 +45,7 @@ def kinds_of(posed, codes):
 
 @kernel(inner=True)
 def is_straight(posed, codes, side, t, width):
-    """Whether an edge turns by next to nothing along so much of its parameter, as it is bent at t."""
+    """Whether an edge, with the curvature that it has at t, hardly turns over a width of its parameter."""
     _p, along, bent = edge_jet(posed.store, feature_at(posed.store.table, posed.shells[side], codes[side]), t)
     side_of = cross(along, bent)
     square = dot(along, along)
@@ -54,7 +54,7 @@ def is_straight(posed, codes, side, t, width):
 
 @kernel(inner=True)
 def is_next(posed, codes, side, t, extrema, count):
-    """Whether an edge has turned, at t, far from all of its points over a face that are among the first `count`."""
+    """Whether the tangent at t is far from those at the edge's points over the same face among the first `count`."""
     store = posed.store
     edge = feature_at(store.table, posed.shells[side], codes[side])
     along = unit(edge_jet(store, edge, t)[1])
@@ -76,9 +76,9 @@ def width_of(posed, codes, side):
 
 @kernel(inner=True)
 def bulge_at(posed, side, code, u, v):
-    """Gaussian curvature of a face of one body, above zero where it is a bulge or a hollow, below where it is a hollow.
+    """Gaussian curvature of a face of one body, made negative in a hollow, and its outward normal in the axes of f.
 
-    A saddle counts as flat. And its outward normal, in the axes of f.
+    A saddle counts as flat: zero.
     """
     store = posed.store
     surface = feature_at(store.table, posed.shells[side], code)
@@ -91,15 +91,15 @@ def bulge_at(posed, side, code, u, v):
     curvature = max(l * k - m * m, 0.0) / area if area > 0.0 else 0.0
     if side == 1:
         n = matvec(posed.pose.rotation, n)
-    # Towards the outside a hollow bends.
+    # A hollow bends toward its outward normal.
     return (-curvature if l + k > 0.0 else curvature), n
 
 
 @kernel(inner=True)
 def next_in_socket(posed, codes, x, extrema):
-    """Of which of two faces a point is to be held, where one is a hollow that the other fills: HELD_F, HELD_G or 0.
+    """Which face a point is held on, the hollow one of two that fill each other: HELD_F, HELD_G or 0.
 
-    So it is where the normal has turned far from those of all points that are known between the two.
+    It is held if the normal has turned far from those at all known points between the two faces.
     """
     bulge_f, n_f = bulge_at(posed, 0, codes[0], x[0], x[1])
     bulge_g, n_g = bulge_at(posed, 1, codes[1], x[2], x[3])
@@ -116,7 +116,7 @@ def next_in_socket(posed, codes, x, extrema):
 
 @kernel(inner=True)
 def is_implied_on_edge(posed, codes, side, extrema, k):
-    """Whether extremum k, any point of an edge that lies on a face, says no more than others do; if not, it is held."""
+    """Whether extremum k, a point of an edge that lies on a face, is implied by others; if not, it is held."""
     extremum = extremum_at(extrema.rows, k)
     t = extremum.parameters[2 * side]
     if extremum.origin == NEW:
@@ -130,7 +130,7 @@ def is_implied_on_edge(posed, codes, side, extrema, k):
 
 @kernel(inner=True)
 def is_implied_in_valley(posed, codes, extrema, k):
-    """The same of any point of a valley between two faces."""
+    """`is_implied_on_edge`, for a point of a valley between two faces."""
     extremum = extremum_at(extrema.rows, k)
     surfaces = features_of(posed, codes)
     x = pair_parameters(extremum)
@@ -145,7 +145,7 @@ def is_implied_in_valley(posed, codes, extrema, k):
 
 @kernel(inner=True)
 def is_implied(posed, extrema, k):
-    """Whether extremum k, behind all that stay, is of a continuum and next to what is held; if not, it is held."""
+    """Whether extremum k, the last one kept, is of a continuum and implied by others; if not, it is held."""
     extremum = extremum_at(extrema.rows, k)
     if extremum.origin == USELESS or not is_loose(extremum):
         return False
@@ -160,9 +160,9 @@ def is_implied(posed, extrema, k):
 
 @kernel(inner=True)
 def hold_continua(posed, extrema):
-    """Of every continuum of extrema hold those that are listed and few of the new ones, and leave the others out.
+    """Hold the listed points of each continuum of extrema and a few of the new ones, and drop the others.
 
-    What Newton's method finds there may fill the room.
+    Otherwise what Newton's method finds on a continuum could fill the list.
     """
     rows = extrema.rows
     stay = 0

@@ -1,9 +1,10 @@
-"""Edges of one body that go through flat faces of the other: where plates cross no middle of a patch is in the other.
+"""Edges of one body that go through flat faces of the other: plates may cross with no patch's middle in the other.
 
-A part of an edge is its chord here, off by what it bends. The edge goes through the plane of a patch where the ends of
-the chord are farther from it than that, on either side; and through the face, where all points of the plane that are as
-near to the chord are inside of the face's boundary: bodies that touch along edges do not cross. Facets of a bent face
-stand out of it where it is hollow, so that a peg in a bore may cut them: of such faces nothing is told here.
+A part of an edge is replaced by its chord, within a margin by which it bends. The edge goes through the plane of a
+patch if the ends of the chord are on opposite sides of it, farther away than the margin; it goes through the face if
+all points of the plane within the margin of the chord are inside the face's boundary: bodies that touch along edges do
+not cross. Facets of a curved face stand out of it where it is hollow, so that a peg in a bore may cut them: curved
+faces are left out.
 """
 
 from __future__ import annotations
@@ -22,14 +23,14 @@ from assembly.proximity.brep.records import EDGE, FACE, FACE_RECORD, face_at, sh
 from assembly.proximity.bvh.tree import ELEMENT, element_at, node_of, tree_at
 from assembly.proximity.extrema.feature_jets import edge_jet, edge_limits
 
-# A part of an edge is looked at with so much of its neighbors, in half widths: what goes through where two meet counts.
+# A part of an edge is widened to this many of its half widths, so that the joint of two parts is covered.
 WIDER = 1.5
 # Sine of the angle by which normals of a flat patch turn, at most.
 FLAT = 1e-9
 
 
-# Where a segment cuts a triangle. hit: whether it does; part: which part of the way; q, r: the shares of these corners
-# there; turns: whether the segment goes to the side to which the corners turn left.
+# Where a segment cuts a triangle p, q, r. hit: whether it does; part: where along the segment, 0 to 1; q, r: the
+# barycentric coordinates of these corners there; turns: whether the segment goes along the normal (q - p) x (r - p).
 TriangleCut = namedtuple("TriangleCut", "hit part q r turns")
 
 
@@ -37,8 +38,8 @@ TriangleCut = namedtuple("TriangleCut", "hit part q r turns")
 def cut_at(a, d, p, q, r, end, beside):
     """Where a segment from a along d cuts a triangle (Möller and Trumbore).
 
-    What is nearer to an end than that part of the segment does not count; what passes `beside` the triangle by so small
-    a part of its sides does.
+    A cut within the part `end` of the segment from one of its ends does not count; one that misses the triangle by no
+    more than the part `beside` of its sides does.
     """
     e = sub(q, p)
     f = sub(r, p)
@@ -72,7 +73,7 @@ def chord_of(store, edge, t, half):
 
 @kernel(inner=True)
 def is_well_inside(store, trim, u, v, du, dv):
-    """Whether parameters are inside a boundary with all that is beside them."""
+    """Whether the four parameters beside (u, v), at du and dv from it, are all inside a boundary."""
     return (
         trim_side(store, trim, u - du, v) > 0
         and trim_side(store, trim, u + du, v) > 0
@@ -83,7 +84,7 @@ def is_well_inside(store, trim, u, v, du, dv):
 
 @kernel(inline=True)
 def patch_vertex_contacts(store, surface, patch):
-    """The first (u, v) of a patch and its widths, and its corners, counterclockwise in (u, v) from there."""
+    """The lowest (u, v) of a patch, its widths, and its four corners from there, counterclockwise in (u, v)."""
     u = patch.middle[0] - patch.half[0]
     v = patch.middle[1] - patch.half[1]
     wide = 2.0 * patch.half[0]
@@ -116,7 +117,7 @@ def goes_through(store, tree, shell, e, a, b, margin):
             continue
         if face.trim < 0:
             return True
-        # A chord that leans over the plane is near to more of it.
+        # The more the chord is inclined to the normal, the more of the plane is within the margin.
         beside = margin * math.sqrt(dot(n, n) * dot(sub(b, a), sub(b, a))) / abs(dot(n, sub(b, a)))
         du = beside * wide / max(math.sqrt(dot(sub(s, t), sub(s, t))), 1e-300)
         dv = beside * high / max(math.sqrt(dot(sub(s, q), sub(s, q))), 1e-300)
@@ -129,7 +130,7 @@ def goes_through(store, tree, shell, e, a, b, margin):
 
 @kernel(inner=True)
 def pierces(posed, pair, margin):
-    """Whether of two elements, of f and of g, one is a part of an edge that goes through the other, a patch."""
+    """Whether one of two elements, of f and of g, is a part of an edge that goes through the other one, a patch."""
     store = posed.store
     for side in range(2):
         tree, shell = posed.trees[side], posed.shells[side]

@@ -43,16 +43,16 @@ EXTREMUM = record_dtype(
     point_f=3,
     point_g=3,
     fold=1,  # how far it is from a fold, det H / |H|^2
-    beyond=1,  # the same, the least beyond the knot lines beside it; NaN: not looked at
-    corner=1,  # what it holds on to if it is a vertex contact (`vertex_contacts.py`), else 0
-    place=1,  # ELSEWHERE, or where it is to given contacts (`contact_place.py`)
+    beyond=1,  # the same beyond the knot lines beside it, the least; NaN: not evaluated
+    corner=1,  # what a vertex contact is locked to (`vertex_contacts.py`); 0: it is none
+    place=1,  # ELSEWHERE, BESIDE_CONTACT or OF_CONTACT (`contact_place.py`)
 )
 extremum_at = record_view(EXTREMUM)
 ROOT = size_of(EXTREMUM)
-# A list of extrema. rows: the EXTREMUM records, of which the row behind the last is that of a start that is tried;
-# count: how many there are, (1,); derivatives, tracked: one record of each, for a pair of features that is tried.
+# A list of extrema. rows: the EXTREMUM records; the row behind the last one is for the start that is being tried;
+# count: how many there are, (1,); derivatives, tracked: a record of each, for the pair of features that is being tried.
 Extrema = namedtuple("Extrema", "rows count derivatives tracked")
-# Where it is from: of no use, new, from LISTED on the place it has, down from GIVEN_CONTACT which given contact it is.
+# Origins of an extremum: USELESS; NEW; LISTED + k if slot k has it; GIVEN_CONTACT - c if it is given contact c.
 USELESS, NEW, LISTED, GIVEN_CONTACT = -2.0, -1.0, 0, -3.0
 # A given contact of two bodies in the table.
 GIVEN_DTYPE = record_dtype(
@@ -65,11 +65,11 @@ GIVEN_DTYPE = record_dtype(
 )
 given_at = record_view(GIVEN_DTYPE)
 GIVEN_RECORD = size_of(GIVEN_DTYPE)
-# Of an extremum: in no contact's place, in one beside the contact's own pair, that pair.
+# Places of an extremum: in no given contact's place; in one, beside the contact's own pair; that pair.
 ELSEWHERE, BESIDE_CONTACT, OF_CONTACT = 0.0, 1.0, 2.0
 # What became of a start: nothing there, an extremum that is known, a saddle, a minimum.
 NOTHING, ALIKE, SADDLE, MINIMUM_FOUND = 0, 1, 2, 3
-# Roots of no use are the same within this radius, in parts of the scene's size.
+# Useless extrema are the same within this radius [over the size of the scene].
 SAME = 1e-6
 
 
@@ -136,7 +136,7 @@ def are_one(posed, rows, i, k, merge_radius):
 def is_known_one(posed, extrema, merge_radius):
     """Whether the extremum that is tried is one of the list.
 
-    One of far sides, or a saddle, hides no contact beside it.
+    A useless one, of far sides or a saddle, hides no contact beside it: its merge radius is small.
     """
     for k in range(extrema.count[0]):
         radius = min(merge_radius, SAME) if extremum_at(extrema.rows, k).origin == USELESS else merge_radius
@@ -147,7 +147,7 @@ def is_known_one(posed, extrema, merge_radius):
 
 @kernel(inner=True)
 def surfaces_extremum(posed, start, extremum):
-    """Newton on two surfaces from `start`, the controller where it fails; fills an extremum.
+    """Newton's method on two surfaces from `start`, the controller where it fails; fills an extremum.
 
     Returns NOTHING, SADDLE or MINIMUM_FOUND.
     """
@@ -168,7 +168,7 @@ def surfaces_extremum(posed, start, extremum):
 
 @kernel(inner=True)
 def solids_extremum(posed, codes, start, n, extrema, vertex_contact):
-    """Switching and Newton on features of two solids, Newton alone for a corner; fills the extremum behind the list."""
+    """Newton's method with switching of features, without it for a vertex contact; fills the row behind the list."""
     store = posed.store
     i, j = posed.bodies
     q = posed.poses
@@ -226,8 +226,9 @@ def write_frame(extremum, x, frame, fold):
 
 @kernel(inner=True)
 def add_extremum(posed, codes, start, n, merge_radius, extrema, vertex_contact):
-    """Look for an extremum from a start and add it, as USELESS, if it is none of the known ones; a corner where it
-    holds on to something.
+    """Look for an extremum from a start and add it, as USELESS, if it is none of the known ones.
+
+    It is a vertex contact where `vertex_contact` says what that is locked to, and not where this is 0.
 
     Returns NOTHING, ALIKE, SADDLE or MINIMUM_FOUND.
     """
@@ -245,7 +246,7 @@ def add_extremum(posed, codes, start, n, merge_radius, extrema, vertex_contact):
 
 @kernel(inner=True)
 def add_surface_extremum(posed, start, merge_radius, extrema):
-    """The same of two surfaces."""
+    """`add_extremum`, for two surfaces."""
     return add_extremum(posed, (0, 0), start, (0.0, 0.0, 0.0), merge_radius, extrema, 0.0)
 
 
@@ -253,8 +254,8 @@ def add_surface_extremum(posed, start, merge_radius, extrema):
 def add_given(posed, tracked, listed, many, merge_radius, extrema):
     """Add the extrema at which given contacts of the two bodies are now.
 
-    A contact whose coordinates are unknowns of a solve may be on its way to another extremum than Newton's method goes
-    to from there: it does not stand for that one.
+    A contact whose coordinates are unknowns of the solve may be on its way to another extremum than the one that
+    Newton's method finds from there: it does not stand for the latter.
     """
     store = posed.store
     for c in range(many):
@@ -275,7 +276,7 @@ def add_given(posed, tracked, listed, many, merge_radius, extrema):
                 same = frame.regular and are_one(posed, extrema.rows, before, count, merge_radius)
                 extrema.count[0] = count if same else before
             elif frame.regular and opposed(frame, posed.pose.rotation, store, posed.surfaces[1], x):
-                # At a fold Newton's method may find nothing: there the contact still is.
+                # At a fold Newton's method may find nothing: the contact is still there.
                 extrema.count[0] += 1
         if extrema.count[0] > before:
             extremum_at(extrema.rows, before).origin = GIVEN_CONTACT - c

@@ -1,7 +1,7 @@
 """Where flat faces can have extrema, known before Newton's method looks for them.
 
-Of two flat faces none is nearest inside of both: it is on an edge of one of them, and found from there. An edge over a
-flat face is nearest or farthest where it is level, where its tangent is perpendicular to the normal.
+The least distance of two flat faces is also that of an edge of one of them, and found from there. The distance of an
+edge from a flat face is stationary where the edge is level: where its tangent is perpendicular to the normal.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from assembly.proximity.manager.overlap import patch_at
 
 __all__ = ["are_flat", "may_be_level"]
 
-# Normals of a flat face lean from each other by rounding alone [rad]; cones around them are a few 1e-14 wide.
+# Normals of a flat face differ by rounding alone, by less than this [rad]; cones around them are a few 1e-14 wide.
 FLAT = 1e-12
-# An edge is level near an element where its tangent and curvature there say so within so many half widths; elements
-# turn by 0.2 rad.
+# An edge is taken for level near an element if, by its tangent and curvature there, it is within so many half widths;
+# elements turn by 0.2 rad.
 BEYOND = 2.0
 
 
@@ -42,7 +42,7 @@ def are_flat(posed, codes, e, d):
 def may_be_level(posed, codes, e, d):
     """Whether an edge may be level over a flat face near its element, or all along it; True for all other features.
 
-    Elements e and d are of features codes.
+    Elements e and d belong to the features `codes`.
     """
     kinds = kinds_of(posed, codes)
     side = 0 if kinds[0] == EDGE else 1

@@ -1,11 +1,10 @@
-"""Pairs of points through which bodies with faces that all but touch seem to be in each other: a head on a plate,
-beside its hole.
+"""False overlaps of flush bodies: extremal pairs with gaps far below zero, as of a head on a plate, beside its hole.
 
-Where a face lies on another one, or slightly in it, the pair of an edge of one and of a wall beside it may have opposed
-normals and a gap far below zero: the rim of a head is behind the wall of the hole that it covers, and the bottom of a
-dovetail behind the top of the lip over it. The intersection at an end of such a pair is a sliver between two opposed
-faces. The way apart is off these faces, which is next to nothing, and they have rows of their own; the way along the
-pair would lead along the faces.
+Where a face of one body lies on a face of the other, or slightly in it, an edge of one and a wall of the other beside
+it may have opposed normals and a gap far below zero: the edge of a screw head is behind the wall of the hole that it
+covers, and the bottom of a dovetail behind the top of the lip over it. The overlap at an end of such a pair is a sliver
+between two opposed faces. To come apart, the bodies move along the normal of these faces, by next to nothing; that is
+told by rows of the faces. A row of this pair would push along the faces instead.
 """
 
 from __future__ import annotations
@@ -20,8 +19,8 @@ from assembly.proximity.manager.overlap import DEPTH, next_near, projection_at, 
 from assembly.proximity.manager.records import HANDED_OFF, LOST
 from assembly.proximity.manager.slots import give_up
 
-# What bodies have in common is thin at an end of a pair where faces of both are nearer to it than this part of its
-# depth, and their normals are opposed, by the cosine between the one and what is opposed to the other.
+# The overlap of two bodies is a sliver at an end of a pair if faces of both are nearer to that end than the first
+# number times the depth of the pair, and the cosine between their normals is less than minus the second number.
 SHORT, OPPOSED = 0.1, 0.5
 # Depths that are rounding, and room for faces about a point.
 DEPTH_ROUNDING, FACES_ABOUT = 1e-9, 16
@@ -61,7 +60,7 @@ def is_in_sliver(posed, c, distance, stack, normals):
 
 @kernel(inner=True, allocates=True)
 def drop_flush(manager, p, posed, extrema, tracked):
-    """Make extrema of pair p useless that begin or end between flush faces; slots are given up."""
+    """Mark extrema of pair p that begin or end between flush faces as USELESS, and free their slots."""
     stack = np.empty(DEPTH, np.int64)
     normals = np.empty((2, FACES_ABOUT, 3))
     for k in range(extrema.count[0]):

@@ -1,9 +1,9 @@
 """How far a pair of bodies may move until its next update, and which part of that it has used.
 
 What an update does not list is farther than the pair's motion bound: until a point of one body has moved by that much,
-seen from the other, it cannot touch. It is the smaller one whose motion is measured (`mover`): a wide plate's rim moves
-far as a small ring turns. Where a motion may bring forth a contact, a ball around these patches of it has a motion
-bound of its own.
+seen from the other, it cannot touch. The motion of the smaller body is measured, seen from the larger one (`mover`):
+seen from a small ring that turns, the border of a wide plate moves far. Where a motion may create a contact, a ball
+around those patches of the body that moves has a motion bound of its own.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def quaternion_distance(e, f):
 
 @kernel(inline=True)
 def turned_by(known, e):
-    """The same of the turn e of a pair and that of its last update."""
+    """`quaternion_distance` between the turn e of a pair and that at its last update."""
     return quaternion_distance(e, (known.turn[0], known.turn[1], known.turn[2], known.turn[3]))
 
 
@@ -104,7 +104,7 @@ def root_ball(store, moving):
 
 @kernel(inner=True)
 def margin_now(manager, p, moving):
-    """Keep the poses of pair p's bodies. Returns its query margin: for several moves like those since the update."""
+    """Keep where pair p is now. Returns its query margin: several times its motion per call since the last update."""
     header, known, lengths = header_of(manager), pair_state_of(manager, p), lengths_of(manager)
     margin = known.margin
     pair = pair_of(manager, p)
@@ -113,8 +113,8 @@ def margin_now(manager, p, moving):
         pace = moved_from(middle, three_of(known.place), moving)
         pace += 2.0 * radius * turned_by(known, moving.quaternion)
         pace /= max(header.calls - known.called, 1.0)
-        # After a step that was cut, as far as the whole step; but motion bounds are no larger where contacts may be
-        # created.
+        # After a step that was cut, the margin is to cover the whole step; but only up to the curvature-limited motion
+        # bound, as motion bounds are no larger where contacts may be created.
         moves = MOVES if pair.centerline_f < 0 else MOVES_OF_WIRES
         asked = max(moves * pace, min(known.cut_short, pair_lengths_of(manager, p).curved_bound))
         margin = min(max(asked, lengths.least_margin), lengths.largest_margin)
@@ -130,9 +130,9 @@ def margin_now(manager, p, moving):
 
 @kernel(inner=True)
 def allow_ball(known, ball, bound, sure):
-    """Keep a ball on the body that moves and how far what is in it may go, in the PAIR_STATE of its pair.
+    """Write a motion ball and its motion bound `bound` into the PAIR_STATE of its pair; infinite: there is no ball.
 
-    Infinite: there is no ball. `sure` is the motion after which an accepted pose needs an update; 0 if any motion does.
+    `sure` is the motion after which an accepted pose needs an update; 0 if any motion does.
     """
     known.ball_bound = bound
     known.sure = sure
@@ -145,9 +145,9 @@ def allow_ball(known, ball, bound, sure):
 
 @kernel(inner=True)
 def part_used(manager, p, q):
-    """Which part of its motion bounds pair p has used at poses q; infinite before its first update. Notes its DOUBT.
+    """Which part of its motion bounds pair p has used at poses q; infinite before its first update. Writes `doubt`.
 
-    A ball's points went no farther than its middle and 2 r |e - e'|: a turn by an angle a about an axis moves a point
+    Points of a ball went no farther than its center plus 2 r |e - e'|: a turn by an angle a about an axis moves a point
     at a distance r from it by 2 r sin(a / 2), and |e - e'| is 2 sin(a / 4).
     """
     known = pair_state_of(manager, p)

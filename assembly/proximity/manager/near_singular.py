@@ -1,8 +1,8 @@
 """Valleys of the gap between two faces: curves along which they almost touch, as a ring and the plate under it.
 
-Across a valley the gap grows as the curvatures say, along it hardly: where it is least runs around the ring as that
-turns by next to nothing. A point at the bottom of the valley, found by Newton's method across it alone, stays near it
-over all small turns, wherever the least gap runs.
+Across a valley the gap grows as the curvatures say, along it hardly: the place of the least gap runs all around the
+ring as the ring tilts by next to nothing. A point at the bottom of the valley, found by Newton's method across the
+valley alone, stays near its place for all small rotations, wherever the least gap is.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_f
 from assembly.proximity.extrema.pair_matrix import FLAT, curvature_bound, pair_matrix
 from assembly.proximity.manager.newton_regions import is_beside
 
-# Across a valley surfaces part by this part of their curvatures at least; along it by this part of that at most.
+# Across a valley the curvature of the gap is at least the first part of the surfaces' own; along it at most the second
+# part of that across.
 STEEP, LEVEL = 0.05, 0.1
 # Steps into a valley, and radians below which one counts as arrived.
 STEPS, ARRIVED = 8, 1e-6

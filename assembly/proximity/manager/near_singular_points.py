@@ -16,9 +16,9 @@ from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.extrema import USELESS, extremum_at
 from assembly.proximity.manager.near_singular import across_near_singular, into_near_singular
 
-# Cosine of the angle by which a valley turns from one of its points that are held to the next.
+# Cosine of the angle by which a valley turns from one held point to the next.
 APART = 0.5
-# Points nearer than this, in parts of the scene's size, are along each other whichever way.
+# Points nearer than this [over the size of the scene] count as along each other in any direction.
 NEAR = 1e-3
 
 
@@ -44,7 +44,7 @@ def is_any_of_many(extremum):
 
 @kernel(inner=True)
 def is_loose(extremum):
-    """Whether an extremum is any one of a continuum, where it is by chance."""
+    """Whether an extremum is an arbitrary point of a continuum and not held in place."""
     return extremum.corner == 0.0 and is_any_of_many(extremum)
 
 
@@ -52,8 +52,8 @@ def is_loose(extremum):
 def is_next_in_near_singular(posed, codes, surfaces, x, along, extrema, count):
     """Whether the point at x of a valley between two faces is to be held; `along` is the valley's direction there.
 
-    So it is where the valley has turned far from all of the points that are known between these faces, or where these
-    lie beside it rather than along it, in another valley.
+    It is held if the valley's direction is far from that at all known points between these faces, or if these lie
+    beside it rather than along it: then they are of another valley.
     """
     store = posed.store
     p = surface_point(store.table, store.pool, surfaces[0], x[0], x[1]).point
@@ -80,9 +80,9 @@ def is_on_face(posed, codes, side, x):
 
 @kernel(inner=True)
 def sunk(posed, codes, held, x):
-    """Where the bottom of the valley is, between two faces, across which x is; x where there is none in the faces.
+    """The bottom of the valley at x between two faces; x itself if there is none on the face.
 
-    `held` says of which face it holds a point, HELD_F or HELD_G.
+    `held` is HELD_F or HELD_G: the face on which the point is held.
     """
     f, g = features_of(posed, codes)
     wide = (math.inf, math.inf, math.inf, math.inf)

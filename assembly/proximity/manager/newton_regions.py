@@ -1,7 +1,7 @@
-"""Whether a pair of patches has an extremum that is known, or one to which Newton's method stays near where it starts.
+"""Whether a pair of patches has a known extremum, or one to which Newton's method from their middles stays near.
 
-The patches of two bodies that face each other are tiles of where they may touch. What is in a tile is found from its
-middle in a few steps; a sequence that leaves it, and those beside it, is on its way to what other tiles have.
+Pairs of patches that face each other are tiles of where two bodies may touch. Newton's method finds what is in a tile
+from its middle, in a few steps; a sequence that leaves the tile and its neighbors goes to what other tiles have.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from assembly.proximity.features.solid_contact import pair_parameters
 from assembly.proximity.manager.extrema import extremum_at, is_alone
 from assembly.proximity.manager.overlap import patch_at
 
-# Steps; and below so many radians, that a step turns a normal, it is as good as there.
+# How many steps; a sequence has arrived when a step turns normals by less than this [rad].
 STEPS, LAST_BEND = 6, 0.02
-# What became of it.
+# What became of a sequence.
 LEFT, STAYED = -1, -2
-# Sequences whose first steps lead as close together as this part of a patch go the same way.
+# Sequences are one if their first steps lead as close together as this part of a patch.
 TOGETHER = 0.25
 # A sequence that was followed.
 NEWTON_WAY = record_dtype(
@@ -57,8 +57,7 @@ def is_beside(store, surfaces, x, y, half, part):
 def known_in_region(posed, e, d, extrema):
     """The features of elements e and d, the parameters of their middles, whether a known extremum is all there is.
 
-    And whether one is there that is near a fold, on this side of a knot line or beyond: a second extremum may be beside
-    it.
+    And whether a known one is near a fold, on this side of a knot line or beyond: a second one may be beside it.
     """
     f, g = patch_at(posed, 0, e), patch_at(posed, 1, d)
     codes = (np.int64(f.feature), np.int64(g.feature))
@@ -70,13 +69,13 @@ def known_in_region(posed, e, d, extrema):
         if extremum.code_f != codes[0] or extremum.code_g != codes[1]:
             continue
         if not is_the_only_one(extremum.fold) or extremum.corner >= POINT:
-            # A point that stays where it is is no extremum: where the edge, or the face, is nearest may be beside it.
+            # A held point is no extremum: the nearest point of the edge, or of the face, may be beside it.
             continue
         x = pair_parameters(extremum)
         if not is_beside(posed.store, posed.surfaces, x, start, half, BESIDE):
             continue
         if posed.surfaces[0] >= 0 and math.isnan(extremum.beyond):
-            # Beyond a knot line curvatures may be others.
+            # Curvatures may jump at a knot line.
             extremum.beyond = fold_beyond(posed.store, posed, x, half)
         if is_alone(extremum):
             return codes, start, True, False
@@ -107,9 +106,9 @@ def keep_way(passed, count, codes):
 
 @kernel(inner=True)
 def step_of_faces(store, surfaces, pose, x, is_cut):
-    """Where Newton's method for two faces goes from x in a step, and by how much that turns a normal [rad].
+    """Where one step of Newton's method for two faces leads from x, and by how much it turns a normal [rad].
 
-    The step is cut to what turns none by much where `is_cut`. Where there is no tangent plane it stays.
+    With `is_cut` the step is shortened so that it turns no normal by much. Without a tangent plane the result is x.
     """
     f, g = surfaces
     frame = pair_frame(store, f, g, pose, x)
@@ -119,7 +118,7 @@ def step_of_faces(store, surfaces, pose, x, is_cut):
     matrix = pair_matrix(a, c, frame.gap, FLAT)
     inverse, _level = across_first(a, c, r, matrix.k, matrix.h, matrix.inverse, FLAT)
     step_f, step_g, bend_f, bend_g = pair_step(a, c, r, matrix.k, inverse, 1.0)
-    # Each surface by its own measure, as in `solve_pair`.
+    # The step is cut on each surface by itself, as in `solve_pair`.
     factor_f = bent_at_most(bend_f) if is_cut else 1.0
     factor_g = bent_at_most(bend_g) if is_cut else 1.0
     step_f = (factor_f * step_f[0], factor_f * step_f[1])
@@ -132,8 +131,8 @@ def step_of_faces(store, surfaces, pose, x, is_cut):
 def stays(posed, start, half, passed, count):
     """Whether Newton's method from `start` stays beside it, within BESIDE times half widths in (u, v) and (s, t).
 
-    Returns STAYED or LEFT, or which of the `count` sequences in `passed` (n, PASSED) it goes along with; where it came
-    to; and how many sequences there are now.
+    Returns STAYED or LEFT, or which of the `count` earlier sequences in `passed` (n, PASSED) it joins; where it ended;
+    and how many sequences there are now.
     """
     store, surfaces, pose = posed.store, posed.surfaces, posed.pose
     x = start

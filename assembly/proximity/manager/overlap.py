@@ -1,9 +1,9 @@
-"""Whether two bodies are in each other, whatever extrema there are, and which extrema are of far sides: by facets.
+"""Whether two bodies cross, whatever extrema there are, and which extrema are of far sides: by facets.
 
-A patch whose middle is inside the other body says so by its projection there, where nothing is between the two; a part
-of an edge that goes through a face does (`proximity/manager/edge_piercing.py`). A segment is inside a body or outside
-by how many facets it cuts. Of a body that is wholly inside another one every ray cuts an odd number; so do some rays
-from outside a tube with open ends, but not three of three points.
+Bodies cross where the middle of a patch is inside the other body: its projection there tells, if no facet is between
+the two; and where a part of an edge goes through a face (`proximity/manager/edge_piercing.py`). Whether a segment is
+inside a body is told by how many facets it cuts. Every ray from a body that is wholly inside another one cuts an odd
+number; so may a ray from outside a tube with open ends, but not three rays from three points.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from assembly.proximity.manager.edge_piercing import cut_at, patch_vertex_contac
 
 # Room for the descent of a segment.
 DEPTH = 256
-# A segment that passes a facet by less than this part of its sides cuts it, where being cut by two is no harm: one
-# through a common side may miss both.
+# A segment that misses a facet by less than this part of its sides counts as cutting it, where counting two facets does
+# no harm: by rounding, one through a common side may miss both.
 BETWEEN = 1e-9
-# What is wholly inside is asked of points this far below a surface, and twice as far as the other's facets are off:
-# bodies at one place are in each other.
+# Whether a body is wholly inside the other one is asked at points below its surface, by this plus twice how far the
+# other's facets are off their surfaces: of two equal bodies at one place, each is inside the other.
 BELOW = 1e-6
 
 
@@ -120,9 +120,10 @@ def next_near(store, tree, y, distance, stack, used):
 
 @kernel(inner=True, allocates=True)
 def facets_cut(posed, side, a, d, end, beside):
-    """How many facets of one body's faces cut the segment from a to a + d, but for that part at its ends; body axes.
+    """How many facets of a body's faces a segment cuts, and whether the first of them leads out of the body.
 
-    Or are beside it, by that part of their sides. And whether the first of them leads out of the body.
+    In body axes, the segment goes from a to a + d; cuts within the part `end` of it from one of its ends do not count.
+    A facet that it misses by no more than the part `beside` of the facet's sides does.
     """
     store = posed.store
     tree = tree_at(store.table, posed.trees[side])
@@ -170,8 +171,8 @@ def patch_at(posed, side, e):
 def projection_at(posed, side, e, y):
     """Signed distance of a point from its projection at one body's element e, the normal there; whether there is one.
 
-    A projection that Newton's method did not reach is none: off the projection of a point outside, the tangent plane of
-    a bulge has it inside. One farther off than BESIDE may be on the far side.
+    Where Newton's method has not converged there is none: the tangent plane elsewhere on a bulge may have a point
+    inside that is outside. One farther from the middle than BESIDE half widths may be on the far side.
     """
     store = posed.store
     patch = patch_at(posed, side, e)
@@ -207,8 +208,8 @@ def nearest_projection(posed, side, y, most):
 def is_inside_at(posed, side, e, y, margin):
     """Whether a point is farther than a margin inside one body, by its projection at element e.
 
-    Of a thin wall the projection may be on the far side. Then one on the near side is nearer, or, where that is past an
-    edge, a facet is between; these are up to an offset beside their surfaces.
+    At a thin wall the projection may be on the far side. Then the one on the near side is nearer, or, if that is past
+    an edge, a facet is between the point and its projection; facets are up to an offset off their surfaces.
     """
     offset = posed.offsets[side]
     distance, n, some = projection_at(posed, side, e, y)
@@ -261,7 +262,8 @@ def is_patch(posed, side, e):
 def below_part(posed, side, k, below):
     """A point `below` the middle of a patch in the k-th of three parts of a body's patches, and whether there is one.
 
-    The parts are of different faces, if there are some: a point of a face that touches may be taken for inside.
+    The three parts belong to different faces if the body has several: below a face that touches, a point may be taken
+    for inside.
     """
     store = posed.store
     elements = tree_at(store.table, posed.trees[side]).elements
@@ -286,7 +288,7 @@ def below_part(posed, side, k, below):
 
 @kernel(inner=True)
 def is_wholly_inside(posed, side, below):
-    """Whether f (side 0) is wholly inside g, or g in f: by rays, each another way, from three points `below` it."""
+    """Whether f (side 0) is wholly inside g, or g in f: by three rays, each from another point `below` its surface."""
     store = posed.store
     tree, other = posed.trees[side], posed.trees[1 - side]
     # Some direction that no face is likely to lie along, and far enough.
@@ -304,7 +306,7 @@ def is_wholly_inside(posed, side, below):
         elif k == 2:
             ray = (0.5218 * far, -0.8125 * far, -0.2601 * far)
         cut, leaves = facets_cut(posed, 1 - side, seen_by_other(posed, side, a), ray, 0.0, 0.0)
-        # In a bore that is open at its ends a ray goes into the material.
+        # From inside a bore that is open at its ends, a ray's first cut leads into the material.
         if cut % 2 == 0 or not leaves:
             return False
     return True
@@ -312,7 +314,7 @@ def is_wholly_inside(posed, side, below):
 
 @kernel(inner=True)
 def crosses(posed, stack, candidates, margin):
-    """Whether two bodies are in each other by more than a margin, or wholly, whatever extrema there are."""
+    """Whether two bodies cross by more than a margin, or one is wholly inside the other, whatever extrema there are."""
     count = overlapping(posed.store, posed.trees, posed.pose, stack, candidates)
     for c in range(count):
         if is_deep(posed, candidates[c, 0], candidates[c, 1], margin):
@@ -326,7 +328,7 @@ def crosses(posed, stack, candidates, margin):
 
 @kernel(inner=True)
 def is_sheet(store, shell):
-    """Whether a body is a sheet: an edge of it has no other side."""
+    """Whether a body is a sheet: one of its edges has a face on one side only."""
     solid = shell_at(store.table, shell)
     for k in range(solid.edges):
         if edge_at(store.table, solid.edge_table + EDGE_RECORD * k).face_b < 0:
@@ -338,7 +340,7 @@ def is_sheet(store, shell):
 def is_cut(posed, side, extremum):
     """Whether facets of one body cut the segment between the points of an extremum with a negative gap.
 
-    Gaps of no more than facets are beside their surfaces are cut by none.
+    A gap within twice the distance of facets from their surfaces counts as not cut.
     """
     a, b = three_of(extremum.point_f), three_of(extremum.point_g)
     if side == 1:
@@ -351,8 +353,8 @@ def is_cut(posed, side, extremum):
 def is_outside(posed, extremum):
     """Whether an extremum with a negative gap is one of far sides: then a surface is between its points.
 
-    A corner or a point of an edge is in the other body where nothing of that is between the two, though the way out may
-    leave its own body, a thin plate, at once.
+    A vertex or a point of an edge is inside the other body if no facet of that body is between the two points; facets
+    of its own body may be, as of a thin plate.
     """
     store, shells = posed.store, posed.shells
     cut = (is_cut(posed, 0, extremum), is_cut(posed, 1, extremum))

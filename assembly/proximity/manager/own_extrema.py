@@ -1,9 +1,8 @@
-"""Which elements of two solids may have an extremum of their own, known by a step of Newton's method.
+"""Which elements of two solids may have an extremum of their own, judged by one step of Newton's method.
 
-Elements are tiles that turn by little: what is in a tile is found from its middle in a few steps, and the first one is
-right to a few percent. Where it leads away from two elements and from those beside them, they have none, and Newton's
-method is on its way to what others have. Of a shaft in its bore a thousand pairs of elements face each other, and
-hardly any has an extremum.
+Elements are tiles that turn by little: Newton's method finds what is in a tile from its middle in a few steps, and its
+first step is right to a few percent. If that leads away from two elements and their neighbors, these have no extremum
+of their own. Of a shaft in its bore a thousand pairs of elements face each other, and hardly any has an extremum.
 """
 
 from __future__ import annotations
@@ -27,9 +26,9 @@ from assembly.proximity.manager.overlap import patch_at, seen_by_other
 
 __all__ = ["may_be_over", "may_have_own"]
 
-# Two elements of edges cross near them where the lines through their middles do within so many of their half widths;
-# elements turn by 0.2 rad, and of edges whose angle's sine is less than this the bends tell where they do, if these are
-# more than rounding.
+# Two edges may cross near two of their elements if the tangents at the middles of these cross within the first number
+# of half widths (elements turn by 0.2 rad). If the sine of the angle between the edges is below the second number,
+# their curvatures tell where they cross, unless these are rounding, below the third.
 BEYOND, PARALLEL, STRAIGHT = 2.0, 0.2, 1e-9
 
 
@@ -60,9 +59,10 @@ def may_cross(posed, codes, f, g):
 
 @kernel(inner=True)
 def stays_over_face(posed, side, codes, face, other):
-    """Whether a step from the middles of an element of a face of one body and of one of no face stays beside them.
+    """Whether one step from the middles of a face's element and of an edge's or vertex's element stays near both.
 
-    It is not cut, however far it goes. A singular pair, as of a rim in its bore, goes nowhere along what is level.
+    The step is not shortened. A singular pair, as of a circular edge in its bore, does not move where the distance is
+    level.
     """
     store = posed.store
     surface = feature_at(store.table, posed.shells[side], codes[side])
@@ -88,7 +88,7 @@ def stays_over_face(posed, side, codes, face, other):
 
 @kernel(inner=True)
 def faces_stay(posed, codes, e, d):
-    """The same of elements of two faces."""
+    """`stays_over_face`, for elements of two faces."""
     store = posed.store
     surfaces = (feature_at(store.table, posed.shells[0], codes[0]), feature_at(store.table, posed.shells[1], codes[1]))
     f, g = patch_at(posed, 0, e), patch_at(posed, 1, d)

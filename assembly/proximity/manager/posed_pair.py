@@ -1,7 +1,7 @@
 """Two bodies as an update sees them: in the axes of the first one, f, where the second one, g, is posed.
 
-What is named for both bodies is a pair of numbers, that of f and that of g: so a kernel that looks from one body at the
-other takes `side` and `1 - side`.
+Where each body has a value of its own, the field is a pair, that of f and that of g: a kernel that works from one body
+to the other takes entries `side` and `1 - side`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from assembly.proximity.manager.records import pair_lengths_of, pair_of, record_
 # surfaces: records of the two surfaces, -1 both where the bodies are B-rep bodies.
 # shells: records of the two B-rep bodies, -1 both where the bodies are surfaces.
 # trees: records of the trees of patches. centerlines: records of those of two round wires, -1 both of other bodies.
-# offsets: how far facets of the two are beside their surfaces at most.
+# offsets: the largest distances of facets from the surfaces of the two.
 # bodies: their rows in poses, (n, 7). track_solids: address of `features/solid_contact.track_solids`.
 PosedPair = namedtuple("PosedPair", "store pose surfaces shells trees centerlines offsets bodies poses track_solids")
 

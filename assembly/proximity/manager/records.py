@@ -24,7 +24,7 @@ MANAGER_DTYPE = record_dtype(
     lists=1,  # number of neighbor lists
     list_table=1,  # where these begin in the table
     corners=1,  # 1: vertex contacts are listed as well (`vertex_contacts.py`)
-    clock=1,  # address of what tells the time; 0: updates take as long as they need
+    clock=1,  # address of a kernel that returns the time; 0: updates have no deadline
     mark_address=1,  # address of `contact_place.mark_places`; 0: no contact's bodies have a least gap above zero
     go_on_address=1,  # address of what says between two parts of a long update whether to go on; 0: nobody is asked
 )
@@ -34,7 +34,7 @@ VERTEX_CONTACTS = place_of(MANAGER_DTYPE, "corners")
 CLOCK = place_of(MANAGER_DTYPE, "clock")
 MARK_AT = place_of(MANAGER_DTYPE, "mark_address")
 MANAGER_SIZE = size_of(MANAGER_DTYPE)
-# Answers to whether to go on: on, to an end with what there is, or nowhere, because an exception throws all away.
+# Its answers: go on; end with what there is; stop, because an exception discards everything.
 GOES_ON, ENDS, ABORTED = 0, 1, 2
 # The lengths of a contact manager in the pool [over the size of the scene].
 LENGTHS_DTYPE = record_dtype(
@@ -67,12 +67,12 @@ PAIR_DTYPE = record_dtype(
 )
 pair_at = record_view(PAIR_DTYPE)
 PAIR_RECORD = size_of(PAIR_DTYPE)
-# Lengths of a pair in the pool [over the size of the scene]. Where contacts are given the same follow IN_PLACE behind
-# with a least gap of zero, for what is in the place of a contact.
+# Lengths of a pair in the pool [over the size of the scene]. If contacts are given, a second record follows IN_PLACE
+# behind, with a least gap of zero: for extrema in the place of a given contact.
 PAIR_LENGTHS = record_dtype(
     "f8",
     least=1,  # least gap
-    curved_bound=1,  # curvature-limited motion bound: how far it may go between updates where contacts may be born
+    curved_bound=1,  # curvature-limited motion bound: motion between updates where contacts may be created
     offset=2,  # how far facets of f, and of g, are from their surfaces
     far=2,  # how far f, and g, reach from their origins
 )
@@ -87,7 +87,7 @@ MEMORY_DTYPE = record_dtype(
     time=1,  # that of the caller
     crowded=1,  # 1: a near extremum once found no slot
     calls=1,  # calls so far
-    deadline=1,  # of a tick with a budget: when an update ends, after the pair that it is at
+    deadline=1,  # of a tick with a budget: the time after which an update begins no other pair
     earlier=1,  # updates of a pair before that tick
     overlap=1,  # by so much less than the least gap a new contact may stay, as where a solve begins
 )
@@ -102,7 +102,7 @@ PAIR_STATE = record_dtype(
     "f8",
     turn=4,  # how that body was turned, a quaternion; NaN before the first update
     place=3,  # where the middle of its tree was
-    motion_bound=1,  # motion bound: until a point of it went so far, nothing that is not listed can touch
+    motion_bound=1,  # motion bound: until a point of it has moved so far, only listed contacts can touch
     margin=1,  # query margin
     state=1,  # FAR, NEAR or TRACKING
     called=1,  # calls at the last update
@@ -111,11 +111,11 @@ PAIR_STATE = record_dtype(
     ball_place=3,  # where its middle was
     ball_bound=1,  # motion bound of what is in the ball; infinite: there is no ball
     part=1,  # which part of its motion bounds is used
-    sure=1,  # how far what is in the ball may go until an accepted pose needs an update, as folds may have contacts
+    sure=1,  # motion of the ball after which an accepted pose needs an update: folds may create contacts
     crossed=1,  # 1: the bodies are in each other where no contact says so; NaN: the last update did not ask
     wanting=1,  # 1: a near extremum found no slot at the last update
-    cut_short=1,  # how far a step was to go that was cut since
-    doubt=1,  # which part of what accepted poses may go is used
+    cut_short=1,  # how far a step that was cut since would have gone
+    doubt=1,  # motion over that after which an accepted pose needs an update
 )
 pair_state_at = record_view(PAIR_STATE)
 PAIR_TURN = place_of(PAIR_STATE, "turn")

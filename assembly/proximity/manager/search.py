@@ -1,8 +1,8 @@
 """The search of an update for contacts that are not known: minima of the distance from the middles of patches.
 
-Most pairs of patches that face each other have none of their own: one that is known is all there is, or Newton's method
-goes where it went from others. Where none is found a motion may bring one forth. Near a fold, where two extrema merge,
-starts are led down the slope of the gap as well.
+Most candidate pairs have no minimum of their own: a known one is all there is, or Newton's method goes where it went
+from other pairs. Where none is found, a motion may create one. Near a fold, where two extrema merge, starts also
+descend the slope of the gap.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ from assembly.proximity.manager.parameters import SLIDES
 # Progress of a search. folding: whether an extremum is near a fold; visited: the number of remembered Newton
 # iterations; slides: the number of descents along a slope.
 Progress = namedtuple("Progress", "folding visited slides")
-# Limits of a search. curved_bound: the curvature-limited motion bound; enough: how near is near enough to look into;
-# span: of gaps of new minima; merge_radius: extrema nearer to each other are one.
+# Limits of a search. curved_bound: the curvature-limited motion bound; enough: distance up to which a pair of patches
+# is searched; span: least and largest gap of new minima; merge_radius: extrema nearer to each other are one.
 Limits = namedtuple("Limits", "curved_bound enough span merge_radius")
 
 
@@ -61,7 +61,7 @@ def is_known(codes, extrema):
 def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
     """Look for an extremum of the patches e of f and d of g that is not known.
 
-    Returns which one is a new minimum, or -1; whether a motion may bring one forth; and the Progress.
+    Returns the index of a new minimum, or -1; whether a motion may create one; and the Progress.
     """
     folding, visited, slides = progress
     codes, start, inside, folds = known_in_region(posed, e, d, extrema)
@@ -70,7 +70,7 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
     if inside or (not smooth and are_flat(posed, codes, e, d)):
         return -1, False, Progress(folding, visited, slides)
     if not smooth and not may_be_level(posed, codes, e, d) and is_known(codes, extrema):
-        # It would go to what is known of the two features, or past it.
+        # Newton's method would go to the extremum known of the two features, or past it.
         return -1, folding, Progress(folding, visited, slides)
     before = extrema.count[0]
     stayed, near, half, mine = True, start, (0.0, 0.0, 0.0, 0.0), visited
@@ -81,15 +81,15 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
         if way >= 0:
             return -1, folding or newton_way_at(passed, way).no_extremum == 1.0, Progress(folding, visited, slides)
     elif not may_have_own(posed, codes, e, d):
-        # It goes to what other elements have: of two features one such sequence is followed, which tells whether that
-        # is known.
+        # Newton's method goes to an extremum of other elements. One such sequence is followed for each pair of
+        # features: it tells whether that extremum is known.
         way = way_of(passed, visited, codes)
         if way >= 0:
             return -1, folding or newton_way_at(passed, way).no_extremum == 1.0, Progress(folding, visited, slides)
         visited = keep_way(passed, visited, codes)
     result = NOTHING
     if stayed or not folding:
-        # Where nothing folds, it tells whether it goes to an extremum that is known.
+        # With no fold near, a sequence that leaves is followed as well: it may lead to a known extremum.
         result = add_extremum(posed, codes, near, (0.0, 0.0, 0.0), merge_radius, extrema, 0.0)
     if extrema.count[0] > before:
         folding = folding or not is_alone(extremum_at(extrema.rows, before))
@@ -105,10 +105,10 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
             result = add_extremum(posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, 0.0)
     progress = Progress(folding, visited, slides)
     if result == ALIKE and not folding:
-        # On the slopes around an extremum that is known.
+        # The patches are on the slope around a known extremum.
         return -1, False, progress
     if extrema.count[0] == before or result != MINIMUM_FOUND:
-        # Patches that face each other and hold no extremum of their own.
+        # The pair has no new minimum of its own: a motion may create one.
         if visited > mine:
             newton_way_at(passed, mine).no_extremum = 1.0
         return -1, True, progress
@@ -117,7 +117,7 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
 
 @kernel(inner=True)
 def search_patches(posed, moving, limits, facing, extrema, passed):
-    """Look into pairs of patches, `facing`, for minima that are not known, within Limits. Returns a PairSearch."""
+    """Search the candidate pairs `facing` for unknown minima, within Limits. Returns a PairSearch."""
     curved_bound, enough, span = limits.curved_bound, limits.enough, limits.span
     rest = math.inf
     birth_bound = math.inf
@@ -132,12 +132,12 @@ def search_patches(posed, moving, limits, facing, extrema, passed):
             break
         bound = facing.distances[c]
         if bound > curved_bound and bound > enough:
-            # An extremum there is not near enough for a slot, but limits the motion bound of the bodies;
+            # An extremum there is too far for a slot, but limits the motion bound of the pair.
             rest = min(rest, bound)
             continue
         e, d = facing.pairs[c, 0], facing.pairs[c, 1]
         if bound > enough:
-            # where patches crowd, that of the ball around it.
+            # It is too far for a slot, but so near that it limits the motion bound of the ball.
             new, bears = -1, True
         else:
             new, bears, progress = search_candidate(posed, e, d, limits.merge_radius, extrema, passed, progress)

@@ -1,4 +1,4 @@
-"""Slots for contacts of a contact manager: which extrema are listed, keep a slot or give it up, and the log of that."""
+"""Slots for contacts: which extrema are listed, keep their slots or give them up, and the log of these events."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ def known_extrema(manager, p, posed, tracked, extrema):
                 log_event(manager, HANDED_OFF, SAME_EXTREMUM, p, slot.number, extremum.gap)
             track_extremum(extremum, tracked_pair)
         else:
-            # A corner that has left its face is none of these.
+            # A vertex contact that has left its face does not count as lost.
             any_gone = any_gone or (lost and vertex_contact == 0.0)
             kind, reason = (HANDED_OFF, LOST) if lost else (MERGED, SAME_EXTREMUM)
             log_event(manager, kind, reason, p, slot.number, tracked_pair.gap)
@@ -203,9 +203,9 @@ def give_up(manager, p, extremum, kind, reason, tracked):
 
 @kernel(inner=True)
 def release_given(manager, p, extrema, tracked):
-    """Take their slots from the extrema that are a given contact's own pair, or that came into its place or left it.
+    """Free the slots of extrema that are a given contact's own pair, or that came into its place or left it.
 
-    The latter ask for another least gap from now on, and are listed anew.
+    Those that came or left have another least gap from now on, and are listed anew.
     """
     for i in range(extrema.count[0]):
         extremum = extremum_at(extrema.rows, i)
@@ -221,7 +221,7 @@ def release_given(manager, p, extrema, tracked):
 
 @kernel(inner=True)
 def nearest_new(extrema, least):
-    """Of the new extrema the one that is the least beyond its least gap, or -1."""
+    """The new extremum whose gap is the least beyond its own least gap, or -1."""
     best = -1
     for i in range(extrema.count[0]):
         if extremum_at(extrema.rows, i).origin == NEW and (
@@ -235,8 +235,8 @@ def nearest_new(extrema, least):
 def list_extrema(manager, p, extrema, tracked):
     """Give slots to the near extrema of pair p and take them from the far ones.
 
-    Returns by how much the nearest one that is not listed is farther than it has to be, its gap, and whether a slot
-    was wanting.
+    Of the extrema that are not listed, returns the least excess of a gap over its least gap, and the lowest gap; and
+    whether a near one found no slot.
     """
     header, known = header_of(manager), pair_state_of(manager, p)
     wanting = False
@@ -250,7 +250,7 @@ def list_extrema(manager, p, extrema, tracked):
             give_up(manager, p, extremum, REMOVED, WENT_AWAY, tracked)
             rest = min(rest, gap_beyond(extrema, i, least))
             lowest = min(lowest, extremum.gap)
-    # The nearest first, so that it is the far ones for which slots may be wanting.
+    # The nearest first: if there are too few slots, the far ones get none.
     while True:
         best = nearest_new(extrema, least)
         if best < 0:
@@ -304,7 +304,7 @@ def minimum_beside(extrema, i):
 
 @kernel(inner=True)
 def keep_slots_of_given(manager, p, extrema, tracked):
-    """Given contacts of surfaces whose minimum has become a saddle move to one of the two new minima.
+    """Move given contacts of surfaces, whose minimum has become a saddle, to one of the two new minima.
 
     A contact that stayed would hold the surfaces at the saddle, and they would cross beside it.
     """

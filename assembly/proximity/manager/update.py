@@ -93,19 +93,19 @@ from assembly.proximity.manager.slots import (
 from assembly.proximity.manager.vertex_contacts import add_vertex_contacts
 from assembly.proximity.manager.wires import both_radii
 
-# Updates: of pairs that used up their motion bound, or at all that moved. The first may be careful, at urgent pairs
-# too, and in turns, earlier at one pair at a time, and ask whether bodies cross where a contact lost its extremum.
-# MEASURED: which parts of motion bounds are used is known. SPARING: only at those that used up all of it, as no pose
-# does that is allowed.
+# Which pairs an update is for. AS_NEEDED: those that used up their motion bound; EVERYTHING: all that moved. Flags:
+# CAREFUL: also pairs whose accepted poses need an update; IN_TURNS: also the one pair that has used most, earlier than
+# others; DOUBTFUL: ask whether bodies cross where a contact lost its extremum; MEASURED: the used parts of motion
+# bounds are known; SPARING: only pairs that used up all of theirs, as no allowed pose does.
 AS_NEEDED, EVERYTHING, CAREFUL, IN_TURNS, DOUBTFUL, MEASURED, SPARING = 0, 1, 2, 4, 8, 16, 32
-# Room: extrema and pairs of patches of an update.
+# The most extrema, and pairs of patches, of an update.
 EXTREMA = 96
 CANDIDATES, STACK = 8192, 1024
 # Arrays of an update. stack: nodes of both trees that wait, (k, 2); candidates: pairs of patches, (k, 2), and their
-# distances; passed: ways of Newton's method, (WAYS, PASSED); pairs: parts of centerlines, (k, 2); boxes: of both
+# distances; passed: sequences of Newton's method, (WAYS, PASSED); pairs: parts of centerlines, (k, 2); boxes: of both
 # (`centerlines/search.py`); marks: of known extrema, and minima of a box.
 Workspace = namedtuple("Workspace", "stack candidates distances passed pairs boxes marks")
-# Ways of Newton's method that are remembered in an update.
+# How many sequences of Newton's method are remembered in an update.
 WAYS = 64
 # Whether an update tests for crossings without a contact. A contact that lost its extremum is a reason in a solve; a
 # tick has no time for it.
@@ -127,7 +127,7 @@ def list_vertex_contacts(manager, p, posed, workspace, extrema, tracked):
 
 @kernel(inner=True)
 def nearest_fold(extrema, least, margin):
-    """The least distance of contacts created at a fold: about that of the nearest extremum near one; not of corners."""
+    """About the least distance at which a fold may create a contact: that of the nearest extremum near a fold."""
     low = math.inf
     for k in range(extrema.count[0]):
         extremum = extremum_at(extrema.rows, k)
@@ -178,7 +178,7 @@ def search_by_patches(manager, p, posed, moving, margin, tracked, workspace, ext
 
 @kernel(inner=True)
 def search_by_centerlines(manager, p, posed, moving, margin, tracked, workspace, extrema):
-    """The same for two round wires, by their centerlines."""
+    """`search_by_patches`, for two round wires and by their centerlines."""
     store, record = manager.store, record_of(manager)
     lengths, asked = lengths_of(manager), pair_lengths_of(manager, p)
     least = asked.least
@@ -187,7 +187,7 @@ def search_by_centerlines(manager, p, posed, moving, margin, tracked, workspace,
     at_list = record.list_table + LIST_INTS * (p % record.lists)
     waiting = near_parts(posed, at_list, p, moving, radii + margin, skin, workspace)
     while waiting < 0 and margin > LEAST_MOTION_BOUND:
-        # Out of memory: the motion bound is shorter, and the pair is updated more often.
+        # An array is full: within a smaller margin the motion bound is shorter, and the pair is updated more often.
         margin *= 0.5
         waiting = near_parts(posed, at_list, p, moving, radii + margin, skin, workspace)
     pair_state_of(manager, p).margin = margin
@@ -199,7 +199,7 @@ def search_by_centerlines(manager, p, posed, moving, margin, tracked, workspace,
     if waiting == 0:
         beyond = parts_beyond(posed, radii + margin, workspace.stack, workspace.pairs) - radii
         return PairSearch(beyond, math.inf, no_ball(), math.inf), any_gone, False
-    # No tangent turns by more than a motion over this.
+    # A motion by a length d turns no tangent by more than d / rho.
     rho = min(2.0 * (radii + margin), 0.99 * root_ball(store, moving)[1])
     limits = CenterlineLimits(least, TAKE * margin, margin, asked.curved_bound, lengths.merge_radius, rho)
     search = search_centerlines(posed, moving, limits, workspace.boxes, waiting, workspace.marks, extrema)
@@ -208,7 +208,7 @@ def search_by_centerlines(manager, p, posed, moving, margin, tracked, workspace,
 
 @kernel(inner=True)
 def update_pair(manager, p, q, tracked, workspace, extrema, asks):
-    """Find and list the extrema of pair p; `asks` says whether it tells if the bodies cross elsewhere."""
+    """Find and list the extrema of pair p; `asks` says when to test whether the bodies cross without a contact."""
     record, header = record_of(manager), header_of(manager)
     pair, known = pair_of(manager, p), pair_state_of(manager, p)
     posed = posed_pair(manager, p, q)
@@ -248,7 +248,7 @@ def update_pair(manager, p, q, tracked, workspace, extrema, asks):
 
 @kernel(inner=True)
 def keep_bounds(manager, p, search, rest, extrema):
-    """Keep how far pair p may go until its next update, by a PairSearch and by the `rest`, which has no slot."""
+    """Keep the motion bounds of pair p, by a PairSearch and by `rest`: how near extrema without slots are."""
     known = pair_state_of(manager, p)
     known.motion_bound = max(min(rest, search.bound), LEAST_MOTION_BOUND)
     known.part = 0.0
@@ -274,13 +274,13 @@ def any_crossed(table, at, memory):
 
 @kernel(inline=True)
 def is_by_patches(manager, p):
-    """Whether pair p is looked at by patches, and not by the centerlines of two round wires."""
+    """Whether pair p is searched by patches, and not by the centerlines of two round wires."""
     return pair_of(manager, p).centerline_f < 0
 
 
 @kernel(inner=True)
 def is_due(manager, p, tracked, how, most):
-    """Whether pair p is to be updated, now that it is known which parts of bounds are used; `most` used most."""
+    """Whether pair p is to be updated, by the used part of its motion bounds; pair `most` has used most."""
     known = pair_state_of(manager, p)
     part = known.part
     if how & ~MEASURED == EVERYTHING:

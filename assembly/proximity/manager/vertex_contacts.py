@@ -1,11 +1,11 @@
-"""Corners of one solid over a face of another one: the next contacts where a face lies almost flat on another one.
+"""Corners of one solid over a face of another one: the next contacts where two faces are almost parallel.
 
-Of two solids only extrema of the distance are contacts. Where a face is nearly parallel to another one, the extremum is
-at one corner, and jumps to the next one as the bodies turn: a step knows of the one alone, and the next one is in the
-way. But every vertex and every point of an edge that has its projection on a face must stay outside of it, as long as
-it is near, whichever is the lowest. Those whose cones miss the normal by little are listed beside the extrema, each a
-contact of the two features that it is of. Of a curved edge that is a point here and there which stays where it is on
-the edge: the extremum of a rim that lies almost flat runs around it as the bodies turn by next to nothing.
+Contacts of two solids are extrema of the distance. Where a face is nearly parallel to another one, the extremum is at
+one corner, and jumps to the next one as the bodies turn: a step that knows of the first corner alone is stopped by the
+next. But every vertex and every point of an edge that has its projection on a face must stay outside of that face as
+long as it is near, not only the lowest one. Those whose normal cones miss the face's normal by little are listed beside
+the extrema, each as a contact of its two features. Of a curved edge they are a few points, each held in its place on
+the edge: the extremum of a circular edge that lies almost flat runs around it as the bodies turn by next to nothing.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ from assembly.proximity.manager.own_extrema import may_be_over, may_have_own
 
 @kernel(inner=True)
 def is_vertex_contact(posed, codes):
-    """Whether two features are a face and no face, or two edges."""
+    """Whether two features are two edges, or a face and an edge or vertex."""
     f, g = kinds_of(posed, codes)
     return (f == EDGE and g == EDGE) or ((f == FACE) != (g == FACE))
 
 
 @kernel(inner=True)
 def hold_extrema(posed, extrema):
-    """Make corners of those extrema that are at one: rows that jump from corner to corner hold none of them."""
+    """Turn extrema that are at a corner into vertex contacts: a row that jumps between corners holds none of them."""
     if is_list_full(extrema):
         return
     for k in range(extrema.count[0]):
@@ -62,7 +62,7 @@ def hold_extrema(posed, extrema):
 
 @kernel(inner=True)
 def add_vertex_contact(posed, codes, start, span, merge_radius, extrema, holds):
-    """Add the corner that holds on to two features, or to a point of an edge."""
+    """Add the vertex contact that is locked to two features, or to a point of one of them."""
     before = extrema.count[0]
     extremum = extremum_at(extrema.rows, before)
     add_extremum(posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, holds)

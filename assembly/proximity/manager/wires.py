@@ -1,8 +1,8 @@
-"""Spines of round wires as kernels read them: points, and which parameters of the surface stand for a point.
+"""Centerlines of round wires as kernels read them: points, and the surface parameters that belong to a point.
 
 A centerline (`geometry/shapes/centerline.py`) is a record in the table. Its pieces, lines and arcs, are cut into parts
-that hardly turn, run through by lengths from their middles; over the parts is a tree of balls, whose root is node 0 and
-where the two children of a node follow each other.
+that hardly turn; a point of a part is given by its length from the part's middle. Over the parts is a tree of balls:
+its root is node 0, and the two children of a node are next to each other.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def centerline_point(pool, o, s):
 
 @kernel(inline=True)
 def arc_place(angle, whole):
-    """From -1 to 1, where a quadratic arc through `whole` is at an angle from its start."""
+    """The parameter, from -1 to 1, at an angle from the start of a rational quadratic arc that turns by `whole`."""
     return math.tan(0.5 * (angle - 0.5 * whole)) / math.tan(0.25 * whole)
 
 
@@ -115,7 +115,7 @@ def at_part_of_span(pool, breaks, k, x):
 
 @kernel(inline=True)
 def both_radii(store, centerlines):
-    """The radii of two wires, together."""
+    """The sum of the radii of two wires."""
     return (
         wire_at(store.pool, centerline_at(store.table, centerlines[0]).numbers).radius
         + wire_at(store.pool, centerline_at(store.table, centerlines[1]).numbers).radius
@@ -124,10 +124,10 @@ def both_radii(store, centerlines):
 
 @kernel(inner=True)
 def wire_parameters(store, centerline, surface, part, s, way):
-    """Parameters (u, v) of the wire's surface in a unit direction from a point of its centerline, s from a part's
-    middle.
+    """Parameters (u, v) of a wire's surface, in the unit direction `way` from a point of the centerline.
 
-    At a free end the direction may lead on: there is a half ball.
+    The point is at a length s from the middle of a part. At a free end the direction may lead beyond it: a half ball is
+    there.
     """
     line = centerline_at(store.table, centerline)
     o = line.part_pool + PART * part

@@ -1,4 +1,4 @@
-"""What two regions of one plane have in common: which points of one are in the other one, and where borders cross."""
+"""The intersection of two regions of a plane: points of one that are in the other, and where boundaries cross."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def beside_chord(s, x, y):
 
 @kernel(inner=True)
 def is_on_arc(s, x, y, tolerance):
-    """Whether a point of the circle of an arc is on that: it turns by a quarter at most, on one side of its chord."""
+    """Whether a point of an arc's circle is on the arc, which turns by a quarter at most: on one side of its chord."""
     beside = beside_chord(s, x, y)
     return beside <= tolerance if s.sweep > 0.0 else beside >= -tolerance
 
@@ -38,7 +38,7 @@ def is_on_segment(s, x, y, tolerance):
 def is_within(segments, x, y, tolerance):
     """Whether a point is in a region, or no farther than a tolerance from its borders.
 
-    By how often a ray crosses the chords; what is between an arc and its chord is turned from in to out, or back.
+    By how often a ray crosses the chords; between an arc and its chord the answer is reversed.
     """
     inside = False
     for k in range(len(segments)):
@@ -56,7 +56,7 @@ def is_within(segments, x, y, tolerance):
 
 @kernel(inline=True)
 def put_if(points, count, x, y, is_one):
-    """Write a point behind others if it is one; how many there are."""
+    """Append a point to others if `is_one`; returns how many there are."""
     if is_one:
         points[count, 0] = x
         points[count, 1] = y
@@ -66,7 +66,7 @@ def put_if(points, count, x, y, is_one):
 
 @kernel(inner=True)
 def cross_lines(s, t, tolerance, points):
-    """Where two straight segments cross, not those along which they lie: points, and how many."""
+    """The point where two straight segments that are not parallel cross, and how many there are: 0 or 1."""
     ax, ay = s.end[0] - s.begin[0], s.end[1] - s.begin[1]
     bx, by = t.end[0] - t.begin[0], t.end[1] - t.begin[1]
     det = ax * by - ay * bx
@@ -133,7 +133,7 @@ def cross_segments(s, t, tolerance, points):
 
 @kernel(inline=True)
 def are_beside(s, t, tolerance):
-    """Whether boxes around two segments are apart."""
+    """Whether the bounding boxes of two segments are apart."""
     r, q = s.radius, t.radius
     for d in range(2):
         low_s, high_s = min(s.begin[d], s.end[d]), max(s.begin[d], s.end[d])
@@ -149,10 +149,9 @@ def are_beside(s, t, tolerance):
 
 @kernel(inner=True)
 def convex_corners(points, count, order, tolerance):
-    """Corners of the convex hull of points, into `order`, counterclockwise; how many.
+    """Write the corners of the convex hull of points, counterclockwise, into `order`; returns how many.
 
-    `order` has places for three times as many and two. Of what lies along a side, but for a tolerance, only the ends
-    are corners.
+    `order` has room for 3 count + 2 entries. Points on a side of the hull, within a tolerance, are no corners.
     """
     for i in range(count):
         k = i
@@ -166,7 +165,7 @@ def convex_corners(points, count, order, tolerance):
     for i in range(count):
         order[2 * count + 2 + i] = order[i]
     found = 0
-    # Along the lower side, then back along the upper one; of corners those before `first` stay.
+    # Andrew's monotone chain: the lower side, then the upper one backward; corners before `first` are final.
     for side in range(2):
         first = found
         for i in range(count):
@@ -181,7 +180,7 @@ def convex_corners(points, count, order, tolerance):
 
 @kernel(inline=True)
 def is_left_turn(points, a, b, c, tolerance):
-    """Whether b is a corner of a to c: on the right of these by more than a tolerance."""
+    """Whether a, b, c turn left: b is on the right of the line from a to c by more than a tolerance."""
     dx, dy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
     ex, ey = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
     return dx * ey - dy * ex < -tolerance * hypot(dx, dy)

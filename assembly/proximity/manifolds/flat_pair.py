@@ -1,11 +1,11 @@
-"""The manifold of two trimmed plane faces that face each other: corners of what they have in common.
+"""The manifold of two trimmed plane faces that face each other: corners of their intersection.
 
-Seen along the normal of the first one, n, the second plane is h above it, an affine function of the place:
+Seen along the normal n of the first plane, the second one is h above it, an affine function of the point x:
 
     h = m.(o - x),      m = n_b / (n_b.n),      m.n = 1,
 
-o a point of the second plane. So it is least at a corner of the convex hull of what both cover, or where an arc of that
-is lowest: over a circle of radius R about c that is h(c) - R |grad h|.
+with o a point of the second plane. So h is least at a corner of the convex hull of what both faces cover, or at the
+lowest point of an arc: over a circle of radius R about c that is h(c) - R |grad h|.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from assembly.proximity.manifolds.records import (
 
 # Planes that lean more than this cosine do not face each other.
 FACING = 0.5
-# What is returned instead of a number of rows where there are more than places for them.
+# Returned instead of a number of rows where there is no room for all of them.
 FULL = -1
 
 
@@ -102,7 +102,7 @@ def name_row(rows, count, kind, first, second):
 
 @kernel(inner=True)
 def crossing_normal(frame, lift, s, t, at):
-    """The direction along which what is between two borders grows where they cross: across both, with m.n = 1."""
+    """The direction of the gap where two boundary curves cross: perpendicular to both; its product with n is 1."""
     a = frame_at(frame, 0)
     m, _ = lift
     u, v = tangent(s, at[0], at[1])
@@ -120,7 +120,7 @@ def crossing_normal(frame, lift, s, t, at):
 
 @kernel(inner=True)
 def put_corners(regions, frame, lift, tolerance, found, points):
-    """Write a row at every end and middle of the segments of either region that the other one has; how many.
+    """Write a row at the start of each segment, and the middle of each arc, that the other region has; how many.
 
     regions: (first, second as it is seen).
     """
@@ -149,7 +149,7 @@ def put_corners(regions, frame, lift, tolerance, found, points):
 
 @kernel(inner=True)
 def put_crossings(regions, frame, lift, tolerance, found, points, count):
-    """Write a row wherever borders of the regions cross, behind others; how many there are."""
+    """Write a row wherever the boundaries of the regions cross, behind `count` others; how many there are then."""
     first, second = regions
     crossed = points[len(found) :]
     for i in range(len(first)):
@@ -170,7 +170,7 @@ def put_crossings(regions, frame, lift, tolerance, found, points, count):
 
 @kernel(inner=True)
 def put_lowest(regions, frame, lift, tolerance, found, points, count):
-    """Write a row where an arc of either region is lowest, and the other one has it, behind others; how many."""
+    """Write a row at the lowest point of each arc that the other region has, behind others; how many there are then."""
     a = frame_at(frame, 0)
     n = triple(a.normal)
     u, v = -dot(lift[0], triple(a.right)), -dot(lift[0], triple(a.up))
@@ -241,7 +241,7 @@ def flat_rows(frame_a, segments_a, frame_b, segments_b, turn, shift, tolerance, 
     turn, shift : (9,), (3,)
         A rotation by rows, and a translation: the second body, seen from the first.
     tolerance : float
-        What is no farther from a border is in the region.
+        Points no farther than this from the boundary of a region are in it.
     rows : (m, ROW_SIZE)
         Where rows are written.
 
@@ -250,7 +250,7 @@ def flat_rows(frame_a, segments_a, frame_b, segments_b, turn, shift, tolerance, 
     count : int
         How many rows there are: none where the faces have no area in common; -1 where they need more places.
     bound : float
-        Above no point that both cover, seen along the first normal, is the gap along that less; infinite without rows.
+        A lower bound of the gap along the first normal, over all points that both cover; infinite without rows.
     """
     posed = np.empty(FRAME_SIZE)
     write_posed(frame_b, turn, shift, posed)
@@ -279,7 +279,7 @@ def flat_rows(frame_a, segments_a, frame_b, segments_b, turn, shift, tolerance, 
     bound = np.inf
     for i in range(count):
         bound = min(bound, row_at(found, i).gap)
-    # Circles that lean are ellipses: by this narrower than they are taken to be.
+    # A tilted circle is seen as an ellipse, narrower by this than the circle that it is taken for.
     narrower = max(largest_radius(segments_a), largest_radius(segments_b)) * (1.0 - facing)
     slope = sub(lift[0], n)
     return corners, bound - sqrt(dot(slope, slope)) * (4.0 * tolerance + narrower)

@@ -11,7 +11,7 @@ from assembly.proximity.manifolds.records import SEGMENT_SIZE, segment_at
 
 @kernel(inner=True)
 def span_within(segments, line, tolerance, borders, room):
-    """The same as `line_span`, with what it works in, which outlives the record of it here."""
+    """`line_span`, with its arrays as an argument `room`: so these outlive the records of them that are made here."""
     one, points = room
     s = segment_at(one, 0)
     s.begin[0], s.begin[1], s.end[0], s.end[1] = line[0], line[1], line[2], line[3]
@@ -37,7 +37,7 @@ def span_within(segments, line, tolerance, borders, room):
 
 @kernel(signatures="(f8[:, ::1], f8[::1], f8, i8[::1])", allocates=True)
 def line_span(segments, line, tolerance, borders):
-    """From where to where a line is in a region, in parts of its length: the outermost of its points there.
+    """The outermost points of a line that are in a region, as parts of the line's length.
 
     Parameters
     ----------
@@ -45,13 +45,13 @@ def line_span(segments, line, tolerance, borders):
     line : (4,)
         Both ends, in the coordinates of the plane.
     tolerance : float
-        What is no farther from a border is in the region.
+        Points no farther than this from the boundary of the region are in it.
     borders : (2,)
-        Where the numbers of segments are written that the line ends at; -1 where it ends by itself.
+        The numbers of the segments at which the line leaves the region are written here; -1 where it ends inside.
 
     Returns
     -------
     low, high : float
-        The first is more where nothing of the line is in the region.
+        `low` is greater than `high` if no point of the line is in the region.
     """
     return span_within(segments, line, tolerance, borders, (np.zeros((1, SEGMENT_SIZE)), np.empty((2, 2))))

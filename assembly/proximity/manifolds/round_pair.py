@@ -4,11 +4,11 @@ About the axis of a hollow wall, a, with the apex or a point of the axis o,
 
     f(x) = cos(alpha) |x across a| - sin(alpha) a.x,      x from o,
 
-is convex, and no steeper than 1; the wall is where f = R (0 of a cone). So what is full is clear of the wall by R less
-the most of f on it, which is on one of its end circles. The most of f over all points is the most of N(u).x over unit
+is convex, and no steeper than 1; the wall is where f = R (0 of a cone). So the full body, shaft or cone, is clear of
+the wall by R less the maximum of f on it, which is on one of its end circles. f(x) is the maximum of N(u).x over unit
 vectors u across a, N(u) = cos(alpha) u - sin(alpha) a: a row for a direction u is the gap between a circle and the
-wall's tangent plane there, R - N.(c - o) - rho |N x b|, smooth at any pose. Where the wall ends before what is full,
-its own circle has rows instead: how far its points are from what is full.
+wall's tangent plane there, R - N.(c - o) - rho |N x b|, smooth at any pose. Where the wall ends before the full body,
+the wall's end circle has rows instead: how far its points are from the full body.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from assembly.geometry.vec import add, cross, dot, matvec, neg, scale, sub
 from assembly.proximity.manifolds.flat_pair import FACING, triple
 from assembly.proximity.manifolds.records import NEAREST_RIM, NEAREST_RING, RIM, RING, round_at, row_at
 
-# Rows of a ring: in so many directions that the wall keeps, and in that in which the ring is nearest.
+# Rows of a ring: in so many directions fixed on the wall, and in the direction in which the ring is nearest.
 HELD = 4
 ROWS_OF_RING = HELD + 1
 # Directions from which the nearest one is sought, and steps of Newton's method.
@@ -174,7 +174,7 @@ def wall_bound(hollow, full, placed, ends):
 
 @kernel(inner=True)
 def most_level(hollow, ring):
-    """A bound of f over a circle: |c across a| and |N x b| are each at most what they are for the worst direction."""
+    """An upper bound of f over a circle: |c across a| and |N x b| each at its maximum over all directions."""
     c, b, rho = ring
     axis, alpha = triple(hollow.axis), hollow.half_angle
     off = sub(c, scale(dot(c, axis), axis))
@@ -200,8 +200,8 @@ def round_rows(hollow_wall, full_wall, turn, shift, rows):
     count : int
         How many rows there are: none where one is no more along than beside the other, or wholly before or behind it.
     bound : float
-        No gap is less, between a shaft and its bore; of cones no gap between the full one and the whole cone that the
-        wall is of.
+        A lower bound of the gap between a shaft and its bore; of cones, of that between the full cone and the whole
+        cone that the wall is a part of.
     """
     hollow, full = round_at(hollow_wall, 0), round_at(full_wall, 0)
     m = (turn[0], turn[1], turn[2], turn[3], turn[4], turn[5], turn[6], turn[7], turn[8])

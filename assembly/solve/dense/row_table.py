@@ -42,8 +42,8 @@ from assembly.solve.loop.parameters import LIFT_BELOW
 from assembly.solve.loop.report import read_tracked, scaled_poses, write_tracked
 from assembly.solve.loop.residuals import arrange, shape_of, size_of_shape
 
-# A point of the loop at a state: the contact that is lost, or -1, and all rows are evaluated; how many contacts are at
-# folds; the iterate, and a program whose rows and unknowns have no places yet.
+# A point of the loop at a state. lost: a contact without a pair there; -1: there is none, and all rows are evaluated;
+# count: how many contacts are at folds; iterate: the iterate; program: its rows and unknowns have no places yet.
 PointFound = namedtuple("PointFound", "lost count iterate program")
 
 
@@ -57,7 +57,7 @@ def spread_block(packed, r, column, body, out):
 
 @kernel(inner=True)
 def spread_lifted(packed, r, at, out):
-    """The entries of row r for a lifted pair's coordinates, to columns at.."""
+    """The entries of row r for a lifted pair's coordinates, to the columns from `at` on."""
     row = jacobian_row_at(packed, r)
     for j in range(4):
         out[r, at + j] = row.lifted[j]
@@ -117,7 +117,7 @@ def new_point(table):
 def point_at(store, state, free):
     """A point of the loop at a state, a `PointFound`.
 
-    Parameters of contacts that are NaN are found by a global start, pairs at folds are freed, as the loop does.
+    Parameters of contacts that are NaN are found by a global start; pairs at folds are lifted, as in the loop.
     """
     header = header_at(store.table, 0)
     pairs = header.contacts
@@ -198,7 +198,7 @@ def gradient_at(table, pool, state, free, gradient, end_effectors):
 
 @kernel(inner=True, allocates=True)
 def slopes_at(store, free, found, end_effectors, gradient, integers, doubles):
-    """The same at a point that `point_at` found, with what it works in."""
+    """`gradient_at`, at a point that `point_at` found, with blocks of integers and doubles to work in."""
     header = header_at(store.table, 0)
     lost, count, point = found.lost, found.count, found.iterate
     rows = header.rows + 4 * count

@@ -1,10 +1,10 @@
 """The step: Cholesky factorization in an envelope, which says whether the matrix is positive definite.
 
-Row i of the upper triangle has entries up to column last[i], and last never falls: so fill-in stays inside. Bodies are
-numbered (`constraints/packing/scene.py`) so that the envelope of a chain or a tree is narrow; that of a small scene is
-all. Unknowns of
-pairs at folds stand elsewhere in the factor than in the step (`constraints/program/envelope.py`), and `order` says
-where. Large scenes are factorized by blocks instead (`block_factor.py`).
+Row i of the upper triangle has entries up to column last[i], and last never falls: so fill-in stays in the envelope.
+Bodies are numbered (`constraints/packing/scene.py`) so that the envelope of a chain or a tree is narrow; that of a
+small scene is the whole triangle. Unknowns of lifted pairs have other positions in the factor than in the step
+(`constraints/program/envelope.py`); `order` says which. Large scenes are factorized by blocks instead
+(`block_factor.py`).
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def substitute(m, n, last, b):
     """Solve U^T U x = b in place."""
     forward(m, n, last, b)
     for k in range(n - 1, -1, -1):
-        # Two sums, each of which waits for its own additions only.
+        # Two sums that do not wait for each other's additions.
         s = b[k]
         t = 0.0
         i = k + 1

@@ -6,8 +6,8 @@
     smallest            s_min
     force               1 / |J^T u|: the force along u that inputs of unit norm hold
 
-With J = U diag(s) V^T, a measure w changes by the sum over i of (dw / ds_i) u_i^T dJ v_i. Where singular values meet,
-the smallest of them has no derivative, and that of one is given.
+With J = U diag(s) V^T, a measure w changes by the sum over i of (dw / ds_i) u_i^T dJ v_i. Where the smallest singular
+values are equal, s_min has no derivative, and that of one of them is returned.
 """
 
 from __future__ import annotations

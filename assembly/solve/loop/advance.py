@@ -23,7 +23,7 @@ from assembly.solve.loop.standstill import bound_nearby, update_floor
 
 @kernel(inline=True)
 def find_step(task, current, trial, rows, system):
-    """Compute the step, and the part of it to try. Whether there is one."""
+    """Compute the step, and the part of it to try. Returns whether there is one."""
     loop, program, restoring = task.loop, task.program, task.loop.restoring == 1
     reach = min(loop.radius, loop.leash)
     if restoring:
@@ -48,7 +48,7 @@ def find_step(task, current, trial, rows, system):
 
 @kernel(inline=True)
 def cut_to_motion_bounds(task, current, trial, system):
-    """Cut the step to what motion bounds allow. Whether to try it: a tick may update the manager first, or end."""
+    """Cut the step to the motion bounds. Returns whether to try it: a tick may update the manager first, or end."""
     loop, program = task.loop, task.program
     store, memory, step = program.store, program.lifted.memory, system.directions.step
     most_of_it = loop.cut
@@ -69,7 +69,7 @@ def cut_to_motion_bounds(task, current, trial, system):
 
 @kernel(inline=True)
 def take_step(task, current, trial, rows, system):
-    """Line search along the step, into the trial iterate. Whether that becomes the next iterate."""
+    """Line search along the step, into the trial iterate. Returns whether that becomes the next iterate."""
     loop = task.loop
     restoring = loop.restoring == 1
     loop.restored = loop.violation if restoring else math.inf

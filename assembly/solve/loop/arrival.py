@@ -14,7 +14,7 @@ from assembly.solve.loop.settings import TESTED, results_at, settings_at
 
 @kernel(inner=True)
 def reach_of(store, q):
-    """How far out the user's coordinates are, over the size."""
+    """The largest coordinate of a body's origin in the user's frame, over the size of the scene."""
     units = pool_header_at(store.pool, 0)
     reach = 0.0
     for b in range(header_at(store.table, 0).bodies):
@@ -34,7 +34,8 @@ def rounding_at(store, settings, current):
 def is_rounding(program, current, rows, system, moved, dual):
     """Whether a step moved poses by no more than doubles tell apart, and rounding explains the slope that is left.
 
-    Poses' rounding by the objective's curvature, and that of forces.
+    The slope explained is the rounding of poses times the largest diagonal entry of the Hessian, plus that of
+    multipliers.
     """
     store, shape = program.store, program.structure
     reach, n = max(1.0, reach_of(store, current.q)), system.gradient.size

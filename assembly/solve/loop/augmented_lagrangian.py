@@ -52,7 +52,7 @@ from assembly.solve.loop.workspace import Iterates, carve_all, memory_of, result
 def solve_program(table, pool, settings, state, history, doubles, integers, end_effectors):
     """Solve in place. State: q (n, 7) | tracked (k, TRACK) | multipliers (m) | residuals (m) | results | memory | kept.
 
-    `doubles` and `integers` are two blocks to work in (`workspace_needed`). `end_effectors` is None where no
+    `doubles` and `integers` are two blocks of memory to work in (`workspace_needed`). `end_effectors` is None where no
     term of the objective is a dexterity.
     """
     table, pool, settings, state = uncounted(table), uncounted(pool), uncounted(settings), uncounted(state)
@@ -147,7 +147,7 @@ def begin(task, workspace, state, current, trial):
 
 @kernel(inline=True)
 def tell(task, state, iterates, rows, system):
-    """Write the end into the state and the results. The status."""
+    """Write the last iterate into the state and the results. Returns the status."""
     loop, result = task.loop, task.result
     if loop.folded and loop.status == CONTACT_LOST:
         loop.violation = math.inf

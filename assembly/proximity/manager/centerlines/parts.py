@@ -34,7 +34,7 @@ def balls_apart(pool, o, p, pose):
 
 @kernel(inline=True)
 def parts_apart(pool, o, p, pose):
-    """A lower bound of the distance of the parts at o of f and at p of g: that of their tangents in the middle."""
+    """A lower bound of the distance of two parts: that of their middle tangents, less how far the parts bend."""
     part = centerline_part_at(pool, o)
     part_record = centerline_part_at(pool, p)
     h = part.half
@@ -46,7 +46,7 @@ def parts_apart(pool, o, p, pose):
 
 @kernel(inline=True)
 def whole_box(store, centerlines, i, j, boxes, b):
-    """Box b: the whole parts i of f and j of g, from and to their ends."""
+    """Write box b: all of part i of f and all of part j of g, from end to end."""
     box = centerline_box_at(boxes, b)
     half_f = centerline_part_at(store.pool, centerline_at(store.table, centerlines[0]).part_pool + PART * i).half
     half_g = centerline_part_at(store.pool, centerline_at(store.table, centerlines[1]).part_pool + PART * j).half
@@ -58,7 +58,7 @@ def whole_box(store, centerlines, i, j, boxes, b):
 def descend(posed, reach, stack, out):
     """Parts (k, 2) of two centerlines that may be within a reach of each other.
 
-    Returns how many, or -1 where there is no room; and how far all others are beyond.
+    Returns how many, or -1 if an array is full; and a lower bound of the distance of all other parts.
     """
     store, pose = posed.store, posed.pose
     line = centerline_at(store.table, posed.centerlines[0])
@@ -107,15 +107,15 @@ def descend(posed, reach, stack, out):
 
 @kernel(inner=True)
 def parts_beyond(posed, reach, stack, out):
-    """How far two centerlines are apart at least, where no parts of them are within a reach of each other."""
+    """A lower bound of the distance of two centerlines of which no parts are within a reach of each other."""
     return descend(posed, reach, stack, out)[1]
 
 
 @kernel(inner=True)
 def near_parts(posed, at, p, moving, reach, skin, workspace):
-    """Boxes of parts of two centerlines that are within a reach of each other; how many, or -1 where there is no room.
+    """Boxes of parts of two centerlines that are within a reach of each other; how many, or -1 if an array is full.
 
-    From the list at `at`, as `neighbor_list.listed_pairs` has patches.
+    They are taken from the neighbor list at `at` while it is valid, as patches are in `neighbor_list.listed_pairs`.
     """
     store, pose, centerlines = posed.store, posed.pose, posed.centerlines
     stack, out, boxes = workspace.stack, workspace.pairs, workspace.boxes

@@ -1,9 +1,10 @@
 """The search of an update (`proximity/manager/update.py`) for contacts of two round wires, by their centerlines.
 
-Wires touch where the distance of their centerlines has a minimum, less their radii. Boxes of both, lengths along a part
-of either, are halved until it is known of each how many minima it holds (`proximity/manager/centerlines/box.py`); where
-that takes boxes that are all but points, projections tell (`minima.py`). So no contact is missed, and it is known how
-far bodies may go until there may be others: what is excluded by a margin stays so for motions that are shorter.
+The gap of two wires is the distance of their centerlines less both radii, so contacts are minima of that distance.
+Boxes, each an interval of length on a part of either centerline, are halved until it is known how many minima each of
+them holds (`proximity/manager/centerlines/box.py`); where a box becomes almost a point without an answer, projections
+tell (`minima.py`). So no contact is missed. A box that excludes minima by a margin still does after any motion shorter
+than that margin: this gives the motion bound.
 """
 
 from __future__ import annotations
@@ -61,17 +62,17 @@ BOXES = 2048
 KNOWN_PLACE = record_dtype("f8", part_f=1, at_f=1, part_g=1, at_g=1)
 known_place_at = record_view(KNOWN_PLACE)
 MARK = size_of(KNOWN_PLACE)
-# Slopes of the distance below this say that a known contact is a minimum's.
+# A known contact is at a minimum if the slopes of the distance there are below this.
 AT_EXTREMUM = 1e-9
-# Newton's method on the surfaces ends at the minimum it began at, if the gap is the same but for this.
+# Newton's method on the surfaces has stayed at its minimum if the gap changed by no more than this.
 ASTRAY = 1e-9
-# Spines that are nearer than this cross, and have no direction to each other.
+# Centerlines nearer than this cross, and have no direction from one to the other.
 MEETING = 1e-12
 
 
-# Limits of a search. least: the least gap; near: how near is near; reach: how far is looked; curved_bound: how far they
-# may go at a fold; merge_radius: extrema nearer to each other are one; rho: no tangent turns by more than a motion over
-# this.
+# Limits of a search [over the size of the scene]. least: the least gap; near: contacts are sought up to this beyond the
+# least gap; reach: the query margin, beyond the least gap as well; curved_bound: the curvature-limited motion bound;
+# merge_radius: extrema nearer to each other are one; rho: a motion by a length d turns no tangent by more than d / rho.
 CenterlineLimits = namedtuple("CenterlineLimits", "least near reach curved_bound merge_radius rho")
 
 
@@ -122,7 +123,7 @@ def mark_known(posed, extrema, marks):
         d = there.d
         slopes = abs(dot(d, there.tangent_f)) + abs(dot(d, there.tangent_g))
         if extremum.origin == USELESS or not slopes <= AT_EXTREMUM * math.sqrt(dot(d, d)):
-            # Of far sides, at a half ball, or on its way to an extremum: what is there is looked for.
+            # It is of far sides, at a half ball, or not yet at its minimum: boxes there are searched all the same.
             mark.part_f = math.nan
 
 
@@ -144,11 +145,11 @@ def is_marked(boxes, b, marks, count):
 
 @kernel(inline=True)
 def across_both(f, g):
-    """A unit vector across two tangents: of centerlines that cross any is as good."""
+    """A unit vector perpendicular to two tangents; where centerlines cross, any such vector will do."""
     n = cross(f, g)
     length = math.sqrt(dot(n, n))
     if length < MEETING:
-        # They run along each other: across the first one.
+        # The tangents are parallel: perpendicular to the first one.
         n = cross(f, (1.0, 0.0, 0.0) if abs(f[0]) < 0.7 else (0.0, 1.0, 0.0))
         length = math.sqrt(dot(n, n))
     return scale(1.0 / length, n)
@@ -173,7 +174,8 @@ def add_minimum(posed, i, j, s, t, merge_radius, extrema):
     extremum = extremum_at(extrema.rows, before)
     found = add_surface_extremum(posed, start, merge_radius, extrema)
     if found == NOTHING or not abs(extremum.gap - gap) <= ASTRAY:
-        # At a fold Newton's method may find nothing, or go elsewhere: the minimum is known without it.
+        # At a fold Newton's method may find nothing, or another extremum: the centerlines' minimum is then taken as it
+        # is.
         extrema.count[0] = before
         frame = pair_frame(store, surfaces[0], surfaces[1], posed.pose, start)
         if not frame.regular:
@@ -188,7 +190,7 @@ def add_minimum(posed, i, j, s, t, merge_radius, extrema):
 
 @kernel(inline=True)
 def around_box(pool, o, box, side, lo, hi):
-    """A box (lo, hi) made larger so that the part of one centerline in a box of both is in it."""
+    """The box (lo, hi) enlarged to contain the interval of one centerline that a search box covers."""
     begin, end = (box.from_f, box.to_f) if side == 0 else (box.from_g, box.to_g)
     half = 0.5 * (end - begin)
     middle = centerline_point(pool, o, begin + half)[0]
@@ -200,7 +202,7 @@ def around_box(pool, o, box, side, lo, hi):
 
 @kernel(inline=True)
 def halves(boxes, b):
-    """Box b is halved along the longer one of its sides; the second half is behind it."""
+    """Halve box b along the longer of its two intervals; the second half becomes box b + 1."""
     for m in range(BOX):
         boxes[b + 1, m] = boxes[b, m]
     first, second = centerline_box_at(boxes, b), centerline_box_at(boxes, b + 1)
@@ -212,7 +214,7 @@ def halves(boxes, b):
 
 @kernel(inner=True)
 def add_minima(posed, box, ends, what, merge_radius, places, extrema):
-    """Add the minima that a box has. Returns whether these are all for certain."""
+    """Add the minima in a box. Returns whether it certainly holds no others."""
     i = np.int64(box.part_f)
     j = np.int64(box.part_g)
     parts = parts_of(posed, i, j)
@@ -227,7 +229,7 @@ def add_minima(posed, box, ends, what, merge_radius, places, extrema):
     if not settled:
         many, level, certain = near_singular_minima(parts, part, ends, places)
         if level:
-            # All along it is as good: points here and there stand for it.
+            # The minimum is as low all along a curve: a few points of it, farther apart, stand for all.
             bend = max(centerline_part_at(parts.pool, parts.f).bend, centerline_part_at(parts.pool, parts.g).bend)
             merge_radius = max(merge_radius, SPARSE / bend)
         for m in range(many):
@@ -239,8 +241,8 @@ def add_minima(posed, box, ends, what, merge_radius, places, extrema):
 def search_centerlines(posed, moving, limits, boxes, waiting, workspaces, extrema):
     """Look for all contacts of two wires with gaps up to `near`, of CenterlineLimits; known ones are in the list.
 
-    `moving` is the body that moves. There are `waiting` boxes; within the reach nothing is outside of them. The `rooms`
-    are for marks of known extrema, and for the minima of a box.
+    `moving` is the body that moves. The first `waiting` boxes hold all that is within the reach. `workspaces` are
+    memory for the marks of known extrema, and for the minima of a box.
 
     Returns a PairSearch.
     """
@@ -266,7 +268,7 @@ def search_centerlines(posed, moving, limits, boxes, waiting, workspaces, extrem
         part = Lengths(box.from_f, box.to_f, box.from_g, box.to_g)
         low, what, margin = box_of(parts, part, ends, radii + reach, limits.rho)
         low -= radii
-        # A minimum that a box may hold, and nobody looks for, is as near as the box.
+        # A box that is neither searched nor free of minima may hold one as near as the box itself.
         hollow = what == EMPTY or what == BARREN
         allowed = max(low, margin) if low <= near or hollow else low
         if allowed >= reach and (low > near or hollow):
@@ -284,14 +286,14 @@ def search_centerlines(posed, moving, limits, boxes, waiting, workspaces, extrem
         if low <= near and not hollow and not (what == CONVEX and is_marked(boxes, b, marks, known)):
             certain = add_minima(posed, box, ends, what, limits.merge_radius, places, extrema)
             if halve or is_list_full(extrema) or not certain:
-                # There may be one that is not known.
+                # The box may hold a minimum that is not known.
                 allowed = low
         waiting = b
         if allowed >= LARGEST_BALL * reach and allowed >= curved_bound:
             rest = min(rest, allowed)
             continue
         if allowed < curved_bound:
-            # A contact may be born beside one that is near: so far it is excluded.
+            # Beyond this motion a contact may be created beside a near one: an accepted pose then needs an update.
             sure = min(sure, allowed)
             allowed = curved_bound
         birth_bound = min(birth_bound, allowed)
