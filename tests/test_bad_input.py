@@ -354,7 +354,10 @@ TYPES = {
     ),
     "manager bodies": (lambda: asm.Manager(3.0), "bodies is 3.0; expected bodies"),
     "manager body": (lambda: asm.Manager([BALL, BALL]), r"bodies\[0\] is NurbsSurface.*; expected a Body"),
-    "follow": (lambda: touching().tracker((0, 0, 0)), r"follow\[0\] is 0; expected a Point, a Frame or a Body"),
+    "follow": (
+        lambda: touching().tracker((0, 0, 0)),
+        r"follow\[0\] is 0; expected a Point, a Frame, a Body or a joint",
+    ),
     "starts an array": (lambda: solve(starts=np.array([1, 2])), r"starts is array\(\[1, 2\]\); expected a mapping"),
     "starts zero": (lambda: solve(starts=0), "starts is 0; expected a mapping of constraint name to parameters"),
     "starts a text": (lambda: solve(starts=""), "starts is ''; expected a mapping"),
