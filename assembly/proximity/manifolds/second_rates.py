@@ -7,6 +7,7 @@ goes to exp(w) x + v, about the origin of the first, in its axes.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,7 +42,7 @@ def _moves(q: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class Row(ABC):
     """A row of a manifold, in the axes of the body that stays.
 
     Attributes
@@ -61,9 +62,9 @@ class Row:
     of_second: bool
     x: Array
 
+    @abstractmethod
     def second(self) -> Array:
         """The gap's second derivative, (6, 6): along exp(t w) x + t v it is twist^T second twist."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)
