@@ -78,6 +78,7 @@ def kept_plan(solution: object, of: object, wrt: object) -> Plan | None:
     if type(solution) is not Solution or type(of) not in SEQUENCES or type(wrt) not in SEQUENCES:
         return None
     try:
+        # The types of `of` and `wrt` were asked above in a way that mypy does not follow.
         plan: Plan | None = solution._packed.derivative_plans.get((tuple(of), tuple(wrt)))  # type: ignore[arg-type]
     except TypeError:  # what cannot be a key is no measure
         return None

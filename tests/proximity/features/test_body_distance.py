@@ -212,6 +212,14 @@ def test_a_tilted_pin_in_a_hole(cases):
         assert found.lower <= expected + 1e-14 and expected - 1e-14 <= found.upper
 
 
+def test_a_ball_over_the_ridge_of_a_trimmed_roof():
+    # Both halves are flat, and the nearest point is on the crease between them, which is no boundary of the face.
+    net = np.array([[[-1, -1, 0], [-1, 1, 0]], [[0, -1, 1], [0, 1, 1]], [[1, -1, 0], [1, 1, 0]]], dtype=float)
+    surface = asm.NurbsSurface(net, ([0, 0, 0.5, 1, 1], [0, 0, 1, 1]), (1, 1))
+    roof = Face(surface, holes=[ellipse(0.25, 0.2, 0.05, 0.05)])
+    check(roof, SHAPES.sphere(0.5), (None, at(0.1, 0.3, 2.5)), np.hypot(0.1, 1.5) - 0.5)
+
+
 def test_bodies_that_meet_are_nowhere_apart():
     box = SHAPES.box(1.0, 1.0, 1.0)
     for shift in (at(0.5, 0.5, 0.5), at(1.0), at(0.999, 0.3, 0.2)):
