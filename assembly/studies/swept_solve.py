@@ -32,7 +32,8 @@ from assembly.solve.solution import Solution
 from assembly.solve.way import Way
 from assembly.studies.obstacles import Obstacles
 from assembly.studies.seen_poses import SeenPoses
-from assembly.tracking.clear_ticks import ClearTicks, WayLimits
+from assembly.tracking.clear_ticks import ClearTicks
+from assembly.tracking.proven_pose import WayLimits
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly

@@ -36,8 +36,9 @@ class TrackStatus(Enum):
     BAD_TARGET = "the target is no finite point or pose; nothing moved"
     VIOLATED = "the constraints hold at no pose that was found; the violation says by how much"
     CHANGED = (
-        "a constraint gained or lost a row since the tracker was made, or a frame, a shape, a least gap or what is "
-        "fixed or enabled was set anew; nothing moved, make another one"
+        "since the tracker was made a body, a constraint or a term was added or removed, or a constraint gained or "
+        "lost a row, or a frame, a shape, a least gap or what is fixed or enabled was set anew; nothing moved, "
+        "make another one"
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from time import perf_counter
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +16,6 @@ from assembly.constraints.packing.renumbered import numbers_told
 from assembly.constraints.packing.scene import structure_of
 from assembly.constraints.program.records import CLOCK_AT, MANAGER_RECORD
 from assembly.kinematics.changes import changes
-from assembly.proximity.clearance.kept_looks import NEVER, Until
 from assembly.proximity.features.solid_contact import STAYS, TRACK
 from assembly.proximity.manager.records import (
     CLOCK,
@@ -29,7 +28,7 @@ from assembly.proximity.manager.records import (
 )
 from assembly.solve.attempts.attempts import new_workspace
 from assembly.solve.clearance_proof import can_prove
-from assembly.solve.loop.settings import CARRIES, HISTORY, RADIUS, VIOLATION
+from assembly.solve.loop.settings import CARRIES, HISTORY, RADIUS
 from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import is_for_proofs
@@ -38,7 +37,8 @@ from assembly.tracking.fitting import fits_of
 from assembly.tracking.followed import Followed
 from assembly.tracking.hands import Hands, Targets
 from assembly.tracking.proven_pairs import ProvenPairs, joined_pairs
-from assembly.tracking.tick import Step, TrackStatus
+from assembly.tracking.tick import TrackStatus
+from assembly.tracking.tick_call import TickCall
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -47,6 +47,12 @@ if TYPE_CHECKING:
 __all__ = ["TickMemory", "forget_updates"]
 
 Array = NDArray[np.float64]
+
+
+def _contents(scene: Assembly) -> tuple[tuple[int, ...], Counter[tuple[float, int]]]:
+    """Which bodies, constraints and terms a scene has; constraints and terms in any order."""
+    items = [(0.0, id(item)) for item in scene.constraints] + [(sign, id(term)) for sign, term in scene.objectives]
+    return tuple(map(id, scene.bodies)), Counter(items)
 
 
 def forget_updates(packed: Packed, state: Array) -> None:
@@ -74,10 +80,11 @@ def _follow_extrema(packed: Packed, state: Array, keeps_time: bool) -> None:
 class TickMemory(InOneProcess):
     """What ticks of a scene with hands read and write: the packed scene, a state, workspaces, settings, and proofs.
 
-    A subclass sets the scene with its hands, the settings and what counts as touching before the first solution is
-    taken in.
+    A subclass sets the scene, the same with its hands, the settings and what counts as touching before the first
+    solution is taken in.
     """
 
+    _scene_given: Assembly
     _inner: Assembly
     _hands: Hands
     _settings: Array
@@ -125,10 +132,7 @@ class TickMemory(InOneProcess):
         self._before = self._pose.copy()
         self._knobs: Any = self._settings.data
         _, doubles, integers = new_workspace(packed)
-        work = (self._settings, self._state, self._history, doubles, integers, packed.end_effectors)
-        self._arguments = (packed.table, packed.pool, *work)
-        # Where no pair has rows, there is no contact manager.
-        self._rows_alone = (packed.without_manager(), packed.pool, *work)
+        self._call = TickCall(packed, (packed.pool, self._settings, self._state, self._history, doubles, integers))
         self._radius = float(self._settings[RADIUS])
         self._seen = float(self._state[packed.memory_at + EVENT_COUNT]) if packed.clearance_rows else 0.0
         self._hands.pack(packed)
@@ -151,9 +155,27 @@ class TickMemory(InOneProcess):
         self._before[packed.results_at : packed.memory_at] = result
         self._pose[:] = self._before
 
+    def _keep_contents(self) -> None:
+        """Note what the scene is made of, which the scene with the hands is made of as well."""
+        self._edition, self._contents = self._scene_given._edition, _contents(self._scene_given)
+
+    def _has_other_contents(self) -> bool:
+        """Whether bodies, constraints or terms were added to the scene, or removed; not where they are there again."""
+        if self._scene_given._edition is not self._edition:
+            if _contents(self._scene_given) != self._contents:
+                return True
+            self._edition = self._scene_given._edition
+        return False
+
     def _has_changed(self) -> bool:
-        """Whether a constraint of the scene, and not of another one, gained or lost a row, or a number was set anew."""
+        """Whether ticks do not follow what is asked for now.
+
+        The scene is made of other things; a constraint of it, and not of another one, gained or lost a row; or a number
+        was set anew.
+        """
         packed = self._packed
+        if self._has_other_contents():
+            return True
         if packed.structure != structure_of(self._inner._seated_constraints()) or self._told() != self._numbers:
             return True
         packed.stamp, self._edits = structure_changes(), changes()
@@ -161,43 +183,3 @@ class TickMemory(InOneProcess):
 
     def _told(self) -> list[object]:
         return numbers_told(self._packed, self._inner.bodies, self._inner.constraints)
-
-    def _until(self, begin: float) -> Until:
-        """When the time of a tick is over that began at a time; what is not done is left to the next one only then."""
-        if self._budget is None or self._knobs[CARRIES] == 0.0:
-            return NEVER
-        return int(self._packed.table[CLOCK_AT]), int(1e9 * (begin + self._budget))
-
-    @property
-    def _stands(self) -> bool:
-        """Whether constraints hold at the pose of the last tick."""
-        return bool(self._before[self._packed.results_at + VIOLATION] <= self._tolerance)
-
-    def _late(self, row: Targets, begin: float) -> Step:
-        """The step of a tick whose time was over: the last pose stands."""
-        status = TrackStatus.LATE if self._stands else TrackStatus.VIOLATED
-        seen, packed = self._seen, self._packed
-        if packed.clearance_rows:
-            # A proof that ended in this tick may have led to it: the next ones do not tell its events again.
-            self._seen = float(self._before[packed.memory_at + EVENT_COUNT])
-        return Step(self._followed, self._before, status, row, seen, perf_counter() - begin, self._way_depth())
-
-    def _refused(self) -> tuple[TrackStatus, Array]:
-        """Go back to the last pose from one at which bodies are not known to be clear."""
-        self._pose[:] = self._before
-        # The contact that was crossed may not be listed: all pairs are searched again.
-        self._rows.list_again(self._state, [] if self._clear is None else self._clear.in_the_way)
-        self._rows.update_all()
-        forget_updates(self._packed, self._state)
-        return TrackStatus.HELD, self._pose.copy()
-
-    def _holds(self) -> Array:
-        """Go on from a pose at which all pairs hold; its state, which nobody writes to."""
-        self._rows.settle(self._pose)
-        return self._pose.copy()
-
-    def _way_depth(self) -> float | None:
-        """How deep the way to the last pose may go in; None where that is not proven."""
-        if self._clear is None:
-            return 0.0
-        return self._clear.way_depth if self._clear.proved else None

@@ -12,52 +12,35 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._read_only import read_only
 from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import Freedom, structure_changes
-from assembly.constraints.packing.scene import MOST_CROWDING
 from assembly.constraints.program.records import CLOCK_AT
 from assembly.errors import InputError, integer, number, positive
 from assembly.kinematics.body import Body, Frame, Point
 from assembly.kinematics.changes import changes
 from assembly.kinematics.pose import Pose, pose_rows
-from assembly.proximity.clearance.kept_looks import Until
-from assembly.proximity.manager.records import EVENT_COUNT
-from assembly.solve.loop.augmented_lagrangian import solve_program
 from assembly.solve.loop.parameters import ROUNDING
 from assembly.solve.loop.settings import (
     ALLOWED_OVERLAP,
     BUDGET,
-    CARRIED,
-    CONTACT_LOST,
     FEASIBILITY,
     FINAL_UPDATE,
     ITERATIONS,
-    LAST_FEASIBLE,
-    OUT_OF_TIME,
     RADIUS,
     SECOND_ORDER,
-    SOLVED,
     STATIONARITY,
     TICK,
-    VIOLATION,
 )
 from assembly.solve.options import Options
 from assembly.solve.solution import Solution
-from assembly.tracking.clear_ticks import Standing
-from assembly.tracking.hands import Followable, SeveralHands, Targets, are_same
+from assembly.tracking.hands import Followable, SeveralHands
 from assembly.tracking.log import TrackLog
 from assembly.tracking.new_hands import new_hands, springs, with_hands
 from assembly.tracking.tick import Step, TrackStatus
-from assembly.tracking.tick_memory import TickMemory
+from assembly.tracking.ticks import LOOP_SHARE, Ticks
 from assembly.tracking.trace import Trace
 
 __all__ = ["Tracker"]
 
 Array = NDArray[np.float64]
-# Steps of a tick may be bounded to this, in parts of the scene's size, after ticks that failed.
-SHORTEST_RADIUS = 1e-7
-# The part of a budget in which the loop may begin steps, where what it ends at has to be proven.
-LOOP_SHARE = 0.5
-# What the loop says of a tick whose pose holds.
-_STATUSES = {SOLVED: TrackStatus.FOLLOWED, OUT_OF_TIME: TrackStatus.LATE}
 _CODES = {status: k for k, status in enumerate(TrackStatus)}
 
 
@@ -89,7 +72,7 @@ def _tick_settings(limit: float, iterations: int, second_order: bool) -> Array:
     return settings
 
 
-class Tracker(TickMemory):
+class Tracker(Ticks):
     """Makes points or frames of bodies, or coordinates of joints, follow targets; made by `Assembly.tracker`.
 
     Every tick is a few steps of the loop that `solve` runs, from the pose and the multipliers of the tick before. A
@@ -100,8 +83,8 @@ class Tracker(TickMemory):
     Parameters
     ----------
     scene : Assembly
-        Its present bodies, constraints and objectives; driven values and limits may change between ticks, but none may
-        be added or removed.
+        Its present bodies, constraints and objectives; driven values and limits may change between ticks. Where
+        anything is added or removed, ticks are CHANGED and nothing moves.
     follow : Point, Frame, Body or Freedom, or a list of them
         What follows the target, or a list of several. The target of a `Point` is a point (3,), that of a `Freedom`, as
         in `joint.coordinate("angle")`, a number, that of the others a pose (7,) or a `Pose`; for a list it is a
@@ -155,6 +138,7 @@ class Tracker(TickMemory):
         if not isinstance(second_order, (bool, np.bool_)):
             raise InputError(f"second_order is {second_order!r}; expected True or False")
         self._scene_given = scene
+        self._keep_contents()
         self._touching = touching
         poses = _begin(scene, q0, touching)
         self._hands = new_hands(scene, follow, poses, weights)
@@ -231,10 +215,13 @@ class Tracker(TickMemory):
         Raises
         ------
         InputError, TypeError
-            A tracker of a single hand, no poses of all bodies, or ones from which the constraints cannot be solved.
+            A tracker of a single hand, a scene that has other bodies, constraints or terms by now, no poses of all
+            bodies, or ones from which the constraints cannot be solved.
         """
         if not isinstance(self._hands, SeveralHands):
             raise InputError("the tracker has a single hand; expected one that was made with a list")
+        if self._has_other_contents():
+            raise InputError("the scene has other bodies, constraints or terms; expected those the tracker was made of")
         poses = pose_rows("q0", q0.q if isinstance(q0, Solution) else q0, len(self._scene_given.bodies))
         before = self.q
         self._hands.at_rest(poses)
@@ -272,8 +259,8 @@ class Tracker(TickMemory):
         """
         begin = perf_counter()
         packed = self._packed
-        is_new = packed.stamp != structure_changes() or self._edits is not changes()
-        changed = is_new and self._has_changed()
+        is_old = packed.stamp == structure_changes() and self._edits is changes()
+        changed = not (is_old and self._edition is self._scene_given._edition) and self._has_changed()
         row = None if changed else self._hands.aimed(target)
         if row is None:
             status = TrackStatus.CHANGED if changed else TrackStatus.BAD_TARGET
@@ -285,91 +272,6 @@ class Tracker(TickMemory):
                 return step
         ended_with = self._moved_clear(row, until)
         return self._late(row, begin) if ended_with is None else self._ended(*ended_with, row, begin)
-
-    def _moved_clear(self, row: Targets, until: Until) -> tuple[TrackStatus, Array] | None:
-        """Run the loop, and prove where that led; None if the loop or the proof goes on in the next tick.
-
-        Some pairs have no rows at first, or those of earlier ticks (`proven_pairs.py`). Where the proof refuses a pose,
-        they get the rows of the last one, once, and the tick begins again.
-        """
-        begun_again = frozenset[int]()
-        while True:
-            status = self._moved()
-            if status is None:
-                # The next tick goes on from a pose that does not hold yet.
-                return None
-            ended = self._pose.copy()
-            if self._clear is None or status is TrackStatus.VIOLATED:
-                return status, ended
-            self._clear.unlisted = self._rows.unlisted
-            self._clear.renewable = self._rows.fitting - begun_again
-            holds = self._clear.hold_at(Standing(self._scene, self._packed, ended), until)
-            if holds is None:
-                self._awaited = status, row, ended
-                return None
-            if holds:
-                return status, self._holds() if self._rows.are_some else ended
-            again = self._rows.without_updates(self._clear.doubtful) & set(self._clear.in_the_way) - begun_again
-            if self._budget is not None or not again:
-                return self._refused()
-            self._pose[:] = self._before
-            self._rows.list_again(self._state, again)
-            begun_again |= again
-
-    def _moved(self) -> TrackStatus | None:
-        """Run the loop once; the status of the tick if bodies are clear, None if the loop goes on in the next one."""
-        view, at = self._view, self._packed.results_at
-        carried = view[at + CARRIED] > 0.0
-        self._rows.leave_out(self._state)
-        code = solve_program(*(self._rows_alone if self._rows.has_no_rows else self._arguments))
-        if view[at + CARRIED] > 0.0:
-            return None
-        status = _STATUSES.get(code, TrackStatus.APPROACHING)
-        if not view[at + VIOLATION] <= self._tolerance:
-            # If a contact appeared that the rows of the last tick did not have, there is no pose to return to.
-            begun = carried or self._history[0, 1] * self._packed.scale <= self._tolerance
-            if code == CONTACT_LOST or (begun and self._stands):
-                self._pose[:] = self._before
-                return TrackStatus.HELD if self._stands else TrackStatus.VIOLATED
-            return TrackStatus.VIOLATED
-        return TrackStatus.HELD if view[at + LAST_FEASIBLE] == 1.0 else status
-
-    def _gone_on(self, row: Targets, begin: float, until: Until) -> Step | None:
-        """The step of a tick that goes on with a proof; None where there is time for the loop as well."""
-        assert self._clear is not None and self._awaited is not None
-        holds = self._clear.go_on(until)
-        if holds is None:
-            return self._late(row, begin)
-        status, asked, ended = self._awaited
-        self._awaited = None
-        if not holds:
-            status, ended = self._refused()
-        else:
-            ended = self._holds() if self._rows.are_some else ended
-            if not are_same(row, asked):
-                # It is as near as it can be to another target.
-                status = TrackStatus.LATE
-                if perf_counter() - begin < LOOP_SHARE * (self._budget or 0.0):
-                    self._before = ended
-                    return None
-        return self._ended(status, ended, row, begin)
-
-    def _ended(self, status: TrackStatus, ended: Array, row: Targets, begin: float) -> Step:
-        """The step of a tick that ended at a state (k,), which nobody writes to."""
-        packed = self._packed
-        # After a step that was too long the next ones are shorter, until they succeed.
-        radius = self._knobs[RADIUS]
-        if status is TrackStatus.HELD:
-            self._knobs[RADIUS] = max(0.25 * radius, SHORTEST_RADIUS)
-        elif radius < self._radius:
-            self._knobs[RADIUS] = min(4.0 * radius, self._radius)
-        seen = self._seen
-        if packed.clearance_rows:
-            self._seen = self._view[packed.memory_at + EVENT_COUNT]
-        self._before, followed = ended, self._followed
-        if packed.is_crowded(ended) and self._inner._crowding < MOST_CROWDING:
-            self._take_more_places()
-        return Step(followed, ended, status, row, seen, perf_counter() - begin, self._way_depth())
 
     def run(self, trace: Trace | Sequence[Trace], *, paced: bool = False, stride: int = 1) -> TrackLog:
         """Follow recorded motions, one tick per sample.

@@ -43,6 +43,8 @@ class Contents:
         self._taken: set[str] = set()  # names of constraints
         self._objectives: list[tuple[float, Objective]] = []
         self._stood: tuple[list[Pose], Array] = [], np.empty((0, 7))
+        # Another object after whatever was added or removed: trackers compare it at every tick.
+        self._edition = object()
         for body in items("bodies", bodies, "bodies, at least one"):
             self.add(body)
 
@@ -57,6 +59,11 @@ class Contents:
 
     def _has_changed(self) -> None:
         """What was made of the contents before holds no more."""
+
+    def _was_edited(self) -> None:
+        """Something was added or removed."""
+        self._edition = object()
+        self._has_changed()
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -135,7 +142,7 @@ class Contents:
             raise InputError(f"body has the name {body.name!r} of another body; expected distinct names")
         self._bodies.append(body)
         self._named[body.name] = body
-        self._has_changed()
+        self._was_edited()
         return body
 
     def constrain(self, *constraints: Constraint) -> None:
@@ -167,7 +174,7 @@ class Contents:
         for constraint in constraints:
             self._constraints.append(constraint)
             self._taken.add(constraint.name)
-        self._has_changed()
+        self._was_edited()
 
     @overload
     def remove(self, constraint: str) -> Constraint: ...
@@ -190,7 +197,7 @@ class Contents:
             kept = [(sign, term) for sign, term in self._objectives if term is not constraint]
             if isinstance(constraint, Objective) and len(kept) < len(self._objectives):
                 self._objectives[:] = kept
-                self._has_changed()
+                self._was_edited()
                 return constraint
             known = ", ".join(repr(item.name) for item in self._constraints) or "none"
             raise InputError(f"constraint is {constraint!r}; expected one of the assembly: {known}, or a term")
@@ -202,7 +209,7 @@ class Contents:
                 )
         self._constraints.remove(item)
         self._taken.discard(item.name)
-        self._has_changed()
+        self._was_edited()
         return item
 
     def minimize(self, *objectives: Objective) -> None:
@@ -228,7 +235,7 @@ class Contents:
                             "expected it to be constrained before"
                         )
             self._objectives.append((sign, objective))
-            self._has_changed()
+            self._was_edited()
 
     def _check_bodies(self, what: str, bodies: Iterable[Body]) -> None:
         for body in bodies:

@@ -56,7 +56,7 @@ class PackedForest:
     Attributes
     ----------
     arrays : tuple
-        As kernels take them (`Forest`).
+        As kernels take them (`Forest`); another tuple where there was no more room in them.
     roots : list of int
         The row of every body's root.
     cells : list of BodyCells
@@ -92,14 +92,10 @@ class PackedForest:
         self._nodes = np.zeros((row_at + SPARE, NODE_SIZE))
         self._links[:row_at], self._nodes[:row_at] = np.concatenate(links), np.concatenate(nodes)
         self._used, self._first = np.array([row_at]), row_at
+        self.arrays: tuple[NDArray[np.generic], ...] = (*self._fixed, self._links, self._nodes, self._used)
         self._shells: dict[int, list[Array]] = {}
         self.roots = [first[shape] for shape in shapes]
         self.cells = [self.made[distinct.index(shape)] for shape in shapes]
-
-    @property
-    def arrays(self) -> tuple[NDArray[np.generic], ...]:
-        """As kernels take them."""
-        return (*self._fixed, self._links, self._nodes, self._used)
 
     @property
     def is_large(self) -> bool:
@@ -144,6 +140,7 @@ class PackedForest:
             return False
         self._links = np.concatenate([self._links, np.zeros_like(self._links)])
         self._nodes = np.concatenate([self._nodes, np.zeros_like(self._nodes)])
+        self.arrays = (*self._fixed, self._links, self._nodes, self._used)
         return True
 
     def room_in_bores(self, walls: Table, within: Table, turn: Array, shift: Array) -> float:
@@ -199,6 +196,11 @@ class Fronts:
         The size of pairs of cells that stay open, in parts of the larger body's size.
     budget : int
         After so many pairs of nodes in a look pairs of cells stay open.
+
+    Attributes
+    ----------
+    arrays : tuple
+        As kernels take them (`Front`); another tuple where there was no more room in them.
     """
 
     def __init__(
@@ -232,16 +234,15 @@ class Fronts:
             (np.zeros((room, PARTED_SIZE)), np.zeros((room, NODES_SIZE), dtype=np.int64)) for _ in range(2)
         )
         self._work = np.zeros(WORK)
+        self.arrays: tuple[NDArray[np.generic], ...] = (
+            *(self._pair, self._counts, self.parted, self.nodes),
+            *(*self._next, *self._waiting, self._work),
+        )
 
     @property
     def left(self) -> tuple[Array, Table]:
         """Of the pair that was looked at last, and not found clear, the rows that its look left."""
         return self._next
-
-    @property
-    def arrays(self) -> tuple[NDArray[np.generic], ...]:
-        """As kernels take them."""
-        return (self._pair, self._counts, self.parted, self.nodes, *self._next, *self._waiting, self._work)
 
     def _rows(self) -> list[np.recarray]:
         counts, kept, half = self.counts.count, self.counts.aside * (self.pair.underway > 0.0), self.nodes.shape[1] // 2

@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._lent import lent_table
 from assembly.geometry.faces.face import Face
 from assembly.proximity.clearance.body_pairs import BodyPairs
 from assembly.proximity.clearance.forest import Fronts
@@ -47,7 +48,7 @@ def run_through(looks: Generator[None, None, Result]) -> Result:
 
 
 class KeptLooks(BodyPairs):
-    """Looks at pairs of bodies and the fronts that they keep; parameters are those of `BodyPairs`.
+    """Looks at pairs of bodies and the fronts that they keep; made as `BodyPairs` are.
 
     Attributes
     ----------
@@ -67,18 +68,30 @@ class KeptLooks(BodyPairs):
         self.fronts = Fronts(self.forest, local, minimum)
         self.fronts.counts.body_a, self.fronts.counts.body_b = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
         self._codes = np.zeros(len(self.pairs), dtype=np.int64)
+        # Last poses before the last looks that asked whether pairs stay clear.
+        self._before = np.zeros((len(self.pairs), 12))
         self._begun = np.zeros(len(self.pairs), dtype=bool)
         # Columns: to ask records for them by name takes longer than a tick.
         self._turn, self._shift = self.fronts.pair.turn, self.fronts.pair.shift
         # Poses of the last looks, where all pairs had them at the same ones.
         self._at: bytes | None = None
         self.until = NEVER
+        self._lent: tuple[object, object, Table] = None, None, np.empty(0, dtype=np.int64)
+
+    @property
+    def lent(self) -> Table:
+        """The arrays that looks work on, as kernels take them (`pair_looks.py`); others once they had to grow."""
+        forest, fronts, table = self._lent
+        if forest is not self.forest.arrays or fronts is not self.fronts.arrays:
+            table = lent_table((*self.forest.arrays, *self.fronts.arrays, self._codes, self._before))
+            self._lent = self.forest.arrays, self.fronts.arrays, table
+        return table
 
     def _looked(
         self, q: Array, touching: float, moves: Array, rows: Sequence[int], swept: bool, budget: int | None
     ) -> Generator[None, None, list[int]]:
         """Look at some pairs; what was asked of each."""
-        self._forget()
+        self.forget_cells()
         tasks = np.zeros(len(self.pairs), dtype=np.int64)
         counts, pair = self.fronts.counts, self.fronts.pair
         # Not while a look goes on with what its time was over for.
@@ -107,33 +120,51 @@ class KeptLooks(BodyPairs):
         at once is not taken in parts.
         """
         task = ON_WAY_AT_ONCE if at_once else ON_WAY
-        return self._stay_clear(q, touching, moves, budget, task, NEVER) == CLEAR
+        return self._stay_clear(q, touching, moves, (task, budget), NEVER) == CLEAR
 
     def staying_clear(
-        self, q: Array, touching: float, moves: Array, budget: int | None = None
+        self, q: Array, touching: float, moves: Array, budget: int | None = None, code: int | None = None
     ) -> Generator[None, None, bool]:
-        """As `stays_clear`, piece by piece: it yields whenever the time of `until` is over."""
-        code = self._stay_clear(q, touching, moves, budget, ON_WAY, self.until)
+        """As `stays_clear`, piece by piece: it yields whenever the time of `until` is over.
+
+        Parameters
+        ----------
+        q, touching, moves, budget
+        code : int, optional
+            How the first piece ended, of one who called the kernel with the task ON_WAY himself.
+        """
+        code = self._stay_clear(q, touching, moves, (ON_WAY, budget), self.until, code)
         while code == SPENT:
             yield
-            code = self._stay_clear(q, touching, moves, budget, GOING_ON, self.until)
+            code = self._stay_clear(q, touching, moves, (GOING_ON, budget), self.until)
         return code == CLEAR
 
-    def _stay_clear(self, q: Array, touching: float, moves: Array, budget: int | None, task: int, until: Until) -> int:
-        self._forget()
+    def _stay_clear(
+        self,
+        q: Array,
+        touching: float,
+        moves: Array,
+        asked: tuple[int, int | None],
+        until: Until,
+        code: int | None = None,
+    ) -> int:
+        """How looks at all pairs end that do a task within a budget; `code` if they were made already."""
         self._at, at = None, np.array(q, dtype=float)
-        asked, codes = (task, budget or 0), self._codes
-        while True:
-            code = stay_clear(self.forest.arrays, self.fronts.arrays, at, moves, touching, asked, codes, until)
-            if code != NO_ROOM or not self._grow():
-                break
-            if task == GOING_ON:
-                codes[codes == NO_ROOM] = SPENT
+        task, budget = asked
+        if code is None:
+            self.forget_cells()
+            code = stay_clear(self.lent, at, moves, touching, (task, budget or 0), until)
+        while code == NO_ROOM and self._grow():
+            if task != ON_WAY_AT_ONCE:
+                # Other pairs have been looked at: they are at these poses.
+                self._codes[self._codes == NO_ROOM] = SPENT
+                task = GOING_ON
+            code = stay_clear(self.lent, at, moves, touching, (task, budget or 0), until)
         if code == CLEAR:
             self._at = at.tobytes()
         return int(code)
 
-    def _forget(self) -> None:
+    def forget_cells(self) -> None:
         """Forget cells where contacts that went along bodies have left too many."""
         if self.forest.is_large:
             self.forest.forget(self.fronts)
@@ -151,7 +182,7 @@ class KeptLooks(BodyPairs):
             usual, pair.touch = counts.budget.copy(), touching
             if budget is not None:
                 counts.budget = budget
-            look_at_pairs(self.forest.arrays, self.fronts.arrays, at, moves, waiting, self._codes, self.until)
+            look_at_pairs(self.lent, at, moves, waiting, self.until)
             counts.budget = usual
             asked = waiting != PASSED_BY
             short, late = asked & (self._codes == NO_ROOM), asked & (self._codes == SPENT)
@@ -169,6 +200,10 @@ class KeptLooks(BodyPairs):
     def last_poses(self) -> tuple[Array, Array]:
         """The rotations (pairs, 9) and shifts (pairs, 3) of second bodies at the last looks that ended clear."""
         return self._turn.copy(), self._shift.copy()
+
+    def poses_before(self) -> tuple[Array, Array]:
+        """What `last_poses` were before the last looks that asked whether all pairs stay clear."""
+        return self._before[:, :9].copy(), self._before[:, 9:].copy()
 
     def go_back(self, poses: tuple[Array, Array]) -> None:
         """Make earlier poses, from which all ways were clear, the last ones again. Looks that go on are given up."""

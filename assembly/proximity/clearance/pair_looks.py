@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly._lent import lent_array
 from assembly._record import Store
 from assembly.geometry.vec import dot, matmul_t, matvec_t, quaternion_matrix, quaternion_product
 from assembly.kinematics.motion import RelativePose, exponential, rotation
@@ -77,10 +78,36 @@ def look_at_pair(forest, front, q, move, task, time):
     return done_task(forest, front, pose, limits, task)
 
 
-FRONTS = (
-    "Tuple((f8[:, ::1], i8[:, ::1], f8[:, :, ::1], i8[:, :, ::1], "
-    "f8[:, ::1], i8[:, ::1], f8[:, ::1], i8[:, ::1], f8[:, ::1]))"
-)
+# Arrays of a proof, as a table of lent arrays has them: those of `Forest`, of `Fronts`, how looks ended, and the last
+# poses (pairs, 12) before the last call of `stay_clear`.
+integers, integer_rows = lent_array("i8", 1), lent_array("i8", 2)
+doubles, double_rows = lent_array("f8", 1), lent_array("f8", 2)
+fronts_of_nodes, fronts_of_directions = lent_array("i8", 3), lent_array("f8", 3)
+PAIRS_AT, CODES_AT, BEGUN_AT = 6, 15, 16
+
+
+@kernel(inline=True, allocates=True)
+def lent_forest(lent):
+    """The trees of a proof."""
+    store = Store(integers(lent, 0), doubles(lent, 1))
+    return Forest(store, integer_rows(lent, 2), integer_rows(lent, 3), double_rows(lent, 4), integers(lent, 5))
+
+
+@kernel(inline=True, allocates=True)
+def lent_front(lent, k):
+    """The front of pair k of a proof."""
+    at = PAIRS_AT
+    return Front(
+        pair=double_rows(lent, at)[k],
+        counts=integer_rows(lent, at + 1)[k],
+        parted=fronts_of_directions(lent, at + 2)[k],
+        nodes=fronts_of_nodes(lent, at + 3)[k],
+        next_parted=double_rows(lent, at + 4),
+        next_nodes=integer_rows(lent, at + 5),
+        waiting=double_rows(lent, at + 6),
+        waiting_nodes=integer_rows(lent, at + 7),
+        work=double_rows(lent, at + 8),
+    )
 
 
 @kernel(inline=True)
@@ -91,20 +118,27 @@ def is_grown(front):
     return idle and counts.count > GROWN * counts.fresh + MANY
 
 
-@kernel(signatures=f"({FOREST}, {FRONTS}, f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], UniTuple(i8, 2))", allocates=True)
-def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes, time):
-    """Look at pairs of bodies at poses q (n, 7), each after a move (6) of its second body; how each look ended.
+@kernel(inline=True)
+def keep_begin(lent, k):
+    """Keep the last pose of pair k."""
+    pair, begun = pair_proof_at(lent_front(lent, k).pair, 0), double_rows(lent, BEGUN_AT)
+    for i in range(9):
+        begun[k, i] = pair.turn[i]
+    for i in range(3):
+        begun[k, 9 + i] = pair.shift[i]
 
-    time: a clock's address and the deadline [ns]; pairs that are left then end SPENT.
+
+@kernel(signatures="(i8[:, ::1], f8[:, ::1], f8[:, ::1], i8[::1], UniTuple(i8, 2))", allocates=True)
+def look_at_pairs(lent, q, moves, tasks, time):
+    """Look at pairs of bodies at poses q (n, 7), each after a move (6) of its second body; codes say how looks ended.
+
+    lent: the arrays of a proof. time: a clock's address and the deadline [ns]; pairs that are left then end SPENT.
     """
-    table, pool, faces, links, tree_nodes, used = forest_arrays
-    forest = Forest(Store(table, pool), faces, links, tree_nodes, used)
-    pairs, counts, parted, nodes, next_parted, next_nodes, waiting, waiting_nodes, work = front_arrays
+    forest, codes = lent_forest(lent), integers(lent, CODES_AT)
     for k in range(len(tasks)):
         if tasks[k] == PASSED_BY:
             continue
-        front = Front(pairs[k], counts[k], parted[k], nodes[k], next_parted, next_nodes, waiting, waiting_nodes, work)
-        codes[k] = look_at_pair(forest, front, q, moves[k], tasks[k], time)
+        codes[k] = look_at_pair(forest, lent_front(lent, k), q, moves[k], tasks[k], time)
         if codes[k] == SPENT:
             for i in range(k + 1, len(tasks)):
                 codes[i] = SPENT
@@ -112,35 +146,36 @@ def look_at_pairs(forest_arrays, front_arrays, q, moves, tasks, codes, time):
 
 
 @kernel(
-    signatures=f"({FOREST}, {FRONTS}, f8[:, ::1], f8[:, ::1], f8, UniTuple(i8, 2), i8[::1], UniTuple(i8, 2))",
+    signatures="(i8[:, ::1], f8[:, ::1], f8[:, ::1], f8, UniTuple(i8, 2), UniTuple(i8, 2))",
     allocates=True,
 )
-def stay_clear(forest_arrays, front_arrays, q, moves, touch, asked, codes, time):
+def stay_clear(lent, q, moves, touch, asked, time):
     """Look at all pairs on the way to poses q (n, 7): SPENT, the code of the first that did not end clear, or CLEAR.
 
     If a pair was not clear at its last look, none is looked at: all end OPEN. asked: the task, and a budget for each
     pair (0: the usual one). The task is ON_WAY; ON_WAY_AT_ONCE for ways that are not to be taken in parts; or GOING_ON,
-    which continues the pairs that ended SPENT in a call whose time was over.
+    which continues the pairs that ended SPENT in a call whose time was over. lent and time are those of
+    `look_at_pairs`.
     """
     task, budget = asked
-    table, pool, faces, links, tree_nodes, used = forest_arrays
-    forest = Forest(Store(table, pool), faces, links, tree_nodes, used)
-    pairs, counts, parted, nodes, next_parted, next_nodes, waiting, waiting_nodes, work = front_arrays
+    forest, codes = lent_forest(lent), integers(lent, CODES_AT)
     if task != GOING_ON:
-        for k in range(len(pairs)):
+        known = True
+        for k in range(len(codes)):
             codes[k] = OPEN
-        for k in range(len(pairs)):
-            if pair_proof_at(pairs[k], 0).known != 1.0:
-                return OPEN
-        for k in range(len(pairs)):
+            keep_begin(lent, k)
+            known = known and pair_proof_at(lent_front(lent, k).pair, 0).known == 1.0
+        if not known:
+            return OPEN
+        for k in range(len(codes)):
             codes[k] = SPENT
     worst = CLEAR
-    for k in range(len(pairs)):
+    for k in range(len(codes)):
         if codes[k] != SPENT:
             if worst == CLEAR:
                 worst = codes[k]
             continue
-        front = Front(pairs[k], counts[k], parted[k], nodes[k], next_parted, next_nodes, waiting, waiting_nodes, work)
+        front = lent_front(lent, k)
         pair_proof_at(front.pair, 0).touch = touch
         each = ON_WAY_AT_ONCE if task == ON_WAY_AT_ONCE else ON_WAY
         if is_grown(front):

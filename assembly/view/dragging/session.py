@@ -155,7 +155,7 @@ class Session(threading.Thread):
     def _ready(self) -> Tracker:
         """The tracker, at the poses that are shown."""
         q = self.shown.q
-        if self._tracker is None:
+        if self._tracker is None or self._tracker._has_other_contents():
             self._tracker = self.scene.tracker(self._movable, q0=q, stiffness=self._stiffness)
             for hand in range(len(self._movable)):
                 self._tracker.hold(hand, None)
