@@ -84,7 +84,7 @@ class ProvenPose:
         proof.forget_poses()
         # Wires are in each other by the distance of their spines, which no move has to open.
         proof.make_slimmer(touching if limits.depth == np.inf else 0.0)
-        self.proof = proof
+        self.proof, self._has_wires = proof, proof.has_wires
         self._judge: ClearanceProof | None = None
         pairs = first._packed.kept_pairs[: len(proof.pairs)]
         self._of_features = {k for k, pair in enumerate(pairs) if not is_of_surfaces(pair)}
@@ -124,7 +124,8 @@ class ProvenPose:
 
     def stay_clear_to(self, there: Standing) -> None:
         """Go on from a pose to which all pairs stayed clear, with what opens them."""
-        self.at, self.proved, self.way_depth = there, True, self.proof.way_depth()
+        # Of others the straight way goes in by nothing.
+        self.at, self.proved, self.way_depth = there, True, self.proof.way_depth() if self._has_wires else 0.0
 
     def go_to(self, there: Standing, moves: Array, answers: dict[int, Answer], deepest: float) -> None:
         """Go on from another pose, with other moves (pairs, 6), by what was found of pairs that did not stay clear."""

@@ -51,10 +51,14 @@ class Standing:
 
     def __init__(self, scene: Scene, packed: Packed, state: Array) -> None:
         self.scene, self.packed, self._state = scene, packed, state
-        self.q = state[: packed.contacts_at].reshape(-1, 7)
         self._relative: dict[int, tuple[Array, Array]] = {}
         self._near: dict[int, Contacts] | None = None
         self._ways: dict[int, float] = {}
+
+    @cached_property
+    def q(self) -> Array:
+        """The poses, (n, 7)."""
+        return self._state[: self.packed.contacts_at].reshape(-1, 7)
 
     def near(self, proof: ClearanceProof) -> dict[int, Contacts]:
         """The contacts that are near, by the number of their pair."""

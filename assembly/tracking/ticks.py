@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from assembly.constraints.packing.scene import MOST_CROWDING
 from assembly.constraints.program.records import CLOCK_AT
 from assembly.proximity.clearance.kept_looks import NEVER, Until
-from assembly.proximity.manager.records import EVENT_COUNT
+from assembly.proximity.manager.records import CROWDED, EVENT_COUNT
 from assembly.solve.loop.settings import (
     CARRIED,
     CARRIES,
@@ -129,11 +129,11 @@ class Ticks(TickMemory):
             self._knobs[RADIUS] = max(0.25 * radius, SHORTEST_RADIUS)
         elif radius < self._radius:
             self._knobs[RADIUS] = min(4.0 * radius, self._radius)
-        seen = self._seen
+        seen, view, is_crowded = self._seen, self._view, False
         if packed.clearance_rows:
-            self._seen = self._view[packed.memory_at + EVENT_COUNT]
+            self._seen, is_crowded = view[packed.memory_at + EVENT_COUNT], view[packed.memory_at + CROWDED] == 1.0
         self._before, followed = ended, self._followed
-        if packed.is_crowded(ended) and self._inner._crowding < MOST_CROWDING:
+        if is_crowded and self._inner._crowding < MOST_CROWDING:
             self._take_more_places()
         return Step(followed, ended, status, row, seen, perf_counter() - begin, self._way_depth())
 

@@ -4,11 +4,12 @@ A pair of nodes is tested again only after points of body b have moved by its ga
 all pairs at once. Then the gap along the same direction is computed, in some nanoseconds. If it is too small, another
 direction is sought; if none is found, one of the nodes is replaced by its children.
 
-A look writes the next front beside the present one. If the look ends clear, the next front replaces the present one;
-else nothing changes. If the time limit interrupts a look, the next front also replaces the present one: its pairs then
-describe the pose that is looked at, and the next look at that pose goes on with the pairs that are not separated yet.
-If that look does not end clear, or another pose is looked at instead, the front from before is restored, since the
-front of a failed proof has many small pieces.
+A look writes the next front beside the present one, of which most pairs need no test and stay as they are: as long as
+no direction fails, only those that are tested are written, each beside its own row. If the look ends clear, the next
+front replaces the present one; else nothing changes. If the time limit interrupts a look, the next front also replaces
+the present one: its pairs then describe the pose that is looked at, and the next look at that pose goes on with the
+pairs that are not separated yet. If that look does not end clear, or another pose is looked at instead, the front from
+before is restored, since the front of a failed proof has many small pieces.
 """
 
 from __future__ import annotations
@@ -123,23 +124,52 @@ def keep(front, nodes, n, expiry):
     pair.next_soonest = min(pair.next_soonest, expiry)
 
 
+@kernel(inline=True)
+def copy_row(rows, nodes, i, to_rows, to_nodes):
+    """Copy row i of one front to the same row of another one."""
+    for c in range(PARTED_SIZE):
+        to_rows[i, c] = rows[i, c]
+    for c in range(NODES_SIZE):
+        to_nodes[i, c] = nodes[i, c]
+
+
 @kernel(inner=True)
 def take_next(front):
-    """Replace the present front by the next one."""
+    """Replace the present front by the next one, which is complete."""
     counts = counts_at(front.counts, 0)
     for i in range(counts.next_count):
-        for c in range(PARTED_SIZE):
-            front.parted[i, c] = front.next_parted[i, c]
-        for c in range(NODES_SIZE):
-            front.nodes[i, c] = front.next_nodes[i, c]
+        copy_row(front.next_parted, front.next_nodes, i, front.parted, front.nodes)
     counts.count = counts.next_count
+
+
+@kernel(inner=True)
+def take_tested(front, travelled):
+    """Replace the pairs of the present front that were tested, where the next one has only these."""
+    for i in range(counts_at(front.counts, 0).count):
+        if parted_at(front.parted, i).expiry <= travelled:
+            copy_row(front.next_parted, front.next_nodes, i, front.parted, front.nodes)
+
+
+@kernel(inner=True)
+def complete_next(front, count, travelled):
+    """Give the next front all of the first `count` pairs of the present one, where it has only those tested."""
+    counts = counts_at(front.counts, 0)
+    if counts.is_partial == 0:
+        return
+    for i in range(count):
+        if not parted_at(front.parted, i).expiry <= travelled:
+            copy_row(front.parted, front.nodes, i, front.next_parted, front.next_nodes)
+    counts.is_partial, counts.next_count = 0, count
 
 
 @kernel(inner=True)
 def replace_front(front, pose, travelled):
     """Replace the present front by the next one, at a pose that becomes the last one."""
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
-    take_next(front)
+    if counts.is_partial == 1:
+        take_tested(front, travelled)
+    else:
+        take_next(front)
     if counts.fresh == 0:
         counts.fresh = counts.count
     pair.soonest = pair.next_soonest
@@ -282,6 +312,24 @@ def ask_spines_again(forest, front, way, needed, i):
 
 
 @kernel(inner=True)
+def test_again(forest, front, way, needed, i):
+    """Whether pair i of the front is separated at a new pose by what separates it; then it is in the next front."""
+    row, parted = nodes_at(front.nodes, i), parted_at(front.parted, i)
+    nodes, n, travelled = Parted(row.a, row.b, row.how), vector(parted.normal), pair_proof_at(front.pair, 0).travelled
+    if nodes.how == BY_SPINES:
+        return ask_spines_again(forest, front, way, needed, i)
+    gap = gap_of(forest, nodes, way.after, n) - needed
+    # expiry - travelled is a lower bound of the gap at the last pose.
+    fine = stays_apart(forest, nodes, way, n, (parted.expiry - travelled, gap))
+    if gap > 0.0 and not fine:
+        before = gap_of(forest, nodes, way.before, n) - needed
+        fine = stays_apart(forest, nodes, way, n, (before, gap))
+    if fine:
+        keep(front, nodes, n, expiry_of(nodes, travelled + way.moved, gap))
+    return fine
+
+
+@kernel(inner=True)
 def ask_again(forest, front, way, limits):
     """Test the front at a new pose along its stored directions. Pairs that fail go to the queue.
 
@@ -289,7 +337,7 @@ def ask_again(forest, front, way, limits):
     """
     counts, pair = counts_at(front.counts, 0), pair_proof_at(front.pair, 0)
     travelled, needed, over = pair.travelled + way.moved, limits.needed, False
-    counts.next_count = 0
+    counts.next_count, counts.is_partial = 0, 1
     pair.next_soonest = math.inf
     tail = 0
     for i in range(counts.count):
@@ -297,33 +345,30 @@ def ask_again(forest, front, way, limits):
         nodes, n, expiry = Parted(row.a, row.b, row.how), vector(parted.normal), parted.expiry
         if nodes.how == LEFT_OPEN:
             # The interrupted look, which goes on, left this pair open.
+            complete_next(front, i, travelled)
             counts.opened += 1
             keep(front, nodes, n, expiry)
             continue
         if nodes.how == OPEN_YET:
+            complete_next(front, i, travelled)
             put_waiting(front, tail, Parted(row.a, row.b, BY_PLANE), n)
             tail += 1
             continue
-        if expiry <= travelled and not over:
-            counts.asked += 1
-            # Pairs that are tested at every pose are no progress: the clock is not read for them.
-            if not is_asked_always(nodes):
-                over = counts.asked % ASKED_AT_ONCE == 0 and is_over(limits)
-            if nodes.how == BY_SPINES:
-                if not ask_spines_again(forest, front, way, needed, i):
-                    put_waiting(front, tail, nodes, (0.0, 0.0, 0.0))
-                    tail += 1
-                continue
-            gap = gap_of(forest, nodes, way.after, n) - needed
-            # expiry - travelled is a lower bound of the gap at the last pose.
-            fine = stays_apart(forest, nodes, way, n, (expiry - pair.travelled, gap))
-            if gap > 0.0 and not fine:
-                before = gap_of(forest, nodes, way.before, n) - needed
-                fine = stays_apart(forest, nodes, way, n, (before, gap))
-            expiry = expiry_of(nodes, travelled, gap)
-            if not fine:
-                put_waiting(front, tail, nodes, n)
-                tail += 1
-                continue
-        keep(front, nodes, n, expiry)
+        if expiry > travelled or over:
+            if counts.is_partial == 1:
+                pair.next_soonest = min(pair.next_soonest, expiry)
+            else:
+                keep(front, nodes, n, expiry)
+            continue
+        counts.asked += 1
+        # Pairs that are tested at every pose are no progress: the clock is not read for them.
+        if not is_asked_always(nodes) and counts.asked % ASKED_AT_ONCE == 0 and is_over(limits):
+            over = True
+            complete_next(front, i, travelled)
+        if counts.is_partial == 1:
+            counts.next_count = i
+        if not test_again(forest, front, way, needed, i):
+            complete_next(front, i, travelled)
+            put_waiting(front, tail, nodes, (0.0, 0.0, 0.0) if nodes.how == BY_SPINES else n)
+            tail += 1
     return tail, over

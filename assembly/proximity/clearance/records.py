@@ -110,6 +110,7 @@ COUNTS = record_dtype(
     budget=1,  # pairs of nodes after so many stay open
     count=1,  # of pairs of nodes in the front
     next_count=1,  # and in the one that follows
+    is_partial=1,  # 1: the one that follows has only the pairs that were tested, each in its row of the present one
     aside=1,  # and in the one that is kept while a look goes on
     fresh=1,  # how many there were when it was last begun; 0: it is not done with that
     earlier=1,  # of a look whose time was over, the pairs for which directions were sought until then
