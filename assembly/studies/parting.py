@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.least_translation import least_translation
+from assembly.proximity.clearance.overlapped import balls_answer
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.solve.clearance_proof import can_prove, lent_proof
 from assembly.solve.interruption import Interruption
@@ -40,7 +41,8 @@ def parted(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     moved = q.copy()
     with lent_proof(packed, scene.bodies) as proof:
         for _ in range(ROUNDS):
-            stuck = [k for k, answer in enumerate(proof.as_they_stand(moved, touching)) if is_stuck(answer, touching)]
+            answers = enumerate(proof.as_they_stand(moved, touching))
+            stuck = [k for k, answer in answers if is_stuck(_told(proof, k, moved, answer, touching), touching)]
             if not stuck:
                 return moved if (moved != q).any() else None
             for k in stuck:
@@ -54,6 +56,13 @@ def is_stuck(answer: Answer, touching: float) -> bool:
     if answer.verdict is Verdict.CROSSING:
         return answer.depth > touching
     return answer.verdict is Verdict.ENCLOSED
+
+
+def _told(proof: ClearanceProof, k: int, q: Array, answer: Answer, touching: float) -> Answer:
+    """The answer to pair k; where cells tell nothing, as of equal bodies in one place, that of balls inside of both."""
+    if answer.verdict is not Verdict.UNDECIDED:
+        return answer
+    return balls_answer(proof, k, q, touching) or answer
 
 
 def _part(proof: ClearanceProof, k: int, q: Array, bodies: tuple[Body, ...]) -> bool:

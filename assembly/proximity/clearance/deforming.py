@@ -23,7 +23,7 @@ from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.body_cells import BodyCells
 from assembly.proximity.clearance.cones import seated_answer
-from assembly.proximity.clearance.overlapped import overlap_answer
+from assembly.proximity.clearance.overlapped import balls_answer, overlap_answer
 from assembly.proximity.clearance.parting import least_affine, least_similar
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.records import NODE
@@ -43,6 +43,9 @@ def smaller_answer(proof: ClearanceProof, k: int, q: Array, touching: float) -> 
 
     That they cross where they lie on each other, too: samples do not see what is in each other by little.
     """
+    crossing = balls_answer(proof, k, q, touching)
+    if crossing is not None:
+        return crossing
     shapes = tuple(proof.faces[body] for body in proof.pairs[k])
     slim = slim_answer(proof, k, q, touching, (shapes[0], shapes[1]))
     if slim is not None:

@@ -3,11 +3,13 @@
 Convex hulls are parted along n by h(n) = max over a of n.x - min over b of n.y, whose least value over unit vectors is
 the least translation, exactly, where both bodies are convex. It is sought from many directions and along its
 subgradient, the difference of the points that carry it. Of others shorter ways may exist, out of a hole or over a step:
-along each of many directions the first place is looked for at which the proof says CLEAR.
+along each of many directions lengths are looked for at which the proof says CLEAR, the shortest of all first.
+Balls inside of both bodies tell which are too short without a look.
 """
 
 from __future__ import annotations
 
+from heapq import heapify, heappop, heappush
 from itertools import product
 
 import numpy as np
@@ -17,16 +19,14 @@ from assembly._record import rows_of
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.body_cells import BodyCells
+from assembly.proximity.clearance.hull_depths import HullDepths
+from assembly.proximity.clearance.inscribed import overlaps_at
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.records import FLAT, LINKS, NODE
 
 __all__ = ["least_translation"]
 
 Array = NDArray[np.float64]
-# Directions of hulls that are followed downhill, steps of each, and how much a step is cut where it leads up.
-FOLLOWED, STEPS, CUT = 8, 60, 0.5
-# The first step, and directions around the subgradient that are tried.
-WIDEST, AROUND = 0.3, np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
 # Normals of flat faces that are tried of each body, and directions of edges between such faces.
 NORMALS, EDGES = 12, 12
 # Sine of an angle below which two of these have no direction across.
@@ -35,8 +35,11 @@ PARALLEL = 1e-6
 FARTHER, CLOSE = 1e-6, 1e-3
 # Other directions are of use where they are shorter by this factor.
 SHORTER = 0.95
-# The first length along a direction, in parts of the longest, and looks between it and that.
-FIRST, LENGTHS = 1e-3, 10
+# The first length along a direction, in parts of the longest, and how much longer the next one is.
+FIRST, NEXT = 1e-3, 1.3
+# Looks along other directions than that of the hulls, and pairs of nodes of each: what is clear by a usual margin takes
+# a few hundred.
+LOOKS, BUDGET = 200, 1000
 
 
 def _directions(a: BodyCells, b: BodyCells, turn: Array) -> tuple[Array, Array]:
@@ -71,93 +74,56 @@ def _across(one: Array, other: Array) -> Array:
     return np.asarray(distinct / np.linalg.norm(distinct, axis=1)[:, None])
 
 
-class _Hulls:
-    """Two convex hulls, and how far they have to be moved along a direction to be parted."""
-
-    def __init__(self, a: BodyCells, b: BodyCells, turn: Array, shift: Array) -> None:
-        self.points, self.thick = [], []
-        for cells, rotation, place in ((a, np.eye(3), np.zeros(3)), (b, turn, shift)):
-            nodes = rows_of(NODE, cells.nodes)[cells.first]
-            self.points.append(nodes.corner.reshape(-1, 3) @ rotation.T + place)
-            self.thick.append(np.repeat(nodes.rho + nodes.disc, 4))
-
-    def depths(self, ways: Array) -> Array:
-        """h of unit vectors (n, 3)."""
-        one, other = (points @ ways.T for points in self.points)
-        found = (one + self.thick[0][:, None]).max(axis=0) - (other - self.thick[1][:, None]).min(axis=0)
-        return np.asarray(found)
-
-    def slope(self, n: Array) -> Array:
-        """The subgradient of h."""
-        i = int((self.points[0] @ n + self.thick[0]).argmax())
-        j = int((self.points[1] @ n - self.thick[1]).argmin())
-        return np.asarray(self.points[0][i] - self.points[1][j])
-
-    def _lower(self, n: Array, step: float) -> tuple[float, Array]:
-        """The lowest of several directions a step from one: along the subgradient, and around, for it has creases."""
-        down = self.slope(n)
-        down = down - (down @ n) * n
-        if not down.any():
-            down = np.eye(3)[np.abs(n).argmin()]
-            down = down - (down @ n) * n
-        down /= np.linalg.norm(down)
-        tried = n - step * (np.cos(AROUND)[:, None] * down + np.sin(AROUND)[:, None] * np.cross(n, down))
-        tried /= np.linalg.norm(tried, axis=1)[:, None]
-        found = self.depths(tried)
-        return float(found.min()), tried[found.argmin()]
-
-    def least(self, ways: Array) -> Array:
-        """The direction times the depth of the least one that is found."""
-        depths = self.depths(ways)
-        best, n = float(depths.min()), ways[depths.argmin()]
-        for k in np.argsort(depths)[:FOLLOWED]:
-            at, depth, step = ways[k], float(depths[k]), WIDEST
-            for _ in range(STEPS):
-                found, other = self._lower(at, step)
-                if found < depth:
-                    at, depth = other, found
-                else:
-                    step *= CUT
-            if depth < best:
-                best, n = depth, at
-        return np.asarray(best * n)
-
-
 class _Translated:
-    """Pair k of a proof at poses (n, 7), its second body translated.
-
-    Where the two cross, no translation by less than the depth undoes it: what is that near to a translation at which
-    they do crosses as well, and is not looked at.
-    """
+    """Pair k of a proof at poses (n, 7), its second body translated."""
 
     def __init__(self, proof: ClearanceProof, k: int, q: Array) -> None:
         self._proof, self._k, self._q = proof, k, q
-        self._crossing, self._depths = np.empty((0, 3)), np.empty(0)
+        a, b = proof.pairs[k]
+        self.overlaps = overlaps_at((proof.faces[a], proof.faces[b]), (q[a], q[b]))
+        self.looks = 0
 
-    def is_clear(self, way: Array) -> bool:
-        """Whether the pair is found clear where its second body is translated so."""
-        if (np.linalg.norm(self._crossing - way, axis=1) < self._depths).any():
-            return False
+    def is_clear(self, way: Array, budget: int | None = BUDGET) -> bool:
+        """Whether the pair is found clear where its second body is translated so.
+
+        Where the two cross, no translation by less than the depth undoes it, so the ball about this one is kept.
+        """
         moved = self._q.copy()
         moved[self._proof.pairs[self._k][1], :3] += way
-        (answer,) = self._proof.look(moved, 0.0, which=[self._k])
+        self.looks += 1
+        (answer,) = self._proof.look(moved, 0.0, which=[self._k], budget=budget)
         if answer.verdict is Verdict.CROSSING:
-            self._crossing = np.append(self._crossing, way[None], axis=0)
-            self._depths = np.append(self._depths, answer.depth)
+            self.overlaps.add(way, answer.depth)
         return answer.verdict is Verdict.CLEAR
 
-    def first_clear(self, n: Array, most: float) -> float:
-        """The least length along a direction, no more than the most, at which it is clear; inf if none is found."""
-        low = 0.0
-        for length in most * np.geomspace(FIRST, 1.0, LENGTHS):
-            if self.is_clear(length * n):
-                high = float(length)
-                while high - low > CLOSE * high:
-                    middle = 0.5 * (low + high)
-                    low, high = (low, middle) if self.is_clear(middle * n) else (middle, high)
-                return high
-            low = float(length)
-        return np.inf
+    def shortened(self, n: Array, low: float, high: float) -> float:
+        """The least length along a direction that is found clear between one that is not and one that is."""
+        while high - low > CLOSE * high:
+            low = self.overlaps.beyond(n, low)
+            middle = 0.5 * (low + high)
+            if middle >= high:
+                break
+            low, high = (low, middle) if self.is_clear(middle * n) else (middle, high)
+        return high
+
+    def shortest(self, ways: Array, most: float) -> Array | None:
+        """The shortest translation found along directions (n, 3) that is shorter than `most`; None if none is.
+
+        The shortest of the next lengths of all directions is looked at first: the first that is clear is the answer.
+        """
+        lengths = [self.overlaps.beyond(n, FIRST * most) for n in ways]
+        queue = [(length, k, 0.0) for k, length in enumerate(lengths) if length < most]
+        heapify(queue)
+        until = self.looks + LOOKS
+        while queue and self.looks < until:
+            length, k, before = heappop(queue)
+            free = self.overlaps.beyond(ways[k], length)
+            if free == length and self.is_clear(length * ways[k]):
+                return np.asarray(self.shortened(ways[k], before, length) * ways[k])
+            following = free if free > length else self.overlaps.beyond(ways[k], NEXT * length)
+            if following < most:
+                heappush(queue, (following, k, length))
+        return None
 
 
 def least_translation(proof: ClearanceProof, k: int, q: Array) -> Array | None:
@@ -170,18 +136,15 @@ def least_translation(proof: ClearanceProof, k: int, q: Array) -> Array | None:
     turn, shift = world.T @ turn_b, (q[b, :3] - q[a, :3]) @ world
     first, second = proof.cells_of_both(k)
     ways, across = _directions(first, second, turn)
-    way = world @ _Hulls(first, second, turn, shift).least(np.concatenate([ways, across]))
+    way = world @ HullDepths(first, second, turn, shift).least(np.concatenate([ways, across]))
     most = float(np.linalg.norm(way)) * (1.0 + FARTHER) + FARTHER * max(first.size, second.size)
-    best = way / np.linalg.norm(way) * most
+    n = way / np.linalg.norm(way)
     translated = _Translated(proof, k, q)
     # How deep they are in each other tells which ways are too short.
     translated.is_clear(np.zeros(3))
-    if not translated.is_clear(best):
+    if not translated.is_clear(most * n, None):
         return None
-    for k_way, n in enumerate([best / most, *(ways @ world.T)]):
-        # First cells of what is round are thicker than it: the way along hulls is shortened by any part.
-        shorter = (1.0 if k_way == 0 else SHORTER) * float(np.linalg.norm(best))
-        found = translated.first_clear(n, shorter)
-        if found < shorter:
-            best = found * (1.0 + FARTHER) * n
-    return np.asarray(best)
+    # First cells of what is round are thicker than it: the way along hulls is shortened by any part.
+    most = translated.shortened(n, translated.overlaps.beyond(n, 0.0), most) * (1.0 + FARTHER)
+    shorter = translated.shortest(np.concatenate([n[None], ways @ world.T]), SHORTER * most)
+    return np.asarray(most * n if shorter is None else (1.0 + FARTHER) * shorter)

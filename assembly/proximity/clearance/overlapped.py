@@ -1,4 +1,8 @@
-"""Bodies that overlap behind flat faces, by less than samples detect.
+"""Bodies that overlap where no cells tell: of which faces lie on each other.
+
+Equal bodies in one place have no cells that cross. Balls inside of both that overlap tell that they do.
+
+Others overlap behind flat faces, by less than samples detect.
 
 Two flat faces that look at each other from inside do not tell that bodies cross: they may be far sides of thin parts,
 or belong to bodies that are beside each other there. A ball between both planes that is inside of both bodies does.
@@ -16,11 +20,12 @@ from assembly.geometry.shapes.surfaces import sphere
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.clearance.answers import Answer, Verdict
+from assembly.proximity.clearance.inscribed import overlaps_at
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.features.body_distance import DistanceStatus, distance
 from assembly.proximity.manifolds.flat_manifolds import flat_manifolds
 
-__all__ = ["overlap_answer"]
+__all__ = ["balls_answer", "overlap_answer"]
 
 Array = NDArray[np.float64]
 # [size of the bodies] Flat faces that are deeper in each other are seen by samples.
@@ -28,6 +33,16 @@ _DEEPEST = 1e-3
 # The ball's radius, over the distance of both planes.
 _PART = 0.25
 _IDENTITY = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+
+def balls_answer(proof: ClearanceProof, k: int, q: Array, touching: float) -> Answer | None:
+    """That bodies of pair k cross at poses q (n, 7), by balls inside of each that overlap by more; None if none do."""
+    a, b = proof.pairs[k]
+    overlaps = overlaps_at((proof.faces[a], proof.faces[b]), (q[a], q[b]))
+    if not len(overlaps.radii):
+        return None
+    depth, place = overlaps.deepest()
+    return Answer(Verdict.CROSSING, depth=depth, place=place) if depth > touching else None
 
 
 def overlap_answer(proof: ClearanceProof, k: int, q: Array, touching: float) -> Answer | None:

@@ -7,7 +7,7 @@ import pytest
 
 import assembly as asm
 from assembly.proximity.clearance.answers import Verdict
-from assembly.proximity.clearance.overlapped import overlap_answer
+from assembly.proximity.clearance.overlapped import balls_answer, overlap_answer
 from tests.proximity.clearance.scenes import at, poses, proof_of
 
 SIZE = 2.0
@@ -58,3 +58,28 @@ def test_far_sides_of_thin_parts_are_no_crossing():
             # Inside of both, as deep as the planes are in each other.
             assert found.depth == pytest.approx(1e-4 + height, rel=1e-9)
             assert -5e-5 < found.place[2] < 5e-5 + height
+
+
+@pytest.mark.parametrize(
+    ("shape", "least"),
+    [
+        (asm.shapes.box(2.0, 3.0, 4.0), 2.0),
+        (asm.shapes.solid_cylinder(5.0, 12.0), 10.0),
+        (asm.shapes.torus(3.0, 1.0), 2.0),
+    ],
+)
+def test_two_equal_bodies_in_one_place_cross_and_are_parted(shape, least):
+    """All their faces lie on each other. As deep as balls inside of both overlap, which no way out is shorter than."""
+    proof, q = proof_of(shape, shape), poses(at(0.0, 0.0, 0.0))
+    told = balls_answer(proof, 0, q, 1e-8)
+    assert told is not None and told.verdict is Verdict.CROSSING and 0.4 * least < told.depth <= least
+    twins = asm.Assembly([asm.Body("a", shape), asm.Body("b", shape, fixed=True)])
+    twins.constrain(asm.Clearance())
+    solution = twins.solve()
+    assert solution.success and solution.proved
+    assert least * (1.0 - 1e-6) <= np.linalg.norm(solution.pose("a").position) <= 1.5 * least
+
+
+def test_bodies_that_touch_are_not_said_to_cross():
+    box = asm.shapes.box(2.0, 3.0, 4.0)
+    assert balls_answer(proof_of(box, box), 0, poses(at(2.0, 0.3, 0.2)), 1e-8) is None
