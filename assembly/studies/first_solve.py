@@ -20,14 +20,14 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import can_prove
 from assembly.solve.interruption import Interruption
-from assembly.solve.loop.settings import ALLOWED_OVERLAP, COUNT, GATHER, NEVER
+from assembly.solve.loop.settings import ALLOWED_OVERLAP, COUNT, GATHER, NEVER, OBJECTIVE
 from assembly.solve.second_order.leave import Outcome
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import prove_start, prove_way
 from assembly.studies.parting import parted
 from assembly.studies.put_together import PutTogether, put_together
 from assembly.studies.resting import resting
-from assembly.studies.seated import seated
+from assembly.studies.seated import Seat, seated
 from assembly.studies.separation import separated
 from assembly.studies.unhindered import Prove, clear_end, rows_from_start, unhindered_at
 
@@ -87,10 +87,7 @@ class _FirstSolve:
         if not self._is_done(ways) and together is not None and together.is_asked and self.scene.objectives:
             ways += self._constraints_first()
         if not self._is_done(ways) and not self.scene.objectives:
-            # Rows of clearances contradict each other where faces nearly fit: from there few solves arrive.
-            ways += self._resting(self.q, partial(prove_start, self.scene.packed(), self.scene.bodies))
-            if not self._is_done(ways):
-                ways += self._seated(False)
+            ways += self._where_faces_fit()
         if not self._is_done(ways):
             ways.append(self.scene._solved(self.settings, self.q, self.starts, self.interruption))
             # A start that holds is not moved.
@@ -140,6 +137,31 @@ class _FirstSolve:
         rests = resting(scene, poses, self.q, prove, self.settings, self.starts, self.interruption)
         return [] if rests is None else [rests]
 
+    def _where_faces_fit(self) -> list[Solution]:
+        """Without an objective, the solution where bodies that are stuck in each other fit; none where none do.
+
+        Rows of clearances contradict each other there: from the start few solves arrive. What leans in its bore by more
+        than its play is put straight, and that is the answer: how it would lean at the least move depends on all of its
+        rows, for a difference of no more than the play. Faces that are all flat may touch at an edge at the least move.
+        """
+        seat = seated(self.scene, self.q, self._touching, self.interruption)
+        if seat is not None and seat.has_bores:
+            there = self._at_seat(seat)
+            if there is not None:
+                return [there]
+        ways = self._resting(self.q, partial(prove_start, self.scene.packed(), self.scene.bodies))
+        if ways or seat is None or self.interruption.is_over():
+            return ways
+        return [self._where_it_fits(seat.poses)]
+
+    def _at_seat(self, seat: Seat) -> Solution | None:
+        """The solution where bodies fit, if that is proven; its move is that from the user's poses."""
+        there = self._unhindered(seat.poses, False)
+        if there is not None:
+            packed, state = there._ended
+            state[packed.results_at + OBJECTIVE] = seat.move / packed.unit
+        return there
+
     def _constraints_first(self) -> list[Solution]:
         """A solve from where constraints hold and bodies are clear, ignoring the objective there.
 
@@ -172,8 +194,8 @@ class _FirstSolve:
             solution = rests[0] if rests else None
         seat = None if solution else seated(self.scene, poses, self._touching, self.interruption)
         if seat is not None:
-            solution = None if self.scene.objectives else self._unhindered(seat, False)
-            solution = solution or self._where_it_fits(seat)
+            solution = None if self.scene.objectives else self._at_seat(seat)
+            solution = solution or self._where_it_fits(seat.poses)
         if together.is_asked and (solution is None or not solution.success) and not self.interruption.is_over():
             solution = self._where_it_fits(poses, contacts)
         if solution is None or not together.is_meant(self.scene, solution):
@@ -199,7 +221,7 @@ class _FirstSolve:
         seat = seated(self.scene, self.q, self._touching, self.interruption)
         if seat is None or self.interruption.is_over():
             return []
-        return [self._from(seat) if is_solved else self._where_it_fits(seat)]
+        return [self._from(seat.poses) if is_solved else self._where_it_fits(seat.poses)]
 
     def _from_apart(self, is_solved: bool) -> list[Solution]:
         """Solves from where bodies that are stuck in each other fit, or are parted; fewer where there is a solution."""
