@@ -24,7 +24,7 @@ from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.program.records import UNKNOWN_BLOCKS
 from assembly.kinematics.pose import rotation_matrix
-from assembly.proximity.clearance.answers import is_proven
+from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.manifolds.closed_gaps import closed_gaps
 from assembly.solve.attempts.attempts import as_it_stands
@@ -55,7 +55,7 @@ from assembly.studies.unhindered import Prove
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["Rest", "resting", "rests_again"]
+__all__ = ["Rest", "beside_others", "resting", "rests_again"]
 
 Array = NDArray[np.float64]
 # Two bodies, and whether it is their flat faces that lie on each other.
@@ -113,10 +113,10 @@ def resting(
     settings: Array,
     starts: Mapping[str, ArrayLike] | None,
     interruption: Interruption,
-) -> Solution | None:
+) -> Solution | Rest | None:
     """The solution of a scene with clearances and an objective at which bodies rest on what they fit near poses (n, 7).
 
-    None if they do not fit, if a fit would have to pull, or if they are not proven to be clear.
+    None if they do not fit, or if a fit would have to pull; how they rest if they are not proven to be clear there.
 
     Parameters
     ----------
@@ -140,7 +140,6 @@ def resting(
     held = list(sides)
     settings = settings.copy()
     settings[GATHER] = NEVER
-    begun = poses
     while held and not interruption.is_over():
         inner = _with_joints(scene, others, [fit.joint for fit in held])
         there = inner._solved(settings, poses, starts, interruption, reference)
@@ -167,9 +166,8 @@ def resting(
         if pushing.issuperset(rest.sides):
             solution = _proven(scene, rest, prove, settings, starts, interruption)
             if solution is None:
-                solution = _beside_others(scene, rest, begun, reference, settings, starts, interruption)
-            if solution is not None:
-                solution.seconds = perf_counter() - begin
+                return rest
+            solution.seconds = perf_counter() - begin
             return solution
         poses, held = there.q.copy(), [fit for fit in held if sides[fit] in pushing]
     return None
@@ -215,7 +213,7 @@ def _is_possible(scene: Assembly) -> bool:
     return scene._scene is not None and not packed.corners and can_prove(packed) and is_for_proofs(packed)
 
 
-def _beside_others(
+def beside_others(
     scene: Assembly,
     rest: Rest,
     poses: Array,
@@ -251,7 +249,7 @@ def _near_fits(scene: Assembly, others: Sequence[Constraint], poses: Array, touc
     packed = scene.packed()
     with lent_proof(packed, scene.bodies) as proof:
         answers = proof.as_they_stand(poses, touching * packed.scale)
-        near = [pair for pair, answer in zip(proof.pairs, answers, strict=True) if not is_proven(answer)]
+        near = [pair for pair, answer in zip(proof.pairs, answers, strict=True) if answer.verdict is not Verdict.CLEAR]
     taken = {item.name for item in others}
     names = (name for name in map("fit {}".format, count()) if name not in taken)
     return {
