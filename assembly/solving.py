@@ -116,6 +116,13 @@ class Solving(PackedContents):
         """The same, without corners of contacts."""
         if not self.packed().keeps_apart or settings[ITERATIONS] == 0.0:
             return self._solved(settings, q0, starts, interruption)
+        if isinstance(q0, Solution) and q0._rest is not None and self._objectives:
+            from assembly.studies.resting import rests_again
+
+            # Bodies that rest on joints do so still, as long as these push.
+            solution = rests_again(self._scene_itself, q0, settings, starts, interruption)
+            if solution is not None:
+                return solution
         if isinstance(q0, Solution) and (not self._objectives or not _is_pushed(q0)):
             from assembly.studies.unhindered import unhindered
 
@@ -228,9 +235,12 @@ class Solving(PackedContents):
 
 
 def _is_pushed(solution: Solution) -> bool:
-    """Whether a contact of a clearance pushes at a solution; none does where contacts were not even listed."""
+    """Whether a contact of a clearance pushes at a solution.
+
+    Where contacts were not even listed none does, unless bodies rest there.
+    """
     if solution._lists is not None:
-        return False
+        return solution._rest is not None
     packed, state = solution._ended
     first = packed.multipliers_at + len(packed.contacts)
     return bool(state[first : first + packed.clearance_rows].any())

@@ -57,6 +57,8 @@ class Result(ReadOnlyArrays):
     put_together = False
     # Of a start that was returned as it is: what lists the contacts of clearances there.
     _lists: Callable[[Result], Ended] | None = None
+    # Of a solution at which bodies rest: the joints by which it was found, for solves that go on from it.
+    _rest: object = None
     _clear: Sequence[PairAnswer] = ()
     # Of a tick: whether samples stand for its proof.
     _is_sampled = False

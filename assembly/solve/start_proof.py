@@ -123,6 +123,9 @@ def prove_way(
         Whether a short way is accepted that is not proven. Else the last poses may be any, of no solution.
     """
     q, length = state[: packed.contacts_at].reshape(-1, 7), touching * packed.scale
+    if (q == last).all():
+        # Nothing has moved: there is no way, and the poses were looked at before.
+        return prove_start(packed, bodies, state, touching)
     with lent_proof(packed, bodies) as proof:
         proof.make_slimmer(length)
         if not may_jump:

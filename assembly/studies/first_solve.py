@@ -20,14 +20,14 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import can_prove
 from assembly.solve.interruption import Interruption
-from assembly.solve.loop.settings import ALLOWED_OVERLAP, COUNT, GATHER, NEVER
+from assembly.solve.loop.settings import ALLOWED_OVERLAP, COUNT, GATHER, NEVER, OBJECTIVE, UNSURE
 from assembly.solve.second_order.leave import Outcome
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import prove_start, prove_way
 from assembly.studies.parting import parted
 from assembly.studies.put_together import PutTogether, put_together
-from assembly.studies.resting import resting
-from assembly.studies.seated import seated
+from assembly.studies.resting import Rest, beside_others, resting
+from assembly.studies.seated import Seat, seated
 from assembly.studies.separation import separated
 from assembly.studies.unhindered import Prove, clear_end, rows_from_start, unhindered_at
 
@@ -71,26 +71,27 @@ class _FirstSolve:
     def solution(self) -> Solution:
         """The solution."""
         begin = perf_counter()
-        scene, rest = self.scene, (self.settings, self.starts, self.interruption)
-        alone = rows_from_start(scene, self.q, *rest)
+        scene = self.scene
+        alone = rows_from_start(scene, self.q, self.settings, self.starts, self.interruption)
         prove = partial(prove_way, scene.packed(), scene.bodies, self.q)
         # Whether a start that nothing has moved holds was asked before.
         is_new = bool(scene.objectives) or alone.state[scene.packed().results_at + COUNT] > 0.0
         found = self._clear_end(alone, partial(prove, may_jump=False)) if is_new else None
+        found = found or self._where_it_stands(alone)
         if found is not None:
             found.seconds = perf_counter() - begin
             return found
         together = put_together(scene, self.q, alone, self.starts, self.options, self.interruption)
-        ways = self._resting(self.q, prove) if scene.objectives else []
+        ways: list[Solution] = []
+        rest = self._resting(self.q, prove, ways) if scene.objectives else None
         if not self._is_done(ways) and together is not None and not together.keeps_topology:
             ways += self._put_together(together)
         if not self._is_done(ways) and together is not None and together.is_asked and self.scene.objectives:
             ways += self._constraints_first()
         if not self._is_done(ways) and not self.scene.objectives:
-            # Rows of clearances contradict each other where faces nearly fit: from there few solves arrive.
-            ways += self._resting(self.q, partial(prove_start, self.scene.packed(), self.scene.bodies))
-            if not self._is_done(ways):
-                ways += self._seated(False)
+            ways += self._where_faces_fit()
+        if not self._is_done(ways) and rest is not None:
+            ways += self._beside_others(rest, self.q)
         if not self._is_done(ways):
             ways.append(self.scene._solved(self.settings, self.q, self.starts, self.interruption))
             # A start that holds is not moved.
@@ -119,6 +120,14 @@ class _FirstSolve:
         """The solution where rows have ended without clearances, if it is proven that no clearance pushes there."""
         return clear_end(self.scene, alone, self.settings, prove, self.interruption)
 
+    def _where_it_stands(self, alone: Outcome) -> Solution | None:
+        """The start, if it is a minimum without clearances, and clear: rows that have not moved alone do not tell."""
+        if alone.code != UNSURE or alone.state[self.scene.packed().results_at + COUNT] > 0.0:
+            return None
+        there = self.scene._part(False, True)._from_start(self.q, self.starts, self.options, self.interruption)
+        is_minimum = there.success and bool((there.q == self.q).all())
+        return self._unhindered(self.q, True) if is_minimum else None
+
     def _where_it_fits(self, poses: Array, contacts: Array | None = None) -> Solution:
         """A solve that begins where bodies nearly fit.
 
@@ -132,13 +141,48 @@ class _FirstSolve:
             self.settings, poses, self.starts, self.interruption
         )
 
-    def _resting(self, poses: Array, prove: Prove) -> list[Solution]:
-        """The solution where an objective draws bodies onto what they fit near poses, if there is one."""
-        scene = self.scene
+    def _resting(self, poses: Array, prove: Prove, ways: list[Solution]) -> Rest | None:
+        """Add the solution where an objective draws bodies onto what they fit near poses, if there is one.
+
+        Returns how they rest where that is not proven to be clear.
+        """
         if self.interruption.is_over():
-            return []
-        rests = resting(scene, poses, self.q, prove, self.settings, self.starts, self.interruption)
-        return [] if rests is None else [rests]
+            return None
+        found = resting(self.scene, poses, self.q, prove, self.settings, self.starts, self.interruption)
+        if isinstance(found, Solution):
+            ways.append(found)
+        return found if isinstance(found, Rest) else None
+
+    def _beside_others(self, rest: Rest, poses: Array) -> list[Solution]:
+        """The solution where bodies rest and others are in the way, if there is one."""
+        found = beside_others(self.scene, rest, poses, self.q, self.settings, self.starts, self.interruption)
+        return [] if found is None else [found]
+
+    def _where_faces_fit(self) -> list[Solution]:
+        """Without an objective, the solution where bodies that are stuck in each other fit; none where none do.
+
+        Rows of clearances contradict each other there: from the start few solves arrive. What leans in its bore by more
+        than its play is put straight, and that is the answer: how it would lean at the least move depends on all of its
+        rows, for a difference of no more than the play. Faces that are all flat may touch at an edge at the least move.
+        """
+        seat = seated(self.scene, self.q, self._touching, self.interruption)
+        if seat is not None and seat.has_bores:
+            there = self._at_seat(seat)
+            if there is not None:
+                return [there]
+        ways: list[Solution] = []
+        self._resting(self.q, partial(prove_start, self.scene.packed(), self.scene.bodies), ways)
+        if ways or seat is None or self.interruption.is_over():
+            return ways
+        return [self._where_it_fits(seat.poses)]
+
+    def _at_seat(self, seat: Seat) -> Solution | None:
+        """The solution where bodies fit, if that is proven; its move is that from the user's poses."""
+        there = self._unhindered(seat.poses, False)
+        if there is not None:
+            packed, state = there._ended
+            state[packed.results_at + OBJECTIVE] = seat.move / packed.unit
+        return there
 
     def _constraints_first(self) -> list[Solution]:
         """A solve from where constraints hold and bodies are clear, ignoring the objective there.
@@ -167,13 +211,16 @@ class _FirstSolve:
         else:
             solution = self._clear_end(alone, prove)
             contacts = alone.state[packed.contacts_at :][: TRACK * len(packed.contacts)]
-        if solution is None:
-            rests = self._resting(poses, prove)
-            solution = rests[0] if rests else None
+        rests: list[Solution] = []
+        rest = self._resting(poses, prove, rests) if solution is None else None
+        solution = rests[0] if rests else solution
+        if rest is not None and not self.interruption.is_over():
+            besides = self._beside_others(rest, poses)
+            solution = besides[0] if besides else None
         seat = None if solution else seated(self.scene, poses, self._touching, self.interruption)
         if seat is not None:
-            solution = None if self.scene.objectives else self._unhindered(seat, False)
-            solution = solution or self._where_it_fits(seat)
+            solution = None if self.scene.objectives else self._at_seat(seat)
+            solution = solution or self._where_it_fits(seat.poses)
         if together.is_asked and (solution is None or not solution.success) and not self.interruption.is_over():
             solution = self._where_it_fits(poses, contacts)
         if solution is None or not together.is_meant(self.scene, solution):
@@ -199,7 +246,7 @@ class _FirstSolve:
         seat = seated(self.scene, self.q, self._touching, self.interruption)
         if seat is None or self.interruption.is_over():
             return []
-        return [self._from(seat) if is_solved else self._where_it_fits(seat)]
+        return [self._from(seat.poses) if is_solved else self._where_it_fits(seat.poses)]
 
     def _from_apart(self, is_solved: bool) -> list[Solution]:
         """Solves from where bodies that are stuck in each other fit, or are parted; fewer where there is a solution."""

@@ -8,7 +8,6 @@ does not tell, as when two posts stop a bar at once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import copy
 from typing import TYPE_CHECKING, Any
 
 from assembly.constraints.model.clearance import Clearance
@@ -83,9 +82,6 @@ class Obstacles:
         pairs = [(bodies[a], bodies[b]) for a, b in (self._proof.pairs[k] for k in left_out)]
         other = type(self._scene)(bodies)
         for item in self._scene.constraints:
-            if isinstance(item, Clearance):
-                item = copy(item)
-                item._excluded = (*item._excluded, *pairs)
-            other.constrain(item)
+            other.constrain(item._without(pairs) if isinstance(item, Clearance) else item)
         other._objectives = list(self._scene._objectives)
         return other

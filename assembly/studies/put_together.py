@@ -19,8 +19,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.clearance.hulls.body_hulls import BodyHulls, hulls_of_body
+from assembly.proximity.clearance.hulls.planes import normal_between
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.solve.clearance_proof import can_prove, lent_proof, open_recognized
 from assembly.solve.interruption import Interruption
@@ -85,8 +88,25 @@ class PutTogether:
 
 
 def _sides(proof: ClearanceProof, q: Array, moves: Array | None = None) -> list[Array | None]:
-    """For every pair the normal of a plane between the bodies, after given moves; None if none is found."""
-    return [proof.plane_between(k, q, moves) for k in range(len(proof.pairs))]
+    """For every pair the normal of a plane between the bodies, after given moves; None if none is found.
+
+    Of bodies whose boxes no plane parts, the hulls of their faces are asked.
+    """
+    found = []
+    for k, (a, b) in enumerate(proof.pairs):
+        side = proof.plane_between(k, q, moves)
+        if side is None:
+            posed = [
+                hulls_of_body(proof.faces[body]).posed(rotation_matrix(q[body, 3:]), q[body, :3]) for body in (a, b)
+            ]
+            side = normal_between(*posed)
+        found.append(side)
+    return found
+
+
+def _posed_hulls(proof: ClearanceProof, body: int, row: Array) -> BodyHulls:
+    """The hulls of the faces of a body at its pose (7)."""
+    return hulls_of_body(proof.faces[body]).posed(rotation_matrix(row[3:]), row[:3])
 
 
 def _are_in_one_place(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
@@ -125,7 +145,10 @@ def put_together(
         open_yet = [k for k, answer in enumerate(answers) if answer.verdict is Verdict.UNDECIDED]
         is_clear = not any(is_stuck(answer, touching) for answer in answers)
         is_clear = is_clear and not any(_are_in_one_place(proof, k, q, touching) for k in open_yet)
-        sides = _sides(proof, q)
+        # Of bodies that cross only those are asked for sides that an objective alone draws together.
+        sides: list[Array | None] = [None] * len(proof.pairs)
+        if is_clear or not is_asked:
+            sides = _sides(proof, q)
 
     def solve() -> There | None:
         if alone.code == SOLVED:

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import count
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +24,7 @@ from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.program.records import UNKNOWN_BLOCKS
 from assembly.kinematics.pose import rotation_matrix
-from assembly.proximity.clearance.answers import is_proven
+from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.manifolds.closed_gaps import closed_gaps
 from assembly.solve.attempts.attempts import as_it_stands
@@ -47,7 +47,7 @@ from assembly.solve.scene import Status
 from assembly.solve.second_order.dense import LocalModel, null_space
 from assembly.solve.second_order.leave import Fit
 from assembly.solve.solution import Solution
-from assembly.solve.start_proof import is_for_proofs
+from assembly.solve.start_proof import is_for_proofs, prove_way
 from assembly.studies.seated import NearFit, NotBelow, drop_farthest, fits
 from assembly.studies.standing_start import with_contacts
 from assembly.studies.unhindered import Prove
@@ -55,7 +55,7 @@ from assembly.studies.unhindered import Prove
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["resting"]
+__all__ = ["Rest", "beside_others", "resting", "rests_again"]
 
 Array = NDArray[np.float64]
 # Two bodies, and whether it is their flat faces that lie on each other.
@@ -68,6 +68,43 @@ ROUNDED = 1e-14
 PUSHES = 1e-7
 
 
+class Rest(NamedTuple):
+    """Joints that hold bodies on what they rest on.
+
+    Attributes
+    ----------
+    inner : Assembly
+        The scene with joints in the place of clearances, after its other constraints.
+    there : Solution
+        Of that.
+    sides : tuple of Side
+        Of each joint.
+    """
+
+    inner: Assembly
+    there: Solution
+    sides: tuple[Side, ...]
+
+    @property
+    def owners(self) -> NDArray[np.int64]:
+        """Of every row the number of its joint; below zero for rows of other constraints."""
+        owners: NDArray[np.int64] = self.there._packed.owners - (len(self.inner.constraints) - len(self.sides))
+        return owners
+
+    def loose(self, model: LocalModel) -> set[int]:
+        """The numbers of the joints of flat faces that stay off each other."""
+        owners = self.owners
+        return set(owners[(owners >= 0) & model.one_sided & ~model.touching].tolist())
+
+    def is_as(self, other: Rest) -> bool:
+        """Whether poses and forces are those of another one, to the bit."""
+        packed, state = self.there._ended
+        before, known = other.there._ended
+        forces = slice(packed.multipliers_at, packed.residuals_at)
+        same = packed is before and bool((self.there.q == other.there.q).all())
+        return same and bool((state[forces] == known[forces]).all())
+
+
 def resting(
     scene: Assembly,
     poses: Array,
@@ -76,10 +113,10 @@ def resting(
     settings: Array,
     starts: Mapping[str, ArrayLike] | None,
     interruption: Interruption,
-) -> Solution | None:
+) -> Solution | Rest | None:
     """The solution of a scene with clearances and an objective at which bodies rest on what they fit near poses (n, 7).
 
-    None if they do not fit, if a fit would have to pull, or if they are not proven to be clear.
+    None if they do not fit, or if a fit would have to pull; how they rest if they are not proven to be clear there.
 
     Parameters
     ----------
@@ -94,7 +131,7 @@ def resting(
     interruption : Interruption
     """
     packed = scene.packed()
-    if scene._scene is None or packed.corners or not (can_prove(packed) and is_for_proofs(packed)):
+    if not _is_possible(scene):
         return None
     begin = perf_counter()
     touching = float(settings[ALLOWED_OVERLAP])
@@ -112,29 +149,96 @@ def resting(
             continue
         if _rises(there, touching):
             return None
+        rest = Rest(inner, there, tuple(sides[fit] for fit in held))
         with postures_from(there._packed, reference):
             model = LocalModel.at(there._packed, there._state)
         if model is None or len(model.jacobian) != there._packed.rows:
             return None
-        is_joint = there._packed.owners >= len(others)
         # Flat faces that stay off each other are let go.
-        loose = set(there._packed.owners[is_joint & model.one_sided & ~model.touching].tolist())
+        loose = rest.loose(model)
         if loose:
-            poses, held = there.q.copy(), [fit for k, fit in enumerate(held, len(others)) if k not in loose]
+            poses, held = there.q.copy(), [fit for k, fit in enumerate(held) if k not in loose]
             continue
         with lent_proof(packed, scene.bodies) as proof:
-            of_joints = [sides[held[owner - len(others)]] for owner in there._packed.owners[is_joint]]
-            closed = _slopes(proof, there, touching * packed.scale)
-            pushing = _pushing(closed, model, is_joint, of_joints)
+            pushing = _pushing(_slopes(proof, there, touching * packed.scale), model, rest)
         if pushing is None:
             return None
-        if pushing.issuperset(of_joints):
-            solution = _proven(scene, there, prove, settings, starts, interruption)
-            if solution is not None:
-                solution.seconds = perf_counter() - begin
+        if pushing.issuperset(rest.sides):
+            solution = _proven(scene, rest, prove, settings, starts, interruption)
+            if solution is None:
+                return rest
+            solution.seconds = perf_counter() - begin
             return solution
         poses, held = there.q.copy(), [fit for fit in held if sides[fit] in pushing]
     return None
+
+
+def rests_again(
+    scene: Assembly,
+    last: Solution,
+    settings: Array,
+    starts: Mapping[str, ArrayLike] | None,
+    interruption: Interruption,
+) -> Solution | None:
+    """The solution of a scene with an objective that is found by the joints by which the last one was, or None.
+
+    The contacts of the last solution need not be listed for that.
+    """
+    packed, rest = scene.packed(), last._rest
+    if not isinstance(rest, Rest) or not last.success or last._ended.packed is not packed or not _is_possible(scene):
+        return None
+    begin = perf_counter()
+    there = rest.inner._solved(settings, rest.there, starts, interruption)
+    if not there.success or interruption.is_over():
+        return None
+    now = Rest(rest.inner, there, rest.sides)
+    if not now.is_as(rest):
+        model = LocalModel.at(there._packed, there._state)
+        if model is None or len(model.jacobian) != there._packed.rows or now.loose(model):
+            return None
+        with lent_proof(packed, scene.bodies) as proof:
+            pushing = _pushing(_slopes(proof, there, float(settings[ALLOWED_OVERLAP]) * packed.scale), model, now)
+        if pushing is None or not pushing.issuperset(now.sides):
+            return None
+    prove = partial(prove_way, packed, scene.bodies, last.q)
+    solution = _proven(scene, now, prove, settings, starts, interruption)
+    if solution is not None:
+        solution.seconds = perf_counter() - begin
+    return solution
+
+
+def _is_possible(scene: Assembly) -> bool:
+    """Whether proofs alone tell that the clearances of a scene hold."""
+    packed = scene.packed()
+    return scene._scene is not None and not packed.corners and can_prove(packed) and is_for_proofs(packed)
+
+
+def beside_others(
+    scene: Assembly,
+    rest: Rest,
+    poses: Array,
+    reference: Array,
+    settings: Array,
+    starts: Mapping[str, ArrayLike] | None,
+    interruption: Interruption,
+) -> Solution | None:
+    """The solution where bodies rest and others are in the way, as for a ball whose stem leans on its cap, or None.
+
+    The joints hold those that rest, and clearances the others: rows of both faces of a ball in its socket would
+    contradict each other until it is there. From there the scene itself is solved.
+    """
+    resting_pairs = [(scene.bodies[a], scene.bodies[b]) for a, b in {(a, b) for a, b, _ in rest.sides}]
+    clearances = [item._without(resting_pairs) for item in scene.constraints if isinstance(item, Clearance)]
+    if interruption.is_over() or not any(item.pairs(scene.bodies) for item in clearances):
+        return None
+    inner = type(scene)(scene.bodies)
+    inner._take_constraints([*rest.inner.constraints, *clearances])
+    inner._objectives = list(scene._objectives)
+    beside = inner._solved(settings, poses, starts, interruption, reference)
+    if not beside.success or interruption.is_over():
+        return None
+    solution = scene._solved(settings, beside.q, starts, interruption, reference)
+    return solution if solution.success else None
 
 
 def _near_fits(scene: Assembly, others: Sequence[Constraint], poses: Array, touching: float) -> dict[NearFit, Side]:
@@ -145,7 +249,7 @@ def _near_fits(scene: Assembly, others: Sequence[Constraint], poses: Array, touc
     packed = scene.packed()
     with lent_proof(packed, scene.bodies) as proof:
         answers = proof.as_they_stand(poses, touching * packed.scale)
-        near = [pair for pair, answer in zip(proof.pairs, answers, strict=True) if not is_proven(answer)]
+        near = [pair for pair, answer in zip(proof.pairs, answers, strict=True) if answer.verdict is not Verdict.CLEAR]
     taken = {item.name for item in others}
     names = (name for name in map("fit {}".format, count()) if name not in taken)
     return {
@@ -172,16 +276,16 @@ def _with_joints(scene: Assembly, others: Sequence[Constraint], joints: Sequence
     return inner
 
 
-def _pushing(
-    closed: tuple[Array, list[Side]], model: LocalModel, is_joint: NDArray[np.bool_], of_joints: list[Side]
-) -> set[Side] | None:
+def _pushing(closed: tuple[Array, list[Side]], model: LocalModel, rest: Rest) -> set[Side] | None:
     """The pairs whose contacts push where joints replace them; None if the joints hold what contacts would not.
 
-    Slopes of closed gaps and the pair of each are given, and which rows of a model are those of joints, of which pairs.
+    Slopes of closed gaps and the pair of each are given, and a model of the joints' solve.
     """
     slopes, owners = closed
     if not len(slopes):
         return None
+    of_rows = rest.owners
+    is_joint = of_rows >= 0
     kept = null_space(model.jacobian[~is_joint & model.touching], len(model.gradient))
     goal, slopes = kept.T @ model.gradient, slopes @ kept
     size = max(float(np.linalg.norm(goal)), PUSHES)
@@ -194,7 +298,7 @@ def _pushing(
     loose = null_space(slopes[strong], slopes.shape[1])
     held = strong | (np.linalg.norm(slopes @ loose, axis=1) < PUSHES) | _opposed(slopes @ loose)
     free = null_space(slopes[held], slopes.shape[1])
-    own = [side in pushing for side in of_joints]
+    own = [rest.sides[k] in pushing for k in of_rows[is_joint]]
     forbidden = model.jacobian[is_joint][own] @ kept @ free
     return pushing if np.abs(forbidden).max(initial=0.0) < 1e-6 else None
 
@@ -238,14 +342,14 @@ def _slopes(proof: ClearanceProof, there: Solution, touching: float) -> tuple[Ar
 
 def _proven(
     scene: Assembly,
-    there: Solution,
+    rest: Rest,
     prove: Prove,
     settings: Array,
     starts: Mapping[str, ArrayLike] | None,
     interruption: Interruption,
 ) -> Solution | None:
     """The solution of a scene where bodies rest, if its rows hold there and it is proven that bodies are clear."""
-    packed = scene.packed()
+    packed, there = scene.packed(), rest.there
     settings = settings.copy()
     settings[STATIONARITY] = np.inf
     code, state, history, *_ = as_it_stands(packed, interruption, settings, scene._start(packed, there.q, starts))
@@ -260,7 +364,7 @@ def _proven(
     fit = Fit(float(settings[FIT]))
     solution = Solution(scene._scene, packed, state, Status.SOLVED, 0.0, history, there.second_order, fit)
     solution._touching, solution._clear = touching, answers
-    solution._lists = partial(with_contacts, scene)
+    solution._lists, solution._rest = partial(with_contacts, scene), rest
     # Samples replace a proof where faces lie on each other: there rows are checked as well.
     held = solution.proved or solution.feasibility <= float(settings[FEASIBILITY]) * packed.scale
     return solution if held else None

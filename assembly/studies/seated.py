@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import count
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from assembly.studies.parting import is_stuck
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["NearFit", "NotBelow", "drop_farthest", "fits", "seated"]
+__all__ = ["NearFit", "NotBelow", "Seat", "drop_farthest", "fits", "seated"]
 
 Array = NDArray[np.float64]
 # Faces that nearly fit are tilted by at most this [rad], and off by at most that part of the smaller body's size, or of
@@ -73,8 +73,25 @@ class _Face:
         return bool((self.low <= other.high + reach).all() and (other.low <= self.high + reach).all())
 
 
-def seated(scene: Assembly, q: Array, touching: float, interruption: Interruption) -> Array | None:
-    """Poses at which bodies that clearances keep apart, and that are stuck in each other at poses (n, 7), fit.
+class Seat(NamedTuple):
+    """Where bodies fit.
+
+    Attributes
+    ----------
+    poses : (n, 7)
+    move : float
+        Of a scene without an objective, what would be minimized: how far bodies were moved.
+    has_bores : bool
+        Whether a shaft is in its bore, a cone in its seat or a ball in its socket; else only flat faces fit.
+    """
+
+    poses: Array
+    move: float
+    has_bores: bool
+
+
+def seated(scene: Assembly, q: Array, touching: float, interruption: Interruption) -> Seat | None:
+    """Where bodies that clearances keep apart, and that are stuck in each other at poses (n, 7), fit.
 
     If they cannot all fit at once, the nearest do. None if none are stuck, or none of their faces nearly fit.
     """
@@ -88,15 +105,16 @@ def seated(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     taken = {item.name for item in others}
     names = (name for name in map("fit {}".format, count()) if name not in taken)
     held = [fit for a, b in stuck for fit in fits((scene.bodies[a], scene.bodies[b]), q[[a, b]], names)]
-    poses = None
+    seat = None
     while held and not interruption.is_over():
         inner = type(scene)(scene.bodies)
         inner._take_constraints([*others, *(fit.joint for fit in held)])
         there = inner._from_start(q, None, {}, interruption)
-        poses = there.q.copy() if np.isfinite(there.q).all() else None
+        has_bores = any(not isinstance(fit.joint, NotBelow) for fit in held)
+        seat = Seat(there.q.copy(), there.objective, has_bores) if np.isfinite(there.q).all() else None
         if there.success or not drop_farthest(held, there.violations):
             break
-    return poses
+    return seat
 
 
 @dataclass(frozen=True, eq=False)

@@ -73,8 +73,8 @@ def test_flat_faces_that_others_keep_apart_are_not_seated():
     poses[1, 3:] /= np.linalg.norm(poses[1, 3:])
     seat = seated(scene, poses, 1e-9, CTRL_C)
     assert seat is not None
-    assert seat[1, 1] == pytest.approx(0.0, abs=1e-9)
-    assert seat[1, 3] == pytest.approx(1.0, abs=1e-9)
+    assert seat.poses[1, 1] == pytest.approx(0.0, abs=1e-9)
+    assert seat.poses[1, 3] == pytest.approx(1.0, abs=1e-9)
 
 
 def _prism(points):

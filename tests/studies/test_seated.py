@@ -176,7 +176,7 @@ def test_axes_coincide_and_planes_where_one_is_below(sunk):
     start = disturbed(np.random.default_rng(5), fit.home, 0.0, ANGLE) + np.r_[1.2, 0.9, -sunk, np.zeros(4)]
     scene = scene_of(fit, start)
     q = np.array(scene.q)
-    found = seated(scene, q, TOUCHING, CTRL_C)
+    found = seated(scene, q, TOUCHING, CTRL_C).poses
     turn, place = rows(found[1])
     # Joints hold to 1e-12 of some hundred lengths.
     assert turn.apply([0.0, 0.0, 1.0]) == pytest.approx([0.0, 0.0, 1.0], abs=1e-11)
@@ -195,13 +195,13 @@ def test_a_flank_goes_with_the_nearest_one():
     """A key is near the wall beyond its slot as well, and has play: it is flush with the flanks that are nearer."""
     fit = fits()["a key in its slot"]
     scene = scene_of(fit, np.r_[0.4, -0.3, 0.2, HOME[3:]])
-    assert abs(fit.depth(seated(scene, np.array(scene.q), TOUCHING, CTRL_C)[1])) < 1e-12
+    assert abs(fit.depth(seated(scene, np.array(scene.q), TOUCHING, CTRL_C).poses[1])) < 1e-12
 
 
 def test_of_faces_that_differ_by_their_play_axes_coincide():
     fit = fits()["a pin with little play"]
     scene = scene_of(fit, disturbed(np.random.default_rng(6), fit.home, WAY, ANGLE))
-    turn, place = rows(seated(scene, np.array(scene.q), TOUCHING, CTRL_C)[1])
+    turn, place = rows(seated(scene, np.array(scene.q), TOUCHING, CTRL_C).poses[1])
     assert np.abs(turn.apply([0.0, 0.0, 1.0])[:2]).max() < 1e-11 and np.abs(place[:2]).max() < 1e-9
     # A pin may be anywhere along its hole: it stays.
     assert place[2] == pytest.approx(scene.q[1, 2], abs=1e-2)

@@ -60,7 +60,7 @@ def test_washers_of_a_stack_are_not_seated_through_each_other(seed):
     # Each is above the one beneath by both halves, but for what those that stay tilted are lower.
     order = [("b", "plate"), ("a", "b"), ("c", "a"), ("plate", "below")]
     half = dict(zip(["plate", "a", "b", "c", "below"], 0.5 * np.array([10.0, *THICK, 6.5]), strict=True))
-    place = {body.name: row[2] for body, row in zip(bodies, seat, strict=True)}
+    place = {body.name: row[2] for body, row in zip(bodies, seat.poses, strict=True)}
     for upper, lower in order:
         assert place[upper] - place[lower] > half[upper] + half[lower] - 0.05, (upper, lower)
     solution = scene.solve()
@@ -90,7 +90,7 @@ def test_a_drawer_is_not_seated_on_the_far_side_of_its_walls():
     drawer = asm.Body("drawer", asm.shapes.extrusion(_rectangle(99, 34), 78, [_rectangle(90, 26)]))
     q = np.array([[0.0, 0, 0, 1, 0, 0, 0], [0.0, -3.0, 0, 1, 0, 0, 0]])
     scene = posed([frame, drawer], q, asm.Clearance())
-    assert seated(scene, q, 1e-8, CTRL_C)[1] == pytest.approx([0, -1, 0, 1, 0, 0, 0], abs=1e-9)
+    assert seated(scene, q, 1e-8, CTRL_C).poses[1] == pytest.approx([0, -1, 0, 1, 0, 0, 0], abs=1e-9)
 
 
 def _rectangle(x, y):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
+from copy import copy
 
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.tracked_sizes import check_size
@@ -166,6 +167,12 @@ class Clearance(Constraint):
             for b in chosen[k + 1 :]
             if not (a.fixed and b.fixed) and not any({id(a), id(b)} == set(map(id, pair)) for pair in self._excluded)
         ]
+
+    def _without(self, pairs: Sequence[tuple[Body, Body]]) -> Clearance:
+        """The same clearance of the other pairs of bodies."""
+        other = copy(self)
+        other._excluded = (*self._excluded, *pairs)
+        return other
 
     def __repr__(self) -> str:
         bodies = "all bodies" if self._all else [body.name for body in self.bodies]

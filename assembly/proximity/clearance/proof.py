@@ -11,6 +11,7 @@ from assembly._record import rows_of
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_of
 from assembly.proximity.clearance.answers import Answer, Verdict
+from assembly.proximity.clearance.hulls.scene import told_by_hulls
 from assembly.proximity.clearance.inside import UNCLEAR, winding_of
 from assembly.proximity.clearance.kept_looks import KeptLooks, run_through
 from assembly.proximity.clearance.pair_looks import BEGUN_ANEW, ON_WAY
@@ -35,6 +36,8 @@ LEAST_SIZE = 1e-30
 ROUNDING = 4e-15
 # Poses whose answers are kept.
 REMEMBERED = 4
+# Pairs of nodes of a look after which hulls are asked.
+SHORT = 500
 # Places in the stack of a ray.
 STACK = 4096
 
@@ -70,19 +73,39 @@ class ClearanceProof(KeptLooks):
         self._stood: dict[tuple[bytes, float], list[Answer]] = {}
 
     def as_they_stand(self, q: Array, touching: float) -> list[Answer]:
-        """What is proven of all pairs at poses (n, 7), without any moves; the last few poses are looked at once.
+        """What is proven of all pairs at poses (n, 7); the last few poses are looked at once.
 
-        Several ways to solve a scene begin with this question, at the same start.
+        Several ways to solve a scene begin with this question, at the same start. No look tells that bodies touch: it
+        would spend its whole budget there, so that hulls are asked first of pairs of which a short one does not tell.
         """
         known = self._stood.get((q.tobytes(), touching))
-        return self.look_from(q, touching) if known is None else known
+        if known is not None:
+            return known
+        found = self.look(q, touching, budget=SHORT)
+        left = [k for k, answer in enumerate(found) if answer.verdict is Verdict.UNDECIDED]
+        by_hulls = [k for k in left if not self.is_of_wires(k)]
+        least = self.minimum[by_hulls].tolist()
+        told = told_by_hulls(self.faces, [self.pairs[k] for k in by_hulls], least, q, touching)
+        for k, answer in zip(by_hulls, told, strict=True):
+            if answer is not None:
+                found[k] = answer
+                left.remove(k)
+        for k, answer in zip(left, self.look(q, touching, which=left), strict=True):
+            found[k] = answer
+        self._remember(q, touching, found)
+        return found
 
     def look_from(self, q: Array, touching: float) -> list[Answer]:
-        """The same, looked at in any case: ways lead on from these poses."""
+        """The same by looks alone, in any case: ways lead on from these poses."""
+        found = self.look(q, touching)
+        self._remember(q, touching, found)
+        return found
+
+    def _remember(self, q: Array, touching: float, found: list[Answer]) -> None:
+        """Keep what is proven of all pairs at poses, in the place of the oldest."""
         while len(self._stood) >= REMEMBERED:
             self._stood.pop(next(iter(self._stood)))
-        found = self._stood[q.tobytes(), touching] = self.look(q, touching)
-        return found
+        self._stood[q.tobytes(), touching] = found
 
     def look(
         self,
