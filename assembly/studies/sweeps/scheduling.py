@@ -23,11 +23,12 @@ __all__ = ["Executor", "StudyError", "in_process", "on_executor"]
 
 # What a row is taken to take before any is measured, in seconds.
 FIRST_GUESS = 1e-3
-# Chunks that a worker has to come at least, where there are rows for them: so that workers end at one time.
-SHARES = 8
+# Chunks that a worker has to come at least, where there are rows for them. With two of them at a worker, one that is
+# half as fast as others ends with them.
+SHARES = 4
 # The part of the requested time that a chunk takes at least, near the end too. A chunk costs c besides its solves, and
 # a worker waits half a chunk at the end: with chunks of m the sum of both is least for m = 2 SHARES c. With Dask c is
-# about 3 ms, of client, scheduler and worker: 50 ms, a tenth of the default.
+# about 6 ms, of client, scheduler and worker together: 50 ms, a tenth of the default.
 LEAST_PART = 0.1
 # Chunks that wait for each worker, so that none is idle while a chunk comes back.
 AHEAD = 2
@@ -73,10 +74,11 @@ class _Waiting:
         """The next runs: for so many seconds, or less near the end, down to a tenth of them."""
         a_row = self._spent / self._solved if self._solved else FIRST_GUESS
         share = a_row * self._left / (SHARES * self._workers)
-        most = max(min(self._seconds, share), LEAST_PART * self._seconds) / a_row
+        least = LEAST_PART * self._seconds
+        most = max(min(self._seconds, share), least) / a_row
         if self._at_hand < self._left:
-            # Others wait for what these runs begin.
-            most = min(most, self._at_hand / self._workers)
+            # Others wait for what these runs begin: shared out, but nothing that takes less than a chunk costs.
+            most = min(most, max(self._at_hand / self._workers, 0.5 * least / SHARES / a_row))
         chosen: list[int] = []
         rows = 0
         while self._ready and (not chosen or rows < most):
