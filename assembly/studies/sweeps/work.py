@@ -19,6 +19,7 @@ from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError
 from assembly.solve.attempts.starts import moving_rows, scattered
 from assembly.solve.solution import Solution
+from assembly.studies.batches.solving import forget_solves
 from assembly.studies.sweeps.chain import ERROR, Chain, Start, Told
 from assembly.studies.sweeps.measuring import Column, measured
 from assembly.studies.sweeps.processor import kernels_of
@@ -187,11 +188,8 @@ class Worker:
         return [self._row(k, values) for k, values in zip(task.rows[: at + 1], task.values.tolist(), strict=False)][-1]
 
     def _begin(self, task: Task) -> None:
-        """Forget what solves before have changed: places for contacts, corners, what is proven of pairs."""
-        packed = self._scene._packed
-        if packed is None or packed.kept or packed.contacts:
-            self._scene._has_changed()
-            self._scene._crowding = 1
+        """Forget what solves before have changed, and begin where the run begins."""
+        forget_solves(self._scene)
         if self._job.seed is None:
             self._chain.begin(task.start)
 
