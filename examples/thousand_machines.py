@@ -10,10 +10,10 @@ Prints a table.
 from __future__ import annotations
 
 import heapq
-import json
 import pickle
 from dataclasses import dataclass
-from time import perf_counter
+from tempfile import TemporaryDirectory
+from time import process_time
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 import assembly as asm
 from assembly.derivatives.response import values_set
 from assembly.studies.sweeps.cutting import Run, cut
+from assembly.studies.sweeps.folder import Folder
 from assembly.studies.sweeps.measuring import columns_of
 from assembly.studies.sweeps.table import Table
 from assembly.studies.sweeps.work import Job, Worker
@@ -67,19 +68,19 @@ def measured() -> Costs:
     plan = asm.sobol({angle: (0.7, 2.7), length: (1.4, 1.6)}, 1024)
     table = Table(plan.values, plan.runs(), 1)
     rows, handing = [], []
-    with values_set(plan.parameters, [angle.value, length.value]):
+    with TemporaryDirectory() as place, values_set(plan.parameters, [angle.value, length.value]):
+        folder = Folder(place, {})
         worker = Worker(Job(scene, plan.parameters, columns_of(asm.Measure(out)), None))
         while ready := table.ready():
             for number in ready:
-                done = worker.compute([table.task(number)])
-                rows.append(done.seconds / len(done.runs[0].rows))
-                begin = perf_counter()
-                pickle.dumps(table.task(number))
-                run = pickle.loads(pickle.dumps(done)).runs[0]
-                table.take(run)
-                for line in zip(run.rows, run.status, run.values, strict=True):
-                    json.dumps(line)
-                handing.append(perf_counter() - begin)
+                done = worker.compute(table.chunk([number]))
+                rows.append(done.seconds / len(done.status))
+                begin = process_time()
+                pickle.dumps(table.chunk([number]))
+                done = pickle.loads(pickle.dumps(done))
+                table.take(done)
+                folder.write(done, table)
+                handing.append(process_time() - begin)
     return Costs(np.array(rows) / np.mean(rows), float(np.median(handing)))
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from time import perf_counter
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.packing.scene import Packed
 from assembly.derivatives.measure import Measure
 from assembly.derivatives.numbers import FrameOrigin
@@ -31,7 +33,7 @@ from assembly.studies.batches.starts import begun_states, starts_of
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["solve_many", "solve_slices"]
+__all__ = ["forget_solves", "solve_many", "solve_slices"]
 
 Array = NDArray[np.float64]
 # Rows of a slice: what a thread solves before anybody can stop it. A slice begins in some 10 us. Chosen.
@@ -83,7 +85,7 @@ def solve_many(
     asked = _Asked(scene, starts, *columns, measures, options, rows)
     out = _empty(asked)
     left = _by_the_loop(asked, out, min(count, -(-rows // SLICE)), bool(retry))
-    _by_themselves(asked, out, left)
+    _by_themselves(asked, out, left, count)
     return Batch(**out, parameters=asked.parameters, values=asked.values, of=measures, seconds=perf_counter() - begin)
 
 
@@ -144,7 +146,11 @@ def solve_slices(packed: Packed, settings: Array, writes: Writes, begun: Array, 
     loop = loop_address(packed.end_effectors)
     slices = iter(range(0, len(ended), SLICE))
 
-    def work(settings: Array) -> None:
+    if threads > 1:
+        settings = settings.copy()
+        settings[ASK_ADDRESS] = 0.0
+
+    def work() -> None:
         own = packed.rows_table.copy(), packed.rows_pool.copy(), np.zeros(packed._state_size)
         desk = Desk(*own, *new_workspace(packed))
         # The next slice is taken under the interpreter's lock.
@@ -155,19 +161,22 @@ def solve_slices(packed: Packed, settings: Array, writes: Writes, begun: Array, 
             if threads == 1:
                 CTRL_C.is_over()
 
+    _over_threads(work, slices, threads)
+
+
+def _over_threads(work: Callable[[], None], remaining: Iterator[int], threads: int) -> None:
+    """Do work in so many threads, which take from the remaining parts; an exception in one ends all of them."""
     if threads == 1:
-        work(settings)
+        work()
         return
-    quiet = settings.copy()
-    quiet[ASK_ADDRESS] = 0.0
     with ThreadPoolExecutor(threads) as pool:
         try:
             # Threads that began already go on while others are submitted: an exception here ends them as well.
-            futures = [pool.submit(work, quiet) for _ in range(threads)]
+            futures = [pool.submit(work) for _ in range(threads)]
             for future in futures:
                 future.result()
         except BaseException:
-            for _ in slices:
+            for _ in remaining:
                 pass
             raise
 
@@ -190,19 +199,65 @@ def _tell(packed: Packed, asked: _Asked, out: dict[str, Any], ended: Array, writ
         out["measures"][solved] = measured(packed, asked.of, ended[solved], own, columns)
 
 
-def _by_themselves(asked: _Asked, out: dict[str, Any], rows: Sequence[int]) -> None:
-    """Solve rows one after the other, with all that `Assembly.solve` tries."""
+def _by_themselves(asked: _Asked, out: dict[str, Any], rows: Sequence[int], threads: int) -> None:
+    """Solve rows with all that `Assembly.solve` tries.
+
+    What solves of clearances leave in a scene, slots for contacts and proofs, changes the bits of the next one. So each
+    row begins with a scene that was never solved, and rows from starts go over threads, each of which has its own.
+    Numbers are those of joints and bodies, which all threads share: rows that have them go one after the other.
+    """
+    if not len(rows):
+        return
+    has_clearances = any(isinstance(item, Clearance) for item in asked.scene.constraints)
+    if not has_clearances or isinstance(asked.starts, list):
+        _one_by_one(asked, out, rows, asked.scene.solve)
+    elif asked.parameters:
+        _one_by_one(asked, out, rows, _unsolved(asked.scene))
+    else:
+        remaining = iter(rows)
+        _over_threads(
+            lambda: _one_by_one(asked, out, remaining, _unsolved(asked.scene)), remaining, min(threads, len(rows))
+        )
+
+
+def forget_solves(scene: Assembly) -> None:
+    """Have a scene as if it was never solved: without slots for contacts, corners, and what was proven of pairs."""
+    packed = scene._packed
+    if packed is None or packed.kept or packed.contacts:
+        scene._has_changed()
+        scene._crowding = 1
+
+
+def _unsolved(scene: Assembly) -> Callable[..., Solution]:
+    """Solve with a scene of the same bodies and constraints that knows of no other solve."""
+    own = copy.copy(scene)
+    forget_solves(own)
+    # Trees of bodies are written once: most of what it takes to pack a scene with clearances.
+    packed = own.packed()
+    packed._write_manager()
+    unsolved, own_scene, seen = packed, own._scene, own._seen
+
+    def solve(start: Array | Solution, **options: Any) -> Solution:
+        forget_solves(own)
+        own._packed, own._scene, own._seen = unsolved.twin(), own_scene, seen
+        own._packed.proofs = []
+        return own.solve(start, **options)
+
+    return solve
+
+
+def _one_by_one(asked: _Asked, out: dict[str, Any], rows: Iterable[int], solve: Callable[..., Solution]) -> None:
     before = [item.value for item in asked.parameters]
     try:
         for k in rows:
             if asked.parameters:
                 set_all(asked.parameters, asked.values[k].tolist())
-            solution = asked.scene.solve(asked.start(k), **asked.options)
+            solution = solve(asked.start(k), **asked.options)
             out["q"][k], out["status"][k], out["alone"][k] = solution.q, solution.status, True
             out["objective"][k], out["feasibility"][k] = solution.objective, solution.feasibility
             out["iterations"][k] = solution.iterations
             told = [item.value(solution) for item in asked.of] if solution.success else np.nan
             out["measures"][k] = told
     finally:
-        if asked.parameters and len(rows):
+        if asked.parameters:
             set_all(asked.parameters, before)

@@ -21,7 +21,7 @@ import numpy as np
 from assembly.errors import InputError
 from assembly.studies.sweeps.chain import Start
 from assembly.studies.sweeps.table import Table
-from assembly.studies.sweeps.work import ChunkDone, RunDone
+from assembly.studies.sweeps.work import ChunkDone, Rows
 
 __all__ = ["Folder"]
 
@@ -74,31 +74,16 @@ class Folder:
     def read(self, table: Table) -> None:
         """Take over what is finished."""
         for path in self._parts():
-            runs = self._runs(path, table)
-            for run in runs:
-                if not table.done[run.number]:
-                    table.take(run)
+            done = self._part(path, table)
+            if done is not None:
+                table.take(done)
 
-    def write(self, done: ChunkDone) -> None:
+    def write(self, done: ChunkDone, table: Table) -> None:
         """Keep a chunk."""
         self.kernels = done.kernels
-        lines = [json.dumps({"kernels": done.kernels})]
-        for run in done.runs:
-            for k, row in enumerate(run.rows):
-                # Written by hand: half of what a chunk costs would be that JSON looks at what all lines have.
-                measures = ", ".join([repr(x) if math.isfinite(x) else "null" for x in run.values[k]])
-                line = (
-                    f'{{"row": {row}, "run": {run.number}, "status": "{run.status[k]}", '
-                    f'"iterations": {run.iterations[k]}, "measures": [{measures}]'
-                )
-                if run.messages[k]:
-                    line += f', "message": {json.dumps(run.messages[k])}'
-                if run.starts:
-                    start = run.starts[k]
-                    line += f', "start": {json.dumps(start and [start.values.tolist(), start.q.tolist()])}'
-                lines.append(line + "}")
-        lines.append(json.dumps({"rows": len(lines) - 1}))
-        self._put(f"{PART}{self._next:06d}.jsonl", "\n".join(lines) + "\n")
+        lines = _lines(done, table)
+        text = "\n".join([json.dumps({"kernels": done.kernels}), *lines, json.dumps({"rows": len(lines)})])
+        self._put(f"{PART}{self._next:06d}.jsonl", text + "\n")
         self._next += 1
 
     def _parts(self) -> list[Path]:
@@ -136,32 +121,58 @@ class Folder:
             file.write(text)
         os.replace(file.name, self.path / name)
 
-    def _runs(self, path: Path, table: Table) -> list[RunDone]:
-        """The runs of a part; none of one that is damaged."""
+    def _part(self, path: Path, table: Table) -> ChunkDone | None:
+        """The runs of a part that are not done yet; None of one that is damaged."""
+        found, rows = Rows(), list[int]()
         try:
             head, *lines, end = map(json.loads, path.read_text(encoding="utf-8").splitlines())
             if end != {"rows": len(lines)}:
-                return []
-            found: dict[int, RunDone] = {}
+                return None
             for line in lines:
-                run = found.setdefault(line["run"], RunDone(line["run"], [], [], [], [], [], []))
-                run.rows.append(line["row"])
-                run.status.append(line["status"])
-                run.messages.append(line.get("message", ""))
-                run.iterations.append(line["iterations"])
-                run.values.append([math.nan if x is None else x for x in line["measures"]])
+                number = line["run"]
+                if table.done[number]:
+                    continue
+                if not found.runs or found.runs[-1] != number:
+                    found.runs.append(number)
+                values = [math.nan if x is None else x for x in line["measures"]]
+                found.add(line["status"], line.get("message", ""), line["iterations"], values)
+                rows.append(line["row"])
                 if "start" in line:
                     start = line["start"]
-                    run.starts.append(start and Start(*map(np.array, start)))
-            runs = list(found.values())
+                    found.starts.setdefault(number, []).append(start and Start(*map(np.array, start)))
             # What a run is of is told by the plan.
-            is_whole = all(run.rows == table.runs[run.number].rows.tolist() for run in runs)
+            if not rows or rows != table.rows(found.runs).tolist():
+                return None
+            done = ChunkDone.of(found, 0.0, head["kernels"])
         except (ValueError, KeyError, IndexError, TypeError, AttributeError):
-            return []
-        if not is_whole:
-            return []
-        self.kernels = self.kernels or head["kernels"]
-        return runs
+            return None
+        self.kernels = self.kernels or done.kernels
+        return done
+
+
+def _lines(done: ChunkDone, table: Table) -> list[str]:
+    """A line of JSON for each row of a chunk, written by hand: most of it is the same in all of them."""
+    rows = table.rows(done.runs).tolist()
+    runs = np.repeat(done.runs, [len(table.runs[number].rows) for number in done.runs]).tolist()
+    heads = [f'"status": {json.dumps(name)}, "iterations": ' for name in done.names]
+    measures = done.values.tolist()
+    if not np.isfinite(done.values).all():
+        measures = [json.dumps([x if math.isfinite(x) else None for x in row]) for row in measures]
+    lines = [
+        f'{{"row": {row}, "run": {run}, {heads[name]}{iterations}, "measures": {values}}}'
+        for row, run, name, iterations, values in zip(
+            rows, runs, done.status.tolist(), done.iterations.tolist(), measures, strict=True
+        )
+    ]
+    for k, message in done.messages.items():
+        lines[k] = f'{lines[k][:-1]}, "message": {json.dumps(message)}}}'
+    at = 0
+    for number in done.runs:
+        for k, start in enumerate(done.starts.get(number, ()), at):
+            place = start and [start.values.tolist(), start.q.tolist()]
+            lines[k] = f'{lines[k][:-1]}, "start": {json.dumps(place)}}}'
+        at += len(table.runs[number].rows)
+    return lines
 
 
 def _locked(path: Path) -> IO[str]:

@@ -16,7 +16,7 @@ from assembly.errors import InputError, integer, items
 from assembly.solve.solution import Solution
 from assembly.studies.sweeps.fronts import not_dominated
 from assembly.studies.sweeps.plans import Plan
-from assembly.studies.sweeps.table import NOT_DONE, Table
+from assembly.studies.sweeps.table import Table
 from assembly.studies.sweeps.work import Job, Worker
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ class Study(ReadOnlyArrays):
 
         parameters = self._job.parameters
         with values_set(parameters, [parameter.value for parameter in parameters]):
-            told = Worker(self._job).solution(self._rows.task(self._rows.run_of(k)), k)
+            told = Worker(self._job).solution(self._rows.chunk([self._rows.run_of(k)]), k)
         assert told.solution is not None
         return told.solution
 
@@ -242,7 +242,7 @@ def new_study(table: Table, plan: Plan, job: Job, kernels: str) -> Study:
         plan=plan,
         measures=tuple(column.name for column in job.columns),
         units=tuple(column.unit for column in job.columns),
-        interrupted=bool((table.status == NOT_DONE).any()),
+        interrupted=not table.is_whole,
         kernels=kernels,
         _rows=table,
         _job=job,

@@ -122,11 +122,10 @@ def _computed(
                     "may round otherwise; expected one kind: fresh processes as workers take portable ones"
                 )
             kernels = done.kernels
-            for run in done.runs:
-                table.take(run)
+            table.take(done)
             if kept is not None:
-                kept.write(done)
-            solved = sum(len(run.rows) for run in done.runs)
+                kept.write(done, table)
+            solved = len(done.status)
             _LOG.debug("a chunk of %d runs, %d rows, took %.3f s", len(done.runs), solved, done.seconds)
             return True if executor is None else advance(solved)
 

@@ -23,8 +23,13 @@ __all__ = ["Executor", "StudyError", "in_process", "on_executor"]
 
 # What a row is taken to take before any is measured, in seconds.
 FIRST_GUESS = 1e-3
-# Chunks that a worker has to come at least, where there are rows for them: so that workers end at one time.
-SHARES = 8
+# Chunks that a worker has to come at least, where there are rows for them. With two of them at a worker, one that is
+# half as fast as others ends with them.
+SHARES = 4
+# The part of the requested time that a chunk takes at least, near the end too. A chunk costs c besides its solves, and
+# a worker waits half a chunk at the end: with chunks of m the sum of both is least for m = 2 SHARES c. With Dask c is
+# about 6 ms, of client, scheduler and worker together: 50 ms, a tenth of the default.
+LEAST_PART = 0.1
 # Chunks that wait for each worker, so that none is idle while a chunk comes back.
 AHEAD = 2
 # Takes a chunk that is done: whether the study goes on.
@@ -48,6 +53,8 @@ class _Waiting:
     def __init__(self, table: Table, seconds: float, workers: int) -> None:
         self._table, self._seconds, self._workers = table, seconds, workers
         self._ready = table.ready()
+        # Rows of these, and all that no worker has yet.
+        self._at_hand = sum(len(table.runs[number].rows) for number in self._ready)
         self._left = table.rows_left
         self._spent, self._solved = 0.0, 0
 
@@ -57,16 +64,21 @@ class _Waiting:
     def took(self, done: ChunkDone) -> None:
         """Learn how long rows take, and which runs may begin now."""
         for run in done.runs:
-            for number in self._table.begun_by(run.number):
+            for number in self._table.begun_by(run):
                 heapq.heappush(self._ready, number)
-            self._solved += len(run.rows)
+                self._at_hand += len(self._table.runs[number].rows)
+        self._solved += len(done.status)
         self._spent += done.seconds
 
     def chunk(self) -> list[int]:
-        """The next runs: for so many seconds, or less near the end."""
+        """The next runs: for so many seconds, or less near the end, down to a tenth of them."""
         a_row = self._spent / self._solved if self._solved else FIRST_GUESS
         share = a_row * self._left / (SHARES * self._workers)
-        most = min(self._seconds, share) / a_row
+        least = LEAST_PART * self._seconds
+        most = max(min(self._seconds, share), least) / a_row
+        if self._at_hand < self._left:
+            # Others wait for what these runs begin: shared out, but nothing that takes less than a chunk costs.
+            most = min(most, max(self._at_hand / self._workers, 0.5 * least / SHARES / a_row))
         chosen: list[int] = []
         rows = 0
         while self._ready and (not chosen or rows < most):
@@ -74,6 +86,7 @@ class _Waiting:
             chosen.append(number)
             rows += len(self._table.runs[number].rows)
         self._left -= rows
+        self._at_hand -= rows
         return chosen
 
 
@@ -89,7 +102,7 @@ def in_process(job: Job, table: Table, seconds: float, take: Take, say: Callable
         return goes_on
 
     while waiting and goes_on:
-        done = worker.compute([table.task(number) for number in waiting.chunk()], heard)
+        done = worker.compute(table.chunk(waiting.chunk()), heard)
         take(done)
         if done.interrupted:
             raise KeyboardInterrupt
@@ -107,8 +120,8 @@ def on_executor(job: Job, table: Table, seconds: float, take: Take, executor: Ex
     try:
         while waiting or under_way:
             while waiting and len(under_way) < AHEAD * workers:
-                tasks = [table.task(number) for number in waiting.chunk()]
-                future = executor.submit(compute, packed, key, pickle.dumps(tasks))
+                chunk = pickle.dumps(table.chunk(waiting.chunk()))
+                future = executor.submit(compute, packed, key, chunk)
                 under_way.add(future)
                 future.add_done_callback(answers.put)
             future = answers.get()

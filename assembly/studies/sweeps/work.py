@@ -1,11 +1,15 @@
-"""What a worker does: runs of rows, solved and measured, and given back as plain numbers."""
+"""What a worker does: runs of rows, solved and measured, and given back as arrays of a chunk's rows.
+
+The process that hands out chunks takes part in every row that any worker solves. So what goes there and back is a few
+arrays for a chunk, whose cost a row is small, and not some objects for a row.
+"""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from time import perf_counter
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +19,12 @@ from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError
 from assembly.solve.attempts.starts import moving_rows, scattered
 from assembly.solve.solution import Solution
+from assembly.studies.batches.solving import forget_solves
 from assembly.studies.sweeps.chain import ERROR, Chain, Start, Told
 from assembly.studies.sweeps.measuring import Column, measured
 from assembly.studies.sweeps.processor import kernels_of
 
-__all__ = ["ChunkDone", "Job", "RunDone", "Task", "Worker"]
+__all__ = ["Chunk", "ChunkDone", "Job", "Task", "Worker"]
 
 Array = NDArray[np.float64]
 
@@ -43,25 +48,108 @@ class Task(NamedTuple):
     begins_others: bool
 
 
-class RunDone(NamedTuple):
-    """What came of a run, one row per place in the lists; `starts` are where others may begin, None without one."""
+class Chunk(NamedTuple):
+    """Runs for a worker.
 
-    number: int
-    rows: list[int]
-    status: list[str]
-    messages: list[str]
-    iterations: list[int]
-    values: list[list[float]]
+    Their numbers, the rows (k,) of all and their values (k, p); of each run its count of rows, where it begins, and
+    whether others begin at its rows.
+    """
+
+    numbers: list[int]
+    rows: NDArray[np.int64]
+    values: Array
+    counts: list[int]
     starts: list[Start | None]
+    begins_others: list[bool]
+
+    def tasks(self) -> Iterator[Task]:
+        """Run by run."""
+        end = 0
+        for number, count, start, begins in zip(
+            self.numbers, self.counts, self.starts, self.begins_others, strict=True
+        ):
+            first, end = end, end + count
+            yield Task(number, self.rows[first:end].tolist(), self.values[first:end], start, begins)
 
 
 class ChunkDone(NamedTuple):
-    """Runs, the seconds that they took, the processor that the kernels are compiled for, whether Ctrl-C ended it."""
+    """What came of a chunk, in the order of its rows.
 
-    runs: list[RunDone]
+    Attributes
+    ----------
+    runs : list of int
+        The runs that are done.
+    names : tuple of str
+        The statuses that rows have.
+    status : (k,) int
+        Places in `names`.
+    messages : dict of int -> str
+        Of rows that have one, by their places.
+    iterations : (k,) int
+    values : (k, m)
+        Measures.
+    starts : dict of int -> list
+        Of runs at whose rows others begin: where these may begin, None without a place.
+    seconds : float
+        That the chunk took.
+    kernels : str
+        The processor that the kernels are compiled for.
+    interrupted : bool
+        Whether Ctrl-C ended it.
+    """
+
+    runs: list[int]
+    names: tuple[str, ...]
+    status: NDArray[np.uint8]
+    messages: dict[int, str]
+    iterations: NDArray[np.int32]
+    values: Array
+    starts: dict[int, list[Start | None]]
     seconds: float
     kernels: str
     interrupted: bool = False
+
+    @classmethod
+    def of(cls, rows: Rows, seconds: float, kernels: str, interrupted: bool = False) -> Self:
+        """Of rows that were collected one by one."""
+        names = tuple(dict.fromkeys(rows.status))
+        places = {name: k for k, name in enumerate(names)}
+        return cls(
+            rows.runs,
+            names,
+            np.array([places[name] for name in rows.status], dtype=np.uint8),
+            {k: message for k, message in enumerate(rows.messages) if message},
+            np.array(rows.iterations, dtype=np.int32),
+            np.array(rows.values, dtype=np.float64).reshape(len(rows.status), -1),
+            rows.starts,
+            seconds,
+            kernels,
+            interrupted,
+        )
+
+
+class Rows:
+    """Rows of a chunk as they are collected: those of whole runs, and of one under way."""
+
+    def __init__(self) -> None:
+        self.runs: list[int] = []
+        self.status: list[str] = []
+        self.messages: list[str] = []
+        self.iterations: list[int] = []
+        self.values: list[list[float]] = []
+        self.starts: dict[int, list[Start | None]] = {}
+
+    def add(self, status: str, message: str, iterations: int, values: list[float]) -> None:
+        """Add a row."""
+        self.status.append(status)
+        self.messages.append(message)
+        self.iterations.append(iterations)
+        self.values.append(values)
+
+    def cut(self, count: int) -> None:
+        """Leave out all but the first rows."""
+        for column in (self.status, self.messages, self.iterations, self.values):
+            del column[count:]
 
 
 class Worker:
@@ -74,50 +162,50 @@ class Worker:
         self._chain = Chain(self._scene, job.parameters)
         self._nothing = [float("nan")] * len(job.columns)
 
-    def compute(self, tasks: Sequence[Task], say: Callable[[int], bool] = lambda _: True) -> ChunkDone:
+    def compute(self, chunk: Chunk, say: Callable[[int], bool] = lambda _: True) -> ChunkDone:
         """Solve runs; where `say`, which hears how many rows were solved, says no, or Ctrl-C, those that are done."""
         begin = perf_counter()
-        done: list[RunDone] = []
-        is_interrupted = False
+        found, whole, is_interrupted = Rows(), 0, False
         try:
-            for task in tasks:
-                done.append(self._run(task))
+            for task in chunk.tasks():
+                starts = self._run(task, found)
+                if task.begins_others:
+                    found.starts[task.number] = starts
+                found.runs.append(task.number)
+                whole = len(found.status)
                 if not say(len(task.rows)):
                     break
         except KeyboardInterrupt:
             is_interrupted = True
-        return ChunkDone(done, perf_counter() - begin, kernels_of(), is_interrupted)
+        found.cut(whole)
+        return ChunkDone.of(found, perf_counter() - begin, kernels_of(), is_interrupted)
 
-    def solution(self, task: Task, row: int) -> Told:
-        """That of one row of a run."""
+    def solution(self, chunk: Chunk, row: int) -> Told:
+        """That of one row of a chunk's first run."""
+        task = next(chunk.tasks())
         self._begin(task)
         at = task.rows.index(row)
         return [self._row(k, values) for k, values in zip(task.rows[: at + 1], task.values.tolist(), strict=False)][-1]
 
     def _begin(self, task: Task) -> None:
-        """Forget what solves before have changed: places for contacts, corners, what is proven of pairs."""
-        packed = self._scene._packed
-        if packed is None or packed.kept or packed.contacts:
-            self._scene._has_changed()
-            self._scene._crowding = 1
+        """Forget what solves before have changed, and begin where the run begins."""
+        forget_solves(self._scene)
         if self._job.seed is None:
             self._chain.begin(task.start)
 
-    def _run(self, task: Task) -> RunDone:
+    def _run(self, task: Task, found: Rows) -> list[Start | None]:
+        """Solve a run; the places at which others may begin."""
         self._begin(task)
-        done = RunDone(task.number, task.rows, [], [], [], [], [])
+        starts: list[Start | None] = []
         for row, values in zip(task.rows, task.values.tolist(), strict=True):
             told = self._row(row, values)
-            found, error = self._nothing, ""
+            numbers, error = self._nothing, ""
             if told.solution is not None:
-                found, error = self._measured(told.solution)
-            done.status.append(ERROR if error else told.status)
-            done.messages.append(error or told.message)
-            done.iterations.append(told.iterations)
-            done.values.append(found)
+                numbers, error = self._measured(told.solution)
+            found.add(ERROR if error else told.status, error or told.message, told.iterations, numbers)
             if task.begins_others:
-                done.starts.append(self._chain.place)
-        return done
+                starts.append(self._chain.place)
+        return starts
 
     def _row(self, row: int, values: list[float]) -> Told:
         if self._job.seed is None:

@@ -125,6 +125,31 @@ def test_nothing_depends_on_threads_or_order():
     np.testing.assert_array_equal(scene.solve_many(q0s[:1]).q, one.q[:1])
 
 
+def crowded():
+    """Boxes that are drawn to one place, and that solves find slots for contacts of."""
+    ground = asm.Body("ground", asm.shapes.box(6, 6, 1), (0, 0, -2), fixed=True)
+    boxes = [asm.Body(f"box {k}", asm.shapes.box(1, 1, 1), (1.5 * k - 0.7, 0.2 * k, 0.3 * k)) for k in range(2)]
+    scene = asm.Assembly([ground, *boxes])
+    scene.constrain(asm.Clearance(minimum=0.05))
+    for k, box in enumerate(boxes):
+        scene.minimize(asm.PointDistance(box.point(0, 0, 0), (0.3 * k, 0.1, 0.0)))
+    return scene
+
+
+def test_rows_with_clearances_depend_on_no_other_row():
+    scene = crowded()
+    q0s = np.repeat(scene.q[None], 5, 0)
+    q0s[:, 1:, :3] += 0.05 * np.random.default_rng(1).standard_normal((5, 2, 3))
+    one = scene.solve_many(q0s, threads=1)
+    assert one.alone.all() and one.success.any()
+    two = scene.solve_many(q0s[::-1], threads=2)
+    least = asm.Parameter(scene.constraints[0], "minimum")
+    same = scene.solve_many(q0s[[3]], parameters={least: [0.05, 0.06, 0.05]})
+    for name in ("q", "status", "iterations", "feasibility"):
+        np.testing.assert_array_equal(getattr(two, name)[::-1], getattr(one, name))
+        assert (getattr(same, name)[[0, 2]] == getattr(one, name)[3]).all()
+
+
 def sizes(scene, crank, count, seed=0):
     """Parameters of the spatial four-bar: a link's length, where the rocker has its joint, the drive."""
     rng = np.random.default_rng(seed)

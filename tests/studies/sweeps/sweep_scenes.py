@@ -1,10 +1,6 @@
-"""Scenes and measures of the tests of studies; processes that run it stand here, too."""
+"""Scenes and measures of the tests of studies."""
 
 from __future__ import annotations
-
-import sys
-import time
-from pathlib import Path
 
 import assembly as asm
 
@@ -68,11 +64,3 @@ def columns(found):
         found.table["status"].tolist(),
         found.table["message"].tolist(),
     )
-
-
-if __name__ == "__main__":
-    # A study in a folder, killed from outside: also where it was done before that came, unless it was done at first.
-    parts = len(list(Path(sys.argv[1]).glob("part-*")))
-    asm.study(*narrow(int(sys.argv[2])), folder=sys.argv[1], chunk_seconds=0.02)
-    if len(list(Path(sys.argv[1]).glob("part-*"))) > parts:
-        time.sleep(600.0)

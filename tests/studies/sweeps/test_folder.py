@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
-import subprocess
-import sys
+import signal
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ import assembly as asm
 from assembly.errors import InputError
 from tests.studies.sweeps.sweep_scenes import columns, four_bar, narrow
 
-ROOT = Path(__file__).resolve().parents[3]
 ROWS = 300
 
 
@@ -87,26 +85,31 @@ def test_failures_and_messages_are_kept(tmp_path):
     assert (again.solution(2).q == first.solution(2).q).all()
 
 
-@pytest.mark.skipif(os.name == "nt", reason="processes are killed by a signal")
+@pytest.mark.skipif(os.name == "nt", reason="there are no forks on this system")
 def test_killed_at_any_moment(tmp_path, cases):
-    rows, kills = cases(700, 40000), cases(1, 200)
+    from tests.studies.sweeps.killed_study import go_on  # which solves when it is imported
+
+    rows, kills = cases(1500, 80000), cases(4, 200)
     rng = np.random.default_rng(5)
-    command = [sys.executable, "-m", "tests.studies.sweeps.sweep_scenes", str(tmp_path), str(rows)]
-    done, killed = 0, 0
-    while killed < kills:
-        process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
-        # From the first part on it is killed at a random moment.
-        while process.poll() is None and len(list(tmp_path.glob("part-*"))) <= done:
-            time.sleep(0.005)
-        time.sleep(rng.uniform(0.0, 0.06))
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["tests.studies.sweeps.killed_study"])
+    kept: dict[str, str] = {}
+    for _ in range(kills):
+        process = context.Process(target=go_on, args=(str(tmp_path), rows))
+        process.start()
+        # From its first part on it is killed at a random moment.
+        while process.is_alive() and len(list(tmp_path.glob("part-*"))) <= len(kept):
+            time.sleep(0.0005)
+        time.sleep(rng.uniform(0.0, 0.01))
         process.kill()
-        if process.wait() == 0:
-            break
-        killed += 1
-        done = len(list(tmp_path.glob("part-*")))
-        found = rows_of(tmp_path)
-        assert found and len(set(found)) == len(found)
-    assert killed
+        process.join()
+        assert process.exitcode == -signal.SIGKILL  # it was not done
+        now = {path.name: path.read_text() for path in tmp_path.glob("part-*")}
+        # What was finished is there as it was, and more.
+        assert len(now) > len(kept) and all(now[name] == text for name, text in kept.items())
+        kept = now
+    found = rows_of(tmp_path)
+    assert len(set(found)) == len(found) < rows
     resumed = asm.study(*narrow(rows), folder=tmp_path)
     assert columns(resumed) == columns(asm.study(*narrow(rows)))
     assert sorted(rows_of(tmp_path)) == list(range(rows))
