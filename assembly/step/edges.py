@@ -73,11 +73,9 @@ class Edges:
         known = self._known.get(number)
         if known is None:
             o = occt()
-            tolerance = o.BRep_Tool.Tolerance_s(edge)
-            for vertex in (o.TopExp.FirstVertex_s(edge), o.TopExp.LastVertex_s(edge)):
-                if not vertex.IsNull():
-                    tolerance = max(tolerance, o.BRep_Tool.Tolerance_s(vertex))
-            known = Known(f"edge {number}", tolerance, is_loose(edge))
+            own = o.BRep_Tool.Tolerance_s(edge)
+            tolerance = max(own, o.BRep_Tool.MaxTolerance_s(edge, o.TopAbs_VERTEX))
+            known = Known(f"edge {number}", tolerance, is_loose(edge, own))
             # What is not of the solid has no number.
             if number:
                 self._known[number] = known
