@@ -57,8 +57,7 @@ def chained(drawn: Drawn, patch: Patch) -> tuple[Drawn, Array, float]:
         Two curves are farther apart than their tolerance.
     """
     rows, n = drawn.rows.copy(), len(drawn.rows)
-    periods, lengths = np.array(patch.periods), patch.lengths
-    noise = np.array([ROUNDING * lengths[0], ROUNDING * lengths[1]])
+    periods, noise = np.array(patch.periods), ROUNDING * patch.sides
     shifts, before, joints = np.empty((n + 1, 2)), np.empty((n, 2)), np.empty((n, 2))
     worst = 0.0
     if join_ends(rows, periods, noise, shifts, before, joints):

@@ -199,7 +199,7 @@ def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> Drawn:
         names.append(known.name)
         seams = seams or traced.seam
     table = np.array(rows, dtype=np.float64).reshape(-1, EDGE_SIZE)
-    if level_lines(table, np.array(patch.scales), np.array(patch.lengths), patch.is_straight):
+    if level_lines(table, patch.scales, patch.sides, patch.is_straight):
         for k in np.flatnonzero(table[:, _LEVEL] == FOLLOWED).tolist():
             traced = wire.edges[k]
             draft, known = _best(traced, edges.known(traced.edge), wire, patch, edges)
@@ -292,7 +292,7 @@ def _level(us: list[float], vs: list[float], patch: Patch) -> int:
 
     0 for none; the other one has to go one way.
     """
-    (scale_u, scale_v), (side_u, side_v) = patch.scales, patch.lengths
+    (scale_u, scale_v), (side_u, side_v) = patch.scales.tolist(), patch.lengths
     extent_u, extent_v = (max(us) - min(us)) * scale_u / side_u, (max(vs) - min(vs)) * scale_v / side_v
     along_v = extent_v > extent_u
     if not (extent_u if along_v else extent_v) <= LEVEL:
