@@ -23,6 +23,10 @@ _BESIDE = (
 )  # fmt: skip
 
 
+# What OCCT looks for in each two edges of a wire, and in each two wires of a face.
+_REPAIRS = ("FixSelfIntersectionMode", "FixIntersectingWiresMode")
+
+
 class StepError(InputError):
     """A STEP file that cannot be read or written, or not whole; the text says which faces, and why."""
 
@@ -49,8 +53,8 @@ def checked_unit(unit: str, name: str = "unit") -> float:
 def document_of(path: str, folder: str | None = None, *, repairs: bool = True) -> tuple[Any, int, list[str]]:
     """The file as a document of OCCT, in millimeters, the number of its faces, and files that it needs and are missing.
 
-    OCCT looks for wires that cross themselves, comparing each two of their edges, and cuts them. Without repairs it does
-    not: faces are checked when they are made of them.
+    OCCT looks for wires that cross themselves or others, comparing each two of their edges, and cuts them. Without
+    repairs it does not: faces are checked when they are made of them.
 
     OCCT may crash, at once or later, where it makes shapes of entities that it could not load, and its parser may never
     end on text that is not a STEP file's. So a damaged file is refused, unless a folder is given: then the undamaged
@@ -107,7 +111,8 @@ def _loaded(path: str, file: str, damaged: bool, repairs: bool) -> tuple[Any, in
             if not repairs:
                 # It has whom to tell this only after a file is read.
                 left_out = o.Texts()
-                left_out.Bind(*map(o.TCollection_AsciiString, ("FixShape.FixSelfIntersectionMode", "0")))
+                for mode in _REPAIRS:
+                    left_out.Bind(o.TCollection_AsciiString(f"FixShape.{mode}"), o.TCollection_AsciiString("0"))
                 reader.SetShapeFixParameters(left_out)
             document = o.TDocStd_Document(o.TCollection_ExtendedString("XmlOcaf"))
             o.XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)

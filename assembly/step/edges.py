@@ -73,9 +73,8 @@ class Edges:
         known = self._known.get(number)
         if known is None:
             o = occt()
-            own = o.BRep_Tool.Tolerance_s(edge)
-            tolerance = max(own, o.BRep_Tool.MaxTolerance_s(edge, o.TopAbs_VERTEX))
-            known = Known(f"edge {number}", tolerance, is_loose(edge, own))
+            tolerance = max(o.BRep_Tool.Tolerance_s(edge), o.BRep_Tool.MaxTolerance_s(edge, o.TopAbs_VERTEX))
+            known = Known(f"edge {number}", tolerance, is_loose(edge))
             # What is not of the solid has no number.
             if number:
                 self._known[number] = known

@@ -183,9 +183,10 @@ class _Edge:
         return kept
 
 
-def is_loose(edge: Any, tolerance: float) -> bool:
+def is_loose(edge: Any) -> bool:
     """Whether an edge has a tolerance of its own, beyond what OCCT gives all, which it finds by samples."""
-    return tolerance > 2.0 * CONFUSION and not occt().BRep_Tool.Degenerated_s(edge)
+    o = occt()
+    return o.BRep_Tool.Tolerance_s(edge) > 2.0 * CONFUSION and not o.BRep_Tool.Degenerated_s(edge)
 
 
 def strays(space: Space | None, own: Side, tolerance: float) -> bool:
