@@ -7,17 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from assembly.errors import AssemblyError
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.step.documents import StepError, document_of
 from assembly.step.edges import Edges
 from assembly.step.faces import read_face
 from assembly.step.images import image_of, placement_of
-from assembly.step.occt import occt, parts, quiet
+from assembly.step.occt import occt, parts, quiet, uncollected
 from assembly.step.profiles import Unreadable
 from assembly.step.tree import Color, Part, free_labels, leaves
 
-__all__ = ["Source", "bodies_in", "read_shape", "solids_in", "solids_of", "unique"]
+__all__ = ["Source", "Unrepaired", "bodies_in", "read_shape", "solids_in", "solids_of", "unique"]
 
 # Deviations below this [mm] are not reported: OCCT takes points that are nearer to each other for one.
 EXACT = 1e-7
@@ -34,12 +35,16 @@ class Shape:
     inexact: list[str]
 
 
+class Unrepaired(AssemblyError):
+    """A face of a document without OCCT's repairs cannot be read; with them it may be."""
+
+
 @dataclass(frozen=True, eq=False)
 class Source:
     """A file as a document of OCCT, in millimeters, with the number of its faces.
 
     `absent` has the names of missing files that it refers to. The document of a damaged file holds its undamaged
-    entities. `names` are those of the bodies, in order, if the document does not have them. `advance` is called with
+    entities. Without `repairs` one face that cannot be read is enough to give up. `names` are those of the bodies, in order, if the document does not have them. `advance` is called with
     numbers of faces that were read.
     """
 
@@ -50,6 +55,7 @@ class Source:
     damaged: bool = False
     names: tuple[str | None, ...] = ()
     advance: Callable[[int], object] = bool
+    repairs: bool = True
 
 
 def solids_of(path: str) -> Iterator[Any]:
@@ -119,7 +125,7 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
     """The bodies of a document, and what there is to warn of; lengths are millimeters times `scale`."""
     file, count = source.file, source.count
     o = occt()
-    with quiet():
+    with quiet(), uncollected():
         root = o.XCAFDoc_DocumentTool.ShapeTool_s(source.document.Main())
         bodies: list[Body] = []
         missing: list[str] = []
@@ -143,6 +149,8 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
                     original = Part(leaf.label)
                     images = (image_of(shape, original.said, factor) for shape in solids_in(original.shape))
                     read[key] = [read_shape(shape, told, original.color, scale) for shape, told in images]
+                    if not source.repairs and any(shape.missing for shape in read[key]):
+                        raise Unrepaired(f"{leaf.name!r} has a face that cannot be read")
                     faces = sum(len(shape.faces) + len(shape.missing) for shape in read[key])
                     if sum(part == key[0] for part, _ in read) == 1:
                         source.advance(faces)

@@ -5,74 +5,80 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import place_of
+from assembly.step.edge_ends import EDGE, join_ends
 from assembly.step.profiles import Unreadable
 from assembly.step.surfaces import Patch
-from assembly.step.trims import Edge, Pair
+from assembly.step.trims import Drawn, Pair, moved, shifted
 
 __all__ = ["chained", "head_to_tail"]
 
 Array = NDArray[np.float64]
 # Ends that are nearer to each other, over the side of the domain, are apart by rounding alone.
 ROUNDING = 1e-12
+_LEVEL, _SEAM, TOLERANCE = (place_of(EDGE, name) for name in ("level", "seam", "tolerance"))
 
 
 def _within(at: Array, patch: Patch) -> Array:
     """(u, v), which may lie beyond the domain, in it."""
-    moved = at.copy()
+    there = at.copy()
     for axis, ((low, high), closed) in enumerate(zip(patch.surface.domain, patch.surface.closed, strict=True)):
-        moved[..., axis] = (
+        there[..., axis] = (
             low + np.mod(at[..., axis] - low, high - low) if closed else np.clip(at[..., axis], low, high)
         )
-    return moved
+    return there
 
 
-def head_to_tail(edges: list[Edge], patch: Patch) -> list[Edge]:
+def head_to_tail(drawn: Drawn, patch: Patch) -> Drawn:
     """Edges in an order in which each begins nearest to where the one before ends, up to periods."""
     period = patch.period
     whole = np.where(np.isfinite(period), period, 1.0)
-    row, left = edges[:1], edges[1:]
+    starts, stops = drawn.rows[:, :2], drawn.rows[:, 2:4]
+    order, left = [0], list(range(1, len(starts)))
     while left:
-        jumps = np.array([edge.ends[0] for edge in left]) - row[-1].ends[1]
+        jumps = starts[left] - stops[order[-1]]
         jumps -= np.where(np.isfinite(period), np.round(jumps / whole) * whole, 0.0)
-        row.append(left.pop(int(np.argmin(np.linalg.norm(jumps, axis=1)))))
-    return row
+        order.append(left.pop(int(np.argmin(np.linalg.norm(jumps, axis=1)))))
+    curves, names = [drawn.curves[k] for k in order], [drawn.names[k] for k in order]
+    return drawn._replace(rows=drawn.rows[order], curves=curves, names=names)
 
 
-def chained(edges: list[Edge], patch: Patch) -> tuple[list[Edge], float]:
+def chained(drawn: Drawn, patch: Patch) -> tuple[Drawn, Array, float]:
     """Edges of one wire, head to tail, moved by periods and joined where they miss one another by the tolerance.
 
     Returns
     -------
-    edges, gap
-        The largest gap that was closed, in space.
+    drawn, ends, gap
+        Its curves are moved; where edges begin and end, (n, 2, 2); the largest gap that was closed, in space.
 
     Raises
     ------
     Unreadable
         Two curves are farther apart than their tolerance.
     """
-    periods = patch.periods
-    rows = edges
-    if any(periods):
-        rows = edges[:1]
-        for edge in edges[1:]:
-            by = _whole(rows[-1].corners[1], edge.corners[0], periods)
-            rows.append(edge.shifted(by) if any(by) else edge)
-    corners = [edge.corners for edge in rows]
+    rows, n = drawn.rows.copy(), len(drawn.rows)
+    periods, noise = np.array(patch.periods), ROUNDING * patch.sides
+    shifts, before, joints = np.empty((n + 1, 2)), np.empty((n, 2)), np.empty((n, 2))
+    worst = 0.0
+    if join_ends(rows, periods, noise, shifts, before, joints):
+        worst = _checked_gaps(rows, before, noise, patch)
+    if drawn.seams:
+        _match_seams(drawn, joints, patch.periods)
+    ends = np.empty((n, 2, 2))
+    ends[:, 0] = joints
+    ends[:-1, 1] = joints[1:]
     # A boundary that runs around a closed surface ends whole periods from where it begins.
-    ring = _whole(corners[0][0], corners[-1][1], periods)
-    # Joint k is where edge k begins.
-    before = [(u + 0.0, v + 0.0) for _, (u, v) in corners[-1:] + corners[:-1]]
-    before[0] = (before[0][0] + ring[0], before[0][1] + ring[1])
-    after = [start for start, _ in corners]
-    worst = _checked_gaps(rows, before, after, patch)
-    joints = [
-        _joint(last, edge, b, a) for last, edge, b, a in zip(rows[-1:] + rows[:-1], rows, before, after, strict=True)
-    ]
-    _match_seams(rows, joints, periods)
-    stops = joints[1:] + joints[:1]
-    stops[-1] = (stops[-1][0] - ring[0], stops[-1][1] - ring[1])
-    return [edge.moved(start, end) for edge, start, end in zip(rows, joints, stops, strict=True)], worst
+    ends[-1, 1] = joints[0] - shifts[n]
+    curves = drawn.curves
+    if any(curves):
+        curves = list(curves)
+        levels = rows[:, _LEVEL].tolist()
+        for k, ((start, end), by) in enumerate(zip(ends.tolist(), shifts[:n].tolist(), strict=True)):
+            curve = curves[k]
+            if curve is not None:
+                curve = shifted(curve, shifts[k]) if any(by) else curve
+                curves[k] = moved(curve, levels[k], (start[0], start[1]), (end[0], end[1]))
+    return drawn._replace(rows=rows, curves=curves), ends, worst
 
 
 def _whole(to: Pair, at: Pair, periods: Pair) -> Pair:
@@ -84,52 +90,33 @@ def _whole(to: Pair, at: Pair, periods: Pair) -> Pair:
     )
 
 
-def _joint(last: Edge, edge: Edge, before: Pair, after: Pair) -> Pair:
-    """Where two edges meet.
-
-    If one of them alone is loose, at the end of the other one. Else in the middle between both ends, except that an
-    edge with a constant u or v keeps that coordinate.
-    """
-    if last.loose != edge.loose:
-        return before if edge.loose else after
-    u, v = (
-        0.5 * (b + a) if last_level == level else b if last_level else a
-        for last_level, level, b, a in zip(last.level, edge.level, before, after, strict=True)
-    )
-    return u, v
-
-
-def _checked_gaps(rows: list[Edge], before: list[Pair], after: list[Pair], patch: Patch) -> float:
+def _checked_gaps(rows: Array, before: Array, noise: Array, patch: Patch) -> float:
     """The largest gap in space at the start of an edge, where the one before ends; raise beyond their tolerances."""
-    noise_u, noise_v = (ROUNDING * side for side in patch.lengths)
-    apart = [
-        k
-        for k, ((u, v), (x, y)) in enumerate(zip(before, after, strict=True))
-        if not (abs(u - x) <= noise_u and abs(v - y) <= noise_v)
-    ]
-    if not apart:
-        return 0.0
+    after = rows[:, :2]
+    apart = np.flatnonzero(~(np.abs(before - after) <= noise).all(axis=1))
     # Points may lie beyond the domain.
-    at = _within(np.array([[before[k] for k in apart], [after[k] for k in apart]]), patch)
+    at = _within(np.array([before[apart], after[apart]]), patch)
     points = patch.surface.evaluate(at[..., 0], at[..., 1])
-    gaps = np.linalg.norm(points[0] - points[1], axis=1).tolist()
-    for k, gap in zip(apart, gaps, strict=True):
-        if gap > 2.0 * (rows[k - 1].tolerance + rows[k].tolerance):
+    gaps = np.linalg.norm(points[0] - points[1], axis=1)
+    tolerances = rows[:, TOLERANCE]
+    for gap, forgiven in zip(gaps.tolist(), (2.0 * (tolerances[apart - 1] + tolerances[apart])).tolist(), strict=True):
+        if gap > forgiven:
             raise Unreadable(f"two edges that should meet are {gap:.2g} mm apart")
-    return float(max(gaps))
+    return float(gaps.max())
 
 
-def _match_seams(rows: list[Edge], joints: list[Pair], periods: Pair) -> None:
+def _match_seams(drawn: Drawn, joints: Array, periods: Pair) -> None:
     """Make both sides of a seam, which is one edge run to and fro, end at the same places up to a period."""
-    for i, edge in enumerate(rows):
-        for j in range(i + 1, len(rows) if edge.seam else 0):
-            if rows[j].name != edge.name:
+    names, n = drawn.names, len(joints)
+    for i, is_seam in enumerate(drawn.rows[:, _SEAM].tolist()):
+        for j in range(i + 1, n if is_seam else 0):
+            if names[j] != names[i]:
                 continue
-            for here, there in ((i, (j + 1) % len(rows)), ((i + 1) % len(rows), j)):
+            for here, there in ((i, (j + 1) % n), ((i + 1) % n, j)):
                 if here == there:
                     continue
-                (u, v), (x, y) = joints[here], joints[there]
+                (u, v), (x, y) = joints[here].tolist(), joints[there].tolist()
                 by = _whole((u, v), (x, y), periods)
                 off_u, off_v = u - x - by[0], v - y - by[1]
-                joints[here] = (u - 0.5 * off_u, v - 0.5 * off_v)
-                joints[there] = (x + 0.5 * off_u, y + 0.5 * off_v)
+                joints[here] = u - 0.5 * off_u, v - 0.5 * off_v
+                joints[there] = x + 0.5 * off_u, y + 0.5 * off_v

@@ -23,6 +23,10 @@ _BESIDE = (
 )  # fmt: skip
 
 
+# What OCCT looks for in each two edges of a wire, and in each two wires of a face.
+_REPAIRS = ("FixSelfIntersectionMode", "FixIntersectingWiresMode")
+
+
 class StepError(InputError):
     """A STEP file that cannot be read or written, or not whole; the text says which faces, and why."""
 
@@ -46,8 +50,11 @@ def checked_unit(unit: str, name: str = "unit") -> float:
     return UNITS[unit]
 
 
-def document_of(path: str, folder: str | None = None) -> tuple[Any, int, list[str]]:
+def document_of(path: str, folder: str | None = None, *, repairs: bool = True) -> tuple[Any, int, list[str]]:
     """The file as a document of OCCT, in millimeters, the number of its faces, and files that it needs and are missing.
+
+    OCCT looks for wires that cross themselves or others, comparing each two of their edges, and cuts them. Without
+    repairs it does not: faces are checked when they are made of them.
 
     OCCT may crash, at once or later, where it makes shapes of entities that it could not load, and its parser may never
     end on text that is not a STEP file's. So a damaged file is refused, unless a folder is given: then the undamaged
@@ -63,7 +70,7 @@ def document_of(path: str, folder: str | None = None) -> tuple[Any, int, list[st
     for other in others.files:
         _whole(str(other), other.read_bytes(), folder, other.relative_to(file.parent))
     del text
-    return (*_loaded(path, str(file) if folder is None else whole, folder is not None), others.missing)
+    return (*_loaded(path, str(file) if folder is None else whole, folder is not None, repairs), others.missing)
 
 
 def _whole(path: str, text: bytes, folder: str | None, name: Path = Path("whole.step")) -> str:
@@ -81,7 +88,7 @@ def _whole(path: str, text: bytes, folder: str | None, name: Path = Path("whole.
     return str(file)
 
 
-def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
+def _loaded(path: str, file: str, damaged: bool, repairs: bool) -> tuple[Any, int]:
     """`document_of` a file that has the syntax of one: the file at the path, or its undamaged statements."""
     o = occt()
     # OCCT has its settings only after a reader was made.
@@ -101,6 +108,12 @@ def _loaded(path: str, file: str, damaged: bool) -> tuple[Any, int]:
                     StepWarning,
                     stacklevel=6,
                 )
+            if not repairs:
+                # It has whom to tell this only after a file is read.
+                left_out = o.Texts()
+                for mode in _REPAIRS:
+                    left_out.Bind(o.TCollection_AsciiString(f"FixShape.{mode}"), o.TCollection_AsciiString("0"))
+                reader.SetShapeFixParameters(left_out)
             document = o.TDocStd_Document(o.TCollection_ExtendedString("XmlOcaf"))
             o.XCAFDoc_DocumentTool.SetLengthUnit_s(document, 1e-3)
             # Of styles only these make something.

@@ -164,3 +164,67 @@ def move_between(surface, beyond, points, places):
         at = (places[k, 0], places[k, 1], places[k, 2], places[k, 3])
         x, y, z = _between(own, there, (points[k, 0], points[k, 1], points[k, 2]), at)
         points[k, 0], points[k, 1], points[k, 2] = x, y, z
+
+
+@kernel(inline=True)
+def _inside(ground, u, v):
+    """Parameters for evaluation; those beyond an open domain count as its end."""
+    patch = surface_at(ground.table, 0)
+    (u0, u1), (v0, v1) = _ends(ground)
+    if patch.closed_u == 0:
+        u = min(max(u, u0), u1)
+    if patch.closed_v == 0:
+        v = min(max(v, v0), v1)
+    u, _fits = into_domain(ground.pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
+    v, _fits = into_domain(ground.pool, patch.breaks_v, patch.spans_v, patch.closed_v, v)
+    return u, v
+
+
+@kernel(signatures="(Tuple((i8[::1], f8[::1], f8)), f8[:, ::1], f8[:, ::1])")
+def fill_surface_points(surface, places, out):
+    """Points (n, 3) of a surface at parameters (n, 2), which count as the end where they are beyond it."""
+    ground = Ground(surface[0], surface[1], surface[2])
+    for k in range(places.shape[0]):
+        u, v = _inside(ground, places[k, 0], places[k, 1])
+        x, y, z = xyz(surface_lanes(Store(ground.table, ground.pool), 0, u, v).point)
+        out[k, 0], out[k, 1], out[k, 2] = x, y, z
+
+
+@kernel(signatures="(Tuple((i8[::1], f8[::1], f8)), f8[::1], f8[:, ::1], f8[:, ::1])")
+def distance_across(surface, t, given, there):
+    """How far points of a surface are from those of a curve on it, across the curve, at most.
+
+    Parameters
+    ----------
+    surface
+        Table, pool and size.
+    t : (n,)
+        Parameters of the curve, rising.
+    given, there : (n, 2)
+        Parameters of the surface on the curve, and of the other points.
+    """
+    ground = Ground(surface[0], surface[1], surface[2])
+    n = t.size
+    worst = 0.0
+    for k in range(n):
+        # Derivatives of the curve from differences, of second order inside.
+        a, b = max(k - 1, 0), min(k + 1, n - 1)
+        left, right = t[k] - t[a], t[b] - t[k]
+        slope_u, slope_v = 0.0, 0.0
+        if left > 0.0:
+            weight = right / (left + right) if right > 0.0 else 1.0
+            slope_u += weight * (given[k, 0] - given[a, 0]) / left
+            slope_v += weight * (given[k, 1] - given[a, 1]) / left
+        if right > 0.0:
+            weight = left / (left + right) if left > 0.0 else 1.0
+            slope_u += weight * (given[b, 0] - given[k, 0]) / right
+            slope_v += weight * (given[b, 1] - given[k, 1]) / right
+        u, v = _inside(ground, given[k, 0], given[k, 1])
+        jet = surface_lanes(Store(ground.table, ground.pool), 0, u, v)
+        su, sv = xyz(jet.u), xyz(jet.v)
+        off = blend(there[k, 0] - given[k, 0], su, there[k, 1] - given[k, 1], sv)
+        along = blend(slope_u, su, slope_v, sv)
+        along = scale(1.0 / max(np.sqrt(dot(along, along)), 1e-300), along)
+        off = sub(off, scale(dot(off, along), along))
+        worst = max(worst, np.sqrt(dot(off, off)))
+    return worst

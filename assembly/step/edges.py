@@ -73,10 +73,7 @@ class Edges:
         known = self._known.get(number)
         if known is None:
             o = occt()
-            tolerance = o.BRep_Tool.Tolerance_s(edge)
-            for vertex in (o.TopExp.FirstVertex_s(edge), o.TopExp.LastVertex_s(edge)):
-                if not vertex.IsNull():
-                    tolerance = max(tolerance, o.BRep_Tool.Tolerance_s(vertex))
+            tolerance = max(o.BRep_Tool.Tolerance_s(edge), o.BRep_Tool.MaxTolerance_s(edge, o.TopAbs_VERTEX))
             known = Known(f"edge {number}", tolerance, is_loose(edge))
             # What is not of the solid has no number.
             if number:

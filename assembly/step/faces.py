@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from assembly.step.edges import Edges
 from assembly.step.occt import occt
 from assembly.step.profiles import Unreadable
 from assembly.step.surfaces import Patch
-from assembly.step.trims import Edge, curves_of, edge_curves
+from assembly.step.trims import curves_of, edge_curves
 from assembly.step.wires import Wire, outermost
 
 __all__ = ["Read", "read_face"]
@@ -35,12 +35,25 @@ class Read:
     gap: float
 
 
-def _loop(wire: Wire, where: Patch, edges: Edges) -> tuple[list[Edge], float] | None:
-    """The boundary curves of a wire; None where nothing is left of it but seams and poles."""
+class _Loop(NamedTuple):
+    """The boundary curves of a wire, and what was not exact about them: a deviation in (u, v), and a gap [mm].
+
+    Of their ends and those of their neighbors `tolerance` [mm] forgives.
+    """
+
+    curves: list[NurbsCurve]
+    tolerance: float
+    deviation: float
+    gap: float
+
+
+def _loop(wire: Wire, where: Patch, edges: Edges, factors: Array) -> _Loop | None:
+    """The curves of a wire, their u and v multiplied; None where nothing is left of it but seams and poles."""
     if not wire.edges or wire.is_bare:
         return None
-    curves = edge_curves(wire, where, edges)
-    return chained(curves if wire.ordered else head_to_tail(curves, where), where)
+    drawn = edge_curves(wire, where, edges)
+    drawn, ends, gap = chained(drawn if wire.ordered else head_to_tail(drawn, where), where)
+    return _Loop(curves_of(drawn, ends, factors), drawn.tolerance, drawn.deviation, gap)
 
 
 def _scaled(where: Patch, scale: float) -> tuple[NurbsSurface, Array]:
@@ -83,17 +96,15 @@ def read_face(face: Any, edges: Edges, name: str | None, scale: float = 1.0) -> 
         # What the file says of its edges and vertices, and at least what faces forgive by themselves.
         tolerance = OVERSHOOT * made_surface.size
         for k, wire in enumerate(wires):
-            made = _loop(wire, where, edges)
+            made = _loop(wire, where, edges, factors)
             if made is None:
                 continue
-            gap = max(gap, made[1])
-            deviation = max(deviation, max(edge.deviation for edge in made[0]))
-            tolerance = max(tolerance, scale * max(edge.tolerance for edge in made[0]))
-            loop = curves_of(made[0], factors)
+            gap, deviation = max(gap, made.gap), max(deviation, made.deviation)
+            tolerance = max(tolerance, scale * made.tolerance)
             if k == around:
-                outer = loop
+                outer = made.curves
             else:
-                holes.append(loop)
+                holes.append(made.curves)
         reverse = face.Orientation() == o.TopAbs_REVERSED
         made_face = Face(made_surface, outer, holes, name=name, reversed=reverse, tolerance=tolerance)
         if outer is None and not holes:

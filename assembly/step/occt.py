@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -10,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from types import SimpleNamespace
 from typing import Any
 
-__all__ = ["occt", "parts", "quiet", "settings"]
+__all__ = ["occt", "parts", "quiet", "settings", "uncollected"]
 
 _MODULES = (
     "BRep",
@@ -52,6 +53,11 @@ _CONTAINERS = {
     "Reals": ("Array1_double", "TColStd", "TColStd_Array1OfReal"),
     "RealNet": ("Array2_double", "TColStd", "TColStd_Array2OfReal"),
     "Integers": ("Array1_int", "TColStd", "TColStd_Array1OfInteger"),
+    "Texts": (
+        "DataMap_TCollection_AsciiString_TCollection_AsciiString",
+        "Resource",
+        "Resource_DataMapOfAsciiStringAsciiString",
+    ),
     "Labels": ("Sequence_TDF_Label", "TDF", "TDF_LabelSequence"),
     "ShapeMap": ("IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher", "TopTools", "TopTools_IndexedMapOfShape"),
 }
@@ -118,6 +124,22 @@ def quiet() -> Iterator[None]:
     finally:
         for printer in kept:
             printers.Append(printer)
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Keep Python from looking for cycles of objects, of which reading makes none but many that it would look through.
+
+    What is released otherwise still is.
+    """
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
 
 
 @contextmanager

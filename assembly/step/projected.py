@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from assembly.errors import InputError
 from assembly.step.crossings import crossings
-from assembly.step.edge_feet import move_between, move_to_feet
+from assembly.step.edge_feet import distance_across, fill_surface_points, move_between, move_to_feet
 from assembly.step.occt import occt
 from assembly.step.profiles import Spline, Unreadable, approximated, knot_row, point, profile
 from assembly.step.surfaces import CONFUSION, Patch
@@ -36,26 +36,6 @@ _FOLLOWED = 1e-10
 _PLACES = 9
 # Places of a whole curve at which it is first asked whether it leaves its edge anywhere (`strays`).
 _LOOKS = 33
-
-
-def _dot(a: Array, b: Array) -> Array:
-    """Products of rows."""
-    made: Array = np.einsum("ij,ij->i", a, b)
-    return made
-
-
-def _norm(a: Array) -> Array:
-    """Lengths of rows."""
-    return np.sqrt(_dot(a, a))
-
-
-def _slopes(values: Array, t: Array) -> Array:
-    """Derivatives by a parameter from differences, of second order inside, as `np.gradient` has them."""
-    steps = np.diff(t)[:, None]
-    ways = np.diff(values, axis=0) / steps
-    left, right = steps[:-1], steps[1:]
-    inside = (left * ways[1:] + right * ways[:-1]) / (left + right)
-    return np.concatenate([ways[:1], inside, ways[-1:]])
 
 
 def points_of(curve: Any, low: float, high: float) -> Callable[[Array], Array]:
@@ -132,22 +112,9 @@ class Side:
 
     def points(self, t: Array) -> Array:
         """Points (n, 3) of the surface on the curve, whose parameters count as the end where they are beyond it."""
-        at = self._inside(self.given(t))
-        made: Array = self.patch.surface.evaluate(at[:, 0], at[:, 1])
-        return made
-
-    def _inside(self, uv: Array) -> Array:
-        at = uv.copy()
-        for axis, (low, high) in enumerate(self.patch.surface.domain):
-            if not self.is_closed[axis]:
-                np.clip(at[:, axis], low, high, out=at[:, axis])
-        return at
-
-    def slopes(self, uv: Array) -> tuple[Array, Array]:
-        """Derivatives (n, 3) of the surface at parameters, which count as the end where they are beyond it."""
-        at = self._inside(uv)
-        _, su, sv = self.patch.surface.evaluate(at[:, 0], at[:, 1], 1)
-        return su, sv
+        out = np.empty((t.size, 3))
+        fill_surface_points(self.ground, np.ascontiguousarray(self.given(t)), out)
+        return out
 
     def feet(self, points: Array, start: Array) -> Array:
         """Parameters (n, 2) of the surface's points that are nearest to others.
@@ -176,14 +143,7 @@ class _Edge:
         Differences along the curve do not count.
         """
         given = self.own.given(t)
-        there = self._from(t, given)
-        su, sv = self.own.slopes(given)
-        across = su * (there - given)[:, :1] + sv * (there - given)[:, 1:]
-        slopes = _slopes(given, t)
-        along = su * slopes[:, :1] + sv * slopes[:, 1:]
-        along /= np.maximum(_norm(along), 1e-300)[:, None]
-        across -= _dot(across, along)[:, None] * along
-        return float(_norm(across).max())
+        return float(distance_across(self.own.ground, t, np.ascontiguousarray(given), self._from(t, given)))
 
     def projection(self, t: Array) -> Array:
         """Parameters (n, 2) on the surface, of the intersection where there is one."""
@@ -237,8 +197,8 @@ def strays(space: Space | None, own: Side, tolerance: float) -> bool:
     if space is None:
         return False
     t = np.linspace(space.low, space.high, _LOOKS)
-    there = own.points(t)
-    return bool(_norm(there - space.points(t)).max() > 1.5 * tolerance)
+    gaps = own.points(t) - space.points(t)
+    return bool((gaps * gaps).sum(axis=1).max() > (1.5 * tolerance) ** 2)
 
 
 def projected(space: Space, own: Side, other: Side | None, low: float, high: float) -> tuple[Spline, float] | None:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,9 +20,9 @@ import numpy as np
 from assembly._progress import Progress, checked_progress, watched
 from assembly.errors import InputError, file_path
 from assembly.kinematics.body import Body
-from assembly.step.bodies import Source, bodies_in
+from assembly.step.bodies import Source, Unrepaired, bodies_in
 from assembly.step.documents import Damaged, Malformed, StepError, StepWarning, checked_unit, document_of
-from assembly.step.occt import quiet
+from assembly.step.occt import quiet, uncollected
 
 __all__ = ["read_step"]
 
@@ -178,9 +179,17 @@ def bodies_of(
 
     `loaded` is called when OCCT has read the file.
     """
-    with quiet():
-        document, count, absent = document_of(path, folder)
+    damaged = folder is not None
+
+    def read(repairs: bool) -> tuple[list[Body], list[str]]:
+        document, count, absent = document_of(path, folder, repairs=repairs)
         loaded()
         with watched(progress, "reading", count, "face") as advance:
-            found = Source(Path(path), document, count, tuple(absent), folder is not None, advance=advance)
+            found = Source(Path(path), document, count, tuple(absent), damaged, (), advance, repairs)
             return bodies_in(found, 1.0 / checked_unit(unit), strict)
+
+    with quiet(), uncollected():
+        # OCCT's repairs are slow, and few files need them.
+        with suppress(Unrepaired):
+            return read(repairs=damaged)
+        return read(repairs=True)

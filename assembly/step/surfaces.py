@@ -7,7 +7,6 @@ are approximated.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from math import cos, pi, sin
 from typing import Any
@@ -39,43 +38,42 @@ Array = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 # Distances [mm] below which OCCT takes two points for one.
 CONFUSION = 1e-7
+# A parameter that is a length.
+LENGTH = Straight(True)
 
 
-@dataclass(frozen=True)
 class Patch:
-    """A surface, the maps from OCCT's (u, v) to its own, and how far it is from what the file says [mm]."""
+    """A surface, the maps from OCCT's (u, v) to its own, and how far it is from what the file says [mm].
 
-    surface: NurbsSurface
-    u: Direction
-    v: Direction
-    deviation: float = 0.0
+    Attributes
+    ----------
+    lengths : (float, float)
+        Lengths of the domain in u and in v.
+    is_straight : bool
+        Whether OCCT's parameters are ours.
+    """
+
+    def __init__(self, surface: NurbsSurface, u: Direction, v: Direction, deviation: float = 0.0) -> None:
+        self.surface, self.u, self.v, self.deviation = surface, u, v, deviation
+        (a, b), (c, d) = surface.domain
+        self.lengths = b - a, d - c
+        self.is_straight = isinstance(u, Straight) and isinstance(v, Straight)
 
     @cached_property
     def sides(self) -> Array:
         """Lengths of the domain in u and in v."""
-        return np.asarray(np.ptp(np.array(self.surface.domain), axis=1))
+        return np.array(self.lengths)
 
     @cached_property
-    def scales(self) -> list[float]:
+    def scales(self) -> Array:
         """Our lengths in one of OCCT's, in u and in v."""
-        return [along.radius if isinstance(along, Turning) else 1.0 for along in (self.u, self.v)]
-
-    @cached_property
-    def lengths(self) -> tuple[float, float]:
-        """The same as floats."""
-        (a, b), (c, d) = self.surface.domain
-        return b - a, d - c
+        return np.array([along.radius if isinstance(along, Turning) else 1.0 for along in (self.u, self.v)])
 
     @cached_property
     def periods(self) -> tuple[float, float]:
         """Periods in u and v; 0 where the surface is not closed."""
         (u, v), (closed_u, closed_v) = self.lengths, self.surface.closed
         return (u if closed_u else 0.0), (v if closed_v else 0.0)
-
-    @cached_property
-    def is_straight(self) -> bool:
-        """Whether OCCT's parameters are ours."""
-        return isinstance(self.u, Straight) and isinstance(self.v, Straight)
 
     @cached_property
     def period(self) -> Array:
@@ -112,7 +110,7 @@ def _plane(surface: Any, box: Box) -> Patch:
     # Four corners: plain floats cost a tenth of arrays.
     columns = list(zip(*axes, strict=True))
     net = np.array([[[o + a * x + b * y for o, x, y in columns] for b in v] for a in u])
-    return Patch(known_surface(net, (_doubled(u), _doubled(v)), (1, 1)), Straight(True), Straight(True))
+    return Patch(known_surface(net, (_doubled(u), _doubled(v)), (1, 1)), LENGTH, LENGTH)
 
 
 def _doubled(ends: tuple[float, float]) -> Array:
@@ -131,7 +129,7 @@ def _round(surface: Any, box: Box) -> Patch:
     if not place.Direct():
         axis = -axis
     low, high = box[2:]
-    v: Direction = Straight(True)
+    v: Direction = LENGTH
     if isinstance(surface, o.Geom_CylindricalSurface):
         radius = surface.Radius()
         ends = _slack(low, high)
@@ -184,7 +182,7 @@ def _extruded(surface: Any, box: Box) -> Patch:
     along = point(surface.Direction())
     net = np.repeat(shape.points[:, None], 2, axis=1)
     net[..., :3] += shape.points[:, None, 3:] * v[None, :, None] * along
-    return Patch(_surface(net, (shape.knots, np.repeat(v, 2)), (shape.degree, 1)), u, Straight(True), deviation)
+    return Patch(_surface(net, (shape.knots, np.repeat(v, 2)), (shape.degree, 1)), u, LENGTH, deviation)
 
 
 def _axis_crossings(surface: Any, low: float, high: float) -> tuple[float, float]:

@@ -7,16 +7,17 @@ ends mapped; any other curve, a helix say, has no rational form and is interpola
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import place_of
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.curve_parts import sampled
-from assembly.step.edges import Edges
+from assembly.step.edge_ends import EDGE, EDGE_SIZE, FOLLOWED, FREE, LEVEL, U_LEVEL, UNKNOWN, V_LEVEL, level_lines
+from assembly.step.edges import Edges, Known
 from assembly.step.occt import occt
 from assembly.step.profiles import Direction, Spline, Unreadable, approximated, profile, spline
 from assembly.step.projected import projected, strays
@@ -24,16 +25,17 @@ from assembly.step.surfaces import Patch
 from assembly.step.tracks import track
 from assembly.step.wires import Traced, Wire
 
-__all__ = ["Edge", "Pair", "Segment", "curves_of", "edge_curves"]
+__all__ = ["HIGH", "LOW", "Drawn", "Pair", "curves_of", "edge_curves", "moved", "shifted"]
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
 # Deviation allowed to curves without rational form, over the shorter side of the surface's domain.
-FOLLOWED = 1e-10
-# Curves that leave a coordinate line by less, over the side of the domain, run along it.
-LEVEL = 1e-9
+FOLLOW = 1e-10
 # A move of an end is spread over the first legs of the control polygon that together are this many times as long.
 GENTLE = 10.0
+# Columns of records of edges: both ends, the interval, and what else is asked for here.
+ENDS, LOW, HIGH = slice(0, 4), place_of(EDGE, "low"), place_of(EDGE, "high")
+TOLERANCE, _LEVEL, _LINE = (place_of(EDGE, name) for name in ("tolerance", "level", "line"))
 
 
 class Segment(NamedTuple):
@@ -45,76 +47,54 @@ class Segment(NamedTuple):
     high: float = 1.0
 
 
-class Edge(NamedTuple):
-    """One boundary curve in our (u, v), run with the material on its left.
+class Drawn(NamedTuple):
+    """The edges of a wire in our (u, v), run with the material on their left.
 
     Attributes
     ----------
-    curve : Spline or Segment
-    level : (bool, bool)
-        Whether u, or v, is constant along it.
-    tolerance : float
-        How far its ends may be from those of its neighbors, in space [mm].
-    name : str
+    rows : (n, EDGE_SIZE)
+        An `EDGE` each.
+    curves : list of Spline, optional
+        Those that are no straight lines.
+    names : list of str
         Edges of two faces that are one edge of the solid have one name.
+    seams : bool
+        Whether the face has some on both sides.
     deviation : float
-        Of its interpolation in (u, v).
-    seam : bool
-        Whether the face has it on both sides.
-    loose : bool
-        Whether it has a tolerance of its own: its ends are less certain than those of others.
+        Of their interpolation in (u, v), at most.
     """
 
-    curve: Spline | Segment
-    level: tuple[bool, bool]
-    tolerance: float
-    name: str
+    rows: Array
+    curves: list[Spline | None]
+    names: list[str]
+    seams: bool
     deviation: float
-    seam: bool = False
-    loose: bool = False
 
     @property
-    def corners(self) -> tuple[Pair, Pair]:
-        """First and last point."""
-        if isinstance(self.curve, Segment):
-            return self.curve.start, self.curve.end
-        (u, v, w), (x, y, z) = self.curve.points[0].tolist(), self.curve.points[-1].tolist()
-        return (u / w, v / w), (x / z, y / z)
+    def tolerance(self) -> float:
+        """The largest [mm]."""
+        return float(self.rows[:, TOLERANCE].max())
 
-    @property
-    def ends(self) -> Array:
-        """The same as an array (2, 2)."""
-        return np.array(self.corners)
 
-    def moved(self, start: Pair, end: Pair) -> Edge:
-        """The curve with its two ends at two points; what is level stays so."""
-        if isinstance(self.curve, Segment):
-            if start == self.curve.start and end == self.curve.end:
-                return self
-            return self._replace(curve=Segment(start, end, self.curve.low, self.curve.high))
-        made = self.curve.points.copy()
-        if len(made) == 2 and made[0, 2] == made[1, 2] == 1.0:
-            made[:, :2] = start, end
-            return self._replace(curve=Spline(made, self.curve.knots, self.curve.degree))
-        for axis in (0, 1):
-            if self.level[axis]:
-                made[:, axis] = start[axis] * made[:, 2]
-        for points, to in ((made, start), (made[::-1], end)):
-            _move_end(points, np.array(to))
-        return self._replace(curve=Spline(made, self.curve.knots, self.curve.degree))
+def moved(curve: Spline, level: float, start: Pair, end: Pair) -> Spline:
+    """A curve in (u, v) with its two ends at two points; what is level stays so."""
+    made = curve.points.copy()
+    if len(made) == 2 and made[0, 2] == made[1, 2] == 1.0:
+        made[:, :2] = start, end
+        return Spline(made, curve.knots, curve.degree)
+    for axis, kept in ((0, U_LEVEL), (1, V_LEVEL)):
+        if level == kept:
+            made[:, axis] = start[axis] * made[:, 2]
+    for points, to in ((made, start), (made[::-1], end)):
+        _move_end(points, np.array(to))
+    return Spline(made, curve.knots, curve.degree)
 
-    def shifted(self, by: Pair) -> Edge:
-        """The curve moved by a vector of (u, v)."""
-        if isinstance(self.curve, Segment):
-            (u, v), (x, y), low, high = self.curve
-            return self._replace(curve=Segment((u + by[0], v + by[1]), (x + by[0], y + by[1]), low, high))
-        made = self.curve.points.copy()
-        made[:, :2] += np.array(by) * made[:, 2:]
-        return self._replace(curve=Spline(made, self.curve.knots, self.curve.degree))
 
-    def nurbs(self, scales: Array) -> NurbsCurve:
-        """As the loops of a face take it, its u and v multiplied."""
-        return curves_of([self], scales)[0]
+def shifted(curve: Spline, by: Array) -> Spline:
+    """A curve moved by a vector of (u, v)."""
+    made = curve.points.copy()
+    made[:, :2] += by * made[:, 2:]
+    return Spline(made, curve.knots, curve.degree)
 
 
 def _move_end(points: Array, to: Array) -> None:
@@ -133,20 +113,25 @@ def _move_end(points: Array, to: Array) -> None:
     points[0, :2] = to * points[0, 2]
 
 
-def curves_of(edges: Sequence[Edge], scales: Array) -> list[NurbsCurve]:
-    """Edges as the loops of a face take them, their u and v multiplied."""
-    straight = [edge for edge in edges if isinstance(edge.curve, Segment)]
-    ends = np.array([edge.corners for edge in straight]).reshape(-1, 2, 2) * scales
-    intervals = [(edge.curve.low, edge.curve.high) for edge in straight if isinstance(edge.curve, Segment)]
-    lines = iter(NurbsCurve._lines(ends, intervals, [edge.name for edge in straight]))
-    made = []
-    for edge in edges:
-        if isinstance(edge.curve, Segment):
-            made.append(next(lines))
+def curves_of(drawn: Drawn, ends: Array, scales: Array) -> list[NurbsCurve]:
+    """Edges as the loops of a face take them, lines between their ends (n, 2, 2); their u and v are multiplied."""
+    rows, curves, names = drawn.rows, drawn.curves, drawn.names
+    intervals = rows[:, LOW : HIGH + 1].tolist()
+    if not any(curves):
+        return NurbsCurve._lines(ends * scales, [(low, high) for low, high in intervals], names)
+    straight = [k for k, curve in enumerate(curves) if curve is None]
+    made = NurbsCurve._lines(
+        ends[straight] * scales, [(intervals[k][0], intervals[k][1]) for k in straight], [names[k] for k in straight]
+    )
+    lines = iter(made)
+    found = []
+    for curve, name in zip(curves, names, strict=True):
+        if curve is None:
+            found.append(next(lines))
         else:
-            points, weights = edge.curve.cartesian
-            made.append(NurbsCurve(points * scales, edge.curve.knots, edge.curve.degree, weights, name=edge.name))
-    return made
+            points, weights = curve.cartesian
+            found.append(NurbsCurve(points * scales, curve.knots, curve.degree, weights, name=name))
+    return found
 
 
 def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: float) -> tuple[Spline, float]:
@@ -169,14 +154,14 @@ def _followed(source: Spline, maps: tuple[Direction, Direction], tolerance: floa
 
 
 class _Draft(NamedTuple):
-    """An edge that is not finished: if it is level or a line, its ends are still in OCCT's (u, v)."""
+    """The curve of an edge, not turned; if it is level or a line, its ends are still in OCCT's (u, v)."""
 
     curve: Spline | Segment
-    level: tuple[bool, bool]
+    level: int
     deviation: float
 
 
-def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> list[Edge]:
+def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> Drawn:
     """The curves of the edges of a wire mapped to our parameters.
 
     Parameters
@@ -193,49 +178,70 @@ def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> list[Edge]:
     Unreadable
         An edge has no curve on the face, or one that cannot be carried over.
     """
-    o = occt()
-    size = patch.surface.size
-    rows = []
-    drafts = []
+    turned = occt().TopAbs_REVERSED
+    size, deviation, seams = patch.surface.size, 0.0, False
+    rows: list[tuple[float, ...]] = []
+    curves: list[Spline | None] = []
+    names = []
     for traced in wire.edges:
         known = edges.known(traced.edge)
-        made = _projected(traced, wire, patch, edges) if known.loose else None
-        if made is None:
-            made = _draft(traced, patch)
-            # OCCT follows edges around axes by samples, and its tolerance says nothing of what is between them.
-            if not (known.loose or patch.is_straight or made.level[0] or made.level[1]) and strays(
-                edges.space(traced.edge), edges.side(traced, wire.face, patch), known.tolerance
-            ):
-                better = _projected(traced, wire, patch, edges)
-                if better is not None:
-                    made, known = better, known._replace(loose=True)
-        rows.append(known)
-        drafts.append(made)
-    # Ends of all curves that are level are mapped at once.
-    level = [draft for draft in drafts if draft.level[0] or draft.level[1]]
-    places = np.array([(draft.curve.start, draft.curve.end) for draft in level if isinstance(draft.curve, Segment)])
-    mapped = places.reshape(-1, 2)
-    if level and not patch.is_straight:
-        mapped = np.column_stack([patch.u(mapped[:, 0]), patch.v(mapped[:, 1])])
-    points = iter(mapped.tolist())
-    found = []
-    for traced, known, (curve, sides, deviation) in zip(wire.edges, rows, drafts, strict=True):
-        if sides[0] or sides[1]:
-            (u, v), (x, y) = next(points), next(points)
-            curve = Segment((u, v), (x, y))
-        if traced.edge.Orientation() == o.TopAbs_REVERSED:
-            curve = _reversed(curve)
-        tolerance = edges.forgiven(known.tolerance, size)
-        found.append(Edge(curve, sides, tolerance, known.name, deviation, traced.seam, known.loose))
-    return found
+        kept: Spline | None = None
+        if traced.line is None or known.loose:
+            draft, known = _best(traced, known, wire, patch, edges)
+            deviation = max(deviation, draft.deviation)
+            ends, kept = _row(draft, traced.edge.Orientation() == turned)
+        else:
+            start, end = traced.line
+            ends = (*start, *end, traced.low, traced.high)
+            ends = (*ends, 0.0, UNKNOWN, 1.0, traced.edge.Orientation() == turned)
+        rows.append((*ends[:6], edges.forgiven(known.tolerance, size), *ends[7:], known.loose, traced.seam))
+        curves.append(kept)
+        names.append(known.name)
+        seams = seams or traced.seam
+    table = np.array(rows, dtype=np.float64).reshape(-1, EDGE_SIZE)
+    if level_lines(table, patch.scales, patch.sides, patch.is_straight):
+        for k in np.flatnonzero(table[:, _LEVEL] == FOLLOWED).tolist():
+            traced = wire.edges[k]
+            draft, known = _best(traced, edges.known(traced.edge), wire, patch, edges)
+            deviation = max(deviation, draft.deviation)
+            ends, curves[k] = _row(draft, traced.edge.Orientation() == turned)
+            table[k] = (*ends[:6], table[k, TOLERANCE], *ends[7:], known.loose, traced.seam)
+    if not patch.is_straight:
+        # Ends of all lines are mapped at once.
+        lines = table[:, _LINE] != 0.0
+        places = table[lines, ENDS].reshape(-1, 2)
+        table[lines, ENDS] = np.column_stack([patch.u(places[:, 0]), patch.v(places[:, 1])]).reshape(-1, 4)
+    return Drawn(table, curves, names, seams, deviation)
 
 
-def _reversed(curve: Spline | Segment) -> Spline | Segment:
-    """A curve run the other way round, over the same interval."""
+def _row(draft: _Draft, is_turned: bool) -> tuple[tuple[float, ...], Spline | None]:
+    """The first ten fields of an `EDGE`, its tolerance left out, of a curve that is turned where it has to be."""
+    curve, level, _ = draft
     if isinstance(curve, Segment):
-        both = curve.low + curve.high
-        return Segment(curve.end, curve.start, both - curve.high, both - curve.low)
-    return Spline(curve.points[::-1], curve.knots[0] + curve.knots[-1] - curve.knots[::-1], curve.degree)
+        if is_turned:
+            both = curve.low + curve.high
+            curve = Segment(curve.end, curve.start, both - curve.high, both - curve.low)
+        return (*curve.start, *curve.end, curve.low, curve.high, 0.0, level, 1.0, 0.0), None
+    if is_turned:
+        curve = Spline(curve.points[::-1], curve.knots[0] + curve.knots[-1] - curve.knots[::-1], curve.degree)
+    (u, v, w), (x, y, z) = curve.points[0].tolist(), curve.points[-1].tolist()
+    return (u / w, v / w, x / z, y / z, 0.0, 1.0, 0.0, level, 0.0, 0.0), curve
+
+
+def _best(traced: Traced, known: Known, wire: Wire, patch: Patch, edges: Edges) -> tuple[_Draft, Known]:
+    """The curve of an edge, projected where the one that is given is off."""
+    made = _projected(traced, wire, patch, edges) if known.loose else None
+    if made is not None:
+        return made, known
+    made = _draft(traced, patch)
+    # OCCT follows edges around axes by samples, and its tolerance says nothing of what is between them.
+    if not (known.loose or patch.is_straight or made.level != FREE) and strays(
+        edges.space(traced.edge), edges.side(traced, wire.face, patch), known.tolerance
+    ):
+        better = _projected(traced, wire, patch, edges)
+        if better is not None:
+            return better, known._replace(loose=True)
+    return made, known
 
 
 def _projected(traced: Traced, wire: Wire, patch: Patch, edges: Edges) -> _Draft | None:
@@ -247,7 +253,7 @@ def _projected(traced: Traced, wire: Wire, patch: Patch, edges: Edges) -> _Draft
         return None
     own = edges.side(traced, wire.face, patch)
     made = projected(space, own, edges.beyond(traced, wire.face), traced.low, traced.high)
-    return None if made is None else _Draft(made[0], (False, False), made[1])
+    return None if made is None else _Draft(made[0], FREE, made[1])
 
 
 def _draft(traced: Traced, patch: Patch) -> _Draft:
@@ -260,38 +266,38 @@ def _draft(traced: Traced, patch: Patch) -> _Draft:
         if level := _level(us, vs, patch):
             return _leveled(us, vs, level, 0.0)
         if patch.is_straight:
-            return _Draft(Segment(start, end, traced.low, traced.high), (False, False), 0.0)
+            return _Draft(Segment(start, end, traced.low, traced.high), FREE, 0.0)
     source, _, deviation = profile(traced.curve, traced.low, traced.high, cut=True)
     points, weights = source.cartesian
     us, vs = points[:, 0].tolist(), points[:, 1].tolist()
     if level := _level(us, vs, patch):
         return _leveled(us, vs, level, deviation)
     if patch.is_straight:
-        return _Draft(spline(points, source.knots, source.degree, weights), (False, False), deviation)
-    made, error = _followed(source, (patch.u, patch.v), FOLLOWED * float(patch.sides.min()))
-    return _Draft(made, (False, False), deviation + error)
+        return _Draft(spline(points, source.knots, source.degree, weights), FREE, deviation)
+    made, error = _followed(source, (patch.u, patch.v), FOLLOW * float(patch.sides.min()))
+    return _Draft(made, FREE, deviation + error)
 
 
-def _leveled(us: list[float], vs: list[float], level: tuple[bool, bool], deviation: float) -> _Draft:
+def _leveled(us: list[float], vs: list[float], level: int, deviation: float) -> _Draft:
     """The line between the ends of a curve, its constant coordinate in the middle of the curve's."""
-    if level[0]:
+    if level == U_LEVEL:
         u = 0.5 * (min(us) + max(us))
         return _Draft(Segment((u, vs[0]), (u, vs[-1])), level, deviation)
     v = 0.5 * (min(vs) + max(vs))
     return _Draft(Segment((us[0], v), (us[-1], v)), level, deviation)
 
 
-def _level(us: list[float], vs: list[float], patch: Patch) -> tuple[bool, bool] | None:
+def _level(us: list[float], vs: list[float], patch: Patch) -> int:
     """Which of our parameters is constant along a curve in OCCT's, of which these are the control points.
 
-    None for none; the other one has to go one way.
+    0 for none; the other one has to go one way.
     """
-    (scale_u, scale_v), (side_u, side_v) = patch.scales, patch.lengths
+    (scale_u, scale_v), (side_u, side_v) = patch.scales.tolist(), patch.lengths
     extent_u, extent_v = (max(us) - min(us)) * scale_u / side_u, (max(vs) - min(vs)) * scale_v / side_v
     along_v = extent_v > extent_u
     if not (extent_u if along_v else extent_v) <= LEVEL:
-        return None
+        return 0
     row = vs if along_v else us
     if len(row) > 2 and not (all(a <= b for a, b in pairwise(row)) or all(a >= b for a, b in pairwise(row))):
-        return None
-    return along_v, not along_v
+        return 0
+    return U_LEVEL if along_v else V_LEVEL

@@ -13,9 +13,10 @@ from assembly.geometry.seams.region_pieces import EDGE, POLE, SEAM, Uncut
 from assembly.geometry.seams.region_strips import strip
 from assembly.geometry.splines.bezier import full_knots
 from assembly.step.chains import chained
+from assembly.step.edge_ends import FREE, U_LEVEL, V_LEVEL
 from assembly.step.profiles import Straight, Turning, Unreadable, approximated, arc, spline
 from assembly.step.surfaces import Patch
-from assembly.step.trims import Edge
+from assembly.step.trims import Drawn, curves_of, moved
 
 
 def circle(center, radius, clockwise=False):
@@ -208,24 +209,24 @@ def test_both_sides_of_a_seam_end_at_the_same_places():
     where = Patch(TUBE, turn, Straight(True))
 
     def edge(name, a, b, level):
-        made = spline(np.array([a, b]), np.array([0.0, 0.0, 1.0, 1.0]), 1)
-        return Edge(made, level, 1e-7, name, 0.0, seam=name == "edge 1")
+        return (*a, *b, 0.0, 1.0, 1e-7, level, 1.0, 0.0, 0.0, float(name == "edge 1"))
 
-    rows = [
-        edge("edge 1", (U, 1.0), (U, 3.0), (True, False)),
-        edge("edge 2", (U, 3.0), (0.0, 3.0), (False, True)),
-        edge("edge 1", (0.0, 3.0), (0.0, 1.0), (True, False)),
-        edge("edge 3", (0.0, 1.0), (U - 1e-8, 1.0 + 2e-8), (False, False)),
-    ]
-    made, gap = chained(rows, where)
+    rows = {
+        "edge 1": edge("edge 1", (U, 1.0), (U, 3.0), U_LEVEL),
+        "edge 2": edge("edge 2", (U, 3.0), (0.0, 3.0), V_LEVEL),
+        "edge 1 back": edge("edge 1", (0.0, 3.0), (0.0, 1.0), U_LEVEL),
+        "edge 3": edge("edge 3", (0.0, 1.0), (U - 1e-8, 1.0 + 2e-8), FREE),
+    }
+    names = ["edge 1", "edge 2", "edge 1", "edge 3"]
+    drawn = Drawn(np.array(list(rows.values())), [None] * 4, names, seams=True, deviation=0.0)
+    drawn, made, gap = chained(drawn, where)
     # A unit of the parameter is within a tenth of a unit of length.
     assert gap == pytest.approx(np.sqrt(5.0) * 1e-8, rel=0.1)
-    np.testing.assert_array_equal(made[0].ends + [-U, 0.0], made[2].ends[::-1])
-    for before, after in zip(made[-1:] + made[:-1], made, strict=True):
-        np.testing.assert_array_equal(before.ends[1], after.ends[0])
+    np.testing.assert_array_equal(made[0] + [-U, 0.0], made[2][::-1])
+    np.testing.assert_array_equal(np.roll(made[:, 1], 1, axis=0), made[:, 0])
     # Half of the gap each, and half of that again for the other side of the seam.
-    assert made[0].ends[0, 1] == pytest.approx(1.0 + 0.5e-8, abs=1e-15)
-    face = asm.Face(TUBE, [row.nurbs(np.ones(2)) for row in made])
+    assert made[0, 0, 1] == pytest.approx(1.0 + 0.5e-8, abs=1e-15)
+    face = asm.Face(TUBE, curves_of(drawn, made, np.ones(2)))
     assert len(face.boundary) == 2
 
 
@@ -238,12 +239,12 @@ def test_an_end_that_is_moved_by_more_than_the_first_leg_does_not_turn_back(move
     knots = np.array([0.0, 0.0, 0.0, 0.0, 1e-8, 1e-8, 1e-8, 1.0, 1.0, 1.0, 1.0])
     if end:
         points, knots = points[::-1].copy(), 1.0 - knots[::-1]
-    given = Edge(spline(points[:, :2], knots, 3), (False, False), 1e-3, "edge", 0.0)
-    ends = list(given.corners)
+    given = spline(points[:, :2], knots, 3)
+    ends = [tuple(row) for row in given.cartesian[0][[0, -1]].tolist()]
     ends[end] = (move, move)
-    made = given.moved(*ends)
-    assert made.corners == tuple(ends)
-    ways = np.diff(made.curve.cartesian[0], axis=0) * (-1.0 if end else 1.0)
+    made = moved(given, FREE, *ends)
+    assert [tuple(row) for row in made.cartesian[0][[0, -1]].tolist()] == ends
+    ways = np.diff(made.cartesian[0], axis=0) * (-1.0 if end else 1.0)
     # No leg goes back: of those along which the move is spread each has nine tenths left.
     assert (ways[:, 0] > 0.0).all()
-    assert np.abs(made.curve.cartesian[0] - given.curve.cartesian[0]).max() <= move * (1.0 + 1e-12)
+    assert np.abs(made.cartesian[0] - given.cartesian[0]).max() <= move * (1.0 + 1e-12)

@@ -85,7 +85,7 @@ def test_edges_of_one_surface_alone_end_at_its_nearest_points():
             assert deviation < 1e-9
             points, _ = curve.cartesian
             assert points.shape[1] == 2
-            made = trims.Edge(curve, (False, False), 0.0, "edge", 0.0).nurbs(np.ones(2))
+            made = asm.NurbsCurve(points, curve.knots, curve.degree, curve.cartesian[1])
             space = O.BRep_Tool.Curve_s(edge, 0.0, 0.0)
             for t in np.linspace(low, high, 41)[1:-1].tolist():
                 u, v = made.evaluate(t)

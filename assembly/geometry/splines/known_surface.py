@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import dist, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,8 @@ def known_surface(
     if weights is None:
         weights = np.ones(points.shape[:2])
     # A sum may overflow: that is seen where all is checked.
-    finite = isfinite(sum(points.ravel().tolist()) + sum(row_u) + sum(row_v))
+    row = points.ravel().tolist()
+    finite = isfinite(sum(row) + sum(row_u) + sum(row_v))
     if not (finite and _is_clamped(row_u, degree[0]) and _is_clamped(row_v, degree[1])):
         return NurbsSurface(points, knots, degree, weights)
     made = object.__new__(NurbsSurface)
@@ -43,7 +44,24 @@ def known_surface(
         array.flags.writeable = False
     made.control_points, made.knots, made.degree, made.weights = points, knots, degree, weights
     made.name, made.domain = None, ((row_u[0], row_u[-1]), (row_v[0], row_v[-1]))
+    if len(row) == 12:
+        _know_corners(made, row[0:3], row[6:9], row[3:6], row[9:12])
     return made
+
+
+def _know_corners(made: NurbsSurface, a: list[float], b: list[float], c: list[float], d: list[float]) -> None:
+    """Keep the size of a surface of four corners, and which are apart, where that is clear from plain floats.
+
+    They are those at low u and v, high u and low v, low u and high v, high u and v.
+    """
+    size = dist([min(row) for row in zip(a, b, c, d, strict=True)], [max(row) for row in zip(a, b, c, d, strict=True)])
+    least = 2e-11 * size
+    if min(_gap(a, b), _gap(c, d), _gap(a, c), _gap(b, d)) > least:
+        made.__dict__.update(size=size, _apart=(True, True))
+
+
+def _gap(p: list[float], q: list[float]) -> float:
+    return max(abs(p[0] - q[0]), abs(p[1] - q[1]), abs(p[2] - q[2]))
 
 
 def _is_clamped(row: list[float], degree: int) -> bool:

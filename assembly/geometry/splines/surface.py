@@ -125,6 +125,8 @@ class NurbsSurface(FoundAgain, ReadOnlyArrays):
     def closed(self) -> tuple[bool, bool]:
         """Whether u and v come back to the edge they start from."""
         apart_u, apart_v = self._apart
+        if apart_v and not apart_u and self._is_same_row:
+            return True, False
         u = not apart_u and self._same_edge(self._pieces[0, :, 0], self._pieces[-1, :, -1])
         v = not apart_v and self._same_edge(self._pieces[:, 0, :, 0], self._pieces[:, -1, :, -1])
         return u, v
@@ -145,6 +147,12 @@ class NurbsSurface(FoundAgain, ReadOnlyArrays):
             return max(abs(p[0] - q[0]), abs(p[1] - q[1]), abs(p[2] - q[2])) > least
 
         return apart(a, b) and apart(c, d), apart(a, c) and apart(b, d)
+
+    @property
+    def _is_same_row(self) -> bool:
+        """Whether the edges at both ends of u have the same control points and weights."""
+        net, weights = self.control_points, self.weights
+        return net[0].tolist() == net[-1].tolist() and weights[0].tolist() == weights[-1].tolist()
 
     @cached_property
     def _periods(self) -> tuple[float, float]:
@@ -171,6 +179,14 @@ class NurbsSurface(FoundAgain, ReadOnlyArrays):
         """Bits 1, 2, 4, 8: whether the edge at the low and high end of u, then of v, is one point."""
         if all(self._apart):
             return 0
+        if self._is_clamped:
+            # Control points of an edge that is one point are that point; others are clearly apart, or looked at below.
+            ends, least = self.control_points[[0, -1]], 1e3 * COINCIDENT * self.size
+            sides = (ends.max(axis=1) - ends.min(axis=1)).max(axis=1).tolist()
+            ends = self.control_points[:, [0, -1]]
+            sides += (ends.max(axis=0) - ends.min(axis=0)).max(axis=1).tolist()
+            if all(side == 0.0 or side > least for side in sides):
+                return sum(bit for bit, side in zip((1, 2, 4, 8), sides, strict=True) if side == 0.0)
         pieces = self._pieces
         edges = (pieces[0, :, 0], pieces[-1, :, -1], pieces[:, 0, :, 0], pieces[:, -1, :, -1])
         points = (edge[..., :3] / edge[..., 3:] for edge in edges)
