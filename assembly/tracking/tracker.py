@@ -97,8 +97,8 @@ class Tracker(Ticks):
     budget : float, optional
         Seconds after which a tick begins nothing further: no step or update of the compiled loop, and no part of the
         proof under a `Clearance`. It is LATE then, at the last pose that is proven, and the next tick continues with
-        what is not done. Under a clearance the loop has the first half of it. Without a budget a tick takes as long as
-        it needs.
+        what is not done. Under a clearance the loop has the first four fifths of it. Without a budget a tick takes as
+        long as it needs.
     iterations : int
         Number of steps after which a tick ends if the constraints hold; otherwise up to four times as many.
     tolerance : float

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.tracking.clear_ticks import ClearTicks, WayLimits
+from assembly.tracking.clear_ticks import ClearTicks
+from assembly.tracking.proven_pose import WayLimits
 from assembly.tracking.tick import TrackStatus
+from benchmarks.running import example
 from tests.validation import exact_solids as exact
 from tests.validation.clearance_scenes import PROMISE_NOTHING, TOUCHING, tracked
 from tests.validation.crossing_judge import Motion, crossing_depth
@@ -53,7 +55,7 @@ def test_what_is_held_has_gone_back(monkeypatch):
     before = tracker.step((0.0, 0.0, 1.3))
     assert before.status is TrackStatus.FOLLOWED
     usual = ClearTicks.hold_at
-    monkeypatch.setattr(ClearTicks, "hold_at", lambda self, there, until: False)
+    monkeypatch.setattr(ClearTicks, "hold_at", lambda self, there, until, code: False)
     held = tracker.step((0.0, 0.0, 1.1))
     assert held.status is TrackStatus.HELD and held.q.tobytes() == before.q.tobytes()
     monkeypatch.setattr(ClearTicks, "hold_at", usual)
@@ -127,6 +129,50 @@ def test_a_way_that_touches_may_be_asked_to_go_in_by_less():
         assert ticks.holds(there(0.05)) is holds
         assert list(ticks.doubtful) == ([] if holds else [0])
         assert ticks.way_depth <= depth
+
+
+def test_what_is_refused_has_the_depth_of_the_way_before():
+    """Where a tick is refused, the last pose stands, and what is told of the way is that of the way to it."""
+    pin, ball = exact.pin(0.5, 2.0), exact.ball(0.2)
+    scene, _ = tracker_of(pin, ball, (0.7, 0.0, 0.0))
+
+    def there(angle):
+        q = np.array([[0, 0, 0, 1, 0, 0, 0], [0.7 * np.cos(angle), 0.7 * np.sin(angle), 0, 1, 0, 0, 0]], dtype=float)
+        return solution_at(scene, q)
+
+    ticks = ClearTicks(there(0.0), 1e-9)
+    assert ticks.holds(there(0.05))
+    depth = ticks.way_depth
+    # The chord is in the pin by its height, and by no more than the square of its length over the least radius, or over
+    # a lower bound of that.
+    assert 0.7 * (1.0 - np.cos(0.025)) <= depth <= (0.7 * 0.05) ** 2 / 0.2 * 1.2
+    # The other way around is through the pin, by as much as the ball is thick.
+    assert not ticks.holds(there(3.0)) and ticks.in_the_way == [0]
+    assert ticks.way_depth == depth and ticks.proved
+    assert ticks.holds(there(0.051)) and ticks.way_depth < 0.01 * depth and not ticks.doubtful
+
+
+def test_a_step_that_is_held_tells_of_the_way_before(monkeypatch):
+    """As above, of a tracker: wires that touch go in on their way, by less where it is shorter."""
+    chain = example("follow_the_hand")
+    scene = chain.paper_clips()
+    tracker = scene.tracker(scene.body("blue").point(*chain.END))
+    targets = chain.hand(asm.Pose(tracker.q[2, :3], tracker.q[2, 3:]).apply(chain.END)).targets
+    for target in targets[1000:1010]:
+        before = tracker.step(target)
+    usual = ClearTicks.hold_at
+
+    def refused(ticks, *given):
+        standing, depth = ticks.last.at, ticks.way_depth
+        assert usual(ticks, *given) and ticks.way_depth != depth
+        ticks.last.proof.go_back(ticks.last.proof.poses_before())
+        ticks.last.at, ticks.last.way_depth = standing, depth
+        return False
+
+    monkeypatch.setattr(ClearTicks, "hold_at", refused)
+    held = tracker.step(targets[1030])
+    assert held.status is TrackStatus.HELD and held.proved
+    assert held.way_depth == before.way_depth > 0.0
 
 
 def test_faces_on_each_other_may_be_asked_to_be_looked_at_often():

@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.tracking import clear_ticks
+from assembly.tracking import standing
 from assembly.tracking.tick import TrackStatus
 from tests.validation.clearance_scenes import PROMISE_NOTHING
 
@@ -69,8 +69,8 @@ def test_a_plate_goes_with_the_hand(low, most):
 def test_flush_faces_are_not_opened_at_every_tick(monkeypatch):
     """Contacts whose normals stay go in on no way: bodies are proven as they are opened at the first tick."""
     asked = []
-    usual = clear_ticks.opening_move
-    monkeypatch.setattr(clear_ticks, "opening_move", lambda *args: asked.append(1) or usual(*args))
+    usual = standing.opening_move
+    monkeypatch.setattr(standing, "opening_move", lambda *args: asked.append(1) or usual(*args))
     scene, upper, _ = plates()
     tracker = scene.tracker(upper)
     for k in range(1, 41):

@@ -146,20 +146,37 @@ def test_events_of_ticks_that_go_on_are_told_once(chain, clips):
     assert len(set(gone)) == len(gone)
 
 
-def refused_at_random(seed):
-    """Proofs of ticks, one in twenty of which is refused though it came to an end."""
-    usual, rng = ClearTicks._proving, np.random.default_rng(seed)
+def refuse_at_random(monkeypatch, seed):
+    """Have one in twenty proofs of ticks refused though they came to an end. No contact is opened for them."""
+    rng, begun = np.random.default_rng(seed), []
 
-    def proving(ticks, there):
-        begin, last = ticks._at, ticks._proof.last_poses()
-        holds = yield from usual(ticks, there)
-        if holds and rng.random() < 0.05:
-            ticks._proof.go_back(last)
-            ticks._at = begin
-            return False
-        return holds
+    def judged(usual, ticks, *given):
+        holds = usual(ticks, *given)
+        if not holds or rng.random() > 0.05:
+            return holds
+        ticks.last.proof.go_back(ticks.last.proof.poses_before())
+        ticks.last.at = begun[-1]
+        return False
 
-    return proving
+    def first(usual, ticks, *given):
+        begun[:] = [ticks.last.at]
+        return judged(usual, ticks, *given)
+
+    hold_at, go_on = ClearTicks.hold_at, ClearTicks.go_on
+    within = []
+
+    def holds_at(ticks, *given):
+        within.append(1)
+        try:
+            return first(hold_at, ticks, *given)
+        finally:
+            within.pop()
+
+    def goes_on(ticks, *given):
+        return go_on(ticks, *given) if within else judged(go_on, ticks, *given)
+
+    monkeypatch.setattr(ClearTicks, "hold_at", holds_at)
+    monkeypatch.setattr(ClearTicks, "go_on", goes_on)
 
 
 def test_a_tick_that_fails_goes_back_to_what_held(chain, clips, monkeypatch):
@@ -168,7 +185,7 @@ def test_a_tick_that_fails_goes_back_to_what_held(chain, clips, monkeypatch):
     And nothing is returned beside whose contacts others may have been born that nobody looked for.
     """
     iterations, statuses, most = 3, Counter(), 0
-    monkeypatch.setattr(ClearTicks, "_proving", refused_at_random(7))
+    refuse_at_random(monkeypatch, 7)
     for seed in range(3):
         tracker, begin = dragged(chain, clips, budget=NO_TIME, iterations=iterations)
         rng, hand = np.random.default_rng(seed), begin

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from time import process_time
 
 import numpy as np
@@ -363,6 +364,48 @@ def test_a_tracker_says_that_something_was_set_anew():
     tracker = scene.tracker(arm.point(2, 0, 0))
     hinge()[0].frame_a.place(at=(0.0, 0.0, 1.0))
     hinge()[0].angle = 0.2
+    assert tracker.step((1.9, 0.3, 0.0)).status is not TrackStatus.CHANGED
+
+
+def test_a_tracker_says_that_its_scene_is_made_of_other_things():
+    """Whatever is added or removed is not followed; once it is there again, or gone, it is."""
+    scene, point = arm()
+    shoulder, elbow = scene.constraints
+    term, more = asm.Posture(), asm.Revolute(elbow.frame_a, elbow.frame_b, name="more")
+    scene.minimize(term)
+    tracker = scene.tracker([point])
+    edits = [
+        (lambda: scene.remove(elbow), lambda: scene.constrain(elbow)),
+        (lambda: scene.constrain(more), lambda: scene.remove(more)),
+        (lambda: scene.remove(term), lambda: scene.minimize(term)),
+        (lambda: scene.maximize(term), lambda: (scene.remove(term), scene.minimize(term))),
+    ]
+    for k, (edit, back) in enumerate(edits):
+        assert tracker.step([(1.9, 0.3, 0.0)]).status is not TrackStatus.CHANGED
+        before = tracker.q
+        edit()
+        for _ in range(2):
+            step = tracker.step([(0.0, 1.9, 0.0)])
+            assert step.status is TrackStatus.CHANGED and "added or removed" in step.status.value, k
+            assert np.array_equal(step.q, before) and np.array_equal(tracker.q, before)
+        with pytest.raises(InputError, match="other bodies, constraints or terms"):
+            tracker.restart(before)
+        back()
+    # A constraint of the same numbers is another one.
+    scene.remove(elbow)
+    scene.constrain(asm.Revolute(elbow.frame_a, elbow.frame_b, name="elbow"))
+    assert tracker.step([(1.9, 0.3, 0.0)]).status is TrackStatus.CHANGED
+    scene.remove("elbow")
+    scene.constrain(elbow)
+    assert tracker.step([(1.9, 0.3, 0.0)]).status is not TrackStatus.CHANGED
+    scene.add(asm.Body("one more"))
+    assert tracker.step([(1.9, 0.3, 0.0)]).status is TrackStatus.CHANGED
+    # Copies go their own way; what another scene is made of is no concern.
+    other, grip = arm()
+    tracker = other.tracker(grip)
+    copied = copy(other)
+    copied.remove("shoulder")
+    scene.remove(shoulder)
     assert tracker.step((1.9, 0.3, 0.0)).status is not TrackStatus.CHANGED
 
 

@@ -43,17 +43,7 @@ STACK = 4096
 
 
 class ClearanceProof(KeptLooks):
-    """The proofs of pairs of bodies, kept from look to look.
-
-    Parameters
-    ----------
-    shapes : sequence of tuple of Face
-        Of every body its faces; bodies without any are of no pair.
-    pairs : sequence of (int, int)
-        Numbers of bodies.
-    minimum : sequence of float
-        Of every pair, what its gap is to be at least.
-    """
+    """The proofs of pairs of bodies, kept from look to look; made as `BodyPairs` are."""
 
     def __init__(
         self,

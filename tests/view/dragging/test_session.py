@@ -251,6 +251,24 @@ def test_two_people_drag_two_bodies_at_once(pair):
     assert session._tracker is tracker, "one tracker for all"
 
 
+def test_a_scene_that_is_edited_gets_another_tracker(pair):
+    """While nothing is held, and while something is: that is let go, and the page says why."""
+    session = Session(pair)
+    session.grab("red", np.array([-1.0, 0.0, 1.0]), 1)
+    tracker, goal = session._tracker, asm.PointDistance(pair.body("blue").point(0.0, 0.0, 0.0), (2.0, 0.0, 1.0))
+    pair.minimize(goal)
+    session._tick()
+    assert session._tracker is None and not session.shown.hands and "added or removed" in session.shown.notice
+    session.grab("red", np.array([-1.0, 0.0, 1.0]), 1)
+    tracker = session._tracker
+    session.release(1)
+    pair.remove(goal)
+    session.grab("red", np.array([-1.0, 0.0, 1.0]), 1)
+    assert session._tracker is not tracker
+    session._tick()
+    assert session.shown.hands
+
+
 def test_a_slider_is_a_hand(crank):
     session = Session(crank)
     for wanted in (0.8, 1.4):
