@@ -9,7 +9,8 @@ listed until none of them pushes at the end of a tick.
 It is the same with a shaft in a bore, whether joints connect them or not. A thousand pairs of patches of such walls
 face each other, so that an update takes milliseconds and is due at every step, though the contacts stay: they are on
 the rims at both ends of what the walls have in common, which keep apart all that is between. So between two refusals
-of the proof nothing is updated, contacts go along their rims, and those of wall on wall have no rows.
+of the proof nothing is updated, contacts go along their rims, and those of wall on wall have no rows. Before the shaft
+is in the bore, the pair has rows like others, but only while a contact is near.
 
 Other bodies that no chain of joints connects, and pairs with a contact between the two, have rows at all times.
 """
@@ -207,24 +208,27 @@ class ProvenPairs:
     def settle(self, state: Array) -> None:
         """Leave out pairs, from the next tick on, of which no contact pushes at the end of a tick.
 
-        Of a shaft that no joint holds in its bore, whose contacts are few, none may be so near, either, that it could
-        touch within some ticks (SOON) if it went on as in this one. What has left its bore has rows like others.
+        Of bodies of which one fits a bore of the other one, and no joint connects them, none may be so near, either,
+        that it could touch within some ticks (SOON) if it went on as in this one. So a pin that is let down into its
+        hole is proven to go in, and no row of the hole's rim, which it passes, turns it aside. What is near, and not in
+        its bore, has rows like others.
         """
         if not self.fitting and self._joined <= self.unlisted:
             return
         q = state[: self.packed.contacts_at].reshape(-1, 7)
-        loose = {k for k in self.fitting - self._joined if any(fit.holds(q) for fit in self._fits[k])}
+        free = self.fitting - self._joined
+        held = {k for k in free if any(fit.holds(q) for fit in self._fits[k])}
         parts = self._parts(state)
-        gone = (self.unlisted | self._kept) - self._joined - loose
+        gone = self._kept - self._joined - held
         self.list_again(state, gone)
         pairs, numbers, gaps = parts.slots[:, PLACE_PAIR], parts.slots[:, PLACE_NUMBER], parts.tracked[:, PAIR_GAP]
         busy = set(pairs[parts.multipliers != 0.0].tolist())
-        if loose - self.unlisted:
+        if free - self.unlisted:
             before = self._last if len(self._last[0]) == len(numbers) else (np.full(len(numbers), -1.0), gaps)
             went = np.where(before[0] == numbers, np.abs(gaps - before[1]), np.inf)
             near = set(pairs[gaps <= np.maximum(SOON * went, CLOSED)].tolist())
             self._last = numbers.copy(), gaps.copy()
         else:
             near = set[float]()
-        self.unlisted |= ((self._joined - busy) | (loose - busy - near)) - gone
-        self._kept = frozenset(loose) - self.unlisted
+        self.unlisted |= ((self._joined - busy) | (free - busy - near)) - gone
+        self._kept = frozenset(held) - self.unlisted

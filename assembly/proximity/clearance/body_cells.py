@@ -295,7 +295,8 @@ class _Builder:
         links.face, links.child = NONE, self.child
         self.links[self.first], self.nodes[self.first] = self.cell_links, self.cell_nodes
         if len(rows):
-            boxes = boxes_around(self.cells.corner, self.cells.rho + self.cells.disc, groups)
+            cells = self.cells
+            boxes = boxes_around(cells.corner, cells.rho, cells.disc, cells.ruling, groups)
             nodes.center[rows], nodes.axes[rows], nodes.half[rows], nodes.radius[rows] = boxes
             if self.bores is not None:
                 parts = groups._replace(members=self.part[groups.members])

@@ -43,28 +43,31 @@ class Boxes(NamedTuple):
     radius: Array
 
 
-def boxes_around(corners: Array, thick: Array, groups: Groups) -> Boxes:
+def boxes_around(corners: Array, rho: Array, disc: Array, rulings: Array, groups: Groups) -> Boxes:
     """Boxes around groups of cells: along principal axes of their corners, or along those of the body.
 
     Parameters
     ----------
     corners : (m, 4, 3)
         Of all cells.
-    thick : (m,)
-        How far a cell may be from the hull of its corners.
+    rho, disc : (m,)
+        How far a cell may be from the hull of its corners: in any direction, and beside that across its ruling.
+    rulings : (m, 3)
+        Unit vectors; of cells without a disc they may be zero.
     groups : Groups
         Numbers of cells.
     """
     owner, starts = groups.owner, groups.starts
-    points, around = corners[groups.members], thick[groups.members]
+    points, around = corners[groups.members], (rho + disc)[groups.members]
+    cells = points, rho[groups.members], disc[groups.members], rulings[groups.members]
     count = np.bincount(owner)
     middle = np.add.reduceat(points.mean(axis=1), starts) / count[:, None]
     off = points - middle[owner, None]
     scatter = np.add.reduceat(np.matmul(off.swapaxes(1, 2), off), starts)
     principal = np.linalg.eigh(scatter)[1].swapaxes(1, 2)[:, ::-1].copy()
     principal[np.linalg.det(principal) < 0.0, 2] *= -1.0
-    own = _extents(points, around, groups, principal)
-    straight = _extents(points, around, groups, np.broadcast_to(np.eye(3), principal.shape))
+    own = _extents(cells, groups, principal)
+    straight = _extents(cells, groups, np.broadcast_to(np.eye(3), principal.shape))
     volumes = [(half + 0.05 * half.max(axis=1, keepdims=True)).prod(axis=1) for _, half in (own, straight)]
     along = (volumes[1] < SMALLER * volumes[0])[:, None]
     center, half = (np.where(along, b, a) for a, b in zip(own, straight, strict=True))
@@ -74,10 +77,14 @@ def boxes_around(corners: Array, thick: Array, groups: Groups) -> Boxes:
     return Boxes(center, axes, half * ROUNDED_UP, radius * ROUNDED_UP)
 
 
-def _extents(points: Array, thick: Array, groups: Groups, axes: Array) -> tuple[Array, Array]:
-    """Centers and half widths of boxes along axes."""
-    heights = np.matmul(points, axes[groups.owner].swapaxes(1, 2))
-    low = np.minimum.reduceat(heights.min(axis=1) - thick[:, None], groups.starts)
-    high = np.maximum.reduceat(heights.max(axis=1) + thick[:, None], groups.starts)
+def _extents(cells: tuple[Array, Array, Array, Array], groups: Groups, axes: Array) -> tuple[Array, Array]:
+    """Centers and half widths of boxes along axes around cells: corners, rho, discs and their rulings."""
+    points, rho, disc, rulings = cells
+    own = axes[groups.owner]
+    heights = np.matmul(points, own.swapaxes(1, 2))
+    # The part of an axis across a ruling by a cross product: a flat face is exactly flat.
+    thick = rho[:, None] + disc[:, None] * np.linalg.norm(np.cross(own, rulings[:, None]), axis=2)
+    low = np.minimum.reduceat(heights.min(axis=1) - thick, groups.starts)
+    high = np.maximum.reduceat(heights.max(axis=1) + thick, groups.starts)
     center = np.matmul(0.5 * (low + high)[:, None], axes)[:, 0]
     return center, 0.5 * (high - low)

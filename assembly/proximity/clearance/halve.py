@@ -86,10 +86,10 @@ def write_radii(links, node):
                 beyond = max(beyond, d)
     node.reach = bent + border + node.pad
     node.rho = node.pad
-    if links.form == FLAT and bent == 0.0:
-        # What a flat face has beyond a chord lies in its plane.
-        node.disc = beyond
-    elif links.form == ROUNDED or links.form == FLAT:
+    if links.form == FLAT:
+        # All that a flat face is off its corners, and what it has beyond a chord, lies in its plane.
+        node.disc = bent + beyond
+    elif links.form == ROUNDED:
         node.rho += bent + beyond
     else:
         node.disc = bent

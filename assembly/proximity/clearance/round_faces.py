@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
+from assembly.geometry.recognition.curves import Circle, curve_form
 from assembly.geometry.recognition.forms import Cylinder, Plane, Sphere, Torus
 from assembly.geometry.splines import bezier
 from assembly.geometry.splines.surface import NurbsSurface
@@ -59,33 +61,73 @@ def _radius(radius: float, deviation: float, outward: bool) -> float:
     return (radius + deviation) * ROUNDED_UP if outward else (radius - deviation) / ROUNDED_UP
 
 
+class _Ring(NamedTuple):
+    """Circles between which a flat surface lies, the inner one only where the surface does not reach the middle."""
+
+    inner: Circle | None
+    outer: Circle
+    off: float
+
+
+def _ring(surface: NurbsSurface) -> _Ring | None:
+    """The circles that straight lines of a flat surface go between, away from their center, as of a revolution."""
+    tolerance = NEARLY * surface.size
+    for around in (0, 1):
+        net, weights = np.moveaxis(surface.control_points, around, 0), np.moveaxis(surface.weights, around, 0)
+        if not surface.closed[around] or net.shape[1] != 2 or np.ptp(weights, axis=1).any():
+            continue
+        # Pieces along one of both edges of the surface.
+        pieces = np.moveaxis(surface.bezier_pieces(), (around, 2 + around), (0, 1))[:, :, 0]
+        sizes = np.ptp(net, axis=0).max(axis=1)
+        last = int(sizes.argmax())
+        outer = curve_form([pieces[:, :, last]], tolerance)
+        if not isinstance(outer, Circle):
+            return None
+        inner = None if sizes[1 - last] <= tolerance else curve_form([pieces[:, :, 1 - last]], tolerance)
+        radius = inner.radius if isinstance(inner, Circle) else 0.0
+        # Points of both edges at one parameter are in one direction from the center, in the ratio of the radii.
+        ends = net[:, 1 - last] - outer.center, net[:, last] - outer.center
+        off = float(np.linalg.norm(ends[0] - radius / outer.radius * ends[1], axis=1).max())
+        if off <= tolerance:
+            return _Ring(inner if isinstance(inner, Circle) else None, outer, off)
+        return None
+    return None
+
+
 def _disc(face: Face) -> Round | None:
-    """A flat face whose outer boundary is a circle, as a cylinder without length."""
-    flat = flat_map(face.surface)
-    if flat is None or face.outer is None:
+    """A flat face within a circle, its outer boundary or that of its surface, as a cylinder without length."""
+    flat, ring = flat_map(face.surface), _ring(face.surface)
+    if ring is not None:
+        circle, beside = ring.outer, ring.off
+    elif flat is not None and face.outer is not None:
+        found = flat.circle(face.boundary[: len(face.chains[0])], NEARLY * face.surface.size)
+        if found is None:
+            return None
+        circle, beside = found, flat.off
+    else:
         return None
-    circle = flat.circle(face.boundary[: len(face.chains[0])], NEARLY * face.surface.size)
-    if circle is None:
-        return None
-    off = circle.deviation + flat.off
+    off = circle.deviation + beside
     return Round(circle.center, circle.axis, off, (circle.radius + off) * ROUNDED_UP, 0.0, True)
 
 
 def round_holes(face: Face) -> list[Round]:
     """The circles of a flat face's round holes, as bores without length: all of the face is beyond each of them."""
-    flat = flat_map(face.surface)
-    if flat is None:
-        return []
-    found = []
-    # The first chain goes around the face; others are clockwise, with material outside.
-    for chain in face.chains[1:]:
-        circle = flat.circle([face.boundary[k] for k in chain], HOLE * face.surface.size)
-        if circle is None:
-            continue
-        off = circle.deviation + flat.off
-        if off < circle.radius:
-            found.append(Round(circle.center, circle.axis, off, (circle.radius - off) / ROUNDED_UP, 0.0, False))
-    return found
+    flat, found = flat_map(face.surface), list[tuple[Circle, float]]()
+    if flat is not None:
+        # The first chain goes around the face; others are clockwise, with material outside.
+        for chain in face.chains[1:]:
+            circle = flat.circle([face.boundary[k] for k in chain], HOLE * face.surface.size)
+            if circle is not None:
+                found.append((circle, circle.deviation + flat.off))
+    elif isinstance(nearly_elementary(face.surface), Plane):
+        ring = _ring(face.surface)
+        if ring is not None and ring.inner is not None:
+            found.append((ring.inner, ring.inner.deviation + ring.off))
+    return [
+        Round(circle.center, circle.axis, off, (circle.radius - off) / ROUNDED_UP, 0.0, False)
+        for circle, off in found
+        if off < circle.radius
+    ]
 
 
 def round_of(face: Face) -> Round | None:

@@ -66,39 +66,81 @@ def separation(forest, a, b, pose, n):
 
 
 @kernel(inner=True)
-def farthest_of_disc(d, axis, ruling, radius):
-    """A bound of how far a disc about d, across a unit vector, is from the line along an axis through the origin.
+def farthest_of_ellipse(square, wide, narrow, p, q):
+    """How far points of an ellipse are from the origin, at most.
 
-    Or from the origin, where the axis is zero. Seen along the line the disc is an ellipse c + E y, |y| <= 1, with half
-    axes r and r cos(lean). For any m above the squares of these
+    With its middle at c, and half axes along two unit vectors across each other, it is c + E y for |y| <= 1. For any m
+    that is not less than the square of the longer half axis
 
         |c + E y|^2 <= |c|^2 + m + c.E (m - E^2)^-1 E c,
 
     with equality for one m, to which Newton's method on the derivative by m converges (as for trust regions).
+
+    Parameters
+    ----------
+    square : float
+        |c|^2.
+    wide, narrow : float
+        The square of the longer half axis, and by how much that of the shorter one is less.
+    p, q : float
+        The lengths of c along the longer and the shorter half axis, each times this half axis; not negative.
+    """
+    # x = m - wide: the slope is 1 - (p / x)^2 - (q / (x + narrow))^2, and rises.
+    x = max(p, q - narrow)
+    for _ in range(NEWTON):
+        if x <= 0.0:
+            break
+        u, v = p / x, q / (x + narrow)
+        length = u * u + v * v
+        if length <= 1.0:
+            break
+        x += length * (math.sqrt(length) - 1.0) / (u * u / x + v * v / (x + narrow))
+    more = p * p / x if p > 0.0 else 0.0
+    less = q * q / (x + narrow) if q > 0.0 else 0.0
+    return math.sqrt(square + wide + x + more + less)
+
+
+@kernel(inner=True)
+def farthest_of_disc(d, axis, ruling, radius):
+    """A bound of how far a disc about d, across a unit vector, is from the line along an axis through the origin.
+
+    Or from the origin, where the axis is zero. Seen along the line the disc is an ellipse with half axes r and r
+    cos(lean).
     """
     if dot(axis, axis) == 0.0:
         height, beside = dot(d, ruling), across(d, ruling)
         return math.hypot(beside + radius, height)
     off, side = sub(d, scale(dot(d, axis), axis)), cross(ruling, axis)
     sine = math.sqrt(dot(side, side))
-    far = math.sqrt(dot(off, off))
-    if radius == 0.0 or far == 0.0 or sine == 0.0:
-        return far + radius
+    square = dot(off, off)
+    if radius == 0.0 or square == 0.0 or sine == 0.0:
+        return math.sqrt(square) + radius
     wide, narrow = abs(dot(off, side)) / sine * radius, abs(dot(off, cross(axis, side))) / sine
     narrow *= radius * math.sqrt(max(1.0 - sine * sine, 0.0))
-    less = radius * radius * sine * sine
-    # m - r^2: the slope is 1 - (wide / x)^2 - (narrow / (x + less))^2, and rises.
-    x = max(wide, narrow - less)
-    for _ in range(NEWTON):
-        if x <= 0.0:
-            break
-        p, q = wide / x, narrow / (x + less)
-        square = p * p + q * q
-        if square <= 1.0:
-            break
-        x += square * (math.sqrt(square) - 1.0) / (p * p / x + q * q / (x + less))
-    more = wide * wide / x if x > 0.0 else 0.0
-    return math.sqrt(far * far + radius * radius + x + more + narrow * narrow / (x + less))
+    return farthest_of_ellipse(square, radius * radius, (radius * sine) ** 2, wide, narrow)
+
+
+@kernel(inner=True)
+def farthest_of_section(e, lean, radius):
+    """A bound of how far the section of a cylinder, across a line through the origin, is from that line.
+
+    It is an ellipse with the half axes r sqrt(1 + s^2) along the lean, of length s, and r across.
+
+    Parameters
+    ----------
+    e : vector
+        Where the cylinder's axis meets the plane of the section, from the line.
+    lean : vector
+        By how much its axis goes sideways for each unit of height.
+    radius : float
+    """
+    slope, square = math.sqrt(dot(lean, lean)), dot(e, e)
+    if radius == 0.0 or square == 0.0 or slope == 0.0:
+        return math.sqrt(square) + radius * math.sqrt(1.0 + slope * slope)
+    along = abs(dot(e, lean)) / slope
+    beside = math.sqrt(max(square - along * along, 0.0))
+    less, longer = (radius * slope) ** 2, radius * math.sqrt(1.0 + slope * slope)
+    return farthest_of_ellipse(square, radius * radius + less, less, longer * along, radius * beside)
 
 
 @kernel(inner=True)

@@ -8,11 +8,11 @@ angle, seen along the bore) and meets the plane at e, in an ellipse. Its support
 
     v.e + r sqrt(1 + (v.s)^2)
 
-and the largest value of that over v is the largest distance D of a point of the section. Its square is a quadratic
-over the unit circle: any multiplier l gives an upper bound of it, and the best l, found by Newton's method, the maximum
-itself. The room R - D times the cosine of the angle is a lower bound of the distance of the bodies.
+and `farthest_of_section` is how far that is from the bore's axis, D. The room R - D times the cosine of the angle is a
+lower bound of the distance of the bodies.
 
-Either end of the cylinder may be taken instead of the section beyond it: its disc is within a ball.
+Either end of the cylinder may be taken instead of the section beyond it: a disc that leans, seen along the bore an
+ellipse as well.
 """
 
 from __future__ import annotations
@@ -24,45 +24,20 @@ from assembly.geometry.vec import add, dot, matvec, neg, scale, sub
 from assembly.kinematics.motion import inverse_pose
 from assembly.proximity.clearance.halve import vector
 from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, BY_PLANE, BY_SLEEVE, node_at
-from assembly.proximity.clearance.separation import across, highest, is_round, placed, room_in_bore, separation
+from assembly.proximity.clearance.separation import (
+    farthest_of_disc,
+    farthest_of_section,
+    highest,
+    is_round,
+    placed,
+    room_in_bore,
+    separation,
+)
 
 __all__ = ["best_bore", "gap_of"]
 
 # The least cosine of the angle by which a shaft leans at a pose, and on a way from there (`sleeve_sag` in `way.py`).
 UPRIGHT, LEAST_COSINE = 0.98, 0.96
-# Steps of Newton's method: it starts near the solution, and three are exact to rounding.
-STEPS = 3
-
-
-@kernel(inner=True)
-def farthest_of_section(e, lean, radius):
-    """The largest distance from the bore's axis of the section of a cylinder, at most.
-
-    Parameters
-    ----------
-    e : vector
-        Where its axis meets the plane of the section, from the bore's axis.
-    lean : vector
-        By how much its axis goes sideways for each unit of height.
-    radius : float
-    """
-    slope = math.sqrt(dot(lean, lean))
-    square = dot(e, e)
-    along = dot(e, lean) / slope if slope > 0.0 else math.sqrt(square)
-    beside = math.sqrt(max(square - along * along, 0.0))
-    # Over c^2 + s^2 = 1 the largest value of 2 (p c + q s) + k c^2.
-    k = radius * radius * slope * slope
-    p, q = radius * math.sqrt(1.0 + slope * slope) * abs(along), radius * beside
-    least, m = max(k + p, q), math.sqrt(p * p + q * q)
-    l = max(m + k * (p / m) ** 2, least) if m > 0.0 else least
-    for _ in range(STEPS):
-        u = p / (l - k) if p > 0.0 else 0.0
-        v = q / l if q > 0.0 else 0.0
-        slow = (2.0 * u * u / (l - k) if p > 0.0 else 0.0) + (2.0 * v * v / l if q > 0.0 else 0.0)
-        if slow > 0.0:
-            l = max(l - (1.0 - u * u - v * v) / slow, least)
-    most = l + (p * p / (l - k) if p > 0.0 else 0.0) + (q * q / l if q > 0.0 else 0.0)
-    return math.sqrt(square + radius * radius + most)
 
 
 @kernel(inner=True)
@@ -89,11 +64,11 @@ def sleeve_room(forest, wall, k, pose, how):
     if how - BY_SLEEVE != 1:
         most = farthest_of_section(add(c, scale(ahead - height, lean)), lean, node.disc)
     else:
-        most = across(add(c, scale(node.half[0], a)), u) + node.disc
+        most = farthest_of_disc(add(c, scale(node.half[0], a)), u, a, node.disc)
     if how - BY_SLEEVE != 2:
         most = max(most, farthest_of_section(add(c, scale(behind - height, lean)), lean, node.disc))
     else:
-        most = max(most, across(sub(c, scale(node.half[0], a)), u) + node.disc)
+        most = max(most, farthest_of_disc(sub(c, scale(node.half[0], a)), u, a, node.disc))
     return LEAST_COSINE * (bore.bore - most)
 
 

@@ -125,6 +125,8 @@ def sleeve_sag(way, forest, a, b):
     With w the angle of the way, w1 the part of it by which b's axis turns, and primes for derivatives along the way:
     |s'| <= 1.1 w1, |s''| <= 2 w w1, |e''| <= 1.3 |c''| + z |s''| + 2 |c'| |s'| for the center c of b at a height z from
     the plane, and r sqrt(1 + (v.s)^2) has a second derivative up to 1.8 r w w1. These hold for angles below 0.25 rad.
+    An end of b instead of a section beyond it, at half the length h along the axis u, has the support v.(c + h u) + r
+    sqrt(1 - (v.u)^2), whose second derivative is less: up to |c''| + h w w1 + 1.5 r w w1.
     """
     wall, node = node_at(forest.nodes, a), node_at(forest.nodes, b)
     u, axis = vector(wall.ruling), vector(node.axes[0])
@@ -141,7 +143,7 @@ def sleeve_sag(way, forest, a, b):
     bent, pace = angle * angle * off, math.sqrt(dot(d, d)) + angle * off
     top, bottom = highest(forest, a, u), -highest(forest, a, neg(u))
     before, after = dot(placed(way.before, center), u), dot(placed(way.after, center), u)
-    far = max(top, bottom, before, after) - min(top, bottom, before, after) + bent
+    far = max(max(top, bottom, before, after) - min(top, bottom, before, after), node.half[0]) + bent
     second = 1.3 * bent + (2.0 * far + 1.8 * node.disc) * angle * turned + 2.2 * pace * turned
     return 0.125 * second
 
@@ -161,8 +163,7 @@ def stays_apart(forest, nodes, way, n, gaps):
         sag = sag_backward(way, forest, nodes.a)
         return after > sag and before > sag
     if nodes.how >= BY_SLEEVE:
-        # An end of the shaft may be asked instead of the section beyond it.
-        sag = max(sleeve_sag(way, forest, nodes.a, nodes.b), sag_of(way, forest, nodes.b))
+        sag = sleeve_sag(way, forest, nodes.a, nodes.b)
         return after > sag and before > sag
     part = 1.0 if nodes.how == BY_BORE_A else part_along(way, n)
     if after > part * way.sag and before > part * way.sag:

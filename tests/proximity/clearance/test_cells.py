@@ -88,7 +88,9 @@ def test_nodes_hold_what_is_below(name):
         if links.child[k] == NONE:
             continue
         if nodes.disc[k] == 0.0 and nodes.rho[k] == 0.0:
-            reach = np.repeat((nodes.rho + nodes.disc)[cells], 4)[:, None]
+            # A disc reaches along an axis by the part of that across its ruling.
+            flat = np.linalg.norm(np.cross(nodes.ruling[cells][:, None], nodes.axes[k]), axis=2)
+            reach = np.repeat(nodes.rho[cells][:, None] + nodes.disc[cells][:, None] * flat, 4, axis=0)
             heights = (points - nodes.center[k]) @ nodes.axes[k].T
             assert (np.abs(heights) + reach <= nodes.half[k] + OFF * far).all()
 
@@ -169,3 +171,13 @@ def test_connected_parts_of_a_boundary():
     assert len(np.unique(cells_of_body(faces_of(SHAPES["plate"])).component)) == 1
     first, second = asm.shapes.sphere(0.3), asm.shapes.sphere(0.2).transformed(translation=[3.0, 0.0, 0.0])
     assert cells_of_body(faces_of([first, second])).component.max() == 1
+
+
+def test_a_flat_face_in_polar_parameters_is_flat():
+    """What its cells are off their corners lies in its plane: what lies on it is decided, however coarse they are."""
+    faces = faces_of(asm.shapes.revolution(asm.curves.polygon([(0.3, 0), (1, 0), (1, 1), (0.3, 1)])))
+    cells = cells_of_body(faces)
+    nodes, links = rows_of(NODE, cells.nodes), rows_of(LINKS, cells.links)
+    flat = cells.first[links.form[cells.first] == FLAT]
+    assert len(flat) > 10 and nodes.rho[flat].max() < 1e-14 and nodes.disc[flat].min() > 1e-4
+    assert nodes.half[0, np.abs(nodes.axes[0, :, 2]).argmax()] < 0.5 + 1e-13

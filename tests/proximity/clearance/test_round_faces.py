@@ -189,3 +189,30 @@ def test_spans_of_a_rod_with_half_balls():
     for part, z in ((parts[0], -0.4), (parts[2], 0.4)):
         assert part.radius == pytest.approx(0.2, abs=1e-14) and not part.axis.any()
         assert part.center == pytest.approx([0.0, 0.0, z], abs=1e-14)
+
+
+def test_flat_rings_of_revolutions(cases):
+    """A flat face all around an axis is within its outer circle and beyond its inner one; of other lines it is not."""
+    rng = np.random.default_rng(7)
+    for number in range(cases(10, 300)):
+        inner = (0.0, rng.uniform(0.1, 0.9))[number % 2]
+        ring = asm.shapes.revolution(asm.curves.polygon([(inner, 0), (1, 0), (1, 1), (inner, 1)]))
+        flat = [face for face in faces_of(ring) if np.ptp(face.surface.control_points[..., 2]) < 1e-9]
+        assert len(flat) == 2
+        for one in flat:
+            face = Face(placed(one.surface, rng, (0.0, 10.0)[number % 3 > 0]))
+            found, holes, points = round_of(face), round_holes(face), surface_points(face, 300, rng)
+            off, far = points - found.center, np.abs(points).max()
+            assert np.abs(off @ found.axis).max() <= found.half + OFF * far
+            assert found.radius == pytest.approx(1.0, abs=1e-13 * far)
+            assert np.linalg.norm(off, axis=1).max() <= found.radius + OFF * far
+            assert len(holes) == (inner > 0.0)
+            for hole in holes:
+                assert hole.radius == pytest.approx(inner, abs=1e-13 * far)
+                assert distances(hole, points).min() >= hole.radius - OFF * far
+    # Lines that lead past the center: the inner circle is turned against the outer one.
+    net = one.surface.control_points.copy()
+    edges = np.moveaxis(net, int(one.surface.closed[1]), 0)
+    edges[:, 0] = edges[:, 0] @ Rotation.from_rotvec((0.0, 0.0, 0.4)).as_matrix().T
+    surface = asm.NurbsSurface(net, one.surface.knots, one.surface.degree, one.surface.weights)
+    assert round_of(Face(surface)) is None and not round_holes(Face(surface))

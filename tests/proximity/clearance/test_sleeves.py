@@ -14,8 +14,9 @@ import assembly as asm
 from assembly._record import Store
 from assembly.kinematics.motion import RelativePose
 from assembly.proximity.clearance.records import BY_SLEEVE, NONE, Forest
-from assembly.proximity.clearance.sleeves import best_sleeve, farthest_of_section, sleeve_room
-from assembly.proximity.clearance.way import pose_at, sag_of, sleeve_sag, way_of
+from assembly.proximity.clearance.separation import farthest_of_section
+from assembly.proximity.clearance.sleeves import LEAST_COSINE, best_sleeve, sleeve_room
+from assembly.proximity.clearance.way import pose_at, sleeve_sag, way_of
 from tests.proximity.clearance.nodes import forest_of, tree_of
 from tests.proximity.clearance.scenes import faces_of
 
@@ -68,9 +69,33 @@ def test_the_farthest_point_of_a_section(cases):
         found = minimize_scalar(off, bounds=(best - 0.05, best + 0.05), method="bounded", options={"xatol": 1e-10})
         told = farthest_of_section(tuple(e), tuple(lean), SHAFT)
         assert told >= -found.fun - 1e-14
-        # Three steps of Newton's method are exact unless the offset is about what leaning adds to the radius.
+        # Six steps of Newton's method are exact unless the offset is about what leaning adds to the radius.
         is_far = np.linalg.norm(e) > 10.0 * SHAFT * slope * slope
         assert told == pytest.approx(-found.fun, rel=1e-13 if is_far else 1e-6)
+
+
+def test_an_end_that_just_fits_has_room(cases):
+    """A shaft that ends in its bore and touches this with its end's rim and at its mouth is decided to rounding."""
+    rng = np.random.default_rng(3)
+    forest, plate, wall = scene(3.0)
+    play = BORE - SHAFT
+    for _ in range(cases(20, 500)):
+        lean, azimuth, inner = rng.uniform(0.005, 0.02), rng.uniform(0.0, 6.28), rng.uniform(-0.5, 0.5)
+        # Seen along the lean: the end's rim at one side, the section at the mouth (height 1) at the other one.
+        cosine = np.cos(lean)
+        off = play + SHAFT * (1.0 - cosine)
+        mouth = (1.0 - inner) * np.tan(lean) - off
+        # The section reaches r / cos(lean) from its middle; what is beside the bore's wall is the play of the pose.
+        gap = BORE - mouth - SHAFT / cosine
+        if not 1e-3 < gap:
+            continue
+        turn = Rotation.from_rotvec(lean * np.array([-np.sin(azimuth), np.cos(azimuth), 0.0]))
+        way = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+        end = -off * way + (0.0, 0.0, inner)
+        shift = end + 1.5 * turn.apply((0.0, 0.0, 1.0))
+        for opened in (0.0, 1e-9):
+            how, room = best_sleeve(forest, plate, wall, relative(turn, shift + opened * way))
+            assert how >= BY_SLEEVE and room == pytest.approx(LEAST_COSINE * opened, abs=1e-13)
 
 
 @pytest.mark.parametrize("length", [6.0, 2.4])
@@ -110,7 +135,7 @@ def test_no_way_takes_more_of_the_room_than_told(cases):
         poses = relative(*before), relative(*after)
         way = way_of(*poses, (0.0, 0.0, 0.3 * rng.normal()), 4.0, True)
         for how in range(BY_SLEEVE, BY_SLEEVE + 3):
-            sag = max(sleeve_sag(way, forest, plate, wall), sag_of(way, forest, wall))
+            sag = sleeve_sag(way, forest, plate, wall)
             ends = min(sleeve_room(forest, plate, wall, pose, how) for pose in poses)
             rooms = [sleeve_room(forest, plate, wall, pose_at(way, s), how) for s in np.linspace(0.0, 1.0, 9)]
             assert min(rooms) >= ends - sag - 1e-13
