@@ -1,4 +1,4 @@
-"""A lower bound of the distance of two circles in space that is the distance itself up to rounding, whatever their pose.
+"""A lower bound of the distance of two circles in space that is the distance itself up to rounding, at any pose.
 
 Let A have center, axis and radius c, m, R, and B o, n, S. Of the point p(t) of A, t from 0 to 2 pi, let d = p - o and
 w = d - (d.n) n. The squared distance of p(t) from B is
@@ -15,8 +15,8 @@ x (4 S |w| - x) = -T, so a lower bound of T is one of f, except where A meets th
 
     |w| <= e.w + |w - (e.w) e|^2 / (2 e.w)
 
-for a unit vector e, or |w| <= |e.w| + |w - (e.w) e|, bounds f by its second-order expansion. L is the least f found. The
-interval of t is gone through once, in steps as long as one of these bounds tells that f >= L - CLOSE there.
+for a unit vector e, or |w| <= |e.w| + |w - (e.w) e|, bounds f by its second-order expansion. L is the least f found.
+The interval of t is gone through once, in steps as long as one of these bounds tells that f >= L - CLOSE there.
 """
 
 from __future__ import annotations
@@ -37,9 +37,8 @@ PLACES, STEPS, CUT = 24, 40, 4.0
 # The longest and the shortest half step, and how many steps there may be: two that all but meet each other's axis along
 # a continuum of nearest points take some thousands, others some tens.
 LONGEST, SHORTEST, MOST = 0.4, 1e-7, 20_000
-# What of a torus the bound needs.
-CircleSpine = namedtuple("CircleSpine", "center axis major")
-# Two circles: A is p = d + e cos t + g sin t, seen from the center of B and in the units of above; n the axis of B; `radius`, `other`: R and S; `center`, `cos`, `sin`: w = center + cos cos t + sin sin t.
+# Two circles: A is p = d + e cos t + g sin t, seen from the center of B and in the units of above; n the axis of B;
+# `radius`, `other`: R and S; `center`, `cos`, `sin`: w = center + cos cos t + sin sin t.
 Circles = namedtuple("Circles", "d e g n radius other center cos sin")
 # Of t: P, its first two derivatives; |w|, w, its first derivative, and half its second one.
 Place = namedtuple("Place", "p dp ddp length w dw bend")
@@ -272,14 +271,3 @@ def nearest_on_circles(s, t, place):
     size = length_of(off)
     way = scale(1.0 / size, off) if size > 0.0 else any_across(t.axis)
     return p, add(t.center, scale(t.major, way))
-
-
-@kernel(signatures="(f8[:, ::1],)")
-def circles_apart_of(rows):
-    """The bound of `circles_apart` of two circles, rows (2, 7): center, axis, radius."""
-    a, b = rows[0], rows[1]
-    gap, _ = circles_apart(
-        CircleSpine((a[0], a[1], a[2]), (a[3], a[4], a[5]), a[6]),
-        CircleSpine((b[0], b[1], b[2]), (b[3], b[4], b[5]), b[6]),
-    )
-    return gap

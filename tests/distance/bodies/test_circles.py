@@ -1,4 +1,4 @@
-"""The bound of two circles is below their distance, and as near to it as is promised, at isolated nearest points or not.
+"""The bound of two circles is below their distance, and as near to it as promised, at isolated nearest points or not.
 
 Judged by a fine sampling of one of them, each low place of it made exact by a bounded search; the distance of a point
 from a circle has a closed form.
@@ -12,7 +12,8 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
-from assembly.distance.bodies.circles import circles_apart_of
+from assembly.distance.bodies.circles import circles_apart
+from assembly.distance.bodies.spines import TORUS, Spine
 from assembly.proximity.features.body_distance import DistanceStatus
 
 UPRIGHT = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -21,6 +22,12 @@ SPACING = 2e-3 * np.pi
 
 def circle(center, axis, radius):
     return np.concatenate([center, np.asarray(axis) / np.linalg.norm(axis), [radius]])
+
+
+def told_apart(one, other):
+    """The bound."""
+    spines = (Spine(TORUS, tuple(row[:3]), tuple(row[3:6]), 0.0, row[6], 0.0) for row in (one, other))
+    return circles_apart(*spines)[0]
 
 
 def distance_judged(one, other):
@@ -49,7 +56,7 @@ def distance_judged(one, other):
 def check(one, other, near=2e-11):
     """A lower bound, and one that is within 2e-11 of the sum of radii and centers' distance, where they do not meet."""
     size = np.linalg.norm(one[:3] - other[:3]) + one[6] + other[6]
-    told, true = circles_apart_of(np.array([one, other])), distance_judged(one, other)
+    told, true = told_apart(one, other), distance_judged(one, other)
     assert told <= true + 1e-14 * size
     # Half of what f is known to divided by the distance.
     if true > 0.02 * size:
@@ -90,7 +97,7 @@ def test_where_one_circle_meets_the_axis_of_the_other():
 def test_circles_that_cross_are_not_apart():
     told, true = check(circle([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 0.5), np.append(UPRIGHT, 0.5))
     assert true < 1e-9 and told < 1e-6
-    assert circles_apart_of(np.array([circle([0, 0, 0], [0, 0, 1], 0.0), np.append(UPRIGHT, 1.0)])) == 0.0
+    assert told_apart(circle([0, 0, 0], [0, 0, 1], 0.0), np.append(UPRIGHT, 1.0)) == 0.0
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-11, 1e-7, 1e-2])
