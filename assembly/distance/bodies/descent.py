@@ -61,6 +61,8 @@ BODY_SEARCH = record_dtype(
     key=1,  # bound of the pair in hand
     tried=1,  # the best bound that a direction gave of the pair in hand
     key_way=3,  # the direction that gave it; before that, the direction of the parent pair
+    rings=2,  # places of the spines of two tori
+    rings_apart=1,  # a lower bound of the distance of these
     on_a=3,  # points in hand, from a's center and in a's axes
     on_b=3,
 )

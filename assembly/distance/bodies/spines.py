@@ -6,6 +6,7 @@ are not isolated, and halving the patches would never end; the bound of the whol
 
 Where axes are not parallel, the second surface is turned about its center until they are, and where they have to
 coincide it is then moved. Turning moves a point within h of the center by at most 1.5 h s, s the sine of the angle.
+Two tori have another bound at any pose, the distance of their circles (`circles.py`).
 """
 
 from __future__ import annotations
