@@ -155,7 +155,7 @@ def test_a_point_that_stays_on_an_edge_is_no_root():
             roots = np.zeros((1, ROOT))
             roots[0, :6] = [*e[1:3], *d[1:3], e[1 + FEATURE], d[1 + FEATURE]]
             root = extremum_at(roots, 0)
-            root.fold, root.beyond = 1.0, np.nan
+            root.fold = 1.0
             for corner, known in ((NOTHING, True), (FEATURES, True), (POINT, False)):
                 root.corner = corner
                 assert known_in_region(looked_into, e[0], d[0], list_of(roots, 1))[2] == known

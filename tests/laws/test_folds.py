@@ -1,4 +1,4 @@
-"""Contacts at folds and knot lines: what a gap gains by tangency, folds beyond knot lines, valleys, parted minima."""
+"""Contacts at folds: what a gap gains by tangency, valleys, given contacts and their extrema."""
 
 from __future__ import annotations
 
@@ -8,21 +8,19 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly._record import Store, rows_of
+from assembly._record import Store
 from assembly.constraints.program.records import FREE_COLUMN, MANAGER_RECORD, ROWS, Iterate, LiftedPairs
 from assembly.geometry.splines.evaluate import SURFACE_RECORD
 from assembly.kinematics.motion import RelativePose, relative_pose, rotation
 from assembly.proximity.extrema.face_face import SINGULAR, solve_pair
 from assembly.proximity.extrema.lifted_pair import VARIABLES, VECTORS, LiftedPair, free_rows
 from assembly.proximity.extrema.pairs import _key, _packed, as_face, extremal_pair
-from assembly.proximity.extrema.singular import fold_beyond
-from assembly.proximity.features.solid_contact import CONTACT_RECORD, PAIR_GAP, TRACK
+from assembly.proximity.features.solid_contact import CONTACT_RECORD, TRACK
 from assembly.proximity.manager import extrema as roots
 from assembly.proximity.manager import motion_bounds
 from assembly.proximity.manager import records as manager_records
 from assembly.proximity.manager import update as watch
 from assembly.proximity.manager.motion_bounds import MotionBall, allow_ball, mover
-from assembly.proximity.manager.slots import keep_slots_of_given
 from assembly.solve.loop.clearances import place_clearance_rows, update_again, update_around
 from assembly.solve.loop.violation import untouched
 from assembly.solve.loop.workspace import new_rows
@@ -72,36 +70,7 @@ def root_at(table, pool, q, start):
     pair = posed(Store(table, pool), turn, shift, surfaces=(0, SURFACE_RECORD))
     out = np.full((1, roots.ROOT), np.nan)
     assert roots.surfaces_extremum(pair, tuple(start), roots.extremum_at(out, 0)) != roots.NOTHING
-    assert np.isnan(roots.extremum_at(out, 0).beyond)
     return pair, roots.extremum_at(out, 0)
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_fold_beyond_a_knot_line_is_that_of_the_pair_there(side):
-    """A ball outside a wire where its bend begins: beyond the knot line the wire curves away from it."""
-    clip = asm.shapes.paper_clip(length=1.0, width=0.25, wire_radius=0.02)
-    ball = asm.shapes.sphere(0.06)
-    table, pool = packed_pair(clip, ball)
-    line = np.unique(clip.knots[0])[2]  # a straight part ends there
-    # Where the wire's middle line bends to, at the knot line.
-    around = np.linspace(*clip.domain[1], 9)[:-1]
-    ring = [clip.evaluate(u, around).mean(axis=0) for u in line + np.r_[-0.02, 0.0, 0.02]]
-    ahead = (ring[1] - ring[0]) / np.linalg.norm(ring[1] - ring[0])
-    outward = ring[1] - ring[2] + ahead * np.vdot(ring[2] - ring[1], ahead)
-    outward /= np.linalg.norm(outward)
-    folds = []
-    for offset in (-1e-6, 1e-6):
-        offset *= side
-        along_line = clip.evaluate(line + offset, 0.0) - clip.evaluate(line, 0.0)
-        q = np.array([[0.0, 0.0, 0.0, *IDENTITY], [*(ring[1] + 0.1 * outward + along_line), *IDENTITY]])
-        near_pair, root = root_at(table, pool, q, extremal_pair(clip, q[0], ball, q[1]).parameters)
-        near = (0.05, -1.0, -1.0, -1.0)  # no other knot lines
-        folds.append((root.fold, fold_beyond(Store(table, pool), near_pair, tuple(root.parameters), near)))
-    (here, beyond), (there, behind) = folds
-    assert abs(here - there) > 0.05
-    # The two places are 2e-6 apart, where curvatures change by some hundreds a unit.
-    assert beyond == pytest.approx(there, abs=1e-3)
-    assert behind == pytest.approx(here, abs=1e-3)
 
 
 def test_a_valley_of_fourth_order_is_a_pair_after_few_steps():
@@ -125,47 +94,6 @@ def test_a_valley_of_fourth_order_is_a_pair_after_few_steps():
         # x^4 where the slope 4 x^3 is 1e-9.
         assert found.frame.gap == pytest.approx(0.01, abs=2e-13)
         assert found.steps <= 25
-
-
-@pytest.mark.parametrize("swapped", [0, 1])
-@pytest.mark.parametrize("listed", [False, True])
-def test_a_given_contact_goes_from_a_saddle_to_the_nearest_minimum(swapped, listed):
-    packed = chain_under_watch()[1]
-    table = packed.table.copy()
-    watch, pair = int(table[MANAGER_RECORD]), 1
-    record = manager_records.pair_in(table, watch, pair)
-    given = record.given
-    assert record.given_count == 1
-    table[given + 1] = swapped
-    row, place = table[given], record.low
-    memory = packed.new_state()[packed.memory_at :].copy()
-    places = manager_records.memory_places(table, watch)[1]
-    tracked = np.zeros((row + place + int(manager_records.manager_at(table, watch).first) + 30, TRACK))
-    found = np.zeros((3, roots.ROOT))
-    extrema = rows_of(roots.EXTREMUM, found)
-    extrema.beyond, extrema.fold, extrema.gap = np.nan, (-1e-4, 2e-4, 1e-4), (0.0, -2e-10, -1e-10)
-    extrema.point_f[:, 0] = 0.0, 0.02, 0.01
-    found[:, :4] = np.arange(12.0).reshape(3, 4)
-    extrema.origin = roots.GIVEN_CONTACT, roots.NEW, place if listed else roots.NEW
-    if listed:
-        memory[places + manager_records.PLACE_MEMORY * place] = pair
-        memory[places + manager_records.PLACE_MEMORY * place + manager_records.PLACE_NUMBER] = 7.0
-    manager = manager_records.ContactManager(Store(table, packed.pool), watch, memory)
-    keep_slots_of_given(manager, pair, list_of(found, 3), tracked)
-    expected = [8.0, 9.0, 10.0, 11.0]
-    assert tracked[row, :4].tolist() == (expected[2:] + expected[:2] if swapped else expected)
-    assert tracked[row, PAIR_GAP] == -1e-10
-    assert extrema.origin.tolist() == [roots.USELESS, roots.NEW, roots.GIVEN_CONTACT]
-    assert memory[manager_records.EVENT_COUNT] == 1.0
-    if listed:
-        assert memory[places + manager_records.PLACE_MEMORY * place] == -1.0
-    # A minimum far below is another contact, and one that is a minimum stays.
-    for gap, fold in ((-1e-3, -1e-4), (0.0, 1e-4)):
-        extrema.origin = roots.GIVEN_CONTACT, roots.NEW, roots.USELESS
-        extrema.fold[0], extrema.gap[1] = fold, gap
-        before = tracked.copy()
-        keep_slots_of_given(manager, pair, list_of(found, 3), tracked)
-        assert np.array_equal(before, tracked, equal_nan=True) and extrema.origin[0] == roots.GIVEN_CONTACT
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-9, 1e-3, 0.2])

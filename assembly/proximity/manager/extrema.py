@@ -22,14 +22,12 @@ from assembly.kinematics.motion import rotation
 from assembly.proximity.brep.borders import feature_at
 from assembly.proximity.brep.records import shell_at
 from assembly.proximity.bvh.tree import three_of
-from assembly.proximity.extrema.face_face import CONVERGED, NOT_CONVERGED, SINGULAR, pair_frame, solve_pair
+from assembly.proximity.extrema.face_face import CONVERGED, SINGULAR, pair_frame, solve_pair
 from assembly.proximity.extrema.feature_pair import two_face_frame
-from assembly.proximity.extrema.feedback import descend_pair
 from assembly.proximity.extrema.global_start import opposed
 from assembly.proximity.extrema.pair_matrix import is_the_only_one
 from assembly.proximity.extrema.rates import derivatives_at
 from assembly.proximity.features.solid_contact import contact_record_at, pair_parameters, tracked_at
-from assembly.proximity.manager.parameters import DESCENTS
 
 # An extremum of the distance of two bodies. Points and the normal are in the axes of f.
 EXTREMUM = record_dtype(
@@ -43,7 +41,6 @@ EXTREMUM = record_dtype(
     point_f=3,
     point_g=3,
     fold=1,  # how far it is from a fold, det H / |H|^2
-    beyond=1,  # the same beyond the knot lines beside it, the least; NaN: not evaluated
     corner=1,  # what a vertex contact is locked to (`vertex_contacts.py`); 0: it is none
     place=1,  # ELSEWHERE, BESIDE_CONTACT or OF_CONTACT (`contact_place.py`)
 )
@@ -147,15 +144,12 @@ def is_known_one(posed, extrema, merge_radius):
 
 @kernel(inner=True)
 def surfaces_extremum(posed, start, extremum):
-    """Newton's method on two surfaces from `start`, the controller where it fails; fills an extremum.
+    """Newton's method on two surfaces from `start`; fills an extremum.
 
     Returns NOTHING, SADDLE or MINIMUM_FOUND.
     """
     store, pose = posed.store, posed.pose
     found = solve_pair(store, posed.surfaces, pose, start, 1.0, math.inf, 0.0, True)
-    if found.status == NOT_CONVERGED:
-        # The controller leads down from anywhere, to a minimum of the distance.
-        found = descend_pair(store, posed.surfaces, pose, start, 1.0, DESCENTS)
     if found.status != CONVERGED and found.status != SINGULAR:
         return NOTHING
     x, frame = found.parameters, found.frame
@@ -213,7 +207,6 @@ def write(extremum, x, codes, n, gap, points, fold):
     extremum.point_f[0], extremum.point_f[1], extremum.point_f[2] = points[0]
     extremum.point_g[0], extremum.point_g[1], extremum.point_g[2] = points[1]
     extremum.fold = fold
-    extremum.beyond = math.nan
     extremum.corner = 0.0
     extremum.place = ELSEWHERE
 
@@ -284,5 +277,5 @@ def add_given(posed, tracked, listed, many, merge_radius, extrema):
 
 @kernel(inline=True)
 def is_alone(extremum):
-    """Whether an extremum is far from a fold, beyond knot lines too as far as it is known."""
-    return is_the_only_one(extremum.fold) and (math.isnan(extremum.beyond) or is_the_only_one(extremum.beyond))
+    """Whether an extremum is far from a fold."""
+    return is_the_only_one(extremum.fold)

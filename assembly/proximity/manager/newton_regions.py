@@ -6,8 +6,6 @@ from its middle, in a few steps; a sequence that leaves the tile and its neighbo
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from assembly._kernel import kernel
@@ -15,10 +13,10 @@ from assembly._record import record_dtype, record_view, size_of
 from assembly.geometry.splines.domain import is_within
 from assembly.proximity.extrema.face_face import bent_at_most, move_pair, pair_frame, pair_step
 from assembly.proximity.extrema.pair_matrix import FLAT, across_first, is_the_only_one, pair_matrix
-from assembly.proximity.extrema.singular import BESIDE, fold_beyond
+from assembly.proximity.extrema.projection import BESIDE
 from assembly.proximity.features.holding import POINT
 from assembly.proximity.features.solid_contact import pair_parameters
-from assembly.proximity.manager.extrema import extremum_at, is_alone
+from assembly.proximity.manager.extrema import extremum_at
 from assembly.proximity.manager.overlap import patch_at
 
 # How many steps; a sequence has arrived when a step turns normals by less than this [rad].
@@ -55,15 +53,11 @@ def is_beside(store, surfaces, x, y, half, part):
 
 @kernel(inner=True)
 def known_in_region(posed, e, d, extrema):
-    """The features of elements e and d, the parameters of their middles, whether a known extremum is all there is.
-
-    And whether a known one is near a fold, on this side of a knot line or beyond: a second one may be beside it.
-    """
+    """The features of elements e and d, the parameters of their middles, whether a known extremum is all there is."""
     f, g = patch_at(posed, 0, e), patch_at(posed, 1, d)
     codes = (np.int64(f.feature), np.int64(g.feature))
     start = (f.middle[0], f.middle[1], g.middle[0], g.middle[1])
     half = half_widths(posed, e, d)
-    folds = False
     for k in range(extrema.count[0]):
         extremum = extremum_at(extrema.rows, k)
         if extremum.code_f != codes[0] or extremum.code_g != codes[1]:
@@ -71,16 +65,9 @@ def known_in_region(posed, e, d, extrema):
         if not is_the_only_one(extremum.fold) or extremum.corner >= POINT:
             # A held point is no extremum: the nearest point of the edge, or of the face, may be beside it.
             continue
-        x = pair_parameters(extremum)
-        if not is_beside(posed.store, posed.surfaces, x, start, half, BESIDE):
-            continue
-        if posed.surfaces[0] >= 0 and math.isnan(extremum.beyond):
-            # Curvatures may jump at a knot line.
-            extremum.beyond = fold_beyond(posed.store, posed, x, half)
-        if is_alone(extremum):
-            return codes, start, True, False
-        folds = True
-    return codes, start, False, folds
+        if is_beside(posed.store, posed.surfaces, pair_parameters(extremum), start, half, BESIDE):
+            return codes, start, True
+    return codes, start, False
 
 
 @kernel(inner=True)

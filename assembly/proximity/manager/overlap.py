@@ -29,8 +29,7 @@ from assembly.proximity.bvh.tree import (
     three_of,
     tree_at,
 )
-from assembly.proximity.extrema.projection import projection_of
-from assembly.proximity.extrema.singular import BESIDE
+from assembly.proximity.extrema.projection import BESIDE, projection_of
 from assembly.proximity.manager.edge_piercing import cut_at, patch_vertex_contacts, pierces
 
 # Room for the descent of a segment.

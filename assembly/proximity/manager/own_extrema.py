@@ -18,7 +18,7 @@ from assembly.proximity.bvh.tree import TREE_ROUNDING, node_of, off_axis, seen_f
 from assembly.proximity.extrema.face_edge import NO_EDGE, edge_over, point_over, step_on_face
 from assembly.proximity.extrema.face_face import own_frame
 from assembly.proximity.extrema.feature_jets import NewtonLimits, edge_jet, other_jet
-from assembly.proximity.extrema.singular import BESIDE
+from assembly.proximity.extrema.projection import BESIDE
 from assembly.proximity.manager.continua import kinds_of
 from assembly.proximity.manager.flat_patches import may_be_level
 from assembly.proximity.manager.newton_regions import half_widths, is_beside, step_of_faces

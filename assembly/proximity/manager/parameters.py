@@ -46,11 +46,6 @@ SKIN, CENTERLINE_SKIN = 2.0, 4.0
 # nearer than a part of the motion bound of a ball where contacts may be created. Doubled: dearer updates, longer steps.
 # Chosen.
 FEW, CROWDED_PART = 40, 0.5
-# [starts] Led down the slope of the gap in an update, because Newton's method found no minimum from there. Doubled:
-# dearer updates at folds, fewer of them. Chosen.
-SLIDES = 6
-# [steps] Of the controller where Newton's method fails. Doubled: dearer updates beside saddles. Chosen.
-DESCENTS = 40
 # [ns] Between two questions whether a solve is to go on. Doubled: an interruption waits twice as long. Chosen: no user
 # waits longer for the answer to Ctrl-C than for a frame or three.
 SLICE = 50_000_000

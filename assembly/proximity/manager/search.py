@@ -1,8 +1,7 @@
 """The search of an update for contacts that are not known: minima of the distance from the middles of patches.
 
 Most candidate pairs have no minimum of their own: a known one is all there is, or Newton's method goes where it went
-from other pairs. Where none is found, a motion may create one. Near a fold, where two extrema merge, starts also
-descend the slope of the gap.
+from other pairs. Where none is found, a motion may create one.
 """
 
 from __future__ import annotations
@@ -11,8 +10,7 @@ import math
 from collections import namedtuple
 
 from assembly._kernel import kernel
-from assembly.proximity.extrema.projection import slide_down
-from assembly.proximity.manager.candidates import around, element_ball
+from assembly.proximity.manager.candidates import around
 from assembly.proximity.manager.extrema import (
     ALIKE,
     MINIMUM_FOUND,
@@ -37,11 +35,10 @@ from assembly.proximity.manager.newton_regions import (
 )
 from assembly.proximity.manager.overlap import is_outside
 from assembly.proximity.manager.own_extrema import may_have_own
-from assembly.proximity.manager.parameters import SLIDES
 
 # Progress of a search. folding: whether an extremum is near a fold; visited: the number of remembered Newton
-# iterations; slides: the number of descents along a slope.
-Progress = namedtuple("Progress", "folding visited slides")
+# iterations.
+Progress = namedtuple("Progress", "folding visited")
 # Limits of a search. curved_bound: the curvature-limited motion bound; enough: distance up to which a pair of patches
 # is searched; span: least and largest gap of new minima; merge_radius: extrema nearer to each other are one.
 Limits = namedtuple("Limits", "curved_bound enough span merge_radius")
@@ -63,29 +60,27 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
 
     Returns the index of a new minimum, or -1; whether a motion may create one; and the Progress.
     """
-    folding, visited, slides = progress
-    codes, start, inside, folds = known_in_region(posed, e, d, extrema)
-    folding = folding or folds
+    folding, visited = progress
+    codes, start, inside = known_in_region(posed, e, d, extrema)
     smooth = posed.surfaces[0] >= 0
     if inside or (not smooth and are_flat(posed, codes, e, d)):
-        return -1, False, Progress(folding, visited, slides)
+        return -1, False, Progress(folding, visited)
     if not smooth and not may_be_level(posed, codes, e, d) and is_known(codes, extrema):
         # Newton's method would go to the extremum known of the two features, or past it.
-        return -1, folding, Progress(folding, visited, slides)
+        return -1, folding, Progress(folding, visited)
     before = extrema.count[0]
-    stayed, near, half, mine = True, start, (0.0, 0.0, 0.0, 0.0), visited
+    stayed, near, mine = True, start, visited
     if smooth:
-        half = half_widths(posed, e, d)
-        way, near, visited = stays(posed, start, half, passed, visited)
+        way, near, visited = stays(posed, start, half_widths(posed, e, d), passed, visited)
         stayed = way != LEFT
         if way >= 0:
-            return -1, folding or newton_way_at(passed, way).no_extremum == 1.0, Progress(folding, visited, slides)
+            return -1, folding or newton_way_at(passed, way).no_extremum == 1.0, Progress(folding, visited)
     elif not may_have_own(posed, codes, e, d):
         # Newton's method goes to an extremum of other elements. One such sequence is followed for each pair of
         # features: it tells whether that extremum is known.
         way = way_of(passed, visited, codes)
         if way >= 0:
-            return -1, folding or newton_way_at(passed, way).no_extremum == 1.0, Progress(folding, visited, slides)
+            return -1, folding or newton_way_at(passed, way).no_extremum == 1.0, Progress(folding, visited)
         visited = keep_way(passed, visited, codes)
     result = NOTHING
     if stayed or not folding:
@@ -93,17 +88,7 @@ def search_candidate(posed, e, d, merge_radius, extrema, passed, progress):
         result = add_extremum(posed, codes, near, (0.0, 0.0, 0.0), merge_radius, extrema, 0.0)
     if extrema.count[0] > before:
         folding = folding or not is_alone(extremum_at(extrema.rows, before))
-    minimum = result == MINIMUM_FOUND or (result == ALIKE and extremum_at(extrema.rows, extrema.count[0]).fold > 0.0)
-    if folding and smooth and stayed and not minimum and slides < SLIDES:
-        # Near a fold Newton's method may go to the saddle, past the minimum beside it.
-        if extrema.count[0] > before:
-            before += 1
-        slides += 1
-        stride = element_ball(posed.store, posed.trees[0], e)[1]
-        start, stayed = slide_down(posed.store, posed.surfaces[0], posed.surfaces[1], posed.pose, start, stride, half)
-        if stayed and not is_list_full(extrema):
-            result = add_extremum(posed, codes, start, (0.0, 0.0, 0.0), merge_radius, extrema, 0.0)
-    progress = Progress(folding, visited, slides)
+    progress = Progress(folding, visited)
     if result == ALIKE and not folding:
         # The patches are on the slope around a known extremum.
         return -1, False, progress
@@ -124,7 +109,7 @@ def search_patches(posed, moving, limits, facing, extrema, passed):
     folding = False
     for k in range(extrema.count[0]):
         folding = folding or not is_alone(extremum_at(extrema.rows, k))
-    progress = Progress(folding, 0, 0)
+    progress = Progress(folding, 0)
     lo = (math.inf, math.inf, math.inf)
     hi = (-math.inf, -math.inf, -math.inf)
     for c in range(facing.found):

@@ -13,8 +13,6 @@ from assembly.proximity.features.solid_contact import pair_parameters, tracked_a
 from assembly.proximity.manager.extrema import (
     ALIKE,
     BESIDE_CONTACT,
-    GIVEN_CONTACT,
-    GIVEN_RECORD,
     LISTED,
     MINIMUM_FOUND,
     NEW,
@@ -23,7 +21,6 @@ from assembly.proximity.manager.extrema import (
     add_extremum,
     add_given,
     extremum_at,
-    given_at,
     is_list_full,
 )
 from assembly.proximity.manager.near_singular_points import sunk
@@ -56,8 +53,6 @@ from assembly.proximity.manager.wires import both_radii
 
 # A point of a valley that is a row moves to the valley's bottom if that is lower by more than this.
 SUNK = 1e-13
-# A given contact goes from a saddle to a minimum that is lower by no more than this.
-SHALLOW = 1e-7
 
 
 @kernel(inner=True)
@@ -278,55 +273,3 @@ def list_extrema(manager, p, extrema, tracked):
         log_event(manager, ADDED, CAME_NEAR, p, header.born, extremum.gap)
     known.wanting = 1.0 if wanting else 0.0
     return rest, lowest, wanting
-
-
-@kernel(inner=True)
-def minimum_beside(extrema, i):
-    """The minimum nearest to extremum i, a saddle, that is hardly lower, or -1."""
-    saddle = extremum_at(extrema.rows, i)
-    best = -1
-    least = math.inf
-    for k in range(extrema.count[0]):
-        extremum = extremum_at(extrema.rows, k)
-        origin = extremum.origin
-        lower = saddle.gap - extremum.gap
-        if not (origin == NEW or origin >= LISTED) or not extremum.fold > 0.0 or not 0.0 <= lower <= SHALLOW:
-            continue
-        square = 0.0
-        for l in range(3):
-            d = saddle.point_f[l] - extremum.point_f[l]
-            square += d * d
-        if square < least:
-            best = k
-            least = square
-    return best
-
-
-@kernel(inner=True)
-def keep_slots_of_given(manager, p, extrema, tracked):
-    """Move given contacts of surfaces, whose minimum has become a saddle, to one of the two new minima.
-
-    A contact that stayed would hold the surfaces at the saddle, and they would cross beside it.
-    """
-    table = manager.store.table
-    for i in range(extrema.count[0]):
-        saddle = extremum_at(extrema.rows, i)
-        if saddle.origin > GIVEN_CONTACT or not saddle.fold < 0.0:
-            continue
-        k = minimum_beside(extrema, i)
-        if k < 0:
-            continue
-        minimum = extremum_at(extrema.rows, k)
-        c = np.int64(GIVEN_CONTACT - saddle.origin)
-        given = given_at(table, pair_of(manager, p).given + GIVEN_RECORD * c)
-        pair = tracked_at(tracked, given.row)
-        swap = 2 * given.swapped
-        for l in range(4):
-            pair.parameters[l] = minimum.parameters[(l + swap) % 4]
-        pair.gap = minimum.gap
-        if minimum.origin == NEW:
-            log_event(manager, HANDED_OFF, LOST, p, 0.0, minimum.gap)
-        else:
-            give_up(manager, p, minimum, MERGED, SAME_EXTREMUM, tracked)
-        minimum.origin = saddle.origin
-        saddle.origin = USELESS

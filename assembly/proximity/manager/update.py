@@ -85,7 +85,6 @@ from assembly.proximity.manager.search import Limits, search_patches
 from assembly.proximity.manager.slots import (
     any_listed,
     any_lost,
-    keep_slots_of_given,
     known_extrema,
     list_extrema,
     release_given,
@@ -222,9 +221,7 @@ def update_pair(manager, p, q, tracked, workspace, extrema, asks):
         search, any_gone, found = search_by_centerlines(manager, p, posed, moving, margin, tracked, workspace, extrema)
     else:
         search, any_gone, found = search_by_patches(manager, p, posed, moving, margin, tracked, workspace, extrema)
-    if posed.surfaces[0] >= 0:
-        keep_slots_of_given(manager, p, extrema, tracked)
-    elif record.corners == 1:
+    if posed.surfaces[0] < 0 and record.corners == 1:
         list_vertex_contacts(manager, p, posed, workspace, extrema, tracked)
     if posed.surfaces[0] < 0 and any_deep(extrema):
         drop_flush(manager, p, posed, extrema, tracked)
