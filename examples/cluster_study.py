@@ -20,6 +20,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from dexterity_study import six_bar, speed, transmission  # noqa: E402
 
 
+# What Dask does all the time besides: profiles that nobody looks at here, and statistics 50 times a second.
+QUIET = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.worker.memory.monitor-interval": "1s",
+}
+
+
 def designs(count: int) -> tuple[asm.Assembly, asm.Plan, dict[str, object]]:
     scene, radius, length, dexterity = six_bar()
     plan = asm.sobol({radius: (15.0, 45.0), length: (60.0, 110.0)}, count)
@@ -28,6 +36,7 @@ def designs(count: int) -> tuple[asm.Assembly, asm.Plan, dict[str, object]]:
 
 def main(count: int = 8192, workers: int = 4) -> asm.Study:
     try:
+        import dask
         from distributed import Client, LocalCluster
     except ImportError:
         raise SystemExit("Dask's distributed is not installed; install the extra cluster") from None
@@ -36,7 +45,7 @@ def main(count: int = 8192, workers: int = 4) -> asm.Study:
     alone = asm.study(*designs(count))
     print(f"here      {perf_counter() - begin:7.2f} s   {alone!r}")
     local = {"n_workers": workers, "threads_per_worker": 1, "dashboard_address": None}
-    with LocalCluster(**local) as cluster, Client(cluster) as client:
+    with dask.config.set(QUIET), LocalCluster(**local) as cluster, Client(cluster) as client:
         client.run(sys.path.insert, 0, str(Path(__file__).resolve().parent))
         asm.study(*designs(64 * workers), executor=client, chunk_seconds=0.01)  # workers load what they need
         begin = perf_counter()

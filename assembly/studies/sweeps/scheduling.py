@@ -19,7 +19,7 @@ from assembly.studies.sweeps.table import Table
 from assembly.studies.sweeps.task import compute
 from assembly.studies.sweeps.work import ChunkDone, Job, Worker
 
-__all__ = ["Executor", "StudyError", "in_process", "on_executor"]
+__all__ = ["Executor", "StudyError", "Waiting", "in_process", "on_executor"]
 
 # What a row is taken to take before any is measured, in seconds.
 FIRST_GUESS = 1e-3
@@ -47,7 +47,7 @@ class StudyError(AssemblyError, RuntimeError):
     """A study's workers were ended, or disagree about what they compute with."""
 
 
-class _Waiting:
+class Waiting:
     """Runs that are ready, the coarse ones first, and how long a row takes."""
 
     def __init__(self, table: Table, seconds: float, workers: int) -> None:
@@ -93,7 +93,7 @@ class _Waiting:
 def in_process(job: Job, table: Table, seconds: float, take: Take, say: Callable[[int], bool]) -> None:
     """Compute a study here; `say` hears how many rows were solved, and may end it."""
     worker = Worker(job)
-    waiting = _Waiting(table, seconds, 1)
+    waiting = Waiting(table, seconds, 1)
     goes_on = True
 
     def heard(count: int) -> bool:
@@ -114,7 +114,7 @@ def on_executor(job: Job, table: Table, seconds: float, take: Take, executor: Ex
     packed = _pickled(job)
     key = hashlib.sha256(packed).hexdigest()
     workers = _workers_of(executor)
-    waiting = _Waiting(table, seconds, workers)
+    waiting = Waiting(table, seconds, workers)
     answers: SimpleQueue[Any] = SimpleQueue()
     under_way: set[Any] = set()
     try:

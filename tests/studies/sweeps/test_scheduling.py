@@ -1,0 +1,107 @@
+"""How runs are handed out: workers end together, chunks are few, and who hands out has little to do for a row."""
+
+from __future__ import annotations
+
+import heapq
+import pickle
+import sys
+from concurrent.futures import Future
+
+import numpy as np
+import pytest
+
+import assembly as asm
+from assembly.studies.sweeps.cutting import cut
+from assembly.studies.sweeps.scheduling import AHEAD, Waiting
+from assembly.studies.sweeps.table import Table
+from assembly.studies.sweeps.work import ChunkDone
+from tests.studies.sweeps.sweep_scenes import four_bar
+
+ROW = 50e-6  # seconds a row takes
+
+
+def simulated(rows, speeds):
+    """Seconds and chunks of a study whose rows take as long on all workers of speed 1, from a queue before them."""
+    table = Table(np.zeros((rows, 1)), cut(np.arange(rows)), 1)
+    waiting, queue, count = Waiting(table, 0.5, len(speeds)), [], 0
+    idle, running, now = sorted(range(len(speeds))), [], 0.0
+    while waiting or queue or running:
+        while waiting and len(queue) + len(running) < AHEAD * len(speeds):
+            queue.append(waiting.chunk())
+            count += 1
+        while queue and idle:
+            chunk, worker = queue.pop(0), idle.pop(0)
+            seconds = ROW * len(table.rows(chunk)) / speeds[worker]
+            heapq.heappush(running, (now + seconds, worker, seconds, chunk))
+        now, worker, seconds, chunk = heapq.heappop(running)
+        idle.append(worker)
+        nothing = np.zeros(len(table.rows(chunk)))
+        starts = {number: [None] * len(table.runs[number].rows) for number in chunk if table.runs[number].begins}
+        done = ChunkDone(chunk, ("SOLVED",), nothing.astype(int), {}, nothing, nothing[:, None], starts, seconds, "")
+        table.take(done)
+        waiting.took(done)
+    assert all(table.done)
+    return now, count
+
+
+# Measured: 0.3, 0.2, 1.6, 0.5 and 0.6 percent more than the time of the rows over all speeds; 45, 63, 64, 20, 303 chunks.
+@pytest.mark.parametrize(
+    ("rows", "speeds", "over", "most"),
+    [
+        (150_000, (1, 1), 0.01, 50),
+        (150_000, (1, 1, 1, 1), 0.01, 70),
+        (150_000, (1, 1, 1, 0.5), 0.02, 70),
+        (20_000, (1, 1), 0.01, 25),
+        (1_000_000, (1,) * 16, 0.01, 320),
+    ],
+)
+def test_workers_end_together_after_few_chunks(rows, speeds, over, most):
+    seconds, chunks = simulated(rows, speeds)
+    assert seconds < (1.0 + over) * rows * ROW / sum(speeds)
+    assert chunks <= most
+
+
+class Elsewhere:
+    """An executor that computes what is submitted, and whose work is not counted."""
+
+    _max_workers = 2
+
+    def __init__(self):
+        self.chunks = 0
+
+    def submit(self, function, *args):
+        counting = sys.getprofile()
+        sys.setprofile(None)
+        future = Future()
+        sent = pickle.loads(pickle.dumps((function, args)))
+        future.set_result(pickle.loads(pickle.dumps(sent[0](*sent[1]))))
+        self.chunks += 1
+        sys.setprofile(counting)
+        return future
+
+
+def calls_of(rows, folder):
+    """How many functions a process calls that hands out a study."""
+    scene, (angle, *_), out = four_bar()
+    plan = asm.grid({angle: np.linspace(0.7, 1.7, rows)})
+    count = 0
+
+    def one_more(_frame, event, _argument):
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(one_more)
+    try:
+        found = asm.study(scene, plan, out, executor=Elsewhere(), folder=folder, chunk_seconds=1e6)
+    finally:
+        sys.setprofile(None)
+    assert found.success.all()
+    return count
+
+
+@pytest.mark.parametrize(("kept", "most"), [(False, 0.75), (True, 1.2)], ids=["kept nowhere", "in a folder"])
+def test_a_row_costs_hardly_anything_where_it_is_handed_out(kept, most, tmp_path):
+    # The first one loads what it needs.
+    _, few, many = (calls_of(rows, tmp_path / str(rows) if kept else None) for rows in (40, 1000, 3000))
+    # 0.65 and 1.08 calls, of runs and coarse rows; solving and measuring a row takes some 160.
+    assert (many - few) / 2000 < most
