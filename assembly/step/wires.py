@@ -44,7 +44,7 @@ class Traced(NamedTuple):
     seam: bool
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Wire:
     """A wire on a face, which is taken forward.
 
