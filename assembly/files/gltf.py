@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.errors import InputError, file_path, positive
+from assembly._file_names import checked_suffix
+from assembly.errors import positive
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
 from assembly.step.documents import checked_unit
@@ -62,9 +63,7 @@ def write_gltf(
     ImportError
         Without pygltflib, of the extra `meshes`.
     """
-    target = file_path("path", path)
-    if target.suffix.lower() != ".glb":
-        raise InputError(f"path is {str(target)!r}; expected a name that ends in .glb")
+    target = checked_suffix(path, ".glb")
     scale = 1e-3 * checked_unit(unit)
     duration = positive("seconds", seconds)
     placed = placed_bodies(what)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.errors import InputError, file_path
+from assembly._file_names import checked_suffix
+from assembly.errors import InputError
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
 from assembly.step.placed import placed_bodies
@@ -41,9 +42,7 @@ def write_stl(path: str | PathLike[str], what: Assembly | Solution | Body | Sequ
     ImportError
         Without trimesh, of the extra `meshes`.
     """
-    target = file_path("path", path)
-    if target.suffix.lower() != ".stl":
-        raise InputError(f"path is {str(target)!r}; expected a name that ends in .stl")
+    target = checked_suffix(path, ".stl")
     placed = [(body, pose.matrix[:3, :3], pose.position) for body, pose in placed_bodies(what)]
     target.write_bytes(stl_bytes(placed, 1.0))
 

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from assembly._file_names import checked_suffix
 from assembly.assembly import Assembly
 from assembly.constraints.model.couplings import Gear, Linear, RackPinion
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.joints import Fixed, Planar, Prismatic, Revolute
 from assembly.constraints.model.mates import Insert
-from assembly.errors import InputError, file_path, positive
+from assembly.errors import InputError, positive
 from assembly.files.primitives import Primitive, primitives_of
 from assembly.files.robot import Inertial, Robot, UrdfError
 from assembly.files.stl import stl_bytes
@@ -96,11 +97,9 @@ def write_urdf(
     UrdfError
         What is no tree, or has constraints that no robot has; nothing is written then.
     """
-    target = file_path("path", path)
+    target = checked_suffix(path, ".urdf", ".xml", shown=".urdf")
     if not isinstance(what, (Robot, Assembly)):
         raise TypeError(f"what is {what!r}; expected a Robot or an Assembly")
-    if target.suffix.lower() not in (".urdf", ".xml"):
-        raise InputError(f"path is {str(target)!r}; expected a name that ends in .urdf")
     constraints = (*what.joints, *what.couplings) if isinstance(what, Robot) else what.constraints
     joints = [item for item in constraints if isinstance(item, Joint)]
     couplings = [item for item in constraints if isinstance(item, (Gear, Linear, RackPinion))]

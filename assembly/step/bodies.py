@@ -44,8 +44,8 @@ class Source:
     """A file as a document of OCCT, in millimeters, with the number of its faces.
 
     `absent` has the names of missing files that it refers to. The document of a damaged file holds its undamaged
-    entities. Without `repairs` one face that cannot be read is enough to give up. `names` are those of the bodies, in
-    order, if the document does not have them. `advance` is called with numbers of faces that were read.
+    entities. `names` are those of the bodies, in order, if the document does not have them. `advance` is called with
+    numbers of faces that were read. Of a document without `repairs`, one face that cannot be read is enough to give up.
     """
 
     file: Path

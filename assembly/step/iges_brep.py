@@ -8,7 +8,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from assembly.errors import InputError, file_path
+from assembly._file_names import checked_suffix
+from assembly.errors import file_path
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
 from assembly.step.bodies import Source, bodies_in
@@ -93,7 +94,7 @@ def write_iges(
     StepError, InputError, ImportError
         As `write_step`, and a path that does not end in .igs or .iges.
     """
-    file = _named(path, _IGES)
+    file = checked_suffix(path, *_IGES)
     o = occt()
     # Settings exist once there is a writer; 1 writes solids rather than single faces.
     o.IGESCAFControl_Writer()
@@ -123,7 +124,7 @@ def write_brep(
     StepWarning
         Several bodies, whose names are lost.
     """
-    file = _named(path, _BREP)
+    file = checked_suffix(path, *_BREP)
     o = occt()
     with quiet():
         document = document_of_bodies(file, what, checked_unit(unit))
@@ -142,13 +143,6 @@ def _there(path: str | PathLike[str]) -> Path:
     file = file_path("path", path)
     if not file.is_file():
         raise FileNotFoundError(f"path is {str(file)!r}; {'a folder' if file.is_dir() else 'no such file'}")
-    return file
-
-
-def _named(path: str | PathLike[str], suffixes: tuple[str, str]) -> Path:
-    file = file_path("path", path)
-    if file.suffix.lower() not in suffixes:
-        raise InputError(f"path is {str(file)!r}; expected a name that ends in {' or '.join(suffixes)}")
     return file
 
 
@@ -174,8 +168,14 @@ def _document() -> Any:
 
 
 def _document_with(shape: Any) -> Any:
-    document = _document()
-    occt().XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).AddShape(shape, False)
+    o = occt()
+    document, auto = _document(), o.XCAFDoc_ShapeTool.AutoNaming_s()
+    # OCCT would name it by its kind.
+    o.XCAFDoc_ShapeTool.SetAutoNaming_s(False)
+    try:
+        o.XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).AddShape(shape, False)
+    finally:
+        o.XCAFDoc_ShapeTool.SetAutoNaming_s(auto)
     return document
 
 

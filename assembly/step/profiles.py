@@ -129,9 +129,7 @@ class Turning:
     @property
     def knots(self) -> Array:
         """Knots of the arcs."""
-        ends = self._ends.copy()
-        ends[-1] = self.low + (self.high - self.low)
-        return bezier.full_knots(self.radius * ends, 2)
+        return self.radius * _ring_knots(self.low, self.high, self.spans)
 
     def __call__(self, x: Array) -> Array:
         """Our parameter of an angle."""
@@ -159,6 +157,14 @@ def tan_ratio(angle: Array, step: float) -> Array:
 def arc(map_: Turning) -> Spline:
     """Unit arc (cos, sin) of the angles of a map, homogeneous in the plane."""
     return Spline(_ring(map_.low, map_.high, map_.spans), map_.knots, 2)
+
+
+@lru_cache(maxsize=256)
+def _ring_knots(low: float, high: float, spans: int) -> Array:
+    """Knots of an arc by the angle, not to be changed."""
+    ends = np.linspace(low, high, spans + 1)
+    ends[-1] = low + (high - low)
+    return bezier.full_knots(ends, 2)
 
 
 @lru_cache(maxsize=256)
@@ -267,7 +273,7 @@ def _conic_axes(curve: Any) -> tuple[Array, Array, Array, float]:
     """Center, the two half-axes as vectors, and a mean radius, of a circle or an ellipse."""
     position = curve.Position()
     x, y = point(position.XDirection()), point(position.YDirection())
-    if hasattr(curve, "Radius"):
+    if isinstance(curve, (occt().Geom_Circle, occt().Geom2d_Circle)):
         major = minor = curve.Radius()
     else:
         major, minor = curve.MajorRadius(), curve.MinorRadius()

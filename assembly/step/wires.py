@@ -44,7 +44,7 @@ class Traced(NamedTuple):
     seam: bool
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Wire:
     """A wire on a face, which is taken forward.
 
@@ -88,10 +88,12 @@ class Wire:
 def wires_of(face: Any) -> list[Wire]:
     """The wires of a face, which is taken forward."""
     o = occt()
-    return [_wire(o.as_wire(wire), face) for wire in parts(face, o.TopAbs_WIRE)]
+    # A plane has no seams.
+    closes = type(o.BRep_Tool.Surface_s(face)) is not o.Geom_Plane
+    return [_wire(o.as_wire(wire), face, closes) for wire in parts(face, o.TopAbs_WIRE)]
 
 
-def _wire(wire: Any, face: Any) -> Wire:
+def _wire(wire: Any, face: Any, closes: bool) -> Wire:
     o = occt()
     walk = o.BRepTools_WireExplorer(wire, face)
     found = []
@@ -99,15 +101,17 @@ def _wire(wire: Any, face: Any) -> Wire:
         found.append(o.as_edge(walk.Current()))
         walk.Next()
     if len(found) == wire.NbChildren():
-        return Wire(wire, face, [_traced(edge, face) for edge in found], ordered=True, whole=True)
+        return Wire(wire, face, [_traced(edge, face, closes) for edge in found], ordered=True, whole=True)
     sides = (o.TopAbs_FORWARD, o.TopAbs_REVERSED)
     every = [o.as_edge(edge) for edge in parts(wire, o.TopAbs_EDGE) if edge.Orientation() in sides]
     # Where vertices are not shared the walk ends early.
     ordered = len(found) == len(every)
-    return Wire(wire, face, [_traced(edge, face) for edge in (found if ordered else every)], ordered, whole=False)
+    return Wire(
+        wire, face, [_traced(edge, face, closes) for edge in (found if ordered else every)], ordered, whole=False
+    )
 
 
-def _traced(edge: Any, face: Any) -> Traced:
+def _traced(edge: Any, face: Any, closes: bool) -> Traced:
     o = occt()
     tool = o.BRep_Tool
     low, high = tool.Range_s(edge, face)
@@ -117,7 +121,7 @@ def _traced(edge: Any, face: Any) -> Traced:
         place, along = curve.Location(), curve.Direction()
         x, y, dx, dy = place.X(), place.Y(), along.X(), along.Y()
         line = (x + low * dx, y + low * dy), (x + high * dx, y + high * dy)
-    return Traced(edge, curve, low, high, line, tool.IsClosed_s(edge, face))
+    return Traced(edge, curve, low, high, line, closes and tool.IsClosed_s(edge, face))
 
 
 def bounds(wires: list[Wire], surface: Any, face: Any) -> Box:

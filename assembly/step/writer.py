@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from assembly._file_names import other_format
 from assembly.errors import AssemblyError, file_path
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
@@ -23,21 +24,6 @@ if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
 __all__ = ["write_step"]
-
-
-# Suffixes of other formats, and what writes those.
-_OTHERS = {
-    ".json": ("scene", "Assembly.save writes these"),
-    ".html": ("HTML", "asm.view.save_html writes these"),
-    ".stl": ("STL", "asm.write_stl writes these"),
-    ".obj": ("OBJ", "this library does not write them"),
-    ".iges": ("IGES", "asm.write_iges writes these"),
-    ".igs": ("IGES", "asm.write_iges writes these"),
-    ".brep": ("BREP", "asm.write_brep writes these"),
-    ".glb": ("glTF", "asm.write_gltf writes these"),
-    ".gltf": ("glTF", "this library does not write them"),
-    ".urdf": ("URDF", "asm.write_urdf writes these"),
-}
 
 
 def _named(label: Any, name: str) -> None:
@@ -125,7 +111,7 @@ def write_step(
     scale = checked_unit(unit)
     placed_bodies(what)  # bad bodies first
     file = file_path("path", path)
-    other = _OTHERS.get(file.suffix.lower())
+    other = other_format(file, (".step", ".stp"))
     if other is not None:
         raise StepError(f"path is {str(file)!r}, a name of {other[0]} files; expected .step or .stp; {other[1]}")
     o = occt()

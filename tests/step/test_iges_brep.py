@@ -54,6 +54,8 @@ def test_what_is_written_is_read_again(tmp_path, kind, unit):
         for one, other in zip(found, bodies(), strict=True):
             assert one.volume == pytest.approx(other.volume, rel=CLOSE)
         assert found[0].color is not None or found[0].faces[0].face.color is not None
+    else:
+        assert [body.name for body in found] == ["parts", "parts 2", "parts 3", "parts 4"]
 
 
 def test_faces_without_solids_are_sewn(tmp_path):
@@ -97,3 +99,8 @@ def test_bad_input(tmp_path):
     ):
         with pytest.raises(StepError, match=f"asm.{name} writes these"):
             asm.write_step(tmp_path / f"parts{suffix}", bodies())
+    for write in (asm.write_iges, asm.write_brep, asm.write_stl, asm.write_gltf):
+        with pytest.raises(InputError, match="a name of STEP files; expected .*; asm.write_step writes these"):
+            write(tmp_path / "parts.step", bodies())
+    with pytest.raises(InputError, match="parts.xyz'; expected a name that ends in .igs or .iges$"):
+        asm.write_iges(tmp_path / "parts.xyz", bodies())

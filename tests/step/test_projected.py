@@ -13,7 +13,7 @@ from assembly.step import trims
 from assembly.step.bodies import read_shape
 from assembly.step.carriers import spline_curve
 from assembly.step.crossings import crossings
-from assembly.step.edge_feet import move_between, move_to_feet
+from assembly.step.edge_feet import distance_across, fill_surface_points, move_between, move_to_feet
 from assembly.step.occt import quiet, settings
 from assembly.step.profiles import approximated, point
 from assembly.step.projected import Side, is_loose, points_of, projected, space_of
@@ -122,6 +122,29 @@ def test_points_of_curves_are_occt_s(name):
                 np.testing.assert_allclose(
                     points_of(curve, low, high)(at), wanted, rtol=0, atol=3e-14 * (1.0 + abs(wanted).max())
                 )
+
+
+def test_distances_across_a_curve_are_those_in_space():
+    # Beside a helix on a cylinder, along it by 1e-4 and across it by 1e-5 times a wave.
+    surface, t = asm.shapes.cylinder(2.0, 6.0), np.linspace(0.0, 1.0, 19) ** 1.1
+    (u0, u1), (v0, v1) = surface.domain
+    given = np.column_stack([u0 + 0.6 * (u1 - u0) * t, v0 + (0.2 + 0.5 * t) * (v1 - v0)])
+    ground = (*surface._tables, surface.size)
+    s, su, sv = surface.evaluate(given[:, 0], given[:, 1], 1)
+    points = np.empty_like(s)
+    fill_surface_points(ground, given, points)
+    np.testing.assert_array_equal(points, s)
+    slopes = np.gradient(given, t, axis=0)
+    along = su * slopes[:, :1] + sv * slopes[:, 1:]
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    off = 1e-4 * along + 1e-5 * np.sin(9.0 * t)[:, None] * np.cross(np.cross(su, sv), along)
+    there = given + np.array(
+        [np.linalg.lstsq(np.column_stack(ways), way, rcond=None)[0] for *ways, way in zip(su, sv, off, strict=True)]
+    )
+    across = off - (off * along).sum(axis=1)[:, None] * along
+    wanted = np.linalg.norm(across, axis=1).max()
+    assert distance_across(ground, t, given, there) == pytest.approx(wanted, rel=1e-9)
+    assert distance_across(ground, t, given, given) == 0.0
 
 
 def test_points_are_moved_the_same_whichever_they_are_with():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import re
 import tempfile
 from itertools import pairwise
@@ -14,6 +15,7 @@ import pytest
 import assembly as asm
 from assembly._copies import FoundAgain
 from assembly.step import StepError, StepWarning, bodies, reader
+from assembly.step.bodies import Source, Unrepaired
 from assembly.step.documents import document_of
 from assembly.step.edges import Edges
 from assembly.step.faces import read_face
@@ -200,6 +202,56 @@ def test_a_face_that_cannot_be_read_is_named(tmp_path, monkeypatch):
     with pytest.warns(StepWarning, match="tower.step: not read: 'tower', 'face 3'"):
         (body,) = asm.read_step(path, strict=False)
     assert "face 3" not in [side.name for side in body.faces] and "face 4" in [side.name for side in body.faces]
+
+
+def test_occt_s_repairs_are_asked_for_where_a_face_cannot_be_read_without(tmp_path, monkeypatch):
+    file = File()
+    file.part(box(), "box")
+    path = file.write(tmp_path / "box.step")
+    known, read, asked = reader.document_of, bodies.read_face, []
+
+    def document(*given, repairs=True):
+        asked.append(repairs)
+        return known(*given, repairs=repairs)
+
+    def reads(*given):
+        if not asked[-1]:
+            raise Unreadable("it crosses itself")
+        return read(*given)
+
+    monkeypatch.setattr(reader, "document_of", document)
+    asm.read_step(path)
+    assert asked == [False] and gc.isenabled()
+    monkeypatch.setattr(bodies, "read_face", reads)
+    (body,) = asm.read_step(path)
+    assert asked == [False, False, True] and len(body.faces) == 6
+    # Of what is wrong with them as well, it is told once.
+    monkeypatch.setattr(bodies, "read_face", lambda *_: reads(*_) if not asked[-1] else broken())
+    with pytest.raises(StepError, match=r"box.step'; not read: 'box', 'face 1': no; "):
+        asm.read_step(path)
+    assert asked == [False, False, True, False, True] and gc.isenabled()
+
+
+def broken():
+    raise Unreadable("no")
+
+
+def test_loops_that_cross_are_found_without_occt_s_repairs(tmp_path):
+    # A bow tie, which OCCT would cut in two, and a hole across the edge.
+    bow = [(0.0, 0.0), (4.0, 3.0), (4.0, 0.0), (0.0, 3.0)]
+    lines = [
+        O.BRepBuilderAPI_MakeEdge(O.gp_Pnt(*a, 0.0), O.gp_Pnt(*b, 0.0)).Edge() for a, b in pairwise([*bow, bow[0]])
+    ]
+    wire = O.BRepBuilderAPI_MakeWire()
+    for line in lines:
+        wire.Add(line)
+    file = File()
+    file.part(O.BRepBuilderAPI_MakeFace(wire.Wire(), True).Face(), "bow")
+    path = file.write(tmp_path / "bow.step")
+    with quiet():
+        bare = Source(path, *document_of(str(path), repairs=False)[:2], repairs=False)
+        with pytest.raises(Unrepaired, match="'bow'"):
+            bodies.bodies_in(bare, 1.0, True)
 
 
 def test_faces_that_occt_drops_are_counted(tmp_path, monkeypatch):

@@ -53,13 +53,24 @@ class _Corners:
     def __init__(self, periods: Array, reach: float) -> None:
         self.periods, self.reach = periods, reach
         self.points: list[Array] = []
+        self._places: list[tuple[float, float]] = []
+        self._lengths: tuple[float, float] = (float(periods[0]), float(periods[1]))
 
     def number(self, point: Array) -> int:
         """Of a place; a new one if it is none yet."""
-        for k, other in enumerate(self.points):
-            if np.abs(point - other - self.move(k, point)).max() <= self.reach:
+        # Plain floats: each place is compared with all that there are.
+        u, v = point.tolist()
+        period_u, period_v = self._lengths
+        for k, (x, y) in enumerate(self._places):
+            off_u, off_v = u - x, v - y
+            if period_u > 0.0:
+                off_u -= round(off_u / period_u) * period_u
+            if period_v > 0.0:
+                off_v -= round(off_v / period_v) * period_v
+            if abs(off_u) <= self.reach and abs(off_v) <= self.reach:
                 return k
         self.points.append(point)
+        self._places.append((u, v))
         return len(self.points) - 1
 
     def move(self, k: int, point: Array) -> Array:

@@ -193,16 +193,17 @@ def _at_knot(t: float, sampled_curve: _Sampled) -> float:
 def _apart(rows: list[tuple[float, float]], a: _Sampled, b: _Sampled, radius: float) -> list[tuple[float, float]]:
     """Of meetings that are next to one another the middle one, if possible one at an end."""
     left = sorted(set(rows))
+    if not left:
+        return []
+    on_a, on_b = (
+        curve.evaluate(np.array(at)).tolist()
+        for curve, at in zip((a.curve, b.curve), zip(*left, strict=True), strict=True)
+    )
+    places = {row: (*p, *q) for row, p, q in zip(left, on_a, on_b, strict=True)}
     chosen = []
     while left:
-        first = left[0]
-        place, other = a.curve.evaluate(first[0]), b.curve.evaluate(first[1])
-        close = [
-            row
-            for row in left
-            if np.abs(a.curve.evaluate(row[0]) - place).max() <= radius
-            and np.abs(b.curve.evaluate(row[1]) - other).max() <= radius
-        ]
+        place = places[left[0]]
+        close = [row for row in left if max(abs(x - y) for x, y in zip(places[row], place, strict=True)) <= radius]
         left = [row for row in left if row not in close]
         ends = [row for row in close if row[0] in (a.t[0], a.t[-1]) or row[1] in (b.t[0], b.t[-1])]
         both = [row for row in ends if row[0] in (a.t[0], a.t[-1]) and row[1] in (b.t[0], b.t[-1])]

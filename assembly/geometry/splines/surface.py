@@ -152,7 +152,7 @@ class NurbsSurface(FoundAgain, ReadOnlyArrays):
     def _is_same_row(self) -> bool:
         """Whether the edges at both ends of u have the same control points and weights."""
         net, weights = self.control_points, self.weights
-        return bool(net[0].tolist() == net[-1].tolist() and weights[0].tolist() == weights[-1].tolist())
+        return bool((net[0] == net[-1]).all() and (weights[0] == weights[-1]).all())
 
     @cached_property
     def _periods(self) -> tuple[float, float]:

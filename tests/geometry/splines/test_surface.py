@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from assembly.geometry import shapes
 from assembly.geometry.splines import evaluate as spline
 from assembly.geometry.splines.curve import NurbsCurve
-from assembly.geometry.splines.surface import NurbsSurface
+from assembly.geometry.splines.known_surface import known_surface
+from assembly.geometry.splines.surface import COINCIDENT, NurbsSurface
 from tests.geometry.reference import KINDS, fractions, knot_vector, surface_derivatives, surface_point
 
 DEGREES = [(1, 1), (2, 2), (3, 3), (1, 3), (3, 2), (4, 4), (2, 5), (6, 1), (7, 7)]
@@ -326,3 +327,26 @@ def test_arrays_are_copies_and_read_only():
     for array in (surface.control_points, surface.knots[0], surface.knots[1], surface.weights, surface.bezier_pieces()):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        shapes.plane(2.0, 3.0),
+        shapes.cylinder(1.0, 2.0),
+        shapes.cone(1.0, 2.0),
+        shapes.sphere(2.0),
+        shapes.torus(3.0, 1.0),
+    ],
+    ids=["plane", "cylinder", "cone", "sphere", "torus"],
+)
+def test_what_control_points_say_of_the_ends_is_what_pieces_say(surface):
+    pieces, least = surface._pieces, COINCIDENT * surface.size
+    edges = (pieces[0, :, 0], pieces[-1, :, -1], pieces[:, 0, :, 0], pieces[:, -1, :, -1])
+    known = known_surface(*(np.array(surface.control_points), tuple(map(np.array, surface.knots))), surface.degree)
+    points = [(edge[..., :3] / edge[..., 3:]).reshape(-1, 3) for edge in edges]
+    poles = sum(bit for bit, rows in zip((1, 2, 4, 8), points, strict=True) if np.ptp(rows, axis=0).max() <= least)
+    assert surface._pole_bits == poles
+    assert surface.closed == (surface._same_edge(*edges[:2]), surface._same_edge(*edges[2:]))
+    if surface.degree == (1, 1):
+        assert known.size == pytest.approx(surface.size, rel=1e-15) and known._apart == surface._apart
