@@ -192,9 +192,6 @@ class Solving(PackedContents):
         while True:
             packed = self.packed()
             turns = turns if not self._turns_near else self._turns_of(packed)
-            apart = None
-            if isinstance(q0, Solution) and q0._fit is not None and q0._packed.rows == packed.rows:
-                apart = q0._fit.apart
             may_grow = self._crowding < MOST_CROWDING and not isinstance(q0, Solution)
             if packed.clearance_rows and settings[PLACES] != may_grow:
                 settings = settings.copy()
@@ -203,10 +200,10 @@ class Solving(PackedContents):
             load(packed, start)
             begin = perf_counter()
             if reference is None:
-                outcome = attempt(packed, settings, start, interruption, turns, apart)
+                outcome = attempt(packed, settings, start, interruption, turns)
             else:
                 with postures_from(packed, reference):
-                    outcome = attempt(packed, settings, start, interruption, turns, apart)
+                    outcome = attempt(packed, settings, start, interruption, turns)
             spent += perf_counter() - begin
             if not (may_grow and packed.is_crowded(outcome.state)) or interruption.is_over():
                 assert self._scene is not None

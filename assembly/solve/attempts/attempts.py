@@ -13,7 +13,7 @@ from assembly.constraints.program.records import DEEPEST_AT, MANAGER_RECORD
 from assembly.solve.attempts.assembled import run_gathered
 from assembly.solve.attempts.balance import balanced
 from assembly.solve.attempts.corners import corners_first
-from assembly.solve.attempts.fit import Loop, fitted, fitted_again
+from assembly.solve.attempts.fit import Loop, fitted
 from assembly.solve.attempts.postures import following_none, rows_measured_from
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.augmented_lagrangian import solve_program
@@ -87,17 +87,11 @@ def attempt(
     start: Callable[[], Array],
     interruption: Interruption,
     turns: Array | None = None,
-    apart: Array | None = None,
 ) -> Outcome:
     """The outcome of a solve from the states that `start` makes; no other attempt is made once it is interrupted.
 
-    `turns` are values near which angles start, which determine their revolution counts; zeros by default. `apart` is
-    the disagreement of rows, if known.
+    `turns` are values near which angles start, which determine their revolution counts; zeros by default.
     """
-    if apart is not None:
-        known = fitted_again(packed, settings, start(), apart, _loop(interruption, turns))
-        if known is not None:
-            return known
     # A contact has corners of its own only after a solve has met a kink.
     if packed.corners and settings[PENALTY] > settings[PENALTY_FLOOR]:
         found = _with_corners_first(packed, settings, start, interruption, turns)

@@ -42,7 +42,7 @@ from assembly.solve.loop.settings import (
 )
 from assembly.solve.second_order.leave import Fit, Outcome
 
-__all__ = ["Loop", "fitted", "fitted_again"]
+__all__ = ["Loop", "fitted"]
 
 Array = NDArray[np.float64]
 Run = Callable[[Packed, Array, Array], Outcome]
@@ -75,19 +75,6 @@ def fitted(packed: Packed, settings: Array, outcome: Outcome, loop: Loop) -> Out
     if apart is None or not settings[FEASIBILITY] < np.abs(apart).max() <= settings[FIT]:
         return outcome
     return _fitted_from(packed.twin(), settings, outcome, loop) or outcome
-
-
-def fitted_again(packed: Packed, settings: Array, state: Array, apart: Array, loop: Loop) -> Outcome | None:
-    """The outcome of a solve whose start is one where rows disagreed by so much; None where they cannot be fitted."""
-    if not settings[FIT] > 0.0:
-        return None
-    twin = packed.twin()
-    twin.move_values(apart)
-    loose = settings.copy()
-    loose[FEASIBILITY] = max(settings[FEASIBILITY], settings[FIT])
-    outcome = loop.begin(twin, loose, state)
-    twin.move_values(-apart)
-    return _fitted_from(twin, settings, outcome, loop) if outcome.code == SOLVED else None
 
 
 def _fitted_from(twin: Packed, settings: Array, outcome: Outcome, loop: Loop) -> Outcome | None:

@@ -275,6 +275,28 @@ def test_a_linkage_out_of_reach(off):
         assert sum(named.values()) == pytest.approx(3.0 * off, rel=1e-3)
 
 
+def test_a_bent_linkage_that_all_but_reaches_is_fitted():
+    # Straight it is off least, and on the way there the violation becomes level: no step can reduce it, though its
+    # singular value is not that of rows that repeat each other.
+    for seed in (7, 11, 19):
+        rng = np.random.default_rng(seed)
+        off, (a, b), bend = 10.0 ** rng.uniform(-10.5, -6.3), rng.uniform(0.2, 3.0, 2), 10.0 ** rng.uniform(-4.0, -0.5)
+        ground = asm.Body("ground", fixed=True)
+        crank = asm.Body("crank", quaternion=(np.cos(0.5 * bend), 0.0, 0.0, np.sin(0.5 * bend)))
+        rod, slider = asm.Body("rod", position=(a, 0.0, 0.0)), asm.Body("slider", position=(a + b, 0.0, 0.0))
+        scene = asm.Assembly([ground, crank, rod, slider])
+        x = (1, 0, 0)
+        scene.constrain(
+            asm.Revolute(ground, crank, "drive"),
+            asm.Revolute(crank.frame(at=(a, 0, 0)), rod, "pin"),
+            asm.Revolute(rod.frame(at=(b, 0, 0)), slider, "wrist"),
+            asm.Prismatic(ground.frame(z=x), slider.frame(z=x), "guide", slide=(a + b) * (1.0 + off)),
+        )
+        solution = scene.solve()
+        assert solution.status is asm.Status.FITTED, seed
+        assert sum(solution.disagreeing.values()) == pytest.approx((a + b) * off, rel=1e-2), seed
+
+
 @pytest.mark.parametrize("off", [-4.7e-6, 2e-6, 4.9e-6])
 def test_only_what_is_mended_nearby_is_no_disagreement(off):
     # Nothing drives it: along its freedom slopes of a few parts of what it is off would mend a part of it, far away.
