@@ -13,6 +13,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
 from assembly._kernel.progress import counted, progress
+from assembly._kernel.shortcuts import needed_passes, nothing_twice
 from assembly._kernel.translation import quick_translation
 
 __all__ = ["EntryCompiler", "InnerCompiler"]
@@ -126,6 +127,10 @@ class InnerCompiler(Compiler):
         library.enable_object_caching()
         super().__init__(typing_context, target_context, library, *rest)
 
+    def define_pipelines(self) -> list[Any]:
+        """The passes, in one list."""
+        return [needed_passes(self.state)]
+
     def compile_extra(self, func: Callable[..., Any]) -> Any:
         """Compile a function, and all that it calls and that is not compiled yet."""
         compiled = super().compile_extra(func)
@@ -143,7 +148,7 @@ class EntryCompiler(Compiler):
 
     def compile_extra(self, func: Any) -> Any:
         """Compile a function and all that it calls."""
-        with _nothing_else(), quick_translation(), progress(func):
+        with _nothing_else(), quick_translation(), nothing_twice(), progress(func):
             return super().compile_extra(func)
 
 
