@@ -19,7 +19,6 @@ import assembly as asm
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from dexterity_study import six_bar, speed, transmission  # noqa: E402
 
-
 # What Dask does all the time besides: profiles that nobody looks at here, and statistics 50 times a second.
 QUIET = {
     "distributed.worker.profile.enabled": False,

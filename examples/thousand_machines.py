@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import heapq
 import pickle
+from contextlib import closing
 from dataclasses import dataclass
 from tempfile import TemporaryDirectory
 from time import process_time
@@ -68,8 +69,8 @@ def measured() -> Costs:
     plan = asm.sobol({angle: (0.7, 2.7), length: (1.4, 1.6)}, 1024)
     table = Table(plan.values, plan.runs(), 1)
     rows, handing = [], []
-    with TemporaryDirectory() as place, values_set(plan.parameters, [angle.value, length.value]):
-        folder = Folder(place, {})
+    now = [angle.value, length.value]
+    with TemporaryDirectory() as place, closing(Folder(place, {})) as folder, values_set(plan.parameters, now):
         worker = Worker(Job(scene, plan.parameters, columns_of(asm.Measure(out)), None))
         worker.compute(table.chunk([0]))  # what is loaded and packed once is no row's
         while ready := table.ready():

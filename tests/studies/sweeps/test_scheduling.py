@@ -44,7 +44,7 @@ def simulated(rows, speeds):
     return now, count
 
 
-# Measured: 0.3, 0.2, 1.6, 0.5 and 0.6 percent more than the time of the rows over all speeds; 45, 63, 64, 20, 303 chunks.
+# Seen: 0.3, 0.2, 1.6, 0.5 and 0.6 percent more than the time of the rows over all speeds; 45, 63, 64, 20, 303 chunks.
 @pytest.mark.parametrize(
     ("rows", "speeds", "over", "most"),
     [
