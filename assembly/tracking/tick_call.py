@@ -56,11 +56,14 @@ class TickCall:
         # Numbers are written and read through views in half the time that arrays take.
         self._orders: Any = orders.data
         self._lengths: Any = lengths.data
-        # Where no pair has rows, there is no contact manager. The tables do not keep what they lend.
-        tables = packed.table, packed.without_manager()
+        state = work[2]
+        parts = state[: packed.contacts_at].reshape(-1, 7), state[packed.results_at : packed.memory_at]
         self._proof: tuple[Table, Array] = np.zeros((0, 4), dtype=np.int64), np.zeros((0, 6))
-        self._kept = tables, work, orders, lengths
-        self._lent, self._lent_alone = (lent_table((table, *work, orders, lengths, *self._proof)) for table in tables)
+        # Where no pair has rows, there is no contact manager. The tables do not keep what they lend.
+        self._kept = packed.table, packed.without_manager(), work, orders, lengths
+        self._lent, self._lent_alone = (
+            lent_table((table, *work, orders, lengths, *parts, *self._proof)) for table in self._kept[:2]
+        )
 
     def run(self, without_rows: bool, tolerance: float) -> int:
         """Run the loop; how it ended. Clearances may have no rows."""

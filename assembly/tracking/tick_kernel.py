@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from assembly._address import call_address
-from assembly._carve import carve
 from assembly._kernel import kernel
 from assembly._lent import lent_array
 from assembly._record import record_dtype, record_view
-from assembly.constraints.program.records import header_at
 from assembly.proximity.clearance.pair_looks import ON_WAY
 from assembly.solve.loop.settings import results_at
-from assembly.solve.loop.workspace import results_of
 
 # How the proof ended if it was not asked; else as looks end (`proximity/clearance/records.py`).
 NOT_ASKED = -1
 # Rows of the table of arrays that are lent: what `solve_program` takes, from its table to its integers; a record of
-# ORDERS and one of LENGTHS; the table of a proof and what opens contacts, as `stay_clear` takes them.
-LOOP_ROWS, ORDERS_ROW, LENGTHS_ROW, PROOF_ROW, MOVES_ROW = 7, 7, 8, 9, 10
+# ORDERS and one of LENGTHS; poses and results, which are parts of the state; the table of a proof and what opens
+# contacts, as `stay_clear` takes them.
+ORDERS_ROW, LENGTHS_ROW, POSES_ROW, RESULTS_ROW, PROOF_ROW, MOVES_ROW = 7, 8, 9, 10, 11, 12
 ORDERS = record_dtype(
     "i8",
     loop=1,  # the address of `solve_program`
@@ -49,9 +47,9 @@ def run_tick(lent, end_effectors):
     history, block, integer_block = double_rows(lent, 4), doubles(lent, 5), integers(lent, 6)
     code = call_address(orders.loop, (table, pool, settings, state, history, block, integer_block, end_effectors))
     orders.found = NOT_ASKED
-    result = results_at(results_of(table, state), 0)
+    result = results_at(doubles(lent, RESULTS_ROW), 0)
     if orders.proves == 1 and result.carried == 0.0 and result.violation <= lengths.tolerance:
-        q, moves = carve(state, 0, (header_at(table, 0).bodies, 7)), double_rows(lent, MOVES_ROW)
+        q, moves = double_rows(lent, POSES_ROW), double_rows(lent, MOVES_ROW)
         asked, time = (ON_WAY, orders.budget), (orders.clock, orders.until)
         arguments = (integer_rows(lent, PROOF_ROW), q, moves, lengths.touching, asked, time)
         orders.found = call_address(orders.proof, arguments)
