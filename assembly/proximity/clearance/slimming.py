@@ -22,6 +22,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.body_cells import BodyCells
+from assembly.proximity.clearance.kept_proofs import kept_proof
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.clearance.records import NODE
 from assembly.proximity.clearance.touching import filled_bore, off_contacts
@@ -58,12 +59,12 @@ def slim_answer(proof: ClearanceProof, k: int, q: Array, touching: float, shapes
     slim = _slimmer(shapes[inner], tuple(center.tolist()), tuple(across.ravel().tolist()), part)
     both = (slim, shapes[1]) if inner == 0 else (shapes[0], slim)
     at = q[list(proof.pairs[k])]
-    other = ClearanceProof(both, [(0, 1)], [float(proof.minimum[k])])
     left = (1.0 - SLIMMER) * touching
-    move = off_contacts(other, 0, at, left, lambda: None)
-    if move is None:
-        return None
-    (answer,) = other.look(at, touching, move[None])
+    with kept_proof(both, [(0, 1)], [float(proof.minimum[k])]) as other:
+        move = off_contacts(other, 0, at, left, lambda: None)
+        if move is None:
+            return None
+        (answer,) = other.look(at, touching, move[None])
     if answer.verdict not in (Verdict.CLEAR, Verdict.TOUCHING):
         return None
     return Answer(Verdict.TOUCHING, answer.bound - SLIMMER * touching, answer.depth + SLIMMER * touching)
