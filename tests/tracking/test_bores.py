@@ -126,3 +126,53 @@ def test_a_ball_goes_down_into_its_socket():
     path += [asm.Pose((0.002 * k, 0, -0.2), (np.cos(0.01 * k), np.sin(0.01 * k), 0, 0)) for k in range(1, 16)]
     step, _ = dragged(scene, ball, path, depth, 40.0)
     assert np.linalg.norm(step.q[1, :3]) == pytest.approx(PLAY, abs=1e-6)
+
+
+def test_a_shoulder_comes_to_lie_on_the_bearing(cases):
+    """A shaft that leans in its bore, pressed on its mouth, comes upright on its shoulder: wall and face touch at once.
+
+    Its faces are of a revolution, and flat ones have polar parameters.
+    """
+    profile = asm.curves.polygon([(0, -40), (SHAFT, -40), (SHAFT, 0), (16, 0), (16, 10), (0, 10)])
+    bodies = [
+        asm.Body("plate", asm.shapes.plate(50, 50, HEIGHT, [(0, 0, BORE)]), fixed=True),
+        asm.Body("shaft", asm.shapes.revolution(profile), position=(0, 0, 14)),
+    ]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+    tracker, statuses = scene.tracker(bodies[1].point(0, 0, 0)), Counter()
+    for z in np.linspace(14.0, 7.0, cases(30, 300)):
+        step = tracker.step((0.3, 0.0, z))
+        statuses[step.status] += 1
+        assert step.proved
+    for _ in range(10):
+        step = tracker.step((0.3, 0.0, 7.0))
+    # One may be, where the shoulder meets the bearing.
+    assert statuses[TrackStatus.HELD] <= 1 and step.status is TrackStatus.FOLLOWED
+    np.testing.assert_allclose(step.q[1, [0, 1, 2, 4, 5]], (PLAY, 0, 10, 0, 0), atol=1e-6)
+
+
+def test_a_pin_is_let_down_into_its_hole():
+    """It passes the mouth where it is led, and no row of the hole's rim turns it aside."""
+    scene, pin = bearing(80.0, (0.0, 0.0, 62.0))
+    tracker = scene.tracker(pin.point(0, 0, 0))
+    for z in np.linspace(62.0, 30.0, 60):
+        step = tracker.step((0.0, 0.0, z))
+        assert step.status is TrackStatus.FOLLOWED and step.proved
+        np.testing.assert_allclose(step.q[1], (0, 0, z, 1, 0, 0, 0), atol=1e-9)
+
+
+def test_a_plug_is_dragged_in_its_conical_seat(cases):
+    """Lifted and moved aside: a cone in a cone is clear where the levels of its circles say so, with no cell halved."""
+    slope = np.tan(np.pi / 6.0)
+    plug = asm.shapes.revolution(asm.curves.polygon([(0, 5), (5 * slope, 5), (20 * slope, 20), (0, 20)]))
+    seat = asm.shapes.revolution(asm.curves.polygon([(3 * slope, 3), (30, 3), (30, 18), (18 * slope, 18)]))
+    bodies = [asm.Body("seat", seat, fixed=True), asm.Body("plug", plug, position=(0, 0, 0.5))]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+    tracker, statuses = scene.tracker(bodies[1].point(0, 0, 15)), Counter()
+    for k in range(cases(40, 400)):
+        step = tracker.step((0.01 * k, 0.0, 15.5 + 0.1 * k))
+        statuses[step.status] += 1
+        assert step.proved
+    assert set(statuses) <= {TrackStatus.FOLLOWED, TrackStatus.APPROACHING}

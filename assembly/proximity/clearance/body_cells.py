@@ -70,7 +70,7 @@ class BodyCells:
     radius : float
         The least radius of what is round of the body, wires, cylinders, balls, tubes; else a quarter of its size.
     walls : tuple of Round
-        Faces that are walls of bores, or of hollow balls.
+        Faces that are walls of cylindrical bores, or of hollow balls.
     """
 
     table: Table
@@ -121,7 +121,8 @@ def _made_of(faces: tuple[Face, ...]) -> BodyCells:
     part, rounds, holes = _parts(topology.faces, tables)
     bores = bores_of(rounds, holes, part, rows_of(NODE, nodes), size)
     builder = _Builder(links, nodes, part, rounds, bores)
-    radii = [found.radius for found in rounds if found is not None]
+    # A cone has any radius down to none.
+    radii = [found.radius for found in rounds if found is not None and not found.is_conical]
     radii += [float(table.first[0, 1]) for table in tables if isinstance(table, WireCells)]
     builder.build()
     _center_on_axis(rows_of(NODE, builder.nodes)[0], rounds)
@@ -139,7 +140,7 @@ def _made_of(faces: tuple[Face, ...]) -> BodyCells:
         size,
         float(max(np.abs(low).max(), np.abs(high).max())),
         min([0.25 * size, *radii]),
-        tuple(found for found in rounds if found is not None and not found.outward),
+        tuple(found for found in rounds if found is not None and not (found.outward or found.is_conical)),
     )
 
 
@@ -280,7 +281,7 @@ class _Builder:
         for k in np.flatnonzero((halved.whole >= 0) & (self.child != NONE)).tolist():
             found = self.rounds[halved.whole[k]]
             if found is not None and found.outward:
-                # All that lies on a cylinder, a ball or a torus from inside of it.
+                # All that lies on a cylinder, a cone, a ball or a torus from inside of it.
                 _write_round(rows_of(NODE, self.nodes[k : k + 1])[0], found)
                 is_round[k] = True
         boxed = np.flatnonzero((self.child != NONE) & ~is_round)
@@ -309,14 +310,15 @@ class _Builder:
             self._write_bores(self.first[cells], self.bores.nearest(parts, corners, rulings), turned=False)
 
     def _write_bores(self, rows: Table, found: tuple[Table, Array], turned: bool = True) -> None:
-        """Write bores into nodes, and their directions unless these have them."""
+        """Write bores into nodes, and their directions unless these have them and are not to be turned."""
         assert self.bores is not None
         bore, radius = found
         rows, bore, radius = rows[bore >= 0], bore[bore >= 0], radius[bore >= 0]
         nodes = rows_of(NODE, self.nodes)
-        nodes.bore[rows], nodes.spine[rows] = radius, self.bores.center[bore]
-        if turned:
-            nodes.ruling[rows] = self.bores.axis[bore]
+        nodes.bore[rows], nodes.spine[rows], nodes.slant[rows] = radius, self.bores.center[bore], self.bores.slant[bore]
+        # What has no ruling has no disc, either.
+        free = np.full(len(rows), turned) | ~nodes.ruling[rows].any(axis=1)
+        nodes.ruling[rows[free]] = self.bores.axis[bore[free]]
 
 
 def _center_on_axis(root: np.record, rounds: list[Round | None]) -> None:
@@ -338,7 +340,7 @@ def _center_on_axis(root: np.record, rounds: list[Round | None]) -> None:
 
 
 def _write_round(node: np.record, found: Round) -> None:
-    """The exact hull of a cylinder, a ball or a torus."""
+    """The exact hull of a cylinder, a cone, a ball or a torus."""
     axis = found.axis if found.axis.any() else np.array([0.0, 0.0, 1.0])
     across = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     across /= np.linalg.norm(across)
@@ -347,7 +349,7 @@ def _write_round(node: np.record, found: Round) -> None:
     if found.ring > 0.0:
         node.disc, node.rho, node.radius = found.ring, found.radius, found.ring + found.radius
     elif found.axis.any():
-        node.half = found.half, 0.0, 0.0
+        node.half, node.less = (found.half, 0.0, 0.0), found.less
         node.disc, node.radius = found.radius, np.hypot(found.half, found.radius) * ROUNDED_UP
     else:
         node.rho = node.radius = found.radius

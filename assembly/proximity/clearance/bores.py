@@ -2,8 +2,9 @@
 
 A bore is a line with a radius: no point of a wall on a cylinder is nearer to its axis than that, and neither is one of
 a flat face whose round hole the bore ends in, for the face is what is outside of that circle. Of other parts cells tell
-how near to the line they are. A node of the tree is outside of the least of its parts, so that a pin that is within is
-clear of all of them at once.
+how near to the line they are. Of a conical bore the level about its axis (`separation.most_in_bore`) stands for the
+distance from a line: over all that is outside it is no less than over the wall. A node of the tree is outside of the
+least of its parts, so that a pin that is within is clear of all of them at once.
 """
 
 from __future__ import annotations
@@ -34,8 +35,10 @@ class Bores:
     ----------
     center, axis : (b, 3)
         The axis is zero for a ball.
+    slant : (b,)
+        The sine of the angle of a cone's wall to the axis; else zero.
     least : (parts, b)
-        No point of a part is nearer to the axis than this; 0 where nothing is known.
+        No point of a part is nearer to the axis than this, or has a lower level; 0 where nothing is known.
     own : (parts, b) of bool
         Whether a part is a wall of the bore, or a flat face with a hole around it.
     size : float
@@ -44,6 +47,7 @@ class Bores:
 
     center: Array
     axis: Array
+    slant: Array
     least: Array
     own: NDArray[np.bool_]
     size: float
@@ -63,17 +67,20 @@ class Bores:
         """
         n = len(groups.starts)
         best, bore, radius = np.full(n, np.inf), np.full(n, -1), np.zeros(n)
-        for b, (center, axis) in enumerate(zip(self.center, self.axis, strict=True)):
+        for b, (center, axis, slant) in enumerate(zip(self.center, self.axis, self.slant, strict=True)):
             least = np.minimum.reduceat(self.least[groups.members, b], groups.starts)
             usable = np.logical_or.reduceat(self.own[groups.members, b], groups.starts)
             if rulings is not None:
                 # The same axis along the ruling is so far off over the body.
                 least = least - 2.0 * self.size * np.linalg.norm(np.cross(axis, rulings), axis=1)
-                usable &= rulings.any(axis=1) == axis.any()
+                # The wall of a cone has none, nor has that of a ball.
+                usable &= (rulings.any(axis=1) == axis.any()) | (slant > 0.0)
             off = points - center
             off = off - (off @ axis)[..., None] * axis
             far = np.sort(np.linalg.norm(off, axis=2), axis=1)[:, min(1, points.shape[1] - 1)]
             score = np.where(usable & (least > 0.0), far / np.maximum(least, SAME * self.size), np.inf)
+            # Of bores about one axis the conical one, as far as nodes have parts of it.
+            score -= SAME * (slant > 0.0)
             better = score < best
             best[better], bore[better], radius[better] = score[better], b, least[better]
         return bore, radius
@@ -100,7 +107,11 @@ def bores_of(
         [*own, *([one] if one is not None and not one.outward else [])] for one, own in zip(rounds, holes, strict=True)
     ]
     distinct: list[Round] = []
+    cones = [bore for own in found for bore in own if bore.slant > 0.0]
     for bore in (bore for own in found for bore in own):
+        # What the mouth of a cone holds, the cone holds.
+        if any(_is_mouth(bore, cone, size) for cone in cones):
+            continue
         if all(_apart(bore, other, size) > SAME * size for other in distinct):
             distinct.append(bore)
     if not distinct:
@@ -114,9 +125,38 @@ def bores_of(
                 off = _apart(one, bore, size)
                 if off <= SAME * size:
                     own[p, b], least[p, b] = True, one.radius - off
+                elif bore.slant > 0.0 and one.slant == 0.0 and one.axis.any():
+                    level = _level_of_hole(one, bore, size)
+                    own[p, b] |= abs(level - bore.radius) <= 4.0 * SAME * size
+                    least[p, b] = max(least[p, b], level)
     return Bores(
-        np.array([bore.center for bore in distinct]), np.array([bore.axis for bore in distinct]), least, own, size
+        np.array([bore.center for bore in distinct]),
+        np.array([bore.axis for bore in distinct]),
+        np.array([bore.slant for bore in distinct]),
+        least,
+        own,
+        size,
     )
+
+
+def _is_mouth(hole: Round, cone: Round, size: float) -> bool:
+    """Whether a hole of a flat face is where a conical bore is widest."""
+    if hole.slant > 0.0 or not hole.axis.any() or float(np.linalg.norm(hole.center - cone.center)) > SAME * size:
+        return False
+    return abs(_level_of_hole(hole, cone, size) - cone.radius) <= 4.0 * SAME * size
+
+
+def _level_of_hole(hole: Round, bore: Round, size: float) -> float:
+    """What the level of a conical bore is at least over a flat face around a hole; -1 where that is elsewhere."""
+    lean = float(np.linalg.norm(np.cross(hole.axis, bore.axis)))
+    off = hole.center - bore.center
+    along = float(off @ bore.axis)
+    beside = float(np.linalg.norm(off - along * bore.axis))
+    # A cylinder of some length is no hole of a flat face.
+    if max(lean * size, beside, hole.half) > SAME * size:
+        return -1.0
+    pad = beside + hole.half + 2.0 * lean * size
+    return float(np.sqrt(1.0 - bore.slant**2) * hole.radius - bore.slant * along - 2.0 * pad)
 
 
 def _apart(one: Round, other: Round, size: float) -> float:
@@ -124,21 +164,27 @@ def _apart(one: Round, other: Round, size: float) -> float:
     if one.axis.any() != other.axis.any():
         return np.inf
     off = one.center - other.center
-    off = off - (off @ other.axis) * other.axis
+    if one.slant != other.slant or (one.slant > 0.0 and one.axis @ other.axis < 0.0):
+        return np.inf
+    if one.slant == 0.0:
+        off = off - (off @ other.axis) * other.axis
     return float(np.linalg.norm(off) + 2.0 * size * np.linalg.norm(np.cross(one.axis, other.axis)))
 
 
 def distances_of_parts(bore: Round, part: Table, cells: np.recarray, count: int) -> Array:
-    """How far parts are from the axis of a bore, at least, by a plane between that and each cell."""
-    corners = cells.corner - bore.center
-    corners = corners - (corners @ bore.axis)[..., None] * bore.axis
+    """How far parts are from the axis of a bore, or their least level, by a plane between that and each cell."""
+    off = cells.corner - bore.center
+    along = off @ bore.axis
+    corners = off - along[..., None] * bore.axis
+    cosine = float(np.sqrt(1.0 - bore.slant**2))
     normals = cells.axes[:, 2] - (cells.axes[:, 2] @ bore.axis)[:, None] * bore.axis
-    best = np.zeros(len(corners))
+    best = np.full(len(corners), -np.inf if bore.slant > 0.0 else 0.0)
     for ways in (corners.mean(axis=1), normals):
         lengths = np.linalg.norm(ways, axis=1)
         units = ways / np.where(lengths > 0.0, lengths, 1.0)[:, None]
-        heights = (corners * units[:, None]).sum(axis=2)
-        best = np.maximum(best, np.maximum(heights.min(axis=1), -heights.max(axis=1)))
+        heights = cosine * (corners * units[:, None]).sum(axis=2)
+        lower, upper = heights - bore.slant * along, heights + bore.slant * along
+        best = np.maximum(best, np.maximum(lower.min(axis=1), -upper.max(axis=1)))
     far = float(np.abs(cells.corner).max())
     least = np.full(count, np.inf)
     np.minimum.at(least, part, best - (cells.rho + cells.disc) - ROUNDING * far)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 from assembly._kernel import kernel
+from assembly.geometry.vec import sub
+from assembly.kinematics.motion import inverse_pose
 from assembly.proximity.clearance.directions import best_direction
 from assembly.proximity.clearance.front import (
     Limits,
@@ -45,7 +47,7 @@ from assembly.proximity.clearance.records import (
     pair_proof_at,
     parted_at,
 )
-from assembly.proximity.clearance.separation import is_cell, is_round, is_wire
+from assembly.proximity.clearance.separation import is_cell, is_round, is_wire, most_in_bore, placed
 from assembly.proximity.clearance.sleeves import best_bore, gap_of
 from assembly.proximity.clearance.spines import spine_gap
 from assembly.proximity.clearance.stab import crossing_of
@@ -151,10 +153,25 @@ def is_too_long(forest, way, nodes, gaps):
 
 
 @kernel(inner=True)
-def divide(forest, front, nodes, n, tail, short):
+def is_held(forest, wall, k, pose):
+    """Whether a box is in the bore of a wall with its middle: its parts may be, all of them, and exactly."""
+    bore = node_at(forest.nodes, wall)
+    if not bore.bore > 0.0 or is_cell(forest, k) or is_round(forest, k):
+        return False
+    d = sub(placed(pose, vector(node_at(forest.nodes, k).center)), vector(bore.spine))
+    return most_in_bore(bore, d, vector(bore.ruling), 0.0) < bore.bore
+
+
+@kernel(inner=True)
+def divide(forest, front, nodes, pose, n, tail, short):
     """Put the children of one of two nodes into the queue, beside the other one; False where there is no room."""
     a, b = nodes.a, nodes.b
     first, by_length = is_halved_first(forest, a, b, short)
+    # What is in a bore is divided before what has the bore.
+    if is_held(forest, a, b, pose):
+        first = False
+    elif is_held(forest, b, a, inverse_pose(pose)):
+        first = True
     k = a if first else b
     if links_at(forest.links, k).child == NONE:
         counts_at(front.counts, 0).halved += 1
@@ -218,7 +235,7 @@ def seek(forest, front, way, limits, tail):
             counts.opened += 1
             keep(front, Parted(nodes.a, nodes.b, LEFT_OPEN), n, -math.inf)
             continue
-        if not divide(forest, front, nodes, n, tail, max(way.sag - gaps[1], 0.0)):
+        if not divide(forest, front, nodes, way.after, n, tail, max(way.sag - gaps[1], 0.0)):
             return NO_ROOM
         tail += 2
     return OPEN if counts.opened > 0 else CLEAR

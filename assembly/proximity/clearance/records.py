@@ -5,10 +5,10 @@ A node stands for a part of a body's boundary, which is within
     (the hull of four corners, or an oriented box)  +  (a disc of radius `disc` across `ruling`)  +  (a ball of `rho`)
 
 (sums of sets). A cell is a part of one face in (u, v) and has corners; a node above cells has a box. Over the box of
-one whole face that lies on a cylinder, a ball or a torus from outside stands the exact hull of that: a segment and a
-disc, a point and a ball, a disc and a ball. A whole face that is the wall of a bore (a cylinder or a ball from inside)
-lies nowhere nearer than `bore` to its axis, or center: what is within that is clear of it. So it is with all of a flat
-face that has a round hole.
+one whole face that lies on a cylinder, a cone, a ball or a torus from outside stands the exact hull of that: a segment
+and a disc, two discs, a point and a ball, a disc and a ball. A whole face that is the wall of a bore (a cylinder or a
+ball from inside) lies nowhere nearer than `bore` to its axis, or center: what is within that is clear of it. So it is
+with all of a flat face that has a round hole. Of a conical bore that is the level `room_in_bore` has.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ NODE = record_dtype(
     ruling=3,  # across which the disc lies: a unit vector
     disc=1,
     rho=1,
+    less=2,  # of the hull of a cone, by how much its disc is smaller at the end along the first axis, and at the other
+    slant=1,  # of a conical bore, the sine of the angle of its wall to its axis, along which it gets wider
     bore=1,  # how far a bore's wall, or a face beside a hole, is from the line along `ruling` by `spine`, or that point
     spine=3,  # of a piece of a wire the center of its arc, of a bore a point of its axis
     corner=(4, 3),  # of a cell; of a triangle the last two are the same

@@ -1,9 +1,9 @@
-"""Faces that lie on a cylinder, a ball or a torus, and discs: exact hulls, and bores of walls from inside."""
+"""Faces that lie on a cylinder, a cone, a ball or a torus, and discs: exact hulls, and bores of walls from inside."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi
+from math import cos, pi, sin, tan
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.curves import Circle, curve_form
-from assembly.geometry.recognition.forms import Cylinder, Plane, Sphere, Torus
+from assembly.geometry.recognition.forms import Cone, Cylinder, Plane, Sphere, Torus
 from assembly.geometry.splines import bezier
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.manifolds.elementary_faces import NEARLY, nearly_elementary
@@ -46,6 +46,11 @@ class Round:
         Of a torus, the radius of the circle of its middles; else 0.
     outward : bool
         Whether the body is within.
+    less : (float, float)
+        Of a cone from outside, by how much it is narrower than the radius at its ends along the axis and against it.
+    slant : float
+        Of a cone from inside, the sine of the angle of its wall to the axis, along which it gets wider. Its radius is
+        the level of the wall (`separation.most_in_bore`), counted from the center.
     """
 
     center: Array
@@ -54,6 +59,13 @@ class Round:
     radius: float
     ring: float
     outward: bool
+    less: tuple[float, float] = (0.0, 0.0)
+    slant: float = 0.0
+
+    @property
+    def is_conical(self) -> bool:
+        """Whether it is a cone."""
+        return self.slant > 0.0 or any(self.less)
 
 
 def _radius(radius: float, deviation: float, outward: bool) -> float:
@@ -130,12 +142,27 @@ def round_holes(face: Face) -> list[Round]:
     ]
 
 
+def _cone(form: Cone, outward: bool) -> Round:
+    """A cone from outside by its end circles, or from inside by its level, about the middle of its widest circle."""
+    low, high = form.heights
+    off, slope = form.deviation, tan(form.half_angle)
+    if outward:
+        # The hull of both end circles, which are moved along the axis by a deviation, too.
+        pad = off + slope * (off + high * (ROUNDED_UP - 1.0))
+        widest, narrowest = (_radius(height * slope, pad, True) for height in (high, low))
+        center, half = form.apex + 0.5 * (low + high) * form.axis, 0.5 * (high - low) * ROUNDED_UP + off
+        return Round(center, form.axis, half, widest, 0.0, True, (0.0, (widest - narrowest) / ROUNDED_UP))
+    level = cos(form.half_angle) * high * slope
+    center = form.apex + high * form.axis
+    return Round(center, form.axis, 0.0, _radius(level, off, False), 0.0, False, slant=sin(form.half_angle))
+
+
 def round_of(face: Face) -> Round | None:
-    """What a face lies on, or None where that is no cylinder, ball or torus, and the face no disc."""
+    """What a face lies on, or None where that is no cylinder, cone, ball or torus, and the face no disc."""
     form = nearly_elementary(face.surface)
     if isinstance(form, Plane):
         return _disc(face)
-    if not isinstance(form, (Cylinder, Sphere, Torus)):
+    if not isinstance(form, (Cone, Cylinder, Sphere, Torus)):
         return None
     outward, off = form.outward == (face.sign > 0), form.deviation
     if isinstance(form, Torus):
@@ -148,6 +175,8 @@ def round_of(face: Face) -> Round | None:
         return Round(form.center, np.zeros(3), 0.0, _radius(form.radius, off, outward), 0.0, outward)
     if outward and form.turn.angle < HALF:
         return None
+    if isinstance(form, Cone):
+        return _cone(form, outward)
     half = form.heights[1] * ROUNDED_UP + off
     return Round(form.point, form.axis, half, _radius(form.radius, off, outward), 0.0, outward)
 

@@ -27,6 +27,8 @@ from assembly.proximity.clearance.records import (
 
 # Steps of Newton's method toward the best bound of a disc in a bore; each bound on the way holds.
 NEWTON = 6
+# Tangents that are tried of a disc in a cone; each bound holds. A root that is less is replaced by this.
+TANGENTS, LEAST_ROOT = 6, 1e-3
 
 
 @kernel(inline=True)
@@ -55,7 +57,12 @@ def highest(forest, k, n):
         for i in range(3):
             top += node.half[i] * abs(dot(vector(node.axes[i]), n))
     if node.disc > 0.0:
-        top += node.disc * across(n, vector(node.ruling))
+        flat = across(n, vector(node.ruling))
+        if node.less[0] + node.less[1] > 0.0:
+            h = node.half[0] * dot(vector(node.axes[0]), n)
+            top -= abs(h)
+            top += max(h - node.less[0] * flat, -h - node.less[1] * flat)
+        top += node.disc * flat
     return top + node.rho
 
 
@@ -144,19 +151,58 @@ def farthest_of_section(e, lean, radius):
 
 
 @kernel(inner=True)
+def level_of_disc(slant, d, axis, ruling, radius):
+    """What the level of a cone is over a disc about d, seen from a point of the cone's axis, at most.
+
+    With the angle s of the cone to its axis a, and N(u) = cos(s) u - sin(s) a, the level f(x) = cos(s) |x across a| -
+    sin(s) a.x is the largest N(u).x over unit vectors u across a: it is convex, and no two points differ by more than
+    they are apart. Over a disc of radius r across b it is the largest
+
+        N(u).d + r sqrt(1 - t^2),   t = N(u).b.
+
+    The root is concave in t, and so nowhere above its tangent at any t0. That leaves a linear function of u, whose
+    maximum is a length: a bound for every t0, and the maximum itself where t0 is the t of the u that attains it.
+    """
+    cosine = math.sqrt(1.0 - slant * slant)
+    height, upright = dot(d, axis), dot(ruling, axis)
+    off, lean = sub(d, scale(height, axis)), sub(ruling, scale(upright, axis))
+    t, best = -slant * upright, math.inf
+    for _ in range(TANGENTS):
+        root = math.sqrt(max(1.0 - t * t, LEAST_ROOT * LEAST_ROOT))
+        t = max(min(t, 1.0), -1.0)
+        steep = radius * t / root
+        v = scale(cosine, sub(off, scale(steep, lean)))
+        length = math.sqrt(dot(v, v))
+        tangent = radius * root + steep * t
+        best = min(best, tangent + steep * slant * upright - slant * height + length)
+        if length == 0.0:
+            break
+        t = cosine * dot(v, lean) / length - slant * upright
+    return best
+
+
+@kernel(inner=True)
+def most_in_bore(bore, d, ruling, radius):
+    """How far a disc about d, from a point of a bore's axis, is from the axis at most; of a conical bore, its level."""
+    axis = vector(bore.ruling)
+    if bore.slant == 0.0:
+        return farthest_of_disc(d, axis, ruling, radius)
+    return level_of_disc(bore.slant, d, axis, ruling, radius)
+
+
+@kernel(inner=True)
 def room_in_bore(forest, wall, k, pose, as_ball):
     """How far node k, at a pose seen from the wall's body, is from the wall of a bore in which it is; else negative.
 
     With `as_ball` its disc is replaced by a ball of the same radius: a lower bound, however its axis turns.
     """
     bore, node = node_at(forest.nodes, wall), node_at(forest.nodes, k)
-    axis, spine = vector(bore.ruling), vector(bore.spine)
-    ruling = matvec(pose.rotation, vector(node.ruling))
-    disc, most = 0.0 if as_ball else node.disc, 0.0
+    spine, ruling = vector(bore.spine), matvec(pose.rotation, vector(node.ruling))
+    disc, most = 0.0 if as_ball else node.disc, -math.inf
     if links_at(forest.links, k).face != NONE:
         for i in range(4):
             d = sub(placed(pose, corner_of(node, i)), spine)
-            most = max(most, farthest_of_disc(d, axis, ruling, disc))
+            most = max(most, most_in_bore(bore, d, ruling, disc))
     else:
         center = sub(placed(pose, vector(node.center)), spine)
         u = scale(node.half[0], matvec(pose.rotation, vector(node.axes[0])))
@@ -166,7 +212,7 @@ def room_in_bore(forest, wall, k, pose, as_ball):
             d = sub(center, u) if i & 1 else add(center, u)
             d = add(d, v) if i & 2 else sub(d, v)
             d = add(d, w) if i & 4 else sub(d, w)
-            most = max(most, farthest_of_disc(d, axis, ruling, disc))
+            most = max(most, most_in_bore(bore, d, ruling, max(disc - node.less[i & 1], 0.0)))
     return bore.bore - most - node.rho - (node.disc - disc)
 
 

@@ -77,9 +77,9 @@ def best_sleeve(forest, a, b, pose):
     """Which sleeve of node a leaves node b, a cylinder, the most room, and that room; BY_PLANE if there is none."""
     one, other = node_at(forest.nodes, a), node_at(forest.nodes, b)
     axis = vector(one.ruling)
-    if not one.bore > 0.0 or dot(axis, axis) == 0.0 or not is_round(forest, b):
+    if not one.bore > 0.0 or one.slant > 0.0 or dot(axis, axis) == 0.0 or not is_round(forest, b):
         return BY_PLANE, -math.inf
-    if other.rho > 0.0 or not other.half[0] > 0.0:
+    if other.rho > 0.0 or not other.half[0] > 0.0 or other.less[0] + other.less[1] > 0.0:
         return BY_PLANE, -math.inf
     how, best = BY_PLANE, -math.inf
     for i in range(3):

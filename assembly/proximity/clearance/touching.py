@@ -76,6 +76,7 @@ def recognized(cells: BodyCells) -> Recognized:
     every = rows_of(NODE, cells.nodes)
     # Of the hull of a torus both are above zero; a disc has no length.
     is_round = (rows_of(LINKS, cells.links).face == NONE) & ((every.disc > 0.0) != (every.rho > 0.0))
+    is_round &= ~every.less.any(axis=1)
     rounds = every[is_round & ((every.disc == 0.0) | (every.half[:, 0] > SHORT * every.disc))]
     along = (rounds.half[:, 0, None] * rounds.axes[:, 0])[:, None]
     ends = rounds.center[:, None] + np.array([[[-1.0], [1.0]]]) * along

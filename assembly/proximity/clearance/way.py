@@ -33,6 +33,8 @@ LEAST_SINE, LARGEST_ANGLE = 1e-9, 3.0
 AXIS_OFF = 1e-6
 # How far what leans in a sleeve may turn on a way [rad]: bounds of `sleeve_sag` rest on it.
 MOST_TURN = 0.05
+# The largest sine of an angle between a wall's normal and a plane across a shaft (`sag_of_disc`).
+STEEPEST = 0.99
 # The rounding error of the rotation's skew part, whose direction is the axis: that of two matrices and their product.
 SINE_OFF = 1e-14
 
@@ -95,6 +97,36 @@ def as_ball(forest, nodes, pose, n, gap):
         return gap - (room - room_in_bore(forest, nodes.a, nodes.b, pose, True))
     flat = across(n, matvec(pose.rotation, vector(node.ruling)))
     return gap - node.disc * (1.0 - flat + 1e-15)
+
+
+@kernel(inner=True)
+def sag_of_disc(way, forest, a, b):
+    """How far the disc of round node b reaches, on the way, beyond the chord of its reach at the ends, in a bore of a.
+
+    Along a unit vector N that is fixed to the wall it reaches r sqrt(1 - t^2), t = N.u, from its middle, u its axis.
+    With w the angle of the way and w1 the part of it by which u turns, |t'| <= w1 and |t''| <= w w1, so that
+
+        |second derivative| <= r ((w1^2 + |t| w w1) / f + t^2 w1^2 / f^3),   f = sqrt(1 - t^2),
+
+    and |t| is at most the sine of the wall's angle to its axis and that of the lean, added.
+    """
+    wall, node = node_at(forest.nodes, a), node_at(forest.nodes, b)
+    bore, ruling = vector(wall.ruling), vector(node.ruling)
+    if node.disc == 0.0:
+        return 0.0
+    if dot(bore, bore) == 0.0:
+        return math.inf
+    angle = 4.0 * math.asin(min(math.sqrt(0.5 * way.factor), 1.0))
+    turned = angle
+    if dot(way.axis, way.axis) > 0.0:
+        turned *= min(across(way.axis, ruling) + way.lean, 1.0)
+    lean = max(across(matvec(way.before.rotation, ruling), bore), across(matvec(way.after.rotation, ruling), bore))
+    t = wall.slant + lean + turned
+    if t > STEEPEST:
+        return math.inf
+    f = math.sqrt(1.0 - t * t)
+    second = (turned * turned + t * angle * turned) / f + (t * turned) ** 2 / (f * f * f)
+    return 0.125 * node.disc * second * ROUNDED_UP
 
 
 @kernel(inner=True)
@@ -165,6 +197,10 @@ def stays_apart(forest, nodes, way, n, gaps):
     if nodes.how >= BY_SLEEVE:
         sag = sleeve_sag(way, forest, nodes.a, nodes.b)
         return after > sag and before > sag
+    if nodes.how == BY_BORE_A and is_round(forest, nodes.b):
+        sag = sag_of(way, forest, nodes.b) + sag_of_disc(way, forest, nodes.a, nodes.b)
+        if after > sag and before > sag:
+            return True
     part = 1.0 if nodes.how == BY_BORE_A else part_along(way, n)
     if after > part * way.sag and before > part * way.sag:
         return True

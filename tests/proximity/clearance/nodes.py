@@ -42,6 +42,10 @@ def top(node, is_cell, n):
         high = n @ node.center + np.abs(n @ node.axes.T) @ node.half
     along = n @ node.ruling
     across = np.linalg.norm(n - along[:, None] * node.ruling, axis=1)
+    if not is_cell and node.less.any():
+        # Two discs.
+        h = node.half[0] * (n @ node.axes[0])
+        high = n @ node.center + np.maximum(h - node.less[0] * across, -h - node.less[1] * across)
     return high + node.disc * across + node.rho
 
 

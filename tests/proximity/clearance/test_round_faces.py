@@ -143,7 +143,7 @@ def test_hulls_above_cells_hold_samples(name):
 
 def test_what_is_not_round_is_none(cases):
     rng = np.random.default_rng(4)
-    for name in ("ellipsoid", "cone", "sheet", "trimmed sheet", "box"):
+    for name in ("ellipsoid", "sheet", "trimmed sheet", "box"):
         assert [round_of(face) for face in faces_of(shapes()[name])] == [None] * len(faces_of(shapes()[name]))
     assert round_of(bumpy_hole()) is None
     for _ in range(cases(10, 300)):
@@ -216,3 +216,32 @@ def test_flat_rings_of_revolutions(cases):
     edges[:, 0] = edges[:, 0] @ Rotation.from_rotvec((0.0, 0.0, 0.4)).as_matrix().T
     surface = asm.NurbsSurface(net, one.surface.knots, one.surface.degree, one.surface.weights)
     assert round_of(Face(surface)) is None and not round_holes(Face(surface))
+
+
+def test_cones_by_their_end_circles(cases):
+    """From outside within the hull of both, from inside the level of the wall; full ones with their apex as well."""
+    rng = np.random.default_rng(8)
+    for number in range(cases(12, 300)):
+        low, high, slope = (0.0, rng.uniform(0.1, 0.8))[number % 2], rng.uniform(0.9, 2.0), rng.uniform(0.1, 2.0)
+        solid = asm.shapes.revolution(
+            asm.curves.polygon([(low * slope, low), (high * slope, high), (0, high), (0, low)][: 4 if low else 3])
+        )
+        wall = max(faces_of(solid), key=lambda face: np.ptp(face.surface.control_points[..., 2]))
+        surface = placed(wall.surface, rng, (0.0, 10.0)[number % 3 > 0])
+        for is_reversed in (False, True):
+            face = Face(surface, reversed=is_reversed)
+            found, points = round_of(face), surface_points(face, 300, rng)
+            far, off = np.abs(points).max(), points - found.center
+            along = off @ found.axis
+            flat = np.linalg.norm(off - along[:, None] * found.axis, axis=1)
+            if found.outward:
+                part = 0.5 * (along / found.half + 1.0)
+                assert np.abs(along).max() <= found.half + OFF * far
+                assert (flat <= found.radius - (1.0 - part) * found.less[1] + OFF * far).all()
+                assert found.radius == pytest.approx(high * slope, abs=1e-12 * far)
+                assert found.radius - found.less[1] == pytest.approx(low * slope, abs=1e-12 * far)
+            else:
+                level = np.sqrt(1.0 - found.slant**2) * flat - found.slant * along
+                assert np.abs(level - found.radius).max() <= 1e-12 * far
+                assert level.min() >= found.radius - OFF * far
+                assert found.slant == pytest.approx(np.sin(np.arctan(slope)), abs=1e-12 * far)

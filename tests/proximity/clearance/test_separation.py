@@ -19,9 +19,9 @@ from assembly.proximity.clearance.directions import best_direction
 from assembly.proximity.clearance.front import Front, Parted
 from assembly.proximity.clearance.pair_looks import gap_along
 from assembly.proximity.clearance.records import BY_BORE_A, BY_PLANE, Forest
-from assembly.proximity.clearance.separation import farthest_of_disc, room_in_bore, separation
+from assembly.proximity.clearance.separation import farthest_of_disc, level_of_disc, room_in_bore, separation
 from assembly.proximity.clearance.sleeves import best_bore
-from assembly.proximity.clearance.way import Way, part_along, pose_at, sag_of, stays_apart, way_of
+from assembly.proximity.clearance.way import Way, part_along, pose_at, sag_of, sag_of_disc, stays_apart, way_of
 from tests.proximity.clearance.nodes import forest_of, halve_all, tree_of
 from tests.proximity.clearance.scenes import direction, faces_of
 from tests.proximity.clearance.splines import points_of, shapes
@@ -117,6 +117,63 @@ def test_the_farthest_of_a_disc_in_a_bore(is_ball, cases):
         # Samples are 0.0016 rad apart, which leaves the squares of half of it of what is farthest.
         assert far <= bound + ROUNDING
         assert bound - far <= 1e-6 * (radius + np.linalg.norm(center))
+
+
+def test_the_level_of_a_disc_in_a_cone(cases):
+    """No sample of the disc's border has a higher level, and one nearly has it, however the disc leans."""
+    rng, turns = np.random.default_rng(8), np.linspace(0.0, 2.0 * np.pi, 4001)
+    for k in range(cases(200, 20000)):
+        axis, radius, half_angle = direction(rng), rng.uniform(0.1, 2.0), rng.uniform(0.02, 1.4)
+        side = np.cross(axis, direction(rng))
+        side /= np.linalg.norm(side)
+        # Turned over, too; no farther than that a line of the cone is across it.
+        lean = 0.0 if k % 5 == 0 else min(10.0 ** rng.uniform(-9.0, 0.2), 0.9 * (0.5 * np.pi - half_angle))
+        ruling = (1 - 2 * (k % 2)) * (np.cos(lean) * axis + np.sin(lean) * np.cross(axis, side))
+        center = 10.0 ** rng.uniform(-9.0, 0.0) * direction(rng) + rng.uniform(-2.0, 2.0) * axis
+        points = center + radius * (np.cos(turns)[:, None] * side + np.sin(turns)[:, None] * np.cross(ruling, side))
+        heights = points @ axis
+        flat = np.linalg.norm(points - heights[:, None] * axis, axis=1)
+        most = (np.cos(half_angle) * flat - np.sin(half_angle) * heights).max()
+        told = level_of_disc(np.sin(half_angle), tuple(center), tuple(axis), tuple(ruling), radius)
+        assert most <= told + ROUNDING
+        # Upright it is exact, but for the samples; else tangents come near, to a part of what the lean is.
+        assert told - most <= 1e-5 + 0.5 * radius * lean
+
+
+def test_room_in_a_cone(cases):
+    """Of a plug in its seat: what is told is less than the distance of samples, on the way as well, and not by much."""
+    rng, stay = np.random.default_rng(9), 0
+    slope = np.tan(0.5)
+    plug = faces_of(asm.shapes.revolution(asm.curves.polygon([(0, 1), (slope, 1), (3 * slope, 3), (0, 3)])))
+    seat = faces_of(asm.shapes.revolution(asm.curves.polygon([(slope, 1), (3, 1), (3, 3), (3 * slope, 3)])))
+    forest = forest_of(seat, plug)
+    _, nodes = tree_of(forest)
+    cone = int(np.flatnonzero(nodes.less.any(axis=1))[0])
+    assert nodes.slant[0] == pytest.approx(np.sin(0.5), abs=1e-14)
+    around, z = rng.uniform(0.0, 2.0 * np.pi, 3000), np.append(rng.uniform(1.0, 3.0, 2000), np.repeat([1.0, 3.0], 500))
+    points = np.column_stack([z * slope * np.cos(around), z * slope * np.sin(around), z])
+    for k in range(cases(40, 2000)):
+        size = 10.0 ** rng.uniform(-4.0, -1.3)
+        ends = []
+        for _ in range(2):
+            spin = Rotation.from_rotvec((0.0, 0.0, 0.3 * rng.normal() * (k % 2)))
+            turn = Rotation.from_rotvec((*(0.1 * size * rng.normal(size=2)), 0.0)) * spin
+            ends.append(relative(turn, (*(0.2 * size * rng.normal(size=2)), 2.0 * size)))
+        rooms = tuple(room_in_bore(packed(forest), 0, cone, pose, False) for pose in ends)
+        for pose, room in zip(ends, rooms, strict=True):
+            here = posed(pose, points)
+            level = np.cos(0.5) * np.hypot(here[:, 0], here[:, 1]) - np.sin(0.5) * here[:, 2]
+            assert room <= -level.max() + ROUNDING
+            assert room >= -level.max() - 0.01 * size
+        way, parted = way_between(*ends, np.array([0.0, 0.0, 2.0]), 2.0), Parted(0, cone, BY_BORE_A)
+        if not stays_apart(packed(forest), parted, way, (0.0, 0.0, 0.0), rooms):
+            continue
+        stay += 1
+        sag = sag_of(way, packed(forest), cone) + sag_of_disc(way, packed(forest), 0, cone)
+        for s in np.linspace(0.0, 1.0, 9):
+            room = room_in_bore(packed(forest), 0, cone, pose_at(way, float(s)), False)
+            assert room > 0.0 and room >= min(rooms) - sag - ROUNDING
+    assert stay > cases(10, 500)
 
 
 def test_room_in_a_bore(cases):
