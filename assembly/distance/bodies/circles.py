@@ -254,6 +254,10 @@ def circles_apart(s, t):
             if at >= 2.0 * math.pi:
                 return size * math.sqrt(max(least - worst - ROUNDING, 0.0)), place
             h = min(2.0 * h, LONGEST)
+        elif square_from(c, at_place(c, at + h)) < least - CLOSE:
+            # Between the first places two valleys may lie, of which one was gone down. What is behind is no lower.
+            least, place = lowest_from(c, at + h, h)
+            x = harmonics_of(c, least)
         else:
             h *= 0.5
             if h < SHORTEST:

@@ -317,8 +317,11 @@ class _Builder:
         nodes = rows_of(NODE, self.nodes)
         nodes.bore[rows], nodes.spine[rows], nodes.slant[rows] = radius, self.bores.center[bore], self.bores.slant[bore]
         # What has no ruling has no disc, either.
+        axis = self.bores.axis[bore]
         free = np.full(len(rows), turned) | ~nodes.ruling[rows].any(axis=1)
-        nodes.ruling[rows[free]] = self.bores.axis[bore[free]]
+        nodes.ruling[rows[free]] = axis[free]
+        # A cone gets wider along its axis only. What a ruling says of a cell is the same both ways.
+        nodes.ruling[rows[(nodes.ruling[rows] * axis).sum(axis=1) < 0.0]] *= -1.0
 
 
 def _center_on_axis(root: np.record, rounds: list[Round | None]) -> None:

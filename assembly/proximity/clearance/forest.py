@@ -159,9 +159,17 @@ class PackedForest:
         of_box = node["center"][:, None] + _SIGNS @ (node["half"][..., None] * node["axes"])
         corners = np.where(is_cell[:, None, None], np.concatenate([node["corner"]] * 2, axis=1), of_box)
         off, axis = corners @ turn.T + (shift - bore["spine"])[:, None], bore["ruling"][:, None]
-        off = off - (off @ axis.transpose(0, 2, 1)) * axis
-        most = np.sqrt((off**2).sum(axis=2).max(axis=1))
-        return float((bore["bore"] - most - node["disc"] - node["rho"]).min(initial=np.inf))
+        along = off @ axis.transpose(0, 2, 1)
+        flat = np.sqrt(((off - along * axis) ** 2).sum(axis=2))
+        slant = bore["slant"][:, None]
+        if not slant.any():
+            return float((bore["bore"] - flat.max(axis=1) - node["disc"] - node["rho"]).min(initial=np.inf))
+        # The level of a cone, and how much of a disc's radius that grows by: see `Level.most_of_circle`.
+        lean = np.linalg.norm(np.cross(bore["ruling"], node["ruling"] @ turn.T), axis=1)
+        part = np.cos(np.maximum(np.arcsin(slant[:, 0]) - np.arcsin(np.minimum(lean, 1.0)), 0.0))[:, None]
+        discs = node["disc"][:, None] - np.where(_SIGNS[:, 0] > 0.0, node["less"][:, :1], node["less"][:, 1:])
+        most = np.sqrt(1.0 - slant**2) * flat - slant * along[..., 0] + discs * part
+        return float((bore["bore"] - most.max(axis=1) - node["rho"]).min(initial=np.inf))
 
     def shells(self, body: int) -> list[Array]:
         """Of every connected part of a body's boundary a few points of it, (n, 3)."""

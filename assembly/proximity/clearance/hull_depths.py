@@ -5,7 +5,7 @@ hull of some points, and a disc of radius r across an axis u, and a ball of radi
 
     max over points of n.p + r sqrt(1 - (n.u)^2) + s.
 
-Cylinders, balls and tubes from outside are one such piece each, exactly. Walls of bores need none: they are within the
+Cylinders, cones, balls and tubes from outside are such pieces, exactly. Walls of bores need none: they are within the
 hull of their rims, at which other faces end.
 """
 
@@ -82,7 +82,9 @@ def _pieces_of(cells: BodyCells) -> _Pieces:
     points = [nodes.center[whole] - half, nodes.center[whole] + half, nodes.corner[single].reshape(-1, 3)]
     count = np.array([1] * (2 * len(whole)) + [4] * len(single))
     row = np.repeat(np.array(2 * whole + single), count)
-    table = np.column_stack([np.concatenate(points), nodes.ruling[row], nodes.disc[row], nodes.rho[row]])
+    # A cone is narrower at one of its ends.
+    less = np.concatenate([nodes.less[whole, 1], nodes.less[whole, 0], np.zeros(len(row) - 2 * len(whole))])
+    table = np.column_stack([np.concatenate(points), nodes.ruling[row], nodes.disc[row] - less, nodes.rho[row]])
     # Cells share corners.
     table = np.unique(table, axis=0)
     return _Pieces(np.ascontiguousarray(table[:, :3]), np.ascontiguousarray(table[:, 3:6]), table[:, 6], table[:, 7])

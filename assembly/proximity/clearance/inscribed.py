@@ -20,6 +20,7 @@ from assembly.proximity.clearance.forest import PackedForest
 from assembly.proximity.clearance.hull_depths import highest_nodes
 from assembly.proximity.clearance.inside import winding_of
 from assembly.proximity.clearance.records import NODE
+from assembly.proximity.manifolds.elementary_faces import NEARLY
 
 __all__ = ["Overlaps", "inscribed_balls", "overlaps_at"]
 
@@ -31,6 +32,9 @@ PLACES = np.array([-0.8, -0.4, 0.0, 0.4, 0.8])
 MOST, LEAST = 24, 0.05
 # Places in the stack of a ray, and what rounding may add to a radius, in parts of the body's coordinates.
 STACK, ROUNDING = 1024, 1e-12
+# How far a face may be from the wall of its exact hull, in parts of the body's size: by its own deviation from what it
+# lies on, and by that and the slope of a cone, which the hull is larger by.
+OFF = 4.0 * NEARLY
 # A cylinder of less half length, in parts of its radius, is a disc.
 DISC = 1e-6
 # Into how many parts cells are divided to be measured.
@@ -43,7 +47,7 @@ def _room(centers: Array, cells: BodyCells) -> Array:
     whole, single = highest_nodes(cells)
     room = np.full(len(centers), np.inf)
     for k in whole:
-        # On a cylinder, a ball or a tube; that of a disc is none.
+        # On a cylinder, a cone, a ball or a tube; that of a disc is none.
         node = nodes[k]
         off = centers - node.center
         along = off @ node.ruling
@@ -51,7 +55,11 @@ def _room(centers: Array, cells: BodyCells) -> Array:
         if node.rho == 0.0 and node.half[0] < DISC * node.disc:
             room = np.minimum(room, np.hypot(np.maximum(across - node.disc, 0.0), along) - node.half[0])
         elif node.rho == 0.0:
-            room = np.minimum(room, np.abs(across - node.disc))
+            # The line through both ends of a ruling, in the half plane of the axis and the point.
+            length = 2.0 * node.half[0]
+            narrower = node.less[0] * (length + 2.0 * along) + node.less[1] * (length - 2.0 * along)
+            sides = np.hypot(length, node.less[0] - node.less[1])
+            room = np.minimum(room, np.abs(across - node.disc + 0.5 * narrower / length) * length / sides)
         else:
             room = np.minimum(room, np.abs(np.hypot(across - node.disc, along) - node.rho))
     for some in np.array_split(np.array(single, dtype=np.int64), CHUNKS):
@@ -77,7 +85,7 @@ def inscribed_balls(faces: tuple[Face, ...]) -> tuple[Array, Array]:
     root = rows_of(NODE, cells.nodes)[0]
     spread = np.maximum(root.half, root.disc) + root.rho
     centers = root.center + np.array(list(product(PLACES, repeat=3))) * spread @ root.axes
-    radii = _room(centers, cells) - ROUNDING * cells.far
+    radii = _room(centers, cells) - (ROUNDING * cells.far + OFF * cells.size)
     order = np.argsort(-radii, kind="stable")
     stack, found = np.zeros(STACK, dtype=np.int64), np.empty(1, dtype=np.int64)
     kept: list[int] = []

@@ -122,9 +122,10 @@ def farthest_of_disc(d, axis, ruling, radius):
     square = dot(off, off)
     if radius == 0.0 or square == 0.0 or sine == 0.0:
         return math.sqrt(square) + radius
-    wide, narrow = abs(dot(off, side)) / sine * radius, abs(dot(off, cross(axis, side))) / sine
-    narrow *= radius * math.sqrt(max(1.0 - sine * sine, 0.0))
-    return farthest_of_ellipse(square, radius * radius, (radius * sine) ** 2, wide, narrow)
+    wide = min(abs(dot(off, side)) / sine, math.sqrt(square))
+    # What is not along one half axis is along the other one, even where a side next to nothing is lost in rounding.
+    narrow = math.sqrt(max(square - wide * wide, 0.0)) * math.sqrt(max(1.0 - sine * sine, 0.0))
+    return farthest_of_ellipse(square, radius * radius, (radius * sine) ** 2, radius * wide, radius * narrow)
 
 
 @kernel(inner=True)

@@ -94,6 +94,16 @@ def test_where_one_circle_meets_the_axis_of_the_other():
             check(circle([beside, 0.0, height], axis, radius), np.append(UPRIGHT, other))
 
 
+@pytest.mark.parametrize("lean", [1e-8, 1e-6, 1e-4])
+def test_two_valleys_nearer_to_each_other_than_first_places(lean):
+    """Equal circles, one above the other and beside it: they lean, so that one of two near places is the nearest."""
+    for turn in np.linspace(0.0, 6.28, 8):
+        axis = [lean * np.cos(turn), lean * np.sin(turn), 1.0]
+        beside = 2.0 * np.cos(0.1) * np.array([np.cos(1.7 * turn), np.sin(1.7 * turn)])
+        told, true = check(circle([*beside, 1.7], axis, 1.0), np.append(UPRIGHT, 1.0))
+        assert true - told <= 1e-10
+
+
 def test_circles_that_cross_are_not_apart():
     told, true = check(circle([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 0.5), np.append(UPRIGHT, 0.5))
     assert true < 1e-9 and told < 1e-6

@@ -18,10 +18,10 @@ from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.body_cells import cells_of_body
 from assembly.proximity.clearance.bores import distances_of_parts
-from assembly.proximity.clearance.records import LINKS, NODE, NONE
+from assembly.proximity.clearance.records import FLAT, LINKS, NODE, NONE
 from assembly.proximity.clearance.round_faces import Round, round_holes
 from tests.proximity.clearance.nodes import forest_of, halve_all, tree_of
-from tests.proximity.clearance.scenes import at, direction, faces_of, poses, proof_of
+from tests.proximity.clearance.scenes import UPRIGHT, at, direction, faces_of, poses, proof_of
 from tests.proximity.clearance.splines import shapes, surface_points
 
 # Of points and axes, in parts of the largest coordinate.
@@ -116,6 +116,51 @@ def test_every_node_at_a_hole_has_its_bore(name):
                 assert nodes.bore[k] == pytest.approx(wall.radius, abs=1e-13)
                 at_axis = nodes.spine[k] - wall.center
                 assert np.linalg.norm(np.cross(at_axis, wall.axis)) < 1e-13
+
+
+CONICAL = {
+    "wider upwards": [(0.5, 0), (2, 0), (2, 1), (1, 1)],
+    "wider downwards": [(1, 0), (2, 0), (2, 1), (0.5, 1)],
+    "widest in the middle": [(0.5, 0), (2, 0), (2, 2), (0.5, 2), (1, 1)],
+    "narrowest in the middle": [(1, 0), (2, 0), (2, 2), (1, 2), (0.5, 1)],
+}
+
+
+@pytest.mark.parametrize("name", CONICAL)
+def test_nodes_are_outside_of_their_cones(name):
+    """Of a cone, which gets wider along its axis only, each node has the axis that its level is meant along."""
+    body = asm.shapes.revolution(asm.curves.polygon(CONICAL[name]))
+    faces = moved(faces_of(body), Rotation.random(random_state=3).as_matrix(), [1.0, -2.0, 0.5])
+    forest = forest_of(faces)
+    halve_all(forest, np.random.default_rng(0))
+    links, nodes = tree_of(forest)
+    conical = np.flatnonzero((nodes.bore > 0.0) & (nodes.slant > 0.0) & (links.face != NONE))
+    assert (links.form[conical] == FLAT).sum() > 10
+    for node in nodes[conical]:
+        off = node.corner - node.spine
+        along = off @ node.ruling
+        beside = np.linalg.norm(off - along[:, None] * node.ruling, axis=1)
+        level = np.sqrt(1.0 - node.slant**2) * beside - node.slant * along
+        assert level.min() >= node.bore - OFF * 5.0
+
+
+@pytest.mark.parametrize("half_angle", [0.03, 0.5, 1.2])
+def test_bounds_of_plugs_whichever_body_is_first(half_angle):
+    """Lifted off its seat, a plug is as far from it as it is lifted times the sine of the half angle."""
+    slope = np.tan(half_angle)
+    heights = np.array([1.0, 2.0]) / slope
+    seat = asm.shapes.revolution(
+        asm.curves.polygon([(1, heights[0]), (4, heights[0]), (4, heights[1]), (2, heights[1])])
+    )
+    low, high = heights[0] + 0.2 / slope, heights[1] - 0.3 / slope
+    plug = asm.shapes.revolution(asm.curves.polygon([(0, low), (1.2, low), (1.7, high), (0, high)]))
+    for play in (1e-2, 1e-5):
+        pose = at(0.0, 0.0, play / np.sin(half_angle), Rotation.from_rotvec([0.0, 0.0, 0.7]))
+        (first,) = proof_of(seat, plug).look(poses(pose), 0.0)
+        (second,) = proof_of(plug, seat).look(poses(UPRIGHT, pose), 0.0)
+        for answer in (first, second):
+            assert answer.verdict is Verdict.CLEAR
+            assert 0.99 * play <= answer.bound <= play + 1e-13
 
 
 @pytest.mark.parametrize("name", PLATES)

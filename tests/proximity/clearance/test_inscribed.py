@@ -30,6 +30,22 @@ def in_cylinder(p):
     return min(5.0 - np.hypot(p[0], p[1]), 6.0 - abs(p[2]))
 
 
+def in_cone(p):
+    """In a cone of radius 1 at its foot and height 2."""
+    across = np.hypot(p[0], p[1])
+    return min(p[2], (1.0 - across - 0.5 * p[2]) / np.hypot(1.0, 0.5))
+
+
+def in_cup(p):
+    """In one that gets wider upwards, from radius 0.1 to 1."""
+    across = np.hypot(p[0], p[1])
+    return min(p[2], 2.0 - p[2], (0.1 + 0.45 * p[2] - across) / np.hypot(1.0, 0.45))
+
+
+def turned(*profile):
+    return asm.shapes.revolution(asm.curves.polygon(profile))
+
+
 @pytest.mark.parametrize(
     ("shape", "room", "most"),
     [
@@ -37,6 +53,8 @@ def in_cylinder(p):
         (asm.shapes.plate(50.0, 20.0, 6.0, HOLES), in_plate, 3.0),
         (asm.shapes.torus(3.0, 1.0), in_torus, 1.0),
         (asm.shapes.solid_cylinder(5.0, 12.0), in_cylinder, 5.0),
+        (turned((0, 0), (1, 0), (0, 2)), in_cone, 0.618),
+        (turned((0, 0), (0.1, 0), (1, 2), (0, 2)), in_cup, 0.625),
     ],
 )
 def test_balls_are_inside(shape, room, most):

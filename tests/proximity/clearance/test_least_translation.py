@@ -12,6 +12,7 @@ import pytest
 
 import assembly as asm
 from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.clearance.hull_depths import HullDepths
 from assembly.proximity.clearance.least_translation import least_translation
 from tests.proximity.clearance.scenes import at, direction, moved, poses, proof_of, quaternion, start_of
 from tests.validation.crossing_judge import Motion, least_signed_distance
@@ -177,3 +178,17 @@ def test_linked_rings_are_parted_across_their_tubes():
     told = length(ring, ring, at(4.1, 0.0, 0.0, turn))
     # Out of each other it would be 4 or more.
     assert 0.1 <= told * (1.0 + 1e-12) and told <= 1.5 * 0.1
+
+
+@pytest.mark.parametrize("top", [0.0, 0.3, 1.6])
+def test_hulls_of_cones_are_exact(top):
+    """Along any direction a cone and a ball are parted as their end circles and its radius tell."""
+    rng, profile = np.random.default_rng(5), [(0, 0), (1, 0), (top, 2), (0, 2)]
+    cone = asm.shapes.revolution(asm.curves.polygon(profile if top > 0.0 else profile[:2] + profile[3:]))
+    cells = proof_of(cone, asm.shapes.sphere(0.5)).cells_of_both(0)
+    shift = rng.normal(size=3)
+    ways = np.array([direction(rng) for _ in range(50)])
+    across = np.hypot(ways[:, 0], ways[:, 1])
+    highest = np.maximum(across, top * across + 2.0 * ways[:, 2])
+    told = HullDepths(*cells, np.eye(3), shift).depths(ways)
+    assert told == pytest.approx(highest + 0.5 - ways @ shift, abs=1e-9)

@@ -119,6 +119,18 @@ def test_the_farthest_of_a_disc_in_a_bore(is_ball, cases):
         assert bound - far <= 1e-6 * (radius + np.linalg.norm(center))
 
 
+def test_a_disc_upright_but_for_rounding(cases):
+    """Across its axis it reaches its radius beyond its middle, whichever way the rounding of both axes points."""
+    rng = np.random.default_rng(11)
+    for _ in range(cases(500, 20000)):
+        axis, radius = direction(rng), rng.uniform(0.1, 2.0)
+        ruling = axis + 10.0 ** rng.uniform(-18.0, -14.0) * rng.normal(size=3)
+        ruling /= np.linalg.norm(ruling)
+        center = 10.0 ** rng.uniform(-9.0, 0.0) * direction(rng)
+        far = np.linalg.norm(center - (center @ axis) * axis) + radius
+        assert farthest_of_disc(tuple(center), tuple(axis), tuple(ruling), radius) == pytest.approx(far, abs=ROUNDING)
+
+
 def test_the_level_of_a_disc_in_a_cone(cases):
     """No sample of the disc's border has a higher level, and one nearly has it, however the disc leans."""
     rng, turns = np.random.default_rng(8), np.linspace(0.0, 2.0 * np.pi, 4001)
