@@ -33,6 +33,7 @@ from assembly.solve.solution import Solution
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
+    from assembly.studies.resting import Rest
 
 __all__ = ["Solving"]
 
@@ -116,13 +117,15 @@ class Solving(PackedContents):
         """The same, without corners of contacts."""
         if not self.packed().keeps_apart or settings[ITERATIONS] == 0.0:
             return self._solved(settings, q0, starts, interruption)
+        rest: Rest | None = None
         if isinstance(q0, Solution) and q0._rest is not None and self._objectives:
             from assembly.studies.resting import rests_again
 
             # Bodies that rest on joints do so still, as long as these push.
-            solution = rests_again(self._scene_itself, q0, settings, starts, interruption)
-            if solution is not None:
-                return solution
+            found = rests_again(self._scene_itself, q0, settings, starts, interruption)
+            if isinstance(found, Solution):
+                return found
+            rest = found
         if isinstance(q0, Solution) and (not self._objectives or not _is_pushed(q0)):
             from assembly.studies.unhindered import unhindered
 
@@ -138,10 +141,28 @@ class Solving(PackedContents):
             if solution is not None:
                 return solution
         if isinstance(q0, Solution):
-            return self._solved(settings, q0, starts, interruption)
+            return self._solved_beside(q0, rest, settings, starts, options, interruption)
         from assembly.studies.first_solve import first_solve
 
         return first_solve(self._scene_itself, self._given(q0), settings, starts, options, interruption)
+
+    def _solved_beside(
+        self,
+        last: Solution,
+        rest: Rest | None,
+        settings: Array,
+        starts: Mapping[str, ArrayLike] | None,
+        options: dict[str, Any],
+        interruption: Interruption,
+    ) -> Solution:
+        """A solve from the last solution; where that fails, joints keep bodies that rest beside what is in the way."""
+        solution = self._solved(settings, last, starts, interruption)
+        if solution.success or rest is None:
+            return solution
+        from assembly.studies.resting import beside_others
+
+        first, poses = self._settings(options, interruption, warm=False), last.q.copy()
+        return beside_others(self._scene_itself, rest, poses, poses, first, starts, interruption) or solution
 
     def _at_corners(self, ended: Solution, again: Callable[[], Solution]) -> Solution:
         """A solve that begins again with the corners of contacts of solids listed; the earlier end if it fails.

@@ -96,10 +96,7 @@ def _sides(proof: ClearanceProof, q: Array, moves: Array | None = None) -> list[
     for k, (a, b) in enumerate(proof.pairs):
         side = proof.plane_between(k, q, moves)
         if side is None:
-            posed = [
-                hulls_of_body(proof.faces[body]).posed(rotation_matrix(q[body, 3:]), q[body, :3]) for body in (a, b)
-            ]
-            side = normal_between(*posed)
+            side = normal_between(*(_posed_hulls(proof, body, q[body]) for body in (a, b)))
         found.append(side)
     return found
 

@@ -179,10 +179,11 @@ def rests_again(
     settings: Array,
     starts: Mapping[str, ArrayLike] | None,
     interruption: Interruption,
-) -> Solution | None:
+) -> Solution | Rest | None:
     """The solution of a scene with an objective that is found by the joints by which the last one was, or None.
 
-    The contacts of the last solution need not be listed for that.
+    The contacts of the last solution need not be listed for that. Returns how bodies rest where that is not proven to
+    be clear.
     """
     packed, rest = scene.packed(), last._rest
     if not isinstance(rest, Rest) or not last.success or last._ended.packed is not packed or not _is_possible(scene):
@@ -202,8 +203,9 @@ def rests_again(
             return None
     prove = partial(prove_way, packed, scene.bodies, last.q)
     solution = _proven(scene, now, prove, settings, starts, interruption)
-    if solution is not None:
-        solution.seconds = perf_counter() - begin
+    if solution is None:
+        return now
+    solution.seconds = perf_counter() - begin
     return solution
 
 

@@ -316,3 +316,19 @@ def test_equal_bodies_in_one_place_are_in_each_other_and_put_together_first():
     solution = scene.solve()
     assert solution.success and solution.put_together and solution.proved
     assert solution.pose(pegs[1]).position == pytest.approx([14.0, 0.0, 0.0], abs=HOLDS)
+
+
+@pytest.mark.parametrize(
+    ("at", "target", "end"),
+    [((2, 0, 0), (-3, 0.5, 0.2), (2, 0.5, 0.2)), ((0, 0, 2), (0, 0, 5), (0, 0, 5)), ((2, 2, 2), (3, 1, 4), (3, 1, 4))],
+)
+def test_equal_boxes_that_begin_flush(at, target, end):
+    """Corners of both coincide at the start, to the bit: no plane is between them, and an objective draws one away."""
+    shape = asm.shapes.box(2, 2, 2)
+    still, drawn = asm.Body("still", shape, fixed=True), asm.Body("drawn", shape, at)
+    scene = asm.Assembly([still, drawn])
+    scene.constrain(asm.Clearance())
+    scene.minimize(asm.PointDistance(drawn.point(0, 0, 0), target))
+    solution = scene.solve()
+    assert solution.success and solution.proved
+    assert solution.q[1, :3] == pytest.approx(end, abs=1e-8)

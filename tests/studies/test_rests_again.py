@@ -84,6 +84,28 @@ def test_others_in_the_way_are_leaned_on(side):
         assert solution.q[1] == pytest.approx([x, 0.0, 7.0, 1, 0, 0, 0], abs=1e-7)
 
 
+@pytest.mark.parametrize(
+    ("shape", "at", "far", "end"),
+    [
+        (asm.shapes.sphere(5.0), (20.0, 0.0, 10.0), 6.0, 10.0 - np.sqrt(24.0)),
+        (asm.shapes.sphere(5.0), (20.0, 0.0, 10.0), 12.0, 10.0 - np.sqrt(24.0)),
+        (asm.shapes.box(1, 60, 30), (15.0, 0.0, 20.0), 6.0, 4.5),
+        (asm.shapes.box(1, 60, 30), (15.0, 0.0, 20.0), 28.0, 4.5),
+    ],
+)
+def test_what_rests_is_drawn_against_others(shape, at, far, end):
+    """A solve goes on from rest to where a ball or a wall is in the way, however hard it is drawn against that.
+
+    Drawn far, the loop alone stays at one multiplier for all of its steps.
+    """
+    scene, drawn = slab_on_a_table(asm.Body("other", shape, at, fixed=True))
+    solution = scene.solve()
+    draw_to(drawn, far, 0.0, 2.0)
+    solution = scene.solve(solution)
+    assert solution.success and solution.proved
+    assert solution.q[1] == pytest.approx([end, 0.0, 7.0, 1, 0, 0, 0], abs=1e-7)
+
+
 def resting_of(scene):
     """How bodies of a scene rest, whatever is in their way."""
     packed, q = scene.packed(), np.array(scene.q)

@@ -19,7 +19,7 @@ __all__ = ["normal_between"]
 Array = NDArray[np.float64]
 # Steps after which bodies count as parted by no plane, as do those that are nearer than this part of the smaller one.
 STEPS, NEAR = 20, 1e-3
-# How hard weights are held to a sum of one, against lengths in parts of the first way.
+# How hard weights are held to a sum of one, against lengths in parts of how far points of both bodies may be apart.
 HELD = 1e3
 
 
@@ -31,6 +31,8 @@ def normal_between(a: BodyHulls, b: BodyHulls) -> Array | None:
     rounding = ROUNDING * max(float(np.abs(body.discs.centers).max() + body.discs.radii.max()) for body in (a, b))
     way = b.ball[0] - a.ball[0]
     near = max(rounding, NEAR * min(a.ball[1], b.ball[1]))
+    # Of points themselves all may be zero: a corner that lies on the other body's.
+    scale = float(np.linalg.norm(way)) + a.ball[1] + b.ball[1]
     points = np.empty((0, 3))
     for _ in range(STEPS):
         size = float(np.linalg.norm(way))
@@ -42,7 +44,6 @@ def normal_between(a: BodyHulls, b: BodyHulls) -> Array | None:
         if -reach_b - reach_a > rounding:
             return normal
         points = np.vstack([points, end_b - end_a])
-        scale = float(np.abs(points).max())
         weights, _ = nnls(np.vstack([points.T / scale, np.full(len(points), HELD)]), np.array([0.0, 0.0, 0.0, HELD]))
         way, points = weights @ points / weights.sum(), points[weights > 0.0]
     return None

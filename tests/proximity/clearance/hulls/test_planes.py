@@ -68,3 +68,11 @@ def test_cylinders_side_by_side_whose_boxes_meet(tilt):
     found = normal_between(hulls.posed(turn, np.zeros(3)), hulls.posed(turn.T, np.array([apart, 0.0, 0.0])))
     assert found is not None and found[0] > 0.9
     assert normal_between(hulls, hulls.posed(turn, np.array([3.9, 0.0, 0.0]))) is None
+
+
+@pytest.mark.parametrize("off", [(2.0, 0, 0), (0, -3.0, 0), (2.0, 0, 4.0), (2.0, 3.0, 4.0), (-2.0, 3.0, -4.0)])
+def test_bodies_whose_first_points_are_the_same_are_parted_by_no_plane(off):
+    """Equal boxes flush, edge to edge and corner to corner: the farthest corners of both coincide, to the bit."""
+    hulls = hulls_of_body(side_faces(asm.Body("b", KINDS[0][0])))
+    posed = hulls.posed(np.eye(3), np.array(off, dtype=float))
+    assert normal_between(hulls, posed) is None and normal_between(posed, hulls) is None
