@@ -131,6 +131,10 @@ def prove_way(
         if not may_jump:
             # What is found is not to depend on what was solved before.
             proof.begin_anew()
+            # A way begins where all are clear. Hulls tell at once of what touches; a look would spend its budget there.
+            stood = enumerate(proof.as_they_stand(last, length))
+            if any(answer.verdict is not Verdict.CLEAR and not proof.is_of_wires(k) for k, answer in stood):
+                return None
         if not (proof.is_at(last) or proof.stays_clear(last, length, proof.moves, QUICK, at_once=True)):
             if may_jump:
                 # Hulls may have told of the last poses: what opens faces that touch there is not known yet.

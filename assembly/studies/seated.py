@@ -23,6 +23,7 @@ from assembly.constraints.model.joints import ALONG, Cylindrical, Spherical
 from assembly.geometry.recognition.forms import Cone, Cylinder, Plane, Sphere
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
+from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.manifolds.elementary_faces import ElementaryFace, elementary_faces
 from assembly.solve.clearance_proof import can_prove, lent_proof
 from assembly.solve.interruption import Interruption
@@ -93,14 +94,20 @@ class Seat(NamedTuple):
 def seated(scene: Assembly, q: Array, touching: float, interruption: Interruption) -> Seat | None:
     """Where bodies that clearances keep apart, and that are stuck in each other at poses (n, 7), fit.
 
-    If they cannot all fit at once, the nearest do. None if none are stuck, or none of their faces nearly fit.
+    Bodies of which nothing is proven count as stuck. If they cannot all fit at once, the nearest do. None if none are
+    stuck, or none of their faces nearly fit.
     """
     packed = scene.packed()
     if not can_prove(packed):
         return None
     with lent_proof(packed, scene.bodies) as proof:
         pairs = proof.pairs
-        stuck = [pairs[k] for k, answer in enumerate(proof.as_they_stand(q, touching)) if is_stuck(answer, touching)]
+        stuck = [
+            pairs[k]
+            for k, answer in enumerate(proof.as_they_stand(q, touching))
+            # A ball lies nearly along its socket where both cross: often a look spends its budget before it is told.
+            if answer.verdict is Verdict.UNDECIDED or is_stuck(answer, touching)
+        ]
     others = [item for item in scene.constraints if not isinstance(item, Clearance)]
     taken = {item.name for item in others}
     names = (name for name in map("fit {}".format, count()) if name not in taken)

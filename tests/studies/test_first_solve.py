@@ -10,6 +10,9 @@ import pytest
 import assembly as asm
 from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.hulls.scene import told_by_hulls
+from assembly.proximity.clearance.proof import SHORT
+from assembly.solve.clearance_proof import lent_proof
+from assembly.solve.start_proof import prove_way
 from benchmarks.center_lines import torus_wire
 from benchmarks.hands import TAUT, linked_rings
 from benchmarks.wire_oracle import WireOracle
@@ -37,6 +40,22 @@ def test_where_nothing_hinders_rows_alone_are_proven_with_their_way():
     oracle = WireOracle([torus_wire(1.0, 0.1)] * 2)
     assert oracle.links(solution.q)[0] == oracle.links(np.array(scene.q))[0] != 0
     assert oracle.deepest(solution.q) > -1e-9
+
+
+def test_from_what_touches_no_way_is_sought():
+    lower = asm.Body("lower", asm.shapes.plate(80, 50, 10, [(-25, 0, 4.5), (25, 0, 4.5)]), fixed=True)
+    upper = asm.Body("upper", asm.shapes.plate(60, 40, 10, [(-20, 0, 4.5)]), (5, 3, 10))
+    scene = asm.Assembly([lower, upper])
+    scene.constrain(asm.Clearance())
+    q = np.array([[0, 0, 0, 1, 0, 0, 0], [5, 3, 10, 1, 0, 0, 0]], dtype=float)
+    ahead = q + [[0.0] * 7, [0, 0, 0.5, 0, 0, 0, 0]]
+    assert prove_way(scene.packed(), scene.bodies, q, ahead.ravel(), 1e-9, may_jump=False) is None
+    with lent_proof(scene.packed(), scene.bodies) as proof:
+        # A look at what touches spent its whole budget.
+        assert 0 < proof.fronts.counts.sought.max() <= 2 * SHORT
+    # From what is clear it is proven.
+    q[1, 2] += 0.01
+    assert prove_way(scene.packed(), scene.bodies, q, ahead.ravel(), 1e-9, may_jump=False) is not None
 
 
 def test_rows_that_lead_through_the_other_ring_are_not_taken():

@@ -53,6 +53,20 @@ def test_rows_of_a_ball_in_its_socket_are_its_slopes():
     assert not len(closed_gaps(shapes, np.eye(3), np.array([1e-3, 0, 0]), (-1e-9, 1e-9))[0])
 
 
+def test_rows_of_a_ball_do_not_depend_on_how_long_its_parameters_are():
+    (whole,) = _faces(asm.Body("ball", asm.shapes.sphere(2.0)))
+    surface = whole.surface
+    # As a profile that begins on its axis is revolved with lengths for angles: the first circle has hardly any.
+    short = asm.NurbsSurface(
+        surface.control_points, (1e-15 * surface.knots[0], surface.knots[1]), surface.degree, surface.weights
+    )
+    hollow = asm.Face(surface, whole.outer, whole.holes, reversed=not whole.reversed)
+    expected, found = (
+        closed_gaps(((hollow,), (ball,)), np.eye(3), np.zeros(3), (-1e-9, 1e-9))[0] for ball in (whole, asm.Face(short))
+    )
+    assert len(expected) > 40 and (found == expected).all()
+
+
 def _faces(body):
     return [face.face for face in body.faces]
 

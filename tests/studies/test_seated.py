@@ -10,6 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import assembly as asm
+from assembly.proximity.clearance.answers import Verdict
+from assembly.solve.clearance_proof import lent_proof
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.studies.seated import seated
 from tests.proximity.manager.test_contact_place import prism
@@ -243,6 +245,22 @@ def test_what_is_clear_is_not_seated():
     assert seated(scene, np.array(scene.q), TOUCHING, CTRL_C) is None
     solution = scene.solve()
     assert solution.success and np.array_equal(solution.q, scene.q)
+
+
+def test_a_ball_in_its_socket_is_seated_where_no_look_tells_that_it_crosses():
+    pair = (
+        asm.Body("socket", socket(10, 18, 16), fixed=True),
+        asm.Body("ball", asm.shapes.sphere(10), (0.37, 0.27, -0.2)),
+    )
+    scene = asm.Assembly(pair)
+    scene.constrain(asm.Clearance())
+    q = np.array([HOME, [0.37, 0.27, -0.2, *HOME[3:]]])
+    with lent_proof(scene.packed(), scene.bodies) as proof:
+        assert proof.as_they_stand(q, TOUCHING)[0].verdict is Verdict.UNDECIDED
+    seat = seated(scene, q, TOUCHING, CTRL_C)
+    assert seat.has_bores and seat.poses[1, :3] == pytest.approx(0.0, abs=1e-9)
+    solution = scene.solve()
+    assert solution.success and solution.proved and solution.iterations == 0
 
 
 def test_where_time_is_over_nothing_is():

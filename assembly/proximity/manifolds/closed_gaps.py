@@ -108,9 +108,10 @@ def _has(face: Face, points: Array, size: float) -> NDArray[np.bool_]:
     (u0, u1), (v0, v1) = face.surface.domain
     for _ in range(STEPS):
         at, along_u, along_v = face.surface.evaluate(u, v, 1)
-        slopes = np.stack([along_u, along_v], axis=2)
+        # In parts of the domain: its two sides may be of any size, and singular values are cut by their ratio.
+        slopes = np.stack([(u1 - u0) * along_u, (v1 - v0) * along_v], axis=2)
         step = np.einsum("kij,kj->ki", np.linalg.pinv(slopes), points - at)
-        u, v = np.clip(u + step[:, 0], u0, u1), np.clip(v + step[:, 1], v0, v1)
+        u, v = np.clip(u + (u1 - u0) * step[:, 0], u0, u1), np.clip(v + (v1 - v0) * step[:, 1], v0, v1)
     off = np.linalg.norm(points - face.surface.evaluate(u, v), axis=1)
     return np.asarray((off <= ON_FACE * size) & face.contains(u, v))
 
