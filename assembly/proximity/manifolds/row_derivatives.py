@@ -30,14 +30,16 @@ from assembly.proximity.manifolds.records import (
     SEGMENT,
 )
 from assembly.proximity.manifolds.regions import PlaneRegion
-from assembly.proximity.manifolds.second_rates import Level, Ray, Row, skew
+from assembly.proximity.manifolds.second_rates import ALIKE, Level, Ray, Row, Socket, skew
 
-__all__ = ["flat_derivatives", "line_derivatives", "round_derivatives"]
+__all__ = ["flat_derivatives", "line_derivatives", "round_derivatives", "socket_row"]
 
 Array = NDArray[np.float64]
 NONE = np.empty(0)
 # The sine of the angle at which borders cross that are tangent as far as rounding tells.
 TANGENT = 1e-7
+# What rounding may make of the gap of a ball in its socket, in parts of the coordinates.
+ROUNDING = 1e-15
 
 
 class _Posed:
@@ -200,6 +202,27 @@ def round_derivatives(
         angle = None if kind == RING else (size * stays.up, -size * stays.right)
         found.append(Level(gap, normal, place, not is_ring, x, of, stays.origin, angle))
     return found
+
+
+def socket_row(hollow: Sphere, full: Sphere, turn: Array, shift: Array) -> tuple[Sequence[Row], float] | None:
+    """The row of a ball at x -> turn x + shift in its socket, and a bound of all gaps; None if its center is not in it.
+
+    Both are taken to be whole: where faces end, gaps are larger.
+    """
+    center = turn @ full.center + shift
+    away = center - hollow.center
+    apart = float(np.linalg.norm(away))
+    if apart >= hollow.radius:
+        return None
+    if apart <= ALIKE * hollow.radius:
+        # All directions are nearest ones. It is taken to lie on the side of -z.
+        normal, middle = np.array([0.0, 0.0, 1.0]), 0.0
+    else:
+        normal, middle = -away / apart, apart
+    gap = hollow.radius - full.radius - apart
+    row = Socket(gap, normal, center - full.radius * normal, False, NONE, center, middle)
+    off = ROUNDING * (float(np.abs(hollow.center).max() + np.abs(center).max()) + hollow.radius + full.radius)
+    return [row], gap - hollow.deviation - full.deviation - off
 
 
 def _origin(form: Cylinder | Cone) -> Array:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from assembly.proximity.manifolds.places import Affine, Place
 
-__all__ = ["Level", "Ray", "Row", "of_both", "skew"]
+__all__ = ["ALIKE", "Level", "Ray", "Row", "Socket", "of_both", "skew"]
 
 Array = NDArray[np.float64]
 # Newton's method begins at what is off by the lean squared; a step below the last, in coordinates, ends it.
@@ -162,6 +162,33 @@ class Level(Row):
         second = np.zeros((6, 6))
         second[3:, 3:] = _turned(c, q)
         return second - mixed.T @ np.linalg.solve(matrix, mixed) if len(matrix) else second
+
+
+@dataclass(frozen=True, eq=False)
+class Socket(Row):
+    """How much farther a point of what moves may go from a center of what stays: radius - |q - o|, and a constant.
+
+    Attributes
+    ----------
+    moves : (3,)
+        q, the center of a ball.
+    apart : float
+        |q - o|. Where that is zero all normals are alike, and the one that it has stays.
+    """
+
+    moves: Array
+    apart: float
+
+    def second(self) -> Array:
+        """The gap's second derivative, (6, 6)."""
+        second = np.zeros((6, 6))
+        second[3:, 3:] = _turned(self.normal, self.moves)
+        if self.apart > 0.0:
+            # What goes across the normal goes around the center.
+            moves = _moves(self.moves)
+            across = moves - np.outer(self.normal, self.normal @ moves)
+            second -= across.T @ across / self.apart
+        return second
 
 
 def of_both(rates: Array, second: Array, arm: Array) -> Array:

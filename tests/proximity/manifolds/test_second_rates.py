@@ -64,6 +64,12 @@ PAIRS = {
     "cone in its seat": (lambda: wall(cone(3.0, 0.2)), lambda: wall(cone(0.0, 0.1)), Rotation.identity(), 0.0),
     "long cone": (lambda: wall(cone(3.0, 0.2)), lambda: wall(cone(0.0, -0.2)), Rotation.identity(), 0.0),
     "cone on a disc": (lambda: sheet(circle(1.0)), lambda: wall(cone(0.0, 0.0)), CONE, 0.0),
+    "ball in its socket": (
+        lambda: asm.Body("socket", [asm.Face(asm.shapes.sphere(0.5), reversed=True)]).faces[0],
+        lambda: asm.Body("ball", asm.shapes.sphere(0.4)).faces[0],
+        DOWN,
+        0.08,
+    ),
     "ball": (lambda: sheet(circle(2.0)), lambda: asm.Body("ball", asm.shapes.sphere(0.4)).faces[0], DOWN, 0.4),
 }
 RINGS = ("shaft", "long shaft", "cone in its seat", "long cone")
