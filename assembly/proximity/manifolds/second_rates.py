@@ -36,6 +36,11 @@ def _turned(c: Array, q: Array) -> Array:
     return np.asarray(0.5 * (both + both.T) - float(c @ q) * np.eye(3))
 
 
+def _along(c: Array, bends: Array) -> Array:
+    """What bends (3, k, k) are along a vector, (k, k)."""
+    return np.asarray((c @ bends.reshape(3, -1)).reshape(bends.shape[1:]))
+
+
 def _moves(q: Array) -> Array:
     """The velocity of a point by twists, (3, 6)."""
     return np.hstack([np.eye(3), -skew(q)])
@@ -93,7 +98,8 @@ class Ray(Row):
         m, is_affine = len(row.x), isinstance(row.stays, Affine) and isinstance(row.moves, Affine)
         for _ in range(1 if is_affine else STEPS):
             matrix, off, _ = row._system()
-            right = np.concatenate([matrix[: m + 1, m + 1 :] @ row.normal, off])
+            right = np.empty(m + 4)
+            right[: m + 1], right[m + 1 :] = matrix[: m + 1, m + 1 :] @ row.normal, off
             right[m] += 1.0
             step = np.linalg.solve(matrix, -right)
             x = row.x + step[:m]
@@ -109,11 +115,13 @@ class Ray(Row):
         q, q_slopes, q_bends = self.moves.at(self.x[:k])
         p, p_slopes, p_bends = self.stays.at(self.x[k:])
         matrix = np.zeros((m + 4, m + 4))
-        matrix[:k, :k] = np.tensordot(c, q_bends, 1)
-        matrix[k:m, k:m] = -np.tensordot(c, p_bends, 1)
-        slopes = np.column_stack([q_slopes, -p_slopes, -self.along])
-        matrix[m + 1 :, : m + 1] = slopes
-        matrix[: m + 1, m + 1 :] = slopes.T
+        if not isinstance(self.moves, Affine):
+            matrix[:k, :k] = _along(c, q_bends)
+        if not isinstance(self.stays, Affine):
+            matrix[k:m, k:m] = -_along(c, p_bends)
+        slopes = matrix[m + 1 :]
+        slopes[:, :k], slopes[:, k:m], slopes[:, m] = q_slopes, -p_slopes, -self.along
+        matrix[: m + 1, m + 1 :] = slopes[:, : m + 1].T
         return matrix, q - p - self.gap * self.along, q_slopes
 
     def second(self) -> Array:
@@ -150,7 +158,7 @@ class Level(Row):
         """The gap's second derivative, (6, 6). A normal that is one of many alike stays."""
         q, slopes, bends = self.moves.at(self.x)
         c, k = self.normal, self.moves.count
-        matrix = np.tensordot(c, bends, 1)
+        matrix = _along(c, bends)
         mixed = np.zeros((k, 6))
         mixed[:, 3:] = -(skew(c) @ slopes).T
         if self.turn is not None:
