@@ -100,6 +100,10 @@ class _Posed:
         off = at - s.center
         return Arc(self.lifted(s.center), s.radius * self.right, s.radius * self.up), np.array([np.arctan2(*off[::-1])])
 
+    def is_straight(self, number: float) -> bool:
+        """Whether a border is, or the one that begins at a corner."""
+        return self._segments[int(number)].radius == 0.0
+
     def corner(self, number: float) -> Place:
         """The beginning of a border, or the middle of an arc."""
         s = self._segments[int(number)]
@@ -133,8 +137,13 @@ def flat_derivatives(a: PlaneRegion, b: PlaneRegion, turn: Array, shift: Array, 
             moves = second.border(int(j), place)
         if kind == CROSSING and _are_tangent(stays, moves, first.normal):
             # Where borders touch they do not cross for long: what is on the first stays there.
-            stays, moves = (Affine(place, np.empty((3, 0))), NONE), second.plane(place)
-        found.append(Ray.near(stays, moves, first.normal, at))
+            stays = Affine(place - at[0] * first.normal, np.empty((3, 0))), NONE
+            moves = second.plane(place)
+        # At straight borders rows are where they were found.
+        is_straight = kind != CROSSING or (first.is_straight(i) and second.is_straight(j))
+        is_straight &= kind != CORNER_A or first.is_straight(i)
+        is_straight &= (kind != CORNER_B or second.is_straight(j)) and kind not in (LOWEST_A, LOWEST_B)
+        found.append((Ray.there if is_straight else Ray.near)(stays, moves, first.normal, at))
     return found
 
 

@@ -90,11 +90,18 @@ class Ray(Row):
     along: Array
 
     @classmethod
+    def there(
+        cls, stays: tuple[Place, Array], moves: tuple[Place, Array], along: Array, at: tuple[float, Array, Array]
+    ) -> Ray:
+        """The row between places, each with its coordinates; `at` has its gap, normal and place."""
+        return cls(at[0], at[1], at[2], False, np.concatenate([moves[1], stays[1]]), stays[0], moves[0], along)
+
+    @classmethod
     def near(
         cls, stays: tuple[Place, Array], moves: tuple[Place, Array], along: Array, at: tuple[float, Array, Array]
     ) -> Ray:
         """The row between places, each with coordinates nearby; `at` has a gap, a normal and a place nearby."""
-        row = cls(at[0], at[1], at[2], False, np.concatenate([moves[1], stays[1]]), stays[0], moves[0], along)
+        row = cls.there(stays, moves, along, at)
         m, is_affine = len(row.x), isinstance(row.stays, Affine) and isinstance(row.moves, Affine)
         for _ in range(1 if is_affine else STEPS):
             matrix, off, _ = row._system()

@@ -99,6 +99,24 @@ def random_poses(rng, lean, turn, height):
     return away, away @ asm.Pose(place, (w, x, y, z))
 
 
+@pytest.mark.parametrize(
+    "loops",
+    [
+        (polygon([(-1, -1), (1, -1), (1, 1), (-1, 1)]), circle(1.0)),
+        (circle(1.0), polygon([(-1, -1), (1, -1), (1, 1), (-1, 1)])),
+        (circle(1.0), circle(0.5, (0.5, 0.0))),
+    ],
+)
+def test_gaps_are_those_of_the_planes_where_borders_are_tangent(loops):
+    a, b = map(sheet, loops)
+    x, y, z, w = DOWN.as_quat()
+    found = contact_manifold(a, b, poses=(asm.Pose(), asm.Pose((0.0, 0.0, 0.3), (w, x, y, z))))
+    assert len(found.gaps) >= 8
+    np.testing.assert_allclose(found.gaps, 0.3, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found.places[:, 2], 0.3, rtol=0, atol=1e-12)
+    assert np.isfinite(found.second_rates()).all()
+
+
 @pytest.mark.parametrize("exchanged", [False, True])
 @pytest.mark.parametrize("lean", [0.0, 1e-6, 0.03])
 @pytest.mark.parametrize("name", PAIRS)
