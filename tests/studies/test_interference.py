@@ -313,6 +313,39 @@ def test_random_pairs_are_what_samples_say(cases):
     assert all(proved)
 
 
+def test_depths_of_boxes_part_them_and_no_less_does(cases):
+    rng = np.random.default_rng(7)
+    kinds = set()
+    for k in range(cases(20, 600)):
+        sizes = rng.uniform(0.2, 1.0, (2, 3))
+        a = body("a", SHAPES.box(*sizes[0]))
+        # Some are aligned, so that faces and edges are over each other.
+        turn = (
+            Rotation.random(random_state=int(rng.integers(1 << 30)))
+            if k % 3
+            else Rotation.from_rotvec(rng.integers(0, 4) * 0.5 * np.pi * np.eye(3)[k % 2])
+        )
+        q = np.concatenate([rng.uniform(-0.5, 0.5, 3), turn.as_quat(scalar_first=True)])
+        found = interference([a, body("b", SHAPES.box(*sizes[1]), q)]).rows
+        if not found or found[0].kind != "crossing":
+            continue
+        (one,) = found
+        way = one.points[0] - one.points[1]
+        depth = float(np.linalg.norm(way))
+        assert one.proved and one.gap == pytest.approx(-depth, abs=1e-13)
+        # Both points are on their bodies, and what the names tell they are on is of the same kind.
+        for point, name, shape, pose in zip(one.points, one.faces, (0, 1), (HERE, q), strict=True):
+            at_rest = Rotation.from_quat(pose[3:], scalar_first=True).inv().apply(point - pose[:3])
+            assert np.abs(at_rest / (0.5 * sizes[shape])).max() == pytest.approx(1.0, abs=1e-9)
+            kinds.add(name.split()[0])
+        for part, kind in ((1.0 - 1e-4, "crossing"), (1.0 + 1e-4, "clear")):
+            moved = q + np.concatenate([part * way, np.zeros(4)])
+            (after,) = interference([a, body("b", SHAPES.box(*sizes[1]), moved)], margin=1.0).rows
+            assert after.kind == kind
+            assert after.gap == pytest.approx((part - 1.0) * depth, abs=1e-9)
+    assert kinds == {"face", "edge", "vertex"}
+
+
 def test_what_constraints_say_of_pairs():
     balls = [body(name, SMALL, at(x)) for name, x in zip("abcde", np.arange(5.0), strict=True)]
     ground = asm.Body("ground", fixed=True)
@@ -352,7 +385,7 @@ def test_pairs_that_there_was_no_time_for_are_undecided(monkeypatch):
     assert [row.gap for row in report] == [None, None] and all(0.0 <= row.bound <= 0.1 for row in report)
     assert report.searched == 0 and "undecided" in str(report)
     # Time that is over before the search for crossings.
-    crossing = [body("a", BOX), body("b", BOX, at(0.9))]
+    crossing = [body("a", SMALL), body("b", SMALL, at(0.9))]
     over = iter([False, True])
     monkeypatch.setattr(search.Interruption, "is_over", lambda self: next(over, True))
     (row,) = interference(crossing, time_limit=1e6)

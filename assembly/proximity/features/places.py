@@ -14,6 +14,7 @@ from assembly.geometry.faces.face import Face
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.topology import Edge, Topology
 from assembly.proximity.features.features import Feature, features_of
+from assembly.proximity.features.polytopes import polytope_of
 
 __all__ = ["body_faces", "body_tree", "feature_at", "is_behind", "is_closed", "normals_at", "pieces_of", "shells_of"]
 
@@ -105,6 +106,13 @@ def feature_at(faces: Faces, spot: Spot, point: Array) -> Feature:
     if place.curve >= 0 and len(body_faces(faces)) == len(topology.faces):
         number = topology.face_edges[place.face][place.curve]
         return names[place.face] if number is None else names[len(topology.faces) + number]
+    flat = polytope_of(faces)
+    if flat is not None:
+        edge = flat.edge_at(point, topology.tolerance)
+        if edge is not None:
+            return names[len(topology.faces) + edge]
+        if place.curve < 0:
+            return names[place.face]
     face, u, v = _parameters(faces, spot)
     found = _edge_at(topology, face, u, v)
     return names[face] if found is None else names[len(topology.faces) + found[1]]

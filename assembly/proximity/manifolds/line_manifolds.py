@@ -19,6 +19,7 @@ from assembly.proximity.manifolds.line_span import line_span
 from assembly.proximity.manifolds.manifold import Manifold
 from assembly.proximity.manifolds.records import BALL, CUT, END, FRAME, SEGMENT
 from assembly.proximity.manifolds.regions import PlaneRegion, plane_region
+from assembly.proximity.manifolds.second_rates import skew
 
 __all__ = ["line_manifold", "line_manifolds"]
 
@@ -75,7 +76,7 @@ def _nearest_line(form: Cylinder | Cone | Sphere, n: Array) -> Array | None:
         return None
     side /= length
     start, angle = form.turn.start, form.turn.angle
-    turned = np.arctan2(np.cross(start, -side) @ form.axis, start @ -side) % (2.0 * np.pi)
+    turned = np.arctan2(-(skew(start) @ side) @ form.axis, start @ -side) % (2.0 * np.pi)
     # Where a face ends at the line it has it.
     if turned > angle + 1e-9 and turned < 2.0 * np.pi - 1e-9:
         return None
@@ -102,7 +103,7 @@ def _tangent(region: PlaneRegion, segment: int, place: Array) -> Array:
 
 def _normal(frame: np.record, way: Array, border: Array) -> Array:
     """How the gap changes where a line ends: across it and the border that it ends at, so that m.n = 1."""
-    across = np.cross(border[0] * frame.right + border[1] * frame.up, way)
+    across = skew(border[0] * frame.right + border[1] * frame.up) @ way
     along = float(across @ frame.normal)
     if abs(along) <= 1e-6 * float(np.linalg.norm(border) * np.linalg.norm(way)):
         return np.array(frame.normal)

@@ -19,7 +19,12 @@ from assembly.proximity.manifolds.line_manifolds import line_manifold
 from assembly.proximity.manifolds.manifold import Manifold
 from assembly.proximity.manifolds.regions import PlaneRegion, plane_region
 from assembly.proximity.manifolds.round_manifolds import SAME_ANGLE, round_manifold
-from assembly.proximity.manifolds.row_derivatives import flat_derivatives, line_derivatives, round_derivatives
+from assembly.proximity.manifolds.row_derivatives import (
+    flat_derivatives,
+    line_derivatives,
+    round_derivatives,
+    socket_row,
+)
 from assembly.proximity.manifolds.second_rates import Row, of_both
 
 __all__ = ["ContactManifold", "contact_manifold"]
@@ -66,7 +71,7 @@ class ContactManifold(ReadOnlyArrays):
 
         Along x + t v, exp(t w) e with constant twists a gap's second derivative is twist^T second twist. Of two rows
         there is none at a kink: of the lowest point of an arc where planes are flush (it is no row there), and of the
-        nearest direction of a ring where axes meet, which is taken to stay there.
+        nearest direction of a ring where axes meet, or of a ball where centers do, which is taken to stay there.
         """
         second = np.empty((len(self._rows), 2, 6, 2, 6))
         for form, (k, row), normal, place in zip(second, self._rows, self.normals, self.places, strict=True):
@@ -83,7 +88,8 @@ def contact_manifold(a: BodyFace, b: BodyFace, *, poses: tuple[Pose, Pose] | Non
     """The contact manifold of two faces that conform, or nearly (docs/certified.md).
 
     Plane on plane: corners of what both trimmed faces have in common, and places on arcs. A cylinder in a bore, a cone
-    in a hollow one: two rings. A cylinder or a cone on a plane: the ends of a line; a ball on a plane: its point.
+    in a hollow one: two rings. A ball in its socket: where it is nearest, both being whole. A cylinder or a cone on a
+    plane: the ends of a line; a ball on a plane: its point.
 
     Parameters
     ----------
@@ -144,13 +150,14 @@ def _full(side: Side | None) -> Cylinder | Cone | Sphere | None:
     return None
 
 
-def _fitting(a: Side | None, b: Side | None) -> tuple[Cylinder | Cone, Cylinder | Cone] | None:
-    """Two cylinders, or cones of one angle, of which one is hollow and one full."""
+def _fitting(a: Side | None, b: Side | None) -> tuple[Cylinder | Cone | Sphere, Cylinder | Cone | Sphere] | None:
+    """Two cylinders, balls, or cones of one angle, of which one is hollow and one full."""
     if not isinstance(a, ElementaryFace) or not isinstance(b, ElementaryFace) or a.is_outward == b.is_outward:
         return None
     one, other = a.form, b.form
-    if isinstance(one, Cylinder) and isinstance(other, Cylinder):
-        return one, other
+    for kind in (Cylinder, Sphere):
+        if isinstance(one, kind) and isinstance(other, kind):
+            return one, other
     if isinstance(one, Cone) and isinstance(other, Cone) and abs(one.half_angle - other.half_angle) <= SAME_ANGLE:
         return one, other
     return None
@@ -168,7 +175,7 @@ def _is_exchanged(faces: tuple[BodyFace, BodyFace], sides: tuple[Side | None, Si
     kinds = " and a ".join(face.kind for face in faces)
     raise InputError(
         f"a and b are {faces[0]!r} and {faces[1]!r}, a {kinds}; expected planes with edges of lines and arcs, a "
-        "cylinder or a cone in a hollow one, or what is round on a plane"
+        "cylinder, a cone or a ball in a hollow one, or what is round on a plane"
     )
 
 
@@ -185,5 +192,9 @@ def _found(a: Side | None, b: Side | None, one: Pose, other: Pose) -> tuple[Sequ
         return None if manifold is None else line_derivatives(a, full, turn, shift, manifold)
     pair = _fitting(a, b)
     assert pair is not None
-    manifold = round_manifold(*pair, turn, shift)
-    return None if manifold is None else (round_derivatives(*pair, turn, shift, manifold), manifold.bound)
+    hollow, inner = pair
+    if isinstance(hollow, Sphere) or isinstance(inner, Sphere):
+        assert isinstance(hollow, Sphere) and isinstance(inner, Sphere)
+        return socket_row(hollow, inner, turn, shift)
+    manifold = round_manifold(hollow, inner, turn, shift)
+    return None if manifold is None else (round_derivatives(hollow, inner, turn, shift, manifold), manifold.bound)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,9 @@ Faces = tuple[ElementaryFace, ...]
 SAME_ANGLE = 1e-6
 
 
+@lru_cache(maxsize=256)
 def _record(form: Cylinder | Cone) -> Array:
-    """The ROUND record of a surface."""
+    """The ROUND record of a surface, kept."""
     record = np.zeros(ROUND_SIZE)
     one = rows_of(ROUND, record[None])[0]
     one.axis, (one.low, one.high) = form.axis, form.heights

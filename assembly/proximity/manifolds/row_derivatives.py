@@ -7,7 +7,9 @@ each begins there, and goes to where it is stationary.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from functools import lru_cache
+from math import hypot, sqrt, tan
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,48 +32,77 @@ from assembly.proximity.manifolds.records import (
     SEGMENT,
 )
 from assembly.proximity.manifolds.regions import PlaneRegion
-from assembly.proximity.manifolds.second_rates import Level, Ray, Row, skew
+from assembly.proximity.manifolds.second_rates import ALIKE, Level, Ray, Row, Socket, skew
 
-__all__ = ["flat_derivatives", "line_derivatives", "round_derivatives"]
+__all__ = ["flat_derivatives", "line_derivatives", "round_derivatives", "socket_row"]
 
 Array = NDArray[np.float64]
 NONE = np.empty(0)
 # The sine of the angle at which borders cross that are tangent as far as rounding tells.
 TANGENT = 1e-7
+# What rounding may make of the gap of a ball in its socket, in parts of the coordinates.
+ROUNDING = 1e-15
+
+
+class _Segment(NamedTuple):
+    """A record of `SEGMENT`."""
+
+    begin: Array
+    end: Array
+    center: Array
+    radius: float
+    sweep: float
+
+
+@lru_cache(maxsize=256)
+def _segments_of(region: PlaneRegion) -> tuple[_Segment, ...]:
+    """The borders of a region, read once: fields of NumPy's records take some microseconds each."""
+    s = rows_of(SEGMENT, region.segments)
+    return tuple(map(_Segment, s.begin, s.end, s.center, s.radius.tolist(), s.sweep.tolist()))
+
+
+@lru_cache(maxsize=256)
+def _frame_of(region: PlaneRegion) -> Array:
+    """The origin of a region and its directions right and up, and its normal, (4, 3)."""
+    frame = rows_of(FRAME, region.frame[None])[0]
+    return np.array([frame.origin, frame.right, frame.up, frame.normal])
 
 
 class _Posed:
     """A trimmed plane at x -> turn x + shift."""
 
     def __init__(self, region: PlaneRegion, turn: Array, shift: Array) -> None:
-        frame = rows_of(FRAME, region.frame[None])[0]
-        self.origin: Array = turn @ frame.origin + shift
-        self.right: Array = turn @ frame.right
-        self.up: Array = turn @ frame.up
-        self.normal: Array = turn @ frame.normal
-        self._segments: Any = rows_of(SEGMENT, region.segments)
+        origin, self.right, self.up, self.normal = _frame_of(region) @ turn.T
+        self.origin: Array = origin + shift
+        self._axes = np.array([self.right, self.up])
+        self._segments = _segments_of(region)
 
     def flat(self, place: Array) -> Array:
         """Coordinates of a place seen along the normal."""
-        return np.array([(place - self.origin) @ self.right, (place - self.origin) @ self.up])
+        return np.asarray(self._axes @ (place - self.origin))
 
     def lifted(self, xy: Array) -> Array:
         """The point of the plane at coordinates."""
-        return np.asarray(self.origin + xy[0] * self.right + xy[1] * self.up)
+        return np.asarray(self.origin + xy @ self._axes)
 
     def plane(self, place: Array) -> tuple[Place, Array]:
         """All of it, and the coordinates of what of it is at a place."""
-        return Affine(self.origin, np.column_stack([self.right, self.up])), self.flat(place)
+        return Affine(self.origin, self._axes.T), self.flat(place)
 
     def border(self, k: int, place: Array) -> tuple[Place, Array]:
         """A border, and the coordinate of what of it is at a place."""
         s, at = self._segments[k], self.flat(place)
         if s.radius == 0.0:
-            way = (s.end - s.begin) / np.linalg.norm(s.end - s.begin)
-            slope = (way[0] * self.right + way[1] * self.up)[:, None]
+            way = s.end - s.begin
+            way = way / sqrt(way @ way)
+            slope = (way @ self._axes)[:, None]
             return Affine(self.lifted(s.begin), slope), np.array([(at - s.begin) @ way])
         off = at - s.center
         return Arc(self.lifted(s.center), s.radius * self.right, s.radius * self.up), np.array([np.arctan2(*off[::-1])])
+
+    def is_straight(self, number: float) -> bool:
+        """Whether a border is, or the one that begins at a corner."""
+        return self._segments[int(number)].radius == 0.0
 
     def corner(self, number: float) -> Place:
         """The beginning of a border, or the middle of an arc."""
@@ -106,8 +137,13 @@ def flat_derivatives(a: PlaneRegion, b: PlaneRegion, turn: Array, shift: Array, 
             moves = second.border(int(j), place)
         if kind == CROSSING and _are_tangent(stays, moves, first.normal):
             # Where borders touch they do not cross for long: what is on the first stays there.
-            stays, moves = (Affine(place, np.empty((3, 0))), NONE), second.plane(place)
-        found.append(Ray.near(stays, moves, first.normal, at))
+            stays = Affine(place - at[0] * first.normal, np.empty((3, 0))), NONE
+            moves = second.plane(place)
+        # At straight borders rows are where they were found.
+        is_straight = kind != CROSSING or (first.is_straight(i) and second.is_straight(j))
+        is_straight &= kind != CORNER_A or first.is_straight(i)
+        is_straight &= (kind != CORNER_B or second.is_straight(j)) and kind not in (LOWEST_A, LOWEST_B)
+        found.append((Ray.there if is_straight else Ray.near)(stays, moves, first.normal, at))
     return found
 
 
@@ -116,14 +152,21 @@ def _are_tangent(one: tuple[Place, Array], other: tuple[Place, Array], n: Array)
     return bool(abs(s @ skew(n) @ t) <= TANGENT * np.linalg.norm(s) * np.linalg.norm(t))
 
 
-def _wall(form: Cylinder | Cone, turn: Array, shift: Array, toward: Array) -> Wall:
-    """A cylinder or a cone at x -> turn x + shift, with angles from a direction across its axis."""
-    axis = turn @ form.axis
-    right = toward - (toward @ axis) * axis
-    right = right / np.linalg.norm(right)
-    if isinstance(form, Cone):
-        return Wall(turn @ form.apex + shift, axis, right, skew(axis) @ right, 0.0, float(np.tan(form.half_angle)))
-    return Wall(turn @ form.point + shift, axis, right, skew(axis) @ right, form.radius, 0.0)
+class _PosedWall:
+    """A cylinder or a cone at x -> turn x + shift."""
+
+    def __init__(self, form: Cylinder | Cone, turn: Array, shift: Array) -> None:
+        self._axis: Array = turn @ form.axis
+        self._around = skew(self._axis)
+        self.origin: Array = turn @ (form.apex if isinstance(form, Cone) else form.point) + shift
+        self._radius = 0.0 if isinstance(form, Cone) else form.radius
+        self._widening = tan(form.half_angle) if isinstance(form, Cone) else 0.0
+
+    def toward(self, way: Array) -> Wall:
+        """The surface with angles from a direction across its axis."""
+        right = way - float(way @ self._axis) * self._axis
+        right = right / sqrt(right @ right)
+        return Wall(self.origin, self._axis, right, self._around @ right, self._radius, self._widening)
 
 
 def _circle(wall: Wall, height: float) -> Arc:
@@ -146,7 +189,7 @@ def line_derivatives(
         center = Affine(turn @ form.center + shift, np.empty((3, 0)))
         (_, at), *_ = _told(manifold)
         return [Level(*at, False, NONE, center, plane.origin, None)], manifold.bound
-    wall = _wall(form, turn, shift, -n)
+    wall = _PosedWall(form, turn, shift).toward(-n)
     ends = [_circle(wall, height).at(np.zeros(1))[0] for height in form.heights]
     for (kind, i, end), at in _told(manifold):
         place = at[2]
@@ -168,14 +211,15 @@ def line_derivatives(
 
 def _least(region: PlaneRegion, slope: Array) -> float:
     """The least of slope.x over a region."""
-    segments = rows_of(SEGMENT, region.segments)
-    least = float((segments.begin @ slope).min())
-    for s in segments[segments.radius > 0.0]:
-        way = -slope / max(float(np.linalg.norm(slope)), 1e-300)
-        # An arc turns by a quarter at most: what is within it is on one side of its chord.
-        beyond = np.cross(np.append(s.end - s.begin, 0.0), np.append(s.center + s.radius * way - s.begin, 0.0))[2]
-        if beyond * s.sweep <= 0.0:
-            least = min(least, float((s.center + s.radius * way) @ slope))
+    segments = _segments_of(region)
+    least = min(float(s.begin @ slope) for s in segments)
+    way = -slope / max(sqrt(slope @ slope), 1e-300)
+    for s in segments:
+        if s.radius > 0.0:
+            # An arc turns by a quarter at most: what is within it is on one side of its chord.
+            (x, y), (u, v) = s.end - s.begin, s.center + s.radius * way - s.begin
+            if (x * v - y * u) * s.sweep <= 0.0:
+                least = min(least, float((s.center + s.radius * way) @ slope))
     return least
 
 
@@ -184,17 +228,17 @@ def round_derivatives(
 ) -> Sequence[Row]:
     """Of the rows of a bore and a shaft, or of cones: what is full at x -> turn x + shift, seen from the wall."""
     found = []
+    here = np.eye(3), np.zeros(3)
+    rings = _PosedWall(hollow, *here), _PosedWall(full, turn, shift)
+    rims = _PosedWall(full, *here), _PosedWall(hollow, turn.T, -turn.T @ shift)
     for (kind, *_), (gap, normal, place) in _told(manifold):
         is_ring = kind in (RING, NEAREST_RING)
-        if is_ring:
-            stays = _wall(hollow, np.eye(3), np.zeros(3), -normal)
-            moves = _wall(full, turn, shift, place - (turn @ _origin(full) + shift))
-        else:
+        if not is_ring:
             normal, place = -turn.T @ normal, turn.T @ (place - shift)
-            stays = _wall(full, np.eye(3), np.zeros(3), normal)
-            moves = _wall(hollow, turn.T, -turn.T @ shift, place - turn.T @ (_origin(hollow) - shift))
+        wall, other = rings if is_ring else rims
+        stays, moves = wall.toward(-normal if is_ring else normal), other.toward(place - other.origin)
         # Normals of a wall by their angle are right - widening axis, over the length of that.
-        size = (-1.0 if is_ring else 1.0) / float(np.hypot(1.0, stays.widening))
+        size = (-1.0 if is_ring else 1.0) / hypot(1.0, stays.widening)
         circle: Place = _circle(moves, float((place - moves.origin) @ moves.axis))
         of, x = (Affine(place, np.empty((3, 0))), NONE) if kind == RIM else (circle, np.zeros(1))
         angle = None if kind == RING else (size * stays.up, -size * stays.right)
@@ -202,5 +246,22 @@ def round_derivatives(
     return found
 
 
-def _origin(form: Cylinder | Cone) -> Array:
-    return form.apex if isinstance(form, Cone) else form.point
+def socket_row(hollow: Sphere, full: Sphere, turn: Array, shift: Array) -> tuple[Sequence[Row], float] | None:
+    """The row of a ball at x -> turn x + shift in its socket, and a bound of all gaps; None if its center is not in it.
+
+    Both are taken to be whole: where faces end, gaps are larger.
+    """
+    center = turn @ full.center + shift
+    away = center - hollow.center
+    apart = float(np.linalg.norm(away))
+    if apart >= hollow.radius:
+        return None
+    if apart <= ALIKE * hollow.radius:
+        # All directions are nearest ones. It is taken to lie on the side of -z.
+        normal, middle = np.array([0.0, 0.0, 1.0]), 0.0
+    else:
+        normal, middle = -away / apart, apart
+    gap = hollow.radius - full.radius - apart
+    row = Socket(gap, normal, center - full.radius * normal, False, NONE, center, middle)
+    off = ROUNDING * (float(np.abs(hollow.center).max() + np.abs(center).max()) + hollow.radius + full.radius)
+    return [row], gap - hollow.deviation - full.deviation - off

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from assembly.proximity.manifolds.places import Affine, Place
 
-__all__ = ["Level", "Ray", "Row", "of_both", "skew"]
+__all__ = ["ALIKE", "Level", "Ray", "Row", "Socket", "of_both", "skew"]
 
 Array = NDArray[np.float64]
 # Newton's method begins at what is off by the lean squared; a step below the last, in coordinates, ends it.
@@ -34,6 +34,11 @@ def _turned(c: Array, q: Array) -> Array:
     """The form (3, 3) of w -> c.(w x (w x q))."""
     both = np.outer(c, q)
     return np.asarray(0.5 * (both + both.T) - float(c @ q) * np.eye(3))
+
+
+def _along(c: Array, bends: Array) -> Array:
+    """What bends (3, k, k) are along a vector, (k, k)."""
+    return np.asarray((c @ bends.reshape(3, -1)).reshape(bends.shape[1:]))
 
 
 def _moves(q: Array) -> Array:
@@ -85,15 +90,23 @@ class Ray(Row):
     along: Array
 
     @classmethod
+    def there(
+        cls, stays: tuple[Place, Array], moves: tuple[Place, Array], along: Array, at: tuple[float, Array, Array]
+    ) -> Ray:
+        """The row between places, each with its coordinates; `at` has its gap, normal and place."""
+        return cls(at[0], at[1], at[2], False, np.concatenate([moves[1], stays[1]]), stays[0], moves[0], along)
+
+    @classmethod
     def near(
         cls, stays: tuple[Place, Array], moves: tuple[Place, Array], along: Array, at: tuple[float, Array, Array]
     ) -> Ray:
         """The row between places, each with coordinates nearby; `at` has a gap, a normal and a place nearby."""
-        row = cls(at[0], at[1], at[2], False, np.concatenate([moves[1], stays[1]]), stays[0], moves[0], along)
+        row = cls.there(stays, moves, along, at)
         m, is_affine = len(row.x), isinstance(row.stays, Affine) and isinstance(row.moves, Affine)
         for _ in range(1 if is_affine else STEPS):
             matrix, off, _ = row._system()
-            right = np.concatenate([matrix[: m + 1, m + 1 :] @ row.normal, off])
+            right = np.empty(m + 4)
+            right[: m + 1], right[m + 1 :] = matrix[: m + 1, m + 1 :] @ row.normal, off
             right[m] += 1.0
             step = np.linalg.solve(matrix, -right)
             x = row.x + step[:m]
@@ -109,11 +122,13 @@ class Ray(Row):
         q, q_slopes, q_bends = self.moves.at(self.x[:k])
         p, p_slopes, p_bends = self.stays.at(self.x[k:])
         matrix = np.zeros((m + 4, m + 4))
-        matrix[:k, :k] = np.tensordot(c, q_bends, 1)
-        matrix[k:m, k:m] = -np.tensordot(c, p_bends, 1)
-        slopes = np.column_stack([q_slopes, -p_slopes, -self.along])
-        matrix[m + 1 :, : m + 1] = slopes
-        matrix[: m + 1, m + 1 :] = slopes.T
+        if not isinstance(self.moves, Affine):
+            matrix[:k, :k] = _along(c, q_bends)
+        if not isinstance(self.stays, Affine):
+            matrix[k:m, k:m] = -_along(c, p_bends)
+        slopes = matrix[m + 1 :]
+        slopes[:, :k], slopes[:, k:m], slopes[:, m] = q_slopes, -p_slopes, -self.along
+        matrix[: m + 1, m + 1 :] = slopes[:, : m + 1].T
         return matrix, q - p - self.gap * self.along, q_slopes
 
     def second(self) -> Array:
@@ -150,7 +165,7 @@ class Level(Row):
         """The gap's second derivative, (6, 6). A normal that is one of many alike stays."""
         q, slopes, bends = self.moves.at(self.x)
         c, k = self.normal, self.moves.count
-        matrix = np.tensordot(c, bends, 1)
+        matrix = _along(c, bends)
         mixed = np.zeros((k, 6))
         mixed[:, 3:] = -(skew(c) @ slopes).T
         if self.turn is not None:
@@ -162,6 +177,33 @@ class Level(Row):
         second = np.zeros((6, 6))
         second[3:, 3:] = _turned(c, q)
         return second - mixed.T @ np.linalg.solve(matrix, mixed) if len(matrix) else second
+
+
+@dataclass(frozen=True, eq=False)
+class Socket(Row):
+    """How much farther a point of what moves may go from a center of what stays: radius - |q - o|, and a constant.
+
+    Attributes
+    ----------
+    moves : (3,)
+        q, the center of a ball.
+    apart : float
+        |q - o|. Where that is zero all normals are alike, and the one that it has stays.
+    """
+
+    moves: Array
+    apart: float
+
+    def second(self) -> Array:
+        """The gap's second derivative, (6, 6)."""
+        second = np.zeros((6, 6))
+        second[3:, 3:] = _turned(self.normal, self.moves)
+        if self.apart > 0.0:
+            # What goes across the normal goes around the center.
+            moves = _moves(self.moves)
+            across = moves - np.outer(self.normal, self.normal @ moves)
+            second -= across.T @ across / self.apart
+        return second
 
 
 def of_both(rates: Array, second: Array, arm: Array) -> Array:

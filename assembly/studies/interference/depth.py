@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from assembly.constraints.model.contact import side_faces
 from assembly.geometry import shapes
+from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import IDENTITY_ROW, rotation_matrix
@@ -26,6 +27,7 @@ from assembly.proximity.clearance.round_faces import round_of
 from assembly.proximity.clearance.touching import recognized
 from assembly.proximity.features.body_distance import BodyDistance, DistanceStatus, distance
 from assembly.proximity.features.features import FeatureStatus, closest_features, features_of
+from assembly.proximity.features.polytopes import polytope_of
 from assembly.solve.crossings import posed_box
 from assembly.tracking.manager import Manager
 
@@ -208,6 +210,9 @@ def _has_inside(body: Body, row: Array, point: Array, radius: float) -> bool:
     """Whether a ball is wholly inside of a body."""
     if not solid_of(side_faces(body)).is_closed:
         return False
+    flat = polytope_of(first_equal(side_faces(body)))
+    if flat is not None:
+        return flat.has_inside(rotation_matrix(row[3:]).T @ (point - row[:3]), radius)
     return _to_ball(body, row, point, radius).status is DistanceStatus.ENCLOSED
 
 

@@ -13,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.model.contact import side_faces
-from assembly.proximity.clearance.answers import Verdict
+from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.body_cells import has_cells
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.features.body_distance import Beyond, BodyDistance, DistanceStatus, beyond, distance
+from assembly.proximity.features.polytopes import Parting
 from assembly.solve.crossings import PairLook
 from assembly.studies.interference.clash import Clash, Kind, Relation
 from assembly.studies.interference.depth import Depth, Two, common_point
+from assembly.studies.interference.flat_bodies import deepest
 
 __all__ = ["NearPair"]
 
@@ -31,6 +33,9 @@ BUDGET = 20_000
 # Parts of a gap that are tried as bounds.
 PARTS = (0.99, 0.9, 0.75, 0.5)
 
+# What is told of bodies that a shorter move than what is called touching parts.
+TOUCHES = PairLook(Answer(Verdict.TOUCHING), False, True)
+
 
 @dataclass(eq=False)
 class NearPair:
@@ -40,14 +45,22 @@ class NearPair:
     ----------
     two : Two
     relation : Relation
+    parting : Parting, optional
+        What parts them, if they are convex and of flat faces.
     """
 
     two: Two
     relation: Relation = field(repr=False)
+    parting: Parting | None = field(default=None, repr=False)
 
     def beyond(self, margin: float) -> Beyond:
         """Whether the two are farther apart than a margin, and whether one may be inside of the other one."""
-        return beyond(*self.two.bodies, self.two.q, max(margin, self.two.touching), BUDGET)
+        least = max(margin, self.two.touching)
+        if self.parting is not None and self.parting.depth <= self.two.touching:
+            # A plane is between them, or nearly. Of those nearer to each other their nearest points tell all.
+            if -self.parting.depth > least or self.parting.depth >= -self.two.touching:
+                return Beyond(-self.parting.depth > least, False)
+        return beyond(*self.two.bodies, self.two.q, least, BUDGET)
 
     @cached_property
     def nearest(self) -> BodyDistance:
@@ -67,6 +80,22 @@ class NearPair:
     def is_told(self) -> bool:
         """Whether nearest points tell what the pair is: they are apart, and so it is known whether one is inside."""
         return self.nearest.converged and self.nearest.upper > self.two.touching
+
+    @property
+    def look(self) -> PairLook | None:
+        """What a look would tell, where what parts the two tells it as well: that they only touch."""
+        if self.parting is None or self.parting.depth > self.two.touching or not self.two.touching > 0.0:
+            return None
+        return TOUCHES
+
+    def overlap(self) -> Clash | None:
+        """The row of bodies that cross as what parts them tells, and how deep; None where it does not tell it."""
+        parting, two = self.parting, self.two
+        if parting is None or parting.is_nested or not parting.depth > max(two.touching, AGREED * two.size):
+            return None
+        depth = deepest(two, parting)
+        inside = common_point(two, depth.points)
+        return Clash(self._names, "crossing", depth.gap, 0.0, depth.points, depth.faces, True, self.relation, inside)
 
     @cached_property
     def bound(self) -> float:

@@ -21,6 +21,7 @@ from assembly.solve.samples import PosedBodies
 from assembly.solve.solution import Solution
 from assembly.studies.interference.clash import Clash, Interference, Relation
 from assembly.studies.interference.depth import Two, depth_of
+from assembly.studies.interference.flat_bodies import partings_of
 from assembly.studies.interference.near_pair import NearPair
 
 __all__ = ["interference"]
@@ -83,10 +84,12 @@ def interference(
     posed = PosedBodies(scene.bodies, q, touching)
     sizes = {k: scene.bodies[k].size for k in shaped}
     within = touching * max(sizes.values(), default=0.0)
-    near = []
-    for i, j, apart in _near(scene, q, shaped, margin):
-        a, b = scene.bodies[i], scene.bodies[j]
-        near.append((NearPair(Two(a, b, q[[i, j]], max(sizes[i], sizes[j]), within), _relation(scene, a, b)), apart))
+    boxed = list(_near(scene, q, shaped, margin))
+    pairs = [Two(scene.bodies[i], scene.bodies[j], q[[i, j]], max(sizes[i], sizes[j]), within) for i, j, _ in boxed]
+    near = [
+        (NearPair(two, _relation(scene, *two.bodies), parting), apart)
+        for two, parting, (_, _, apart) in zip(pairs, partings_of(pairs), boxed, strict=True)
+    ]
     rows, searched = _rows_of(near, posed, margin, interruption)
     kept = [row for row in rows if row.bound <= margin or row.kind in ("crossing", "enclosed", "undecided")]
     return Interference(
@@ -125,6 +128,8 @@ def _near(scene: Assembly, q: Array, shaped: Sequence[int], margin: float) -> It
 def _relation(scene: Assembly, a: Body, b: Body) -> Relation:
     """What the constraints of a scene say of two of its bodies."""
     enabled = [item for item in scene.constraints if item.enabled]
+    if not enabled:
+        return "free"
     if joined_pairs((a, b), enabled):
         return "joined"
     if not free_pairs((a, b), enabled):
@@ -145,12 +150,18 @@ def _rows_of(
             rows.append(pair.unsearched(apart))
             continue
         searched += 1
+        crossing = pair.overlap()
+        if crossing is not None:
+            rows.append(crossing)
+            continue
         beyond = pair.beyond(margin)
         if beyond.is_apart:
             if beyond.may_nest:
                 asked.append((pair, apart, True))
         elif pair.is_told:
             rows.append(pair.told())
+        elif pair.look is not None and pair.nearest.upper <= pair.two.touching:
+            rows.append(pair.looked(pair.look))
         else:
             asked.append((pair, apart, False))
     normals = [None if is_apart else pair.normal for pair, _, is_apart in asked]

@@ -91,6 +91,31 @@ def test_the_bound_holds_of_points():
     assert gap - 2e-3 < contact_manifold(a, b).bound <= gap
 
 
+def test_a_ball_in_its_socket_has_one_row():
+    socket = asm.Body("socket", [asm.Face(asm.shapes.sphere(0.5), reversed=True)])
+    ball = asm.Body("ball", asm.shapes.sphere(0.4))
+    rng = np.random.default_rng(8)
+    for apart in (1e-6, 0.05, 0.1, 0.3):
+        way = rng.normal(size=3)
+        way /= np.linalg.norm(way)
+        socket.pose, ball.pose = AWAY, pose_of(apart * way, (0.5, 0.1, -0.7, 0.5))
+        found = contact_manifold(socket.faces[0], ball.faces[0])
+        exchanged = contact_manifold(ball.faces[0], socket.faces[0])
+        assert found.gaps.tolist() == pytest.approx([0.1 - apart], abs=1e-13)
+        np.testing.assert_allclose(found.normals, [-AWAY.matrix[:3, :3] @ way], rtol=0, atol=1e-7)
+        np.testing.assert_allclose(found.places, [AWAY.apply((apart + 0.4) * way)], rtol=0, atol=1e-7)
+        np.testing.assert_allclose(exchanged.normals, -found.normals, rtol=0, atol=1e-12)
+        # Samples of the ball, in the axes of the socket.
+        gaps = 0.5 - np.linalg.norm(seen_from(socket.faces[0], ball.faces[0]), axis=1)
+        assert found.gaps[0] - 1e-12 < found.bound <= gaps.min() + 1e-14 and gaps.min() < found.bound + 1e-3
+    # Where the centers meet the normal is one of all; beyond the socket they do not face each other.
+    ball.pose = AWAY
+    (normal,) = contact_manifold(socket.faces[0], ball.faces[0]).normals
+    np.testing.assert_allclose(normal, AWAY.matrix[:3, 2], rtol=0, atol=1e-14)
+    ball.pose = pose_of((0.6, 0.0, 0.0))
+    assert contact_manifold(socket.faces[0], ball.faces[0]) is None
+
+
 def test_faces_that_have_nothing_in_common():
     base, lid = plate(), block((30, 20, 10), (200.0, 0.0, 10.5))
     assert contact_manifold(base.face("top"), lid.face("bottom")) is None

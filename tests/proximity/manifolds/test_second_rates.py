@@ -64,6 +64,12 @@ PAIRS = {
     "cone in its seat": (lambda: wall(cone(3.0, 0.2)), lambda: wall(cone(0.0, 0.1)), Rotation.identity(), 0.0),
     "long cone": (lambda: wall(cone(3.0, 0.2)), lambda: wall(cone(0.0, -0.2)), Rotation.identity(), 0.0),
     "cone on a disc": (lambda: sheet(circle(1.0)), lambda: wall(cone(0.0, 0.0)), CONE, 0.0),
+    "ball in its socket": (
+        lambda: asm.Body("socket", [asm.Face(asm.shapes.sphere(0.5), reversed=True)]).faces[0],
+        lambda: asm.Body("ball", asm.shapes.sphere(0.4)).faces[0],
+        DOWN,
+        0.08,
+    ),
     "ball": (lambda: sheet(circle(2.0)), lambda: asm.Body("ball", asm.shapes.sphere(0.4)).faces[0], DOWN, 0.4),
 }
 RINGS = ("shaft", "long shaft", "cone in its seat", "long cone")
@@ -91,6 +97,24 @@ def random_poses(rng, lean, turn, height):
     x, y, z, w = (Rotation.from_rotvec(lean * np.append(rng.normal(size=2), 0.0)) * spin * turn).as_quat()
     place = np.append((0.05 * lean if height == 0.0 else 0.1) * rng.normal(size=2), height + 0.1 * lean)
     return away, away @ asm.Pose(place, (w, x, y, z))
+
+
+@pytest.mark.parametrize(
+    "loops",
+    [
+        (polygon([(-1, -1), (1, -1), (1, 1), (-1, 1)]), circle(1.0)),
+        (circle(1.0), polygon([(-1, -1), (1, -1), (1, 1), (-1, 1)])),
+        (circle(1.0), circle(0.5, (0.5, 0.0))),
+    ],
+)
+def test_gaps_are_those_of_the_planes_where_borders_are_tangent(loops):
+    a, b = map(sheet, loops)
+    x, y, z, w = DOWN.as_quat()
+    found = contact_manifold(a, b, poses=(asm.Pose(), asm.Pose((0.0, 0.0, 0.3), (w, x, y, z))))
+    assert len(found.gaps) >= 8
+    np.testing.assert_allclose(found.gaps, 0.3, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found.places[:, 2], 0.3, rtol=0, atol=1e-12)
+    assert np.isfinite(found.second_rates()).all()
 
 
 @pytest.mark.parametrize("exchanged", [False, True])
