@@ -145,7 +145,7 @@ class OpposedFrame(Frame):
 
 
 class Body(Weighed):
-    """A rigid body. Its pose and whether it is fixed may be set; its name and its shape cannot be changed.
+    """A rigid body. Its pose, its density and whether it is fixed may be set; its name and its shape cannot be changed.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ class Body(Weighed):
     color : (red, green, blue), optional
         0 to 1 each, for pictures and files; settable.
     density : float
-        Mass per volume, positive; cannot be changed.
+        Mass per volume, positive; settable.
     picture : PictureMesh, optional
         Triangles that are drawn instead of the body's faces; settable.
     pose : Pose, optional

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.errors import KnownSettings
+from assembly.errors import KnownSettings, positive
+from assembly.kinematics.changes import count_number
 
 if TYPE_CHECKING:
     from assembly.proximity.features.mass import MassProperties
@@ -27,8 +28,13 @@ class Weighed(KnownSettings):
 
     @property
     def density(self) -> float:
-        """Mass a volume."""
+        """Mass a volume; settable, as bodies of files have one."""
         return self._density
+
+    @density.setter
+    def density(self, value: float) -> None:
+        self._density = positive("density", value)
+        count_number(self)
 
     @property
     def mass_properties(self) -> MassProperties:

@@ -42,6 +42,38 @@ def test_a_pendulum_hangs_and_its_joint_carries_it():
         assert asm.reference.solve(scene).objective == pytest.approx(solution.objective, rel=1e-8)
 
 
+def test_a_density_is_set_anew():
+    """A scale of equal arms tips to the heavier side, wherever it is solved from, as a new one does."""
+
+    def made(density):
+        ground, beam = asm.Body("ground", fixed=True), asm.Body("beam")
+        sides = [asm.Body(name, asm.shapes.box(1.0, 1.0, 1.0)) for name in ("left", "right")]
+        sides[0].density = density
+        scene = asm.Assembly([ground, beam, *sides])
+        scene.constrain(asm.Revolute(ground.frame(z=(0, 1, 0)), beam.frame(z=(0, 1, 0)), "tilt", limits=(-0.5, 0.5)))
+        for x, side in zip((-2.0, 2.0), sides, strict=True):
+            scene.constrain(asm.Fixed(beam.frame((x, 0, 0)), side))
+        scene.minimize(asm.Weight(sides))
+        return scene
+
+    scene = made(2.0)
+    left = scene.body("left")
+    first = scene.solve()
+    assert first.values["tilt.angle"] == pytest.approx(-0.5, abs=1e-9)
+    left.density = 0.5
+    second = scene.solve(first)
+    assert left.mass == pytest.approx(0.5, rel=1e-12) and second.success
+    assert second.values["tilt.angle"] == pytest.approx(0.5, abs=1e-9)
+    assert second.objective == pytest.approx(2.0 * np.sin(0.5) * (0.5 - 1.0), rel=1e-9)
+    new = made(0.5).solve(first.q)
+    np.testing.assert_allclose(second.q, new.q, rtol=0, atol=1e-9)
+    assert asm.reference.solve(scene).objective == pytest.approx(second.objective, rel=1e-8)
+    for wrong in (0.0, -1.0, np.nan):
+        with pytest.raises(asm.errors.InputError, match="density is"):
+            left.density = wrong
+    assert left.density == 0.5
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_box_falls_onto_a_floor(seed):
     """It lies on one of its faces, the lowest rest there is, or stands on a higher one: flat anyway."""

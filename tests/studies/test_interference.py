@@ -127,6 +127,16 @@ def test_radii_tell_where_very_many_points_are_nearest():
     assert 0.5 - 1e-9 * 6.0 <= loose.bound <= loose.gap
 
 
+@pytest.mark.parametrize("height", [1e-3, 1e-7])
+def test_a_shoulder_over_its_bearing_is_nearer_than_the_wall_of_the_bore(height):
+    # Points of the wall are 0.03 apart, all around: a search that is busy with these must not end there.
+    bearing = SHAPES.plate(40.0, 40.0, 15.0, [(0.0, 0.0, 6.03)])
+    profile = [(0, -30), (6, -30), (6, 7.5), (9, 7.5), (9, 14), (0, 14)]
+    found = row(bearing, SHAPES.revolution(asm.curves.polygon(profile)), at(0.0, 0.0, height))
+    assert found.gap == pytest.approx(height, abs=1e-10) and found.proved
+    assert found.kind == ("clear" if height > 1e-6 * 60.0 else "touching")
+
+
 TURNED = Rotation.from_rotvec([0.3, -0.5, 0.8])
 
 

@@ -211,6 +211,7 @@ class Weight(Objective):
         super().__init__(tuple(pulled), weight)
         self._direction = unit_direction("direction", direction)
         self._faces: list[Face] = []
+        self._densities: list[float] = []
         self._points = self._points_of_now()
 
     @property
@@ -221,15 +222,17 @@ class Weight(Objective):
     @property
     def points(self) -> tuple[tuple[float, Array], ...]:
         """Mass and center of mass, in body coordinates, of every body."""
-        # Numbers of shapes may be set anew.
+        # Numbers of shapes, and densities, may be set anew.
         faces = [side.face for body in self.bodies for side in body.faces]
-        if len(faces) != len(self._faces) or not all(map(is_, faces, self._faces)):
+        same = len(faces) == len(self._faces) and all(map(is_, faces, self._faces))
+        if not same or self._densities != [body.density for body in self.bodies]:
             self._points = self._points_of_now()
         return self._points
 
     def _points_of_now(self) -> tuple[tuple[float, Array], ...]:
-        """The same, and of which faces."""
+        """The same, and of which faces and densities."""
         self._faces = [side.face for body in self.bodies for side in body.faces]
+        self._densities = [body.density for body in self.bodies]
         return tuple((body.mass, read_only(body.center_of_mass)) for body in self.bodies)
 
     @property

@@ -28,8 +28,10 @@ __all__ = ["NearPair"]
 Array = NDArray[np.float64]
 # Bounds of a distance that agree to this part of the size are one number, and nearest points are sought to it.
 AGREED = 1e-9
-# Pairs of parts that a search for them, or a proof of a bound, may look at.
+# Pairs of parts that a search for them, or a proof of a bound, may look at; and a search where a proof does not agree
+# with what was found: beside a bore whose points are all equally near, a shoulder may be nearer than these.
 BUDGET = 20_000
+MOST = 200_000
 # Parts of a gap that are tried as bounds.
 PARTS = (0.99, 0.9, 0.75, 0.5)
 
@@ -62,11 +64,36 @@ class NearPair:
                 return Beyond(-self.parting.depth > least, False)
         return beyond(*self.two.bodies, self.two.q, least, BUDGET)
 
-    @cached_property
+    @property
     def nearest(self) -> BodyDistance:
         """Their nearest points."""
+        return self._found[0]
+
+    @property
+    def bound(self) -> float:
+        """No points of the two surfaces are nearer than this."""
+        return self._found[1]
+
+    @cached_property
+    def _found(self) -> tuple[BodyDistance, float]:
+        """Nearest points, and a bound.
+
+        A search among points of which very many are nearest has no room to end: there radii may tell, or at least of
+        most of the gap. Where they do not tell all of it, points that the search did not come to may be nearer.
+        """
+        near = self._search(BUDGET)
+        bound = self._bound(near)
+        if near.converged or near.upper <= self.two.touching or self._agree(near, bound):
+            return near, bound
+        near = self._search(MOST)
+        return near, max(bound, self._bound(near))
+
+    def _search(self, budget: int) -> BodyDistance:
         a, b = self.two.q
-        return distance(*self.two.bodies, poses=(a, b), tolerance=AGREED * self.two.size, budget=BUDGET)
+        return distance(*self.two.bodies, poses=(a, b), tolerance=AGREED * self.two.size, budget=budget)
+
+    def _agree(self, near: BodyDistance, bound: float) -> bool:
+        return near.upper - bound <= AGREED * self.two.size
 
     def normal(self) -> Array | None:
         """From the first body to the second where they touch; None where they do not, or it is not known."""
@@ -74,7 +101,7 @@ class NearPair:
 
     @property
     def _agreed(self) -> bool:
-        return self.nearest.upper - self.bound <= AGREED * self.two.size
+        return self._agree(self.nearest, self.bound)
 
     @property
     def is_told(self) -> bool:
@@ -97,14 +124,8 @@ class NearPair:
         inside = common_point(two, depth.points)
         return Clash(self._names, "crossing", depth.gap, 0.0, depth.points, depth.faces, True, self.relation, inside)
 
-    @cached_property
-    def bound(self) -> float:
-        """No points of the two surfaces are nearer than this.
-
-        A search among points of which very many are nearest has no room to end: there radii may tell, or at least of
-        most of the gap.
-        """
-        near = self.nearest
+    def _bound(self, near: BodyDistance) -> float:
+        """What the search has proven, or radii."""
         if near.converged or near.upper <= self.two.touching:
             return near.lower
         if not all(has_cells(side_faces(body)) for body in self.two.bodies):
@@ -145,7 +166,7 @@ class NearPair:
 
     def unsearched(self, bound: float) -> Clash:
         """The row of a pair that there was no time for."""
-        known = max(bound, self.nearest.lower) if "nearest" in self.__dict__ else bound
+        known = max(bound, self.nearest.lower) if "_found" in self.__dict__ else bound
         return Clash(self._names, "undecided", None, known, None, None, False, self.relation)
 
     def _row(self, kind: Kind, gap: float, proved: bool) -> Clash:
