@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import Any
 from weakref import WeakKeyDictionary
 
+from assembly._garbage import uncollected
 from assembly.assembly import Assembly
 from assembly.cad.cadquery_joints import Maker
-from assembly.cad.libraries import uncollected
 from assembly.cad.locations import location_of, pose_of
 from assembly.cad.markers import Requirement, requirements_of
 from assembly.constraints.model.joint import Joint

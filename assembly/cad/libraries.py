@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import gc
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
-__all__ = ["is_of", "shown", "uncollected"]
+__all__ = ["is_of", "shown"]
 
 
 def is_of(library: str, kind: str, thing: Any) -> bool:
@@ -16,21 +13,6 @@ def is_of(library: str, kind: str, thing: Any) -> bool:
     module = sys.modules.get(library)
     cls = getattr(module, kind, None)
     return cls is not None and isinstance(thing, cls)
-
-
-@contextmanager
-def uncollected() -> Iterator[None]:
-    """Collect no garbage while a scene is built, of which there is none.
-
-    CAD libraries have so many objects that a look at all of them takes longer than a solve of hundreds of joints.
-    """
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collects:
-            gc.enable()
 
 
 def shown(thing: Any) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from assembly._garbage import uncollected
 from assembly.errors import AssemblyError
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
@@ -14,7 +15,7 @@ from assembly.step.documents import StepError, document_of
 from assembly.step.edges import Edges
 from assembly.step.faces import read_face
 from assembly.step.images import image_of, placement_of
-from assembly.step.occt import occt, parts, quiet, uncollected
+from assembly.step.occt import occt, parts, quiet
 from assembly.step.profiles import Unreadable
 from assembly.step.tree import Color, Part, free_labels, leaves
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -11,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from types import SimpleNamespace
 from typing import Any
 
-__all__ = ["occt", "parts", "quiet", "settings", "uncollected"]
+__all__ = ["occt", "parts", "quiet", "settings"]
 
 _MODULES = (
     "BRep",
@@ -124,22 +123,6 @@ def quiet() -> Iterator[None]:
     finally:
         for printer in kept:
             printers.Append(printer)
-
-
-@contextmanager
-def uncollected() -> Iterator[None]:
-    """Keep Python from looking for cycles of objects, of which reading makes none but many that it would look through.
-
-    What is released otherwise still is.
-    """
-    if not gc.isenabled():
-        yield
-        return
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
 
 
 @contextmanager

@@ -17,12 +17,13 @@ from time import perf_counter
 
 import numpy as np
 
+from assembly._garbage import uncollected
 from assembly._progress import Progress, checked_progress, watched
 from assembly.errors import InputError, file_path
 from assembly.kinematics.body import Body
 from assembly.step.bodies import Source, Unrepaired, bodies_in
 from assembly.step.documents import Damaged, Malformed, StepError, StepWarning, checked_unit, document_of
-from assembly.step.occt import quiet, uncollected
+from assembly.step.occt import quiet
 
 __all__ = ["read_step"]
 

@@ -14,6 +14,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._garbage import uncollected
 from assembly.assembly import Assembly
 from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError
@@ -168,7 +169,8 @@ class Worker:
         found, is_interrupted = Rows(), False
         try:
             for task in chunk.tasks():
-                starts = self._run(task, found)
+                with uncollected():
+                    starts = self._run(task, found)
                 if task.begins_others:
                     found.starts[task.number] = starts
                 found.runs.append(task.number)
