@@ -197,7 +197,7 @@ class _FirstSolve:
         return [solution] if solution.success else []
 
     def _put_together(self, together: PutTogether) -> list[Solution]:
-        """The same, from where bodies were put together without clearances; None if that is not found.
+        """The same, from where bodies were put together without clearances; nothing if that is not found.
 
         If bodies overlap there, some of their faces may nearly fit: then a solve begins where these do. An objective
         alone may draw bodies into each other in any case, so bodies without such faces are not put together by it.

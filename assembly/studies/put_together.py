@@ -96,7 +96,7 @@ def _sides(proof: ClearanceProof, q: Array, moves: Array | None = None) -> list[
     for k, (a, b) in enumerate(proof.pairs):
         side = proof.plane_between(k, q, moves)
         if side is None:
-            side = normal_between(*(_posed_hulls(proof, body, q[body]) for body in (a, b)))
+            side = normal_between(_posed_hulls(proof, a, q[a]), _posed_hulls(proof, b, q[b]))
         found.append(side)
     return found
 
@@ -109,7 +109,8 @@ def _posed_hulls(proof: ClearanceProof, body: int, row: Array) -> BodyHulls:
 def _are_in_one_place(proof: ClearanceProof, k: int, q: Array, touching: float) -> bool:
     """Whether the bodies of pair k are equal, and in one place, as pins that all stand at the origin.
 
-    Then they are in each other, which no proof says: their surfaces are the same, and do not cross.
+    Then they are in each other, which no look says: their surfaces are the same, and do not cross. Balls inside of both
+    (`overlapped.py`) say so of most bodies, and not of those with thin walls.
     """
     a, b = proof.pairs[k]
     turn, shift = proof.relative(k, q)

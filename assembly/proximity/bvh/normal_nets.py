@@ -1,4 +1,4 @@
-"""Products of Bezier nets, and nets restricted to boxes.
+"""Bezier nets restricted to boxes.
 
 Restricted to [x0, x1], the k-th Bezier point of degree n is the blossom of n - k times x0 and k times x1 (Piegl &
 Tiller, The NURBS Book, section 5.3).
@@ -6,33 +6,14 @@ Tiller, The NURBS Book, section 5.3).
 
 from __future__ import annotations
 
-from math import comb
-
 import numpy as np
 from numpy.typing import NDArray
 
 from assembly.geometry.splines.bezier import bernstein
 
-__all__ = ["bezier_product", "restricted", "restriction"]
+__all__ = ["restricted", "restriction"]
 
 Array = NDArray[np.float64]
-
-
-def _binomials(degree: int) -> Array:
-    return np.array([comb(degree, k) for k in range(degree + 1)], dtype=float)
-
-
-def bezier_product(a: Array, b: Array) -> Array:
-    """Bezier points of the product of two, (..., m + 1, n + 1, components) each."""
-    m, n, i, j = a.shape[-3] - 1, a.shape[-2] - 1, b.shape[-3] - 1, b.shape[-2] - 1
-    left = a * (_binomials(m)[:, None] * _binomials(n))[..., None]
-    right = b * (_binomials(i)[:, None] * _binomials(j))[..., None]
-    total = np.zeros((*a.shape[:-3], m + i + 1, n + j + 1, max(a.shape[-1], b.shape[-1])))
-    for k in range(m + 1):
-        for l in range(n + 1):
-            one = left[..., k : k + 1, l : l + 1, :]
-            total[..., k : k + i + 1, l : l + j + 1, :] += one * right
-    return np.asarray(total / (_binomials(m + i)[:, None] * _binomials(n + j))[..., None])
 
 
 def restriction(degree: int, low: Array, high: Array) -> Array:

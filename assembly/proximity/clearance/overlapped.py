@@ -1,11 +1,10 @@
-"""Bodies that overlap where no cells tell: of which faces lie on each other.
+"""Bodies that overlap where cells do not tell, because faces lie on each other.
 
 Equal bodies in one place have no cells that cross. Balls inside of both that overlap tell that they do.
 
-Others overlap behind flat faces, by less than samples detect.
-
-Two flat faces that look at each other from inside do not tell that bodies cross: they may be far sides of thin parts,
-or belong to bodies that are beside each other there. A ball between both planes that is inside of both bodies does.
+Others overlap behind flat faces, by less than samples detect. Two flat faces that look at each other from inside do not
+tell that bodies cross: they may be far sides of thin parts, or belong to bodies that are beside each other there. A
+ball between both planes that is inside of both bodies does.
 """
 
 from __future__ import annotations

@@ -46,7 +46,6 @@ __all__ = [
     "closest_features",
     "faces_of",
     "features_of",
-    "nearest_features",
     "pose_of",
 ]
 
@@ -262,24 +261,6 @@ def closest_features(
     if pair.status is FeatureStatus.PENETRATING and pair.gap >= -reach:
         return replace(pair, status=FeatureStatus.APART)
     return _parted(faces, q, reach) or pair
-
-
-def nearest_features(a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: ArrayLike | None = None) -> FeaturePair:
-    """The nearest points of two bodies, or CROSSING and a point that their surfaces have in common.
-
-    `closest_features` begins with it, and goes on where they have one: bodies that touch have one, too.
-
-    Raises
-    ------
-    InputError, TypeError
-        As those of `closest_features`.
-    """
-    faces = faces_of("a", a), faces_of("b", b)
-    q = np.stack([pose_of("q_a", a, q_a), pose_of("q_b", b, q_b)])
-    codes, out = np.zeros(2, dtype=np.int64), np.empty(PAIR)
-    table, pool, shells, size = _packed(*faces)
-    status = _STATUSES[find_nearest(table, pool, shells, q, size, codes, out)]
-    return _pair((features_of(faces[0]), features_of(faces[1])), codes, out, status)
 
 
 def _closest(faces: tuple[Faces, Faces], q: Array) -> FeaturePair:

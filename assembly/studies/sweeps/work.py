@@ -166,7 +166,7 @@ class Worker:
     def compute(self, chunk: Chunk, say: Callable[[int], bool] = lambda _: True) -> ChunkDone:
         """Solve runs; where `say`, which hears how many rows were solved, says no, or Ctrl-C, those that are done."""
         begin = perf_counter()
-        found, whole, is_interrupted = Rows(), 0, False
+        found, is_interrupted = Rows(), False
         try:
             for task in chunk.tasks():
                 with uncollected():
@@ -174,12 +174,12 @@ class Worker:
                 if task.begins_others:
                     found.starts[task.number] = starts
                 found.runs.append(task.number)
-                whole = len(found.status)
                 if not say(len(task.rows)):
                     break
         except KeyboardInterrupt:
             is_interrupted = True
-        found.cut(whole)
+        # Ctrl-C may come anywhere in a run: its rows are left out.
+        found.cut(sum(chunk.counts[: len(found.runs)]))
         return ChunkDone.of(found, perf_counter() - begin, kernels_of(), is_interrupted)
 
     def solution(self, chunk: Chunk, row: int) -> Told:
