@@ -90,8 +90,7 @@ def test_bodies_with_play_are_clear_and_proven_so(name):
     answer = told(first, second, pose)
     assert answer is not None and answer.verdict is Verdict.CLEAR and answer.bound > 0.0
     (proven,) = proof_of(first, second).look(poses(pose), TOUCHING)
-    # Cells of a cone in its seat are more than a proof may take.
-    assert proven.verdict is (Verdict.UNDECIDED if name == "a plug in its seat" else Verdict.CLEAR)
+    assert proven.verdict is Verdict.CLEAR
 
 
 def test_without_touching_nothing_touches():
