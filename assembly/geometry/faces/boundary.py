@@ -20,7 +20,7 @@ from assembly.geometry.faces.trim_table import TrimTable, build
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
 
-__all__ = ["OVERSHOOT", "Boundary", "LoopLike", "make_boundary"]
+__all__ = ["OVERSHOOT", "Boundary", "LoopLike", "boundary_of_parts", "make_boundary"]
 
 Array = NDArray[np.float64]
 LoopLike = NurbsCurve | Iterable[NurbsCurve] | Loop
@@ -306,3 +306,20 @@ def _loops_of(
     names = [chain.name for chain in new.walks]
     first = names.index(around)
     return loops[first], tuple(loops[:first] + loops[first + 1 :])
+
+
+def boundary_of_parts(boundary: Boundary, parts: Sequence[Sequence[NurbsCurve]]) -> Boundary:
+    """The boundary with every curve replaced by its parts, which run head to tail; its loops stay as they are."""
+    sheet = _Sheet.of(boundary.surface)
+    chains, silent = [], [] if boundary.outer is not None else _natural(sheet)[1]
+    for loop in (boundary.outer, *boundary.holes):
+        if loop is not None:
+            silent += without_seams(loop, boundary.surface)[1]
+    for chain in boundary.chains:
+        jump = curve_ends(boundary.curves[chain[-1]])[1] - curve_ends(boundary.curves[chain[0]])[0]
+        closes = True
+        for off, period, (low, high) in zip(jump.tolist(), sheet.periods, sheet.domain, strict=True):
+            whole = round(off / period) * period if period else 0.0
+            closes = closes and abs(off - whole) <= SLACK * (high - low)
+        chains.append(([part for k in chain for part in parts[k]], closes))
+    return Boundary(boundary.surface, boundary.outer, boundary.holes, *_table_of(chains, sheet, silent))

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._copies import FoundAgain
 from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError, checked_color, items, positive
-from assembly.geometry.faces.boundary import Boundary, LoopLike, make_boundary
+from assembly.geometry.faces.boundary import Boundary, LoopLike, boundary_of_parts, make_boundary
 from assembly.geometry.faces.loop import Loop
 from assembly.geometry.faces.measures import face_integrals
 from assembly.geometry.faces.space_nearest import nearest_in_space
@@ -176,6 +176,14 @@ class Face(FoundAgain):
             # What it is in (u, v) does not change.
             moved.__dict__["_boundary"] = self._boundary
         return moved
+
+    def _of_parts(self, parts: Sequence[Sequence[NurbsCurve]]) -> Face:
+        """The face with every curve of its boundary replaced by its parts; its loops stay as they are."""
+        made = object.__new__(Face)
+        made.surface, made.name, made.reversed, made.color = self.surface, self.name, self.reversed, self.color
+        made._outer, made._holes = self._outer, self._holes
+        made.__dict__["_boundary"] = boundary_of_parts(self._boundary, parts)
+        return made
 
     def packed_trim(self, table_at: int = 0, pool_at: int = 0) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Table and pool of the boundary as kernels read it, for being appended at these places."""

@@ -39,6 +39,9 @@ def _loop_with_cuts(loop: Loop, boundary: Sequence[NurbsCurve], parts: Sequence[
 def with_cuts(face: Face, parts: Sequence[Sequence[NurbsCurve]]) -> Face:
     """The face with every boundary curve replaced by its parts, in their order.
 
+    Its loops have the parts as well, unless they touch at a pole: then the boundary is cut where they do, and they are
+    not.
+
     Parameters
     ----------
     face
@@ -53,10 +56,11 @@ def with_cuts(face: Face, parts: Sequence[Sequence[NurbsCurve]]) -> Face:
         edges = [segment(corners[k], corners[(k + 1) % 4]) for k in range(4)]
         outer = Loop.unchecked(edges, TOLERANCE, face.surface._periods, "outer")
     boundary = face.boundary
-    return Face(
+    made = Face(
         face.surface,
         None if outer is None else _loop_with_cuts(outer, boundary, parts),
         [_loop_with_cuts(hole, boundary, parts) for hole in face.holes],
         name=face.name,
         reversed=face.reversed,
     )
+    return made if len(made.boundary) == sum(map(len, parts)) else face._of_parts(parts)

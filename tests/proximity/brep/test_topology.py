@@ -10,7 +10,9 @@ from assembly.geometry import shapes
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.bezier import full_knots
 from assembly.geometry.splines.curve import NurbsCurve
+from assembly.geometry.splines.curve_parts import between
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.proximity.brep.recut import with_cuts
 from assembly.proximity.brep.topology import topology_of
 from tests.solids import tiled_solid
 
@@ -406,6 +408,24 @@ def test_edges_of_a_surface_itself_are_cut_too():
         low, high = topology.faces[edge.face_b].boundary[edge.curve_b].domain
         b, _, _ = along(topology, edge, 1, np.array([high, low]))
         np.testing.assert_allclose(b, [start, end], atol=1e-13)
+
+
+def test_loops_that_touch_and_end_at_a_pole_are_cut():
+    """A hole touches a loop through the pole in the middle of a line: the boundary is cut there, the loop is not."""
+    ball = shapes.sphere(2.0)
+    top = ball.domain[1][1]
+    corners = [(0.5, top), (0.5, 2.0), (6.0, 2.0), (6.0, top)], [(3.0, 2.0), (4.0, 4.0), (2.0, 4.0)]
+    loops = [[line(a, b) for a, b in zip(loop, loop[1:] + loop[:1], strict=True)] for loop in corners]
+    face = Face(ball, loops[0], holes=loops[1:])
+    assert len(face.boundary) == 7 and len(face.outer.curves) == 4
+    halves = [np.array([c.domain[0], sum(c.domain) / 2, c.domain[1]]) for c in face.boundary]
+    parts = [[between(c, a, b), between(c, b, d)] for c, (a, b, d) in zip(face.boundary, halves, strict=True)]
+    made = with_cuts(face, parts)
+    assert [c.domain for c in made.boundary] == [c.domain for pair in parts for c in pair]
+    assert [len(chain) for chain in made.chains] == [2 * len(chain) for chain in face.chains]
+    u, v = np.meshgrid(np.linspace(*ball.domain[0], 41), np.linspace(*ball.domain[1], 43))
+    np.testing.assert_array_equal(made.locate(u, v), face.locate(u, v))
+    assert {-1, 1} <= set(made.locate(u, v).ravel().tolist())
 
 
 def test_a_slice_of_a_ball():
