@@ -20,8 +20,9 @@ def uncollected() -> Iterator[None]:
     if not gc.isenabled():
         yield
         return
-    gc.disable()
     try:
+        # In here: Ctrl-C may come as soon as it is off.
+        gc.disable()
         yield
     finally:
         gc.enable()

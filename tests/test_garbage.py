@@ -4,6 +4,7 @@ import gc
 
 import pytest
 
+from assembly import _garbage
 from assembly._garbage import uncollected
 
 
@@ -31,3 +32,16 @@ def test_nested_work_and_collection_that_is_off() -> None:
         assert not gc.isenabled()
     finally:
         gc.enable()
+
+
+def test_ctrl_c_as_soon_as_collection_is_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    off = gc.disable
+
+    def interrupted() -> None:
+        off()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(_garbage.gc, "disable", interrupted)
+    with pytest.raises(KeyboardInterrupt), uncollected():
+        pass
+    assert gc.isenabled()
