@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -173,7 +173,8 @@ def _over_threads(work: Callable[[], None], remaining: Iterator[int], threads: i
         try:
             # Threads that began already go on while others are submitted: an exception here ends them as well.
             futures = [pool.submit(work) for _ in range(threads)]
-            for future in futures:
+            # Of those that have ended: others go on until there is nothing left to take.
+            for future in wait(futures, return_when=FIRST_EXCEPTION).done:
                 future.result()
         except BaseException:
             for _ in remaining:

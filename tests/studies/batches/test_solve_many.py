@@ -7,7 +7,7 @@ import os
 import signal
 from concurrent.futures import ThreadPoolExecutor
 from itertools import count
-from threading import Event
+from threading import Barrier, Event
 from time import sleep
 
 import numpy as np
@@ -359,3 +359,20 @@ def limited_batch():
     freedom = scene.constraints[0].freedom()
     columns = {asm.Parameter(freedom, "lower"): [0.1, 0.6], asm.Parameter(freedom, "upper"): [0.5, 0.5]}
     return scene.solve_many(parameters=columns)
+
+
+def test_an_exception_in_any_thread_ends_the_others():
+    remaining, taken, together = iter(range(400)), [], Barrier(3)
+
+    def work():
+        first = next(remaining)
+        together.wait()
+        if first == 2:
+            raise RuntimeError("of the third one")
+        for k in remaining:
+            sleep(0.002)
+            taken.append(k)
+
+    with pytest.raises(RuntimeError, match="third"):
+        solving._over_threads(work, remaining, 3)
+    assert len(taken) < 200
