@@ -4,7 +4,6 @@ import gc
 
 import pytest
 
-from assembly import _garbage
 from assembly._garbage import uncollected
 
 
@@ -41,7 +40,7 @@ def test_ctrl_c_as_soon_as_collection_is_off(monkeypatch: pytest.MonkeyPatch) ->
         off()
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(_garbage.gc, "disable", interrupted)
+    monkeypatch.setattr(gc, "disable", interrupted)
     with pytest.raises(KeyboardInterrupt), uncollected():
         pass
     assert gc.isenabled()
