@@ -144,7 +144,7 @@ class Folder:
             if not rows or rows != table.rows(found.runs).tolist():
                 return None
             done = ChunkDone.of(found, 0.0, head["kernels"])
-        except (ValueError, KeyError, IndexError, TypeError, AttributeError):
+        except (ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError):
             return None
         self.kernels = self.kernels or done.kernels
         return done
