@@ -20,7 +20,7 @@ from assembly.proximity.features.features import Feature, Shape, faces_of, pose_
 from assembly.proximity.features.parting import are_balls, parting_translation
 from assembly.proximity.features.places import body_tree, feature_at, is_behind, is_closed, normals_at, shells_of
 
-__all__ = ["BodyDistance", "DistanceStatus", "beyond", "distance"]
+__all__ = ["BodyDistance", "DistanceStatus", "beyond", "distance", "distance_at"]
 
 Array = NDArray[np.float64]
 Faces = tuple[Face, ...]
@@ -158,7 +158,11 @@ def distance(
     q = np.empty((2, 7))
     q[0], q[1] = pose_of("poses[0]", a, poses[0]), pose_of("poses[1]", b, poses[1])
     tolerance = positive("tolerance", tolerance)
-    pairs = _BUDGET if budget is None else integer("budget", budget, 1, 2**40)
+    return distance_at(faces, q, tolerance, _BUDGET if budget is None else integer("budget", budget, 1, 2**40))
+
+
+def distance_at(faces: tuple[Faces, Faces], q: Array, tolerance: float, pairs: int) -> BodyDistance:
+    """The same of faces at poses q (2, 7) that are known to be right, as those of a scene are."""
     found = bodies_apart(body_tree(faces[0]), body_tree(faces[1]), q, tolerance, pairs)
     status = _status(found, tolerance)
     if status is DistanceStatus.CONVERGED and found.lower > 0.0 and _is_enclosed(faces, q, found, tolerance):

@@ -16,7 +16,8 @@ from assembly.constraints.model.contact import side_faces
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.body_cells import has_cells
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.proximity.features.body_distance import Beyond, BodyDistance, DistanceStatus, beyond, distance
+from assembly.proximity.features.body_distance import Beyond, BodyDistance, DistanceStatus, beyond, distance_at
+from assembly.proximity.features.features import faces_of
 from assembly.proximity.features.polytopes import Parting
 from assembly.solve.crossings import PairLook
 from assembly.studies.interference.clash import Clash, Kind, Relation
@@ -89,8 +90,8 @@ class NearPair:
         return near, max(bound, self._bound(near))
 
     def _search(self, budget: int) -> BodyDistance:
-        a, b = self.two.q
-        return distance(*self.two.bodies, poses=(a, b), tolerance=AGREED * self.two.size, budget=budget)
+        faces = faces_of("a", self.two.a), faces_of("b", self.two.b)
+        return distance_at(faces, self.two.q, AGREED * self.two.size, budget)
 
     def _agree(self, near: BodyDistance, bound: float) -> bool:
         return near.upper - bound <= AGREED * self.two.size
