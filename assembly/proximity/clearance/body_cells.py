@@ -319,6 +319,9 @@ class _Builder:
         # What has no ruling has no disc, either.
         free = np.full(len(rows), turned) | ~nodes.ruling[rows].any(axis=1)
         nodes.ruling[rows[free]] = self.bores.axis[bore[free]]
+        # A cone gets wider along its axis. A flat face at its narrow end is across the same line the other way around.
+        turns_over = (nodes.ruling[rows] * self.bores.axis[bore]).sum(axis=1) < 0.0
+        nodes.ruling[rows[turns_over]] *= -1.0
 
 
 def _center_on_axis(root: np.record, rounds: list[Round | None]) -> None:
