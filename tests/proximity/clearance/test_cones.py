@@ -82,3 +82,29 @@ def test_a_solve_of_a_plug_is_proven():
     assert not solution.crossings and smaller_answer(
         proof_of(seat(0.5, 1.0, 2.0, 2.0), plug(0.5, 1.2, 2.5)), 0, solution.q, TOUCHING
     )
+
+
+@pytest.mark.parametrize("down", [False, True])
+def test_what_comes_from_behind_a_seat_crosses_its_back(down, cases):
+    """The flat faces at both ends of a conical bore are outside of the same cone, though they face opposite ways.
+
+    A ball crosses the block where a ball's radius reaches beyond the corners and sides of its profile.
+    """
+    rng, radius = np.random.default_rng(1), 0.1
+    corners = np.array([(0.5, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0)])
+    block, ball = turned(*corners), asm.shapes.sphere(radius)
+    pose = poses(UPRIGHT, UPRIGHT)[0] if not down else np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+    proof, crossed = proof_of(block, ball), 0
+    sides = np.roll(corners, -1, axis=0) - corners
+    normals = np.column_stack([sides[:, 1], -sides[:, 0]]) / np.linalg.norm(sides, axis=1)[:, None]
+    for _ in range(cases(60, 2000)):
+        place = np.array([*rng.uniform(-3.0, 3.0, 2), rng.choice([1.0, 2.0]) + rng.uniform(-0.09, 0.09)])
+        flat = np.array([np.hypot(*place[:2]), place[2]])
+        inside = float(-((flat - corners) * normals).sum(axis=1).max())
+        there = place * (1.0, -1.0, -1.0) if down else place
+        proof.begin_anew()
+        answer = proof.look(np.array([pose, [*there, 1.0, 0.0, 0.0, 0.0]]), TOUCHING)[0]
+        if inside > -0.5 * radius and 0.7 < flat[0] < 2.9:
+            crossed += 1
+            assert answer.verdict is not Verdict.CLEAR
+    assert crossed > 20
