@@ -17,7 +17,7 @@ from tests.test_bad_input import contact, pair
         (lambda: asm.Distance(*pair(), 1.0), "distance", "'enabled', 'limits', 'value'"),
         (lambda: asm.PointDistance(pair()[1].point(0, 0, 0), (0, 0, 0)), "targets", "'target'"),
         (lambda: contact(), "least", "'enabled', 'minimum'"),
-        (lambda: pair()[1], "position", "'color', 'fixed', 'picture', 'pose'"),
+        (lambda: pair()[1], "position", "'color', 'density', 'fixed', 'picture', 'pose'"),
     ],
     ids=["joint", "value", "objective", "contact", "body"],
 )

@@ -105,10 +105,15 @@ def with_contacts(scene: Assembly, solution: Result) -> Ended:
 def _with_more_places(scene: Assembly, packed: Packed, solution: Result) -> Packed | None:
     """The scene of a solution packed with more slots, if it still has the same rows."""
     if scene._packed_as(packed) is packed:
-        return scene._pack_with_more_places()
-    there = solution._scene
-    more = Packed(there.bodies, there.constraints, (), packed.crowding * MORE_PLACES)
-    return more if more.has_rows_of(packed) else None
+        more = scene._pack_with_more_places()
+    else:
+        there = solution._scene
+        more = Packed(there.bodies, there.constraints, (), packed.crowding * MORE_PLACES)
+        if not more.has_rows_of(packed):
+            return None
+    # Values and targets are not there yet.
+    more.refresh()
+    return more
 
 
 def _start_of(packed: Packed, ended: Ended) -> Array:

@@ -174,6 +174,16 @@ def test_touching_is_a_number_of_the_size():
             scene.solve(touching=touching)
 
 
+def test_a_tracked_body_at_its_target_is_drawn_by_nothing_where_bodies_touch():
+    bodies = flush(1.0, 1e-7, (0, 0, 0))["parts of faces"]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+    before = np.array(scene.q)
+    tracker = scene.tracker(follow=bodies[1], touching=1e-6)
+    step = tracker.step(before[1])
+    assert step.iterations == 0 and np.array_equal(step.q, before)
+
+
 @pytest.mark.parametrize(("over", "touching", "crosses"), [(0.0, 1e-9, False), (1e-7, 1e-6, False), (1e-7, 1e-9, True)])
 def test_crossings_are_more_than_touching(over, touching, crosses):
     """Of a scene without a clearance: bodies that a contact holds, and one that is flush with another one."""
@@ -203,6 +213,8 @@ def test_a_tracker_begins_where_bodies_touch():
     tracker = scene.tracker(follow=bodies[1].point(0, 0, 0), touching=1e-6)
     step = tracker.step(before[1, :3])
     assert step.status is asm.TrackStatus.FOLLOWED and np.allclose(step.q, before, rtol=0.0, atol=1e-12)
+    # It is at its target: nothing draws it. The scene was packed anew for its contacts, after the target was set.
+    assert step.iterations == 0
     # Drawn down it goes no deeper.
     for _ in range(20):
         step = tracker.step(before[1, :3] - np.array([0.0, 0.0, 0.5]))

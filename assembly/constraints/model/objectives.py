@@ -159,7 +159,7 @@ class FrameDistance(Objective):
         check_coordinates("target.position", value.position.tolist())
         self._pose = value
         self._target = value.position
-        self._body_quaternion = self._turned_back()
+        self._body_quaternion = self.body_quaternion_of(self._pose)
 
     @property
     def body_quaternion(self) -> Array:
@@ -167,13 +167,13 @@ class FrameDistance(Objective):
         if self._axes is not self._frame.axes:
             # The frame was placed anew.
             self._axes = self._frame.axes
-            self._body_quaternion = self._turned_back()
+            self._body_quaternion = self.body_quaternion_of(self._pose)
         return read_only(self._body_quaternion)
 
-    def _turned_back(self) -> Array:
-        """The target's quaternion after the turn from the frame's axes on the body to the body's."""
+    def body_quaternion_of(self, target: Pose) -> Array:
+        """The quaternion of the body whose frame is at a target: after the turn from the frame's axes to the body's."""
         w, x, y, z = axes_quaternion(self._frame.axes)
-        return multiply(self._pose.quaternion, np.array([w, -x, -y, -z]))
+        return multiply(target.quaternion, np.array([w, -x, -y, -z]))
 
     def __repr__(self) -> str:
         return f"FrameDistance({self._frame!r}, target={self._pose!r}, length={self._length:g}, weight={self.weight:g})"

@@ -261,12 +261,18 @@ class Packed(WrittenScene):
         return other
 
     def as_asked(self, asked: Asked) -> Packed:
-        """The same with a pool of its own, in which rows have the values that a solve was asked for."""
+        """The same with a pool of its own, in which rows and terms have the values and targets of a solve."""
         other = self.twin()
         # Versions differ in more than values.
         other.pool[layout.VERSION] = self.pool[layout.VERSION]
         for (_, at, unit), value in zip(self._sources, asked, strict=False):
             other.pool[at] = value / unit
+        first = len(self._sources)
+        for (_, at), target in zip(self._targets, asked[first:], strict=False):
+            other.pool[at : at + 3] = (target - self.reference) / self.scale
+        first += len(self._targets)
+        for (term, at), target in zip(self._turns, asked[first:], strict=False):
+            other.pool[at : at + 4] = term.body_quaternion_of(target)
         return other
 
     @property
