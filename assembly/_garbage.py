@@ -14,7 +14,7 @@ def uncollected() -> Iterator[None]:
     """Keep Python from looking for cycles of objects, for work of a bounded time that makes next to none.
 
     What is released otherwise still is. A look at all objects takes longer than the solve of a hundred joints where CAD
-    libraries are loaded; programs like the workers of Dask listen to each look, which took a seventh of their time.
+    libraries are loaded; programs like the workers of Dask listen to each look, which took a tenth of their time.
     Where the caller has the collection off, it stays off.
     """
     if not gc.isenabled():
