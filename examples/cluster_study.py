@@ -17,7 +17,7 @@ import numpy as np
 import assembly as asm
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from dexterity_study import six_bar, speed, transmission  # noqa: E402
+from dexterity_study import six_bar, speed, transmission  # noqa: E402  # It stands beside this file.
 
 # What Dask does all the time besides: profiles that nobody looks at here, and statistics 50 times a second.
 QUIET = {

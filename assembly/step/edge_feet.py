@@ -43,9 +43,9 @@ def _ends(ground):
     )
 
 
-@kernel(inner=True)
-def _approach(ground, u, v, point):
-    """The _Approach of a point from parameters, which count as the end where they are beyond an open one."""
+@kernel(inline=True)
+def _inside(ground, u, v):
+    """Parameters for evaluation; those beyond an open domain count as its end."""
     patch = surface_at(ground.table, 0)
     (u0, u1), (v0, v1) = _ends(ground)
     if patch.closed_u == 0:
@@ -54,6 +54,14 @@ def _approach(ground, u, v, point):
         v = min(max(v, v0), v1)
     u, _fits = into_domain(ground.pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
     v, _fits = into_domain(ground.pool, patch.breaks_v, patch.spans_v, patch.closed_v, v)
+    return u, v
+
+
+@kernel(inner=True)
+def _approach(ground, u, v, point):
+    """The _Approach of a point from parameters, which count as the end where they are beyond an open one."""
+    (u0, u1), (v0, v1) = _ends(ground)
+    u, v = _inside(ground, u, v)
     jet = surface_lanes(Store(ground.table, ground.pool), 0, u, v)
     su, sv = xyz(jet.u), xyz(jet.v)
     off = sub(point, xyz(jet.point))
@@ -164,20 +172,6 @@ def move_between(surface, beyond, points, places):
         at = (places[k, 0], places[k, 1], places[k, 2], places[k, 3])
         x, y, z = _between(own, there, (points[k, 0], points[k, 1], points[k, 2]), at)
         points[k, 0], points[k, 1], points[k, 2] = x, y, z
-
-
-@kernel(inline=True)
-def _inside(ground, u, v):
-    """Parameters for evaluation; those beyond an open domain count as its end."""
-    patch = surface_at(ground.table, 0)
-    (u0, u1), (v0, v1) = _ends(ground)
-    if patch.closed_u == 0:
-        u = min(max(u, u0), u1)
-    if patch.closed_v == 0:
-        v = min(max(v, v0), v1)
-    u, _fits = into_domain(ground.pool, patch.breaks_u, patch.spans_u, patch.closed_u, u)
-    v, _fits = into_domain(ground.pool, patch.breaks_v, patch.spans_v, patch.closed_v, v)
-    return u, v
 
 
 @kernel(signatures="(Tuple((i8[::1], f8[::1], f8)), f8[:, ::1], f8[:, ::1])")

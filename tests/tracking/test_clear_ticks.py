@@ -114,8 +114,8 @@ def test_random_hands(cases):
     assert {outcome.number: outcome.wrong for outcome in outcomes if outcome.wrong} == {}
 
 
-def test_a_way_that_touches_may_be_asked_to_go_in_by_less():
-    """A ball that goes over an arc of a cylinder in one step: the chord is in it, by less than is allowed or not."""
+def around_a_pin():
+    """Solutions by the angle at which a ball touches a pin."""
     pin, ball = exact.pin(0.5, 2.0), exact.ball(0.2)
     scene, _ = tracker_of(pin, ball, (0.7, 0.0, 0.0))
 
@@ -123,6 +123,12 @@ def test_a_way_that_touches_may_be_asked_to_go_in_by_less():
         q = np.array([[0, 0, 0, 1, 0, 0, 0], [0.7 * np.cos(angle), 0.7 * np.sin(angle), 0, 1, 0, 0, 0]], dtype=float)
         return solution_at(scene, q)
 
+    return there
+
+
+def test_a_way_that_touches_may_be_asked_to_go_in_by_less():
+    """A ball that goes over an arc of a cylinder in one step: the chord is in it, by less than is allowed or not."""
+    there = around_a_pin()
     for depth, holds in ((1e-2, True), (1e-4, False), (np.inf, True)):
         ticks = ClearTicks(there(0.0), 1e-9, limits=WayLimits(depth=depth))
         assert ticks.proved and not ticks.doubtful
@@ -133,13 +139,7 @@ def test_a_way_that_touches_may_be_asked_to_go_in_by_less():
 
 def test_what_is_refused_has_the_depth_of_the_way_before():
     """Where a tick is refused, the last pose stands, and what is told of the way is that of the way to it."""
-    pin, ball = exact.pin(0.5, 2.0), exact.ball(0.2)
-    scene, _ = tracker_of(pin, ball, (0.7, 0.0, 0.0))
-
-    def there(angle):
-        q = np.array([[0, 0, 0, 1, 0, 0, 0], [0.7 * np.cos(angle), 0.7 * np.sin(angle), 0, 1, 0, 0, 0]], dtype=float)
-        return solution_at(scene, q)
-
+    there = around_a_pin()
     ticks = ClearTicks(there(0.0), 1e-9)
     assert ticks.holds(there(0.05))
     depth = ticks.way_depth
