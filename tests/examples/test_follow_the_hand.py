@@ -27,7 +27,7 @@ def test_every_tick_holds(run):
     assert log.worst_violation < 5e-11
     held, followed, near = (log.count(name) for name in ("HELD", "FOLLOWED", "APPROACHING"))
     assert held + followed + near == len(log)
-    # Which ticks wedge is decided by rounding (docs/decisions.md): of hands 1e-7 apart one has 3 HELD, one 500.
+    # Which ticks wedge is decided by rounding (docs/limits.md): of hands 1e-7 apart one has 3 HELD, one 500.
     assert held < 0.25 * len(log)
 
 
