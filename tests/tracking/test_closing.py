@@ -53,11 +53,13 @@ def test_rates_are_derivatives_of_gaps():
         point, normal = rng.normal(size=3), rng.normal(size=3)
         normal /= np.linalg.norm(normal)
         there = retract(here, 1e-6 * rng.normal(size=(2, 6)))
-        (first, second), (first_there, second_there) = ([rotation_matrix(q[3:]) for q in both] for both in (here, there))
-        taken = second_there @ second.T @ (point - here[1, :3]) + there[1, :3]
-        seen = first_there.T @ (taken - there[0, :3]) - first.T @ (point - here[0, :3])
+        first, second = (rotation_matrix(q[3:]) for q in here)
+        first_after, second_after = (rotation_matrix(q[3:]) for q in there)
+        taken = second_after @ second.T @ (point - here[1, :3]) + there[1, :3]
+        seen = first_after.T @ (taken - there[0, :3]) - first.T @ (point - here[0, :3])
         # What is left out is of second order.
-        assert closing_rates(contact(normal, point), here, there)[0] == pytest.approx((first @ seen) @ normal, abs=1e-10)
+        rate = closing_rates(contact(normal, point), here, there)[0]
+        assert rate == pytest.approx((first @ seen) @ normal, abs=1e-10)
 
 
 @pytest.mark.parametrize("angle", [1e-6, 0.05, 1.0, 2.5])
