@@ -40,6 +40,11 @@ from assembly.proximity.manager.records import (
     PLACE_PAIR,
 )
 from assembly.solve.clearance_proof import owned_pairs
+from assembly.solve.contact_pairs import rows_of_contacts
+from assembly.solve.loop.settings import HISTORY
+from assembly.solve.scene import Scene, Status
+from assembly.solve.solution import Solution
+from assembly.tracking.closing import closing_rates
 from assembly.tracking.fitting import Fit
 
 if TYPE_CHECKING:
@@ -134,6 +139,9 @@ class ProvenPairs:
         self._kept = frozenset[int]()
         # Numbers and gaps of contacts at the end of the last tick.
         self._last = np.empty(0), np.empty(0)
+        # Numbers of contacts that joints let close, and the poses that were refused in this tick.
+        self._closing = frozenset[float]()
+        self._refused: Array | None = None
         self.settle(first)
 
     @property
@@ -192,43 +200,70 @@ class ProvenPairs:
         """Those of some pairs that have no rows, or rows which motion does not ask to be updated."""
         return (self.unlisted | self.fitting).intersection(which)
 
-    def list_again(self, state: Array, which: Iterable[int]) -> None:
-        """Have the next run of the loop update pairs, of those without updates of their own."""
+    def list_again(self, state: Array, which: Iterable[int], refused: Array | None = None) -> None:
+        """Have the next run of the loop update pairs, of those without updates of their own.
+
+        Parameters
+        ----------
+        state : array
+        which : iterable of int
+        refused : (n, 7), optional
+            The poses that the proof refused because of these pairs.
+        """
         some = sorted(self.without_updates(which))
         if some:
             pairs = self._parts(state).pairs
             pairs[some, PAIR_TURN], pairs[some, MOTION_BOUND] = np.nan, 0.0
             self._kept |= self.unlisted.intersection(some) & self.fitting
+            if refused is not None and self.unlisted.intersection(some):
+                self._refused = refused
             self.unlisted = self.unlisted.difference(some)
 
     def update_all(self) -> None:
         """Have motion ask for updates of all that is listed, and cut steps by them, until a tick holds."""
         self._kept = frozenset[int]()
 
-    def settle(self, state: Array) -> None:
+    def settle(self, state: Array, scene: Scene | None = None) -> None:
         """Leave out pairs, from the next tick on, of which no contact pushes at the end of a tick.
 
-        Of bodies of which one fits a bore of the other one, and no joint connects them, none may be so near, either,
-        that it could touch within some ticks (SOON) if it went on as in this one. So a pin that is let down into its
-        hole is proven to go in, and no row of the hole's rim, which it passes, turns it aside. What is near, and not in
-        its bore, has rows like others.
+        None of their contacts may be so near, either, that it could touch within some ticks (SOON) if it went on as in
+        this one. Of bodies that joints connect only contacts count that joints let close (`closing.py`): what is free
+        to go is pushed by nothing, and yet is pushed. Of bodies of which one fits a bore of the other one, and no joint
+        connects them, all count. So a pin that is let down into its hole is proven to go in, and no row of the hole's
+        rim, which it passes, turns it aside. What is near, and not in its bore, has rows like others.
         """
-        if not self.fitting and self._joined <= self.unlisted:
+        if (self._joined | self.fitting) <= self.unlisted:
             return
         q = state[: self.packed.contacts_at].reshape(-1, 7)
         free = self.fitting - self._joined
-        held = {k for k in free if any(fit.holds(q) for fit in self._fits[k])}
+        held = {k for k in self.fitting - self.unlisted if any(fit.holds(q) for fit in self._fits[k])}
         parts = self._parts(state)
-        gone = self._kept - self._joined - held
+        gone = self._kept - held
         self.list_again(state, gone)
         pairs, numbers, gaps = parts.slots[:, PLACE_PAIR], parts.slots[:, PLACE_NUMBER], parts.tracked[:, PAIR_GAP]
         busy = set(pairs[parts.multipliers != 0.0].tolist())
-        if free - self.unlisted:
-            before = self._last if len(self._last[0]) == len(numbers) else (np.full(len(numbers), -1.0), gaps)
-            went = np.where(before[0] == numbers, np.abs(gaps - before[1]), np.inf)
-            near = set(pairs[gaps <= np.maximum(SOON * went, CLOSED)].tolist())
-            self._last = numbers.copy(), gaps.copy()
-        else:
-            near = set[float]()
-        self.unlisted |= ((self._joined - busy) | (free - busy - near)) - gone
+        before = self._last if len(self._last[0]) == len(numbers) else (np.full(len(numbers), -1.0), gaps)
+        same = before[0] == numbers
+        went = np.where(same, np.abs(gaps - before[1]), np.inf)
+        self._last = numbers.copy(), gaps.copy()
+        is_near = gaps <= np.maximum(SOON * went, CLOSED)
+        near = set(pairs[is_near].tolist())
+        self._closing = self._closing.intersection(numbers.tolist()).union(numbers[same & (went > CLOSED)].tolist())
+        if self._refused is not None and scene is not None:
+            self._closing |= self._closed_by_joints(state, scene, self._refused)
+            self._refused = None
+        closing = set(pairs[is_near & np.isin(numbers, list(self._closing))].tolist())
+        self.unlisted |= (self._joined - busy - closing) | (free - busy - near - gone)
         self._kept = frozenset(held) - self.unlisted
+
+    def _closed_by_joints(self, state: Array, scene: Scene, refused: Array) -> set[float]:
+        """Numbers of the contacts whose gaps are others where joints alone led, at poses (n, 7) that were refused."""
+        solution = Solution(scene, self.packed, state.copy(), Status.SOLVED, 0.0, np.empty((0, HISTORY)))
+        found = rows_of_contacts(solution)
+        if found is None:
+            return set()
+        # The listed ones come in the order of their numbers, without those that are lost.
+        parts, is_listed = self._parts(state), found.pairs >= 0
+        numbers = parts.slots[:, PLACE_NUMBER][(parts.slots[:, PLACE_PAIR] >= 0.0) & ~np.isnan(parts.tracked[:, 0])]
+        rates = closing_rates(found, solution.q, refused)[is_listed]
+        return set(np.sort(numbers)[np.abs(rates) > CLOSED * self.packed.scale].tolist())

@@ -69,7 +69,7 @@ class Ticks(TickMemory):
             if self._budget is not None or not again:
                 return self._refused()
             self._pose[:] = self._before
-            self._rows.list_again(self._state, again)
+            self._rows.list_again(self._state, again, self._poses_of(ended))
             begun_again |= again
 
     def _run(self, until: Until) -> tuple[int, int | None]:
@@ -160,17 +160,22 @@ class Ticks(TickMemory):
 
     def _refused(self) -> tuple[TrackStatus, Array]:
         """Go back to the last pose from one at which bodies are not known to be clear."""
+        refused = self._poses_of(self._pose).copy()
         self._pose[:] = self._before
         # The contact that was crossed may not be listed: all pairs are searched again.
-        self._rows.list_again(self._state, [] if self._clear is None else self._clear.in_the_way)
+        self._rows.list_again(self._state, [] if self._clear is None else self._clear.in_the_way, refused)
         self._rows.update_all()
         forget_updates(self._packed, self._state)
         return TrackStatus.HELD, self._pose.copy()
 
     def _holds(self) -> Array:
         """Go on from a pose at which all pairs hold; its state, which nobody writes to."""
-        self._rows.settle(self._pose)
+        self._rows.settle(self._pose, self._scene)
         return self._pose.copy()
+
+    def _poses_of(self, state: Array) -> Array:
+        """The poses of the bodies in a state, (n, 7)."""
+        return state[: self._packed.contacts_at].reshape(-1, 7)
 
     def _way_depth(self) -> float | None:
         """How deep the way to the last pose may go in; None where that is not proven."""

@@ -29,26 +29,26 @@ def least(function):
     return min(float(found.fun), float(function(best)))
 
 
-def shaft_depth(row, length):
+def shaft_depth(row, length, bore=BORE, radius=SHAFT, height=HEIGHT):
     """By how much a shaft at a pose row (7,) is in the wall of a bore about the z axis; negative where it is clear."""
     pose = asm.Pose(row[:3], row[3:])
     axis, middle = pose.apply((0, 0, 1)) - pose.position, pose.position
     depths = []
-    for z in (-0.5 * HEIGHT, 0.5 * HEIGHT):
+    for z in (-0.5 * height, 0.5 * height):
         if abs((z - middle[2]) / axis[2]) < 0.5 * length:
 
             def to_axis(angle, z=z):
                 return np.linalg.norm(
-                    np.cross(np.array([BORE * np.cos(angle), BORE * np.sin(angle), z]) - middle, axis)
+                    np.cross(np.array([bore * np.cos(angle), bore * np.sin(angle), z]) - middle, axis)
                 )
 
-            depths.append(SHAFT - least(to_axis))
+            depths.append(radius - least(to_axis))
     for end in (-0.5 * length, 0.5 * length):
-        if abs(pose.apply((0, 0, end))[2]) < 0.5 * HEIGHT:
+        if abs(pose.apply((0, 0, end))[2]) < 0.5 * height:
 
             def to_wall(angle, end=end):
-                place = pose.apply((SHAFT * np.cos(angle), SHAFT * np.sin(angle), end))
-                return BORE - np.hypot(place[0], place[1])
+                place = pose.apply((radius * np.cos(angle), radius * np.sin(angle), end))
+                return bore - np.hypot(place[0], place[1])
 
             depths.append(-least(to_wall))
     return max(depths, default=-np.inf)
@@ -100,6 +100,28 @@ def test_a_shaft_leans_in_its_bore():
     # Both sections fill the bore: R = |e| + r / cos, with e opposed at both rims.
     tilt = np.arctan2(np.hypot(*axis[:2]), axis[2])
     assert 0.5 * HEIGHT * np.tan(tilt) + SHAFT / np.cos(tilt) == pytest.approx(BORE, abs=1e-4)
+
+
+def test_a_ring_leans_on_its_shaft(cases):
+    """Held beside its axis and slid along the shaft: its flat faces are rings, of a revolution, and end in its bore."""
+    bore, radius, height = 5.05, 5.0, 4.0
+    ring = asm.shapes.revolution(asm.curves.polygon([(bore, -2), (9, -2), (9, 2), (bore, 2)]))
+    bodies = [
+        asm.Body("shaft", asm.shapes.solid_cylinder(radius, 60.0), fixed=True),
+        asm.Body("ring", ring, position=(0, 0, 3)),
+    ]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+
+    def depth(q):
+        back = asm.Pose(q[1, :3], q[1, 3:]).inverse()
+        return shaft_depth(np.r_[back.position, back.quaternion], 60.0, bore, radius, height)
+
+    ways = 0.03 * np.arange(1, cases(40, 200))
+    path = [(1 + 0.5 * np.sin(a), 0.3 * np.sin(2 * a), 5 + 8 * np.sin(0.5 * a)) for a in ways]
+    step, statuses = dragged(scene, bodies[1].point(1, 0, 2), path, depth, 60.0)
+    assert set(statuses) <= {TrackStatus.FOLLOWED, TrackStatus.APPROACHING}
+    assert step.q[1, 2] == pytest.approx(path[-1][2] - 2.0, abs=0.2)
 
 
 def test_a_pin_is_dropped_into_its_hole():

@@ -284,6 +284,12 @@ class _Builder:
                 # All that lies on a cylinder, a cone, a ball or a torus from inside of it.
                 _write_round(rows_of(NODE, self.nodes[k : k + 1])[0], found)
                 is_round[k] = True
+        if self.bores is not None and is_round.any():
+            # A disc with a round hole is outside of that as well.
+            discs = np.flatnonzero(is_round)
+            parts, nodes = Groups(halved.whole[discs], np.arange(len(discs))), rows_of(NODE, self.nodes)
+            nearest = self.bores.nearest(parts, nodes.center[discs, None], nodes.ruling[discs])
+            self._write_bores(discs, nearest, turned=False)
         boxed = np.flatnonzero((self.child != NONE) & ~is_round)
         many = (end - begin)[boxed]
         starts = np.cumsum(many) - many

@@ -32,6 +32,12 @@ PLATES = {
     "two holes": asm.shapes.plate(3.0, 2.0, THICK, [(-0.7, 0.0, RADIUS), (0.7, 0.1, 0.4)]),
     "off the middle": asm.shapes.plate(3.0, 2.0, THICK, [(-0.8, 0.45, RADIUS), (0.3, -0.3, 0.2), (1.1, 0.5, 0.3)]),
 }
+RINGS = {
+    "washer": asm.shapes.revolution(asm.curves.polygon([(RADIUS, 0.0), (1.0, 0.0), (1.0, THICK), (RADIUS, THICK)])),
+    "two rings": asm.shapes.revolution(
+        asm.curves.polygon([(RADIUS, 0.0), (1.0, 0.0), (1.0, 1.0), (0.7, 1.0), (0.7, 0.5), (RADIUS, 0.5)])
+    ),
+}
 PLACES = {"one hole": (0.0, 0.0), "two holes": (-0.7, 0.0), "off the middle": (-0.8, 0.45)}
 
 
@@ -57,11 +63,11 @@ def moved(faces, rotation, translation):
     return tuple(out)
 
 
-@pytest.mark.parametrize("name", [*PLATES, "plate", "slot", "cam", "bumpy hole", "trimmed ball", "pin", "box"])
+@pytest.mark.parametrize("name", [*PLATES, *RINGS, "plate", "slot", "cam", "bumpy hole", "trimmed ball", "pin", "box"])
 def test_nodes_are_outside_of_their_bores(name):
     rng = np.random.default_rng(0)
-    faces = faces_of({**shapes(), **PLATES}[name])
-    if name in PLATES:
+    faces = faces_of({**shapes(), **PLATES, **RINGS}[name])
+    if name in PLATES or name in RINGS:
         faces = moved(faces, Rotation.random(random_state=3).as_matrix(), [1.0, -2.0, 0.5])
     forest = forest_of(faces)
     halve_all(forest, rng)
@@ -69,7 +75,10 @@ def test_nodes_are_outside_of_their_bores(name):
     points = [surface_points(face, 1500, rng) for face in solid_of(faces).faces]
     far = max(np.abs(p).max() for p in points)
     bored = np.flatnonzero(nodes.bore > 0.0)
-    assert (len(bored) > 10) == (name in PLATES or name in ("plate", "slot", "cam"))
+    assert (len(bored) > 10) == (name in PLATES or name in RINGS or name in ("plate", "slot", "cam"))
+    # A disc that is the hull of a whole flat face is outside of that face's hole.
+    discs = (nodes.disc[bored] > 0.0) & (links.face[bored] == NONE)
+    assert discs.any() == (name in RINGS)
     nearest = {}
     for k in bored:
         line = (*nodes.spine[k], *nodes.ruling[k])
