@@ -26,7 +26,7 @@ from assembly.solve.solution import Solution
 from assembly.solve.start_proof import prove_start, prove_way
 from assembly.studies.parting import parted
 from assembly.studies.put_together import PutTogether, put_together
-from assembly.studies.resting import Rest, beside_others, resting
+from assembly.studies.resting import Rest, beside_others, resting, resting_start
 from assembly.studies.seated import Seat, seated
 from assembly.studies.separation import separated
 from assembly.studies.unhindered import Prove, clear_end, rows_from_start, unhindered_at
@@ -72,6 +72,10 @@ class _FirstSolve:
         """The solution."""
         begin = perf_counter()
         scene = self.scene
+        # What rests where it starts stays, whatever rows would do without clearances.
+        stays = self._resting_start()
+        if stays is not None:
+            return stays
         alone = rows_from_start(scene, self.q, self.settings, self.starts, self.interruption)
         prove = partial(prove_way, scene.packed(), scene.bodies, self.q)
         # Whether a start that nothing has moved holds was asked before.
@@ -106,6 +110,12 @@ class _FirstSolve:
         if len(ways) > 1:
             solution.seconds = perf_counter() - begin
         return solution
+
+    def _resting_start(self) -> Solution | None:
+        """The start, if an objective presses bodies onto each other there, and they rest."""
+        if not self.scene.objectives:
+            return None
+        return resting_start(self.scene, self.q, self.settings, self.starts, self.interruption)
 
     def _is_done(self, ways: list[Solution]) -> bool:
         """Whether one of the attempts ended at a solution, or there is no time for another one."""
