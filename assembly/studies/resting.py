@@ -20,12 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from assembly.constraints.model.clearance import Clearance
-from assembly.constraints.program.records import UNKNOWN_BLOCKS
-from assembly.kinematics.pose import rotation_matrix
-from assembly.proximity.manifolds.closed_gaps import closed_gaps
 from assembly.solve.attempts.attempts import as_it_stands
 from assembly.solve.attempts.postures import postures_from
-from assembly.solve.clearance_proof import can_prove, proven_pairs
+from assembly.solve.clearance_proof import can_prove
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import (
     ALLOWED_OVERLAP,
@@ -45,6 +42,7 @@ from assembly.solve.second_order.leave import Fit
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import is_for_proofs, prove_start, prove_way
 from assembly.studies.fitting import Fitting, Side, fitting
+from assembly.studies.pressed import BALANCED, PUSHES, Pressed, closed_slopes, pressed_start
 from assembly.studies.seated import drop_farthest
 from assembly.studies.standing_start import with_contacts
 from assembly.studies.unhindered import Prove
@@ -55,12 +53,8 @@ if TYPE_CHECKING:
 __all__ = ["Rest", "beside_others", "resting", "resting_start", "rests_again"]
 
 Array = NDArray[np.float64]
-# [of the objective's slope] What contact forces may leave of it: the joints' solve holds 1e-10 of a largest one of 1.
-BALANCED = 1e-9
 # What rounding alone may change of an objective, in parts of it.
 ROUNDED = 1e-14
-# A force that is stronger pushes, in parts of the objective's slope.
-PUSHES = 1e-7
 
 
 class Rest(NamedTuple):
@@ -151,13 +145,17 @@ def resting_start(
     begin = perf_counter()
     stands = settings.copy()
     stands[STATIONARITY] = np.inf
-    code, state, *_ = as_it_stands(packed, interruption, stands, scene._start(packed, q, starts))
+    start = scene._start(packed, q, starts)
+    code, state, *_ = as_it_stands(packed, interruption, stands, start.copy())
     if code not in (SOLVED, UNSURE) or state[packed.results_at + DUAL] <= settings[STATIONARITY]:
         # Rows do not hold, or nothing presses: rows alone tell more.
         return None
     fit = fitting(scene, q, float(settings[ALLOWED_OVERLAP]))
     if not fit.is_told:
         return None
+    if not fit.sides:
+        # What touches along lines alone has no joints.
+        return pressed_start(scene, fit, start, settings, interruption)
     rest = _rest(scene, fit, q, q, settings, starts, interruption, may_move=False)
     prove = partial(prove_start, packed, scene.bodies)
     return None if rest is None else _proven(scene, rest, prove, settings, starts, interruption, begin)
@@ -198,7 +196,7 @@ def _rest(
         if loose:
             poses, held = there.q.copy(), [one for k, one in enumerate(held) if k not in loose]
             continue
-        pushing = _pushing(_slopes(scene, there, touching), model, rest)
+        pushing = _pushing(closed_slopes(scene, there._packed, there.q, touching), model, rest)
         if pushing is None:
             return None
         if pushing.issuperset(rest.sides):
@@ -220,6 +218,8 @@ def rests_again(
     be clear.
     """
     packed, rest = scene.packed(), last._rest
+    if isinstance(rest, Pressed) and last.success and last._ended.packed is packed:
+        return resting_start(scene, last.q.copy(), settings, starts, interruption)
     if not isinstance(rest, Rest) or not last.success or last._ended.packed is not packed or not _is_possible(scene):
         return None
     begin = perf_counter()
@@ -231,7 +231,7 @@ def rests_again(
         model = LocalModel.at(there._packed, there._state)
         if model is None or len(model.jacobian) != there._packed.rows or now.loose(model):
             return None
-        pushing = _pushing(_slopes(scene, there, float(settings[ALLOWED_OVERLAP])), model, now)
+        pushing = _pushing(closed_slopes(scene, there._packed, there.q, float(settings[ALLOWED_OVERLAP])), model, now)
         if pushing is None or not pushing.issuperset(now.sides):
             return None
     prove = partial(prove_way, packed, scene.bodies, last.q)
@@ -324,34 +324,6 @@ def _opposed(slopes: Array) -> NDArray[np.bool_]:
                 found[k] = True
                 found |= forces * np.linalg.norm(slopes, axis=1) > PUSHES * size
     return found
-
-
-def _slopes(scene: Assembly, there: Solution, touching: float) -> tuple[Array, list[Side]]:
-    """Slopes of gaps that are closed, in the unknowns of a solve, and the pair of bodies of each.
-
-    Gaps up to `touching`, in parts of the scene's size, count as closed.
-    """
-    q, packed = there.q, there._packed
-    shapes, pairs, minimum = proven_pairs(scene.packed(), scene.bodies)
-    within = touching * scene.packed().scale
-    # Unknowns are numbered by what constraints are between bodies.
-    numbers = packed.table[packed.table[UNKNOWN_BLOCKS] :][: packed.count]
-    column = {body: 6 * int(numbers[body]) for body in np.flatnonzero(numbers >= 0).tolist()}
-    blocks: list[Array] = [np.empty((0, 6 * len(column)))]
-    owners: list[Side] = []
-    for (a, b), least in zip(pairs, minimum, strict=True):
-        turn = rotation_matrix(q[a, 3:])
-        seen = turn.T @ rotation_matrix(q[b, 3:]), (q[b, :3] - q[a, :3]) @ turn
-        normals, places, is_flat = closed_gaps((shapes[a], shapes[b]), *seen, (least - within, least + within))
-        normals, places = normals @ turn.T, places @ turn.T + q[a, :3]
-        block = np.zeros((len(normals), 6 * len(column)))
-        for body, sign in ((a, -1.0), (b, 1.0)):
-            if body in column:
-                arms = (places - q[body, :3]) / packed.scale
-                block[:, column[body] :][:, :6] = sign * np.hstack([normals, np.cross(arms, normals)])
-        blocks.append(block)
-        owners += [(a, b, bool(flat)) for flat in is_flat]
-    return np.concatenate(blocks), owners
 
 
 def _proven(
