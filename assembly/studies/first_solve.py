@@ -20,10 +20,21 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import can_prove
 from assembly.solve.interruption import Interruption
-from assembly.solve.loop.settings import ALLOWED_OVERLAP, COUNT, GATHER, NEVER, OBJECTIVE, UNSURE
+from assembly.solve.loop.settings import (
+    ALLOWED_OVERLAP,
+    COUNT,
+    GATHER,
+    ITERATIONS,
+    NEVER,
+    OBJECTIVE,
+    SOLVED,
+    UNSURE,
+)
+from assembly.solve.scene import Status
 from assembly.solve.second_order.leave import Outcome
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import prove_start, prove_way
+from assembly.studies.held_crossing import crosses_where_held
 from assembly.studies.parting import parted
 from assembly.studies.put_together import PutTogether, put_together
 from assembly.studies.resting import Rest, beside_others, resting, resting_start
@@ -85,6 +96,9 @@ class _FirstSolve:
         if found is not None:
             found.seconds = perf_counter() - begin
             return found
+        held = self._crossing_where_held(alone)
+        if held is not None:
+            return held
         together = put_together(scene, self.q, alone, self.starts, self.options, self.interruption)
         ways: list[Solution] = []
         rest = self._resting(self.q, prove, ways) if scene.objectives else None
@@ -116,6 +130,19 @@ class _FirstSolve:
         if not self.scene.objectives:
             return None
         return resting_start(self.scene, self.q, self.settings, self.starts, self.interruption)
+
+    def _crossing_where_held(self, alone: Outcome) -> Solution | None:
+        """The end of rows without clearances, STALLED, where bodies cross there that constraints let not part."""
+        if alone.code != SOLVED:
+            return None
+        poses = alone.state[: self.scene.packed().contacts_at].reshape(-1, 7).copy()
+        if not crosses_where_held(self.scene, poses, self.settings, self.interruption):
+            return None
+        settings = self.settings.copy()
+        settings[ITERATIONS] = 0.0
+        solution = self.scene._solved(settings, poses, self.starts, self.interruption, reference=self.q)
+        solution.status = Status.STALLED
+        return solution
 
     def _is_done(self, ways: list[Solution]) -> bool:
         """Whether one of the attempts ended at a solution, or there is no time for another one."""

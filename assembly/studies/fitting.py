@@ -42,12 +42,15 @@ class Fitting:
         What the scene asks for beside clearances.
     sides : dict of NearFit -> Side
         The joints, and of which two bodies each is.
+    near : set of (int, int)
+        The pairs of bodies that are not proven to be clear.
     is_told : bool
         Whether hulls of faces prove that all bodies are clear or touch there.
     """
 
     others: list[Constraint]
     sides: dict[NearFit, Side]
+    near: set[tuple[int, int]]
     is_told: bool
     _scenes: dict[tuple[NearFit, ...], Assembly] = field(default_factory=dict)
 
@@ -93,5 +96,5 @@ def fitting(scene: Assembly, poses: Array, touching: float) -> Fitting:
     }
     while len(scene._fitted) >= REMEMBERED:
         scene._fitted.pop(next(iter(scene._fitted)))
-    found = scene._fitted[key] = Fitting(others, sides, told is not None)
+    found = scene._fitted[key] = Fitting(others, sides, set(near), told is not None)
     return found

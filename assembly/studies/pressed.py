@@ -8,6 +8,7 @@ matter then, and the start is a minimum.
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
@@ -106,7 +107,7 @@ def _forces(
     model = LocalModel.at(packed, state) if code in (SOLVED, UNSURE) else None
     if model is None or len(model.jacobian) != packed.rows:
         return None
-    slopes, _ = closed_slopes(scene, packed, q, float(settings[ALLOWED_OVERLAP]))
+    slopes, _ = closed_slopes(scene, packed, q, float(settings[ALLOWED_OVERLAP]), fit.near)
     # Limits that are reached push as gaps do.
     limits = model.one_sided & model.touching
     kept = null_space(model.jacobian[~model.one_sided], len(model.gradient))
@@ -121,10 +122,13 @@ def _forces(
     return Pressed(tuple(forces[strong].tolist())), float(left)
 
 
-def closed_slopes(scene: Assembly, packed: Packed, q: Array, touching: float) -> tuple[Array, list[Side]]:
+def closed_slopes(
+    scene: Assembly, packed: Packed, q: Array, touching: float, near: Container[tuple[int, int]] | None = None
+) -> tuple[Array, list[Side]]:
     """Slopes of gaps that are closed at poses (n, 7), in the unknowns of a packed scene, and the pair of each.
 
-    Gaps up to `touching`, in parts of the scene's size, count as closed.
+    Gaps up to `touching`, in parts of the scene's size, count as closed. If it is known which pairs are `near`, only
+    those are asked.
     """
     shapes, pairs, minimum = proven_pairs(scene.packed(), scene.bodies)
     within = touching * scene.packed().scale
@@ -134,6 +138,8 @@ def closed_slopes(scene: Assembly, packed: Packed, q: Array, touching: float) ->
     blocks: list[Array] = [np.empty((0, 6 * len(column)))]
     owners: list[Side] = []
     for (a, b), least in zip(pairs, minimum, strict=True):
+        if near is not None and (a, b) not in near:
+            continue
         turn = rotation_matrix(q[a, 3:])
         seen = turn.T @ rotation_matrix(q[b, 3:]), (q[b, :3] - q[a, :3]) @ turn
         normals, places, is_flat = closed_gaps((shapes[a], shapes[b]), *seen, (least - within, least + within))

@@ -20,7 +20,7 @@ from assembly.proximity.manifolds.line_manifolds import line_manifolds
 from assembly.proximity.manifolds.manifold import Manifold
 from assembly.proximity.manifolds.round_manifolds import round_manifolds
 
-__all__ = ["closed_gaps"]
+__all__ = ["closed_gaps", "wall_manifolds", "walls"]
 
 Array = NDArray[np.float64]
 Faces = tuple[Face, ...]
@@ -51,7 +51,7 @@ def closed_gaps(
     found = [
         *flat,
         *line_manifolds(shapes, turn, shift, within),
-        *_round_manifolds(shapes, turn, shift, within),
+        *wall_manifolds(shapes, turn, shift, within),
     ]
     normals, places = _balls(shapes, turn, shift, within)
     normals = np.concatenate([*(manifold.normals for _, manifold in found), normals])
@@ -59,17 +59,17 @@ def closed_gaps(
     return normals, places, np.arange(len(normals)) < sum(len(manifold.gaps) for _, manifold in flat)
 
 
-def _round_manifolds(
+def wall_manifolds(
     shapes: tuple[Faces, Faces], turn: Array, shift: Array, within: tuple[float, float]
 ) -> list[tuple[tuple[int, int], Manifold]]:
     """Manifolds of walls that are whole, of both bodies; only walls that fit are asked for that."""
-    (faces, ones), (others, twos) = map(_walls, shapes)
+    (faces, ones), (others, twos) = map(walls, shapes)
     found = round_manifolds((ones, twos), turn, shift, within)
     return [((i, j), manifold) for (i, j), manifold in found if _is_whole(faces[i]) and _is_whole(others[j])]
 
 
 @lru_cache(maxsize=256)
-def _walls(faces: Faces) -> tuple[Faces, tuple[ElementaryFace, ...]]:
+def walls(faces: Faces) -> tuple[Faces, tuple[ElementaryFace, ...]]:
     """The cylinders and cones among a body's faces that go all around."""
     found = [
         (face, one)
