@@ -57,10 +57,11 @@ def crosses_where_held(scene: Assembly, q: Array, settings: Array, interruption:
     touching = float(settings[ALLOWED_OVERLAP]) * packed.scale
     with lent_proof(packed, scene.bodies) as proof:
         answers = proof.as_they_stand(q, touching)
-        crossing = [
-            k for k, answer in enumerate(answers) if answer.verdict is Verdict.CROSSING and answer.depth > touching
-        ]
-        return any(_is_held(proof, k, q, twists, rows.scale) for k in crossing)
+        return any(
+            _is_held(proof, k, q, twists, (rows.scale, touching), is_stuck(answer, touching))
+            for k, answer in enumerate(answers)
+            if answer.verdict not in (Verdict.CLEAR, Verdict.TOUCHING)
+        )
 
 
 def _is_held(
