@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
-from typing import Any, Self, TypeGuard
+from typing import TYPE_CHECKING, Any, Self, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,6 +33,9 @@ from assembly.proximity.extrema.pairs import inside
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution
+
+if TYPE_CHECKING:
+    from assembly.studies.fitting import Fitting
 
 __all__ = ["PackedContents"]
 
@@ -66,6 +69,8 @@ class PackedContents(Contents):
         self._packings: dict[tuple[tuple[int, Seat], ...], tuple[Packed | None, Scene | None]] = {}
         # Scenes of the same bodies without clearances, or objectives, which solves begin with; packed once.
         self._parts: dict[tuple[bool, bool], Self] = {}
+        # Scenes with joints in the place of clearances, by where faces fit so.
+        self._fitted: dict[bytes, Fitting] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """State for pickles and deep copies: what the scene is made of, without its packing, which is 100 times as

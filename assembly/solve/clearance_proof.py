@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import side_faces
 from assembly.constraints.packing.scene import Packed
+from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_proven
@@ -107,7 +108,8 @@ def proven_pairs(
     """
     number = {id(body): k for k, body in enumerate(bodies)}
     owned = owned_pairs(packed)
-    shapes = [side_faces(body) for body in bodies]
+    # What faces are is known of the first shape of this content that was asked for.
+    shapes = [first_equal(side_faces(body)) for body in bodies]
     rows = [(number[id(a)], number[id(b)]) for _, (a, b), _ in owned]
     rows = [(b, a) if holds_first(shapes[a], shapes[b]) else (a, b) for a, b in rows]
     minimum = [0.0 if touched else item.minimum for item, _, touched in owned]

@@ -20,13 +20,24 @@ from numpy.typing import ArrayLike, NDArray
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.clearance_proof import can_prove
 from assembly.solve.interruption import Interruption
-from assembly.solve.loop.settings import ALLOWED_OVERLAP, COUNT, GATHER, NEVER, OBJECTIVE, UNSURE
+from assembly.solve.loop.settings import (
+    ALLOWED_OVERLAP,
+    COUNT,
+    GATHER,
+    ITERATIONS,
+    NEVER,
+    OBJECTIVE,
+    SOLVED,
+    UNSURE,
+)
+from assembly.solve.scene import Status
 from assembly.solve.second_order.leave import Outcome
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import prove_start, prove_way
+from assembly.studies.held_crossing import crosses_where_held
 from assembly.studies.parting import parted
 from assembly.studies.put_together import PutTogether, put_together
-from assembly.studies.resting import Rest, beside_others, resting
+from assembly.studies.resting import Rest, beside_others, resting, resting_start
 from assembly.studies.seated import Seat, seated
 from assembly.studies.separation import separated
 from assembly.studies.unhindered import Prove, clear_end, rows_from_start, unhindered_at
@@ -72,6 +83,10 @@ class _FirstSolve:
         """The solution."""
         begin = perf_counter()
         scene = self.scene
+        # What rests where it starts stays, whatever rows would do without clearances.
+        stays = self._resting_start()
+        if stays is not None:
+            return stays
         alone = rows_from_start(scene, self.q, self.settings, self.starts, self.interruption)
         prove = partial(prove_way, scene.packed(), scene.bodies, self.q)
         # Whether a start that nothing has moved holds was asked before.
@@ -81,6 +96,9 @@ class _FirstSolve:
         if found is not None:
             found.seconds = perf_counter() - begin
             return found
+        held = self._crossing_where_held(alone)
+        if held is not None:
+            return held
         together = put_together(scene, self.q, alone, self.starts, self.options, self.interruption)
         ways: list[Solution] = []
         rest = self._resting(self.q, prove, ways) if scene.objectives else None
@@ -105,6 +123,25 @@ class _FirstSolve:
         solution = min((way for way in ways if way.success), key=lambda way: way.objective, default=failed)
         if len(ways) > 1:
             solution.seconds = perf_counter() - begin
+        return solution
+
+    def _resting_start(self) -> Solution | None:
+        """The start, if an objective presses bodies onto each other there, and they rest."""
+        if not self.scene.objectives:
+            return None
+        return resting_start(self.scene, self.q, self.settings, self.starts, self.interruption)
+
+    def _crossing_where_held(self, alone: Outcome) -> Solution | None:
+        """The end of rows without clearances, STALLED, where bodies cross there that constraints let not part."""
+        if alone.code != SOLVED:
+            return None
+        poses = alone.state[: self.scene.packed().contacts_at].reshape(-1, 7).copy()
+        if not crosses_where_held(self.scene, poses, self.settings, self.interruption):
+            return None
+        settings = self.settings.copy()
+        settings[ITERATIONS] = 0.0
+        solution = self.scene._solved(settings, poses, self.starts, self.interruption, reference=self.q)
+        solution.status = Status.STALLED
         return solution
 
     def _is_done(self, ways: list[Solution]) -> bool:

@@ -10,9 +10,8 @@ pushes onto each other are removed, and the objective is minimized again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
-from itertools import count
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -21,15 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from assembly.constraints.model.clearance import Clearance
-from assembly.constraints.model.constraint import Constraint
-from assembly.constraints.program.records import UNKNOWN_BLOCKS
-from assembly.kinematics.pose import rotation_matrix
-from assembly.proximity.clearance.answers import Verdict
-from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.proximity.manifolds.closed_gaps import closed_gaps
 from assembly.solve.attempts.attempts import as_it_stands
 from assembly.solve.attempts.postures import postures_from
-from assembly.solve.clearance_proof import can_prove, lent_proof
+from assembly.solve.clearance_proof import can_prove
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import (
     ALLOWED_OVERLAP,
@@ -47,25 +40,21 @@ from assembly.solve.scene import Status
 from assembly.solve.second_order.dense import LocalModel, null_space
 from assembly.solve.second_order.leave import Fit
 from assembly.solve.solution import Solution
-from assembly.solve.start_proof import is_for_proofs, prove_way
-from assembly.studies.seated import NearFit, NotBelow, drop_farthest, fits
+from assembly.solve.start_proof import is_for_proofs, prove_start, prove_way
+from assembly.studies.fitting import Fitting, Side, fitting
+from assembly.studies.pressed import BALANCED, PUSHES, Pressed, closed_slopes, pressed_start
+from assembly.studies.seated import drop_farthest
 from assembly.studies.standing_start import with_contacts
 from assembly.studies.unhindered import Prove
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
-__all__ = ["Rest", "beside_others", "resting", "rests_again"]
+__all__ = ["Rest", "beside_others", "resting", "resting_start", "rests_again"]
 
 Array = NDArray[np.float64]
-# Two bodies, and whether it is their flat faces that lie on each other.
-Side = tuple[int, int, bool]
-# [of the objective's slope] What contact forces may leave of it: the joints' solve holds 1e-10 of a largest one of 1.
-BALANCED = 1e-9
 # What rounding alone may change of an objective, in parts of it.
 ROUNDED = 1e-14
-# A force that is stronger pushes, in parts of the objective's slope.
-PUSHES = 1e-7
 
 
 class Rest(NamedTuple):
@@ -130,26 +119,74 @@ def resting(
     starts : mapping of constraint name -> (4,), optional
     interruption : Interruption
     """
+    if not _is_possible(scene):
+        return None
+    begin = perf_counter()
+    fit = fitting(scene, poses, float(settings[ALLOWED_OVERLAP]))
+    rest = _rest(scene, fit, poses, reference, settings, starts, interruption)
+    return None if rest is None else _proven(scene, rest, prove, settings, starts, interruption, begin) or rest
+
+
+def resting_start(
+    scene: Assembly,
+    q: Array,
+    settings: Array,
+    starts: Mapping[str, ArrayLike] | None,
+    interruption: Interruption,
+) -> Solution | None:
+    """Poses q (n, 7) as the solution of a scene, if bodies rest there under its objective; else None.
+
+    That takes one look by hulls of faces, a solve without steps with joints in the place of contacts, and the forces of
+    closed gaps: no cells are made, and no contacts listed.
+    """
     packed = scene.packed()
     if not _is_possible(scene):
         return None
     begin = perf_counter()
-    touching = float(settings[ALLOWED_OVERLAP])
-    others = [item for item in scene.constraints if not isinstance(item, Clearance)]
-    sides = _near_fits(scene, others, poses, touching)
-    held = list(sides)
+    stands = settings.copy()
+    stands[STATIONARITY] = np.inf
+    start = scene._start(packed, q, starts)
+    code, state, *_ = as_it_stands(packed, interruption, stands, start.copy())
+    if code not in (SOLVED, UNSURE) or state[packed.results_at + DUAL] <= settings[STATIONARITY]:
+        # Rows do not hold, or nothing presses: rows alone tell more.
+        return None
+    fit = fitting(scene, q, float(settings[ALLOWED_OVERLAP]))
+    if not fit.is_told:
+        return None
+    if not fit.sides:
+        # What touches along lines alone has no joints.
+        return pressed_start(scene, fit, start, settings, interruption)
+    rest = _rest(scene, fit, q, q, settings, starts, interruption, may_move=False)
+    prove = partial(prove_start, packed, scene.bodies)
+    return None if rest is None else _proven(scene, rest, prove, settings, starts, interruption, begin)
+
+
+def _rest(
+    scene: Assembly,
+    fit: Fitting,
+    poses: Array,
+    reference: Array,
+    settings: Array,
+    starts: Mapping[str, ArrayLike] | None,
+    interruption: Interruption,
+    may_move: bool = True,
+) -> Rest | None:
+    """How bodies rest on what they fit near poses (n, 7), or at these; None if they do not."""
+    touching, held = float(settings[ALLOWED_OVERLAP]), list(fit.sides)
     settings = settings.copy()
     settings[GATHER] = NEVER
     while held and not interruption.is_over():
-        inner = _with_joints(scene, others, [fit.joint for fit in held])
+        inner = fit.scene_with(scene, held)
         there = inner._solved(settings, poses, starts, interruption, reference)
+        if not may_move and not (there.success and _is_where(there.q, poses, scene.packed().scale, touching)):
+            return None
         if not there.success:
             if there.status is Status.UNBOUNDED or not drop_farthest(held, there.violations):
                 return None
             continue
         if _rises(there, touching):
             return None
-        rest = Rest(inner, there, tuple(sides[fit] for fit in held))
+        rest = Rest(inner, there, tuple(fit.sides[one] for one in held))
         with postures_from(there._packed, reference):
             model = LocalModel.at(there._packed, there._state)
         if model is None or len(model.jacobian) != there._packed.rows:
@@ -157,19 +194,14 @@ def resting(
         # Flat faces that stay off each other are let go.
         loose = rest.loose(model)
         if loose:
-            poses, held = there.q.copy(), [fit for k, fit in enumerate(held) if k not in loose]
+            poses, held = there.q.copy(), [one for k, one in enumerate(held) if k not in loose]
             continue
-        with lent_proof(packed, scene.bodies) as proof:
-            pushing = _pushing(_slopes(proof, there, touching * packed.scale), model, rest)
+        pushing = _pushing(closed_slopes(scene, there._packed, there.q, touching), model, rest)
         if pushing is None:
             return None
         if pushing.issuperset(rest.sides):
-            solution = _proven(scene, rest, prove, settings, starts, interruption)
-            if solution is None:
-                return rest
-            solution.seconds = perf_counter() - begin
-            return solution
-        poses, held = there.q.copy(), [fit for fit in held if sides[fit] in pushing]
+            return rest
+        poses, held = there.q.copy(), [one for one in held if fit.sides[one] in pushing]
     return None
 
 
@@ -186,6 +218,8 @@ def rests_again(
     be clear.
     """
     packed, rest = scene.packed(), last._rest
+    if isinstance(rest, Pressed) and last.success and last._ended.packed is packed:
+        return resting_start(scene, last.q.copy(), settings, starts, interruption)
     if not isinstance(rest, Rest) or not last.success or last._ended.packed is not packed or not _is_possible(scene):
         return None
     begin = perf_counter()
@@ -197,16 +231,11 @@ def rests_again(
         model = LocalModel.at(there._packed, there._state)
         if model is None or len(model.jacobian) != there._packed.rows or now.loose(model):
             return None
-        with lent_proof(packed, scene.bodies) as proof:
-            pushing = _pushing(_slopes(proof, there, float(settings[ALLOWED_OVERLAP]) * packed.scale), model, now)
+        pushing = _pushing(closed_slopes(scene, there._packed, there.q, float(settings[ALLOWED_OVERLAP])), model, now)
         if pushing is None or not pushing.issuperset(now.sides):
             return None
     prove = partial(prove_way, packed, scene.bodies, last.q)
-    solution = _proven(scene, now, prove, settings, starts, interruption)
-    if solution is None:
-        return now
-    solution.seconds = perf_counter() - begin
-    return solution
+    return _proven(scene, now, prove, settings, starts, interruption, begin) or now
 
 
 def _is_possible(scene: Assembly) -> bool:
@@ -243,22 +272,10 @@ def beside_others(
     return solution if solution.success else None
 
 
-def _near_fits(scene: Assembly, others: Sequence[Constraint], poses: Array, touching: float) -> dict[NearFit, Side]:
-    """How bodies nearly fit that are not proven to be clear at poses, and of which two bodies each is.
-
-    The names of its joints are not those of other constraints.
-    """
-    packed = scene.packed()
-    with lent_proof(packed, scene.bodies) as proof:
-        answers = proof.as_they_stand(poses, touching * packed.scale)
-        near = [pair for pair, answer in zip(proof.pairs, answers, strict=True) if answer.verdict is not Verdict.CLEAR]
-    taken = {item.name for item in others}
-    names = (name for name in map("fit {}".format, count()) if name not in taken)
-    return {
-        fit: (a, b, isinstance(fit.joint, NotBelow))
-        for a, b in near
-        for fit in fits((scene.bodies[a], scene.bodies[b]), poses[[a, b]], names)
-    }
+def _is_where(q: Array, poses: Array, scale: float, touching: float) -> bool:
+    """Whether poses (n, 7) are others up to `touching`: joints that hold up to rounding are moved by that."""
+    off = np.abs(q - poses)
+    return float(max(off[:, :3].max() / scale, off[:, 3:].max())) <= touching
 
 
 def _rises(there: Solution, touching: float) -> bool:
@@ -267,15 +284,6 @@ def _rises(there: Solution, touching: float) -> bool:
     return len(objective) > 1 and bool(
         violation[0] <= touching and objective[-1] - objective[0] > ROUNDED * abs(objective[0])
     )
-
-
-def _with_joints(scene: Assembly, others: Sequence[Constraint], joints: Sequence[Constraint]) -> Assembly:
-    """The bodies and objectives of a scene, with joints in the place of clearances."""
-    inner = type(scene)(scene.bodies)
-    inner._take_constraints([*others, *joints])
-    for sign, objective in scene.objectives:
-        (inner.minimize if sign > 0.0 else inner.maximize)(objective)
-    return inner
 
 
 def _pushing(closed: tuple[Array, list[Side]], model: LocalModel, rest: Rest) -> set[Side] | None:
@@ -318,30 +326,6 @@ def _opposed(slopes: Array) -> NDArray[np.bool_]:
     return found
 
 
-def _slopes(proof: ClearanceProof, there: Solution, touching: float) -> tuple[Array, list[Side]]:
-    """Slopes of gaps that are closed, in the unknowns of a solve, and the pair of bodies of each."""
-    q, packed = there.q, there._packed
-    # Unknowns are numbered by what constraints are between bodies.
-    numbers = packed.table[packed.table[UNKNOWN_BLOCKS] :][: packed.count]
-    column = {body: 6 * int(numbers[body]) for body in np.flatnonzero(numbers >= 0).tolist()}
-    blocks: list[Array] = [np.empty((0, 6 * len(column)))]
-    owners: list[Side] = []
-    for k, (a, b) in enumerate(proof.pairs):
-        least = float(proof.minimum[k])
-        shapes = (proof.faces[a], proof.faces[b])
-        normals, places, is_flat = closed_gaps(shapes, *proof.relative(k, q), (least - touching, least + touching))
-        turn = rotation_matrix(q[a, 3:])
-        normals, places = normals @ turn.T, places @ turn.T + q[a, :3]
-        block = np.zeros((len(normals), 6 * len(column)))
-        for body, sign in ((a, -1.0), (b, 1.0)):
-            if body in column:
-                arms = (places - q[body, :3]) / packed.scale
-                block[:, column[body] :][:, :6] = sign * np.hstack([normals, np.cross(arms, normals)])
-        blocks.append(block)
-        owners += [(a, b, bool(flat)) for flat in is_flat]
-    return np.concatenate(blocks), owners
-
-
 def _proven(
     scene: Assembly,
     rest: Rest,
@@ -349,8 +333,12 @@ def _proven(
     settings: Array,
     starts: Mapping[str, ArrayLike] | None,
     interruption: Interruption,
+    begin: float,
 ) -> Solution | None:
-    """The solution of a scene where bodies rest, if its rows hold there and it is proven that bodies are clear."""
+    """The solution of a scene where bodies rest, if its rows hold there and it is proven that bodies are clear.
+
+    Its time is that since `begin`.
+    """
     packed, there = scene.packed(), rest.there
     settings = settings.copy()
     settings[STATIONARITY] = np.inf
@@ -369,4 +357,5 @@ def _proven(
     solution._lists, solution._rest = partial(with_contacts, scene), rest
     # Samples replace a proof where faces lie on each other: there rows are checked as well.
     held = solution.proved or solution.feasibility <= float(settings[FEASIBILITY]) * packed.scale
+    solution.seconds = perf_counter() - begin
     return solution if held else None

@@ -20,6 +20,7 @@ from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.contact import side_faces
 from assembly.constraints.model.joint import SAME_AXIS, Joint, Side
 from assembly.constraints.model.joints import ALONG, Cylindrical, Spherical
+from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.recognition.forms import Cone, Cylinder, Plane, Sphere
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
@@ -153,7 +154,7 @@ def fits(bodies: tuple[Body, Body], rows: Array, names: Iterator[str]) -> Iterat
     """
     reach = OFF * min(body.size for body in bodies)
     ones, others = (
-        [_Face(body, turn, row[:3], face) for face in elementary_faces(side_faces(body))]
+        [_Face(body, turn, row[:3], face) for face in elementary_faces(first_equal(side_faces(body)))]
         for body, row, turn in zip(bodies, rows, map(rotation_matrix, rows[:, 3:]), strict=True)
     )
     axes: list[tuple[Array, Array]] = []
@@ -208,7 +209,7 @@ def _thickness(face: _Face) -> float:
     point, normal = _plane(face)
     found = [
         float((point - other.form.point) @ normal)
-        for other in elementary_faces(side_faces(face.body))
+        for other in elementary_faces(first_equal(side_faces(face.body)))
         if isinstance(other.form, Plane)
         and (other.form.normal if other.is_outward else -other.form.normal) @ normal < PARALLEL - 1.0
         and _is_beside(face.box, other.box, normal)

@@ -7,6 +7,8 @@ angle in one look.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from assembly.geometry.faces.face import Face
@@ -19,6 +21,7 @@ __all__ = ["holds_first"]
 ROUNDED = 1e-9
 
 
+@lru_cache(maxsize=1024)
 def holds_first(one: tuple[Face, ...], other: tuple[Face, ...]) -> bool:
     """Whether the second of two bodies has a bore that fits what is round of the first one better than it fits into."""
     return _slack(other, one) < _slack(one, other)

@@ -17,9 +17,10 @@ from assembly.geometry.recognition.forms import Cone, Cylinder, Sphere
 from assembly.proximity.manifolds.elementary_faces import ElementaryFace, elementary_faces
 from assembly.proximity.manifolds.flat_manifolds import flat_manifolds
 from assembly.proximity.manifolds.line_manifolds import line_manifolds
+from assembly.proximity.manifolds.manifold import Manifold
 from assembly.proximity.manifolds.round_manifolds import round_manifolds
 
-__all__ = ["closed_gaps"]
+__all__ = ["closed_gaps", "wall_manifolds", "walls"]
 
 Array = NDArray[np.float64]
 Faces = tuple[Face, ...]
@@ -46,12 +47,11 @@ def closed_gaps(
         The second body is at x -> turn x + shift, seen from the first.
     within : (float, float)
     """
-    walls = _walls(shapes[0]), _walls(shapes[1])
     flat = flat_manifolds(shapes, turn, shift, within)
     found = [
         *flat,
         *line_manifolds(shapes, turn, shift, within),
-        *round_manifolds(walls, turn, shift, within),
+        *wall_manifolds(shapes, turn, shift, within),
     ]
     normals, places = _balls(shapes, turn, shift, within)
     normals = np.concatenate([*(manifold.normals for _, manifold in found), normals])
@@ -59,17 +59,31 @@ def closed_gaps(
     return normals, places, np.arange(len(normals)) < sum(len(manifold.gaps) for _, manifold in flat)
 
 
+def wall_manifolds(
+    shapes: tuple[Faces, Faces], turn: Array, shift: Array, within: tuple[float, float]
+) -> list[tuple[tuple[int, int], Manifold]]:
+    """Manifolds of walls that are whole, of both bodies; only walls that fit are asked for that."""
+    (faces, ones), (others, twos) = map(walls, shapes)
+    found = round_manifolds((ones, twos), turn, shift, within)
+    return [((i, j), manifold) for (i, j), manifold in found if _is_whole(faces[i]) and _is_whole(others[j])]
+
+
 @lru_cache(maxsize=256)
-def _walls(faces: Faces) -> tuple[ElementaryFace, ...]:
-    """The cylinders and cones among a body's faces that go all around and are whole."""
-    return tuple(
-        one
+def walls(faces: Faces) -> tuple[Faces, tuple[ElementaryFace, ...]]:
+    """The cylinders and cones among a body's faces that go all around."""
+    found = [
+        (face, one)
         for face in faces
         for one in elementary_faces((face,))
-        if isinstance(one.form, Cylinder | Cone)
-        and one.form.turn.angle > 2.0 * np.pi - ALL_AROUND
-        and face.contains(*_grid(face)).all()
-    )
+        if isinstance(one.form, Cylinder | Cone) and one.form.turn.angle > 2.0 * np.pi - ALL_AROUND
+    ]
+    return tuple(face for face, _ in found), tuple(one for _, one in found)
+
+
+@lru_cache(maxsize=1024)
+def _is_whole(face: Face) -> bool:
+    """Whether a face has all of its surface, as far as points all over it tell."""
+    return bool(face.contains(*_grid(face)).all())
 
 
 @lru_cache(maxsize=256)

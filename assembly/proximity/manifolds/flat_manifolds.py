@@ -12,8 +12,8 @@ from assembly._record import rows_of
 from assembly.geometry.faces.face import Face
 from assembly.proximity.manifolds.flat_pair import FULL, flat_rows
 from assembly.proximity.manifolds.manifold import Manifold
-from assembly.proximity.manifolds.records import FRAME, ROW, ROW_SIZE
-from assembly.proximity.manifolds.regions import PlaneRegion, plane_region
+from assembly.proximity.manifolds.records import ROW, ROW_SIZE
+from assembly.proximity.manifolds.regions import PlaneRegion, plane_of, plane_region
 
 __all__ = ["flat_manifold", "flat_manifolds"]
 
@@ -26,32 +26,33 @@ PLACES = 128
 
 @dataclass(frozen=True, eq=False)
 class _PlaneFaces:
-    """Those of a body's faces that are regions of planes.
+    """Those of a body's faces that are in planes; regions are made of those only that lie near another body's.
 
     Attributes
     ----------
-    numbers : (f,) of int
+    numbers : list of int
         Which faces they are.
-    regions : tuple of PlaneRegion
+    faces : list of Face
     points, normals : (f, 3)
+    sizes : (f,)
     """
 
-    numbers: NDArray[np.int64]
-    regions: tuple[PlaneRegion, ...]
+    numbers: list[int]
+    faces: list[Face]
     points: Array
     normals: Array
+    sizes: Array
 
 
 @lru_cache(maxsize=256)
 def _plane_faces(faces: tuple[Face, ...]) -> _PlaneFaces:
-    found = [(k, region) for k, face in enumerate(faces) if (region := plane_region(face)) is not None]
-    regions = tuple(region for _, region in found)
-    frames = [rows_of(FRAME, region.frame[None])[0] for region in regions]
+    found = [(k, face, *plane) for k, face in enumerate(faces) if (plane := plane_of(face)) is not None]
     return _PlaneFaces(
-        np.array([k for k, _ in found], dtype=np.int64),
-        regions,
-        np.array([frame.origin for frame in frames]).reshape(-1, 3),
-        np.array([frame.normal for frame in frames]).reshape(-1, 3),
+        [k for k, *_ in found],
+        [face for _, face, *_ in found],
+        np.array([point for *_, point, _ in found]).reshape(-1, 3),
+        np.array([normal for *_, normal in found]).reshape(-1, 3),
+        np.array([face.surface.size for _, face, *_ in found]),
     )
 
 
@@ -98,19 +99,20 @@ def flat_manifolds(
         With the numbers of the faces.
     """
     a, b = map(_plane_faces, shapes)
-    if not (len(a.numbers) and len(b.numbers)):
+    if not (a.numbers and b.numbers):
         return []
     low, high = within
     opposed = a.normals @ (b.normals @ turn.T).T < -0.5
     # A plane that leans is as far as asked somewhere on the faces, and nowhere farther than they are large.
     away = ((b.points @ turn.T + shift)[None] - a.points[:, None]) * a.normals[:, None]
-    sizes = np.array([r.size for r in a.regions])[:, None] + np.array([r.size for r in b.regions])
+    sizes = a.sizes[:, None] + b.sizes
     lean = np.linalg.norm(a.normals[:, None] + b.normals @ turn.T, axis=2)
     off = away.sum(axis=2)
     near = opposed & (off <= high + 2.0 * lean * sizes) & (off >= low - 2.0 * lean * sizes)
     found = []
     for i, j in np.argwhere(near).tolist():
-        manifold = flat_manifold(a.regions[i], b.regions[j], turn, shift)
+        one, other = plane_region(a.faces[i]), plane_region(b.faces[j])
+        manifold = None if one is None or other is None else flat_manifold(one, other, turn, shift)
         if manifold is not None and low <= manifold.gaps.min() and manifold.gaps.max() <= high:
-            found.append(((int(a.numbers[i]), int(b.numbers[j])), manifold))
+            found.append(((a.numbers[i], b.numbers[j]), manifold))
     return found

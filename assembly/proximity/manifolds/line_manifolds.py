@@ -7,6 +7,7 @@ along it, so that it is least at an end of what of it the plane's region has.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from assembly.proximity.manifolds.elementary_faces import elementary_faces
 from assembly.proximity.manifolds.line_span import line_span
 from assembly.proximity.manifolds.manifold import Manifold
 from assembly.proximity.manifolds.records import BALL, CUT, END, FRAME, SEGMENT
-from assembly.proximity.manifolds.regions import PlaneRegion, plane_region
+from assembly.proximity.manifolds.regions import PlaneRegion, plane_of, plane_region
 from assembly.proximity.manifolds.second_rates import skew
 
 __all__ = ["line_manifold", "line_manifolds"]
@@ -110,10 +111,19 @@ def _normal(frame: np.record, way: Array, border: Array) -> Array:
     return np.asarray(across / along)
 
 
+class _Plane(NamedTuple):
+    """A plane face of a body: its number, the face, a point and the outward normal."""
+
+    number: int
+    face: Face
+    point: Array
+    normal: Array
+
+
 @lru_cache(maxsize=256)
-def _faces(faces: tuple[Face, ...]) -> tuple[list[tuple[int, PlaneRegion]], list[tuple[int, Cylinder | Cone | Sphere]]]:
+def _faces(faces: tuple[Face, ...]) -> tuple[list[_Plane], list[tuple[int, Cylinder | Cone | Sphere]]]:
     """The plane faces of a body, and those that are round and full, with their numbers."""
-    planes = [(k, region) for k, face in enumerate(faces) if (region := plane_region(face)) is not None]
+    planes = [_Plane(k, face, *plane) for k, face in enumerate(faces) if (plane := plane_of(face)) is not None]
     rounds = [
         (k, one.form)
         for k, face in enumerate(faces)
@@ -121,6 +131,29 @@ def _faces(faces: tuple[Face, ...]) -> tuple[list[tuple[int, PlaneRegion]], list
         if one.is_outward and isinstance(one.form, Cylinder | Cone | Sphere)
     ]
     return planes, rounds
+
+
+def _near_manifold(
+    plane: _Plane, form: Cylinder | Cone | Sphere, turn: Array, shift: Array, within: tuple[float, float]
+) -> Manifold | None:
+    """The manifold of a plane face and what is round if its gaps are between two lengths.
+
+    Gaps are heights along the nearest line: where none of them is between the lengths, no region is made of the face.
+    """
+    low, high = within
+    line = _nearest_line(form, turn.T @ plane.normal)
+    if line is None:
+        return None
+    ends = line @ turn.T + shift
+    heights = (ends - plane.point) @ plane.normal
+    rounding = ON_BORDER * (plane.face.surface.size + float(np.abs(ends).max()) + float(np.abs(heights).max()))
+    if heights.min() > high + rounding or heights.max() < low - rounding:
+        return None
+    region = plane_region(plane.face)
+    manifold = None if region is None else line_manifold(region, form, turn, shift)
+    if manifold is None or manifold.gaps.min() < low or manifold.gaps.max() > high:
+        return None
+    return manifold
 
 
 def line_manifolds(
@@ -142,14 +175,15 @@ def line_manifolds(
         With the numbers of the faces.
     """
     (planes_a, rounds_a), (planes_b, rounds_b) = map(_faces, shapes)
-    low, high = within
-    found = [((i, j), line_manifold(region, form, turn, shift)) for i, region in planes_a for j, form in rounds_b]
-    for j, region in planes_b:
-        for i, form in rounds_a:
-            manifold = line_manifold(region, form, turn.T, -turn.T @ shift)
-            found.append(((i, j), None if manifold is None else manifold.turned(turn, shift)))
-    return [
-        (pair, manifold)
-        for pair, manifold in found
-        if manifold is not None and low <= manifold.gaps.min() and manifold.gaps.max() <= high
+    found = [
+        ((plane.number, j), manifold)
+        for plane in planes_a
+        for j, form in rounds_b
+        if (manifold := _near_manifold(plane, form, turn, shift, within)) is not None
+    ]
+    return found + [
+        ((i, plane.number), manifold.turned(turn, shift))
+        for plane in planes_b
+        for i, form in rounds_a
+        if (manifold := _near_manifold(plane, form, turn.T, -turn.T @ shift, within)) is not None
     ]

@@ -24,7 +24,7 @@ from assembly.proximity.manifolds.elementary_faces import NEARLY, nearly_element
 from assembly.proximity.manifolds.flat_map import flat_map
 from assembly.proximity.manifolds.records import FRAME, FRAME_SIZE, SEGMENT_SIZE
 
-__all__ = ["PlaneRegion", "plane_region"]
+__all__ = ["PlaneRegion", "plane_of", "plane_region"]
 
 Array = NDArray[np.float64]
 # Arcs are cut into pieces that turn by no more, so that each is on one side of its chord.
@@ -54,13 +54,22 @@ class PlaneRegion:
     size: float
 
 
+def plane_of(face: Face) -> tuple[Array, Array] | None:
+    """A point of a plane face and its outward normal; None of a face in no plane. Its borders are not looked at."""
+    form = nearly_elementary(face.surface)
+    if not isinstance(form, Plane):
+        return None
+    return form.point, form.normal if face.sign > 0 else -form.normal
+
+
 @lru_cache(maxsize=1024)
 def plane_region(face: Face) -> PlaneRegion | None:
     """The region of a face; None where it is in no plane, or its borders are not of lines and arcs."""
     form = nearly_elementary(face.surface)
-    if not isinstance(form, Plane):
+    plane = plane_of(face)
+    if plane is None or not isinstance(form, Plane):
         return None
-    normal = form.normal if face.sign > 0 else -form.normal
+    normal = plane[1]
     right = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
     right /= np.linalg.norm(right)
     axes = np.array([right, np.cross(normal, right)])

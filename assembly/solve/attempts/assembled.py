@@ -62,7 +62,7 @@ def _assembled(packed: Packed, table: Table, settings: Array, given: Array, turn
     _choose_turns(packed, state, turns)
     onward[GATHER] = 0.0
     if not packed.is_implicit:
-        return run(following_none(packed), onward, state)
+        return run(following_none(packed.table), onward, state)
     # The least move is sought from the present poses, and reported from the original ones.
     outcome = run(table, onward, state)
     onward[ITERATIONS] = 0.0

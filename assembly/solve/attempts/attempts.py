@@ -27,6 +27,7 @@ from assembly.solve.loop.settings import (
     GATHER,
     HISTORY,
     ITERATIONS,
+    LAST_FEASIBLE,
     LIFT_TRIMS,
     NEVER,
     OBJECTIVE,
@@ -230,9 +231,24 @@ def run(
         code = solve_program(table, pool, settings, state, *workspace, packed.end_effectors)
         # A solution keeps the rows that were written: untouched memory is slow to allocate.
         history = workspace[0][: int(state[packed.results_at + COUNT]) + 1].copy()
+        if code != SOLVED and has_manager and state[packed.results_at + LAST_FEASIBLE] == 1.0:
+            # The last pose that held is returned, and the loop tells the objective of its last iterate.
+            state[packed.results_at + OBJECTIVE] = _objective_at(packed, table, settings, state, workspace)
     finally:
         spare.append(workspace)
     return code, state, history
+
+
+def _objective_at(
+    packed: Packed, table: Table, settings: Array, state: Array, workspace: tuple[Array, Array, Table]
+) -> float:
+    """The objective at the poses of a state, with postures measured from where the solve did that."""
+    settings = settings.copy()
+    settings[ITERATIONS], settings[GATHER], settings[PLACES], settings[ANY_POSE] = 0.0, NEVER, 0.0, 0.0
+    table = following_none(table)
+    table[MANAGER_RECORD] = -1
+    solve_program(table, packed.rows_pool, settings, state.copy(), *workspace, packed.end_effectors)
+    return float(workspace[0][0, 0])
 
 
 def go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:
@@ -242,4 +258,4 @@ def go_on_once(interruption: Interruption, packed: Packed, settings: Array, stat
     """
     settings = settings.copy()
     settings[ALLOWED_OVERLAP] = 0.0
-    return _run(packed, interruption, following_none(packed), settings, state)
+    return _run(packed, interruption, following_none(packed.table), settings, state)

@@ -24,9 +24,9 @@ def _terms(table: NDArray[np.int64]) -> Any:
     return rows_of(TERM_RECORD, table[table[TERM_TABLE] :][: TERM * table[TERMS]].reshape(-1, TERM))
 
 
-def following_none(packed: Packed) -> NDArray[np.int64]:
-    """A table for a run of the loop that measures postures from where they were measured before."""
-    table = packed.table.copy()
+def following_none(table: NDArray[np.int64]) -> NDArray[np.int64]:
+    """A copy of a table for a run of the loop that measures postures from where they were measured before."""
+    table = table.copy()
     _terms(table).follows = 0
     return table
 

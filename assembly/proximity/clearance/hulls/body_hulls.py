@@ -78,6 +78,16 @@ class BodyHulls:
         rows = hollow.depth(self.discs)
         return np.maximum.reduceat(np.minimum.reduceat(rows, self.first) - self.pad, self.of_face)
 
+    def nearest(self, hollow: Hollow | Prism, face: int) -> Array:
+        """The middle of the disc of a face (3,) that is nearest to the border of a hollow around it."""
+        ends = np.append(self.first, len(self.discs.radii))
+        last = self.of_face[face + 1] if face + 1 < len(self.of_face) else len(self.first)
+        hulls = [slice(int(ends[k]), int(ends[k + 1])) for k in range(int(self.of_face[face]), int(last))]
+        depths = [hollow.depth(Discs(*(column[rows] for column in self.discs))) for rows in hulls]
+        # Of the hull that is nearest to the face.
+        best = int(np.argmax([depth.min() for depth in depths]))
+        return np.asarray(self.discs.centers[hulls[best]][depths[best].argmin()])
+
     def posed(self, turn: Array, shift: Array) -> BodyHulls:
         """The same in other axes: x -> turn x + shift."""
         return BodyHulls(

@@ -79,13 +79,22 @@ class Hollow(NamedTuple):
         """How far points (m, 3) are within."""
         return self.depth(Discs.of_points(points))
 
-    def planes(self, count: int = 12) -> tuple[Array, Array]:
-        """Some half spaces that it is in: unit vectors inward (count, 3), and the heights of their borders."""
+    def planes(self, near: Array, count: int = 12) -> tuple[Array, Array]:
+        """Some half spaces that it is in: unit vectors inward (m, 3), and the heights of their borders.
+
+        The first touches the hollow where that is nearest to a point: what lies along a wall is moved straight off it.
+        """
+        away = near - self.center
         if not self.axis.any():
-            ways = _SPHERE
+            length = float(np.linalg.norm(away))
+            ways = np.concatenate([away[None] / length, _SPHERE]) if length > 0.0 else _SPHERE
             return -ways, -ways @ self.center - self.radius
-        across = np.cross(self.axis, np.eye(3)[np.abs(self.axis).argmin()])
-        across /= np.linalg.norm(across)
+        across = away - (away @ self.axis) * self.axis
+        length = float(np.linalg.norm(across))
+        if not length > 0.0:
+            across = np.cross(self.axis, np.eye(3)[np.abs(self.axis).argmin()])
+            length = float(np.linalg.norm(across))
+        across /= length
         angle = 2.0 * pi / count * np.arange(count)[:, None]
         around = np.cos(angle) * across + np.sin(angle) * np.cross(self.axis, across)
         inward = sin(self.slope) * self.axis - cos(self.slope) * around
@@ -125,7 +134,7 @@ class Prism(NamedTuple):
         """How far points (m, 3) are within."""
         return self.depth(Discs.of_points(points))
 
-    def planes(self) -> tuple[Array, Array]:
+    def planes(self, near: Array) -> tuple[Array, Array]:  # noqa: ARG002 - as of a `Hollow`
         """The half spaces that it is in: unit vectors inward, and the heights of their borders."""
         return self.inward, self.borders
 

@@ -130,7 +130,7 @@ def test_depths_of_discs_are_bounds(hollow):
         sampled = hollow.depth_of(rim).min()
         assert depth <= sampled + 1e-14
         # Within by the half spaces as well.
-        inward, borders = hollow.planes()
+        inward, borders = hollow.planes(center)
         if depth > 0.0:
             inside += 1
             assert (rim @ inward.T >= borders - 1e-12).all()
