@@ -26,7 +26,7 @@ from assembly.proximity.manager.records import (
     PAIR_TURN,
     PAIRS,
 )
-from assembly.solve.attempts.attempts import new_workspace
+from assembly.solve.workspace import new_workspace
 from assembly.solve.clearance_proof import can_prove
 from assembly.solve.loop.settings import CARRIES, HISTORY, RADIUS
 from assembly.solve.scene import Scene

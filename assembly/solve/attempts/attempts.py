@@ -25,7 +25,6 @@ from assembly.solve.loop.settings import (
     FEASIBILITY,
     FIT,
     GATHER,
-    HISTORY,
     ITERATIONS,
     LIFT_TRIMS,
     NEVER,
@@ -38,9 +37,9 @@ from assembly.solve.loop.settings import (
     UNSURE,
     VIOLATION,
 )
-from assembly.solve.loop.workspace import workspace_needed
 from assembly.solve.options import Options
 from assembly.solve.second_order.leave import Fit, Outcome, leave_saddles
+from assembly.solve.workspace import Workspace, new_workspace
 
 __all__ = [
     "as_it_stands",
@@ -48,7 +47,6 @@ __all__ = [
     "begin",
     "go_on_once",
     "load",
-    "new_workspace",
     "rows_alone",
     "run",
     "with_listed",
@@ -56,21 +54,10 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-# Rows of history that are kept, beside the first.
-MOST_HISTORY = 1000
 # A violation larger than any scene's.
 ANYTHING = 1e6
 _LOADING = Options(max_iterations=0).settings()
 _loaded: set[int | None] = set()
-
-
-def new_workspace(packed: Packed) -> tuple[Array, Array, Table]:
-    """The workspace of a solve of a packed scene: its history, and two blocks of memory.
-
-    Zeros, because a solve leaves whole records in its state, including fields that their kind does not use.
-    """
-    doubles, integers = workspace_needed(packed.rows_table)
-    return np.zeros((MOST_HISTORY + 1, HISTORY)), np.zeros(int(doubles)), np.zeros(int(integers), dtype=np.int64)
 
 
 def load(packed: Packed, start: Callable[[], Array]) -> None:
@@ -223,13 +210,14 @@ def run(
         interruption.watched = (state, packed.results_at)
     # Threads have workspaces of their own.
     spare = packed.workspaces
-    workspace = spare.pop() if spare else new_workspace(packed)
+    workspace = spare.pop() if spare else Workspace(packed)
     try:
         has_manager = packed.clearance_rows > 0 and table[MANAGER_RECORD] >= 0
         pool = packed.pool if has_manager else packed.rows_pool
-        code = solve_program(table, pool, settings, state, *workspace, packed.end_effectors)
+        history, doubles, integers = workspace.arrays
+        code = solve_program(table, pool, settings, state, history, doubles, integers, packed.end_effectors)
         # A solution keeps the rows that were written: untouched memory is slow to allocate.
-        history = workspace[0][: int(state[packed.results_at + COUNT]) + 1].copy()
+        history = history[: int(state[packed.results_at + COUNT]) + 1].copy()
     finally:
         spare.append(workspace)
     return code, state, history

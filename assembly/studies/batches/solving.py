@@ -19,7 +19,7 @@ from assembly.derivatives.measure import Measure
 from assembly.derivatives.numbers import FrameOrigin
 from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError, integer, items
-from assembly.solve.attempts.attempts import new_workspace
+from assembly.solve.workspace import new_workspace
 from assembly.solve.interruption import CTRL_C, STATUSES
 from assembly.solve.loop.settings import ASK_ADDRESS, COUNT, OBJECTIVE, SCATTER, SOLVED, UNSURE, VIOLATION
 from assembly.solve.loop_address import loop_address
