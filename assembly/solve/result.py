@@ -101,7 +101,7 @@ class Result(ReadOnlyArrays):
 
     @classmethod
     def _arrived(cls, scene: Scene, packed: Packed, state: Array, seconds: float, history: Array | bytes) -> Self:
-        """The end of a solve at which the loop arrived at once, right after `packed` was asked, in the shortest time."""
+        """The end of a solve at which the loop arrived at once, of what `packed` is asked for now; soon made."""
         if scene.contacts and not packed.is_asked_whole:
             return cls(scene, packed, state, Status.SOLVED, seconds, history)
         self = _new(cls)

@@ -66,7 +66,8 @@ class Workspace:
 
     def rows_of_history(self) -> bytes:
         """The figures of every iteration that `go_on` made, and of the start."""
-        return self._history[: HISTORY * (self._orders[ITERATIONS] + 1)].tobytes()
+        rows: bytes = self._history[: HISTORY * (self._orders[ITERATIONS] + 1)].tobytes()
+        return rows
 
     def _lend(self, packed: Packed, has_objective: bool) -> None:
         """Lend the arrays of a packed scene, and settings for this thread."""
