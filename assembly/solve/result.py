@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from assembly.constraints.packing.scene import Packed
 from assembly.kinematics.body import Body
 from assembly.kinematics.pose import Pose
 from assembly.proximity.features.solid_contact import TRACK
-from assembly.solve.loop.settings import COUNT, VIOLATION
+from assembly.solve.loop.settings import COUNT, HISTORY, VIOLATION
 from assembly.solve.measure import measure, standing
 from assembly.solve.options import Options
 from assembly.solve.scene import Scene, Status
@@ -32,7 +32,9 @@ __all__ = ["Ended", "Iteration", "Result"]
 Array = NDArray[np.float64]
 # A constraint that is off by less than this part of the worst is not one of those that disagree.
 IDLE = 1e-3
-_new_tuple = tuple.__new__
+_new, _new_tuple = object.__new__, tuple.__new__
+# To read a member of an enumeration takes as long as to set five attributes.
+_SOLVED = Status.SOLVED
 
 
 class Ended(NamedTuple):
@@ -66,8 +68,9 @@ class Result(ReadOnlyArrays):
     _touching = Options.touching
     _order: SecondOrder | None = None
     _fit: Fit | None = None
-    # What the objective asked for; flat contacts alone need it again, for the center of their pressure.
-    _targets: Array | None = None
+    # What the objective asked for, where `_asked` does not tell; flat contacts alone need it again, for the center of
+    # their pressure.
+    _targets: bytes | None = None
 
     def __init__(
         self,
@@ -76,14 +79,15 @@ class Result(ReadOnlyArrays):
         state: Array,
         status: Status,
         seconds: float,
-        history: Array,
+        history: Array | bytes,
         order: SecondOrder | None = None,
         fit: Fit | None = None,
     ) -> None:
         self._scene = scene
         # As `Ended(packed, state)`, which goes through a function of Python's.
         self._ended = _new_tuple(Ended, (packed, state))
-        self._rows = history
+        # As bytes where they were read from the memory of a solve, which takes half the time of an array.
+        self._figures = history
         self.status = status
         self.seconds = seconds
         if order is not None:
@@ -93,7 +97,21 @@ class Result(ReadOnlyArrays):
         # What it was solved with: a solve that goes on from it may ask for the way.
         self._asked = packed.asked
         if scene.contacts:
-            self._targets = packed.rows_pool[scene.target_places(packed)].copy()
+            self._targets = scene.targets_in(packed)
+
+    @classmethod
+    def _arrived(cls, scene: Scene, packed: Packed, state: Array, seconds: float, history: Array | bytes) -> Self:
+        """The end of a solve at which the loop arrived at once, of what `packed` is asked for now; soon made."""
+        if scene.contacts and not packed.is_asked_whole:
+            return cls(scene, packed, state, Status.SOLVED, seconds, history)
+        self = _new(cls)
+        self._scene = scene
+        self._ended = _new_tuple(Ended, (packed, state))
+        self._figures = history
+        self.status = _SOLVED
+        self.seconds = seconds
+        self._asked = packed.asked
+        return self
 
     def _list_contacts(self) -> None:
         """List the contacts of clearances, unless they are: a start that holds is returned before any is looked for."""
@@ -149,6 +167,12 @@ class Result(ReadOnlyArrays):
     def _is_lost(self) -> bool:
         """Whether the loop could not evaluate its rows at the pose, because a contact had no pair there."""
         return bool(self._scene.contacts) and self._result(VIOLATION) == np.inf
+
+    @property
+    def _rows(self) -> Array:
+        """One row per iteration."""
+        figures = self._figures
+        return np.frombuffer(figures).reshape(-1, HISTORY) if isinstance(figures, bytes) else figures
 
     @property
     def history(self) -> Array:
@@ -236,8 +260,10 @@ class Result(ReadOnlyArrays):
 
     def _pool_as_solved(self) -> Array:
         """The pool with the objective as it was in this solve."""
+        if self._targets is None:
+            return self._packed.as_asked(self._asked).pool
         pool = self._packed.pool.copy()
-        pool[self._scene.target_places(self._packed)] = self._targets
+        pool[self._scene.target_places(self._packed)] = np.frombuffer(self._targets)
         return pool
 
     def pose(self, body: Body | str) -> Pose:

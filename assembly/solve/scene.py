@@ -86,6 +86,12 @@ class Scene:
             self._target_places = slice(int(found[0]), int(found[-1]) + 1) if is_one else found
         return self._target_places
 
+    def targets_in(self, packed: Packed) -> bytes:
+        """What the pool has there: a copy, in the shortest time."""
+        places = self.target_places(packed)
+        pool = packed.rows_pool
+        return (pool.data[places] if isinstance(places, slice) else pool[places]).tobytes()
+
     def index(self, body: Body | str) -> int:
         """Place of a body, given itself or its name."""
         for k, other in enumerate(self.bodies):

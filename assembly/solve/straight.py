@@ -10,22 +10,15 @@ from __future__ import annotations
 
 from time import perf_counter
 
-import numpy as np
-from numpy.typing import NDArray
-
 from assembly.constraints.model.constraint import structure_changes
 from assembly.constraints.packing.earlier import with_numbers_of
 from assembly.constraints.packing.scene import Packed
 from assembly.solve.interruption import CTRL_C
-from assembly.solve.loop.augmented_lagrangian import solve_program
-from assembly.solve.loop.settings import COUNT, SOLVED
-from assembly.solve.scene import Scene, Status
-from assembly.solve.scene_settings import scene_settings
+from assembly.solve.loop.settings import SOLVED
+from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution
 
 __all__ = ["straight_from"]
-
-Array = NDArray[np.float64]
 
 
 def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, has_objective: bool) -> Solution | None:
@@ -44,7 +37,7 @@ def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, h
     """
     if packed is None or scene is None:
         return None
-    earlier = begun._ended.packed
+    earlier, left = begun._ended
     if packed is not earlier and (packed.number_places is None or packed.number_places is not earlier.number_places):
         return None
     if not packed.is_loop_alone or begun._fit is not None or packed.stamp != structure_changes():
@@ -57,18 +50,17 @@ def straight_from(begun: Solution, scene: Scene | None, packed: Packed | None, h
         return None
     try:
         begin = perf_counter()
-        state = begun._ended.state.copy() if packed is earlier else with_numbers_of(packed, earlier, begun._ended.state)
+        state = left.copy() if packed is earlier else with_numbers_of(packed, earlier, left)
         packed.refresh()
-        packed.start_angles(state, True)
-        settings = scene_settings({}, CTRL_C, has_objective, True)
-        table, pool, end_effectors = packed.rows_table, packed.rows_pool, packed.end_effectors
-        code = solve_program(table, pool, settings, state, *workspace, end_effectors)
+        if packed.has_coupled_angles:
+            packed.start_angles(state, True)
+        code = workspace.go_on(packed, has_objective, state)
         # The next solve writes to the same memory.
-        history = workspace[0][: int(state[packed.results_at + COUNT]) + 1].copy()
+        history = workspace.rows_of_history()
         seconds = perf_counter() - begin
     finally:
         spare.append(workspace)
     # What a signal's handler raised is raised here.
     if CTRL_C.is_over() or code != SOLVED:
         return None
-    return Solution(scene, packed, state, Status.SOLVED, seconds, history)
+    return Solution._arrived(scene, packed, state, seconds, history)

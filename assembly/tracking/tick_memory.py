@@ -26,12 +26,12 @@ from assembly.proximity.manager.records import (
     PAIR_TURN,
     PAIRS,
 )
-from assembly.solve.attempts.attempts import new_workspace
 from assembly.solve.clearance_proof import can_prove
 from assembly.solve.loop.settings import CARRIES, HISTORY, RADIUS
 from assembly.solve.scene import Scene
 from assembly.solve.solution import Solution
 from assembly.solve.start_proof import is_for_proofs
+from assembly.solve.workspace import new_workspace
 from assembly.tracking.clear_ticks import ClearTicks
 from assembly.tracking.fitting import fits_of
 from assembly.tracking.followed import Followed

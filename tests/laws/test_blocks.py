@@ -27,8 +27,8 @@ from assembly.constraints.program.hessian_blocks import (
     is_blocked,
 )
 from assembly.constraints.program.records import header_at
-from assembly.solve.attempts.attempts import new_workspace
 from assembly.solve.loop.workspace import carve_all, carve_unknowns
+from assembly.solve.workspace import new_workspace
 from tests.laws.loop_point import LoopPoint
 
 

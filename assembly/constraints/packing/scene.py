@@ -30,6 +30,7 @@ from assembly.proximity.manager.parameters import LARGEST_MARGIN
 if TYPE_CHECKING:
     from assembly.constraints.packing.number_places import NumberPlaces
     from assembly.proximity.clearance.proof import ClearanceProof
+    from assembly.solve.workspace import Workspace
 
 __all__ = ["MORE_PLACES", "MOST_CROWDING", "Packed", "structure_of"]
 
@@ -70,8 +71,8 @@ class Packed(WrittenScene):
         The same of a scene that is packed again with more places, and of no other one.
     kept_at, kept_size : int
         Where in a state, and how long, what a solve leaves for the next one is (`program/kept.py`).
-    workspaces : list of three arrays
-        What solves that are over worked in, for the next ones (`solve/attempts/attempts.py`).
+    workspaces : list of Workspace
+        What solves that are over worked in, for the next ones (`solve/workspace.py`).
     proofs : list of ClearanceProof
         Of the pairs that clearances keep apart, of solves that have ended.
     stood : (bytes, float, list) or None
@@ -86,6 +87,13 @@ class Packed(WrittenScene):
         How solutions are derived (`derivatives/plan.py`), of the scene and its twins.
     has_size : bool
         Whether the scene has a size.
+    has_coupled_angles : bool
+        Whether an angle is on a turn that another one tells.
+    is_asked_whole : bool
+        Whether `asked` has all that the objective asks for: no reference of a posture, no coordinate's value.
+    is_loop_alone : bool
+        Whether a solve that goes on from another one is a run of the loop and nothing else, if that arrives. What has
+        no extent may have outgrown its size; corners are tried first; clearances are looked after.
     before : Packed or None
         The same scene as it was packed before it had this size, or these rows of clearances.
     lineage : object
@@ -125,7 +133,8 @@ class Packed(WrittenScene):
         self.contacts_at = 7 * self.count
         self.angles_at = self.contacts_at + TRACK * self.pair_rows
         self.angles = slice(self.angles_at, self.angles_at + TRACK * len(self._angles), TRACK)
-        self._driven_angles = [(self.angles_at + TRACK * k, at) for k, at in self._turned.driven]
+        # Where a state looks for each driven angle, and where the pool has its value.
+        self.driven_angles = [(self.angles_at + TRACK * k, at) for k, at in self._turned.driven]
         self.multipliers_at = self.contacts_at + TRACK * self.tracked
         self.residuals_at = self.multipliers_at + self.rows
         self.results_at = self.residuals_at + self.rows
@@ -135,7 +144,7 @@ class Packed(WrittenScene):
             # The first update sees what crosses at the start as well, if it is no deeper than this.
             self._memory = fresh_memory(len(self.kept_pairs), self.clearance_rows, LARGEST_MARGIN)
         self.asked: Asked = []
-        self.workspaces: list[tuple[Array, Array, Table]] = []
+        self.workspaces: list[Workspace] = []
         self.proofs: list[ClearanceProof] = []
         self.stood: Stood | None = None
         self.owned_pairs: OwnedPairs | None = None
@@ -144,16 +153,15 @@ class Packed(WrittenScene):
         self.kept_at = self.memory_at + self._memory.size
         self.rows_table[layout.KEPT] = self.kept_at
         self.kept_size = int(kept_size(self.rows_table))
+        # What every solve asks is no property: that would take longer than what it asks.
+        self.has_coupled_angles = self._turned.coupled
+        self.is_asked_whole = not self._coordinates and not any(
+            isinstance(term, Posture) for _, term in objectives or [(1.0, Posture())]
+        )
+        may_need_more = self._has_no_extent or self.keeps_apart or self.clearance_rows > 0 or bool(self.corners)
+        self.is_loop_alone = not may_need_more
         # Without a factor, to copy what a solution keeps takes longer than to evaluate it anew.
         self._state_size = self.kept_at + (self.kept_size if kept_unknowns(self.rows_table) > 0 else 0)
-
-    @property
-    def is_loop_alone(self) -> bool:
-        """Whether a solve that goes on from another one is a run of the loop and nothing else, if that arrives.
-
-        What has no extent may have outgrown its size; corners are tried first; clearances are looked after.
-        """
-        return not (self._has_no_extent or self.keeps_apart or self.clearance_rows > 0 or bool(self.corners))
 
     def is_crowded(self, state: Array) -> bool:
         """Whether contacts of clearances were near that found no place."""
@@ -229,8 +237,8 @@ class Packed(WrittenScene):
         if not self._angles:
             return
         pool = self.rows_pool
-        if warm and not self._turned.coupled:
-            for place, at in self._driven_angles:
+        if warm and not self.has_coupled_angles:
+            for place, at in self.driven_angles:
                 state[place] = pool[at]
             return
 

@@ -25,7 +25,6 @@ from assembly.solve.loop.settings import (
     FEASIBILITY,
     FIT,
     GATHER,
-    HISTORY,
     ITERATIONS,
     LAST_FEASIBLE,
     LIFT_TRIMS,
@@ -39,9 +38,9 @@ from assembly.solve.loop.settings import (
     UNSURE,
     VIOLATION,
 )
-from assembly.solve.loop.workspace import workspace_needed
 from assembly.solve.options import Options
 from assembly.solve.second_order.leave import Fit, Outcome, leave_saddles
+from assembly.solve.workspace import Workspace, new_workspace
 
 __all__ = [
     "as_it_stands",
@@ -49,7 +48,6 @@ __all__ = [
     "begin",
     "go_on_once",
     "load",
-    "new_workspace",
     "rows_alone",
     "run",
     "with_listed",
@@ -57,21 +55,10 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-# Rows of history that are kept, beside the first.
-MOST_HISTORY = 1000
 # A violation larger than any scene's.
 ANYTHING = 1e6
 _LOADING = Options(max_iterations=0).settings()
 _loaded: set[int | None] = set()
-
-
-def new_workspace(packed: Packed) -> tuple[Array, Array, Table]:
-    """The workspace of a solve of a packed scene: its history, and two blocks of memory.
-
-    Zeros, because a solve leaves whole records in its state, including fields that their kind does not use.
-    """
-    doubles, integers = workspace_needed(packed.rows_table)
-    return np.zeros((MOST_HISTORY + 1, HISTORY)), np.zeros(int(doubles)), np.zeros(int(integers), dtype=np.int64)
 
 
 def load(packed: Packed, start: Callable[[], Array]) -> None:
@@ -224,13 +211,14 @@ def run(
         interruption.watched = (state, packed.results_at)
     # Threads have workspaces of their own.
     spare = packed.workspaces
-    workspace = spare.pop() if spare else new_workspace(packed)
+    workspace = spare.pop() if spare else Workspace(packed)
     try:
         has_manager = packed.clearance_rows > 0 and table[MANAGER_RECORD] >= 0
         pool = packed.pool if has_manager else packed.rows_pool
-        code = solve_program(table, pool, settings, state, *workspace, packed.end_effectors)
+        history, doubles, integers = workspace.arrays
+        code = solve_program(table, pool, settings, state, history, doubles, integers, packed.end_effectors)
         # A solution keeps the rows that were written: untouched memory is slow to allocate.
-        history = workspace[0][: int(state[packed.results_at + COUNT]) + 1].copy()
+        history = history[: int(state[packed.results_at + COUNT]) + 1].copy()
         if code != SOLVED and has_manager and state[packed.results_at + LAST_FEASIBLE] == 1.0:
             # The last pose that held is returned, and the loop tells the objective of its last iterate.
             state[packed.results_at + OBJECTIVE] = _objective_at(packed, table, settings, state, workspace)
@@ -239,16 +227,15 @@ def run(
     return code, state, history
 
 
-def _objective_at(
-    packed: Packed, table: Table, settings: Array, state: Array, workspace: tuple[Array, Array, Table]
-) -> float:
+def _objective_at(packed: Packed, table: Table, settings: Array, state: Array, workspace: Workspace) -> float:
     """The objective at the poses of a state, with postures measured from where the solve did that."""
     settings = settings.copy()
     settings[ITERATIONS], settings[GATHER], settings[PLACES], settings[ANY_POSE] = 0.0, NEVER, 0.0, 0.0
     table = following_none(table)
     table[MANAGER_RECORD] = -1
-    solve_program(table, packed.rows_pool, settings, state.copy(), *workspace, packed.end_effectors)
-    return float(workspace[0][0, 0])
+    history, doubles, integers = workspace.arrays
+    solve_program(table, packed.rows_pool, settings, state.copy(), history, doubles, integers, packed.end_effectors)
+    return float(history[0, 0])
 
 
 def go_on_once(interruption: Interruption, packed: Packed, settings: Array, state: Array) -> Outcome:

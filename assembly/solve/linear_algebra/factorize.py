@@ -19,78 +19,114 @@ from assembly.constraints.program.hessian_blocks import blocks_at, is_blocked
 
 
 @kernel(inline=True)
-def pivot_row(m, k, end):
-    """Scale row k by the root of its pivot, kept inverted; False where that is not positive."""
-    pivot = m[k, k]
-    if not pivot > 0.0:
-        return False
-    inverse = 1.0 / math.sqrt(pivot)
-    m[k, k] = inverse
-    for j in range(k + 1, end):
-        m[k, j] *= inverse
-    return True
+def are_alike(last, k, n):
+    """Whether rows k to k + 2 have entries up to the same column, as the rows of a body have."""
+    return k + 2 < n and last[k + 2] == last[k]
 
 
 @kernel(inner=True)
 def factorize(m, n, last):
     """Cholesky in the upper triangle of m, m = U^T U, diagonal stored inverted; False where not positive definite.
 
-    Right-looking, two rows at a time: rows are updated along memory, and each is loaded half as often.
+    Right-looking, three rows at a time where these end alike: rows are updated along memory, and each is loaded a third
+    as often.
     """
     k = 0
     while k < n:
         end = last[k] + 1
-        if not pivot_row(m, k, end):
+        pivot = m[k, k]
+        if not pivot > 0.0:
             return False
-        if end < k + 2:
+        first = 1.0 / math.sqrt(pivot)
+        m[k, k] = first
+        if not are_alike(last, k, n):
+            for j in range(k + 1, end):
+                m[k, j] *= first
+            for i in range(k + 1, end):
+                f = m[k, i]
+                for j in range(i, end):
+                    m[i, j] -= f * m[k, j]
             k += 1
             continue
-        f = m[k, k + 1]
-        for j in range(k + 1, end):
-            m[k + 1, j] -= f * m[k, j]
-        end_next = last[k + 1] + 1
-        if not pivot_row(m, k + 1, end_next):
+        # The triangle of three: its entries u, v in the first row, w in the second.
+        u, v = m[k, k + 1] * first, m[k, k + 2] * first
+        pivot = m[k + 1, k + 1] - u * u
+        if not pivot > 0.0:
             return False
-        for i in range(k + 2, end):
+        second = 1.0 / math.sqrt(pivot)
+        w = (m[k + 1, k + 2] - u * v) * second
+        pivot = m[k + 2, k + 2] - v * v - w * w
+        if not pivot > 0.0:
+            return False
+        third = 1.0 / math.sqrt(pivot)
+        m[k + 1, k + 1], m[k + 2, k + 2] = second, third
+        m[k, k + 1], m[k, k + 2], m[k + 1, k + 2] = u, v, w
+        for j in range(k + 3, end):
+            x = m[k, j] * first
+            y = (m[k + 1, j] - u * x) * second
+            m[k, j] = x
+            m[k + 1, j] = y
+            m[k + 2, j] = (m[k + 2, j] - v * x - w * y) * third
+        for i in range(k + 3, end):
             f = m[k, i]
             g = m[k + 1, i]
+            h = m[k + 2, i]
             for j in range(i, end):
-                m[i, j] -= f * m[k, j] + g * m[k + 1, j]
-        if end_next > end:
-            for i in range(k + 2, end_next):
-                g = m[k + 1, i]
-                for j in range(max(i, end), end_next):
-                    m[i, j] -= g * m[k + 1, j]
-        k += 2
+                m[i, j] -= f * m[k, j] + g * m[k + 1, j] + h * m[k + 2, j]
+        k += 3
     return True
 
 
 @kernel(inner=True)
 def forward(m, n, last, b):
-    """Solve U^T x = b in place, for the factor that `factorize` left."""
-    for k in range(n):
-        s = b[k] * m[k, k]
-        b[k] = s
-        for i in range(k + 1, last[k] + 1):
-            b[i] -= m[k, i] * s
+    """Solve U^T x = b in place, for the factor that `factorize` left; three rows at a time where these end alike."""
+    k = 0
+    while k < n:
+        end = last[k] + 1
+        x = b[k] * m[k, k]
+        b[k] = x
+        if not are_alike(last, k, n):
+            for i in range(k + 1, end):
+                b[i] -= m[k, i] * x
+            k += 1
+            continue
+        y = (b[k + 1] - m[k, k + 1] * x) * m[k + 1, k + 1]
+        z = (b[k + 2] - m[k, k + 2] * x - m[k + 1, k + 2] * y) * m[k + 2, k + 2]
+        b[k + 1] = y
+        b[k + 2] = z
+        for i in range(k + 3, end):
+            b[i] -= m[k, i] * x + m[k + 1, i] * y + m[k + 2, i] * z
+        k += 3
 
 
 @kernel(inner=True)
 def substitute(m, n, last, b):
-    """Solve U^T U x = b in place."""
+    """Solve U^T U x = b in place, as `forward` does, and then backward."""
     forward(m, n, last, b)
-    for k in range(n - 1, -1, -1):
-        # Two sums that do not wait for each other's additions.
-        s = b[k]
-        t = 0.0
-        i = k + 1
-        while i < last[k]:
-            s -= m[k, i] * b[i]
-            t -= m[k, i + 1] * b[i + 1]
-            i += 2
-        if i == last[k]:
-            s -= m[k, i] * b[i]
-        b[k] = (s + t) * m[k, k]
+    left = n
+    while left > 0:
+        if left < 3 or not are_alike(last, left - 3, n):
+            k = left - 1
+            x = b[k]
+            for i in range(left, last[k] + 1):
+                x -= m[k, i] * b[i]
+            b[k] = x * m[k, k]
+            left -= 1
+            continue
+        # Three sums that do not wait for each other's additions.
+        k = left - 3
+        x, y, z = b[k], b[k + 1], b[k + 2]
+        for i in range(left, last[k] + 1):
+            s = b[i]
+            x -= m[k, i] * s
+            y -= m[k + 1, i] * s
+            z -= m[k + 2, i] * s
+        z *= m[k + 2, k + 2]
+        y = (y - m[k + 1, k + 2] * z) * m[k + 1, k + 1]
+        b[k] = (x - m[k, k + 1] * y - m[k, k + 2] * z) * m[k, k]
+        b[k + 1] = y
+        b[k + 2] = z
+        left -= 3
 
 
 @kernel(inner=True)

@@ -99,5 +99,5 @@ def writes_of(packed: Packed, parameters: Sequence[Parameter], values: Array, ro
             places.append(write.place)
             columns.append(numbers)
     numbers = np.array(columns).T if columns else np.empty((rows, 0))
-    turns = np.array(packed._driven_angles, dtype=np.int64).reshape(-1, 2)
+    turns = np.array(packed.driven_angles, dtype=np.int64).reshape(-1, 2)
     return Writes(np.array(places, dtype=np.int64), turns, np.ascontiguousarray(numbers, dtype=np.float64))

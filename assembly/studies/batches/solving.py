@@ -19,11 +19,11 @@ from assembly.derivatives.measure import Measure
 from assembly.derivatives.numbers import FrameOrigin
 from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError, integer, items
-from assembly.solve.attempts.attempts import new_workspace
 from assembly.solve.interruption import CTRL_C, STATUSES
 from assembly.solve.loop.settings import ASK_ADDRESS, COUNT, OBJECTIVE, SCATTER, SOLVED, UNSURE, VIOLATION
 from assembly.solve.loop_address import loop_address
 from assembly.solve.solution import Solution
+from assembly.solve.workspace import new_workspace
 from assembly.studies.batches.columns import parameter_columns, set_all, writes_of
 from assembly.studies.batches.measured import can_measure, measured
 from assembly.studies.batches.result import Batch
