@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly._record import rows_of
 from assembly.geometry.faces.face import Face
 from assembly.proximity.manifolds.flat_pair import FULL, flat_rows
-from assembly.proximity.manifolds.manifold import Manifold
-from assembly.proximity.manifolds.records import ROW, ROW_SIZE
+from assembly.proximity.manifolds.manifold import NORMAL, Manifold
+from assembly.proximity.manifolds.records import ROW_SIZE
 from assembly.proximity.manifolds.regions import PlaneRegion, plane_of, plane_region
 
 __all__ = ["flat_manifold", "flat_manifolds"]
@@ -74,10 +74,9 @@ def flat_manifold(a: PlaneRegion, b: PlaneRegion, turn: Array, shift: Array) -> 
         places *= 2
     if count == 0:
         return None
-    found = rows_of(ROW, rows[:count])
-    off = a.deviation + b.deviation / float(np.linalg.norm(found.normal, axis=1).min())
-    kinds = np.column_stack([found.kind, found.first, found.second])
-    return Manifold(found.normal.copy(), found.place.copy(), found.gap.copy(), float(bound) - 2.0 * off, kinds)
+    normals = rows[:count, NORMAL]
+    off = a.deviation + b.deviation / sqrt((normals * normals).sum(axis=1).min())
+    return Manifold.of_rows(rows[:count], float(bound) - 2.0 * off)
 
 
 def flat_manifolds(

@@ -8,10 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly._read_only import ReadOnlyArrays
+from assembly._record import place_of
+from assembly.proximity.manifolds.records import ROW
 
-__all__ = ["Manifold"]
+__all__ = ["NORMAL", "Manifold"]
 
 Array = NDArray[np.float64]
+# Columns of `ROW` records: slices of arrays take a tenth of the time of fields of NumPy's records.
+NORMAL, PLACE = (slice(place_of(ROW, name), place_of(ROW, name) + 3) for name in ("normal", "place"))
+GAP, KINDS = place_of(ROW, "gap"), slice(place_of(ROW, "kind"), place_of(ROW, "second") + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +43,11 @@ class Manifold(ReadOnlyArrays):
     gaps: Array
     bound: float
     kinds: Array
+
+    @classmethod
+    def of_rows(cls, rows: Array, bound: float) -> Manifold:
+        """That of `ROW` records, one a row, which are copied."""
+        return cls(rows[:, NORMAL].copy(), rows[:, PLACE].copy(), rows[:, GAP].copy(), bound, rows[:, KINDS].copy())
 
     def rates(self) -> Array:
         """How gaps change by twists (v, w) of the second body: (m, 6)."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError
 from assembly.geometry.recognition.forms import Cone, Cylinder, Sphere
 from assembly.kinematics.body import BodyFace
-from assembly.kinematics.pose import Pose
+from assembly.kinematics.pose import Pose, rotation_of
 from assembly.proximity.manifolds.elementary_faces import ElementaryFace, elementary_faces
 from assembly.proximity.manifolds.flat_manifolds import flat_manifold
 from assembly.proximity.manifolds.line_manifolds import line_manifold
@@ -20,6 +20,7 @@ from assembly.proximity.manifolds.manifold import Manifold
 from assembly.proximity.manifolds.regions import PlaneRegion, plane_region
 from assembly.proximity.manifolds.round_manifolds import SAME_ANGLE, round_manifold
 from assembly.proximity.manifolds.row_derivatives import (
+    all_straight,
     flat_derivatives,
     line_derivatives,
     round_derivatives,
@@ -55,8 +56,7 @@ class ContactManifold(ReadOnlyArrays):
     bound: float
     _origins: Array = field(repr=False)
     _turns: Array = field(repr=False)
-    # Each with which body stays, 0 or 1, in whose axes it is.
-    _rows: tuple[tuple[int, Row], ...] = field(repr=False)
+    _found: _Found = field(repr=False)
 
     def rates(self) -> tuple[Array, Array]:
         """Row of the gaps by the twists of the bodies of a and of b, (m, 6) each.
@@ -73,8 +73,10 @@ class ContactManifold(ReadOnlyArrays):
         there is none at a kink: of the lowest point of an arc where planes are flush (it is no row there), and of the
         nearest direction of a ring where axes meet, or of a ball where centers do, which is taken to stay there.
         """
-        second = np.empty((len(self._rows), 2, 6, 2, 6))
-        for form, (k, row), normal, place in zip(second, self._rows, self.normals, self.places, strict=True):
+        rows, first = self._found.rows, self._found.first
+        second = np.empty((len(rows), 2, 6, 2, 6))
+        for form, row, normal, place in zip(second, rows, self.normals, self.places, strict=True):
+            k = 1 - first if row.of_second else first
             order = [k, 1 - k]
             normal = (1 - 2 * k) * normal
             rates = np.concatenate([normal, np.cross(place - self._origins[k], normal)])
@@ -115,19 +117,16 @@ def contact_manifold(a: BodyFace, b: BodyFace, *, poses: tuple[Pose, Pose] | Non
         raise InputError(f"a and b are {a!r} and {b!r}, of one body; expected faces of two bodies")
     one, other = (a.body.pose, b.body.pose) if poses is None else _checked(poses)
     sides = _side(a), _side(b)
-    is_exchanged = _is_exchanged((a, b), sides)
-    order = (1, 0) if is_exchanged else (0, 1)
-    poses = one, other
-    found = _found(sides[order[0]], sides[order[1]], poses[order[0]], poses[order[1]])
+    k = int(_is_exchanged((a, b), sides))
+    origins = np.array([one.position, other.position])
+    turns = np.array([rotation_of(one.quaternion), rotation_of(other.quaternion)])
+    first = turns[k].T
+    found = _find(k, (sides[k], sides[1 - k]), first @ turns[1 - k], first @ (origins[1 - k] - origins[k]))
     if found is None:
         return None
-    rows, bound = found
-    origins, turns = (np.array(parts) for parts in zip(*((p.position, p.matrix[:3, :3]) for p in poses), strict=True))
-    stays = [order[1] if row.of_second else order[0] for row in rows]
-    normals = np.array([(1 - 2 * k) * turns[k] @ row.normal for k, row in zip(stays, rows, strict=True)])
-    places = np.array([turns[k] @ row.place + origins[k] for k, row in zip(stays, rows, strict=True)])
-    gaps = np.array([row.gap for row in rows])
-    return ContactManifold(places, normals, gaps, bound, origins, turns, tuple(zip(stays, rows, strict=True)))
+    gaps, normals, places = found.told
+    normals = normals @ first if k == 0 else -normals @ first
+    return ContactManifold(places @ first + origins[k], normals, gaps, found.bound, origins, turns, found)
 
 
 def _checked(poses: tuple[Pose, Pose]) -> tuple[Pose, Pose]:
@@ -179,22 +178,90 @@ def _is_exchanged(faces: tuple[BodyFace, BodyFace], sides: tuple[Side | None, Si
     )
 
 
-def _found(a: Side | None, b: Side | None, one: Pose, other: Pose) -> tuple[Sequence[Row], float] | None:
-    """Rows, each in the axes of the body that stays, and the bound of all gaps; a plane or a hollow wall is first."""
-    first = one.matrix[:3, :3]
-    turn, shift = first.T @ other.matrix[:3, :3], (other.position - one.position) @ first
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What was found of two faces: a plane or a hollow wall, and what is at x -> turn x + shift, seen from it.
+
+    Attributes
+    ----------
+    first : int
+        Which of the faces of a query the first one is, 0 or 1.
+    sides : (Side, Side)
+    turn, shift : (3, 3), (3,)
+    manifold : Manifold or None
+        None of a ball in its socket.
+    known : tuple of Row or None
+        Rows, where gaps, normals and places are theirs; else these are those of the manifold.
+    bound : float
+    """
+
+    first: int
+    sides: tuple[Side, Side]
+    turn: Array
+    shift: Array
+    manifold: Manifold | None
+    known: tuple[Row, ...] | None
+    bound: float
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """Rows with second derivatives, each in the axes of the body that stays; made when they are asked for."""
+        if self.known is not None:
+            return self.known
+        (a, b), manifold = self.sides, self.manifold
+        assert manifold is not None
+        if isinstance(a, PlaneRegion) and isinstance(b, PlaneRegion):
+            return tuple(flat_derivatives(a, b, self.turn, self.shift, manifold))
+        hollow, inner = _walls(a, b)
+        return tuple(round_derivatives(hollow, inner, self.turn, self.shift, manifold))
+
+    @property
+    def told(self) -> tuple[Array, Array, Array]:
+        """Gaps (m,), and normals and places (m, 3) in the axes of the first body."""
+        if self.known is None:
+            assert self.manifold is not None
+            return self.manifold.gaps, self.manifold.normals, self.manifold.places
+        rows = self.known
+        gaps, normals, places = (np.array([getattr(row, name) for row in rows]) for name in ("gap", "normal", "place"))
+        moves = [row.of_second for row in rows]
+        if any(moves):
+            normals[moves] = -normals[moves] @ self.turn.T
+            places[moves] = places[moves] @ self.turn.T + self.shift
+        return gaps, normals, places
+
+
+def _walls(a: Side | None, b: Side | None) -> tuple[Cylinder | Cone, Cylinder | Cone]:
+    """The walls of a bore and a shaft, or of cones."""
+    pair = _fitting(a, b)
+    assert pair is not None
+    assert not isinstance(pair[0], Sphere) and not isinstance(pair[1], Sphere)
+    return pair[0], pair[1]
+
+
+def _find(first: int, sides: tuple[Side | None, Side | None], turn: Array, shift: Array) -> _Found | None:
+    """What is found of two faces, a plane or a hollow wall and another one; see `_Found`."""
+    a, b = sides
+    assert a is not None and b is not None
     manifold: Manifold | None
     if isinstance(a, PlaneRegion) and isinstance(b, PlaneRegion):
         manifold = flat_manifold(a, b, turn, shift)
-        return None if manifold is None else (flat_derivatives(a, b, turn, shift, manifold), manifold.bound)
+        if manifold is None:
+            return None
+        # Rows of arcs go from where the manifold has them to where they are stationary.
+        is_straight = all_straight(a, b, manifold)
+        known = None if is_straight else tuple(flat_derivatives(a, b, turn, shift, manifold))
+        return _Found(first, (a, b), turn, shift, manifold, known, manifold.bound)
     if isinstance(a, PlaneRegion) and (full := _full(b)) is not None:
         manifold = line_manifold(a, full, turn, shift)
-        return None if manifold is None else line_derivatives(a, full, turn, shift, manifold)
+        if manifold is None:
+            return None
+        rows, bound = line_derivatives(a, full, turn, shift, manifold)
+        return _Found(first, (a, b), turn, shift, manifold, tuple(rows), bound)
     pair = _fitting(a, b)
     assert pair is not None
     hollow, inner = pair
-    if isinstance(hollow, Sphere) or isinstance(inner, Sphere):
-        assert isinstance(hollow, Sphere) and isinstance(inner, Sphere)
-        return socket_row(hollow, inner, turn, shift)
-    manifold = round_manifold(hollow, inner, turn, shift)
-    return None if manifold is None else (round_derivatives(hollow, inner, turn, shift, manifold), manifold.bound)
+    if isinstance(hollow, Sphere) and isinstance(inner, Sphere):
+        socket = socket_row(hollow, inner, turn, shift)
+        return None if socket is None else _Found(first, (a, b), turn, shift, None, tuple(socket[0]), socket[1])
+    manifold = round_manifold(*_walls(a, b), turn, shift)
+    return None if manifold is None else _Found(first, (a, b), turn, shift, manifold, None, manifold.bound)

@@ -12,7 +12,7 @@ from assembly._record import rows_of
 from assembly.geometry.recognition.forms import Cone, Cylinder
 from assembly.proximity.manifolds.elementary_faces import ElementaryFace
 from assembly.proximity.manifolds.manifold import Manifold
-from assembly.proximity.manifolds.records import ROUND, ROUND_SIZE, ROW, ROW_SIZE
+from assembly.proximity.manifolds.records import ROUND, ROUND_SIZE, ROW_SIZE
 from assembly.proximity.manifolds.round_pair import ROWS_OF_RING, round_rows
 
 __all__ = ["round_manifold", "round_manifolds"]
@@ -48,10 +48,7 @@ def round_manifold(hollow: Cylinder | Cone, full: Cylinder | Cone, turn: Array, 
     count, bound = round_rows(_record(hollow), _record(full), rotation, place, rows)
     if count == 0:
         return None
-    found = rows_of(ROW, rows[:count])
-    off = hollow.deviation + full.deviation
-    kinds = np.column_stack([found.kind, found.first, found.second])
-    return Manifold(found.normal.copy(), found.place.copy(), found.gap.copy(), float(bound) - off, kinds)
+    return Manifold.of_rows(rows[:count], float(bound) - hollow.deviation - full.deviation)
 
 
 def round_manifolds(

@@ -34,7 +34,7 @@ from assembly.proximity.manifolds.records import (
 from assembly.proximity.manifolds.regions import PlaneRegion
 from assembly.proximity.manifolds.second_rates import ALIKE, Level, Ray, Row, Socket, skew
 
-__all__ = ["flat_derivatives", "line_derivatives", "round_derivatives", "socket_row"]
+__all__ = ["all_straight", "flat_derivatives", "line_derivatives", "round_derivatives", "socket_row"]
 
 Array = NDArray[np.float64]
 NONE = np.empty(0)
@@ -100,10 +100,6 @@ class _Posed:
         off = at - s.center
         return Arc(self.lifted(s.center), s.radius * self.right, s.radius * self.up), np.array([np.arctan2(*off[::-1])])
 
-    def is_straight(self, number: float) -> bool:
-        """Whether a border is, or the one that begins at a corner."""
-        return self._segments[int(number)].radius == 0.0
-
     def corner(self, number: float) -> Place:
         """The beginning of a border, or the middle of an arc."""
         s = self._segments[int(number)]
@@ -139,12 +135,22 @@ def flat_derivatives(a: PlaneRegion, b: PlaneRegion, turn: Array, shift: Array, 
             # Where borders touch they do not cross for long: what is on the first stays there.
             stays = Affine(place - at[0] * first.normal, np.empty((3, 0))), NONE
             moves = second.plane(place)
-        # At straight borders rows are where they were found.
-        is_straight = kind != CROSSING or (first.is_straight(i) and second.is_straight(j))
-        is_straight &= kind != CORNER_A or first.is_straight(i)
-        is_straight &= (kind != CORNER_B or second.is_straight(j)) and kind not in (LOWEST_A, LOWEST_B)
+        is_straight = _is_straight((a, b), kind, i, j)
         found.append((Ray.there if is_straight else Ray.near)(stays, moves, first.normal, at))
     return found
+
+
+def _is_straight(regions: tuple[PlaneRegion, PlaneRegion], kind: float, i: float, j: float) -> bool:
+    """Whether a row of two plane faces is of straight borders: then it is where the manifold has it."""
+    if kind in (LOWEST_A, LOWEST_B):
+        return False
+    is_first = kind == CORNER_B or _segments_of(regions[0])[int(i)].radius == 0.0
+    return is_first and (kind == CORNER_A or _segments_of(regions[1])[int(j)].radius == 0.0)
+
+
+def all_straight(a: PlaneRegion, b: PlaneRegion, manifold: Manifold) -> bool:
+    """Whether all rows of two plane faces are of straight borders."""
+    return all(_is_straight((a, b), kind, i, j) for kind, i, j in manifold.kinds.tolist())
 
 
 def _are_tangent(one: tuple[Place, Array], other: tuple[Place, Array], n: Array) -> bool:
