@@ -26,6 +26,7 @@ from assembly.errors import InputError
 from assembly.kinematics.pose import retract, rotation_matrix
 from assembly.solve.dense.jacobian import rows_of
 from assembly.solve.diagnosis.nearby_poses import moves
+from assembly.studies.branches.slots import copy_slots
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -235,7 +236,13 @@ class Curve:
             packed.refresh()
         except InputError:
             raise LostError from None
-        state = place.state if packed is place.packed else taken_over(place.packed, packed, place.state)
+        if packed is place.packed:
+            return replace(place, packed=packed, state=place.state)
+        state = taken_over(place.packed, packed, place.state)
+        if packed.keeps_apart:
+            if packed.clearance_rows != place.packed.clearance_rows:
+                raise LostError
+            copy_slots(place.packed, place.state, packed, state)
         return replace(place, packed=packed, state=state)
 
     def _tracked(self, place: Place) -> Place:

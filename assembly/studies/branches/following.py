@@ -18,13 +18,18 @@ from numpy.typing import NDArray
 
 from assembly.derivatives.implicit import check_is_of, several, the_scene
 from assembly.derivatives.measure import Measure
+from assembly.derivatives.numbers import ControlPoint, ControlWeight, LeastGap, ShapeNumber
 from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError, bounded
+from assembly.proximity.clearance.proof import LEAST_SIZE
+from assembly.solve.clearance_proof import can_prove
 from assembly.solve.solution import Solution
 from assembly.studies.branches.curve import Curve, LostError, Place, Point
 from assembly.studies.branches.events import Found, NotFoundError, Step, closing
 from assembly.studies.branches.options import FollowOptions
 from assembly.studies.branches.result import Branch, branch_of
+from assembly.studies.branches.slots import rows_of_slots
+from assembly.studies.branches.surroundings import AT_BOUND, CrowdedError, Surroundings
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -32,13 +37,18 @@ if TYPE_CHECKING:
 __all__ = ["follow"]
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 # Singular values of the equations, over the largest, that are none where a branch begins.
 FLAT = 1e-10
 EXPECTED = "expected rows that determine the poses, or an objective that has one best pose"
-# Forces that push, over the objective's unit, and one-sided rows that are at their bound.
-PUSHING, AT_BOUND = 1e-9, 1e-9
+# Forces that push, over the objective's unit; rates of gaps along a branch that are none.
+PUSHING, STILL = 1e-9, 1e-9
 # By how much a step may be longer than the last one; and how far the corrector may lead, in parts of the step.
 LONGER, ASTRAY = 2.0, 0.25
+# A step is cut in halves at most so many times to prove its way.
+DEEPEST = 12
+# Numbers with which faces, or the gaps that are proven, change.
+OF_FACES = (ControlPoint, ControlWeight, LeastGap, ShapeNumber)
 
 
 @dataclass(eq=False)
@@ -48,10 +58,12 @@ class Way:
     places: list[Place] = field(default_factory=list)
     lengths: list[float] = field(default_factory=list)
     events: list[tuple[int, Found]] = field(default_factory=list)
+    proved: list[bool] = field(default_factory=list)
     closure: float | None = None
 
-    def add(self, place: Place, length: float) -> None:
-        """Add a place."""
+    def add(self, place: Place, length: float, around: Surroundings | None) -> None:
+        """Add a place, and whether bodies are proven to be clear there."""
+        self.proved.append(around is None or around.proved)
         self.places.append(place)
         self.lengths.append(length)
 
@@ -74,7 +86,7 @@ def follow(
     Parameters
     ----------
     scene : Assembly
-        Rows must determine the poses, or an objective must; no clearances.
+        Rows must determine the poses, or an objective must.
     parameter : Parameter
         One that is set in place, or makes faces.
     low, high : float
@@ -89,8 +101,8 @@ def follow(
     Raises
     ------
     InputError, TypeError
-        A range without the parameter's value, a start that failed, a scene with free motions and no objective,
-        clearances.
+        A range without the parameter's value, a start that failed or at which bodies are not known to be clear, a scene
+        with free motions and no objective; `swept` without a clearance, or of a number that makes faces.
     """
     the_scene(scene)
     if not isinstance(parameter, Parameter):
@@ -105,8 +117,7 @@ def follow(
             "where the branch is followed, in between"
         )
     measures = () if isinstance(of, (tuple, list)) and not of else several("of", of, Measure)
-    if scene.packed().keeps_apart:
-        raise InputError("scene has a clearance; expected contacts of pairs, whose rows are the same along a branch")
+    _check_clearances(scene, parameter, settings)
     solution = scene.solve() if start is None else start
     if not isinstance(solution, Solution):
         raise TypeError(f"start is {start!r}; expected a Solution")
@@ -116,12 +127,33 @@ def follow(
             f"{solution.message}"
         )
     try:
-        follower = _Follower(scene, parameter, (low, high), settings, solution)
-        ways = follower.ways()
-        return branch_of(follower.first, ways, measures)
+        while True:
+            try:
+                follower = _Follower(scene, parameter, (low, high), settings, solution)
+                ways = follower.ways()
+                return branch_of(follower.first, ways, measures, follower.depth)
+            except CrowdedError:
+                # With more slots it begins anew: rows are others.
+                parameter._number.put(value)
+                scene._pack_with_more_places()
     finally:
         parameter._number.put(value)
         scene.packed().refresh()
+
+
+def _check_clearances(scene: Assembly, parameter: Parameter, settings: FollowOptions) -> None:
+    """Raise where what is asked of clearances cannot be told."""
+    packed = scene.packed()
+    if settings.swept and not packed.keeps_apart:
+        raise InputError("swept is True where no clearance keeps bodies apart; expected one, asm.Clearance()")
+    if packed.keeps_apart and not can_prove(packed):
+        low, high = LEAST_SIZE, 1.0 / LEAST_SIZE
+        raise InputError(f"scene has clearances and a size of {packed.scale:g}; expected {low:g} to {high:g}")
+    if settings.swept and isinstance(parameter._number, OF_FACES):
+        raise InputError(
+            f"swept is True for {parameter.name}, with which faces or least gaps change; expected a number with which "
+            "bodies move"
+        )
 
 
 class _Follower:
@@ -142,10 +174,19 @@ class _Follower:
         state = scene._state_of("start", packed, solution).copy()
         place = Place(packed, state, parameter.value, np.zeros(packed.rows))
         curve = Curve(scene, parameter, 1.0 if self.is_angle else length, settings.tolerance)
+        self.around: Surroundings | None = None
+        if packed.keeps_apart:
+            self.around = Surroundings(scene, solution._touching, settings.swept)
+            place = _beside(self.around, curve, place)
         try:
             self.first, self.start = _begun(curve, place)
         except LostError:
             raise InputError("start is at a fold of a contact; expected a pose near it") from None
+
+    @property
+    def depth(self) -> float:
+        """The largest overlap that bodies may have had on the way; NaN where that was not asked for."""
+        return self.around.depth if self.around is not None and self.around.swept else float("nan")
 
     def ways(self) -> list[Way]:
         """What is found as the parameter grows at first, and, if that is no loop, as it shrinks."""
@@ -159,29 +200,32 @@ class _Follower:
         """What is found in one direction from the start."""
         curve, settings = self.first, self.settings
         here = start = curve.point(self.start.place, sign * curve.bordering(self.start.tangent), self.start.basis)
-        way, length, along = Way(), settings.first_step, 0.0
-        way.add(here.place, 0.0)
+        way, length, along, around = Way(), settings.first_step, 0.0, self.around
+        if around is not None:
+            around.begin(here.place)
+        way.add(here.place, 0.0, around)
         for _ in range(settings.max_steps):
             found = self._stepped(curve, here, length, start if len(way.places) > 2 and curve is self.first else None)
             if found is None:
-                way.events.append((len(way.places) - 1, Found("lost", -1, 0.0, here.place, here, True)))
+                meets = None if around is None else around.in_the_way
+                way.events.append((len(way.places) - 1, Found("lost", -1, 0.0, here.place, here, True, meets)))
                 return way
             step, events, off = found
             for event in events:
                 if event.along > 0.0:
-                    way.add(event.place, along + event.along)
+                    way.add(event.place, along + event.along, around)
                 way.events.append((len(way.places) - 1, event))
             last = events[-1] if events and events[-1].ends else None
             if last is None:
                 along += step.length
-                way.add(step.there.place, along)
+                way.add(step.there.place, along, around)
                 turn = _turn(curve, here, step.there)
                 length = min(settings.largest_step, step.length * min(LONGER, settings.turn / max(turn, 1e-9)))
                 here = step.there
                 continue
             way.closure = off
             along += last.along
-            after = None if last.kind in ("end of range", "closed loop") else _switched(curve, last)
+            after = None if last.kind in ("end of range", "closed loop") else self._after(curve, last)
             # A row that comes and goes at one place ends the branch: there is no way on that pushes or opens.
             if after is None or (curve is not self.first and last.along == 0.0):
                 return way
@@ -197,20 +241,69 @@ class _Follower:
         while length >= self.settings.least_step:
             there = curve.corrected(here, length * here.tangent)
             if there is not None and self._is_near(curve, here, there, length):
-                step = Step(curve, here, there, length, self.ends)
+                step = Step(curve, here, there, length, self.ends, self.around)
                 try:
                     closed = None if start is None else closing(step, start, self.is_angle)
                     events = step.events()
                 except NotFoundError:
                     length *= 0.5
                     continue
+                off = None
                 if closed is not None:
                     events = [event for event in events if event.along < closed[0].along]
                     if not (events and events[-1].ends):
-                        return step, [*events, closed[0]], closed[1]
-                return step, events, None
+                        events, off = [*events, closed[0]], closed[1]
+                if self._is_clear(step, events):
+                    return step, events, off
             length *= 0.5
         return None
+
+    def _is_clear(self, step: Step, events: list[Found]) -> bool:
+        """Whether bodies are proven clear all along a step, at its events and at its end; then the next goes on there.
+
+        With `swept` it is cut in halves until the branch is as good as straight between their ends.
+        """
+        around, curve = self.around, step.curve
+        if around is None:
+            return True
+        stops = [(event.along, event.place) for event in events if event.along > 0.0]
+        if not (events and events[-1].ends):
+            stops.append((step.length, step.there.place))
+        places, begin = list[Place](), (0.0, step.here.place)
+        try:
+            for stop in stops:
+                places += self._halved(step, begin, stop, DEEPEST) if around.swept else [stop[1]]
+                begin = stop
+            return all(around.keeps(curve.held, place) for place in places) and around.goes_to(places)
+        except (NotFoundError, LostError):
+            return False
+
+    def _halved(self, step: Step, begin: tuple[float, Place], end: tuple[float, Place], times: int) -> list[Place]:
+        """Places along a step, the last one at its end, between which it is as good as straight."""
+        around = self.around
+        assert around is not None
+        middle = 0.5 * (begin[0] + end[0])
+        place = step.at(middle).place
+        if around.is_straight(begin[1], place, end[1]):
+            return [end[1]]
+        if times == 0:
+            raise NotFoundError
+        halves = (begin, (middle, place)), ((middle, place), end)
+        return [found for one, other in halves for found in self._halved(step, one, other, times - 1)]
+
+    def _after(self, curve: Curve, event: Found) -> tuple[Curve, Point] | None:
+        """The equations after an event at which rows come or go, and the point; None where the branch ends there."""
+        around, place = self.around, event.place
+        if around is None:
+            return _switched(curve, event)
+        own = np.zeros(place.packed.rows, dtype=np.bool_)
+        own[rows_of_slots(place.packed)] = True
+        if not own[event.row]:
+            return _switched(curve, event)
+        if curve.held[event.row]:
+            return _without_contacts(around, curve, place, curve.held & own & (place.forces > -PUSHING))
+        closed = ~curve.held & own & (around.gaps(place) <= AT_BOUND)
+        return _with_contacts(around, curve, place, closed)
 
     def _is_near(self, curve: Curve, here: Point, there: Point, length: float) -> bool:
         """Whether a step found a point of its own branch: it turned little, and went about where it was to go."""
@@ -226,6 +319,76 @@ class _Follower:
 def _turn(curve: Curve, here: Point, there: Point) -> float:
     """The angle between the directions of two points."""
     return acos(min(1.0, max(-1.0, float(curve.bordering(here.tangent) @ there.tangent))))
+
+
+def _beside(around: Surroundings, curve: Curve, place: Place) -> Place:
+    """A start with those contacts of clearances as rows that touch, where an objective may push bodies together.
+
+    Where rows alone determine poses, none is a row: bodies that come to touch block the branch.
+    """
+    if not around.begin(place):
+        meets = " and ".join(around.in_the_way.bodies)
+        raise InputError(f"start is a solution at which {meets} are not clear; expected a clear one")
+    rows = np.zeros(place.packed.rows, dtype=np.bool_)
+    if not place.packed.is_implicit:
+        rows = np.abs(around.gaps(place)) <= AT_BOUND
+    return around.holding(place, rows)
+
+
+def _with_contacts(around: Surroundings, curve: Curve, place: Place, closed: Flags) -> tuple[Curve, Point] | None:
+    """The equations with contacts that have closed (m,), of which those hold that push; None where they block all.
+
+    Several may close at a place, those of an edge on a face say: all of them are rows at first, and those go that would
+    pull along the branch then.
+    """
+    if place.packed.is_implicit:
+        return None
+    n = curve.columns.size
+    while closed.any():
+        held = curve.held | closed
+        other = curve.with_rows(held, True)
+        try:
+            here = around.holding(place, held)
+            balanced = here if curve.balances else other.balanced(here)
+            point = other.point(replace(balanced, forces=np.where(held, balanced.forces, 0.0)))
+        except LostError:
+            return None
+        if len(point.equations) != len(point.tangent) - 1 or point.basis.shape[1] > n:
+            return None
+        changes = np.zeros(len(held))
+        changes[held] = point.basis @ point.tangent[n:-1]
+        sign = -1.0 if changes[closed].sum() > 0.0 else 1.0
+        pulling = closed & (sign * changes > STILL)
+        if not pulling.any():
+            return other, other.point(point.place, sign * other.bordering(point.tangent), point.basis)
+        closed = closed & ~pulling
+    return None
+
+
+def _without_contacts(around: Surroundings, curve: Curve, place: Place, opened: Flags) -> tuple[Curve, Point] | None:
+    """The equations without contacts (m,) that push no more; None where none of them would open.
+
+    Several may open at a place, those of a face on another one say: none is a row at first, and those are again that
+    would close along the branch then.
+    """
+    n = curve.columns.size
+    while opened.any():
+        held = curve.held & ~opened
+        other = curve.with_rows(held, True)
+        try:
+            point = other.point(replace(place, forces=np.where(held, place.forces, 0.0)))
+        except LostError:
+            return None
+        if len(point.equations) != len(point.tangent) - 1 or point.basis.shape[1] > n:
+            return None
+        rates = np.array([other.rate(point, row) for row in np.flatnonzero(opened).tolist()])
+        sign = -1.0 if rates.sum() < 0.0 else 1.0
+        closing = sign * rates < -STILL
+        if not closing.any():
+            alone = around.holding(point.place, held)
+            return other, other.point(alone, sign * other.bordering(point.tangent), point.basis)
+        opened[np.flatnonzero(opened)[closing]] = False
+    return None
 
 
 def _begun(curve: Curve, place: Place) -> tuple[Curve, Point]:
