@@ -276,7 +276,8 @@ class Curve:
         problem = Problem(
             self.bodies, scene.constraints, goals, packed, state, turns, place.forces, frames, probed, here
         )
-        return place, problem, columns_of(problem, [self.parameter])
+        # Between contacts a number of a body may change nothing.
+        return place, problem, columns_of(problem, [self.parameter], may_be_idle=packed.keeps_apart)
 
     def _stretch(self, packed: Packed) -> Array:
         """What columns of twists are multiplied with: lengths are over the size that the scene had at first."""

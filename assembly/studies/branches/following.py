@@ -47,6 +47,8 @@ PUSHING, STILL = 1e-9, 1e-9
 LONGER, ASTRAY = 2.0, 0.25
 # A step is cut in halves at most so many times to prove its way.
 DEEPEST = 12
+# Where bodies come to touch so that no proof tells it, all along a circle say, rows alone tell of a last step as short.
+LAST_STEP = 1e-3
 # Numbers with which faces, or the gaps that are proven, change.
 OF_FACES = (ControlPoint, ControlWeight, LeastGap, ShapeNumber)
 
@@ -175,6 +177,8 @@ class _Follower:
         place = Place(packed, state, parameter.value, np.zeros(packed.rows))
         curve = Curve(scene, parameter, 1.0 if self.is_angle else length, settings.tolerance)
         self.around: Surroundings | None = None
+        # Bodies that were found to meet where no proof tells that they only touch.
+        self._untold: set[tuple[str, ...]] = set()
         if packed.keeps_apart:
             self.around = Surroundings(scene, solution._touching, settings.swept)
             place = _beside(self.around, curve, place)
@@ -226,6 +230,10 @@ class _Follower:
             way.closure = off
             along += last.along
             after = None if last.kind in ("end of range", "closed loop") else self._after(curve, last)
+            if after is not None and around is not None and around.untold:
+                # Nor is anything known of what is beyond.
+                way.events.append((len(way.places) - 1, Found("lost", -1, 0.0, last.place, here, True, last.meets)))
+                return way
             # A row that comes and goes at one place ends the branch: there is no way on that pushes or opens.
             if after is None or (curve is not self.first and last.along == 0.0):
                 return way
@@ -269,14 +277,21 @@ class _Follower:
         stops = [(event.along, event.place) for event in events if event.along > 0.0]
         if not (events and events[-1].ends):
             stops.append((step.length, step.there.place))
+        meets = events[-1].meets if events and events[-1].ends else None
+        if meets is not None and meets.bodies in self._untold:
+            return events[-1].along <= LAST_STEP and around.goes_untold(stops[-1][1])
         places, begin = list[Place](), (0.0, step.here.place)
         try:
             for stop in stops:
                 places += self._halved(step, begin, stop, DEEPEST) if around.swept else [stop[1]]
                 begin = stop
-            return all(around.keeps(curve.held, place) for place in places) and around.goes_to(places)
+            if all(around.keeps(curve.held, place) for place in places) and around.goes_to(places):
+                return True
         except (NotFoundError, LostError):
             return False
+        if meets is not None and around.is_undecided and around.in_the_way.bodies == meets.bodies:
+            self._untold.add(meets.bodies)
+        return False
 
     def _halved(self, step: Step, begin: tuple[float, Place], end: tuple[float, Place], times: int) -> list[Place]:
         """Places along a step, the last one at its end, between which it is as good as straight."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.constraints.packing.scene import MOST_CROWDING, Packed
+from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.solve.attempts.attempts import with_listed
 from assembly.solve.clearance_proof import new_proof, owned_pairs
@@ -75,28 +76,37 @@ class Surroundings:
         other.
     depth : float
         The largest overlap that bodies may have had on any way, in the scene's unit.
+    untold : bool
+        Whether the last place is one at which rows alone tell that bodies touch, as they may all along a circle.
     """
 
     def __init__(self, scene: Assembly, touching: float, swept: bool) -> None:
         self._scene, self._touching, self.swept = scene, touching, swept
         self._settings = CTRL_C.settings(CTRL_C.fill(Options(touching=touching).settings(warm=True)))
         self._known: object = None
-        self.proved, self.depth = True, 0.0
+        self._doubtful: dict[int, Answer] = {}
+        self.proved, self.depth, self.untold = True, 0.0, False
 
     def begin(self, place: Place) -> bool:
         """Go on from a place with whatever its slots have; whether all is known to be clear there."""
         self._at = self._listed(place, place.state)
         is_clear = self._looks_at(self._at)
-        self.proved = self._ticks.proved
+        self._doubtful = self._ticks.doubtful
+        self.proved, self.untold = self._ticks.proved, False
         return is_clear
 
     @property
     def in_the_way(self) -> Meeting:
         """The first pair of bodies that was not known to be clear where a proof failed last."""
-        for k, answer in self._ticks.doubtful.items():
+        for k, answer in self._doubtful.items():
             names = sorted(self._scene.bodies[number].name for number in self._ticks.last.proof.pairs[k])
             return Meeting(tuple(names), answer.place)
         return NOBODY
+
+    @property
+    def is_undecided(self) -> bool:
+        """Whether the last proof that failed tells nothing of one pair, and all others are clear."""
+        return [answer.verdict for answer in self._doubtful.values()] == [Verdict.UNDECIDED]
 
     def gaps(self, place: Place) -> Array:
         """By how much listed contacts are open at a place, over the size; of all rows (m,), infinite where none is.
@@ -136,8 +146,10 @@ class Surroundings:
         for place in places:
             there = self._listed(place, self._at_poses(place))
             gaps = gaps_of_slots(there.packed, there.state)
-            # A contact that was not listed where the step began cannot have closed unseen.
-            if gaps is None or (gaps < -AT_BOUND).any() or not self._holds(there):
+            # A contact that was not listed where the step began may not have closed unseen.
+            is_open = gaps is not None and not (gaps < -AT_BOUND).any()
+            if not (is_open and self._holds(there)):
+                self._doubtful = self._ticks.doubtful if is_open else {}
                 if self._at is not at:
                     self._at = at
                     self._looks_at(at)
@@ -145,6 +157,15 @@ class Surroundings:
             self._at = there
             proved, depth = proved and self._ticks.proved, max(depth, self._ticks.way_depth)
         self.proved, self.depth = proved, depth
+        return True
+
+    def goes_untold(self, place: Place) -> bool:
+        """Go to a place at which rows alone tell that bodies touch; whether they do."""
+        there = self._listed(place, self._at_poses(place))
+        gaps = gaps_of_slots(there.packed, there.state)
+        if gaps is None or (gaps < -AT_BOUND).any():
+            return False
+        self._at, self.proved, self.untold = there, False, True
         return True
 
     def is_straight(self, before: Place, middle: Place, after: Place) -> bool:
