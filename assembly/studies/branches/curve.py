@@ -196,6 +196,10 @@ class Curve:
                 return None
             if size <= EXACT or (size >= 0.5 * before and before <= ROUNDING):
                 before = min(before, size)
+                # Where poses go on along a line they are exact at once, and multipliers are not yet.
+                pushes = change - self.bordering(change)
+                if np.abs(pushes).max(initial=0.0) > ROUNDING * (1.0 + np.abs(place.forces).max()):
+                    place = self.moved(place, pushes, origin.basis)
                 break
             place, before = self.moved(place, change, origin.basis), size
         if before > ROUNDING and k:

@@ -49,6 +49,9 @@ LONGER, ASTRAY = 2.0, 0.25
 DEEPEST = 12
 # Where bodies come to touch so that no proof tells it, all along a circle say, rows alone tell of a last step as short.
 LAST_STEP = 1e-3
+# Where a contact that holds ends is found to this, in parts of the size; others that take over are looked for so far
+# beyond.
+ENDED, BEYOND = 1e-12, 1e-6
 # Numbers with which faces, or the gaps that are proven, change.
 OF_FACES = (ControlPoint, ControlWeight, LeastGap, ShapeNumber)
 
@@ -210,6 +213,15 @@ class _Follower:
         way.add(here.place, 0.0, around)
         for _ in range(settings.max_steps):
             found = self._stepped(curve, here, length, start if len(way.places) > 2 and curve is self.first else None)
+            handed = None if found is not None else self._handed_on(curve, here)
+            if handed is not None:
+                end, gone, row, (curve, here) = handed
+                way.add(end.place, along + gone, around)
+                way.events.append((len(way.places) - 1, Found("contact over an edge", row, gone, end.place, end)))
+                along += gone + BEYOND
+                way.add(here.place, along, around)
+                length = settings.first_step
+                continue
             if found is None:
                 meets = None if around is None else around.in_the_way
                 way.events.append((len(way.places) - 1, Found("lost", -1, 0.0, here.place, here, True, meets)))
@@ -306,13 +318,39 @@ class _Follower:
         halves = (begin, (middle, place)), ((middle, place), end)
         return [found for one, other in halves for found in self._halved(step, one, other, times - 1)]
 
+    def _handed_on(self, curve: Curve, here: Point) -> tuple[Point, float, int, tuple[Curve, Point]] | None:
+        """Where a contact that holds ends a little beyond a point, and others take over there.
+
+        A corner that leaves its face, say, which edges carry from then on. The last point, how far it is, the row that
+        ends there, and the equations with a point beyond; None where there is nothing like that.
+        """
+        around = self.around
+        if around is None or not (curve.held & _own(here.place)).any():
+            return None
+        low, high, end = 0.0, 2.0 * self.settings.least_step, here
+        while high - low > ENDED:
+            middle = 0.5 * (low + high)
+            point = curve.corrected(here, middle * here.tangent)
+            if point is not None and not around.ended(point.place, curve.held).any():
+                low, end = middle, point
+            else:
+                high = middle
+        beyond = curve.moved(end.place, BEYOND * end.tangent, end.basis)
+        try:
+            ended = around.ended(beyond, curve.held)
+            if not (ended.any() and around.goes_to([end.place, beyond])):
+                return None
+            after = _pushing(around, curve, beyond, end)
+        except LostError:
+            return None
+        return None if after is None else (end, low, int(np.flatnonzero(ended)[0]), after)
+
     def _after(self, curve: Curve, event: Found) -> tuple[Curve, Point] | None:
         """The equations after an event at which rows come or go, and the point; None where the branch ends there."""
         around, place = self.around, event.place
         if around is None:
             return _switched(curve, event)
-        own = np.zeros(place.packed.rows, dtype=np.bool_)
-        own[rows_of_slots(place.packed)] = True
+        own = _own(place)
         if not own[event.row]:
             return _switched(curve, event)
         if curve.held[event.row]:
@@ -348,6 +386,35 @@ def _beside(around: Surroundings, curve: Curve, place: Place) -> Place:
     if not place.packed.is_implicit:
         rows = np.abs(around.gaps(place)) <= AT_BOUND
     return around.holding(place, rows)
+
+
+def _own(place: Place) -> Flags:
+    """The rows (m,) of slots."""
+    rows = np.zeros(place.packed.rows, dtype=np.bool_)
+    rows[rows_of_slots(place.packed)] = True
+    return rows
+
+
+def _pushing(around: Surroundings, curve: Curve, place: Place, before: Point) -> tuple[Curve, Point] | None:
+    """The equations at a place with those contacts that touch and push there, and the point, on from one before."""
+    n = curve.columns.size
+    held = (curve.held & ~_own(place)) | (around.gaps(place) <= AT_BOUND)
+    while True:
+        other = curve.with_rows(held, True)
+        balanced = other.balanced(around.holding(place, held))
+        pulling = held & place.packed.one_sided & (balanced.forces > -PUSHING)
+        if not pulling.any():
+            break
+        held = held & ~pulling
+    point = other.point(balanced)
+    if len(point.equations) != len(point.tangent) - 1 or point.basis.shape[1] > n:
+        return None
+    along = point.tangent[:n] @ before.tangent[:n] + point.tangent[-1] * before.tangent[-1]
+    border = (-1.0 if along < 0.0 else 1.0) * other.bordering(point.tangent)
+    found = other.corrected(other.point(point.place, border, point.basis), np.zeros(len(point.tangent)))
+    if found is None or np.abs(other.between(place, found.place)).max() > ASTRAY * BEYOND:
+        return None
+    return other, found
 
 
 def _with_contacts(around: Surroundings, curve: Curve, place: Place, closed: Flags) -> tuple[Curve, Point] | None:

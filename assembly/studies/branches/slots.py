@@ -19,6 +19,7 @@ __all__ = [
     "NOBODY",
     "Meeting",
     "copy_slots",
+    "ended_slots",
     "features_of",
     "gaps_of_slots",
     "held_alone",
@@ -58,6 +59,17 @@ def gaps_of_slots(packed: Packed, state: Array) -> Array | None:
     is_listed = np.array([pair >= 0 for pair, _ in packed.listed(state)], dtype=np.bool_)
     gaps: Array = np.where(is_listed, found[0][own], np.inf)
     return gaps
+
+
+def ended_slots(packed: Packed, state: Array) -> Flags:
+    """Which of the contacts of slots (s,) have no pair at the poses of a state."""
+    own = rows_of_slots(packed)
+    found = _evaluated(packed, state, np.arange(own.start, own.stop))
+    if found is None:
+        return np.ones(packed.clearance_rows, dtype=np.bool_)
+    is_listed = np.array([pair >= 0 for pair, _ in packed.listed(state)], dtype=np.bool_)
+    ended: Flags = is_listed & np.isnan(found[2][own, 0])
+    return ended
 
 
 def meeting(packed: Packed, state: Array, row: int) -> Meeting:
@@ -108,8 +120,8 @@ def copy_slots(earlier: Packed, before: Array, packed: Packed, state: Array) -> 
     _tracked(packed, state)[:] = _tracked(earlier, before)
 
 
-def _evaluated(packed: Packed, state: Array, rows: NDArray[np.int64]) -> tuple[Array, Array] | None:
-    """Residuals and records of some rows of contacts at the poses of a state; None where one has no pair."""
+def _evaluated(packed: Packed, state: Array, rows: NDArray[np.int64]) -> tuple[Array, Array, Array] | None:
+    """Residuals, records and tracked pairs of some rows of contacts at a state's poses; None where one has no pair."""
     table = packed.table_at(state)
     count, q = int(table[CONTACTS]), state[: packed.contacts_at].reshape(-1, 7).copy()
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
@@ -117,9 +129,10 @@ def _evaluated(packed: Packed, state: Array, rows: NDArray[np.int64]) -> tuple[A
     free[rows] = -1
     start = state[packed.contacts_at :][: TRACK * count].reshape(-1, TRACK).copy()
     records, residual = np.zeros((count, CONTACT_RECORD)), np.zeros(count)
-    work = q, start.copy(), records, residual, np.zeros((count, FREE_COLUMN + 4 + int(table[EXTRA])))
+    tracked = start.copy()
+    work = q, tracked, records, residual, np.zeros((count, FREE_COLUMN + 4 + int(table[EXTRA])))
     lost = contact_rows((table, packed.pool), start, np.inf, free, work) >= 0
-    return None if lost else (residual, records)
+    return None if lost else (residual, records, tracked)
 
 
 def _slots(packed: Packed, state: Array) -> Array:

@@ -19,7 +19,7 @@ from assembly.constraints.packing.scene import MOST_CROWDING, Packed
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.solve.attempts.attempts import with_listed
-from assembly.solve.clearance_proof import new_proof, owned_pairs
+from assembly.solve.clearance_proof import new_proof, owned_pairs, prove_end
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.options import Options
 from assembly.solve.scene import Status
@@ -29,6 +29,7 @@ from assembly.studies.branches.slots import (
     NOBODY,
     Meeting,
     copy_slots,
+    ended_slots,
     gaps_of_slots,
     held_alone,
     meeting,
@@ -92,7 +93,7 @@ class Surroundings:
         self._at = self._listed(place, place.state)
         is_clear = self._looks_at(self._at)
         self._doubtful = self._ticks.doubtful
-        self.proved, self.untold = self._ticks.proved, False
+        self.proved, self.untold = self._is_proven(self._at), False
         return is_clear
 
     @property
@@ -131,6 +132,13 @@ class Surroundings:
         """Which bodies meet at the listed contact of a row, and where."""
         return meeting(place.packed, self._at_poses(place), row)
 
+    def ended(self, place: Place, held: Flags) -> Flags:
+        """Which contacts that hold (m,) have ended on the way to a place, as a corner that has left its face."""
+        own = rows_of_slots(place.packed)
+        rows = np.zeros(len(held), dtype=np.bool_)
+        rows[own] = held[own] & ended_slots(place.packed, place.state)
+        return rows
+
     def keeps(self, held: Flags, place: Place) -> bool:
         """Whether contacts that hold are those that are listed in their rows."""
         own = rows_of_slots(place.packed)
@@ -155,7 +163,7 @@ class Surroundings:
                     self._looks_at(at)
                 return False
             self._at = there
-            proved, depth = proved and self._ticks.proved, max(depth, self._ticks.way_depth)
+            proved, depth = proved and self._is_proven(there), max(depth, self._ticks.way_depth)
         self.proved, self.depth = proved, depth
         return True
 
@@ -165,7 +173,10 @@ class Surroundings:
         gaps = gaps_of_slots(there.packed, there.state)
         if gaps is None or (gaps < -AT_BOUND).any():
             return False
-        self._at, self.proved, self.untold = there, False, True
+        answers = prove_end(self._solution(there))
+        if not all(pair.holds or pair.answer.verdict is Verdict.UNDECIDED for pair in answers):
+            return False
+        self._at, self.proved, self.untold = there, all(pair.proved for pair in answers), True
         return True
 
     def is_straight(self, before: Place, middle: Place, after: Place) -> bool:
@@ -202,6 +213,15 @@ class Surroundings:
             # Faces or gaps are others there: of the way nothing can be told.
             return self._looks_at(there)
         return self._ticks.holds(self._solution(there))
+
+    def _is_proven(self, there: Place) -> bool:
+        """Whether the place to which proofs have gone is proven; of faces that lie on each other hulls may tell it.
+
+        Not of the way there: swept branches are proven only where that is.
+        """
+        if self._ticks.proved or self.swept:
+            return self._ticks.proved
+        return all(pair.proved for pair in prove_end(self._solution(there)))
 
     def _looks_at(self, there: Place) -> bool:
         """Begin proofs at a place; whether all pairs are clear or touch there."""
