@@ -121,6 +121,7 @@ class Branch(ReadOnlyArrays):
     start: int
     proved: NDArray[np.bool_] = field(repr=False)
     depth: float
+    _has_clearances: bool = field(default=False, repr=False)
 
     @property
     def table(self) -> NDArray[np.void]:
@@ -130,10 +131,14 @@ class Branch(ReadOnlyArrays):
         """
         names = [self.parameter.name, "length", *(item.name for item in self.of)]
         for k, name in enumerate(names):
-            if name in names[:k]:
+            if name in names[:k] or (name == "proved" and self._has_clearances):
                 raise InputError(f"measures are {names[2:]}; expected names that differ: give them name=")
-        table = np.empty(len(self.values), dtype=[(name, np.float64) for name in names])
-        for name, column in zip(names, (self.values, self.lengths, *self.measures.T), strict=True):
+        columns = [self.values, self.lengths, *self.measures.T]
+        if self._has_clearances:
+            names.append("proved")
+            columns.append(self.proved)
+        table = np.empty(len(self.values), dtype=[(name, one.dtype) for name, one in zip(names, columns, strict=True)])
+        for name, column in zip(names, columns, strict=True):
             table[name] = column
         return table
 
@@ -212,6 +217,7 @@ def branch_of(curve: Curve, ways: Sequence[Way], measures: tuple[Measure, ...], 
         start,
         np.array(proved, dtype=np.bool_),
         depth,
+        curve.scene.packed().keeps_apart,
     )
 
 
