@@ -24,7 +24,7 @@ from assembly.studies.branches.slots import NOBODY, meeting
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from assembly.studies.branches.following import Way
+    from assembly.studies.branches.follower import Way
 
 __all__ = ["Branch", "BranchEvent", "branch_of"]
 
