@@ -159,13 +159,13 @@ def _on_probe(parameter: Parameter, known: Collection[int]) -> FrameNumber | Non
     return number if isinstance(number, FrameNumber) and id(number.frame) in known else None
 
 
-def columns_of(problem: Problem, parameters: Sequence[Parameter]) -> Columns:
-    """The columns of parameters.
+def columns_of(problem: Problem, parameters: Sequence[Parameter], may_be_idle: bool = False) -> Columns:
+    """The columns of parameters; whether one may be idle, as a number of a body is between contacts.
 
     Raises
     ------
     InputError
-        A parameter that enters no row and no term.
+        A parameter that enters no row and no term, where none may.
     """
     frames, here = problem.frames, problem.here
     rows, slopes = here.by_frames @ frames.twists, by_frames(problem, here)
@@ -187,7 +187,7 @@ def columns_of(problem: Problem, parameters: Sequence[Parameter]) -> Columns:
             enters = bool(rows[:, r].any() or slopes[:, r].any() or values[r]) or _is_of_a_face(problem, parameter)
             # A hinge may turn about its axis in its frame: rows are as they were, what is measured is not.
             enters = enters or _on_probe(parameter, _frames_of(problem.packed)) is not None
-        if not enters:
+        if not (enters or may_be_idle):
             raise InputError(
                 f"parameter {parameter.name!r} enters no row and no term; expected one on which the solve depends"
             )

@@ -26,6 +26,7 @@ from assembly.errors import InputError
 from assembly.kinematics.pose import retract, rotation_matrix
 from assembly.solve.dense.jacobian import rows_of
 from assembly.solve.diagnosis.nearby_poses import moves
+from assembly.studies.branches.slots import copy_slots
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
@@ -195,6 +196,10 @@ class Curve:
                 return None
             if size <= EXACT or (size >= 0.5 * before and before <= ROUNDING):
                 before = min(before, size)
+                # Where poses go on along a line they are exact at once, and multipliers are not yet.
+                pushes = change - self.bordering(change)
+                if np.abs(pushes).max(initial=0.0) > ROUNDING * (1.0 + np.abs(place.forces).max()):
+                    place = self.moved(place, pushes, origin.basis)
                 break
             place, before = self.moved(place, change, origin.basis), size
         if before > ROUNDING and k:
@@ -235,7 +240,13 @@ class Curve:
             packed.refresh()
         except InputError:
             raise LostError from None
-        state = place.state if packed is place.packed else taken_over(place.packed, packed, place.state)
+        if packed is place.packed:
+            return replace(place, packed=packed, state=place.state)
+        state = taken_over(place.packed, packed, place.state)
+        if packed.keeps_apart:
+            if packed.clearance_rows != place.packed.clearance_rows:
+                raise LostError
+            copy_slots(place.packed, place.state, packed, state)
         return replace(place, packed=packed, state=state)
 
     def _tracked(self, place: Place) -> Place:
@@ -269,7 +280,8 @@ class Curve:
         problem = Problem(
             self.bodies, scene.constraints, goals, packed, state, turns, place.forces, frames, probed, here
         )
-        return place, problem, columns_of(problem, [self.parameter])
+        # Between contacts a number of a body may change nothing.
+        return place, problem, columns_of(problem, [self.parameter], may_be_idle=packed.keeps_apart)
 
     def _stretch(self, packed: Packed) -> Array:
         """What columns of twists are multiplied with: lengths are over the size that the scene had at first."""

@@ -1,4 +1,8 @@
-"""What happens along a step of a branch, and where exactly."""
+"""What happens along a step of a branch, and where exactly.
+
+Events are zeros of functions of the length along the step. For contacts that clearances keep open these are gaps of
+what is listed at the step's beginning.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +15,21 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from assembly.kinematics.pose import retract
-from assembly.studies.branches.curve import Curve, Place, Point
+from assembly.studies.branches.curve import Curve, LostError, Place, Point
+from assembly.studies.branches.slots import Meeting, features_of
+from assembly.studies.branches.surroundings import AT_BOUND, Surroundings
 
 __all__ = ["Found", "Step", "closing"]
 
 Array = NDArray[np.float64]
-# Lengths along a branch are found to this.
-EXACT = 1e-15
+# Lengths along a branch are found to this; where features change, to this part of the step.
+EXACT, EDGE = 1e-15, 1e-13
 # A crossing is interpolated between so many points about it, within this part of the step to either side.
 POINTS, ABOUT = 8, 0.3
 # Points of a branch that are the same one.
 SAME = 1e-7
+# A contact comes to so many other features within a step, at most.
+MOST_FEATURES = 8
 
 
 class NotFoundError(Exception):
@@ -30,7 +38,7 @@ class NotFoundError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """An event: what kind, the row or the name that it is of, how far along the step, and where."""
+    """An event: what kind, the row or the name that it is of, how far along the step, where, and which bodies meet."""
 
     kind: str
     row: int
@@ -38,6 +46,7 @@ class Found:
     place: Place
     point: Point | None
     ends: bool = False
+    meets: Meeting | None = None
 
 
 class Step:
@@ -50,10 +59,21 @@ class Step:
     length : float
     ends : (float, float)
         Of the range of the parameter.
+    around : Surroundings, optional
+        Of a scene with clearances: what is around the point.
     """
 
-    def __init__(self, curve: Curve, here: Point, there: Point, length: float, ends: tuple[float, float]) -> None:
+    def __init__(
+        self,
+        curve: Curve,
+        here: Point,
+        there: Point,
+        length: float,
+        ends: tuple[float, float],
+        around: Surroundings | None = None,
+    ) -> None:
         self.curve, self.here, self.there, self.length, self.ends = curve, here, there, length, ends
+        self.around = around
 
     def at(self, along: float) -> Point:
         """The point in the plane across the step's beginning at a part of its length."""
@@ -66,7 +86,9 @@ class Step:
 
     def events(self) -> list[Found]:
         """The events of the step, in order; none after one that ends the branch, or changes which rows hold."""
-        found = [*self._at_ends(), *self._of_rows(), *self._turning(), *self._crossing()]
+        found = [*self._at_ends(), *self._of_rows(), *self._of_features(), *self._turning(), *self._crossing()]
+        if self.around is not None:
+            found += self._of_gaps(self.around)
         found.sort(key=lambda event: event.along)
         for k, event in enumerate(found):
             if event.ends:
@@ -121,6 +143,47 @@ class Step:
                 found.append(self._event("contact closed" if is_contact else "limit reached", row, _gap(row), True))
         return found
 
+    def _of_gaps(self, around: Surroundings) -> list[Found]:
+        """Contacts that clearances keep open, where they close."""
+        try:
+            before, after = around.gaps(self.here.place), around.gaps(self.there.place)
+        except LostError:
+            raise NotFoundError from None
+        least, found = self.curve.tolerance, []
+        for row in np.flatnonzero(~self.curve.held & (after < -least) & (before >= -least)).tolist():
+            event = self._event("contact closed", row, _listed_gap(around, row), True)
+            if abs(around.gaps(event.place)[row]) > AT_BOUND:
+                # It ended, and another one is nearer: a shorter step lists that.
+                raise NotFoundError
+            found.append(replace(event, meets=around.meeting(event.place, row)))
+        return found
+
+    def _of_features(self) -> list[Found]:
+        """Where contacts that hold come to another face, edge or vertex."""
+        packed, found = self.here.place.packed, []
+        for row in np.flatnonzero(self.curve.held & (packed.pairs >= 0)).tolist():
+            now, last = (features_of(packed, point.place.state, row) for point in (self.here, self.there))
+            along = 0.0
+            for _ in range(MOST_FEATURES):
+                if now == last:
+                    break
+                along, point = self._leaves(row, now, along)
+                found.append(Found("contact over an edge", row, along, point.place, point))
+                now = features_of(packed, point.place.state, row)
+        return found
+
+    def _leaves(self, row: int, features: tuple[float, ...], low: float) -> tuple[float, Point]:
+        """Where the contact of a row leaves features that it is on up to a length, by halving."""
+        packed, high, found = self.here.place.packed, self.length, self.there
+        while high - low > max(EXACT, EDGE * self.length):
+            middle = 0.5 * (low + high)
+            point = self.at(middle)
+            if features_of(packed, point.place.state, row) == features:
+                low = middle
+            else:
+                high, found = middle, point
+        return high, found
+
     def _crossing(self) -> list[Found]:
         """Where another branch crosses: the bordered determinant changes its sign.
 
@@ -160,6 +223,18 @@ def _force(row: int) -> Callable[[Point], float]:
 def _gap(row: int) -> Callable[[Point], float]:
     """The residual of a row at a point."""
     return lambda point: float(point.residual[row])
+
+
+def _listed_gap(around: Surroundings, row: int) -> Callable[[Point], float]:
+    """By how much a listed contact is open at a point."""
+
+    def gap(point: Point) -> float:
+        try:
+            return float(around.gaps(point.place)[row])
+        except LostError:
+            raise NotFoundError from None
+
+    return gap
 
 
 def closing(step: Step, start: Point, is_angle: bool) -> tuple[Found, float] | None:

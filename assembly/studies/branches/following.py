@@ -9,51 +9,28 @@ tangent, changes its sign; steps go over that along their own branch.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from math import acos
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from assembly.derivatives.implicit import check_is_of, several, the_scene
 from assembly.derivatives.measure import Measure
+from assembly.derivatives.numbers import ControlPoint, ControlWeight, LeastGap, ShapeNumber
 from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError, bounded
+from assembly.proximity.clearance.proof import LEAST_SIZE
+from assembly.solve.clearance_proof import can_prove
 from assembly.solve.solution import Solution
-from assembly.studies.branches.curve import Curve, LostError, Place, Point
-from assembly.studies.branches.events import Found, NotFoundError, Step, closing
+from assembly.studies.branches.follower import Follower
 from assembly.studies.branches.options import FollowOptions
 from assembly.studies.branches.result import Branch, branch_of
+from assembly.studies.branches.surroundings import CrowdedError
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
 
 __all__ = ["follow"]
 
-Array = NDArray[np.float64]
-# Singular values of the equations, over the largest, that are none where a branch begins.
-FLAT = 1e-10
-EXPECTED = "expected rows that determine the poses, or an objective that has one best pose"
-# Forces that push, over the objective's unit, and one-sided rows that are at their bound.
-PUSHING, AT_BOUND = 1e-9, 1e-9
-# By how much a step may be longer than the last one; and how far the corrector may lead, in parts of the step.
-LONGER, ASTRAY = 2.0, 0.25
-
-
-@dataclass(eq=False)
-class Way:
-    """What was found in one direction: places along it, how far they are, and events by the place's number."""
-
-    places: list[Place] = field(default_factory=list)
-    lengths: list[float] = field(default_factory=list)
-    events: list[tuple[int, Found]] = field(default_factory=list)
-    closure: float | None = None
-
-    def add(self, place: Place, length: float) -> None:
-        """Add a place."""
-        self.places.append(place)
-        self.lengths.append(length)
+# Numbers with which faces, or the gaps that are proven, change.
+OF_FACES = (ControlPoint, ControlWeight, LeastGap, ShapeNumber)
 
 
 def follow(
@@ -74,7 +51,7 @@ def follow(
     Parameters
     ----------
     scene : Assembly
-        Rows must determine the poses, or an objective must; no clearances.
+        Rows must determine the poses, or an objective must.
     parameter : Parameter
         One that is set in place, or makes faces.
     low, high : float
@@ -89,8 +66,8 @@ def follow(
     Raises
     ------
     InputError, TypeError
-        A range without the parameter's value, a start that failed, a scene with free motions and no objective,
-        clearances.
+        A range without the parameter's value, a start that failed or at which bodies are not known to be clear, a scene
+        with free motions and no objective; `swept` without a clearance, or of a number that makes faces.
     """
     the_scene(scene)
     if not isinstance(parameter, Parameter):
@@ -105,8 +82,7 @@ def follow(
             "where the branch is followed, in between"
         )
     measures = () if isinstance(of, (tuple, list)) and not of else several("of", of, Measure)
-    if scene.packed().keeps_apart:
-        raise InputError("scene has a clearance; expected contacts of pairs, whose rows are the same along a branch")
+    _check_clearances(scene, parameter, settings)
     solution = scene.solve() if start is None else start
     if not isinstance(solution, Solution):
         raise TypeError(f"start is {start!r}; expected a Solution")
@@ -116,184 +92,30 @@ def follow(
             f"{solution.message}"
         )
     try:
-        follower = _Follower(scene, parameter, (low, high), settings, solution)
-        ways = follower.ways()
-        return branch_of(follower.first, ways, measures)
+        while True:
+            try:
+                follower = Follower(scene, parameter, (low, high), settings, solution)
+                ways = follower.ways()
+                return branch_of(follower.first, ways, measures, follower.depth)
+            except CrowdedError:
+                # With more slots it begins anew: rows are others.
+                parameter._number.put(value)
+                scene._pack_with_more_places()
     finally:
         parameter._number.put(value)
         scene.packed().refresh()
 
 
-class _Follower:
-    """What goes along a branch."""
-
-    def __init__(
-        self,
-        scene: Assembly,
-        parameter: Parameter,
-        ends: tuple[float, float],
-        settings: FollowOptions,
-        solution: Solution,
-    ) -> None:
-        packed = scene.packed()
-        self.ends, self.settings = ends, settings
-        self.is_angle = parameter._number.unit == "rad"
-        length = packed.scale if parameter._number.unit == "length" else ends[1] - ends[0]
-        state = scene._state_of("start", packed, solution).copy()
-        place = Place(packed, state, parameter.value, np.zeros(packed.rows))
-        curve = Curve(scene, parameter, 1.0 if self.is_angle else length, settings.tolerance)
-        try:
-            self.first, self.start = _begun(curve, place)
-        except LostError:
-            raise InputError("start is at a fold of a contact; expected a pose near it") from None
-
-    def ways(self) -> list[Way]:
-        """What is found as the parameter grows at first, and, if that is no loop, as it shrinks."""
-        grows = 1.0 if self.start.tangent[-1] >= 0.0 else -1.0
-        ways = [self._way(grows)]
-        if ways[0].closure is None:
-            ways.append(self._way(-grows))
-        return ways
-
-    def _way(self, sign: float) -> Way:
-        """What is found in one direction from the start."""
-        curve, settings = self.first, self.settings
-        here = start = curve.point(self.start.place, sign * curve.bordering(self.start.tangent), self.start.basis)
-        way, length, along = Way(), settings.first_step, 0.0
-        way.add(here.place, 0.0)
-        for _ in range(settings.max_steps):
-            found = self._stepped(curve, here, length, start if len(way.places) > 2 and curve is self.first else None)
-            if found is None:
-                way.events.append((len(way.places) - 1, Found("lost", -1, 0.0, here.place, here, True)))
-                return way
-            step, events, off = found
-            for event in events:
-                if event.along > 0.0:
-                    way.add(event.place, along + event.along)
-                way.events.append((len(way.places) - 1, event))
-            last = events[-1] if events and events[-1].ends else None
-            if last is None:
-                along += step.length
-                way.add(step.there.place, along)
-                turn = _turn(curve, here, step.there)
-                length = min(settings.largest_step, step.length * min(LONGER, settings.turn / max(turn, 1e-9)))
-                here = step.there
-                continue
-            way.closure = off
-            along += last.along
-            after = None if last.kind in ("end of range", "closed loop") else _switched(curve, last)
-            # A row that comes and goes at one place ends the branch: there is no way on that pushes or opens.
-            if after is None or (curve is not self.first and last.along == 0.0):
-                return way
-            curve, here = after
-            length = settings.first_step
-        way.events.append((len(way.places) - 1, Found("step limit", -1, 0.0, here.place, here, True)))
-        return way
-
-    def _stepped(
-        self, curve: Curve, here: Point, length: float, start: Point | None
-    ) -> tuple[Step, list[Found], float | None] | None:
-        """A step, its events, and how far from the start it closes; None where none of any length is found."""
-        while length >= self.settings.least_step:
-            there = curve.corrected(here, length * here.tangent)
-            if there is not None and self._is_near(curve, here, there, length):
-                step = Step(curve, here, there, length, self.ends)
-                try:
-                    closed = None if start is None else closing(step, start, self.is_angle)
-                    events = step.events()
-                except NotFoundError:
-                    length *= 0.5
-                    continue
-                if closed is not None:
-                    events = [event for event in events if event.along < closed[0].along]
-                    if not (events and events[-1].ends):
-                        return step, [*events, closed[0]], closed[1]
-                return step, events, None
-            length *= 0.5
-        return None
-
-    def _is_near(self, curve: Curve, here: Point, there: Point, length: float) -> bool:
-        """Whether a step found a point of its own branch: it turned little, and went about where it was to go."""
-        if _turn(curve, here, there) > 2.0 * self.settings.turn:
-            return False
-        gone = np.append(
-            curve.between(here.place, there.place), (there.place.value - here.place.value) / self.first.unit
+def _check_clearances(scene: Assembly, parameter: Parameter, settings: FollowOptions) -> None:
+    """Raise where what is asked of clearances cannot be told."""
+    packed = scene.packed()
+    if settings.swept and not packed.keeps_apart:
+        raise InputError("swept is True where no clearance keeps bodies apart; expected one, asm.Clearance()")
+    if packed.keeps_apart and not can_prove(packed):
+        low, high = LEAST_SIZE, 1.0 / LEAST_SIZE
+        raise InputError(f"scene has clearances and a size of {packed.scale:g}; expected {low:g} to {high:g}")
+    if settings.swept and isinstance(parameter._number, OF_FACES):
+        raise InputError(
+            f"swept is True for {parameter.name}, with which faces or least gaps change; expected a number with which "
+            "bodies move"
         )
-        meant = length * np.append(here.tangent[: curve.columns.size], here.tangent[-1])
-        return bool(np.linalg.norm(gone - meant) <= ASTRAY * length)
-
-
-def _turn(curve: Curve, here: Point, there: Point) -> float:
-    """The angle between the directions of two points."""
-    return acos(min(1.0, max(-1.0, float(curve.bordering(here.tangent) @ there.tangent))))
-
-
-def _begun(curve: Curve, place: Place) -> tuple[Curve, Point]:
-    """The equations that determine a branch at its start, and the start's point.
-
-    Rows alone, where they do; else the objective, with the one-sided rows that push.
-    """
-    packed, n = place.packed, curve.columns.size
-    point = curve.point(place)
-    rank = point.basis.shape[1]
-    if rank > n:
-        raise InputError(f"{curve.parameter.name} cannot change: rows have no solution near the start")
-    has_objective = not packed.is_implicit
-    if rank == n and not has_objective:
-        return curve, _settled(curve, point)
-    if not has_objective:
-        raise InputError(f"scene leaves {n - rank} motions free with {curve.parameter.name} given; {EXPECTED}")
-    at_bound = packed.one_sided & (np.abs(point.residual) <= AT_BOUND)
-    if rank == n and not at_bound.any():
-        return curve, _settled(curve, point)
-    held = ~packed.one_sided | at_bound
-    for _ in range(int(at_bound.sum()) + 1):
-        pushing = curve.with_rows(held, True)
-        balanced = pushing.balanced(place)
-        open_rows = held & packed.one_sided & (balanced.forces > -PUSHING)
-        if not open_rows.any():
-            break
-        held = held & ~open_rows
-    if not (held & packed.one_sided).any() and rank == n:
-        return curve, _settled(curve, point)
-    point = pushing.point(balanced)
-    values = np.linalg.svd(point.matrix, compute_uv=False)
-    flat = int(np.count_nonzero(values <= FLAT * values[0]))
-    if flat:
-        raise InputError(f"objective does not determine {flat} of the motions that rows leave free; {EXPECTED}")
-    return pushing, _settled(pushing, point)
-
-
-def _settled(curve: Curve, point: Point) -> Point:
-    """The start itself, to the last digit."""
-    found = curve.corrected(point, np.zeros(len(point.tangent)))
-    if found is None:
-        raise InputError("start is where branches cross, or a contact is at a fold; expected a pose near it")
-    return found
-
-
-def _switched(curve: Curve, event: Found) -> tuple[Curve, Point] | None:
-    """The equations with a row more that pushes, or one less, and the point; None where the branch ends there."""
-    row, place = event.row, event.place
-    comes = not curve.held[row]
-    if comes and not curve.balances and place.packed.is_implicit:
-        return None
-    held = curve.held.copy()
-    held[row] = comes
-    other = curve.with_rows(held, True)
-    try:
-        balanced = place if curve.balances else other.balanced(place)
-        point = other.point(replace(balanced, forces=np.where(held, balanced.forces, 0.0)))
-    except LostError:
-        return None
-    n = curve.columns.size
-    # A row that comes is to push, one that goes is to open; the other direction is back where it came from.
-    if comes:
-        change = (point.basis @ point.tangent[n:-1])[int(held[:row].sum())]
-        sign = -1.0 if change > 0.0 else 1.0
-    else:
-        rate = other.rate(point, row)
-        sign = -1.0 if rate < 0.0 else 1.0
-    if len(point.equations) != len(point.tangent) - 1 or point.basis.shape[1] > n:
-        return None
-    return other, other.point(point.place, sign * other.bordering(point.tangent), point.basis)

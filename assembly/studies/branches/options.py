@@ -26,6 +26,10 @@ class FollowOptions:
         What rows, over the scene's size, may be off at a point.
     max_steps : int
         Steps in either direction from the start, after which the branch ends as "step limit".
+    swept : bool
+        Of a scene with clearances, whether the way between points is proven along the branch, as `Assembly.solve` does
+        with `swept=True`. Without it the straight way from point to point is, from which the branch is off by an eighth
+        of the square of a step, times its curvature.
     """
 
     first_step: float = 0.02
@@ -34,9 +38,12 @@ class FollowOptions:
     turn: float = 0.12
     tolerance: float = 1e-12
     max_steps: int = 5000
+    swept: bool = False
 
     def __post_init__(self) -> None:
         integer("max_steps", self.max_steps, 1, 10**9)
+        if not isinstance(self.swept, bool):
+            raise TypeError(f"swept is {self.swept!r}; expected True or False")
         highest = {"largest_step": 1e3, "first_step": self.largest_step, "least_step": self.first_step}
         for name, high in {**highest, "turn": 1.0, "tolerance": 1e-6}.items():
             value = number(name, getattr(self, name))

@@ -6,6 +6,9 @@ root that continues the branch (Deuflhard, Newton Methods for Nonlinear Problems
 it leaves more the numbers are gone to in shorter steps. The motion of a branch shrinks with the step, that of a jump
 does not: where steps of 1/256 are not enough, and bodies still move far in one, or it cannot be solved, the branch ends
 before these numbers.
+
+What is swept is solved by swept solves (`studies/swept_solve.py`), which stay on their branch by themselves, and end
+where something is in the way.
 """
 
 from __future__ import annotations
@@ -17,9 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.assembly import Assembly
+from assembly.constraints.model.clearance import Clearance
+from assembly.constraints.packing.corners import body_of
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.response import set_values
 from assembly.errors import InputError
+from assembly.solve.contact_pairs import listed_contacts
 from assembly.solve.diagnosis.nearby_poses import moves
 from assembly.solve.scene import Status
 from assembly.solve.solution import Solution
@@ -43,6 +49,8 @@ FEW_ITERATIONS = 12
 # What bodies may move in such a step where the first step of Newton's method says little, as where a limit is reached:
 # over the scene's size, and radians. Branches that are farther apart are told apart.
 STILL = 0.05
+# Bodies that are apart by less where a solve failed, in parts of the size, may be in its way.
+NEAR = 1e-2
 # Columns of a history: what rows are off by, and the slope of the objective.
 RESIDUAL, SLOPE = 1, 2
 
@@ -71,10 +79,12 @@ class Chain:
     scene : Assembly
         Solves of it do not begin elsewhere by themselves any more.
     parameters : several Parameter
+    swept : bool
+        Whether the way from one row to the next has to be clear.
     """
 
-    def __init__(self, scene: Assembly, parameters: Sequence[Parameter]) -> None:
-        self._scene, self._parameters = scene, list(parameters)
+    def __init__(self, scene: Assembly, parameters: Sequence[Parameter], swept: bool = False) -> None:
+        self._scene, self._parameters, self._swept = scene, list(parameters), swept
         self._numbers = [parameter._number for parameter in parameters]
         self._now = [number.get() for number in self._numbers]
         self._has_objective = bool(scene.objectives)
@@ -147,6 +157,8 @@ class Chain:
     def _next(self, last: Solution, values: list[float]) -> Told:
         """From the last row, at once or in shorter steps."""
         self._put(values)
+        if self._swept:
+            return _told_of_way(self._scene.solve(last, swept=True))
         solution = self._scene.solve(last)
         if solution.success and self._is_near(solution):
             return Told(solution.status.name, "", solution.iterations, solution)
@@ -168,7 +180,7 @@ class Chain:
             if solution.success and (is_still or self._is_near(solution)):
                 last, part, step = solution, there, min(2.0 * step, 0.5)
             elif is_short:
-                message = f"the branch ends {part:.2f} of the way from the last row that was solved"
+                message = f"the branch ends {part:.2f} of the way from the last row that was solved{_nearest(solution)}"
                 return Told(BRANCH_ENDED, message, iterations)
             else:
                 step *= 0.5
@@ -195,6 +207,32 @@ class Chain:
         if not (packed.one_sided.any() or packed.contacts):
             return False
         return bool(np.abs(moves(last.q, solution.q, packed.scale)).max() <= STILL)
+
+
+def _nearest(solution: Solution) -> str:
+    """Which bodies that clearances keep apart are nearest where a solve failed: they may be in the way."""
+    packed = solution._packed
+    if not packed.keeps_apart:
+        return ""
+    found = [
+        (pair.gap - kept.minimum, number)
+        for number, kept, pair in listed_contacts(solution)
+        if isinstance(kept, Clearance)
+    ]
+    gap, number = min(found, default=(np.inf, -1))
+    if gap > NEAR * packed.scale:
+        return ""
+    names = " and ".join(sorted(body_of(side).name for side in packed.kept_pairs[number]))
+    return f"; {names} are {gap:.2g} apart there"
+
+
+def _told_of_way(solution: Solution) -> Told:
+    """How a swept solve ended."""
+    way = solution.way
+    if solution.success or way is None or solution.status is not Status.BLOCKED:
+        return _told(solution)
+    message = f"blocked {way.part:.6g} of the way from the last row that was solved: {way.reason}"
+    return Told(solution.status.name, message, solution.iterations)
 
 
 def _told(solution: Solution) -> Told:

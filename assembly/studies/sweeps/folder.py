@@ -105,11 +105,11 @@ class Folder:
             before = None
         if not isinstance(before, dict) or before.get("format") != manifest["format"]:
             raise InputError(f"folder {str(self.path)!r} has a {MANIFEST} of something else; expected that of a study")
-        for key in manifest:
-            if before.get(key) != manifest[key]:
+        for key in {**manifest, **before}:
+            if before.get(key) != manifest.get(key):
                 raise InputError(
                     f"folder {str(self.path)!r} is of a study that differs in its {key}: "
-                    f"{_shown(before.get(key))} there, {_shown(manifest[key])} here; "
+                    f"{_shown(before.get(key))} there, {_shown(manifest.get(key))} here; "
                     "expected the same, or another folder"
                 )
 

@@ -19,15 +19,15 @@ from assembly.studies.sweeps.plans import Plan
 __all__ = ["manifest_of"]
 
 
-def manifest_of(scene: Assembly, plan: Plan, columns: tuple[Column, ...]) -> dict[str, Any]:
-    """Hashes of the scene and the plan, names, versions: JSON.
+def manifest_of(scene: Assembly, plan: Plan, columns: tuple[Column, ...], swept: bool = False) -> dict[str, Any]:
+    """Hashes of the scene and the plan, names, versions, and whether ways have to be clear: JSON.
 
     Raises
     ------
     InputError
         The scene has what scene files do not hold.
     """
-    return {
+    manifest = {
         "format": "assembly-study",
         "version": 1,
         "scene": _scene_hash(scene),
@@ -41,6 +41,8 @@ def manifest_of(scene: Assembly, plan: Plan, columns: tuple[Column, ...]) -> dic
         "numba": version("numba"),
         "numpy": np.__version__,
     }
+    # Folders of studies that are not swept are those of before.
+    return {**manifest, "swept": True} if swept else manifest
 
 
 def _scene_hash(scene: Assembly) -> str:

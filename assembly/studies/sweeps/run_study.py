@@ -12,12 +12,13 @@ import numpy as np
 from assembly._progress import Progress, checked_progress, watched
 from assembly.assembly import Assembly
 from assembly.derivatives.implicit import check_is_of, the_scene
+from assembly.derivatives.numbers import RowNumber, TargetNumber
 from assembly.derivatives.response import values_set
 from assembly.errors import InputError, positive
 from assembly.studies.sweeps.folder import Folder
 from assembly.studies.sweeps.identity import manifest_of
 from assembly.studies.sweeps.measuring import columns_of
-from assembly.studies.sweeps.plans import as_plan
+from assembly.studies.sweeps.plans import Plan, as_plan
 from assembly.studies.sweeps.result import Study, new_study
 from assembly.studies.sweeps.scheduling import Executor, StudyError, in_process, on_executor
 from assembly.studies.sweeps.table import Table
@@ -39,6 +40,7 @@ def study(
     folder: str | PathLike[str] | None = None,
     progress: Progress = False,
     chunk_seconds: float = 0.5,
+    swept: bool = False,
 ) -> Study:
     """Solve a scene for every row of a plan, and measure it.
 
@@ -60,6 +62,10 @@ def study(
         study by returning True.
     chunk_seconds : float
         About how long a chunk for a worker takes; it does not change the results.
+    swept : bool
+        Under a clearance, whether the way from one row to the next has to be clear, as in solves with `swept=True`. A
+        row on the other side of something is BLOCKED, and its message says by which bodies. Every run of rows begins at
+        a pose to which runs before it have come.
 
     Returns
     -------
@@ -90,14 +96,33 @@ def study(
     if executor is not None and not callable(getattr(executor, "submit", None)):
         raise TypeError(f"executor is {executor!r}; expected an Executor with submit, or a client of Dask")
     checked_progress(progress)
+    _check_swept(scene, designs, swept)
     seconds = positive("chunk_seconds", chunk_seconds)
-    job = Job(scene, designs.parameters, columns, designs.seed if designs.kind == "starts" else None)
+    job = Job(scene, designs.parameters, columns, designs.seed if designs.kind == "starts" else None, swept)
     table = Table(designs.values, designs.runs(), len(columns))
     before = np.array([parameter.value for parameter in designs.parameters])
-    kept = None if folder is None else Folder(folder, manifest_of(scene, designs, columns))
+    kept = None if folder is None else Folder(folder, manifest_of(scene, designs, columns, swept))
     with closing(kept) if kept is not None else nullcontext(), values_set(designs.parameters, before):
         kernels = _computed(job, table, kept, executor, progress, seconds)
     return new_study(table, designs, job, kernels)
+
+
+def _check_swept(scene: Assembly, designs: Plan, swept: bool) -> None:
+    """Raise where ways between rows cannot be asked for."""
+    if not isinstance(swept, bool):
+        raise TypeError(f"swept is {swept!r}; expected True or False")
+    if not swept:
+        return
+    if designs.kind == "starts":
+        raise InputError("swept is True with starts, between which there is no way; expected another plan")
+    if not scene.packed().keeps_apart:
+        raise InputError("swept is True where no clearance keeps bodies apart; expected one, asm.Clearance()")
+    for parameter in designs.parameters:
+        if not isinstance(parameter._number, (RowNumber, TargetNumber)):
+            raise InputError(
+                f"swept is True for {parameter.name}, which changes the bodies or the joints; expected driven values, "
+                "limits, offsets and targets"
+            )
 
 
 def _computed(

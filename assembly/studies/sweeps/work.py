@@ -31,12 +31,13 @@ Array = NDArray[np.float64]
 
 
 class Job(NamedTuple):
-    """What a study is of; `seed` of random starts."""
+    """What a study is of; `seed` of random starts; whether ways between rows have to be clear."""
 
     scene: Assembly
     parameters: tuple[Parameter, ...]
     columns: tuple[Column, ...]
     seed: int | None
+    swept: bool = False
 
 
 class Task(NamedTuple):
@@ -160,7 +161,7 @@ class Worker:
         self._job = job
         # Lists of its own, and nothing packed: what the user's scene met before, and meets after, is not its business.
         self._scene = copy.copy(job.scene)
-        self._chain = Chain(self._scene, job.parameters)
+        self._chain = Chain(self._scene, job.parameters, job.swept)
         self._nothing = [float("nan")] * len(job.columns)
 
     def compute(self, chunk: Chunk, say: Callable[[int], bool] = lambda _: True) -> ChunkDone:

@@ -270,9 +270,11 @@ def test_what_cannot_be_followed_raises():
     scene.remove("guide")
     with pytest.raises(InputError, match="does not determine 3 of the motions"):
         asm.follow(scene, asm.Parameter(goal, "target", "z"), -1.0, 3.0)
-    scene.constrain(asm.Clearance())
-    with pytest.raises(InputError, match="has a clearance"):
-        asm.follow(scene, asm.Parameter(goal, "target", "z"), -1.0, 3.0)
+    height = asm.Parameter(goal, "target", "z")
+    with pytest.raises(InputError, match="swept is True where no clearance keeps bodies apart"):
+        asm.follow(scene, height, -1.0, 3.0, swept=True)
+    with pytest.raises(TypeError, match="swept is 1; expected True or False"):
+        asm.follow(scene, height, -1.0, 3.0, swept=1)
 
 
 def test_what_cannot_be_followed_is_told():
