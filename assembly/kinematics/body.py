@@ -304,17 +304,19 @@ class Body(Weighed):
         if not parts:
             raise InputError(f"shape of body {self.name!r} is empty; expected a surface, or None for a body without")
         faces: list[BodyFace] = []
+        names: set[str] = set()
         for k, part in enumerate(parts):
             if not isinstance(part, (NurbsSurface, Face)):
                 raise TypeError(f"shape of body {self.name!r} holds {part!r}; expected NurbsSurface or Face")
             face = part if isinstance(part, Face) else Face(part)
             # Names of surfaces and faces may be set anew.
             name = text(f"shape[{k}].name", face.name or ("surface" if len(parts) == 1 else f"face {k + 1}"))
-            if any(name == other.name for other in faces):
+            if name in names:
                 raise InputError(
                     f"shape of body {self.name!r} has two faces named {name!r}; expected distinct names, as "
                     "asm.shapes.joined(...) makes them"
                 )
+            names.add(name)
             faces.append(BodyFace(self, face, name))
         return tuple(faces)
 

@@ -13,7 +13,7 @@ from assembly.geometry.faces.face import Face
 from assembly.kinematics.body import Body
 from assembly.step.documents import StepError, document_of
 from assembly.step.edges import Edges
-from assembly.step.faces import read_face
+from assembly.step.faces import read_faces
 from assembly.step.images import image_of, placement_of
 from assembly.step.occt import occt, parts, quiet
 from assembly.step.profiles import Unreadable
@@ -97,14 +97,15 @@ def read_shape(
     name, own_color = said(shape)
     made = Shape([], own_color or color, name, [], [])
     taken: set[str] = set()
-    for k, face in enumerate(parts(shape, o.TopAbs_FACE), 1):
-        face = o.as_face(face)
+    faces = [o.as_face(face) for face in parts(shape, o.TopAbs_FACE)]
+    names, tints = [], []
+    for k, face in enumerate(faces, 1):
         own, tint = said(face)
-        label = unique(own or f"face {k}", taken)
-        try:
-            read = read_face(face, edges, label, scale)
-        except Unreadable as reason:
-            made.missing.append(f"{label!r}: {reason}")
+        names.append(unique(own or f"face {k}", taken))
+        tints.append(tint)
+    for label, tint, read in zip(names, tints, read_faces(faces, edges, names, scale), strict=True):
+        if isinstance(read, Unreadable):
+            made.missing.append(f"{label!r}: {read}")
             continue
         if read.deviation > EXACT:
             made.inexact.append(f"{label!r} to {read.deviation:.1g} mm")

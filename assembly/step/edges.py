@@ -5,9 +5,10 @@ What is asked of OCCT is asked once an edge, and of faces on other sides only fo
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from math import isclose, isfinite
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -16,10 +17,11 @@ from assembly.step.occt import occt, parts
 from assembly.step.profiles import Unreadable, point
 from assembly.step.projected import Side, Space, is_loose, space_of
 from assembly.step.surfaces import Patch, patch
-from assembly.step.wires import Traced, Wire, bounds, wires_of
+from assembly.step.wires import Box, Traced, Wire, bounds, wires_of
 
 __all__ = ["Edges", "Known", "Laid"]
 
+_Made = TypeVar("_Made")
 # OCCT stands for "unbounded" with numbers beyond this one.
 _FAR = 1e50
 # Tolerances of files count up to this part of the part's size: one of a meter does not make all faces meet.
@@ -60,6 +62,7 @@ class Edges:
         self.shape = shape
         self._map = o.ShapeMap()
         o.TopExp.MapShapes_s(shape, o.TopAbs_EDGE, self._map)
+        self._find = self._map.FindIndex
         self._known: dict[int, Known] = {}
         self._face_map = o.ShapeMap()
         o.TopExp.MapShapes_s(shape, o.TopAbs_FACE, self._face_map)
@@ -69,7 +72,7 @@ class Edges:
 
     def known(self, edge: Any) -> Known:
         """What is known of an edge."""
-        number = self._map.FindIndex(edge)
+        number = self._find(edge)
         known = self._known.get(number)
         if known is None:
             o = occt()
@@ -93,6 +96,13 @@ class Edges:
         points = [point(o.BRep_Tool.Pnt_s(o.as_vertex(one))) for one in parts(self.shape, o.TopAbs_VERTEX)]
         return float(np.linalg.norm(np.ptp(np.array(points), axis=0))) if points else 0.0
 
+    def lay(self, faces: Sequence[Any]) -> None:
+        """Find what faces of the solid, which are taken forward, lie in, all of them before `laid` is asked for one."""
+        left = {self._face_map.FindIndex(face): face for face in faces}
+        drawn = {number: _kept(_outlined, face) for number, face in left.items() if number}
+        for number, outline in drawn.items():
+            self._laid[number] = outline if isinstance(outline, AssemblyError) else _kept(_laid, outline)
+
     def laid(self, face: Any) -> Laid:
         """What a face of the solid lies in; it is taken forward.
 
@@ -104,10 +114,8 @@ class Edges:
         number = self._face_map.FindIndex(face)
         known = self._laid.get(number) if number else None
         if known is None:
-            try:
-                known = _laid(face)
-            except (Unreadable, InputError) as reason:
-                known = reason
+            outline = _kept(_outlined, face)
+            known = outline if isinstance(outline, AssemblyError) else _kept(_laid, outline)
             if number:
                 self._laid[number] = known
         if isinstance(known, AssemblyError):
@@ -158,13 +166,34 @@ class Edges:
         return self.side(other, others[0], there.patch)
 
 
-def _laid(face: Any) -> Laid:
-    """What a face lies in."""
+class _Outline(NamedTuple):
+    """A surface, the wires of a face on it, and their extent."""
+
+    surface: Any
+    wires: list[Wire]
+    box: Box
+
+
+def _outlined(face: Any) -> _Outline:
+    """The outline of a face."""
     surface = occt().BRep_Tool.Surface_s(face)
     if surface is None:
         raise Unreadable("it has no surface")
-    wires = wires_of(face)
+    wires = wires_of(face, surface)
     box = bounds(wires, surface, face)
     if not all(isfinite(x) and abs(x) < _FAR for x in box):
         raise Unreadable("it has no boundary, and its surface is unbounded")
-    return Laid(surface, wires, patch(surface, box))
+    return _Outline(surface, wires, box)
+
+
+def _laid(outline: _Outline) -> Laid:
+    """What a face of an outline lies in."""
+    return Laid(outline.surface, outline.wires, patch(outline.surface, outline.box))
+
+
+def _kept(step: Callable[[Any], _Made], given: Any) -> _Made | AssemblyError:
+    """What a step makes, or why it does not."""
+    try:
+        return step(given)
+    except (Unreadable, InputError) as reason:
+        return reason

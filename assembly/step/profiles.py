@@ -236,7 +236,7 @@ def _interpolation() -> tuple[Array, Array, Array]:
 
 def point(p: Any) -> Array:
     """Coordinates of a point, vector or direction in space or in the plane."""
-    return np.array([p.X(), p.Y(), p.Z()] if hasattr(p, "Z") else [p.X(), p.Y()])
+    return np.array(p.Coord())
 
 
 def reals(array: Any) -> Array:
@@ -253,11 +253,8 @@ def _bspline(curve: Any) -> Spline:
     """Of a B-spline or Bezier curve of OCCT, in space or in the plane, that is not periodic."""
     n = curve.NbPoles()
     # Elements of the array cost a tenth of the curve's own.
-    each = map(curve.Poles().Value, range(1, n + 1))
-    if isinstance(curve, (occt().Geom2d_BSplineCurve, occt().Geom2d_BezierCurve)):
-        poles = np.array([(p.X(), p.Y()) for p in each])
-    else:
-        poles = np.array([(p.X(), p.Y(), p.Z()) for p in each])
+    points = list(map(curve.Poles().Value, range(1, n + 1)))
+    poles = np.array(list(map(type(points[0]).Coord, points)))
     weights = np.array([curve.Weight(k) for k in range(1, n + 1)]) if curve.IsRational() else None
     degree = curve.Degree()
     if degree > bezier.MAX_DEGREE:

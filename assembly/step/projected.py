@@ -103,6 +103,10 @@ class Side:
         made = points_of(*self._flat)
         return made.with_maps((self.patch.u, self.patch.v)) if isinstance(made, Track) else made
 
+    def ready(self) -> None:
+        """Make its tables, which are otherwise made when they are asked for."""
+        _ = self.ground, self._points
+
     def given(self, t: Array) -> Array:
         """Parameters (n, 2) of the surface on the curve."""
         if isinstance(self._points, Track):
@@ -185,8 +189,8 @@ class _Edge:
 
 def is_loose(edge: Any) -> bool:
     """Whether an edge has a tolerance of its own, beyond what OCCT gives all, which it finds by samples."""
-    o = occt()
-    return o.BRep_Tool.Tolerance_s(edge) > 2.0 * CONFUSION and not o.BRep_Tool.Degenerated_s(edge)
+    tool = occt().BRep_Tool
+    return tool.Tolerance_s(edge) > 2.0 * CONFUSION and not tool.Degenerated_s(edge)
 
 
 def strays(space: Space | None, own: Side, tolerance: float) -> bool:

@@ -106,7 +106,7 @@ def _turned(shape: Spline, turning: Turning, v: Direction, origin: Array, axis: 
 def _plane(surface: Any, box: Box) -> Patch:
     place = surface.Position()
     u, v = _slack(*box[:2]), _slack(*box[2:])
-    axes = [(p.X(), p.Y(), p.Z()) for p in (place.Location(), place.XDirection(), place.YDirection())]
+    axes = [p.Coord() for p in (place.Location(), place.XDirection(), place.YDirection())]
     # Four corners: plain floats cost a tenth of arrays.
     columns = list(zip(*axes, strict=True))
     net = np.array([[[o + a * x + b * y for o, x, y in columns] for b in v] for a in u])
@@ -233,8 +233,8 @@ def _net(surface: Any) -> tuple[Array, tuple[Array, Array], tuple[int, int]]:
     net = np.ones((n, m, 4))
     # Elements of the array cost a tenth of the surface's own.
     each = surface.Poles().Value
-    rows = ((each(i, j) for j in range(1, m + 1)) for i in range(1, n + 1))
-    net[..., :3] = [[(p.X(), p.Y(), p.Z()) for p in row] for row in rows]
+    points = [each(i, j) for i in range(1, n + 1) for j in range(1, m + 1)]
+    net[..., :3] = np.array(list(map(type(points[0]).Coord, points))).reshape(n, m, 3)
     if rational:
         net[..., 3] = [[surface.Weight(i, j) for j in range(1, m + 1)] for i in range(1, n + 1)]
         net[..., :3] *= net[..., 3:]

@@ -25,7 +25,7 @@ from assembly.step.surfaces import Patch
 from assembly.step.tracks import track
 from assembly.step.wires import Traced, Wire
 
-__all__ = ["HIGH", "LOW", "Drawn", "Pair", "curves_of", "edge_curves", "moved", "shifted"]
+__all__ = ["HIGH", "LOW", "Drawn", "Pair", "curves_of", "edge_curves", "moved", "ready_edges", "shifted"]
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
@@ -183,21 +183,23 @@ def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> Drawn:
     rows: list[tuple[float, ...]] = []
     curves: list[Spline | None] = []
     names = []
+    known_of, forgiven = edges.known, edges.forgiven
     for traced in wire.edges:
-        known = edges.known(traced.edge)
-        kept: Spline | None = None
-        if traced.line is None or known.loose:
+        edge, _, low, high, line, seam = traced
+        known = known_of(edge)
+        tolerance, is_turned = forgiven(known.tolerance, size), edge.Orientation() == turned
+        if line is None or known.loose:
             draft, known = _best(traced, known, wire, patch, edges)
             deviation = max(deviation, draft.deviation)
-            ends, kept = _row(draft, traced.edge.Orientation() == turned)
+            ends, kept = _row(draft, is_turned)
+            rows.append((*ends[:6], tolerance, *ends[7:], known.loose, seam))
+            curves.append(kept)
         else:
-            start, end = traced.line
-            ends = (*start, *end, traced.low, traced.high)
-            ends = (*ends, 0.0, UNKNOWN, 1.0, traced.edge.Orientation() == turned)
-        rows.append((*ends[:6], edges.forgiven(known.tolerance, size), *ends[7:], known.loose, traced.seam))
-        curves.append(kept)
+            (u, v), (x, y) = line
+            rows.append((u, v, x, y, low, high, tolerance, UNKNOWN, 1.0, is_turned, False, seam))
+            curves.append(None)
         names.append(known.name)
-        seams = seams or traced.seam
+        seams = seams or seam
     table = np.array(rows, dtype=np.float64).reshape(-1, EDGE_SIZE)
     if level_lines(table, patch.scales, patch.sides, patch.is_straight):
         for k in np.flatnonzero(table[:, _LEVEL] == FOLLOWED).tolist():
@@ -212,6 +214,14 @@ def edge_curves(wire: Wire, patch: Patch, edges: Edges) -> Drawn:
         places = table[lines, ENDS].reshape(-1, 2)
         table[lines, ENDS] = np.column_stack([patch.u(places[:, 0]), patch.v(places[:, 1])]).reshape(-1, 4)
     return Drawn(table, curves, names, seams, deviation)
+
+
+def ready_edges(wire: Wire, patch: Patch, edges: Edges) -> None:
+    """Have what loose edges of a wire are compared with at hand: their curves in space, and those on the surface."""
+    for traced in wire.edges:
+        if edges.known(traced.edge).loose and traced.curve is not None and not traced.seam:
+            if edges.space(traced.edge) is not None:
+                edges.side(traced, wire.face, patch).ready()
 
 
 def _row(draft: _Draft, is_turned: bool) -> tuple[tuple[float, ...], Spline | None]:

@@ -85,11 +85,11 @@ class Wire:
         )
 
 
-def wires_of(face: Any) -> list[Wire]:
-    """The wires of a face, which is taken forward."""
+def wires_of(face: Any, surface: Any = None) -> list[Wire]:
+    """The wires of a face, which is taken forward, and its surface where it is known."""
     o = occt()
     # A plane has no seams.
-    closes = type(o.BRep_Tool.Surface_s(face)) is not o.Geom_Plane
+    closes = type(surface or o.BRep_Tool.Surface_s(face)) is not o.Geom_Plane
     return [_wire(o.as_wire(wire), face, closes) for wire in parts(face, o.TopAbs_WIRE)]
 
 
@@ -98,30 +98,31 @@ def _wire(wire: Any, face: Any, closes: bool) -> Wire:
     walk = o.BRepTools_WireExplorer(wire, face)
     found = []
     while walk.More():
-        found.append(o.as_edge(walk.Current()))
+        found.append(walk.Current())
         walk.Next()
     if len(found) == wire.NbChildren():
-        return Wire(wire, face, [_traced(edge, face, closes) for edge in found], ordered=True, whole=True)
+        return Wire(wire, face, _traced(found, face, closes), ordered=True, whole=True)
     sides = (o.TopAbs_FORWARD, o.TopAbs_REVERSED)
     every = [o.as_edge(edge) for edge in parts(wire, o.TopAbs_EDGE) if edge.Orientation() in sides]
     # Where vertices are not shared the walk ends early.
     ordered = len(found) == len(every)
-    return Wire(
-        wire, face, [_traced(edge, face, closes) for edge in (found if ordered else every)], ordered, whole=False
-    )
+    return Wire(wire, face, _traced(found if ordered else every, face, closes), ordered, whole=False)
 
 
-def _traced(edge: Any, face: Any, closes: bool) -> Traced:
+def _traced(edges: list[Any], face: Any, closes: bool) -> list[Traced]:
     o = occt()
-    tool = o.BRep_Tool
-    low, high = tool.Range_s(edge, face)
-    curve = tool.CurveOnSurface_s(edge, face, low, high)
-    line = None
-    if type(curve) is o.Geom2d_Line:
-        place, along = curve.Location(), curve.Direction()
-        x, y, dx, dy = place.X(), place.Y(), along.X(), along.Y()
-        line = (x + low * dx, y + low * dy), (x + high * dx, y + high * dy)
-    return Traced(edge, curve, low, high, line, closes and tool.IsClosed_s(edge, face))
+    tool, straight = o.BRep_Tool, o.Geom2d_Line
+    interval, drawn, is_closed = tool.Range_s, tool.CurveOnSurface_s, tool.IsClosed_s
+    found = []
+    for edge in edges:
+        low, high = interval(edge, face)
+        curve = drawn(edge, face, low, high)
+        line = None
+        if type(curve) is straight:
+            (x, y), (dx, dy) = curve.Location().Coord(), curve.Direction().Coord()
+            line = (x + low * dx, y + low * dy), (x + high * dx, y + high * dy)
+        found.append(Traced(edge, curve, low, high, line, closes and is_closed(edge, face)))
+    return found
 
 
 def bounds(wires: list[Wire], surface: Any, face: Any) -> Box:

@@ -186,17 +186,23 @@ def test_periodic_splines_bound_faces(tmp_path):
         assert sum(side.face.volume_integral() for side in body.faces) == pytest.approx(4.0 * area, rel=1e-12)
 
 
+def refusing(reason, *names):
+    """`read_faces` that refuses faces of these names, or all."""
+    read = bodies.read_faces
+
+    def reads(given, edges, known, scale):
+        found = zip(read(given, edges, known, scale), known, strict=True)
+        return [Unreadable(reason) if not names or name in names else face for face, name in found]
+
+    return reads
+
+
 def test_a_face_that_cannot_be_read_is_named(tmp_path, monkeypatch):
     file = File()
     file.part(joined(box(), box(1.0, 1.0, 1.0, (0, 0, 3))), "tower")
     path = file.write(tmp_path / "tower.step")
 
-    def fails(face, edges, name, scale):
-        if name == "face 3":
-            raise Unreadable("two edges that should meet are 1 mm apart")
-        return read_face(face, edges, name, scale)
-
-    monkeypatch.setattr(bodies, "read_face", fails)
+    monkeypatch.setattr(bodies, "read_faces", refusing("two edges that should meet are 1 mm apart", "face 3"))
     with pytest.raises(StepError, match="not read: 'tower', 'face 3': two edges that should meet are 1 mm apart; pass"):
         asm.read_step(path)
     with pytest.warns(StepWarning, match="tower.step: not read: 'tower', 'face 3'"):
@@ -208,32 +214,27 @@ def test_occt_s_repairs_are_asked_for_where_a_face_cannot_be_read_without(tmp_pa
     file = File()
     file.part(box(), "box")
     path = file.write(tmp_path / "box.step")
-    known, read, asked = reader.document_of, bodies.read_face, []
+    known, read, asked = reader.document_of, bodies.read_faces, []
+    crossed, broken = refusing("it crosses itself"), refusing("no", "face 1")
 
     def document(*given, repairs=True):
         asked.append(repairs)
         return known(*given, repairs=repairs)
 
     def reads(*given):
-        if not asked[-1]:
-            raise Unreadable("it crosses itself")
-        return read(*given)
+        return (read if asked[-1] else crossed)(*given)
 
     monkeypatch.setattr(reader, "document_of", document)
     asm.read_step(path)
     assert asked == [False] and gc.isenabled()
-    monkeypatch.setattr(bodies, "read_face", reads)
+    monkeypatch.setattr(bodies, "read_faces", reads)
     (body,) = asm.read_step(path)
     assert asked == [False, False, True] and len(body.faces) == 6
     # Of what is wrong with them as well, it is told once.
-    monkeypatch.setattr(bodies, "read_face", lambda *_: reads(*_) if not asked[-1] else broken())
+    monkeypatch.setattr(bodies, "read_faces", lambda *_: (broken if asked[-1] else crossed)(*_))
     with pytest.raises(StepError, match=r"box.step'; not read: 'box', 'face 1': no; "):
         asm.read_step(path)
     assert asked == [False, False, True, False, True] and gc.isenabled()
-
-
-def broken():
-    raise Unreadable("no")
 
 
 def test_loops_that_cross_are_found_without_occt_s_repairs(tmp_path):
