@@ -10,7 +10,7 @@ open elsewhere. With A, B the placements of the parts, J of the joint on the fir
 | linear to rigid | A T(p + d position) = B K | Prismatic |
 | cylindrical to rigid | A T(p + d position) P Rz(angle) = B K | Cylindrical |
 | linear to revolute | A T(p + d position) P Rz(angle) = B T(o) | Prismatic and Revolute, a slide between them |
-| ball to rigid | A J Rx(x) Ry(y) Rz(z) = B K | Spherical; with ranges three Revolute, as in a gimbal |
+| ball to rigid | A J Rx(x) Ry(y) Rz(z) = B K | Spherical; with ranges or driven three Revolute, as in a gimbal |
 
 p, d are origin and direction of the first joint's axis, o the origin of the second one's, and P the axes that the
 reference of angles, x, and the axis, z, make; a revolute joint with a reference has J P for J. A tie that a rigid
@@ -30,11 +30,11 @@ from assembly.cad.locations import pose_of
 from assembly.constraints.model.constraint import Bounds
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.joints import Cylindrical, Fixed, Prismatic, Revolute, Spherical
-from assembly.errors import InputError, number
+from assembly.errors import InputError, number, vector
 from assembly.kinematics.body import Body, Frame
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
 
-__all__ = ["Tie"]
+__all__ = ["Tie", "kind_of"]
 
 Array = NDArray[np.float64]
 IDENTITY = np.eye(3)
@@ -53,11 +53,11 @@ class Tie:
         Of their parts.
     name : str
     driven : number or mapping, optional
-        Values that are held: degrees of "angle", length of "position".
+        Values that are held: degrees of "angle", of a ball three "angles", length of "position".
     """
 
     def __init__(self, first: Any, second: Any, bodies: tuple[Body, Body], name: str, driven: Any) -> None:
-        if _kind(first) == "Rigid" and _kind(second) != "Rigid":
+        if kind_of(first) == "Rigid" and kind_of(second) != "Rigid":
             first, second, bodies = second, first, (bodies[1], bodies[0])
         self._first, self._second = first, second
         self._a, self._b = bodies
@@ -73,7 +73,7 @@ class Tie:
         InputError
             Of other kinds, or with values for what the joint does not leave free.
         """
-        kinds = _kind(self._first), _kind(self._second)
+        kinds = kind_of(self._first), kind_of(self._second)
         makers = {
             ("Rigid", "Rigid"): self._fixed,
             ("Revolute", "Rigid"): self._revolute,
@@ -93,18 +93,26 @@ class Tie:
             )
         return found
 
-    def _value(self, what: str) -> float | None:
-        return self._driven.pop(what, None)
+    def _value(self, what: str, limits: tuple[float, float] | None) -> float | None:
+        """A driven value, in the unit of build123d, as the limits are; None if there is none."""
+        value = self._driven.pop(what, None)
+        if value is None or limits is None or limits[0] <= value <= limits[1]:
+            return value
+        low, high = limits
+        expected = f"expected one in its range, {low:g} to {high:g}"
+        raise InputError(f"driven has the {what} {value:g} for {self._name!r}; {expected}")
 
-    def _turn(self, joint: Any) -> tuple[float | None, Bounds | None]:
-        """Driven angle and limits [rad]."""
-        value = self._value("angle")
-        return (None if value is None else radians(value)), _angles(joint.angular_range)
+    def _turn(self, degrees: Any, what: str = "angle") -> tuple[float | None, Bounds | None]:
+        """Driven angle and limits [rad] of a range [degrees], which has none where it leaves every angle."""
+        low, high = (float(value) for value in degrees)
+        limits = None if high - low >= WHOLE_TURN else (low, high)
+        value = self._value(what, limits)
+        return (None if value is None else radians(value)), (limits and (radians(low), radians(high)))
 
     def _slide(self, joint: Any) -> tuple[float | None, Bounds | None]:
         low, high = joint.linear_range
         limits = None if low == -np.inf and high == np.inf else (float(low), float(high))
-        return self._value("position"), limits
+        return self._value("position", limits), limits
 
     def _fixed(self) -> list[Joint]:
         return [Fixed(_frame(self._a, self._first), _frame(self._b, self._second), name=self._name)]
@@ -113,7 +121,7 @@ class Tie:
         frame = _frame(self._a, self._first)
         if self._first._angle_reference_provided:
             frame = Frame(self._a, frame.origin, frame.axes @ _reference(self._a, self._first).axes)
-        angle, limits = self._turn(self._first)
+        angle, limits = self._turn(self._first.angular_range)
         return [Revolute(frame, _frame(self._b, self._second), name=self._name, angle=angle, limits=limits)]
 
     def _prismatic(self) -> list[Joint]:
@@ -124,7 +132,7 @@ class Tie:
         return [Prismatic(along, turned, name=self._name, slide=slide, limits=limits)]
 
     def _cylindrical(self) -> list[Joint]:
-        angle, angle_limits = self._turn(self._first)
+        angle, angle_limits = self._turn(self._first.angular_range)
         slide, slide_limits = self._slide(self._first)
         return [
             Cylindrical(
@@ -142,7 +150,7 @@ class Tie:
         slider = Body(f"slide of {self._name}")
         self.between.append(slider)
         slide, slide_limits = self._slide(self._first)
-        angle, limits = self._turn(self._second)
+        angle, limits = self._turn(self._second.angular_range)
         along = _along(self._a, self._first)
         # The slider has the axes of the first part, and the joint's origin for its own.
         turns = _reference(self._a, self._second).axes
@@ -160,8 +168,8 @@ class Tie:
 
     def _ball(self) -> list[Joint]:
         a, b = _frame(self._a, self._first), _frame(self._b, self._second)
-        ranges = [_angles(one) for one in self._first.angular_range]
-        if not any(ranges):
+        turns = [self._turn(one, axis) for one, axis in zip(self._first.angular_range, "xyz", strict=True)]
+        if all(turn == (None, None) for turn in turns):
             return [Spherical(a, b, name=self._name)]
         # Turns about x, y and z, each carried by the ones before.
         rings = [Body(f"{ring} ring of {self._name}") for ring in ("outer", "inner")]
@@ -171,13 +179,14 @@ class Tie:
         for k, axis in enumerate("xyz"):
             cyclic = np.roll(IDENTITY, -(k + 1), axis=1)
             before, after = (Frame(end.body, end.origin, end.axes @ cyclic) for end in chain[k : k + 2])
-            found.append(Revolute(before, after, name=f"{self._name}, {axis}", limits=ranges[k]))
+            angle, limits = turns[k]
+            found.append(Revolute(before, after, name=f"{self._name}, {axis}", angle=angle, limits=limits))
         return found
 
     def begin(self, poses: Mapping[Body, Pose]) -> None:
         """Put the bodies between to where the parts stand."""
         for k, body in enumerate(self.between):
-            if _kind(self._first) == "Linear":
+            if kind_of(self._first) == "Linear":
                 along = _along(self._a, self._first)
                 a, b = poses[self._a], poses[self._b]
                 away = b.apply(_vector(self._second.relative_axis.position)) - a.apply(along.origin)
@@ -199,7 +208,8 @@ def _rings(a: Frame, b: Frame, poses: Mapping[Body, Pose]) -> list[Pose]:
     return [Pose(middle, axes_quaternion(axes)) for axes in turned]
 
 
-def _kind(joint: Any) -> str:
+def kind_of(joint: Any) -> str:
+    """The kind of a joint of build123d, "Revolute" say, also of a class made of one."""
     for cls in type(joint).__mro__:
         if cls.__module__.partition(".")[0] == "build123d" and cls.__name__.endswith("Joint"):
             return cls.__name__.removesuffix("Joint")
@@ -207,21 +217,20 @@ def _kind(joint: Any) -> str:
 
 
 def _checked(name: str, driven: Any) -> dict[str, float]:
-    """Values by "angle" and "position"; a number is that of the only one there is."""
+    """Values by "angle" and "position", the three "angles" of a ball by "x", "y" and "z"."""
     if driven is None:
         return {}
     if not isinstance(driven, Mapping):
         raise InputError(f"driven is {driven!r} for {name!r}; expected {{'angle': degrees, 'position': length}}")
-    for what in driven:
-        if what not in ("angle", "position"):
-            raise InputError(f"driven has {what!r} for {name!r}; expected 'angle' or 'position'")
-    return {what: number(f"the {what} of {name!r}", value) for what, value in driven.items()}
-
-
-def _angles(degrees: Any) -> Bounds | None:
-    """Limits [rad] of a range [degrees]; None where it leaves every angle."""
-    low, high = (float(value) for value in degrees)
-    return None if high - low >= WHOLE_TURN else (radians(low), radians(high))
+    found: dict[str, float] = {}
+    for what, value in driven.items():
+        if what not in ("angle", "angles", "position"):
+            raise InputError(f"driven has {what!r} for {name!r}; expected 'angle', 'angles' or 'position'")
+        if what == "angles":
+            found.update(zip("xyz", vector(f"the angles of {name!r}", value, 3).tolist(), strict=True))
+        else:
+            found[what] = number(f"the {what} of {name!r}", value)
+    return found
 
 
 def _vector(value: Any) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from assembly.assembly import Assembly
-from assembly.cad.build123d_joints import Tie
+from assembly.cad.build123d_joints import Tie, kind_of
 from assembly.cad.build123d_parts import built, renew
 from assembly.cad.libraries import is_of, shown
 from assembly.cad.locations import location_of, pose_of
@@ -19,12 +19,15 @@ from assembly.step.bodies import unique
 
 __all__ = ["is_build123d", "solve_build123d"]
 
+# What a driven value that is no mapping is of; of other joints the angle.
+_DRIVEN = {"Linear": "position", "Ball": "angles"}
+
 
 def is_build123d(thing: Any) -> bool:
-    """Whether a thing is a part, a compound or a builder of build123d, or several of them."""
+    """Whether a thing is a part, a compound or a builder of build123d, which have joints, or several of them."""
     if isinstance(built(thing), (list, tuple)):
         return bool(thing) and all(is_build123d(one) for one in thing)
-    return is_of("build123d", "Shape", built(thing))
+    return is_of("build123d", "Shape", built(thing)) and hasattr(built(thing), "joints")
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ def _by_joint(driven: Any) -> dict[int, dict[str, Any]]:
         if not is_of("build123d", "Joint", joint):
             raise TypeError(f"driven has {shown(joint)}; expected joints of build123d")
         if not isinstance(value, Mapping):
-            value = {"position" if is_of("build123d", "LinearJoint", joint) else "angle": value}
+            value = {_DRIVEN.get(kind_of(joint), "angle"): value}
         found[id(joint)] = dict(value)
     return found
 

@@ -34,8 +34,8 @@ def solve(assembly: Any, *, fixed: Any = (), driven: Mapping[Any, Any] | None = 
         For build123d: parts that do not move; by default the first part. For CadQuery use `constrain(name, "Fixed")`
         instead.
     driven : mapping of joint -> value
-        For build123d: values at which joints are held, an angle in degrees or a position; for a joint that has both
-        {"angle": degrees, "position": length}.
+        For build123d: values at which joints are held, an angle in degrees or a position, for a ball its three angles;
+        for a joint that has both {"angle": degrees, "position": length}.
     **options
         Of `Assembly.solve`: `tolerance`, `fit`, `time_limit` and so on.
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from assembly._file_names import read_elsewhere
 from assembly.errors import InputError, file_path
 from assembly.files.stl import the_trimesh
 from assembly.kinematics.picture_mesh import PictureMesh
@@ -56,7 +57,8 @@ def read_picture(path: str | PathLike[str], *, unit: str = "mm", file_unit: str 
 def picture_of(source: Path) -> tuple[PictureMesh, float | None]:
     """Triangles of a file in its own unit, and the millimeters of that unit where the file, or its format, says it."""
     if source.suffix.lower() not in _SUFFIXES:
-        raise InputError(f"path is {str(source)!r}; expected a name that ends in one of {', '.join(_SUFFIXES)}")
+        expected = f"expected a name that ends in one of {', '.join(_SUFFIXES)}{read_elsewhere(source, ())}"
+        raise InputError(f"path is {str(source)!r}; {expected}")
     if not source.is_file():
         raise FileNotFoundError(f"path is {str(source)!r}; {'a folder' if source.is_dir() else 'no such file'}")
     trimesh = the_trimesh()

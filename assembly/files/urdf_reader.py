@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from assembly._file_names import read_elsewhere
 from assembly.constraints.model.couplings import Coupling, Gear, Linear, RackPinion
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.joints import Fixed, Planar, Prismatic, Revolute
@@ -79,7 +80,10 @@ def _parsed(path: str) -> Any:
     try:
         loaded = module.URDF.load(path, build_scene_graph=False, load_meshes=False)
     except Exception as error:  # whatever its parser trips over, the file is what is wrong
-        raise UrdfError(f"path is {path!r}; expected a URDF file ({type(error).__name__}: {error})") from None
+        elsewhere = read_elsewhere(Path(path), (".urdf", ".xml"))
+        raise UrdfError(
+            f"path is {path!r}; expected a URDF file ({type(error).__name__}: {error}){elsewhere}"
+        ) from None
     if not loaded.robot.links:
         raise UrdfError(f"path is {path!r}; it has no links; expected a robot")
     return loaded.robot

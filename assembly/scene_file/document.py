@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from assembly._file_names import not_of_another, read_elsewhere
 from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.model.tangent import ContactTangent
@@ -39,13 +40,13 @@ def save(scene: Assembly, path: str | PathLike[str]) -> None:
         Not an assembly.
     InputError
         A constraint or a term that scene files do not hold, or a coupling of joints that are not in the scene; one that
-        is disabled, or of fixed bodies alone.
+        is disabled, or of fixed bodies alone; or a path with the suffix of another format.
     OSError
         The file cannot be written.
     """
     if not isinstance(scene, Assembly):
         raise TypeError(f"scene is {scene!r}; expected an Assembly")
-    Path(path).write_text(scene_text(scene), encoding="ascii")
+    not_of_another(path, ".json").write_text(scene_text(scene), encoding="ascii")
 
 
 def scene_text(scene: Assembly) -> str:
@@ -108,7 +109,8 @@ def load(path: str | PathLike[str]) -> Assembly:
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not JSON ({error}); expected a file of format {FORMAT!r}") from None
+        elsewhere = read_elsewhere(Path(path), (".json",))
+        raise InputError(f"{path} is not JSON ({error}); expected a file of format {FORMAT!r}{elsewhere}") from None
     try:
         return _scene(document)
     except InputError as error:

@@ -1,8 +1,8 @@
 """Selector strings of CadQuery: what they say, and which of several things they choose.
 
-    expression   operand {"exc" | "except" operand}, perhaps behind "not", which takes all that follows it
+    expression   operand {"exc" | "except" operand}
     operand      terms {"or" terms},  terms  atom {"and" atom}
-    atom         a selector, or an expression in parentheses
+    atom         a selector, an expression in parentheses, or "not" and an expression: all that follows it
 
     >D  <D       farthest along a direction, by centers             >D[i]   the i-th place of those parallel to it
     >>D  <<D     the same                                           >>D[i]  the i-th place of all
@@ -160,17 +160,10 @@ class _Reader:
         self._depth += 1
         if self._depth > _DEEPEST:
             raise InputError(f"selector nests more than {_DEEPEST} times 'not' and '('; expected a shorter one")
-        rule = self._nested()
-        self._depth -= 1
-        return rule
-
-    def _nested(self) -> Rule:
-        if self._takes("not"):
-            inner = self._expression()
-            return lambda seen: seen.all() - inner(seen)
         rule = self._operand()
         while self._takes("except", "exc"):
             rule = _without(rule, self._operand())
+        self._depth -= 1
         return rule
 
     def _operand(self) -> Rule:
@@ -186,9 +179,10 @@ class _Reader:
         return lambda seen: set.intersection(*(rule(seen) for rule in rules))
 
     def _atom(self) -> Rule:
+        if self._takes("not"):
+            inner = self._expression()
+            return lambda seen: seen.all() - inner(seen)
         rest = self._rest()
-        if rest.startswith("not"):
-            raise self._unexpected("a selector; 'not' takes all that follows it, so write (not ...)")
         if rest.startswith("(") and not _VECTOR.match(rest):
             self._at += 1
             rule = self._expression()

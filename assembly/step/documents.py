@@ -6,6 +6,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from assembly._file_names import read_elsewhere
 from assembly.errors import InputError
 from assembly.step.occt import occt, settings
 from assembly.step.references import references_of
@@ -64,7 +65,8 @@ def document_of(path: str, folder: str | None = None, *, repairs: bool = True) -
     file = Path(path).absolute()
     text = file.read_bytes()
     if not is_step(text):
-        raise StepError(f"path is {path!r}; expected a STEP file, which begins with ISO-10303-21")
+        elsewhere = read_elsewhere(file, (".step", ".stp"))
+        raise StepError(f"path is {path!r}; expected a STEP file, which begins with ISO-10303-21{elsewhere}")
     others = references_of(text, file.parent)
     whole = _whole(path, text, folder)
     for other in others.files:

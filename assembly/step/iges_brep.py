@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from assembly._file_names import checked_suffix
+from assembly._file_names import checked_suffix, read_elsewhere
 from assembly.errors import file_path
 from assembly.kinematics.body import Body
 from assembly.solve.solution import Solution
@@ -60,7 +60,8 @@ def read_iges(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
             getattr(reader, mode)(True)
         document = _document()
         if not _is_iges(file) or reader.ReadFile(str(file)) != o.IFSelect_RetDone or not reader.Transfer(document):
-            raise StepError(f"path is {str(file)!r}; expected an IGES file with shapes, and OCCT finds none")
+            missing = f"expected an IGES file with shapes, and OCCT finds none{read_elsewhere(file, _IGES)}"
+            raise StepError(f"path is {str(file)!r}; {missing}")
         shape, names = reader.OneShape(), _names_of_solids(reader.IGESModel())
         solids = len(parts(shape, o.TopAbs_SOLID))
         if not solids:
@@ -77,7 +78,8 @@ def read_brep(path: str | PathLike[str], *, unit: str = "mm", strict: bool = Tru
     with quiet():
         shape = o.TopoDS_Shape()
         if not o.BRepTools.Read_s(shape, str(file), o.BRep_Builder()) or shape.IsNull():
-            raise StepError(f"path is {str(file)!r}; expected a BREP file with a shape, and OCCT finds none")
+            missing = f"expected a BREP file with a shape, and OCCT finds none{read_elsewhere(file, _BREP)}"
+            raise StepError(f"path is {str(file)!r}; {missing}")
         document = _document_with(shape)
     return _bodies(Source(file, document, len(parts(shape, o.TopAbs_FACE))), scale, strict)
 

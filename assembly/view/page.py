@@ -17,6 +17,7 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
+from assembly._file_names import not_of_another
 from assembly.assembly import Assembly
 from assembly.errors import InputError, check_encodable
 from assembly.kinematics.ellipsoid import Ellipsoid
@@ -145,8 +146,9 @@ def write_page(path: str | PathLike[str], title: str | None, drawing: Iterable[C
     if title is not None:
         check_encodable("title", title)
     # The name of a file may be none that UTF-8 has.
-    heading = Path(path).stem.encode(errors="replace").decode() if title is None else title
-    Path(path).write_text(page_text(heading, drawing, controls), encoding="utf-8")
+    file = not_of_another(path, ".html", ".htm")
+    heading = file.stem.encode(errors="replace").decode() if title is None else title
+    file.write_text(page_text(heading, drawing, controls), encoding="utf-8")
 
 
 def player(frames: int, loop: bool) -> str:

@@ -116,6 +116,20 @@ def test_driven_values_are_those_that_connect_to_would_have(joint, value):
     assert ours == pytest.approx(rows(b), abs=1e-12)
 
 
+@pytest.mark.parametrize("name", ["ball", "ball without ranges"])
+def test_a_ball_is_driven_at_three_angles(name):
+    a, b, random = two_boxes()
+    TIES[name][0](a, b, random)
+    ball = a.joints["r"]
+    assert asm.cad.solve([a, b], driven={ball: (20, 70, 10)}).success
+    ours = rows(b)
+    ball.connect_to(b.joints["l"], angles=(20, 70, 10))
+    assert ours == pytest.approx(rows(b), abs=1e-12)
+    if name == "ball":
+        with pytest.raises(asm.errors.InputError, match="driven has the y 81 for .* its range, -80 to 80"):
+            asm.cad.solve([a, b], driven={ball: (0, 81, 0)})
+
+
 def bar(label, length):
     part = bd.Box(length, 1, 1)
     part.label = label
@@ -161,7 +175,7 @@ def test_ranges_are_limits():
     b.location = bd.Location((9, 1, 1))
     solution = asm.cad.solve([a, b])
     assert solution.success and rows(b)[:, 3] == pytest.approx([3, 0, 0], abs=1e-12)
-    with pytest.raises(asm.errors.InputError, match="expected a value within the limits"):
+    with pytest.raises(asm.errors.InputError, match="driven has the position 4 for 'a.r-b.l'.* its range, 0 to 3"):
         asm.cad.solve([a, b], driven={a.joints["r"]: 4})
 
 
@@ -178,7 +192,7 @@ def test_what_is_fixed_and_what_is_not_tied():
         ({"fixed": "c"}, asm.errors.InputError, "expected parts of the assembly: 'a', 'b'"),
         ({"driven": {a: 1}}, TypeError, "expected joints of build123d"),
         ({"driven": {a.joints["r"]: {"position": 1}}}, asm.errors.InputError, "which the joint does not leave free"),
-        ({"driven": {a.joints["r"]: {"turn": 1}}}, asm.errors.InputError, "expected 'angle' or 'position'"),
+        ({"driven": {a.joints["r"]: {"turn": 1}}}, asm.errors.InputError, "expected 'angle', 'angles' or 'position'"),
         ({"driven": 3}, TypeError, "expected a mapping"),
     ):
         with pytest.raises(error, match=text):
@@ -243,5 +257,6 @@ def test_a_builder_and_a_single_part():
         asm.cad.from_build123d(3)
     with pytest.raises(asm.errors.InputError, match="the label of a face"):
         asm.cad.from_build123d(builder, faces=[builder.part.faces()[0]])
-    with pytest.raises(TypeError, match="expected a cadquery.Assembly, or build123d parts"):
-        asm.cad.solve(3)
+    for thing in (3, builder.part.faces()[0]):
+        with pytest.raises(TypeError, match="expected a cadquery.Assembly, or build123d parts"):
+            asm.cad.solve(thing)

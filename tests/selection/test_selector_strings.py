@@ -117,33 +117,35 @@ def test_senses_of_planes(axis):
 
 @pytest.mark.parametrize("seed", range(40))
 def test_words_and_parentheses(seed):
-    """Random expressions, against Python's own sets. "and" binds first, then "or", "exc"; "not" takes it all."""
+    """Random expressions, against Python's own sets. "and" binds first, then "or", "exc"; "not" takes the rest."""
     rng = np.random.default_rng(seed)
     what = ("faces", "edges")[seed % 2]
     things = THINGS[what]
     simple = [">Z", "<Y", "|X", "|Z", "#Y", ">>X[0]", ">(1, -2, 0.5)", *(f"%{kind}" for kind in KINDS[what][:2])]
 
-    def atom(depth):
+    def atom(depth, last):
+        if last and rng.random() < 0.3:
+            text, chosen = expression(max(depth - 1, 0))
+            return f"not {text}", set(things) - chosen
         if depth and rng.random() < 0.4:
             text, chosen = expression(depth - 1)
             return f"({text})", chosen
         text = str(rng.choice(simple))
         return text, brute(things, text)
 
-    def terms(depth):
-        parts = [atom(depth) for _ in range(rng.integers(1, 3))]
-        return " and ".join(text for text, _ in parts), set.intersection(*(chosen for _, chosen in parts))
-
-    def operand(depth):
-        parts = [terms(depth) for _ in range(rng.integers(1, 3))]
-        return " or ".join(text for text, _ in parts), set.union(*(chosen for _, chosen in parts))
+    def several(part, word, joined, last):
+        count = rng.integers(1, 3)
+        texts, sets = zip(*(part(last and k == count - 1) for k in range(count)), strict=True)
+        return f" {word} ".join(texts), joined(*sets)
 
     def expression(depth):
-        negated = rng.random() < 0.3
-        (text, chosen), *others = [operand(depth) for _ in range(rng.integers(1, 3))]
-        for other, less in others:
-            text, chosen = f"{text} {rng.choice(['exc', 'except'])} {other}", chosen - less
-        return (f"not {text}", set(things) - chosen) if negated else (text, chosen)
+        def terms(last):
+            return several(lambda last: atom(depth, last), "and", set.intersection, last)
+
+        def operand(last):
+            return several(terms, "or", set.union, last)
+
+        return several(operand, rng.choice(["exc", "except"]), set.difference, True)
 
     text, chosen = expression(2)
     assert set(things(text)) == chosen, text
@@ -167,7 +169,8 @@ def test_vertices():
         (">Z[x]", "expected 'and', 'or', 'exc' or the end at '[x]'"),
         (">Z <X", "expected 'and', 'or', 'exc' or the end at '<X'"),
         (">Z and", "expected one of"),
-        (">Z and not <X", "'not' takes all that follows it"),
+        (">Z not <X", "expected 'and', 'or', 'exc' or the end at 'not <X'"),
+        (">Z and not", "or a direction, X, Y, Z, XY, XZ, YZ or (x, y, z) at its end"),
         ("(>Z", "expected ')' at its end"),
         ("%", "expected the name of a kind"),
         ("%FOO", "with kind FOO; expected one of PLANE, CYLINDER"),
