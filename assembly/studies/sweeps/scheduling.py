@@ -5,7 +5,6 @@ Of an executor nothing is used but `submit`, and that its futures say when they 
 
 from __future__ import annotations
 
-import hashlib
 import heapq
 import os
 import pickle
@@ -16,7 +15,7 @@ from typing import Any, Protocol
 
 from assembly.errors import AssemblyError, InputError
 from assembly.studies.sweeps.table import Table
-from assembly.studies.sweeps.task import compute
+from assembly.studies.sweeps.task import Parcel, compute
 from assembly.studies.sweeps.work import ChunkDone, Job, Worker
 
 __all__ = ["Executor", "StudyError", "Waiting", "in_process", "on_executor"]
@@ -111,8 +110,7 @@ def in_process(job: Job, table: Table, seconds: float, take: Take, say: Callable
 
 def on_executor(job: Job, table: Table, seconds: float, take: Take, executor: Executor) -> None:
     """Compute a study on workers. What they have not begun is called off where it ends early."""
-    packed = _pickled(job)
-    key = hashlib.sha256(packed).hexdigest()
+    packed = Parcel(_pickled(job))
     workers = _workers_of(executor)
     waiting = Waiting(table, seconds, workers)
     answers: SimpleQueue[Any] = SimpleQueue()
@@ -120,8 +118,8 @@ def on_executor(job: Job, table: Table, seconds: float, take: Take, executor: Ex
     try:
         while waiting or under_way:
             while waiting and len(under_way) < AHEAD * workers:
-                chunk = pickle.dumps(table.chunk(waiting.chunk()))
-                future = executor.submit(compute, packed, key, chunk)
+                chunk = Parcel(pickle.dumps(table.chunk(waiting.chunk())))
+                future = executor.submit(compute, packed, chunk)
                 under_way.add(future)
                 future.add_done_callback(answers.put)
             future = answers.get()

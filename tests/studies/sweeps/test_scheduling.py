@@ -14,6 +14,7 @@ import assembly as asm
 from assembly.studies.sweeps.cutting import cut
 from assembly.studies.sweeps.scheduling import AHEAD, Waiting
 from assembly.studies.sweeps.table import Table
+from assembly.studies.sweeps.task import Parcel
 from assembly.studies.sweeps.work import ChunkDone
 from tests.studies.sweeps.sweep_scenes import four_bar
 
@@ -105,3 +106,19 @@ def test_a_row_costs_hardly_anything_where_it_is_handed_out(kept, most, tmp_path
     _, few, many = (calls_of(rows, tmp_path / str(rows) if kept else None) for rows in (40, 1000, 3000))
     # 0.65 and 1.08 calls, of runs and coarse rows; solving and measuring a row takes some 160.
     assert (many - few) / 2000 < most
+
+
+def test_what_workers_are_sent_has_a_name_by_its_content():
+    one, same, other = (Parcel(content) for content in (b"rows", b"rows", b"row"))
+    assert one.name == same.name != other.name
+    there = pickle.loads(pickle.dumps(one))
+    assert (there.content, there.name) == (one.content, one.name)
+
+
+def test_dask_takes_the_name_of_what_is_sent_and_does_not_print_it():
+    tokenize = pytest.importorskip("dask.tokenize", reason="Dask, of the extra cluster, is not installed").tokenize
+    one = Parcel(b"rows")
+    named = tokenize(one)
+    assert named == tokenize(Parcel(b"rows")) != tokenize(Parcel(b"row"))
+    one.content = b"others"
+    assert tokenize(one) == named
