@@ -198,3 +198,29 @@ def test_a_plug_is_dragged_in_its_conical_seat(cases):
         statuses[step.status] += 1
         assert step.proved
     assert set(statuses) <= {TrackStatus.FOLLOWED, TrackStatus.APPROACHING}
+
+
+def test_a_plug_leans_on_the_edge_of_its_seat(cases):
+    """Turned by a hand beside its axis while it is lifted a little: what of it is in the seat is a cone in a sleeve."""
+    slope = np.tan(np.pi / 6.0)
+    plug = asm.shapes.revolution(asm.curves.polygon([(0, 5), (5 * slope, 5), (20 * slope, 20), (0, 20)]))
+    seat = asm.shapes.revolution(asm.curves.polygon([(3 * slope, 3), (30, 3), (30, 18), (18 * slope, 18)]))
+    bodies = [asm.Body("seat", seat, fixed=True), asm.Body("plug", plug, position=(0, 0, 0.5))]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+    tracker, statuses, leans = scene.tracker(bodies[1].point(0, 0, 15)), Counter(), 0.0
+    around = np.linspace(0.0, 2.0 * np.pi, 361)
+    for way in 0.05 * np.arange(cases(40, 200)):
+        step = tracker.step((2.0 * np.sin(way), np.sin(2.0 * way), 16.0 + 1.5 * np.sin(0.7 * way)))
+        statuses[step.status] += 1
+        assert step.proved
+        pose = asm.Pose(step.q[1, :3], step.q[1, 3:])
+        leans = max(leans, np.hypot(*(pose.apply((0, 0, 1)) - pose.position)[:2]))
+        # Circles of the plug are within the seat's cone, where they are between its ends; the seat's upper edge is
+        # outside of the plug.
+        for radius, height in ((slope * z, z) for z in np.linspace(5, 20, 61)):
+            ring = pose.apply(np.column_stack([radius * np.cos(around), radius * np.sin(around), 0 * around + height]))
+            level = np.hypot(ring[:, 0], ring[:, 1]) - slope * ring[:, 2]
+            assert level[(ring[:, 2] > 3.0) & (ring[:, 2] < 18.0)].max(initial=-1.0) <= 1e-6
+    assert set(statuses) <= {TrackStatus.FOLLOWED, TrackStatus.APPROACHING}
+    assert leans > 0.01

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.face import Face
 from assembly.geometry.meshing.trimmed_cells import BoundaryCells, TrimmedCells, parallelogram_cells, tube_cells
 from assembly.geometry.recognition.elementary import elementary_form
-from assembly.geometry.recognition.forms import Cylinder, Extrusion, Plane
+from assembly.geometry.recognition.forms import Cone, Cylinder, Extrusion, Plane
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.proximity.clearance.derivative_nets import surface_bounds
 from assembly.proximity.clearance.records import FLAT, ROUNDED, RULED
@@ -89,11 +89,24 @@ def _sweep(surface: NurbsSurface) -> tuple[int, Array, float]:
         off = min(_unevenness(surface, ruling, along) for along in (0, 1))
         if off <= EXACT * float(np.abs(surface.control_points).max()):
             return RULED, ruling, 2.0 * off
+    if isinstance(form, Cone):
+        # Its heights are interpolated exactly, so that all that cells lack is across its axis, as of a swept face.
+        off = min(_uneven_heights(surface, form.axis, along) for along in (0, 1))
+        if off <= EXACT * float(np.abs(surface.control_points).max()):
+            return RULED, form.axis, 2.0 * off
     return ROUNDED, np.zeros(3), 0.0
 
 
 def _unevenness(surface: NurbsSurface, ruling: Array, along: int) -> float:
     """How far a surface is from lines along a ruling that a parameter runs along at the same speed, side by side."""
+    points = surface.control_points if along == 1 else surface.control_points.swapaxes(0, 1)
+    ways = points - points[:, :1]
+    beside = ways - (ways @ ruling)[..., None] * ruling
+    return _uneven_heights(surface, ruling, along) + float(np.linalg.norm(beside, axis=-1).max())
+
+
+def _uneven_heights(surface: NurbsSurface, ruling: Array, along: int) -> float:
+    """How far heights along a ruling are from those of a linear function of one parameter."""
     points, weights = surface.control_points, surface.weights
     if along == 0:
         points, weights = points.swapaxes(0, 1), weights.T
@@ -104,11 +117,8 @@ def _unevenness(surface: NurbsSurface, ruling: Array, along: int) -> float:
     at = np.convolve(knots[1:-1], np.full(degree, 1.0 / degree), mode="valid")
     part = (at - at[0]) / (at[-1] - at[0])
     heights = points @ ruling
-    ways = points - points[:, :1]
-    beside = ways - (ways @ ruling)[..., None] * ruling
     first, last = heights[0, [0, -1]]
-    uneven = np.abs(heights - first - (last - first) * part).max() + unlike * surface.size
-    return float(uneven + np.linalg.norm(beside, axis=-1).max())
+    return float(np.abs(heights - first - (last - first) * part).max() + unlike * surface.size)
 
 
 def _grid(surface: NurbsSurface, tolerance: float) -> Array:

@@ -54,7 +54,7 @@ LINKS = record_dtype(
 links_at = record_view(LINKS)
 LINKS_SIZE = size_of(LINKS)
 # A face in a plane (ruling is its normal); one that is swept along straight lines, by a curve across them (ruling is
-# their direction); any other.
+# their direction), or a cone about its axis (ruling); any other.
 # A piece of a round wire: corners are the ends of a piece of its spine, a line or an arc about `spine`; `first` is the
 # curvature of that and the radius of the wire.
 FLAT, RULED, ROUNDED, WIRE = 0, 1, 2, 3

@@ -129,26 +129,39 @@ def farthest_of_disc(d, axis, ruling, radius):
 
 
 @kernel(inner=True)
-def farthest_of_section(e, lean, radius):
-    """A bound of how far the section of a cylinder, across a line through the origin, is from that line.
+def farthest_of_section(e, lean, radius, slope):
+    """A bound of how far the section of a cylinder or cone, across a line through the origin, is from that line.
 
-    It is an ellipse with the half axes r sqrt(1 + s^2) along the lean, of length s, and r across.
+    With s the lean, S the slope and D = 1 - S^2 |s|^2, its support along a unit vector v across the line is
+
+        v.e + r (S v.s sqrt(1 + |s|^2) + sqrt(D + (1 + S^2) (v.s)^2)) / D,
+
+    that of an ellipse about e + (r S sqrt(1 + |s|^2) / D) s with the half axes r sqrt(1 + |s|^2) / D along the lean and
+    r / sqrt(D) across.
 
     Parameters
     ----------
     e : vector
-        Where the cylinder's axis meets the plane of the section, from the line.
+        Where its axis meets the plane of the section, from the line.
     lean : vector
         By how much its axis goes sideways for each unit of height.
     radius : float
+        Across the axis, where that meets the plane.
+    slope : float
+        By how much it gets wider for each unit along the axis, upwards; with the lean, less than 1.
     """
-    slope, square = math.sqrt(dot(lean, lean)), dot(e, e)
-    if radius == 0.0 or square == 0.0 or slope == 0.0:
-        return math.sqrt(square) + radius * math.sqrt(1.0 + slope * slope)
-    along = abs(dot(e, lean)) / slope
+    tilt = dot(lean, lean)
+    rest = 1.0 - slope * slope * tilt
+    longer = radius * math.sqrt(1.0 + tilt) / rest
+    center = add(e, scale(longer * slope, lean))
+    square = dot(center, center)
+    if radius == 0.0 or square == 0.0 or tilt == 0.0:
+        return math.sqrt(square) + longer
+    along = min(abs(dot(center, lean)) / math.sqrt(tilt), math.sqrt(square))
     beside = math.sqrt(max(square - along * along, 0.0))
-    less, longer = (radius * slope) ** 2, radius * math.sqrt(1.0 + slope * slope)
-    return farthest_of_ellipse(square, radius * radius + less, less, longer * along, radius * beside)
+    less = radius * radius * tilt * (1.0 + slope * slope) / (rest * rest)
+    shorter = radius / math.sqrt(rest)
+    return farthest_of_ellipse(square, longer * longer, less, longer * along, shorter * beside)
 
 
 @kernel(inner=True)

@@ -1,18 +1,19 @@
-"""A shaft that is longer than its bore and leans in it: only what is within the bore's height is in the bore.
+"""A shaft or plug that is longer than its bore and leans in it: only what is within the bore's height is in the bore.
 
-The surface in the node that has the bore lies farther from the bore's axis than its radius, and between two planes
-across the axis. So a cylinder of the other body is apart from it if the cylinder's part between these planes is within
-the bore. Along every ruling the distance from the axis is convex: it is largest where the ruling crosses one of both
-planes, or ends. A plane at height z cuts the cylinder of radius r, whose axis leans by the vector s (the tangent of its
-angle, seen along the bore) and meets the plane at e, in an ellipse. Its support along a unit v across the axis is
+The surface in the node that has the bore lies outside of the bore, a cylinder or a cone, and between two planes across
+its axis. So a cylinder or cone of the other body is apart from it if its part between these planes is within the bore.
+The level of the bore's wall (the distance from the axis, of a cylinder) is convex: along every ruling it is largest
+where the ruling crosses one of both planes, or ends. A plane at height z cuts the cone whose axis leans by the vector s
+(the tangent of its angle, seen along the bore), meets the plane at e, where the radius across it is r, and which gets
+wider by S for each unit of its axis, in an ellipse. Its support along a unit v across the bore's axis is
 
-    v.e + r sqrt(1 + (v.s)^2)
+    v.e + r (S v.s sqrt(1 + |s|^2) + sqrt(D + (1 + S^2) (v.s)^2)) / D,      D = 1 - S^2 |s|^2,
 
-and `farthest_of_section` is how far that is from the bore's axis, D. The room R - D times the cosine of the angle is a
-lower bound of the distance of the bodies.
+and `farthest_of_section` is how far that is from the bore's axis. The bore's level less the largest level of the part,
+times the cosine of the largest angle of a ruling to the bore's axis, is a lower bound of the distance of the bodies
+(`docs/certified.md`).
 
-Either end of the cylinder may be taken instead of the section beyond it: a disc that leans, seen along the bore an
-ellipse as well.
+Either end may be taken instead of the section beyond it: a disc that leans.
 """
 
 from __future__ import annotations
@@ -25,10 +26,10 @@ from assembly.kinematics.motion import inverse_pose
 from assembly.proximity.clearance.halve import vector
 from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, BY_PLANE, BY_SLEEVE, node_at
 from assembly.proximity.clearance.separation import (
-    farthest_of_disc,
     farthest_of_section,
     highest,
     is_round,
+    most_in_bore,
     placed,
     room_in_bore,
     separation,
@@ -38,11 +39,33 @@ __all__ = ["best_bore", "gap_of"]
 
 # The least cosine of the angle by which a shaft leans at a pose, and on a way from there (`sleeve_sag` in `way.py`).
 UPRIGHT, LEAST_COSINE = 0.98, 0.96
+LARGEST_SINE = 0.28
+# The largest sine of a bore's angle, and slope of what leans in it: bounds of `sleeve_sag` rest on these.
+MOST_SLANT, MOST_SLOPE = 0.62, 1.0
+# A section near the apex of a cone is not asked: where its radius is below this part of the widest one.
+NARROWEST = 0.05
+
+
+@kernel(inline=True)
+def slope_of(node):
+    """By how much a cylinder or cone gets wider for each unit along its first axis."""
+    return 0.5 * (node.less[1] - node.less[0]) / node.half[0]
+
+
+@kernel(inner=True)
+def level_of_section(bore, section, slope, height):
+    """The level of a bore over the section of what leans in it by a plane at a height, at most.
+
+    section: where the axis meets the plane, from the bore's axis, the lean, and the radius across the axis there.
+    """
+    e, lean, radius = section
+    far = farthest_of_section(e, lean, radius, slope)
+    return math.sqrt(1.0 - bore.slant * bore.slant) * far - bore.slant * height
 
 
 @kernel(inner=True)
 def sleeve_room(forest, wall, k, pose, how):
-    """A lower bound of the distance of a cylinder, node k, from the node of a bore that it is in; else negative.
+    """A lower bound of the distance of a cylinder or cone, node k, from the node of a bore around it; else negative.
 
     `how` - BY_SLEEVE: 0 if both its ends are beyond the bore, 1 or 2 if the end along its axis, or the other, is asked.
     The pose is seen from the node with the bore.
@@ -53,33 +76,43 @@ def sleeve_room(forest, wall, k, pose, how):
     cosine = dot(a, u)
     if not abs(cosine) >= UPRIGHT:
         return -math.inf
-    c = sub(placed(pose, vector(node.center)), spine)
-    height = dot(c, u)
+    center = sub(placed(pose, vector(node.center)), spine)
+    height = dot(center, u)
     lean = scale(1.0 / cosine, sub(a, scale(cosine, u)))
-    c = sub(c, scale(height, u))
+    c = sub(center, scale(height, u))
     top, bottom = highest(forest, wall, u) - dot(spine, u), -highest(forest, wall, neg(u)) - dot(spine, u)
     # Where the end along the axis is, and where the other one.
     ahead, behind = (top, bottom) if cosine > 0.0 else (bottom, top)
-    most = 0.0
+    slope, middle = slope_of(node), node.disc - 0.5 * (node.less[0] + node.less[1])
+    upwards = slope if cosine > 0.0 else -slope
     if how - BY_SLEEVE != 1:
-        most = farthest_of_section(add(c, scale(ahead - height, lean)), lean, node.disc)
+        radius = middle + slope * (ahead - height) / cosine
+        if radius < NARROWEST * node.disc:
+            return -math.inf
+        section = add(c, scale(ahead - height, lean)), lean, radius
+        most = level_of_section(bore, section, upwards, ahead)
     else:
-        most = farthest_of_disc(add(c, scale(node.half[0], a)), u, a, node.disc)
+        most = most_in_bore(bore, add(center, scale(node.half[0], a)), a, node.disc - node.less[0])
     if how - BY_SLEEVE != 2:
-        most = max(most, farthest_of_section(add(c, scale(behind - height, lean)), lean, node.disc))
+        radius = middle + slope * (behind - height) / cosine
+        if radius < NARROWEST * node.disc:
+            return -math.inf
+        section = add(c, scale(behind - height, lean)), lean, radius
+        other = level_of_section(bore, section, upwards, behind)
     else:
-        most = max(most, farthest_of_disc(sub(c, scale(node.half[0], a)), u, a, node.disc))
-    return LEAST_COSINE * (bore.bore - most)
+        other = most_in_bore(bore, sub(center, scale(node.half[0], a)), a, node.disc - node.less[1])
+    steep = abs(slope)
+    return (LEAST_COSINE - LARGEST_SINE * steep) / math.sqrt(1.0 + steep * steep) * (bore.bore - max(most, other))
 
 
 @kernel(inner=True)
 def best_sleeve(forest, a, b, pose):
-    """Which sleeve of node a leaves node b, a cylinder, the most room, and that room; BY_PLANE if there is none."""
+    """Which sleeve of node a leaves node b, a cylinder or cone, the most room, and that room; BY_PLANE for none."""
     one, other = node_at(forest.nodes, a), node_at(forest.nodes, b)
     axis = vector(one.ruling)
-    if not one.bore > 0.0 or one.slant > 0.0 or dot(axis, axis) == 0.0 or not is_round(forest, b):
+    if not one.bore > 0.0 or one.slant > MOST_SLANT or dot(axis, axis) == 0.0 or not is_round(forest, b):
         return BY_PLANE, -math.inf
-    if other.rho > 0.0 or not other.half[0] > 0.0 or other.less[0] + other.less[1] > 0.0:
+    if other.rho > 0.0 or not other.half[0] > 0.0 or abs(slope_of(other)) > MOST_SLOPE:
         return BY_PLANE, -math.inf
     how, best = BY_PLANE, -math.inf
     for i in range(3):

@@ -33,6 +33,8 @@ LEAST_SINE, LARGEST_ANGLE = 1e-9, 3.0
 AXIS_OFF = 1e-6
 # How far what leans in a sleeve may turn on a way [rad]: bounds of `sleeve_sag` rest on it.
 MOST_TURN = 0.05
+# A section of a cone in a sleeve is no narrower than this part of its widest disc (`sleeves.NARROWEST`).
+NARROWED = 0.05
 # The largest sine of an angle between a wall's normal and a plane across a shaft (`sag_of_disc`).
 STEEPEST = 0.99
 # The rounding error of the rotation's skew part, whose direction is the axis: that of two matrices and their product.
@@ -154,11 +156,14 @@ def part_along(way, n):
 def sleeve_sag(way, forest, a, b):
     """How far the room of node b in a sleeve of node a may fall, on the way, below the chord of its values at the ends.
 
-    With w the angle of the way, w1 the part of it by which b's axis turns, and primes for derivatives along the way:
-    |s'| <= 1.1 w1, |s''| <= 2 w w1, |e''| <= 1.3 |c''| + z |s''| + 2 |c'| |s'| for the center c of b at a height z from
-    the plane, and r sqrt(1 + (v.s)^2) has a second derivative up to 1.8 r w w1. These hold for angles below 0.25 rad.
-    An end of b instead of a section beyond it, at half the length h along the axis u, has the support v.(c + h u) + r
-    sqrt(1 - (v.u)^2), whose second derivative is less: up to |c''| + h w w1 + 1.5 r w w1.
+    With w the angle of the way, w1 the part of it by which b's axis turns, primes for derivatives along the way, and
+    angles below 0.28 rad: |s'| <= 1.1 w1, |s''| <= 2 w w1, |e''| <= 1.3 |c''| + z |s''| + 2 |c'| |s'| for the center c
+    of b at a height z from the plane. The radius r + S z / cos in the plane has derivatives up to S (1.05 |c'| + 0.31 z
+    w1) and S (1.05 |c''| + 0.61 |c'| w1 + 1.27 z w w1), and the factor of it, sqrt(1 + (v.s)^2) of a cylinder, has a
+    second derivative up to 1.8 w w1; of a cone it is below 1.48 with derivatives up to 3.5 w1 and 22 w w1.
+    (`docs/derivations.md`, "Cones in sleeves").
+    An end of b instead of a section beyond it, at half the length h along the axis u, has the support N.(c + h u) + r
+    sqrt(1 - (N.u)^2), whose second derivative is less: up to |c''| + h w w1 + 1.5 r w w1; in a cone 14.2 for the 1.5.
     """
     wall, node = node_at(forest.nodes, a), node_at(forest.nodes, b)
     u, axis = vector(wall.ruling), vector(node.axes[0])
@@ -176,8 +181,14 @@ def sleeve_sag(way, forest, a, b):
     top, bottom = highest(forest, a, u), -highest(forest, a, neg(u))
     before, after = dot(placed(way.before, center), u), dot(placed(way.after, center), u)
     far = max(max(top, bottom, before, after) - min(top, bottom, before, after), node.half[0]) + bent
-    second = 1.3 * bent + (2.0 * far + 1.8 * node.disc) * angle * turned + 2.2 * pace * turned
-    return 0.125 * second
+    slope = 0.5 * abs(node.less[1] - node.less[0]) / node.half[0]
+    widest = node.disc + 1.05 * slope * far
+    bend = 1.8 if slope == 0.0 and wall.slant == 0.0 else 22.0
+    second = (1.3 + 1.54 * slope) * bent + (2.2 + 8.2 * slope) * pace * turned
+    second += ((2.0 + 4.0 * slope) * far + bend * widest) * angle * turned
+    sag = 0.125 * second
+    # What a section's radius may lose must not bring it to the apex.
+    return math.inf if slope > 0.0 and sag > NARROWED * node.disc else sag
 
 
 @kernel(inner=True)

@@ -18,7 +18,7 @@ from assembly.proximity.clearance.separation import farthest_of_section
 from assembly.proximity.clearance.sleeves import LEAST_COSINE, best_sleeve, sleeve_room
 from assembly.proximity.clearance.way import pose_at, sleeve_sag, way_of
 from tests.proximity.clearance.nodes import forest_of, tree_of
-from tests.proximity.clearance.scenes import faces_of
+from tests.proximity.clearance.scenes import direction, faces_of
 
 BORE, HEIGHT, SHAFT = 1.03, 2.0, 1.0
 PLATE = asm.shapes.plate(6, 6, HEIGHT, [(0, 0, BORE)])
@@ -67,7 +67,7 @@ def test_the_farthest_point_of_a_section(cases):
         angles = np.linspace(0.0, 2.0 * np.pi, 200)
         best = angles[int(np.argmin([off(angle) for angle in angles]))]
         found = minimize_scalar(off, bounds=(best - 0.05, best + 0.05), method="bounded", options={"xatol": 1e-10})
-        told = farthest_of_section(tuple(e), tuple(lean), SHAFT)
+        told = farthest_of_section(tuple(e), tuple(lean), SHAFT, 0.0)
         assert told >= -found.fun - 1e-14
         # Six steps of Newton's method are exact unless the offset is about what leaning adds to the radius.
         is_far = np.linalg.norm(e) > 10.0 * SHAFT * slope * slope
@@ -142,3 +142,111 @@ def test_no_way_takes_more_of_the_room_than_told(cases):
             closest = max(closest, (ends - min(rooms)) / sag if sag < np.inf else 0.0)
     # Not a bound that nothing comes near.
     assert closest > 0.01
+
+
+# Radii of a seat's bore at heights of -1 and 1, and of what is in it at -half and half of its length.
+TAPERED = {
+    "plug in a seat": ((0.7, 1.3), (0.4, 1.6), 4.0),
+    "plug that ends in it": ((0.7, 1.3), (0.82, 1.25), 1.5),
+    "plug the other way up": ((1.3, 0.7), (1.6, 0.4), 4.0),
+    "pin in a seat": ((1.03, 1.6), (1.0, 1.0), 5.0),
+    "cone in a bore": ((1.03, 1.03), (0.55, 1.0), 2.5),
+}
+
+
+def tapered_scene(name):
+    """The packed trees of a seat and of what is in it, the root of one and the node of the other's wall."""
+    (low, high), (narrow, wide), length = TAPERED[name]
+    profile = [(low, -1), (3, -1), (3, 1), (high, 1)], [(0, -length / 2), (narrow, -length / 2), (wide, length / 2)]
+    seat, plug = asm.curves.polygon(profile[0]), asm.curves.polygon([*profile[1], (0, length / 2)])
+    forest = forest_of(*(faces_of(asm.shapes.revolution(each)) for each in (seat, plug)))
+    table, pool, faces, links, nodes, used = forest.arrays
+    kinds, rows = tree_of(forest)
+    second = np.arange(len(kinds)) >= forest.roots[1]
+    is_wall = second & (kinds.face == NONE) & (rows.disc > 0.0) & (rows.half[:, 0] > 0.4 * length)
+    (wall,) = np.flatnonzero(is_wall & (rows.rho == 0.0))
+    return Forest(Store(table, pool), faces, links, nodes, used), int(forest.roots[0]), int(wall)
+
+
+def distance_from_plug(points, name):
+    """Of points from a plug about the z axis, negative inside of its wall."""
+    _, (narrow, wide), length = TAPERED[name]
+    off, slope = np.hypot(points[:, 0], points[:, 1]), (wide - narrow) / length
+    beyond = off - (0.5 * (narrow + wide) + slope * points[:, 2])
+    wall = beyond / np.hypot(1.0, slope)
+    # Where the nearest place on a ruling is beyond an end, the end's disc is nearer to the point than told by the wall.
+    along = points[:, 2] + slope * beyond / (1.0 + slope * slope)
+    end = np.clip(along, -0.5 * length, 0.5 * length)
+    radius = 0.5 * (narrow + wide) + slope * end
+    beside = np.hypot(np.maximum(off - radius, 0.0), points[:, 2] - end)
+    return np.where(np.abs(along) > 0.5 * length, beside, wall)
+
+
+@pytest.mark.parametrize("slope", [-0.9, -0.3, 1e-6, 0.6])
+def test_the_section_of_a_cone(slope, cases):
+    """All its points are within what is told, and one is nearly there: points of rulings in the plane."""
+    rng = np.random.default_rng(4)
+    angle = np.linspace(0.0, 2.0 * np.pi, 4001)
+    for _ in range(cases(20, 1000)):
+        lean = 0.28 * rng.random() * np.append(direction(rng)[:2], 0.0)
+        e, radius = np.append(rng.normal(scale=0.3, size=2), 0.0), rng.uniform(0.3, 1.0)
+        axis = (lean + (0.0, 0.0, 1.0)) / np.hypot(1.0, np.linalg.norm(lean))
+        first = np.cross(axis, (1.0, 0.0, 0.0))
+        first /= np.linalg.norm(first)
+        out = np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * np.cross(axis, first)
+        # e + t axis + (radius + slope t) out is at height zero.
+        t = -radius * out[:, 2] / (axis[2] + slope * out[:, 2])
+        points = e + t[:, None] * axis + (radius + slope * t)[:, None] * out
+        assert np.abs(points[:, 2]).max() < 1e-12
+        far = np.linalg.norm(points, axis=1).max()
+        told = farthest_of_section(tuple(e), tuple(lean), radius, slope)
+        assert far - 1e-14 <= told <= far * (1.0 + 1e-4)
+
+
+@pytest.mark.parametrize("name", TAPERED)
+def test_the_room_of_tapered_shafts_is_less_than_the_distance(name, cases):
+    """By samples of the seat's wall and rims, seen from the plug; only where it is near the seat none is told."""
+    rng, roomy = np.random.default_rng(5), 0
+    forest, seat, wall = tapered_scene(name)
+    (low, high), (narrow, wide), length = TAPERED[name]
+    angle, z = rng.uniform(0.0, 2.0 * np.pi, 8000), np.clip(rng.uniform(-1.3, 1.3, 8000), -1.0, 1.0)
+    radius = 0.5 * (low + high) + 0.5 * z * (high - low)
+    of_bore = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
+    lean = 0.06 if "end" in name else 0.03
+    for _ in range(cases(60, 2000)):
+        turn = leaning(rng, lean)
+        # Toward where the seat gets wider.
+        shift = np.array([*rng.normal(scale=0.01, size=2), rng.uniform(-0.05, 0.3) * (1.0 if high >= low else -1.0)])
+        how, room = best_sleeve(forest, seat, wall, relative(turn, shift))
+        least = distance_from_plug(turn.inv().apply(of_bore - shift), name).min()
+        if room > 0.0:
+            assert how >= BY_SLEEVE and room <= least + 1e-12
+            roomy += 1
+        else:
+            # What is not told is near, or in the wall.
+            assert least < 0.05
+    assert roomy > 3
+
+
+@pytest.mark.parametrize("name", TAPERED)
+def test_no_way_takes_more_of_a_tapered_room_than_told(name, cases):
+    """As of shafts: at any part of a way."""
+    rng = np.random.default_rng(6)
+    forest, seat, wall = tapered_scene(name)
+    told = 0
+    for k in range(cases(12, 400)):
+        size = 10.0 ** -rng.uniform(0, 2)
+        before = leaning(rng, 0.1), np.array([*rng.normal(scale=0.01, size=2), rng.uniform(-0.3, 0.3)])
+        spin = Rotation.from_rotvec((0.0, 0.0, size * rng.normal() * (k % 2)))
+        after = leaning(rng, 0.04 * size) * before[0] * spin, before[1] + size * rng.normal(scale=(0.05, 0.05, 0.3))
+        poses = relative(*before), relative(*after)
+        way = way_of(*poses, (0.0, 0.0, 0.3 * rng.normal()), 4.0, True)
+        sag = sleeve_sag(way, forest, seat, wall)
+        for how in range(BY_SLEEVE, BY_SLEEVE + 3):
+            ends = min(sleeve_room(forest, seat, wall, pose, how) for pose in poses)
+            if sag == np.inf or ends == -np.inf:
+                continue
+            rooms = [sleeve_room(forest, seat, wall, pose_at(way, s), how) for s in np.linspace(0.0, 1.0, 9)]
+            assert min(rooms) >= ends - sag - 1e-13
+            told += 1
+    assert told > 5
