@@ -34,6 +34,8 @@ SHORTEST_RADIUS = 1e-7
 # The part of a budget in which the loop may begin steps, where what it ends at has to be proven: proofs take less than
 # loops, and most end at once. Halved: one in five ticks more is LATE. Twice the rest: as many as now.
 LOOP_SHARE = 0.8
+# Made once: to make one of a type with a parameter takes half a microsecond.
+_NO_PAIRS: frozenset[int] = frozenset()
 # What the loop says of a tick whose pose holds.
 _STATUSES = {SOLVED: TrackStatus.FOLLOWED, OUT_OF_TIME: TrackStatus.LATE}
 
@@ -47,7 +49,7 @@ class Ticks(TickMemory):
         Some pairs have no rows at first, or those of earlier ticks (`proven_pairs.py`). Where the proof refuses a pose,
         they get the rows of the last one, once, and the tick begins again.
         """
-        begun_again = frozenset[int]()
+        begun_again = _NO_PAIRS
         clear = self._clear
         while True:
             if clear is not None:
