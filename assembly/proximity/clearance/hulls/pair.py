@@ -143,8 +143,9 @@ class _Gaps:
         """Contacts of a face in a hollow with half spaces around that."""
         is_first = number < len(self.a.hollows)
         hollow = (*self.a.hollows, *self.b.hollows)[number][1]
-        inward, borders = hollow.planes()
-        heights = -(self.b if is_first else self.a).reach(-inward)[face_b if is_first else face_a]
+        other, face = (self.b, face_b) if is_first else (self.a, face_a)
+        inward, borders = hollow.planes(other.discs.centers[other.first[other.of_face[face]]])
+        heights = -other.reach(-inward)[face]
         gaps = heights - borders
         # The depth in a hollow is a bound, and may be less than all of these: then the least one stands for it.
         ones = np.flatnonzero(gaps <= max(below, float(gaps.min())))
