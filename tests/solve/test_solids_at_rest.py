@@ -69,6 +69,28 @@ def test_a_contact_that_ends_where_it_touches_is_not_updated_forever(cases):
     assert solved >= int(0.9 * 2 * len(scenes))
 
 
+def test_a_ring_comes_to_rest_on_a_ball(cases):
+    """Along all of a circle, with a least gap or without: all of 24 are SOLVED, and none was by extrema alone."""
+    for number in range(cases(2, 24)):
+        rng, gap = np.random.default_rng([31, number]), 0.05 * (number % 2)
+        turn = Rotation.random(random_state=int(rng.integers(1 << 30)))
+        way = rng.normal(size=3)
+        ball = asm.Body("ball", asm.shapes.sphere(0.5), fixed=True)
+        place = 1.5 * way / np.linalg.norm(way)
+        ring = asm.Body("ring", asm.shapes.torus(0.5, 0.15), place, turn.as_quat(scalar_first=True))
+        scene = asm.Assembly([ball, ring])
+        scene.constrain(asm.Clearance(minimum=gap))
+        scene.minimize(asm.PointDistance(ring.point(*(0.05 * rng.normal(size=3))), 0.05 * rng.normal(size=3)))
+        solution = scene.solve()
+        assert solution.success and solution.proved, number
+        axis = Rotation.from_quat(solution.q[1, 3:], scalar_first=True).apply([0.0, 0.0, 1.0])
+        height = solution.q[1, :3] @ axis
+        off = np.linalg.norm(solution.q[1, :3] - height * axis)
+        # The ball's center is on the ring's axis, and the ring's circle as far from it as both radii and the gap say.
+        assert off < 1e-9 and abs(np.hypot(0.5 - off, height) - (0.65 + gap)) < 1e-9
+        assert len(solution.contacts) <= 12
+
+
 def test_a_solve_that_began_again_tells_of_all_its_steps():
     again = 0
     for number in (2, 9):

@@ -79,8 +79,16 @@ def slot_count(kept: Kept, pairs: Sequence[SidePair]) -> int:
 
 
 def is_of_surfaces(pair: SidePair) -> bool:
-    """Whether contacts of two bodies are of two surfaces; else they are of solids."""
-    return all(is_one_smooth(side_faces(side)) for side in pair)
+    """Whether contacts of two bodies are of two surfaces; else they are of solids.
+
+    A round wire and a body that is none may touch along all of a circle, as a ring and a ball that it lies on: points
+    of such a continuum are held in place only where features are (`proximity/manager/continua.py`).
+    """
+    both = [side_faces(side) for side in pair]
+    if not all(map(is_one_smooth, both)):
+        return False
+    first, second = (spine_of(faces[0]) is None for faces in both)
+    return first == second
 
 
 class WatchedPairs(NamedTuple):

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.proximity.clearance.hulls.face_hulls import hulls_of_face
-from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism
+from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Tube
 
 __all__ = ["BodyHulls", "hulls_of_body"]
 
@@ -49,8 +49,8 @@ class BodyHulls:
         Where each face begins among the hulls.
     points, owner : (p, 3), (p,) of int
         Points that are on faces, corners among them, and the face of each.
-    hollows : tuple of (int, Hollow or Prism)
-        Convex sets into whose inside no point of a face goes, with the face.
+    hollows : tuple of (int, Hollow, Prism or Tube)
+        Sets into whose inside no point of a face goes, with the face.
     directions : (d, 3)
         Normals of flat faces and axes, up to their senses.
     centers, axes : (r, 3)
@@ -63,7 +63,7 @@ class BodyHulls:
     of_face: Table
     points: Array
     owner: Table
-    hollows: tuple[tuple[int, Hollow | Prism], ...]
+    hollows: tuple[tuple[int, Hollow | Prism | Tube], ...]
     directions: Array
     centers: Array
     axes: Array
@@ -73,12 +73,15 @@ class BodyHulls:
         rows = self.discs.reach(normals)
         return np.minimum.reduceat(np.maximum.reduceat(rows, self.first) + self.pad[:, None], self.of_face)
 
-    def within(self, hollow: Hollow | Prism) -> Array:
+    def within(self, hollow: Hollow | Prism | Tube) -> Array:
         """How far every face is from the border of a hollow that it is within, at least: (f,); below zero outside."""
         rows = hollow.depth(self.discs)
+        if isinstance(hollow, Tube):
+            # It is not convex: what is in it with all of its discs need not be.
+            rows[~self.is_ball] = -np.inf
         return np.maximum.reduceat(np.minimum.reduceat(rows, self.first) - self.pad, self.of_face)
 
-    def nearest(self, hollow: Hollow | Prism, face: int) -> Array:
+    def nearest(self, hollow: Hollow | Prism | Tube, face: int) -> Array:
         """The middle of the disc of a face (3,) that is nearest to the border of a hollow around it."""
         ends = np.append(self.first, len(self.discs.radii))
         last = self.of_face[face + 1] if face + 1 < len(self.of_face) else len(self.first)
@@ -118,6 +121,12 @@ class BodyHulls:
             left * self.centers + shift,
             self.axes,
         )
+
+    @cached_property
+    def is_ball(self) -> NDArray[np.bool_]:
+        """Whether each disc is a point, and all of its hull but for the radius around it: (m,)."""
+        sizes = np.diff(np.append(self.first, len(self.discs.radii)))
+        return np.asarray((np.repeat(sizes, sizes) == 1) & (self.discs.radii == 0.0))
 
     @cached_property
     def ball(self) -> tuple[Array, float]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sphere, Torus
 from assembly.proximity.clearance.hulls.flat_hulls import hulls_of_flat
-from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, parts_of_one
+from assembly.proximity.clearance.hulls.hollows import Discs, FaceHulls, Hollow, Prism, Tube, parts_of_one
 from assembly.proximity.manifolds.elementary_faces import nearly_elementary
 from assembly.proximity.manifolds.flat_map import FlatMap, flat_map
 
@@ -73,8 +73,11 @@ def _of_form(form: Form) -> tuple[Discs, float] | None:
     return None
 
 
-def _hollow(form: Form, sign: int) -> list[Hollow | Prism]:
-    """What is within a face's cylinder, cone or sphere, without what the face may be off it."""
+def _hollow(form: Form, sign: int) -> list[Hollow | Prism | Tube]:
+    """What is within a face's cylinder, cone or sphere, without what the face may be off it; what is beside a torus.
+
+    Of a torus that is the cylinder through it as well.
+    """
     if isinstance(form, Sphere):
         return [Hollow(form.center, np.zeros(3), form.radius - form.deviation, 0.0, form.outward != (sign > 0))]
     if isinstance(form, Cylinder):
@@ -82,6 +85,14 @@ def _hollow(form: Form, sign: int) -> list[Hollow | Prism]:
     if isinstance(form, Cone):
         off = form.deviation / cos(form.half_angle)
         return [Hollow(form.apex, form.axis, -off, form.half_angle, form.outward != (sign > 0))]
+    if isinstance(form, Torus):
+        is_solid = form.outward == (sign > 0)
+        outer, inner = form.minor + form.deviation, form.minor - form.deviation
+        return [
+            Hollow(form.center, form.axis, form.major - outer, 0.0, is_solid),
+            Tube(form.center, form.axis, form.major, outer, True, is_solid),
+            Tube(form.center, form.axis, form.major, inner, False, not is_solid),
+        ]
     return []
 
 

@@ -1,16 +1,19 @@
-"""Discs, what hulls are made of, and hollows: convex sets into which a face does not go."""
+"""Discs, what hulls are made of, and hollows: convex sets into which a face does not go, and tubes, for balls alone."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Discs", "FaceHulls", "Hollow", "Prism", "parts_of_one"]
+__all__ = ["Discs", "FaceHulls", "Hollow", "Prism", "Tube", "parts_of_one"]
 
 Array = NDArray[np.float64]
+# [radii] A point so near to an axis is on it: rounding decides where it is seen from there.
+ON_AXIS = 1e-9
 
 
 class Discs(NamedTuple):
@@ -79,7 +82,7 @@ class Hollow(NamedTuple):
         """How far points (m, 3) are within."""
         return self.depth(Discs.of_points(points))
 
-    def planes(self, near: Array, count: int = 12) -> tuple[Array, Array]:
+    def planes(self, near: Array) -> tuple[Array, Array]:
         """Some half spaces that it is in: unit vectors inward (m, 3), and the heights of their borders.
 
         The first touches the hollow where that is nearest to a point: what lies along a wall is moved straight off it.
@@ -90,13 +93,9 @@ class Hollow(NamedTuple):
             ways = np.concatenate([away[None] / length, _SPHERE]) if length > 0.0 else _SPHERE
             return -ways, -ways @ self.center - self.radius
         across = away - (away @ self.axis) * self.axis
-        length = float(np.linalg.norm(across))
-        if not length > 0.0:
+        if not np.linalg.norm(across) > 0.0:
             across = np.cross(self.axis, np.eye(3)[np.abs(self.axis).argmin()])
-            length = float(np.linalg.norm(across))
-        across /= length
-        angle = 2.0 * pi / count * np.arange(count)[:, None]
-        around = np.cos(angle) * across + np.sin(angle) * np.cross(self.axis, across)
+        around = _around(self.axis, across)
         inward = sin(self.slope) * self.axis - cos(self.slope) * around
         return inward, inward @ self.center - self.radius * cos(self.slope)
 
@@ -148,6 +147,76 @@ class Prism(NamedTuple):
         return self._replace(borders=left * self.borders + self.inward @ shift)
 
 
+class Tube(NamedTuple):
+    """What is outside of a torus, or inside of its tube: not convex, but how far a ball is in it is known exactly.
+
+    Attributes
+    ----------
+    center, normal : (3,)
+        Of the circle of the tube's middles.
+    major : float
+        The radius of that circle.
+    minor : float
+        Of the tube.
+    outside : bool
+        Whether it is the outside.
+    is_wall : bool
+        As of a Hollow.
+    """
+
+    center: Array
+    normal: Array
+    major: float
+    minor: float
+    outside: bool
+    is_wall: bool
+    # No half line is known to stay in it.
+    axis: Array = np.zeros(3)
+    slope: float = 0.0
+
+    def depth(self, discs: Discs) -> Array:
+        """How far the centers of discs (m,) are within: of balls, which are points with a radius, their centers."""
+        return self.depth_of(discs.centers)
+
+    def depth_of(self, points: Array) -> Array:
+        """How far points (m, 3) are within."""
+        away = points - self.center
+        height = away @ self.normal
+        beside = np.sqrt(((away - height[:, None] * self.normal) ** 2).sum(axis=1))
+        over = np.hypot(beside - self.major, height) - self.minor
+        return np.asarray(over if self.outside else -over)
+
+    def planes(self, near: Array) -> tuple[Array, Array]:
+        """Half spaces at whose borders the tube is, where it is next to a point (3,), and around from there."""
+        away = near - self.center
+        beside = away - (away @ self.normal) * self.normal
+        if not np.linalg.norm(beside) > ON_AXIS * self.major:
+            beside = np.cross(self.normal, np.eye(3)[np.abs(self.normal).argmin()])
+        around = _around(self.normal, beside)
+        # A ball within the tube touches it at its nearest point alone.
+        feet = self.center + self.major * (around if self.outside else around[:1])
+        ways = near - feet
+        lengths = np.linalg.norm(ways, axis=1)
+        feet, ways = feet[lengths > 0.0], ways[lengths > 0.0] / lengths[lengths > 0.0, None]
+        inward = ways if self.outside else -ways
+        return inward, (inward * feet).sum(axis=1) + (self.minor if self.outside else -self.minor)
+
+    def posed(self, turn: Array, shift: Array) -> Tube:
+        """The same after x -> turn x + shift."""
+        return self._replace(center=turn @ self.center + shift, normal=turn @ self.normal)
+
+    def scaled(self, left: float, shift: Array) -> Tube:
+        """The same after x -> left x + shift."""
+        return self._replace(center=left * self.center + shift, major=left * self.major, minor=left * self.minor)
+
+
+def _around(axis: Array, first: Array, count: int = 12) -> Array:
+    """Unit vectors (count, 3) across an axis, equally far apart, from one of any length that is across it."""
+    across = first / np.linalg.norm(first)
+    angle = 2.0 * pi / count * np.arange(count)[:, None]
+    return np.asarray(np.cos(angle) * across + np.sin(angle) * np.cross(axis, across))
+
+
 _SPHERE = np.array([[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z], dtype=float)
 _SPHERE /= np.linalg.norm(_SPHERE, axis=1, keepdims=True)
 
@@ -159,7 +228,7 @@ class FaceHulls(NamedTuple):
     ----------
     hulls : list of (Discs, float)
         Each with the radius of a ball around all of it.
-    hollows : list of Hollow or Prism
+    hollows : sequence of Hollow, Prism or Tube
     points : (p, 3)
         Points of it.
     direction : (3,) or None
@@ -169,7 +238,7 @@ class FaceHulls(NamedTuple):
     """
 
     hulls: list[tuple[Discs, float]]
-    hollows: list[Hollow | Prism]
+    hollows: Sequence[Hollow | Prism | Tube]
     points: Array
     direction: Array | None
     line: tuple[Array, Array] | None

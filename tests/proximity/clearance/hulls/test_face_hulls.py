@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly.geometry.shapes.plane_curves import circle
 from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body
-from assembly.proximity.clearance.hulls.hollows import Discs, Hollow, Prism
+from assembly.proximity.clearance.hulls.hollows import Discs, Hollow, Prism, Tube
 from assembly.proximity.clearance.hulls.triangles import triangles_of
 from tests.proximity.clearance.scenes import direction, faces_of
 from tests.studies.machined import bolt, socket, turned_part
@@ -135,6 +135,26 @@ def test_depths_of_discs_are_bounds(hollow):
             inside += 1
             assert (rim @ inward.T >= borders - 1e-12).all()
     assert inside > 5
+
+
+@pytest.mark.parametrize("outside", [True, False])
+def test_a_tube_and_a_ball_are_apart_by_what_samples_say(outside):
+    """The depth of a ball's center less its radius is the distance to samples, and half spaces say no less of it."""
+    rng = np.random.default_rng(8)
+    tube = Tube(np.array([0.1, -0.2, 0.3]), direction(rng), 2.0, 0.6, outside, True)
+    angle, around = (grid.ravel() for grid in np.meshgrid(*[np.linspace(0.0, 2.0 * np.pi, 400)] * 2))
+    across = np.linalg.svd(tube.normal[None])[2][1:]
+    ways = np.cos(angle)[:, None] * across[0] + np.sin(angle)[:, None] * across[1]
+    sides = np.cos(around)[:, None] * ways + np.sin(around)[:, None] * tube.normal
+    surface = tube.center + tube.major * ways + tube.minor * sides
+    for k in range(20):
+        center = tube.center + tube.normal if k == 0 else surface[rng.integers(len(surface))] + 0.5 * rng.normal(size=3)
+        depth, sampled = tube.depth_of(center[None])[0], np.linalg.norm(surface - center, axis=1).min()
+        # Samples are up to 0.03 from each other.
+        assert abs(depth) <= sampled + 1e-12 and sampled <= abs(depth) + 0.03
+        inward, borders = tube.planes(center)
+        least = (inward @ center - borders).min()
+        assert abs(least - depth) < 1e-12
 
 
 def test_poses_and_scales_move_all_of_it():

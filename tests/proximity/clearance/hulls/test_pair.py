@@ -21,6 +21,8 @@ from tests.validation.crossing_judge import Motion, crossing_depth
 
 TOUCHING = 1e-7
 PLATE = asm.shapes.plate(60, 40, 10, [(0, 0, 4.0)])
+# How far from a ring of 5 by 1.5 a ball of 5 is that lies on it, along the axis.
+ON_RING = (6.5**2 - 5.0**2) ** 0.5
 
 
 def dovetail(wider=0.0):
@@ -43,6 +45,8 @@ FITS = {
     "a bore over its pin": lambda off: (asm.shapes.solid_cylinder(4 + off, 40), PLATE, at(0, 0, 4)),
     "a bolt on its plate": lambda off: (PLATE, bolt(4 + off, 30, 6.5, 8), at(0, 0, 5)),
     "a ball in its socket": lambda off: (socket(10, 18, 16), asm.shapes.sphere(10 + off), at(0, 0, 0)),
+    "a ball on a ring": lambda off: (asm.shapes.torus(5, 1.5), asm.shapes.sphere(5 + off), at(0, 0, ON_RING)),
+    "a ring around a ball": lambda off: (asm.shapes.sphere(5 + off), asm.shapes.torus(5, 1.5), at(0, 0, ON_RING)),
     "a plug in its seat": lambda off: (*plug(2.0 * off), at(0, 0, 0)),
     "a dovetail": lambda off: (*dovetail(2.0 * off), at(0, 0, 3)),
     "a block in a square hole": lambda off: (
@@ -167,6 +171,21 @@ def test_pairs_that_all_but_fit_are_judged(names, cases):
         found += answer is not None
         assert answer is None or depth <= answer.depth + 1e-13, (names, pose, t)
     assert found
+
+
+def test_balls_beside_rings_are_judged():
+    """Anywhere about a ring, also in its hole: what is told is the distance, and it is told wherever they are apart."""
+    rng, ring, told_of = np.random.default_rng(7), asm.shapes.torus(0.5, 0.15), 0
+    for _ in range(60):
+        radius, place = rng.uniform(0.1, 0.5), 0.5 * rng.normal(size=3)
+        distance = np.hypot(np.hypot(*place[:2]) - 0.5, place[2]) - 0.15 - radius
+        turned = np.r_[place, Rotation.random(rng=rng).as_quat(scalar_first=True)]
+        answer = told(ring, asm.shapes.sphere(radius), turned)
+        assert (answer is not None) == (distance > -TOUCHING)
+        if answer is not None:
+            assert answer.bound <= distance + 1e-14
+            told_of += 1
+    assert told_of > 20
 
 
 def test_of_a_scene_all_pairs_or_none():
