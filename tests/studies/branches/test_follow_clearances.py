@@ -244,6 +244,28 @@ def test_a_ball_is_drawn_into_a_corner():
     np.testing.assert_allclose(closed.place, [1.0, 0.0, 0.5], rtol=0, atol=1e-12)
 
 
+def test_a_ball_pushes_another_one_to_a_wall():
+    """Weights 1 and 1/2 share the way that is left once they touch; at the wall both stand."""
+    wall = asm.Body("wall", asm.shapes.box(1, 4, 4), position=(2, 0, 0), fixed=True)
+    drawn = asm.Body("drawn", asm.shapes.sphere(0.5), position=(-3, 0, 0))
+    pushed = asm.Body("pushed", asm.shapes.sphere(0.5))
+    goal = asm.FrameDistance(drawn.frame(), asm.Pose((-3, 0, 0)))
+    scene = asm.Assembly([wall, drawn, pushed])
+    scene.constrain(asm.Clearance())
+    scene.minimize(goal)
+    scene.minimize(asm.FrameDistance(pushed.frame(), asm.Pose((0, 0, 0)), weight=0.5))
+    measures = [asm.Measure(drawn, "x"), asm.Measure(pushed, "x")]
+    branch = asm.follow(scene, asm.Parameter(goal, "target", "x"), -4.0, 3.0, of=measures, swept=True)
+    closed = branch.events_of("contact closed")
+    assert [event.bodies for event in closed] == [("drawn", "pushed"), ("pushed", "wall")]
+    np.testing.assert_allclose([event.value for event in closed], [-1.0, 0.5], rtol=0, atol=1e-12)
+    x = branch.values
+    first = np.minimum(np.where(x < -1.0, x, (x - 0.5) / 1.5), 0.0)
+    second = np.where(x < -1.0, 0.0, first + 1.0)
+    np.testing.assert_allclose(branch.measures, np.column_stack([first, second]), rtol=0, atol=1e-12)
+    assert branch.proved.all() and branch.depth < 1e-12
+
+
 def ball_before_a_wall(shape, clearance=None):
     """A ball at 1, driven about 0, and a wall at 2.5."""
     base = asm.Body("base", fixed=True)
