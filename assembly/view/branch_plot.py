@@ -12,7 +12,15 @@ if TYPE_CHECKING:
 __all__ = ["plot_branch"]
 
 # How events are marked.
-_MARKS = {"turning point": "o", "crossing": "X", "end of range": "|", "closed loop": "."}
+_MARKS = {
+    "turning point": "o",
+    "crossing": "X",
+    "end of range": "|",
+    "closed loop": ".",
+    "contact closed": "v",
+    "contact opened": "^",
+    "contact over an edge": "D",
+}
 
 
 def plot_branch(branch: Branch) -> Figure:
@@ -31,6 +39,8 @@ def plot_branch(branch: Branch) -> Figure:
             events = branch.events_of(kind)
             places = [event.value for event in events], [column[event.row] for event in events]
             panel.plot(*places, _MARKS.get(kind, "s"), color=f"C{k + 1}", label=kind)
+        if not branch.proved.all():
+            panel.plot(branch.values[~branch.proved], column[~branch.proved], "x", color="black", label="not proved")
         panel.set_xlabel(f"{branch.parameter.name} [{branch.parameter.unit or '1'}]")
         panel.set_ylabel(name)
         panel.legend(frameon=False)

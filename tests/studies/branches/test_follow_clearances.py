@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from math import asin, cos, hypot, pi, sin, sqrt
 
 import numpy as np
@@ -46,6 +47,16 @@ def test_an_arm_is_blocked_by_a_post(swept):
     # What is swept is off the straight ways that are proven by 1e-4 of the size at most.
     assert 0.0 <= branch.depth <= 3e-4 if swept else np.isnan(branch.depth)
     assert drive.angle == 0.0
+
+
+@pytest.mark.parametrize("before", [0.0, 1e-10])
+def test_a_branch_that_begins_where_it_is_blocked_goes_the_other_way(before):
+    scene, drive = swinging_arm()
+    drive.angle = MEETS_POST - before
+    branch = asm.follow(scene, asm.Parameter(drive, "angle"), -0.3, 3.0)
+    assert branch.ends == ("end of range", "blocked") and len(branch.values) > 5
+    assert branch.values[-1] == pytest.approx(MEETS_POST, abs=1e-14) and branch.values[0] == -0.3
+    assert branch.proved.all()
 
 
 class BlockedFourBar:
@@ -117,6 +128,11 @@ def test_a_four_bar_whose_post_is_out_of_reach_closes_its_loop():
     branch = asm.follow(bar.scene, angle, -7.0, 7.0, start=bar.scene.solve(bar.q))
     assert branch.closed and branch.closure < 1e-12 and branch.ends == ("closed loop", "closed loop")
     assert branch.proved.all() and bar.apart(branch) < 1e-13
+    # Where nothing touches the branch has the bits that it has without the clearance.
+    bar.scene.remove("clearance")
+    alone = asm.follow(bar.scene, angle, -7.0, 7.0, start=bar.scene.solve(bar.q))
+    assert alone.poses.tobytes() == branch.poses.tobytes() and alone.values.tobytes() == branch.values.tobytes()
+    assert "proved" not in alone.table.dtype.names and alone.proved.all()
 
 
 def block_on_plate(height):
@@ -228,6 +244,28 @@ def test_a_ball_is_drawn_into_a_corner():
     np.testing.assert_allclose(closed.place, [1.0, 0.0, 0.5], rtol=0, atol=1e-12)
 
 
+def test_a_ball_pushes_another_one_to_a_wall():
+    """Weights 1 and 1/2 share the way that is left once they touch; at the wall both stand."""
+    wall = asm.Body("wall", asm.shapes.box(1, 4, 4), position=(2, 0, 0), fixed=True)
+    drawn = asm.Body("drawn", asm.shapes.sphere(0.5), position=(-3, 0, 0))
+    pushed = asm.Body("pushed", asm.shapes.sphere(0.5))
+    goal = asm.FrameDistance(drawn.frame(), asm.Pose((-3, 0, 0)))
+    scene = asm.Assembly([wall, drawn, pushed])
+    scene.constrain(asm.Clearance())
+    scene.minimize(goal)
+    scene.minimize(asm.FrameDistance(pushed.frame(), asm.Pose((0, 0, 0)), weight=0.5))
+    measures = [asm.Measure(drawn, "x"), asm.Measure(pushed, "x")]
+    branch = asm.follow(scene, asm.Parameter(goal, "target", "x"), -4.0, 3.0, of=measures, swept=True)
+    closed = branch.events_of("contact closed")
+    assert [event.bodies for event in closed] == [("drawn", "pushed"), ("pushed", "wall")]
+    np.testing.assert_allclose([event.value for event in closed], [-1.0, 0.5], rtol=0, atol=1e-12)
+    x = branch.values
+    first = np.minimum(np.where(x < -1.0, x, (x - 0.5) / 1.5), 0.0)
+    second = np.where(x < -1.0, 0.0, first + 1.0)
+    np.testing.assert_allclose(branch.measures, np.column_stack([first, second]), rtol=0, atol=1e-12)
+    assert branch.proved.all() and branch.depth < 1e-12
+
+
 def ball_before_a_wall(shape, clearance=None):
     """A ball at 1, driven about 0, and a wall at 2.5."""
     base = asm.Body("base", fixed=True)
@@ -278,6 +316,9 @@ def test_what_touches_all_around_is_told_by_rows_and_not_proven():
     assert branch.values[0] == pytest.approx(0.1 + sqrt(0.5**2 - 0.35**2), abs=1e-12)
     assert hypot(*branch.events[0].place[:2]) == pytest.approx(0.35, abs=1e-12)
     assert not branch.proved[0] and branch.proved[1:].all()
+    if find_spec("matplotlib"):
+        labels = {text.get_text() for text in branch.plot().axes[0].get_legend().get_texts()}
+        assert labels == {"contact closed", "end of range", "not proved"}
 
 
 def test_the_same_again_whatever_was_solved_before():
