@@ -35,6 +35,8 @@ def crossings(values: Array, at: Array, function: Callable[[Array], Array], join
         found.append(at[(sides == 0.0).any(axis=1)])
         k, j = np.nonzero(sides[:-1] * sides[1:] < 0.0)
         rows.append((at[k], at[k + 1], sides[k, j], sides[k + 1, j], np.full(k.size, axis), row[j]))
+    if not any(row[0].size for row in rows):
+        return np.concatenate(found)
     low, high, below, above, which, wanted = (np.concatenate(column) for column in zip(*rows, strict=True))
     which = which.astype(np.int64)
 

@@ -217,9 +217,11 @@ def approximated(function: Callable[[Array], Array], breaks: Array, tolerance: f
         low, high = low[~fits], high[~fits]
         middle = 0.5 * (low + high)
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
-    begins, ends, stack = (np.concatenate(column) for column in zip(*found, strict=True))
-    order = np.argsort(begins)
-    begins, ends, stack = begins[order], ends[order], stack[order]
+    begins, ends, stack = found[0]
+    if len(found) > 1:
+        begins, ends, stack = (np.concatenate(column) for column in zip(*found, strict=True))
+        order = np.argsort(begins)
+        begins, ends, stack = begins[order], ends[order], stack[order]
     stack[1:, 0] = stack[:-1, -1]
     at = np.append(begins[:1], ends)
     return spline(bezier.joined(stack), bezier.full_knots(at, _DEGREE), _DEGREE), worst
@@ -266,6 +268,29 @@ def _bspline(curve: Any) -> Spline:
     return spline(poles, knots, degree, weights)
 
 
+def _open_spline(curve: Any) -> Any:
+    """A B-spline curve that is not periodic."""
+    if not curve.IsPeriodic():
+        return curve
+    part = curve.Copy()
+    part.SetNotPeriodic()
+    return part
+
+
+def _cut_spline(curve: Any, low: float, high: float) -> Any:
+    """A B-spline curve from one parameter to another, its ends control points."""
+    first, last = curve.FirstParameter(), curve.LastParameter()
+    near = 1e-12 * (last - first)
+    if not (low > first + near or high < last - near):
+        if min(curve.Multiplicity(1), curve.Multiplicity(curve.NbKnots())) > curve.Degree():
+            return _open_spline(curve)
+        # Periodic curves among others, whose ends are no control points.
+        low, high = first, last
+    part = curve.Copy()
+    part.Segment(low, high)
+    return part
+
+
 def _conic_axes(curve: Any) -> tuple[Array, Array, Array, float]:
     """Center, the two half-axes as vectors, and a mean radius, of a circle or an ellipse."""
     position = curve.Position()
@@ -295,6 +320,9 @@ def profile(curve: Any, low: float, high: float, *, cut: bool) -> tuple[Spline, 
         The map leads from OCCT's parameters to the spline's; the deviation is zero for what is exact.
     """
     o = occt()
+    # Most of those that are no lines.
+    if isinstance(curve, (o.Geom_BSplineCurve, o.Geom2d_BSplineCurve)):
+        return _bspline(_cut_spline(curve, low, high) if cut else _open_spline(curve)), Straight(False), 0.0
     if isinstance(curve, (o.Geom_TrimmedCurve, o.Geom2d_TrimmedCurve)):
         return profile(curve.BasisCurve(), low, high, cut=cut)
     slack = 0.0 if cut else SLACK * (high - low)
@@ -314,25 +342,14 @@ def profile(curve: Any, low: float, high: float, *, cut: bool) -> tuple[Spline, 
         flat = ring.points
         space = flat[:, :1] * x + flat[:, 1:2] * y + flat[:, 2:] * center
         return Spline(np.column_stack([space, flat[:, 2]]), ring.knots, 2), turning, 0.0
-    if isinstance(curve, (o.Geom_BSplineCurve, o.Geom2d_BSplineCurve, o.Geom_BezierCurve, o.Geom2d_BezierCurve)):
-        copy = curve.Copy()
-        if isinstance(copy, (o.Geom_BSplineCurve, o.Geom2d_BSplineCurve)):
-            first, last = copy.FirstParameter(), copy.LastParameter()
-            near = 1e-12 * (last - first)
-            clamped = min(copy.Multiplicity(1), copy.Multiplicity(copy.NbKnots())) > copy.Degree()
-            if cut and (low > first + near or high < last - near):
-                copy.Segment(low, high)
-            elif cut and not clamped:
-                # Periodic curves among others, whose ends are no control points.
-                copy.Segment(first, last)
-            elif copy.IsPeriodic():
-                copy.SetNotPeriodic()
-        elif cut and (low > 1e-12 or high < 1.0 - 1e-12):
+    if isinstance(curve, (o.Geom_BezierCurve, o.Geom2d_BezierCurve)):
+        if cut and (low > 1e-12 or high < 1.0 - 1e-12):
             # A cut Bezier curve runs over [0, 1] again.
-            copy.Segment(low, high)
-            made = _bspline(copy)
+            part = curve.Copy()
+            part.Segment(low, high)
+            made = _bspline(part)
             return Spline(made.points, low + (high - low) * made.knots, made.degree), Straight(False), 0.0
-        return _bspline(copy), Straight(False), 0.0
+        return _bspline(curve), Straight(False), 0.0
     if isinstance(curve, (o.Geom_Parabola, o.Geom2d_Parabola)):
         # P(t) = origin + t^2 / (4 focal) x + t y; its blossom at both ends is the middle control point.
         place, a, b = curve.Position(), low - slack, high + slack

@@ -10,6 +10,7 @@ are not looked at.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property
 from math import isclose
 from typing import Any, NamedTuple
@@ -21,7 +22,7 @@ from assembly.errors import InputError
 from assembly.step.crossings import crossings
 from assembly.step.edge_feet import distance_across, fill_surface_points, move_between, move_to_feet
 from assembly.step.occt import occt
-from assembly.step.profiles import Spline, Unreadable, approximated, knot_row, point, profile
+from assembly.step.profiles import Direction, Spline, Unreadable, approximated, knot_row, point, profile
 from assembly.step.surfaces import CONFUSION, Patch
 from assembly.step.tracks import Track, track
 
@@ -40,18 +41,29 @@ _LOOKS = 33
 
 def points_of(curve: Any, low: float, high: float) -> Callable[[Array], Array]:
     """Points of a curve of OCCT at parameters in an interval: of its spline where that is exact, which is quicker."""
-    o = occt()
-    exact = (o.Geom_Line, o.Geom_Circle, o.Geom_Ellipse, o.Geom_BSplineCurve, o.Geom_BezierCurve)
-    flat = (o.Geom2d_Line, o.Geom2d_Circle, o.Geom2d_Ellipse, o.Geom2d_BSplineCurve, o.Geom2d_BezierCurve)
-    if isinstance(curve, exact + flat):
+    if is_exact(curve):
         try:
             source, along, _ = profile(curve, low, high, cut=True)
         except (Unreadable, InputError):
             pass
         else:
-            made = track(source, along)
-            if made is not None:
-                return made
+            return _tracked(curve, source, along)
+    return _asked(curve)
+
+
+def is_exact(curve: Any) -> bool:
+    """Whether a curve of OCCT, in space or in the plane, is a spline or has one with the same points."""
+    o = occt()
+    exact = (o.Geom_Line, o.Geom_Circle, o.Geom_Ellipse, o.Geom_BSplineCurve, o.Geom_BezierCurve)
+    flat = (o.Geom2d_Line, o.Geom2d_Circle, o.Geom2d_Ellipse, o.Geom2d_BSplineCurve, o.Geom2d_BezierCurve)
+    return isinstance(curve, exact + flat)
+
+
+def _tracked(curve: Any, source: Spline, along: Direction) -> Callable[[Array], Array]:
+    return track(source, along) or _asked(curve)
+
+
+def _asked(curve: Any) -> Callable[[Array], Array]:
     return lambda t: np.array([point(curve.Value(x)) for x in t.tolist()])
 
 
@@ -99,8 +111,23 @@ class Side:
         return *surface._tables, surface.size
 
     @cached_property
+    def profile(self) -> tuple[Spline, Direction, float]:
+        """The curve, in OCCT's parameters of the surface, as `profiles.profile` has it.
+
+        Raises
+        ------
+        Unreadable
+            It has a degree that is too high.
+        """
+        return profile(*self._flat, cut=True)
+
+    @cached_property
     def _points(self) -> Callable[[Array], Array]:
-        made = points_of(*self._flat)
+        made = _asked(self._flat[0])
+        if is_exact(self._flat[0]):
+            with suppress(Unreadable, InputError):
+                source, along, _ = self.profile
+                made = _tracked(self._flat[0], source, along)
         return made.with_maps((self.patch.u, self.patch.v)) if isinstance(made, Track) else made
 
     def ready(self) -> None:

@@ -243,7 +243,7 @@ def _best(traced: Traced, known: Known, wire: Wire, patch: Patch, edges: Edges) 
     made = _projected(traced, wire, patch, edges) if known.loose else None
     if made is not None:
         return made, known
-    made = _draft(traced, patch)
+    made = _draft(traced, wire, patch, edges)
     # OCCT follows edges around axes by samples, and its tolerance says nothing of what is between them.
     if not (known.loose or patch.is_straight or made.level != FREE) and strays(
         edges.space(traced.edge), edges.side(traced, wire.face, patch), known.tolerance
@@ -266,7 +266,7 @@ def _projected(traced: Traced, wire: Wire, patch: Patch, edges: Edges) -> _Draft
     return None if made is None else _Draft(made[0], FREE, made[1])
 
 
-def _draft(traced: Traced, patch: Patch) -> _Draft:
+def _draft(traced: Traced, wire: Wire, patch: Patch, edges: Edges) -> _Draft:
     """The curve of an edge, its ends not mapped where it is level."""
     if traced.curve is None:
         raise Unreadable("an edge has no curve in the surface's parameters")
@@ -277,7 +277,10 @@ def _draft(traced: Traced, patch: Patch) -> _Draft:
             return _leveled(us, vs, level, 0.0)
         if patch.is_straight:
             return _Draft(Segment(start, end, traced.low, traced.high), FREE, 0.0)
-    source, _, deviation = profile(traced.curve, traced.low, traced.high, cut=True)
+    if traced.seam:
+        source, _, deviation = profile(traced.curve, traced.low, traced.high, cut=True)
+    else:
+        source, _, deviation = edges.side(traced, wire.face, patch).profile
     points, weights = source.cartesian
     us, vs = points[:, 0].tolist(), points[:, 1].tolist()
     if level := _level(us, vs, patch):

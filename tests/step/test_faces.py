@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from assembly.step.edges import Edges
-from assembly.step.faces import read_face
+from assembly.step.faces import read_face, read_faces
 from assembly.step.profiles import Unreadable
 from assembly.step.surfaces import patch
 from tests.step.models import MODELS, O, areas, box, cone, cylinder, faces, off, sphere, torus, volumes, without
@@ -139,6 +139,33 @@ def test_what_has_no_end_is_unreadable():
     face = O.BRepBuilderAPI_MakeFace(O.gp_Pln()).Face()
     with pytest.raises(Unreadable, match="no boundary, and its surface is unbounded"):
         read_face(face, Edges(face), None)
+
+
+def test_faces_read_together_are_those_read_one_by_one_and_one_that_fails_stops_no_other():
+    shape = without(box(), cylinder(0.5, 9.0))
+    compound, build = O.TopoDS_Compound(), O.BRep_Builder()
+    build.MakeCompound(compound)
+    bare = O.TopoDS_Face()
+    build.MakeFace(bare)
+    given = faces(shape)
+    given.insert(2, bare)
+    endless = O.BRepBuilderAPI_MakeFace(O.gp_Pln()).Face()
+    given.append(endless)
+    for face in given:
+        build.Add(compound, face)
+    names = [f"face {k}" for k in range(len(given))]
+    together = read_faces(given, Edges(compound), names, 0.5)
+    numbers = Edges(compound)
+    reasons = {2: "no surface", len(given) - 1: "its surface is unbounded"}
+    for k, (face, name, found) in enumerate(zip(given, names, together, strict=True)):
+        if k in reasons:
+            assert isinstance(found, Unreadable) and reasons[k] in str(found)
+            continue
+        alone = read_face(face, numbers, name, 0.5).face
+        assert found.face.name == alone.name == name and found.face.reversed == alone.reversed
+        for one, other in zip(found.face.boundary, alone.boundary, strict=True):
+            np.testing.assert_array_equal(one.control_points, other.control_points)
+        np.testing.assert_array_equal(found.face.surface.control_points, alone.surface.control_points)
 
 
 def test_triangles_are_unreadable():

@@ -10,8 +10,9 @@ form with f(t, ..., t) = C(t), gives the Bezier points of the span [a, b] as
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import lru_cache
-from itertools import groupby, pairwise
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -49,27 +50,26 @@ def checked_knots(name: str, value: ArrayLike, degree: int, count: int) -> Array
         # One clamped span.
         knots.flags.writeable = False
         return knots
-    for k, (knot, following) in enumerate(pairwise(values)):
-        if following < knot:
-            raise InputError(
-                f"{name} decreases from {knot:g} to {following:g} at index {k + 1}; expected nondecreasing knots"
-            )
+    if sorted(values) != values:
+        k = next(k for k, (knot, following) in enumerate(pairwise(values)) if following < knot)
+        raise InputError(
+            f"{name} decreases from {values[k]:g} to {values[k + 1]:g} at index {k + 1}; expected nondecreasing knots"
+        )
     low, high = values[degree], values[count]
     if not high > low:
         raise InputError(
             f"{name} has the empty domain [{low:g}, {high:g}]; expected knots[degree] < knots[-degree - 1]"
         )
-    distinct = []
-    for knot, run in groupby(values):
-        times = sum(1 for _ in run)
-        allowed = degree if low < knot < high else degree + 1
-        if times > allowed:
-            raise InputError(
-                f"{name} holds {knot:g} {times} times; expected at most {allowed} "
-                f"(more would tear the spline of degree {degree})"
-            )
-        if low <= knot <= high:
-            distinct.append(knot)
+    times = Counter(values)
+    if max(times.values()) > degree:
+        for knot, count_of in times.items():
+            allowed = degree if low < knot < high else degree + 1
+            if count_of > allowed:
+                raise InputError(
+                    f"{name} holds {knot:g} {count_of} times; expected at most {allowed} "
+                    f"(more would tear the spline of degree {degree})"
+                )
+    distinct = [knot for knot in times if low <= knot <= high]
     shortest = min(following - knot for knot, following in pairwise(distinct))
     if shortest < _MIN_SPAN * (high - low):
         raise InputError(
