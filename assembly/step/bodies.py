@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,7 @@ class Shape:
     name: str | None
     missing: list[str]
     inexact: list[str]
+    slits: list[str] = field(default_factory=list)
 
 
 class Unrepaired(AssemblyError):
@@ -79,7 +80,7 @@ def solids_in(shape: Any) -> Iterator[Any]:
 def read_shape(
     shape: Any, said: Callable[[Any], tuple[str | None, Color | None]], color: Color | None, scale: float
 ) -> Shape:
-    """The faces of a shape, those that cannot be read left out and told.
+    """The faces of a shape, those that cannot be read left out and told, apart from them those that are slits.
 
     Parameters
     ----------
@@ -103,15 +104,32 @@ def read_shape(
         own, tint = said(face)
         names.append(unique(own or f"face {k}", taken))
         tints.append(tint)
-    for label, tint, read in zip(names, tints, read_faces(faces, edges, names, scale), strict=True):
-        if isinstance(read, Unreadable):
-            made.missing.append(f"{label!r}: {read}")
+    read = read_faces(faces, edges, names, scale)
+    for face, label, tint, one in zip(faces, names, tints, read, strict=True):
+        if isinstance(one, Unreadable):
+            if _is_slit(face):
+                made.slits.append(repr(label))
+            else:
+                made.missing.append(f"{label!r}: {one}")
             continue
-        if read.deviation > EXACT:
-            made.inexact.append(f"{label!r} to {read.deviation:.1g} mm")
-        read.face.color = tint
-        made.faces.append(read.face)
+        if one.deviation > EXACT:
+            made.inexact.append(f"{label!r} to {one.deviation:.1g} mm")
+        one.face.color = tint
+        made.faces.append(one.face)
     return made
+
+
+def _is_slit(face: Any) -> bool:
+    """Whether a face is nowhere wider than its edges are exact: it has no area, and nothing is missing without it."""
+    o = occt()
+    if o.BRep_Tool.Surface_s(face) is None:
+        return False
+    along, over = o.GProp_GProps(), o.GProp_GProps()
+    o.BRepGProp.LinearProperties_s(face, along)
+    o.BRepGProp.SurfaceProperties_s(face, over)
+    edges = [o.as_edge(edge) for edge in parts(face, o.TopAbs_EDGE)]
+    tolerance = max((o.BRep_Tool.Tolerance_s(edge) for edge in edges), default=0.0)
+    return bool(abs(over.Mass()) <= tolerance * along.Mass())
 
 
 def unique(name: str, taken: set[str]) -> str:
@@ -132,6 +150,7 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
         bodies: list[Body] = []
         missing: list[str] = []
         inexact: list[str] = []
+        slits: list[str] = []
         built = 0
         taken: set[str] = set()
         read: dict[tuple[str, float], list[Shape]] = {}
@@ -153,13 +172,14 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
                     read[key] = [read_shape(shape, told, original.color, scale) for shape, told in images]
                     if not source.repairs and any(shape.missing for shape in read[key]):
                         raise Unrepaired(f"{leaf.name!r} has a face that cannot be read")
-                    faces = sum(len(shape.faces) + len(shape.missing) for shape in read[key])
+                    faces = sum(len(shape.faces) + len(shape.missing) + len(shape.slits) for shape in read[key])
                     if sum(part == key[0] for part, _ in read) == 1:
                         source.advance(faces)
                         built += faces
                     for shape in read[key]:
                         missing += [f"{leaf.name!r}, {text}" for text in shape.missing]
                         inexact += [f"{leaf.name!r}, {text}" for text in shape.inexact]
+                        slits += [f"{leaf.name!r}, {text}" for text in shape.slits]
                 for shape in read[key]:
                     own, at = next(said, None) or shape.name, leaf.name or file.stem
                     if shape.faces:
@@ -177,7 +197,7 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
     if not bodies:
         raise StepError(f"path is {str(file)!r}; it has no faces" + (f"; {_listed('not read', away)}" if away else ""))
     missing += lost + away
-    lines = (("not read", missing), ("approximated", inexact))
+    lines = (("not read", missing), ("left out, as they have no area", slits), ("approximated", inexact))
     return bodies, [f"{file.name}: {_listed(what, told)}" for what, told in lines if told]
 
 

@@ -15,8 +15,10 @@ __all__ = ["occt", "parts", "quiet", "settings"]
 _MODULES = (
     "BRep",
     "BRepBuilderAPI",
+    "BRepGProp",
     "BRepLib",
     "BRepTools",
+    "GProp",
     "Geom",
     "Geom2d",
     "GeomAbs",

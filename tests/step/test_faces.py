@@ -5,6 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
+from assembly.step.bodies import read_shape
 from assembly.step.edges import Edges
 from assembly.step.faces import read_face, read_faces
 from assembly.step.profiles import Unreadable
@@ -260,3 +261,29 @@ def test_holes_that_touch_are_read_at_every_size(scale):
     # What two holes take off two sides their walls give back.
     assert sum(face.area() for face in found) == pytest.approx(2200.0 * scale**2, rel=1e-6)
     assert sum(face.volume_integral() for face in found) == pytest.approx((4000.0 - 250.0 * pi) * scale**3, rel=1e-6)
+
+
+def slit(width):
+    """A flat face between an edge of a box of 1 and a line beside its middle, which are `width` apart there."""
+    a, m, b = O.gp_Pnt(1, 0, 1), O.gp_Pnt(1 + width, 0.5, 1), O.gp_Pnt(1, 1, 1)
+    wire = O.BRepBuilderAPI_MakeWire()
+    for ends in ((a, b), (b, m), (m, a)) if width else ((a, b), (b, a)):
+        wire.Add(O.BRepBuilderAPI_MakeEdge(*ends).Edge())
+    plane = O.gp_Pln(O.gp_Pnt(0, 0, 1), O.gp_Dir(0, 0, 1))
+    return O.BRepBuilderAPI_MakeFace(plane, wire.Wire()).Face()
+
+
+@pytest.mark.parametrize("width", [0.0, 1e-7])
+def test_faces_without_area_are_left_out_and_told(width):
+    """Files have faces whose edges lie on each other: they bound nothing, and nothing is missing without them."""
+    shell = O.TopoDS_Shell()
+    O.BRep_Builder().MakeShell(shell)
+    for face in (*faces(box(1.0, 1.0, 1.0)), slit(width)):
+        O.BRep_Builder().Add(shell, face)
+    made = read_shape(shell, lambda _: (None, None), None, 1.0)
+    assert not made.missing and len(made.faces) == 6 and made.slits == ["'face 7'"]
+
+
+def test_a_thin_face_is_read():
+    made = read_shape(slit(1e-3), lambda _: (None, None), None, 1.0)
+    assert len(made.faces) == 1 and made.faces[0].area() == pytest.approx(5e-4, rel=1e-9)
