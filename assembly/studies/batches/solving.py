@@ -36,8 +36,13 @@ if TYPE_CHECKING:
 __all__ = ["forget_solves", "solve_many", "solve_slices"]
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 # Rows of a slice: what a thread solves before anybody can stop it. A slice begins in some 10 us. Chosen.
 SLICE = 128
+# Slices whose rows are told at a time: what it takes to tell any rows is then a hundredth of four-bars' solves. Chosen.
+TOLD = 8
+# By the codes of the loop; None of those that are no statuses.
+_STATUSES = np.array([*STATUSES, None], dtype=object)
 
 
 @dataclass(frozen=True)
@@ -125,43 +130,94 @@ def _by_the_loop(asked: _Asked, out: dict[str, Any], threads: int, retry: bool) 
         return everything
     warm = isinstance(asked.starts, list)
     settings = scene._settings(dict(asked.options), CTRL_C, warm)
-    ended = np.empty((asked.count, packed.memory_at))
-    solve_slices(packed, settings, writes, begun, ended, threads)
-    codes = ended[:, packed.results_at].astype(np.int64)
-    left = codes != SOLVED if retry else codes == UNSURE
-    if not warm and packed.chooses_turns:
-        # Bodies that were assembled may be on other turns.
-        left |= ended[:, packed.results_at + SCATTER] == 1.0
+    left = np.zeros(asked.count, dtype=bool)
+
+    def tell(rows: Rows, ended: Array) -> None:
+        codes = ended[:, packed.results_at].astype(np.int64)
+        missed = codes != SOLVED if retry else codes == UNSURE
+        if not warm and packed.chooses_turns:
+            # Bodies that were assembled may be on other turns.
+            missed |= ended[:, packed.results_at + SCATTER] == 1.0
+        left[rows] = missed
+        _tell(packed, asked, out, rows, ended, writes)
+
+    _solve_on_threads(packed, settings, writes, begun, asked.count, threads, tell)
     if isinstance(asked.starts, list):
         left |= np.array([item._fit is not None for item in asked.starts])
-    _tell(packed, asked, out, ended, writes)
     return np.flatnonzero(left).tolist()
 
 
-def solve_slices(packed: Packed, settings: Array, writes: Writes, begun: Array, ended: Array, threads: int) -> None:
-    """Solve all rows in place, on so many threads; an exception of a signal's handler is raised between slices.
+def _solve_on_threads(
+    packed: Packed,
+    settings: Array,
+    writes: Writes,
+    begun: Array,
+    count: int,
+    threads: int,
+    tell: Callable[[Rows, Array], None],
+) -> None:
+    """Solve all rows in slices; `tell` hears of some slices at a time with which states their rows ended.
 
-    Rows begin with the states in `begun`, and end with those in `ended`, as `solve_rows` has them.
+    A thread tells its own while others solve. So states take memory for a few slices, and no thread waits until
+    all rows are told.
     """
-    loop = loop_address(packed.end_effectors)
-    slices = iter(range(0, len(ended), SLICE))
-
+    remaining = iter(range(0, count, SLICE))
     if threads > 1:
         settings = settings.copy()
         settings[ASK_ADDRESS] = 0.0
 
     def work() -> None:
-        own = packed.rows_table.copy(), packed.rows_pool.copy(), np.zeros(packed._state_size)
-        desk = Desk(*own, *new_workspace(packed))
-        # The next slice is taken under the interpreter's lock.
-        for first in slices:
-            span = Span(first, min(first + SLICE, len(ended)), loop)
-            # Signatures have plain tuples.
-            solve_rows(tuple(desk), settings, tuple(writes), begun, ended, tuple(span), packed.end_effectors)
+        solve = _solver(packed, settings)
+        ended = np.empty((min(TOLD * SLICE, count), packed.memory_at))
+        taken: list[Rows] = []
+
+        def tell_taken() -> None:
+            rows = np.concatenate(taken)
+            tell(rows, ended[: len(rows)])
+            taken.clear()
+
+        # The next slice is taken under the interpreter's lock. The one that is shorter is the last of its thread.
+        for first in remaining:
+            rows = np.arange(first, min(first + SLICE, count))
+            at = SLICE * len(taken)
+            own = Writes(writes.places, writes.turns, writes.numbers[first : first + SLICE])
+            solve(own, begun[first : first + SLICE] if len(begun) > 1 else begun, ended[at : at + len(rows)])
             if threads == 1:
                 CTRL_C.is_over()
+            taken.append(rows)
+            if len(taken) == TOLD:
+                tell_taken()
+        if taken:
+            tell_taken()
 
-    _over_threads(work, slices, threads)
+    _over_threads(work, remaining, threads)
+
+
+def _solver(packed: Packed, settings: Array) -> Callable[[Writes, Array, Array], None]:
+    """Solves rows in memory of its own: these numbers, from these states, to those in which they end."""
+    loop = loop_address(packed.end_effectors)
+    own = packed.rows_table.copy(), packed.rows_pool.copy(), np.zeros(packed._state_size)
+    # Signatures have plain tuples.
+    desk = tuple(Desk(*own, *new_workspace(packed)))
+
+    def solve(writes: Writes, begun: Array, ended: Array) -> None:
+        span = Span(0, len(ended), loop)
+        solve_rows(desk, settings, tuple(writes), begun, ended, tuple(span), packed.end_effectors)
+
+    return solve
+
+
+def solve_slices(packed: Packed, settings: Array, writes: Writes, begun: Array, ended: Array) -> None:
+    """Solve all rows in place; an exception of a signal's handler is raised between slices.
+
+    Rows begin with the states in `begun`, and end with those in `ended`, as `solve_rows` has them.
+    """
+    solve = _solver(packed, settings)
+    for first in range(0, len(ended), SLICE):
+        rows = slice(first, first + SLICE)
+        own = Writes(writes.places, writes.turns, writes.numbers[rows])
+        solve(own, begun[rows] if len(begun) > 1 else begun, ended[rows])
+        CTRL_C.is_over()
 
 
 def _over_threads(work: Callable[[], None], remaining: Iterator[int], threads: int) -> None:
@@ -182,22 +238,23 @@ def _over_threads(work: Callable[[], None], remaining: Iterator[int], threads: i
             raise
 
 
-def _tell(packed: Packed, asked: _Asked, out: dict[str, Any], ended: Array, writes: Writes) -> None:
-    """What rows of the loop ended with."""
+def _tell(packed: Packed, asked: _Asked, out: dict[str, Any], rows: Rows, ended: Array, writes: Writes) -> None:
+    """What these rows of the loop ended with."""
     results = ended[:, packed.results_at :]
     codes = results[:, 0].astype(np.int64)
-    out["q"][:] = ended[:, : packed.contacts_at].reshape(out["q"].shape)
-    out["status"][:] = [STATUSES[code] if code < len(STATUSES) else None for code in codes.tolist()]
-    out["objective"][:] = results[:, OBJECTIVE] * packed.unit
-    out["iterations"][:] = results[:, COUNT]
+    out["q"][rows] = ended[:, : packed.contacts_at].reshape(len(rows), -1, 7)
+    out["status"][rows] = _STATUSES[np.minimum(codes, len(STATUSES))]
+    out["objective"][rows] = results[:, OBJECTIVE] * packed.unit
+    out["iterations"][rows] = results[:, COUNT]
     residuals = ended[:, packed.residuals_at : packed.results_at]
     off = np.where(packed.one_sided, np.maximum(-residuals, 0.0), np.abs(residuals))
-    out["feasibility"][:] = np.where(results[:, VIOLATION] == np.inf, np.inf, off.max(axis=1, initial=0.0))
+    out["feasibility"][rows] = np.where(results[:, VIOLATION] == np.inf, np.inf, off.max(axis=1, initial=0.0))
     solved = codes == SOLVED
     if asked.of and solved.any():
-        own = Writes(writes.places, writes.turns, writes.numbers[solved])
-        columns = asked.parameters, asked.values[solved] if asked.parameters else asked.values
-        out["measures"][solved] = measured(packed, asked.of, ended[solved], own, columns)
+        held = rows[solved]
+        own = Writes(writes.places, writes.turns, writes.numbers[held])
+        columns = asked.parameters, asked.values[held] if asked.parameters else asked.values
+        out["measures"][held] = measured(packed, asked.of, ended[solved], own, columns)
 
 
 def _by_themselves(asked: _Asked, out: dict[str, Any], rows: Sequence[int], threads: int) -> None:

@@ -246,7 +246,7 @@ class DrawnTip:
         # Rows that the last solve evaluated are left out: they are most of a state, and a step is as far as a cell, so
         # that to begin with what they say of the place before takes more steps than to begin without.
         ended = np.empty((len(begun), packed.memory_at))
-        solve_slices(packed, scene_settings({}, CTRL_C, True, warm), writes, begun, ended, 1)
+        solve_slices(packed, scene_settings({}, CTRL_C, True, warm), writes, begun, ended)
         CTRL_C.is_over()
         results = ended[:, packed.results_at :]
         is_there = results[:, OBJECTIVE] * packed.unit <= self._close**2

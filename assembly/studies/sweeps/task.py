@@ -27,7 +27,7 @@ class Parcel:
     """Bytes for a worker, and their name.
 
     Dask names what is submitted by a hash of its arguments, and hashes bytes as the text that they are printed as: 2 ms
-    for a chunk of a second, a third of what it costs to hand it out. It asks arguments for a name of their own first.
+    for a chunk of 6,000 rows. It asks arguments for a name of their own first.
 
     Attributes
     ----------

@@ -125,6 +125,21 @@ def test_nothing_depends_on_threads_or_order():
     np.testing.assert_array_equal(scene.solve_many(q0s[:1]).q, one.q[:1])
 
 
+def test_rows_are_told_in_their_places_however_many_a_thread_tells_at_a_time(monkeypatch):
+    scene, crank = spatial_four_bar()
+    start, of = scene.solve(), [asm.Measure(scene.constraints[3]), asm.Measure(scene.bodies[2], "y")]
+    columns = sizes(scene, crank, 1300)
+    batches = [scene.solve_many(start, parameters=columns, of=of, threads=threads) for threads in (1, 2)]
+    monkeypatch.setattr(solving, "TOLD", 1)
+    batches += [scene.solve_many(start, parameters=columns, of=of, threads=3)]
+    for k in (0, 127, 128, 1023, 1024, 1299):
+        one = scene.solve_many(start, parameters={item: values[[k]] for item, values in columns.items()}, of=of)
+        for batch in batches:
+            assert batch.status[k] is one.status[0] and batch.iterations[k] == one.iterations[0]
+            for name in ("q", "measures", "objective", "feasibility"):
+                np.testing.assert_array_equal(getattr(batch, name)[k], getattr(one, name)[0])
+
+
 def crowded():
     """Boxes that are drawn to one place, and that solves find slots for contacts of."""
     ground = asm.Body("ground", asm.shapes.box(6, 6, 1), (0, 0, -2), fixed=True)
