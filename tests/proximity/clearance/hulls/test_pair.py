@@ -212,3 +212,15 @@ def test_grooves_are_not_convex():
     block = asm.shapes.extrusion(polygon(GROOVE), 30.0)
     answer = told(block, asm.shapes.box(6, 4, 50), at(0, -3, 0))
     assert answer is not None and answer.verdict is Verdict.CLEAR and 0.0 < answer.bound <= 3.0
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.11, 0.37, 1.0, 4.4])
+def test_a_pin_that_lies_along_the_wall_of_a_wider_bore_touches_it(angle):
+    """Wherever around the bore: half spaces at fixed angles moved it beside the contact, and told nothing."""
+    plate = hulls_of_body(faces_of(asm.shapes.plate(60, 40, 12, [(8, 0, 4.5)])))
+    pin = hulls_of_body(faces_of(asm.shapes.solid_cylinder(4.0, 40)))
+    place = np.array([8.0 + 0.5 * np.cos(angle), 0.5 * np.sin(angle), 4.0])
+    answer = answer_by_hulls(plate, pin.posed(np.eye(3), place), 0.0, TOUCHING)
+    assert answer is not None and answer.verdict is Verdict.TOUCHING and answer.depth <= TOUCHING
+    deeper = place + 1e-5 * np.array([np.cos(angle), np.sin(angle), 0.0])
+    assert answer_by_hulls(plate, pin.posed(np.eye(3), deeper), 0.0, TOUCHING) is None
