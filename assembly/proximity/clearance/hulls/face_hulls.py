@@ -42,7 +42,7 @@ def hulls_of_face(face: Face) -> list[FaceHulls]:
     if isinstance(form, Plane):
         net = surface.control_points.reshape(-1, 3)
         return [FaceHulls([(Discs.of_points(net), 0.0)], [], points, form.normal, None)]
-    around, line, hollows = _of_form(form), _line_of(form), _hollow(form, face.sign)
+    around, line, hollows = _of_form(form), _line_of(form), _hollow(form, face)
     known = hollows, points, _axis_of(form), line
     if around is not None and _is_all_around(form):
         return [FaceHulls([around], hollows, points, _axis_of(form), line)]
@@ -73,11 +73,13 @@ def _of_form(form: Form) -> tuple[Discs, float] | None:
     return None
 
 
-def _hollow(form: Form, sign: int) -> list[Hollow | Prism | Tube]:
+def _hollow(form: Form, face: Face) -> list[Hollow | Prism | Tube]:
     """What is within a face's cylinder, cone or sphere, without what the face may be off it; what is beside a torus.
 
-    Of a torus that is the cylinder through it as well.
+    Of a whole torus that is the cylinder through it as well. Of the many parts of tori that round edges off only those
+    that go all around and are hollow have some, as races of balls.
     """
+    sign = face.sign
     if isinstance(form, Sphere):
         return [Hollow(form.center, np.zeros(3), form.radius - form.deviation, 0.0, form.outward != (sign > 0))]
     if isinstance(form, Cylinder):
@@ -86,13 +88,13 @@ def _hollow(form: Form, sign: int) -> list[Hollow | Prism | Tube]:
         off = form.deviation / cos(form.half_angle)
         return [Hollow(form.apex, form.axis, -off, form.half_angle, form.outward != (sign > 0))]
     if isinstance(form, Torus):
-        is_solid = form.outward == (sign > 0)
         outer, inner = form.minor + form.deviation, form.minor - form.deviation
-        return [
-            Hollow(form.center, form.axis, form.major - outer, 0.0, is_solid),
-            Tube(form.center, form.axis, form.major, outer, True, is_solid),
-            Tube(form.center, form.axis, form.major, inner, False, not is_solid),
-        ]
+        if form.outward != (sign > 0):
+            race = Tube(form.center, form.axis, form.major, inner, False, True)
+            return [race] if any(face.surface.closed) else []
+        if all(face.surface.closed) and face.outer is None:
+            through = Hollow(form.center, form.axis, form.major - outer)
+            return [through, Tube(form.center, form.axis, form.major, outer, True, True)]
     return []
 
 

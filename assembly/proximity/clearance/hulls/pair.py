@@ -90,14 +90,14 @@ class _Gaps:
         by_plane = np.take_along_axis(gaps, best[..., None], axis=2)[..., 0]
         by_hollow, which = np.full(by_plane.shape, -np.inf), np.full(by_plane.shape, -1)
         count = len(self.a.hollows)
+        places = [{int(face): place for place, face in enumerate(near)} for near in (self.near_a, self.near_b)]
         for number, (face, hollow) in enumerate((*self.a.hollows, *self.b.hollows)):
-            mine, others = (self.near_a, self.b) if number < count else (self.near_b, self.a)
-            (place,) = np.nonzero(mine == face)
-            if not len(place):
+            others, place = (self.b, places[0].get(face)) if number < count else (self.a, places[1].get(face))
+            if place is None:
                 continue
             depth = others.within(hollow)[self.near_b if number < count else self.near_a]
-            row = by_hollow[place[0]] if number < count else by_hollow[:, place[0]]
-            found = which[place[0]] if number < count else which[:, place[0]]
+            row = by_hollow[place] if number < count else by_hollow[:, place]
+            found = which[place] if number < count else which[:, place]
             # What touches a face from within the body is in no contact with it.
             better = (depth > row) & (hollow.is_wall | (depth > self.inside))
             row[better], found[better] = depth[better], number
