@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.curves import Circle, Line, curve_form
+from assembly.geometry.recognition.nets import exactness
 from assembly.geometry.seams.region_cuts import cut_in_two, cut_open
 from assembly.geometry.seams.region_pieces import EDGE, POLE, SEAM, Piece
 from assembly.geometry.seams.region_strips import area_of, corners_of, strip, winds
@@ -37,8 +38,6 @@ FOLLOWED = 1e-10
 EDGE_TOLERANCE, SEWING = 1e-7, (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 # Splines that go on over more than so many turns are cut.
 ONCE = 1.0 + 1e-6
-# How far a bilinear surface may be from an affine one, over its size.
-LINEAR = 1e-13
 
 
 class _FaceBuilder:
@@ -87,7 +86,8 @@ class _FaceBuilder:
         if surface.degree != (1, 1) or surface.control_points.shape != (2, 2, 3) or np.ptp(surface.weights) > 0.0:
             return False
         net = surface.control_points
-        return float(np.abs(net[1, 1] - net[1, 0] - net[0, 1] + net[0, 0]).max()) <= LINEAR * surface.size
+        twist = float(np.abs(net[1, 1] - net[1, 0] - net[0, 1] + net[0, 0]).max())
+        return twist <= exactness(surface.size, float(np.abs(net).max()))
 
     def extended(self, uv: Array) -> Array:
         """Points of an affine plane at any parameters."""
@@ -140,9 +140,11 @@ class _FaceBuilder:
         if self.carrier.is_own:
             flat = spline_curve(curve.control_points, curve.weights, curve.knots, curve.degree)
         else:
-            around = FOLLOWED * float(np.ptp(self.carrier.at(np.array(self.surface.domain).T), axis=0).min())
-            mapped, _ = approximated(lambda t: self.carrier.at(curve.evaluate(t)), joints, around)
-            flat = spline_curve(*mapped.cartesian, mapped.knots, mapped.degree)
+            # Each parameter in parts of its own extent: one may be an angle, the other thousands of millimeters.
+            extent = np.ptp(self.carrier.at(np.array(self.surface.domain).T), axis=0)
+            mapped, _ = approximated(lambda t: self.carrier.at(curve.evaluate(t)) / extent, joints, FOLLOWED)
+            points_flat, weights_flat = mapped.cartesian
+            flat = spline_curve(extent * points_flat, weights_flat, mapped.knots, mapped.degree)
         return flat, spline_curve(points, weights, space.knots, space.degree), low, high, False
 
     def _joints(self, curve: NurbsCurve) -> Array:
@@ -168,7 +170,9 @@ class _FaceBuilder:
             (points, weights), knots, degree = space.cartesian, space.knots, space.degree
         inside = (points - origin) @ axes.T
         whole = NurbsCurve(np.column_stack([inside, np.zeros(len(inside))]), knots, degree, weights)
-        form = curve_form([whole.bezier_pieces()])
+        # The points are rounded where they are in space, which may be far out.
+        size, far = float(np.linalg.norm(np.ptp(inside, axis=0))), float(np.abs(points).max())
+        form = curve_form([whole.bezier_pieces()], exactness(size, far))
         if isinstance(form, Line):
             way = inside[-1] - inside[0]
             length = float(np.linalg.norm(way))

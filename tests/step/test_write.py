@@ -337,3 +337,19 @@ def test_bad_arguments_are_named(tmp_path):
     assert [body.name for body in asm.read_step(tmp_path / "a.step")] == ["ball"]
     with pytest.raises(StepError, match="cannot write there"):
         asm.write_step(tmp_path / "none" / "a.step", ball)
+
+
+def test_straight_edges_far_from_the_origin_stay_lines(tmp_path):
+    """Points of a plane at 2e4 are rounded by more than lines at the origin are; a circle of radius 4e14 fits too."""
+    start, u, v = np.array([[-9164.775095, 19918.19766, 22092.173425], [4.1, 12.51, -272.9], [4.49, -45.89, -2.037]])
+    # Rounded as points of files are, so that it is a plane but no parallelogram to the last digit.
+    corners = np.round([[start, start + v], [start + u, start + u + v + [8e-10, 0, -8e-10]]], 11)
+    plane = asm.NurbsSurface(corners, [[0, 0, 1, 1], [0, 0, 1, 1]], (1, 1))
+    ends = np.array([(0.1, 0.2), (0.9, 0.15), (0.43, 0.97), (0.1, 0.2)])
+    lines = [asm.NurbsCurve(ends[k : k + 2], [0, 0, 1, 1], 1) for k in range(3)]
+    sheet = asm.Body("sheet", asm.Face(plane, lines))
+    path = tmp_path / "sheet.step"
+    asm.write_step(path, sheet)
+    assert "CIRCLE" not in path.read_text() and path.read_text().count("= LINE(") >= 3
+    (again,) = asm.read_step(path)
+    assert again.area == pytest.approx(sheet.area, rel=1e-11)

@@ -72,7 +72,8 @@ def curve_form(parts: Sequence[Array], tolerance: float | None = None) -> Line |
         w = part[..., 3:]
         flat.append(np.concatenate([(part[..., :3] - middle * w) @ ways[:2].T / size, w], axis=-1))
     center, radius, beside = _circle(flat)
-    if not off + size * beside <= allowed:
+    # What bends by no more than a line may be off, and is none, is no circle either but rounding.
+    if not off + size * beside <= allowed or size <= 8.0 * radius * allowed:
         return None
     return Circle(
         middle + size * center @ ways[:2], ways[2], size * radius, off + size * beside + rounding * (1.0 + radius)
