@@ -42,7 +42,8 @@ THICKER = 0.1
 def crosses_where_held(scene: Assembly, q: Array, settings: Array, interruption: Interruption) -> bool:
     """Whether bodies cross at poses q (n, 7), at which constraints hold, and these leave no way apart, however long."""
     packed = scene.packed()
-    if not can_prove(packed):
+    # Without other constraints bodies are free.
+    if not can_prove(packed) or len(packed.clearances) == sum(item._is_asked for item in scene.constraints):
         return False
     inner = scene._part(False, False)
     settings, rows = settings.copy(), inner.packed()
