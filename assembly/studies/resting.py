@@ -297,6 +297,9 @@ def _pushing(closed: tuple[Array, list[Side]], model: LocalModel, rest: Rest) ->
     of_rows = rest.owners
     is_joint = of_rows >= 0
     kept = null_space(model.jacobian[~is_joint & model.touching], len(model.gradient))
+    if not kept.shape[1]:
+        # Other constraints hold all: no contact has to. `nnls` returns memory as it finds it where there are no rows.
+        return set()
     goal, slopes = kept.T @ model.gradient, slopes @ kept
     size = max(float(np.linalg.norm(goal)), PUSHES)
     forces, left = nnls(slopes.T, goal)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+import assembly.studies.resting as resting_module
 from assembly.solve.interruption import CTRL_C
 from assembly.studies.pressed import Pressed
 from assembly.studies.resting import Rest, resting_start
@@ -144,3 +145,23 @@ def test_an_end_that_fails_tells_the_objective_of_the_pose_that_it_returns():
         assert not failed.success
         off = failed.pose(box).apply(np.array([1.0, 1.0, 0.0])) - goal
         assert failed.objective == pytest.approx(float(off @ off), rel=1e-9)
+
+
+def test_of_bodies_that_other_constraints_hold_no_contact_pushes(monkeypatch):
+    """Where no motion is left, forces of contacts are not asked for: those of no equations would be any numbers."""
+
+    def with_rows(matrix, goal, solve=resting_module.nnls):
+        assert len(goal)
+        return solve(matrix, goal)
+
+    monkeypatch.setattr(resting_module, "nnls", with_rows)
+    table = asm.Body("table", asm.shapes.box(80, 60, 10), fixed=True)
+    slab = asm.Body("slab", asm.shapes.box(20, 20, 4), (0, 0, 7))
+    # A slide that is drawn to its limit, along the table, while two joints hold the rest.
+    axis = asm.Prismatic(table.frame((0, 0, 7), (1, 0, 0)), slab.frame((0, 0, 0), (1, 0, 0)), limits=(None, 0.0))
+    scene = asm.Assembly([table, slab])
+    scene.constrain(axis, asm.Clearance())
+    scene.minimize(asm.PointDistance(slab.point(0, 0, 0), (3.0, 0.0, 5.0)))
+    solution = scene.solve()
+    assert solution.success and np.abs(solution.q - scene.q).max() < 1e-12
+    assert solution.objective == pytest.approx(13.0, rel=1e-12)
