@@ -197,7 +197,10 @@ class Tube(NamedTuple):
         feet = self.center + self.major * (around if self.outside else around[:1])
         ways = near - feet
         lengths = np.linalg.norm(ways, axis=1)
-        feet, ways = feet[lengths > 0.0], ways[lengths > 0.0] / lengths[lengths > 0.0, None]
+        # From a point on the circle of middles, every way across that leads to where the tube is nearest.
+        is_middle = lengths == 0.0
+        ways[is_middle], lengths[is_middle] = (around[: len(feet)])[is_middle], 1.0
+        ways /= lengths[:, None]
         inward = ways if self.outside else -ways
         return inward, (inward * feet).sum(axis=1) + (self.minor if self.outside else -self.minor)
 

@@ -186,3 +186,13 @@ def test_triangles_are_the_polygon(corners):
     areas = [area(part) for part in parts]
     assert min(areas) >= 0.0
     assert sum(areas) == pytest.approx(area(range(len(flat))), rel=1e-12)
+
+
+@pytest.mark.parametrize("outside", [True, False])
+def test_a_tube_has_half_spaces_for_a_ball_on_its_middles(outside):
+    """A ball that fills a race is as far from the tube all around: one half space at least says by how much."""
+    tube = Tube(np.zeros(3), np.array([0.0, 0.0, 1.0]), 2.0, 0.5, outside, True)
+    center = np.array([2.0, 0.0, 0.0])
+    inward, borders = tube.planes(center)
+    assert len(inward) > 0 and np.linalg.norm(inward, axis=1) == pytest.approx(1.0, abs=1e-15)
+    assert (inward @ center - borders).min() == tube.depth_of(center[None])[0]
