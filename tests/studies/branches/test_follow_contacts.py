@@ -1,0 +1,35 @@
+"""Branches along which contacts hold: bodies that are squeezed, slots that are empty."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import assembly as asm
+
+ALONG_X = {"z": (1, 0, 0), "x": (0, 1, 0)}
+
+
+def ball_in_a_vise():
+    """A ball of radius 0.4 that is drawn to 0, a jaw's face at -1, and a press with its face at `slide`."""
+    base = asm.Body("base", fixed=True)
+    jaw = asm.Body("jaw", asm.shapes.box(1, 4, 4), position=(-1.5, 0, 0), fixed=True)
+    press = asm.Body("press", asm.shapes.box(1, 4, 4), position=(2.5, 0, 0))
+    ball = asm.Body("ball", asm.shapes.sphere(0.4), position=(0.2, 0, 0))
+    drive = asm.Prismatic(base.frame(**ALONG_X), press.frame(at=(-0.5, 0, 0), **ALONG_X), "drive", slide=2.0)
+    scene = asm.Assembly([base, jaw, press, ball])
+    scene.constrain(drive, asm.Clearance(exclude=[(jaw, press)]))
+    scene.minimize(asm.FrameDistance(ball.frame(), asm.Pose((0, 0, 0))))
+    return scene, drive, ball
+
+
+@pytest.mark.parametrize("swept", [False, True])
+def test_a_ball_that_is_squeezed_blocks_the_branch(swept):
+    """From 0.4 on the press takes the ball along, and at -0.2 the jaw is behind it: forces alone could grow."""
+    scene, drive, ball = ball_in_a_vise()
+    branch = asm.follow(scene, asm.Parameter(drive, "slide"), -2.0, 2.5, of=asm.Measure(ball, "x"), swept=swept)
+    assert branch.ends == ("blocked", "end of range") and branch.proved.all()
+    assert [event.kind for event in branch.events] == ["contact closed", "contact closed", "end of range"]
+    assert [event.bodies for event in branch.events] == [("ball", "jaw"), ("ball", "press"), ()]
+    np.testing.assert_allclose([event.value for event in branch.events], [-0.2, 0.4, 2.5], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(branch.measures[:, 0], np.minimum(branch.values - 0.4, 0.0), rtol=0, atol=1e-13)
