@@ -1,4 +1,4 @@
-"""Branches along which contacts hold: bodies that are squeezed, slots that are empty."""
+"""Branches along which contacts hold: bodies that are squeezed, forces that turn, slots that are empty."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
+from assembly.derivatives.probed import ProbedScene
 
 ALONG_X = {"z": (1, 0, 0), "x": (0, 1, 0)}
 
@@ -33,3 +34,20 @@ def test_a_ball_that_is_squeezed_blocks_the_branch(swept):
     assert [event.bodies for event in branch.events] == [("ball", "jaw"), ("ball", "press"), ()]
     np.testing.assert_allclose([event.value for event in branch.events], [-0.2, 0.4, 2.5], rtol=0, atol=1e-12)
     np.testing.assert_allclose(branch.measures[:, 0], np.minimum(branch.values - 0.4, 0.0), rtol=0, atol=1e-13)
+
+
+def test_slots_without_contacts_take_no_room_and_change_nothing():
+    scene, drive, _ = ball_in_a_vise()
+    slide = asm.Parameter(drive, "slide")
+    few = asm.follow(scene, slide, 0.0, 2.5)
+    slots = scene.packed().clearance_rows
+    scene._pack_with_more_places()
+    assert scene.packed().clearance_rows > 2 * slots
+    many = asm.follow(scene, slide, 0.0, 2.5)
+    assert many.poses.tobytes() == few.poses.tobytes() and many.values.tobytes() == few.values.tobytes()
+    solution = scene.solve()
+    packed, state = scene.packed(), solution._state
+    listed = sum(pair >= 0 for pair, _ in packed.listed(state))
+    assert listed < slots
+    probed = ProbedScene(packed, state, scene.bodies)
+    assert probed._most == (packed.rows + 4 * listed, 6 * len(scene.bodies) + 4 * listed)
