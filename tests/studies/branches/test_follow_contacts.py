@@ -1,4 +1,4 @@
-"""Branches along which contacts hold: bodies that are squeezed, forces that turn, slots that are empty."""
+"""Branches along which contacts hold: bodies that are squeezed, slots that are empty, where numbers end, forces."""
 
 from __future__ import annotations
 
@@ -51,3 +51,18 @@ def test_slots_without_contacts_take_no_room_and_change_nothing():
     assert listed < slots
     probed = ProbedScene(packed, state, scene.bodies)
     assert probed._most == (packed.rows + 4 * listed, 6 * len(scene.bodies) + 4 * listed)
+
+
+@pytest.mark.parametrize("least", [0.1, 0.0])
+def test_a_range_may_end_where_numbers_do(least):
+    """No gap is below zero, so there is no point beyond that end; the ball is 2.3 - cos(0.3) from the wall."""
+    base, wall = asm.Body("base", fixed=True), asm.Body("wall", asm.shapes.box(1, 2, 2), position=(3, 0, 0), fixed=True)
+    ball = asm.Body("ball", asm.shapes.sphere(0.2), position=(1, 0, 0))
+    drive = asm.Revolute(base, ball.frame(at=(-1, 0, 0)), "drive", angle=0.3)
+    clearance = asm.Clearance(minimum=least)
+    scene = asm.Assembly([base, wall, ball])
+    scene.constrain(drive, clearance)
+    branch = asm.follow(scene, asm.Parameter(clearance, "minimum"), 0.0, 4.0)
+    assert branch.ends == ("end of range", "blocked") and branch.proved.all()
+    assert branch.values[0] == 0.0 and branch.values[-1] == pytest.approx(2.3 - np.cos(0.3), abs=1e-12)
+    assert (np.diff(branch.values) > 0.0).all()
