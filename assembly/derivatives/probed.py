@@ -104,8 +104,10 @@ class ProbedScene:
         header[layout.UNKNOWN_BLOCKS] = self.table.size - count
         header[layout.BODIES] = header[layout.MOVING] = count
         header[layout.BLOCK_RECORD] = header[layout.BLOCK_LENGTH] = 0
-        # Rows, folds and columns that there may be.
-        self._most = int(header[layout.ROWS]) + 4 * packed.pair_rows, 6 * count + 4 * packed.pair_rows
+        # Rows and columns that there may be, with four for each fold. Slots without a contact have none: room for folds
+        # of all of them would be most of what is written.
+        folds = packed.pair_rows - sum(pair < 0 for pair, _ in packed.listed(state))
+        self._most = int(header[layout.ROWS]) + 4 * folds, 6 * count + 4 * folds
 
     def _with_probes(self, state: Array) -> Array:
         packed = self.packed

@@ -92,7 +92,8 @@ def listed_places(memory: Array, pairs: int, places: int) -> list[list[int]]:
     """Of every place its pair of bodies, or -1, the number of its contact, and 1 if that is in a given one's place."""
     at = manager_records.MEMORY_HEADER + manager_records.PAIR_MEMORY * pairs
     rows = memory[at : at + manager_records.PLACE_MEMORY * places].reshape(-1, manager_records.PLACE_MEMORY)
-    return [[int(value) for value in row] for row in rows.tolist()]
+    found: list[list[int]] = rows.astype(np.int64).tolist()
+    return found
 
 
 def events_of(memory: Array, names: list[tuple[str, str]], scale: float, since: int = 0) -> tuple[Event, ...]:

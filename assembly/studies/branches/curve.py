@@ -37,13 +37,18 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 # Singular values of rows over the largest that count as none, where a branch begins.
 DEPENDENT = 1e-8
+# A tangent of which less than this part is of poses and parameter: forces alone grow, and nothing moves.
+STANDS = 1e-10
 # Newton's method: steps at most; one shorter than EXACT is rounding, and one that is no shorter than the last one is
 # so too where it is below ROUNDING.
 ITERATIONS, EXACT, ROUNDING = 10, 2e-15, 1e-11
 
 
 class LostError(Exception):
-    """The equations have no value at a place: a contact lost its pair, or the number cannot be had."""
+    """The equations have no value or no direction at a place.
+
+    A contact lost its pair, the number cannot be had, or forces alone grow, as where bodies are squeezed.
+    """
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +157,10 @@ class Curve:
                 tangent = np.linalg.solve(bordered, np.append(np.zeros(k), 1.0))
             except np.linalg.LinAlgError:
                 raise LostError from None
-        tangent = tangent / np.linalg.norm(self.bordering(tangent))
+        length = float(np.linalg.norm(self.bordering(tangent)))
+        if not length > STANDS * float(np.linalg.norm(tangent)):
+            raise LostError
+        tangent = tangent / length
         determinant = 0.0
         if matrix.shape[1] == k + 1:
             # Of more or fewer equations there is none, and no branch.

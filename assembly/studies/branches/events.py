@@ -115,7 +115,9 @@ class Step:
     def _at_ends(self) -> list[Found]:
         """Where the parameter leaves its range."""
         low, high = self.ends
-        value = self.there.place.value
+        value, rate = self.there.place.value, self.there.tangent[-1]
+        if value == (high if rate > 0.0 else low):
+            return [Found("end of range", -1, self.length, self.there.place, self.there, True)]
         end = high if value > high else low if value < low else None
         if end is None:
             return []

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import acos
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from assembly.derivatives.parameter import Parameter
 from assembly.errors import InputError
@@ -146,6 +147,8 @@ class Follower:
         """A step, its events, and how far from the start it closes; None where none of any length is found."""
         while length >= self.settings.least_step:
             there = curve.corrected(here, length * here.tangent)
+            if there is None:
+                there, length = self._at_end(curve, here, length)
             if there is not None and self._is_near(curve, here, there, length):
                 step = Step(curve, here, there, length, self.ends, self.around)
                 try:
@@ -163,6 +166,27 @@ class Follower:
                     return step, events, off
             length *= 0.5
         return None
+
+    def _at_end(self, curve: Curve, here: Point, length: float) -> tuple[Point | None, float]:
+        """The point at an end of the range that a step would pass, and how far it is; None where it would pass none.
+
+        Beyond an end there may be no such number, as no gap below zero.
+        """
+        rate, value = float(here.tangent[-1]) * curve.unit, here.place.value
+        end = self.ends[1 if rate > 0.0 else 0]
+        if not abs(end - value) <= abs(rate) * length or rate == 0.0:
+            return None, length
+        step = (end - value) / rate * here.tangent
+        while not self.ends[0] <= value + float(step[-1]) * curve.unit <= self.ends[1]:
+            step[-1] = np.nextafter(step[-1], 0.0)
+        border = np.zeros(len(step))
+        border[-1] = np.sign(rate)
+        there = curve.corrected(here, step, border)
+        if there is None:
+            return None, length
+        there = replace(there, place=replace(there.place, value=end))
+        n = curve.columns.size
+        return there, float(_gone(curve, here, there) @ np.append(here.tangent[:n], here.tangent[-1]))
 
     def _is_clear(self, step: Step, events: list[Found]) -> bool:
         """Whether bodies are proven clear all along a step, at its events and at its end; then the next goes on there.
@@ -208,11 +232,13 @@ class Follower:
         """Whether a step found a point of its own branch: it turned little, and went about where it was to go."""
         if _turn(curve, here, there) > 2.0 * self.settings.turn:
             return False
-        gone = np.append(
-            curve.between(here.place, there.place), (there.place.value - here.place.value) / self.first.unit
-        )
         meant = length * np.append(here.tangent[: curve.columns.size], here.tangent[-1])
-        return bool(np.linalg.norm(gone - meant) <= ASTRAY * length)
+        return bool(np.linalg.norm(_gone(curve, here, there) - meant) <= ASTRAY * length)
+
+
+def _gone(curve: Curve, here: Point, there: Point) -> NDArray[np.float64]:
+    """The way (n + 1,) from a point to another one: twists, and the parameter over its unit."""
+    return np.append(curve.between(here.place, there.place), (there.place.value - here.place.value) / curve.unit)
 
 
 def _turn(curve: Curve, here: Point, there: Point) -> float:
