@@ -71,6 +71,8 @@ class Workspace:
 
     def _lend(self, packed: Packed, has_objective: bool) -> None:
         """Lend the arrays of a packed scene, and settings for this thread."""
+        # A signal's handler may raise anywhere below: what is lent is then nobody's.
+        self._pool = None
         settings = scene_settings({}, CTRL_C, has_objective, True)
         orders = np.zeros(size_of(ORDERS), dtype=np.int64)
         orders[place_of(ORDERS, "loop")] = loop_address(packed.end_effectors)

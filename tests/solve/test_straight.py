@@ -174,3 +174,38 @@ def test_what_was_edited_is_noticed_before_it_goes_straight(edit, rows):
     else:
         with pytest.raises(asm.errors.InputError, match="q0 is a solution of another assembly"):
             scene.solve(begun)
+
+
+class Interrupted(Exception):
+    pass
+
+
+@pytest.mark.parametrize("at", ["reshape", "get_ident"])
+def test_what_interrupts_the_lending_of_other_arrays_leaves_none_of_them_lent(monkeypatch, at):
+    scene, change = four_bar()
+    begun = scene.solve()
+    change(1)
+    before = scene.solve(begun)
+    packed = scene._packed
+    (workspace,) = packed.workspaces
+    other = packed.twin()
+    other.rows_pool[[place for _, place in other.driven_angles]] += 0.4
+
+    def interrupt():
+        raise Interrupted
+
+    class Arrays(tuple):
+        def __getitem__(self, k):
+            interrupt()
+
+    lent = workspace.arrays
+    with monkeypatch.context() as patch:
+        if at == "reshape":
+            workspace.arrays = Arrays(lent)
+        else:
+            patch.setattr("assembly.solve.workspace.get_ident", interrupt)
+        with pytest.raises(Interrupted):
+            workspace.go_on(other, False, begun._state.copy())
+    workspace.arrays = lent
+    # The first scene has the workspace as well: it solves its own numbers, not the other's.
+    np.testing.assert_array_equal(scene.solve(begun).q, before.q)
