@@ -46,6 +46,7 @@ BENCHMARKS = (
     "derivatives",
     "joint_errors",
     "batches",
+    "studies",
     "laws",
     "accuracy",
     "step",
@@ -56,7 +57,7 @@ BENCHMARKS = (
 COUNTS = "counts"
 LIBRARIES = (
     *("assembly", "casadi", "meshcat", "numba", "numpy", "scipy"),
-    *("cadquery", "cadquery-ocp", "coal", "drake"),
+    *("cadquery", "cadquery-ocp", "coal", "distributed", "drake"),
 )
 RESULTS = Path(__file__).resolve().parent / "results"
 

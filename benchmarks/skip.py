@@ -46,7 +46,7 @@ print(json.dumps([seconds, 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_ma
 """
 RUN = "import runpy; sys.argv = [{path!r}]; runpy.run_path({path!r}, run_name='__main__')"
 # What an example needs besides the core.
-NEEDS = {"step_assembly.py": "OCP", "urdf_arm.py": "yourdfpy"}
+NEEDS = {"cluster_study.py": "distributed", "step_assembly.py": "OCP", "urdf_arm.py": "yourdfpy"}
 
 
 def _idle_parts() -> dict[str, Callable[[asm.Assembly], object]]:

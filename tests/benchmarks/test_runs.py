@@ -35,6 +35,7 @@ def slope(what):
         "tracking",
         "mechanisms",
         "derivatives",
+        "studies",
         "laws",
         "accuracy",
         "growth",

@@ -7,8 +7,8 @@ from importlib.util import find_spec
 import numpy as np
 
 from assembly.kinematics.pose import rotation_matrix
+from benchmarks.planar_four_bars import FourBar
 from tests.examples.running import run_example
-from tests.studies.branches.four_bars import FourBar
 
 
 def test_the_branch_turns_where_cosines_say(tmp_path):

@@ -12,8 +12,8 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
-from tests.studies.branches.arms import Arm, angles_of, hand_of, is_found
-from tests.studies.branches.four_bars import FourBar
+from benchmarks.planar_four_bars import FourBar
+from benchmarks.six_axis_arm import Arm, angles_of, hand_of, is_found
 
 
 def test_the_closed_form_reaches_the_hand():

@@ -11,7 +11,7 @@ import assembly as asm
 from assembly.errors import InputError
 from assembly.kinematics.pose import rotation_matrix
 from assembly.studies.branches.result import KINDS
-from tests.studies.branches.four_bars import FourBar
+from benchmarks.planar_four_bars import FourBar
 
 CRANK_ROCKER, DOUBLE_ROCKER, DRAG_LINK = (1.0, 3.0, 2.5, 3.2), (2.0, 2.2, 2.1, 4.5), (3.0, 1.2, 3.1, 1.0)
 

@@ -11,7 +11,7 @@ import pytest
 import assembly as asm
 from assembly.errors import InputError
 from assembly.kinematics.pose import rotation_matrix
-from tests.studies.branches.four_bars import FourBar
+from benchmarks.planar_four_bars import FourBar
 
 CRANK_ROCKER = (1.0, 3.0, 2.5, 3.2)
 HALF_WIDTH, RADIUS = 0.1, 0.15

@@ -10,7 +10,7 @@ import pytest
 import assembly as asm
 from assembly.errors import InputError, UnknownNameError
 from assembly.solve.measure import measure, standing
-from tests.studies.branches.four_bars import FourBar
+from benchmarks.planar_four_bars import FourBar
 from tests.studies.branches.test_joint_space import tree_of_all_kinds
 
 # Some ten roundings of a pose.

@@ -11,8 +11,8 @@ import assembly as asm
 from assembly.solve.dense.jacobian import rows_of
 from assembly.studies.branches.joint_newton import close_rows, move_joint, place_bodies, tree_frames_at, tree_joint_at
 from assembly.studies.branches.joint_tree import JointTree
-from tests.studies.branches.arms import Arm, hand_of
-from tests.studies.branches.four_bars import FourBar
+from benchmarks.planar_four_bars import FourBar
+from benchmarks.six_axis_arm import Arm, hand_of
 
 TILTED = (0.9, 0.1, -0.3, 0.2)
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from math import acos, atan2, cos, hypot, pi, sin
 
 import numpy as np
+from numpy.typing import NDArray
 
 import assembly as asm
 
+__all__ = ["Arm", "angles_of", "hand_of", "is_found"]
+
+Array = NDArray[np.float64]
 # a, d and alpha of every axis [m, rad].
 DH = (
     (0.0, 0.089159, pi / 2),
@@ -19,27 +24,28 @@ DH = (
 )
 
 
-def link(k, angle):
+def link(k: int, angle: float) -> Array:
     """The transform (4, 4) along axis k, turned by an angle."""
     a, d, alpha = DH[k]
     c, s, ca, sa = cos(angle), sin(angle), cos(alpha), sin(alpha)
     return np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]])
 
 
-def hand_of(angles):
+def hand_of(angles: Iterable[float]) -> Array:
     """Where the hand is, (4, 4)."""
-    place = np.eye(4)
+    place: Array = np.eye(4)
     for k, angle in enumerate(angles):
         place = place @ link(k, angle)
     return place
 
 
-def angles_of(hand):
+def angles_of(hand: Array) -> list[list[float]]:
     """All angles (k, 6) that bring the hand there: shoulder left or right, wrist flipped or not, elbow up or down."""
     (_, a2), (_, a3) = ((k, DH[k][0]) for k in (1, 2))
     d4, d6 = DH[3][1], DH[5][1]
     wrist = hand @ [0, 0, -d6, 1]
-    reach, found = hypot(wrist[0], wrist[1]), []
+    reach = hypot(wrist[0], wrist[1])
+    found: list[list[float]] = []
     if reach < d4:
         return found
     for shoulder in (1, -1):
@@ -63,7 +69,7 @@ def angles_of(hand):
 class Arm:
     """The arm as a scene: its last link is held to a hand that stands where it is put."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         base, self.hand = asm.Body("base", fixed=True), asm.Body("hand", fixed=True)
         links = [asm.Body(f"link {k + 1}") for k in range(6)]
         self.scene = asm.Assembly([base, *links, self.hand])
@@ -77,7 +83,7 @@ class Arm:
             before = body.frame()
         self.scene.constrain(*self.joints, asm.Fixed(self.hand, before, "hold"))
 
-    def reach(self, hand):
+    def reach(self, hand: Array) -> None:
         """Put the hand to a place (4, 4)."""
         rotation = hand[:3, :3]
         # The quaternion of a rotation: half the angle, about its axis.
@@ -85,10 +91,10 @@ class Arm:
         axis = np.real(vectors[:, np.argmin(np.abs(values - 1.0))])
         sine = 0.5 * np.array([rotation[k - 1, k - 2] - rotation[k - 2, k - 1] for k in range(3)]) @ axis
         angle = atan2(sine, 0.5 * (np.trace(rotation) - 1.0))
-        self.hand.pose = asm.Pose(hand[:3, 3], [cos(0.5 * angle), *(sin(0.5 * angle) * axis)])
+        self.hand.pose = asm.Pose(hand[:3, 3], np.array([cos(0.5 * angle), *(sin(0.5 * angle) * axis)]))
 
 
-def is_found(angles, solutions):
+def is_found(angles: Sequence[float], solutions: Iterable[asm.Solution]) -> bool:
     """Whether a solution has these angles."""
     for solution in solutions:
         told = np.array([solution.values[f"axis {k + 1}.angle"] for k in range(6)])

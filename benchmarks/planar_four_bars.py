@@ -8,11 +8,13 @@ import numpy as np
 
 import assembly as asm
 
+__all__ = ["FourBar"]
+
 
 class FourBar:
     """A crank, a coupler, a rocker and the ground between their hinges, with the crank at an angle."""
 
-    def __init__(self, crank, coupler, rocker, ground, angle=0.7):
+    def __init__(self, crank: float, coupler: float, rocker: float, ground: float, angle: float = 0.7) -> None:
         self.lengths = crank, coupler, rocker, ground
         bodies = [asm.Body("ground", fixed=True), *(asm.Body(name) for name in ("crank", "coupler", "rocker"))]
         base, first, second, third = bodies
@@ -31,7 +33,7 @@ class FourBar:
         places = [(0, 0, 0), (0, 0, angle), (x, y, turn), (ground, 0, self.swing)]
         self.q = np.array([[x, y, 0, cos(0.5 * a), 0, 0, sin(0.5 * a)] for x, y, a in places])
 
-    def dead_centers(self):
+    def dead_centers(self) -> list[float]:
         """Angles of the rocker, from 0 to pi, at which crank and coupler lie along each other."""
         crank, coupler, rocker, ground = self.lengths
         cosines = [
