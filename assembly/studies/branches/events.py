@@ -28,6 +28,8 @@ EXACT, EDGE = 1e-15, 1e-13
 POINTS, ABOUT = 8, 0.3
 # Points of a branch that are the same one.
 SAME = 1e-7
+# The zero of a gap that is listed anew is approached by so many secants: errors below 1e-3 are squared by each.
+MOST_SECANTS = 4
 # A contact comes to so many other features within a step, at most.
 MOST_FEATURES = 8
 
@@ -157,8 +159,27 @@ class Step:
             if abs(around.gaps(event.place)[row]) > AT_BOUND:
                 # It ended, and another one is nearer: a shorter step lists that.
                 raise NotFoundError
-            found.append(replace(event, meets=around.meeting(event.place, row)))
+            found.append(self._closed_anew(around, replace(event, meets=around.meeting(event.place, row))))
         return found
+
+    def _closed_anew(self, around: Surroundings, event: Found) -> Found:
+        """An event of a contact that closes, its zero that of gaps that are listed anew.
+
+        Where bodies touch all along a circle a contact stays at its points as they move, so that along a step its gap
+        is off by the square of the way.
+        """
+        found, start, before = event, 0.0, around.gaps(self.here.place)[event.row]
+        gap, _ = around.anew(event.place, event.row)
+        for _ in range(MOST_SECANTS):
+            if not EXACT < abs(gap) < np.inf or before == gap:
+                break
+            along = found.along - gap * (found.along - start) / (gap - before)
+            if not 0.0 < along < self.length:
+                break
+            start, before, point = found.along, gap, self.at(along)
+            gap, meets = around.anew(point.place, event.row)
+            found = replace(found, along=along, place=point.place, point=point, meets=meets)
+        return found if abs(gap) <= AT_BOUND else event
 
     def _of_features(self) -> list[Found]:
         """Where contacts that hold come to another face, edge or vertex."""

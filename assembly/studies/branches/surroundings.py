@@ -124,6 +124,16 @@ class Surroundings:
         gaps[rows_of_slots(place.packed)] = found
         return gaps
 
+    def anew(self, place: Place, row: int) -> tuple[float, Meeting]:
+        """By how much the listed contact of a row is open at a place, over the size, once all is listed anew there.
+
+        And which bodies meet there, and where.
+        """
+        there = self._listed(place, self._at_poses(place))
+        gaps = gaps_of_slots(there.packed, there.state)
+        gap = float("nan") if gaps is None else float(gaps[row - rows_of_slots(there.packed).start])
+        return gap, meeting(there.packed, there.state, row)
+
     def holding(self, place: Place, rows: Flags) -> Place:
         """A place with those listed contacts alone as rows that are flagged (m,)."""
         return replace(place, state=held_alone(place.packed, self._at_poses(place), rows))

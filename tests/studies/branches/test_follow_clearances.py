@@ -321,6 +321,18 @@ def test_what_touches_all_around_is_told_by_rows_and_not_proven():
         assert labels == {"contact closed", "end of range", "not proved"}
 
 
+def test_a_ring_let_down_on_a_ball_meets_it_exactly_and_that_is_proven():
+    """Its circle is sqrt(0.6^2 - 0.4^2) above the ball's center then; contacts keep their points along a step."""
+    rail, ball = asm.Body("rail", fixed=True), asm.Body("ball", asm.shapes.sphere(0.5), fixed=True)
+    ring = asm.Body("ring", asm.shapes.torus(0.4, 0.1), position=(0, 0, 0.6))
+    drive = asm.Prismatic(rail.frame(), ring.frame(), "drive", slide=0.6)
+    scene = asm.Assembly([rail, ball, ring])
+    scene.constrain(drive, asm.Clearance())
+    branch = asm.follow(scene, asm.Parameter(drive, "slide"), 0.0, 0.7)
+    assert branch.ends == ("blocked", "end of range") and branch.proved.all()
+    assert branch.values[0] == pytest.approx(sqrt(0.6**2 - 0.4**2), rel=0, abs=1e-12)
+
+
 def test_the_same_again_whatever_was_solved_before():
     scene, drive = swinging_arm()
     angle = asm.Parameter(drive, "angle")
@@ -341,7 +353,7 @@ def test_what_is_told_and_refused():
     with pytest.raises(TypeError, match="swept is 'yes'; expected True or False"):
         asm.follow(scene, angle, -0.3, 3.0, swept="yes")
     drive.angle = MEETS_POST + 0.05
-    with pytest.raises(InputError, match="start is INFEASIBLE"):
+    with pytest.raises(InputError, match="start is STALLED at drive.angle = .* not clear: post and arm"):
         asm.follow(scene, angle, -0.3, 3.0, start=scene.solve())
     drive.angle = 0.0
     other, _ = swinging_arm()
