@@ -40,8 +40,9 @@ __all__ = ["best_bore", "gap_of"]
 # The least cosine of the angle by which a shaft leans at a pose, and on a way from there (`sleeve_sag` in `way.py`).
 UPRIGHT, LEAST_COSINE = 0.98, 0.96
 LARGEST_SINE = 0.28
-# The largest sine of a bore's angle, and slope of what leans in it: bounds of `sleeve_sag` rest on these.
-MOST_SLANT, MOST_SLOPE = 0.62, 1.0
+# The largest sine of a bore's angle, and slope of what leans in it: bounds of `sleeve_sag` rest on these. Countersinks
+# of 90 degrees have slopes of 1, as they are rounded.
+MOST_SLANT, MOST_SLOPE = 0.74, 1.0001
 # A section near the apex of a cone is not asked: where its radius is below this part of the widest one.
 NARROWEST = 0.05
 
