@@ -341,7 +341,7 @@ def test_what_is_told_and_refused():
     with pytest.raises(TypeError, match="swept is 'yes'; expected True or False"):
         asm.follow(scene, angle, -0.3, 3.0, swept="yes")
     drive.angle = MEETS_POST + 0.05
-    with pytest.raises(InputError, match="start is INFEASIBLE"):
+    with pytest.raises(InputError, match="start is STALLED"):
         asm.follow(scene, angle, -0.3, 3.0, start=scene.solve())
     drive.angle = 0.0
     other, _ = swinging_arm()
