@@ -91,6 +91,8 @@ class Point:
         W, of the rows that hold.
     tangent : (k + 1,)
         Along the branch, of length one in twists and parameter.
+    rates, force_rates : (m,)
+        What residuals and multipliers grow by along the tangent.
     determinant : float
         Of the matrix bordered by the tangent, continuous along the branch but for a factor.
     """
@@ -101,6 +103,8 @@ class Point:
     matrix: Array
     basis: Array
     tangent: Array
+    rates: Array
+    force_rates: Array
     determinant: float
 
 
@@ -150,7 +154,7 @@ class Curve:
         equations, matrix = self._system(problem, columns, place, basis)
         k = len(equations)
         if border is None or len(border) != k + 1:
-            tangent = np.linalg.svd(matrix)[2][-1] if k else np.ones(1)
+            tangent = np.linalg.svd(matrix)[2][-1] if k else np.eye(matrix.shape[1])[-1]
         else:
             bordered = np.vstack([matrix, border])
             try:
@@ -166,7 +170,12 @@ class Curve:
             # Of more or fewer equations there is none, and no branch.
             sign, size = np.linalg.slogdet(np.vstack([matrix, self.bordering(tangent)]))
             determinant = float(sign * np.exp(size))
-        return Point(place, problem.here.residual, equations, matrix, basis, tangent, determinant)
+        n, forces = self.columns.size, np.zeros(len(self.held))
+        slopes = problem.here.jacobian[:, self.columns] * self._stretch(place.packed)
+        rates = slopes @ tangent[:n] + columns.rows[:, 0] * (self.unit * tangent[-1])
+        if self.balances:
+            forces[self.held] = basis @ tangent[n:-1]
+        return Point(place, problem.here.residual, equations, matrix, basis, tangent, rates, forces, determinant)
 
     def bordering(self, step: Array) -> Array:
         """A step (k + 1,) without multipliers, which do not count in lengths."""
@@ -219,6 +228,10 @@ class Curve:
         off = np.abs(found.residual[self.held]).max(initial=0.0)
         return found if off <= self.tolerance else None
 
+    def ahead(self, point: Point, along: float) -> Place:
+        """A place so far along a point's tangent, or back."""
+        return self._packed_at(self.moved(point.place, along * point.tangent, point.basis))
+
     def between(self, here: Place, there: Place) -> Array:
         """The twists (n,) that lead from a place to another one, lengths over the size."""
         return moves(here.q[self.moving], there.q[self.moving], self.scale).ravel()
@@ -226,13 +239,6 @@ class Curve:
     def objective(self, place: Place) -> float:
         """The objective at a place, over its unit."""
         return self._derived(place)[1].here.value
-
-    def rate(self, point: Point, row: int) -> float:
-        """What a row's residual grows by along a point's tangent."""
-        place, problem, columns = self._derived(point.place)
-        slopes = problem.here.jacobian[row, self.columns] * self._stretch(place.packed)
-        by = float(columns.rows[row, 0]) * self.unit
-        return float(slopes @ point.tangent[: self.columns.size]) + by * float(point.tangent[-1])
 
     def owner(self, row: int) -> str:
         """The name of the constraint that asks for a row."""

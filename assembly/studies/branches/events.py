@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import pi, remainder
+from math import pi, remainder, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,12 @@ POINTS, ABOUT = 8, 0.3
 SAME = 1e-7
 # The zero of a gap that is listed anew is approached by so many secants: errors below 1e-3 are squared by each.
 MOST_SECANTS = 4
+# Slopes of gaps are central differences over twice this length.
+NEARBY = 1e-6
+# What is said to fall to less than this part of what it is at a step's ends is looked at there.
+DOUBTFUL = 0.25
+# Rates along a branch that are none.
+STILL = 1e-9
 # A contact comes to so many other features within a step, at most.
 MOST_FEATURES = 8
 
@@ -135,16 +141,32 @@ class Step:
         return []
 
     def _of_rows(self) -> list[Found]:
-        """One-sided rows that reach their bounds, and that push no more."""
-        packed, held, least = self.here.place.packed, self.curve.held, self.curve.tolerance
+        """One-sided rows that reach their bounds, and that push no more.
+
+        Raises
+        ------
+        NotFoundError
+            One does and ceases to within the step: a shorter one tells where.
+        """
+        packed, held, here, there = self.here.place.packed, self.curve.held, self.here, self.there
         found = []
         for row in np.flatnonzero(packed.one_sided).tolist():
             is_contact = packed.pairs[row] >= 0
             if held[row]:
-                if self.there.place.forces[row] > 0.0 > self.here.place.forces[row]:
-                    found.append(self._event("contact opened" if is_contact else "limit left", row, _force(row), True))
-            elif self.there.residual[row] < -least <= self.here.residual[row]:
-                found.append(self._event("contact closed" if is_contact else "limit reached", row, _gap(row), True))
+                values = -np.array([point.place.forces[row] for point in (here, there)])
+                rates = -np.array([point.force_rates[row] for point in (here, there)])
+                kind, value, least = "contact opened" if is_contact else "limit left", _force(row), 0.0
+            else:
+                values = np.array([point.residual[row] for point in (here, there)])
+                rates = np.array([point.rates[row] for point in (here, there)])
+                kind, value, least = (
+                    "contact closed" if is_contact else "limit reached",
+                    _gap(row),
+                    self.curve.tolerance,
+                )
+            self._check_between(values, rates, value, -1.0 if held[row] else 1.0)
+            if values[1] < -least <= values[0]:
+                found.append(self._event(kind, row, value, True))
         return found
 
     def _of_gaps(self, around: Surroundings) -> list[Found]:
@@ -155,12 +177,51 @@ class Step:
             raise NotFoundError from None
         least, found = self.curve.tolerance, []
         for row in np.flatnonzero(~self.curve.held & (after < -least) & (before >= -least)).tolist():
+            if before[row] <= 0.0 and self._slopes(around, self.here)[row] > STILL:
+                raise NotFoundError
             event = self._event("contact closed", row, _listed_gap(around, row), True)
             if abs(around.gaps(event.place)[row]) > AT_BOUND:
                 # It ended, and another one is nearer: a shorter step lists that.
                 raise NotFoundError
             found.append(self._closed_anew(around, replace(event, meets=around.meeting(event.place, row))))
+        near = ~self.curve.held & (np.minimum(before, after) >= -least) & (np.minimum(before, after) < self.length)
+        near &= np.isfinite(before) & np.isfinite(after)
+        if near.any():
+            slopes = [self._slopes(around, point) for point in (self.here, self.there)]
+            for row in np.flatnonzero(near).tolist():
+                values, rates = np.array([before[row], after[row]]), np.array([each[row] for each in slopes])
+                self._check_between(values, rates, _listed_gap(around, row), 1.0)
         return found
+
+    def _slopes(self, around: Surroundings, point: Point) -> Array:
+        """What listed gaps (m,) grow by along a point's tangent; NaN where that is not known."""
+        try:
+            gaps = [around.gaps(self.curve.ahead(point, along)) for along in (-NEARBY, NEARBY)]
+        except LostError:
+            raise NotFoundError from None
+        with np.errstate(invalid="ignore"):
+            slopes: Array = (gaps[1] - gaps[0]) / (2.0 * NEARBY)
+        return slopes
+
+    def _check_between(self, values: Array, rates: Array, value: Callable[[Point], float], sign: float) -> None:
+        """Raise where what may not be negative, a value times a sign, is zero twice in the step.
+
+        At its beginning, from where it grows; or about where the cubic with values and rates at both ends is least.
+        """
+        (before, after), (first, last) = values.tolist(), (self.length * rates).tolist()
+        if after < 0.0:
+            if before <= 0.0 and rates[0] > STILL:
+                raise NotFoundError
+            return
+        if not first < 0.0 < last:
+            return
+        # In parts of the step, 3 a s^2 + 2 b s + first is zero where the cubic is least.
+        a, b = first + last - 2.0 * (after - before), 3.0 * (after - before) - 2.0 * first - last
+        root = sqrt(max(b * b - 3.0 * a * first, 0.0))
+        s = -first / (b + root) if b > 0.0 else (root - b) / (3.0 * a)
+        least = before + s * (first + s * (b + s * a))
+        if least < DOUBTFUL * max(before, after) and sign * value(self.at(s * self.length)) < -AT_BOUND:
+            raise NotFoundError
 
     def _closed_anew(self, around: Surroundings, event: Found) -> Found:
         """An event of a contact that closes, its zero that of gaps that are listed anew.

@@ -21,7 +21,7 @@ class FollowOptions:
         finds no point ends as "lost".
     turn : float
         [rad] By how much the branch's direction may turn in a step: steps are as long as its curvature lets them.
-        Events that come and go twice within a step are not seen: a smaller turn sees closer ones.
+        Two turning points within a step are not seen: a smaller turn sees closer ones.
     tolerance : float
         What rows, over the scene's size, may be off at a point.
     max_steps : int

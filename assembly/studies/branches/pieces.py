@@ -165,7 +165,7 @@ def _without_contacts(around: Surroundings, curve: Curve, place: Place, opened: 
             return None
         if len(point.equations) != len(point.tangent) - 1 or point.basis.shape[1] > n:
             return None
-        rates = np.array([other.rate(point, row) for row in np.flatnonzero(opened).tolist()])
+        rates = point.rates[opened]
         sign = -1.0 if rates.sum() < 0.0 else 1.0
         closing = sign * rates < -STILL
         if not closing.any():
@@ -239,8 +239,7 @@ def _switched(curve: Curve, event: Found) -> tuple[Curve, Point] | None:
         change = (point.basis @ point.tangent[n:-1])[int(held[:row].sum())]
         sign = -1.0 if change > 0.0 else 1.0
     else:
-        rate = other.rate(point, row)
-        sign = -1.0 if rate < 0.0 else 1.0
+        sign = -1.0 if point.rates[row] < 0.0 else 1.0
     if len(point.equations) != len(point.tangent) - 1 or point.basis.shape[1] > n:
         return None
     return other, other.point(point.place, sign * other.bordering(point.tangent), point.basis)

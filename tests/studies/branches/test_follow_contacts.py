@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import acos, asin, pi
+
 import numpy as np
 import pytest
 
@@ -66,3 +68,46 @@ def test_a_range_may_end_where_numbers_do(least):
     assert branch.ends == ("end of range", "blocked") and branch.proved.all()
     assert branch.values[0] == 0.0 and branch.values[-1] == pytest.approx(2.3 - np.cos(0.3), abs=1e-12)
     assert (np.diff(branch.values) > 0.0).all()
+
+
+@pytest.mark.parametrize("height", [0.600001, 1.39999])
+def test_contacts_that_come_and_go_within_a_step_are_seen(height):
+    """An eccentric lifts a block to 1 - 0.4 sin(angle), and a spring holds it where that is less.
+
+    At 0.600001 they part for 0.0045 rad, much less than a step, and at 1.39999 they meet for 0.014 rad.
+    """
+    ground, cam = asm.Body("ground", fixed=True), asm.Body("cam", asm.shapes.sphere(1.0))
+    block = asm.Body("block", asm.shapes.box(4, 0.5, 4), position=(0, 1.9, 0))
+    shaft = asm.Revolute(ground.frame(at=(0.4, 0, 0)), cam.frame(at=(0.4, 0, 0)), "shaft", angle=0.3)
+    up = {"z": (0, 1, 0), "x": (1, 0, 0)}
+    lift = asm.Prismatic(ground.frame(**up), block.frame(at=(0, -0.25, 0), **up), "lift")
+    scene = asm.Assembly([ground, cam, block])
+    scene.constrain(shaft, lift, asm.Clearance())
+    scene.minimize(asm.PointDistance(block.point(0, -0.25, 0), (0, height, 0)))
+    branch = asm.follow(scene, asm.Parameter(shaft, "angle"), -2.2, 2.2, of=asm.Measure(lift))
+    first = asin((1.0 - height) / 0.4) if height < 1.0 else -pi - asin((1.0 - height) / 0.4)
+    last = pi - first if height < 1.0 else -pi - first
+    found = branch.events[1:-1]
+    # Kinds are as seen from the start, at 0.3.
+    assert [event.kind for event in found] == ["contact opened", "contact closed"]
+    np.testing.assert_allclose([event.value for event in found], [first, last], rtol=0, atol=1e-9)
+    lifted = np.maximum(1.0 - 0.4 * np.sin(branch.values), height)
+    np.testing.assert_allclose(branch.measures[:, 0], lifted, rtol=0, atol=1e-13)
+    assert branch.ends == ("end of range", "end of range") and branch.proved.all()
+
+
+@pytest.mark.parametrize("below", [1e-6, 1e-7])
+def test_a_limit_just_below_what_is_reached_blocks(below):
+    """A slider goes to 4 at a crank's angle of 0; with its limit a little below that the crank does not get there."""
+    ground, crank, rod, slider = asm.Body("ground", fixed=True), asm.Body("crank"), asm.Body("rod"), asm.Body("slider")
+    rod.pose, slider.pose = asm.Pose((np.cos(1.0), -np.sin(1.0), 0.0)), asm.Pose((3.5, 0.0, 0.0))
+    drive = asm.Revolute(ground, crank, "drive", angle=-1.0)
+    pin = asm.Revolute(crank.frame(at=(1, 0, 0)), rod, "pin")
+    guide = asm.Prismatic(ground.frame(**ALONG_X), slider.frame(**ALONG_X), "guide", limits=(0.0, 4.0 - below))
+    scene = asm.Assembly([ground, crank, rod, slider])
+    scene.constrain(drive, pin, asm.Revolute(rod.frame(at=(3, 0, 0)), slider, "wrist"), guide)
+    branch = asm.follow(scene, asm.Parameter(drive, "angle"), -1.5, 1.0, of=asm.Measure(guide))
+    assert branch.ends == ("end of range", "blocked") and branch.events[-1].kind == "limit reached"
+    reach = 4.0 - below
+    assert branch.values[-1] == pytest.approx(-acos((reach**2 - 8.0) / (2.0 * reach)), abs=1e-9)
+    assert branch.measures.max() <= reach + 1e-12
