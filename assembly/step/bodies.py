@@ -170,7 +170,8 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
                     original = Part(leaf.label)
                     images = (image_of(shape, original.said, factor) for shape in solids_in(original.shape))
                     read[key] = [read_shape(shape, told, original.color, scale) for shape, told in images]
-                    if not source.repairs and any(shape.missing for shape in read[key]):
+                    # Areas of a loop that crosses itself cancel: a face with none is judged with repairs, which cut it.
+                    if not source.repairs and any(shape.missing or shape.slits for shape in read[key]):
                         raise Unrepaired(f"{leaf.name!r} has a face that cannot be read")
                     faces = sum(len(shape.faces) + len(shape.missing) + len(shape.slits) for shape in read[key])
                     if sum(part == key[0] for part, _ in read) == 1:
