@@ -26,7 +26,7 @@ from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_p
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.deforming import smaller_answer
 from assembly.proximity.clearance.holder_first import holds_first
-from assembly.proximity.clearance.hulls.scene import answers_by_hulls, told_by_hulls
+from assembly.proximity.clearance.hulls.scene import answers_by_hulls, crossings_by_hulls, told_by_hulls
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof, stayed_answers
 from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
 from assembly.solve.interruption import CTRL_C, Interruption
@@ -43,6 +43,7 @@ __all__ = [
     "TRIES",
     "PairAnswer",
     "can_prove",
+    "crosses_by_hulls",
     "judge_end",
     "lent_proof",
     "named_answers",
@@ -53,6 +54,7 @@ __all__ = [
     "prove_end",
     "proven_by_hulls",
     "proven_pairs",
+    "stood_by_hulls",
 ]
 
 Array = NDArray[np.float64]
@@ -141,6 +143,32 @@ def proven_by_hulls(
     if proof is not None and proof.has_wires:
         return None
     return answers_by_hulls(*proven_pairs(packed, bodies), q, touching)
+
+
+def crosses_by_hulls(
+    packed: Packed, bodies: Sequence[Body], proof: ClearanceProof | None, q: Array, touching: float
+) -> bool:
+    """Whether hulls of faces prove that any pair crosses at poses: that needs no cells, which take longer to make."""
+    if proof is not None and proof.has_wires:
+        return False
+    shapes, pairs, _ = proven_pairs(packed, bodies)
+    return any(answer is not None for answer in crossings_by_hulls(shapes, pairs, q, touching))
+
+
+def stood_by_hulls(
+    packed: Packed, bodies: Sequence[Body], proof: ClearanceProof | None, q: Array, touching: float
+) -> list[Answer] | None:
+    """What all pairs are at poses, those that cross as well, by hulls of faces; None where these do not tell it."""
+    if proof is not None and proof.has_wires:
+        return None
+    shapes, pairs, minimum = proven_pairs(packed, bodies)
+    found = []
+    for pair, answer in zip(pairs, told_by_hulls(shapes, pairs, minimum, q, touching), strict=True):
+        answer = answer or next(crossings_by_hulls(shapes, [pair], q, touching))
+        if answer is None:
+            return None
+        found.append(answer)
+    return found
 
 
 def _told_by_hulls(

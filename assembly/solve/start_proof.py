@@ -23,6 +23,7 @@ from assembly.solve.clearance_proof import (
     TRIES,
     PairAnswer,
     StayedClear,
+    crosses_by_hulls,
     lent_proof,
     named_answers,
     nothing_known,
@@ -73,6 +74,9 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
         found = named_answers(packed, hulled)
         packed.stood = asked, touching, found
         return found
+    if crosses_by_hulls(packed, bodies, known, q, touching * packed.scale):
+        packed.stood = asked, touching, None
+        return None
     with lent_proof(packed, bodies) as proof:
         proof.make_slimmer(touching * packed.scale)
         answers, conforming = _answers(proof, q, touching * packed.scale)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint
 from assembly.proximity.clearance.answers import Verdict
-from assembly.solve.clearance_proof import lent_proof, proven_by_hulls, proven_pairs
+from assembly.solve.clearance_proof import lent_proof, proven_by_hulls, proven_pairs, stood_by_hulls
 from assembly.studies.seated import NearFit, NotBelow, fits
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def fitting(scene: Assembly, poses: Array, touching: float) -> Fitting:
         return known
     proof = packed.proofs[-1] if packed.proofs else None
     told = proven_by_hulls(packed, scene.bodies, proof, poses, touching * packed.scale)
-    answers = told
+    answers = told or stood_by_hulls(packed, scene.bodies, proof, poses, touching * packed.scale)
     if answers is None:
         with lent_proof(packed, scene.bodies) as proof:
             answers = proof.as_they_stand(poses, touching * packed.scale)

@@ -26,7 +26,7 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.manifolds.elementary_faces import ElementaryFace, elementary_faces
-from assembly.solve.clearance_proof import can_prove, lent_proof
+from assembly.solve.clearance_proof import can_prove, lent_proof, proven_pairs, stood_by_hulls
 from assembly.solve.interruption import Interruption
 from assembly.studies.parting import is_stuck
 
@@ -101,14 +101,16 @@ def seated(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     packed = scene.packed()
     if not can_prove(packed):
         return None
-    with lent_proof(packed, scene.bodies) as proof:
-        pairs = proof.pairs
-        stuck = [
-            pairs[k]
-            for k, answer in enumerate(proof.as_they_stand(q, touching))
-            # A ball lies nearly along its socket where both cross: often a look spends its budget before it is told.
-            if answer.verdict is Verdict.UNDECIDED or is_stuck(answer, touching)
-        ]
+    answers = stood_by_hulls(packed, scene.bodies, packed.proofs[-1] if packed.proofs else None, q, touching)
+    if answers is None:
+        with lent_proof(packed, scene.bodies) as proof:
+            answers = proof.as_they_stand(q, touching)
+    stuck = [
+        pair
+        for pair, answer in zip(proven_pairs(packed, scene.bodies)[1], answers, strict=True)
+        # A ball lies nearly along its socket where both cross: often a look spends its budget before it is told.
+        if answer.verdict is Verdict.UNDECIDED or is_stuck(answer, touching)
+    ]
     others = [item for item in scene.constraints if not isinstance(item, Clearance)]
     taken = {item.name for item in others}
     names = (name for name in map("fit {}".format, count()) if name not in taken)

@@ -47,6 +47,8 @@ class BodyHulls:
     pad : (h,)
     of_face : (f,) of int
         Where each face begins among the hulls.
+    part_of : (f,) of int
+        What is not convex counts as several faces, one for each part: the number of the whole face.
     points, owner : (p, 3), (p,) of int
         Points that are on faces, corners among them, and the face of each.
     hollows : tuple of (int, Hollow, Prism or Tube)
@@ -61,6 +63,7 @@ class BodyHulls:
     first: Table
     pad: Array
     of_face: Table
+    part_of: Table
     points: Array
     owner: Table
     hollows: tuple[tuple[int, Hollow | Prism | Tube], ...]
@@ -98,6 +101,7 @@ class BodyHulls:
             self.first,
             self.pad,
             self.of_face,
+            self.part_of,
             self.points @ turn.T + shift,
             self.owner,
             tuple((face, hollow.posed(turn, shift)) for face, hollow in self.hollows),
@@ -114,6 +118,7 @@ class BodyHulls:
             self.first,
             left * self.pad,
             self.of_face,
+            self.part_of,
             left * self.points + shift,
             self.owner,
             tuple((face, hollow.scaled(left, shift)) for face, hollow in self.hollows),
@@ -155,6 +160,7 @@ def _made_of(faces: tuple[Face, ...]) -> BodyHulls:
         np.append(0, np.cumsum(sizes)[:-1]),
         np.array([pad for _, pad in hulls]),
         np.append(0, np.cumsum(counts)[:-1]),
+        np.repeat(np.arange(len(by_face)), [len(parts) for parts in by_face]),
         np.concatenate([face.points for face in found]),
         np.repeat(np.arange(len(found)), [len(face.points) for face in found]),
         tuple(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,10 @@ from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body
+from assembly.proximity.clearance.hulls.crossing import crossing_by_hulls
 from assembly.proximity.clearance.hulls.pair import ROUNDING, answer_by_hulls
 
-__all__ = ["answers_by_hulls", "told_by_hulls"]
+__all__ = ["answers_by_hulls", "crossings_by_hulls", "told_by_hulls"]
 
 Array = NDArray[np.float64]
 
@@ -74,3 +76,30 @@ def told_by_hulls(
         turn = turns[one].T @ turns[other]
         shift = (q[other, :3] - q[one, :3]) @ turns[one]
         yield answer_by_hulls(hulls[one], hulls[other].posed(turn, shift), float(minimum[k]), touching)
+
+
+def crossings_by_hulls(
+    shapes: Sequence[tuple[Face, ...]], pairs: Sequence[tuple[int, int]], q: Array, touching: float
+) -> Iterator[Answer | None]:
+    """Of one pair after the other that it crosses by more than `touching`, or None where hulls do not tell it.
+
+    Parameters
+    ----------
+    shapes : sequence of tuple of Face
+        Of every body its faces.
+    pairs : sequence of (int, int)
+        Numbers of bodies.
+    q : (n, 7)
+        One row per body.
+    touching : float
+    """
+    for one, other in pairs:
+        turns = [rotation_matrix(q[body, 3:]) for body in (one, other)]
+        middles, radii = zip(*(hulls_of_body(shapes[body]).ball for body in (one, other)), strict=True)
+        places = [turn @ middle + q[k, :3] for turn, middle, k in zip(turns, middles, (one, other), strict=True)]
+        if float(np.linalg.norm(places[1] - places[0])) > sum(radii):
+            yield None
+            continue
+        shift = (q[other, :3] - q[one, :3]) @ turns[0]
+        found = crossing_by_hulls((shapes[one], shapes[other]), turns[0].T @ turns[1], shift, touching)
+        yield found and replace(found, place=turns[0] @ found.place + q[one, :3])
