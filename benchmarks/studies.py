@@ -169,7 +169,7 @@ def _bits(found: asm.Study) -> list[bytes]:
 
 def _workers(sweep: Sweep, quick: bool) -> list[dict[str, Any]]:
     """One process, two, and four workers of Dask: the same study in turn."""
-    count, repeats = (2_000, 1) if quick else (40_000, 4)
+    count, repeats = (2_000, 1) if quick else (150_000, 3)
     plan, spawn = sweep.plan(count), get_context("spawn")
     with ExitStack() as open_ones:
         executors: dict[str, Any] = {

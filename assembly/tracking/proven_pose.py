@@ -42,10 +42,13 @@ class WayLimits(NamedTuple):
         How far bodies whose faces lie on each other may move in one way, in parts of their size.
     depth : float
         How deep a way may go in, in the unit of the scene.
+    of_pushed : bool
+        Whether `depth` limits ways of the pairs in `ProvenPose.pushed` as well.
     """
 
     sampled: float = np.inf
     depth: float = np.inf
+    of_pushed: bool = True
 
 
 class ProvenPose:
@@ -74,6 +77,8 @@ class ProvenPose:
         Whether all pairs were proven clear, or touching; else faces lie on each other.
     way_depth : float
         The largest overlap of bodies on the way to it.
+    pushed : frozenset of int
+        Pairs that contacts hold together, for `limits.of_pushed`.
     """
 
     def __init__(self, first: Solution, touching: float, proof: ClearanceProof | None, limits: WayLimits) -> None:
@@ -83,7 +88,7 @@ class ProvenPose:
             proof.fronts.counts.budget = BUDGET
         proof.forget_poses()
         # Wires are in each other by the distance of their spines, which no move has to open.
-        proof.make_slimmer(touching if limits.depth == np.inf else 0.0)
+        proof.make_slimmer(0.0 if limits.of_pushed and limits.depth < np.inf else touching)
         self.proof, self._has_wires = proof, proof.has_wires
         self._judge: ClearanceProof | None = None
         pairs = first._packed.kept_pairs[: len(proof.pairs)]
@@ -94,6 +99,7 @@ class ProvenPose:
         self.at = Standing(first._scene, first._packed, first._state)
         self.moves, self.opened = np.zeros((len(proof.pairs), 6)), list[int]()
         self.proved, self.way_depth = True, 0.0
+        self.pushed = frozenset[int]()
 
     @property
     def judge(self) -> ClearanceProof:
@@ -193,6 +199,8 @@ class ProvenPose:
 
     def may_go_in(self, k: int, there: Standing, part: float) -> bool:
         """Whether pair k may go in by a part of what it may if it touches all along."""
+        if k in self.pushed and not self.limits.of_pushed:
+            return True
         return self.limits.depth == np.inf or self.roll_depth(k, there, part) <= self.limits.depth
 
     def roll_depth(self, k: int, there: Standing, part: float) -> float:

@@ -67,8 +67,6 @@ class Follower:
         place = Place(packed, state, parameter.value, np.zeros(packed.rows))
         curve = Curve(scene, parameter, 1.0 if self.is_angle else length, settings.tolerance)
         self.around: Surroundings | None = None
-        # Bodies that were found to meet where no proof tells that they only touch.
-        self._untold: set[tuple[str, ...]] = set()
         if packed.keeps_apart:
             self.around = Surroundings(scene, solution._touching, settings.swept)
             place = beside(self.around, curve, place)
@@ -200,8 +198,6 @@ class Follower:
         if not (events and events[-1].ends):
             stops.append((step.length, step.there.place))
         meets = events[-1].meets if events and events[-1].ends else None
-        if meets is not None and meets.bodies in self._untold:
-            return events[-1].along <= LAST_STEP and around.goes_untold(stops[-1][1])
         places, begin = list[Place](), (0.0, step.here.place)
         try:
             for stop in stops:
@@ -211,9 +207,10 @@ class Follower:
                 return True
         except (NotFoundError, LostError):
             return False
-        if meets is not None and around.is_undecided and around.in_the_way.bodies == meets.bodies:
-            self._untold.add(meets.bodies)
-        return False
+        # Ways as short as this one go in by nothing: what is not known is whether bodies only touch at its end.
+        if meets is None or events[-1].along > LAST_STEP or not around.is_undecided:
+            return False
+        return around.in_the_way.bodies == meets.bodies and around.goes_untold(stops[-1][1])
 
     def _halved(self, step: Step, begin: tuple[float, Place], end: tuple[float, Place], times: int) -> list[Place]:
         """Places along a step, the last one at its end, between which it is as good as straight."""

@@ -162,6 +162,8 @@ class Surroundings:
         """
         at, proved, depth = self._at, True, self.depth
         for place in places:
+            # Between contacts that hold bodies go around each other, and the straight way is in both.
+            self._ticks.last.pushed = frozenset(pair for pair, _ in place.packed.listed(place.state) if pair >= 0)
             there = self._listed(place, self._at_poses(place))
             gaps = gaps_of_slots(there.packed, there.state)
             # A contact that was not listed where the step began may not have closed unseen.
@@ -236,7 +238,7 @@ class Surroundings:
     def _looks_at(self, there: Place) -> bool:
         """Begin proofs at a place; whether all pairs are clear or touch there."""
         packed = there.packed
-        limits = WayLimits(SAMPLED_WAY, STRAIGHT * packed.scale) if self.swept else WayLimits()
+        limits = WayLimits(SAMPLED_WAY if self.swept else np.inf, STRAIGHT * packed.scale, of_pushed=self.swept)
         proof = self._proof(packed)
         self._ticks = ClearTicks(self._solution(there), self._touching * packed.scale, proof, limits)
         return not self._ticks.doubtful

@@ -111,3 +111,24 @@ def test_a_limit_just_below_what_is_reached_blocks(below):
     reach = 4.0 - below
     assert branch.values[-1] == pytest.approx(-acos((reach**2 - 8.0) / (2.0 * reach)), abs=1e-9)
     assert branch.measures.max() <= reach + 1e-12
+
+
+@pytest.mark.parametrize("swept", [False, True])
+def test_a_ball_that_passes_close_by_is_not_drawn_through(swept):
+    """A ball of radius 0.5 is drawn past another one, through it by 1e-4: much less than the square of a step."""
+    post = asm.Body("post", asm.shapes.sphere(0.5), fixed=True)
+    ball = asm.Body("ball", asm.shapes.sphere(0.5), position=(-1, 0.9999, 0))
+    scene, goal = asm.Assembly([post, ball]), asm.FrameDistance(ball.frame(), asm.Pose((-1, 0.9999, 0)))
+    scene.constrain(asm.Clearance())
+    scene.minimize(goal)
+    branch = asm.follow(scene, asm.Parameter(goal, "target", "x"), -1.0, 1.0, swept=swept)
+    meets = (1.0 - 0.9999**2) ** 0.5
+    assert [event.kind for event in branch.events] == [
+        "end of range",
+        "contact closed",
+        "contact opened",
+        "end of range",
+    ]
+    # Along x the gap grows by 0.014 of the way, and by no more.
+    np.testing.assert_allclose([e.value for e in branch.events], [-1, -meets, meets, 1], rtol=0, atol=1e-12)
+    assert branch.proved.all()
