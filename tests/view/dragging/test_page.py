@@ -52,6 +52,7 @@ def drag(page, client, browser, tab, body, inside):
     corners = asm.Pose(row[:3], row[3:]).apply(body_mesh(body).vertices)
     waits = (3.0 * 2.0 ** min(k, 4) for k in itertools.count())
     ends = []
+    place, middle = client.camera.position, client.camera.look_at
 
     def grabbed():
         pixels = on_screen(page, client, corners)
@@ -66,8 +67,10 @@ def drag(page, client, browser, tab, body, inside):
         while page.shown.held != body.name and time.monotonic() < end:
             time.sleep(0.05)
         if page.shown.held != body.name:
-            # The page was not drawn yet.
+            # The page was not drawn yet, and the mouse has turned the camera: body may be behind another one from there.
             browser.mouse(tab, "mouseReleased", *ends[-1])
+            client.camera.position, client.camera.look_at = place, middle
+            time.sleep(1.0)
         return page.shown.held == body.name
 
     wait_for(grabbed, 3.0 * PATIENCE)
