@@ -67,7 +67,7 @@ def drag(page, client, browser, tab, body, inside):
         while page.shown.held != body.name and time.monotonic() < end:
             time.sleep(0.05)
         if page.shown.held != body.name:
-            # The page was not drawn yet, and the mouse has turned the camera: body may be behind another one from there.
+            # The page was not drawn yet, and the mouse turned the camera: from there a body may be behind another one.
             browser.mouse(tab, "mouseReleased", *ends[-1])
             client.camera.position, client.camera.look_at = place, middle
             time.sleep(1.0)
