@@ -219,7 +219,7 @@ class ProbedScene:
         """Add what dexterities are, of the mechanism as it is: fixed bodies are fixed, and no row is one too many."""
         packed, state = self.packed, self._given
         table, n = packed.table_at(state), 6 * int(packed.table[layout.MOVING])
-        blocks = table[table[layout.UNKNOWN_BLOCKS] :][: packed.count]
+        blocks = packed.unknown_blocks
         moving = np.flatnonzero(blocks >= 0)
         # The unknowns of a block, as columns of its body.
         own = (6 * moving[np.argsort(blocks[moving])][:, None] + np.arange(6)).ravel()

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.program.records import UNKNOWN_BLOCKS
 from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.forms import Cone, Cylinder
 from assembly.kinematics.pose import rotation_matrix
@@ -53,8 +52,8 @@ def crosses_where_held(scene: Assembly, q: Array, settings: Array, interruption:
     if model is None or interruption.is_over():
         return False
     free = null_space(model.jacobian[~model.one_sided], model.jacobian.shape[1])
-    numbers = rows.table[rows.table[UNKNOWN_BLOCKS] :][: rows.count]
-    twists = {k: free[6 * at :][:6] if at >= 0 else np.zeros((6, free.shape[1])) for k, at in enumerate(numbers)}
+    fixed, blocks = np.zeros((6, free.shape[1])), rows.unknown_blocks.tolist()
+    twists = {body: free[6 * block :][:6] if block >= 0 else fixed for body, block in enumerate(blocks)}
     touching = float(settings[ALLOWED_OVERLAP]) * packed.scale
     with lent_proof(packed, scene.bodies) as proof:
         answers = proof.as_they_stand(q, touching)

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from assembly.constraints.packing.scene import Packed
-from assembly.constraints.program.records import UNKNOWN_BLOCKS
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.manifolds.closed_gaps import closed_gaps
 from assembly.solve.attempts.attempts import as_it_stands
@@ -133,8 +132,7 @@ def closed_slopes(
     shapes, pairs, minimum = proven_pairs(scene.packed(), scene.bodies)
     within = touching * scene.packed().scale
     # Unknowns are numbered by what constraints are between bodies.
-    numbers = packed.table[packed.table[UNKNOWN_BLOCKS] :][: packed.count]
-    column = {body: 6 * int(numbers[body]) for body in np.flatnonzero(numbers >= 0).tolist()}
+    column = {body: 6 * block for body, block in enumerate(packed.unknown_blocks.tolist()) if block >= 0}
     blocks: list[Array] = [np.empty((0, 6 * len(column)))]
     owners: list[Side] = []
     for (a, b), least in zip(pairs, minimum, strict=True):

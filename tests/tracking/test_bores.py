@@ -184,14 +184,20 @@ def test_a_pin_is_let_down_into_its_hole():
         np.testing.assert_allclose(step.q[1], (0, 0, z, 1, 0, 0, 0), atol=1e-9)
 
 
-def test_a_plug_is_dragged_in_its_conical_seat(cases):
-    """Lifted and moved aside: a cone in a cone is clear where the levels of its circles say so, with no cell halved."""
+def plug_in_its_seat():
+    """Both of a half angle of 30 degrees, the plug lifted by 0.5: scene, bodies, slope."""
     slope = np.tan(np.pi / 6.0)
     plug = asm.shapes.revolution(asm.curves.polygon([(0, 5), (5 * slope, 5), (20 * slope, 20), (0, 20)]))
     seat = asm.shapes.revolution(asm.curves.polygon([(3 * slope, 3), (30, 3), (30, 18), (18 * slope, 18)]))
     bodies = [asm.Body("seat", seat, fixed=True), asm.Body("plug", plug, position=(0, 0, 0.5))]
     scene = asm.Assembly(bodies)
     scene.constrain(asm.Clearance())
+    return scene, bodies, slope
+
+
+def test_a_plug_is_dragged_in_its_conical_seat(cases):
+    """Lifted and moved aside: a cone in a cone is clear where the levels of its circles say so, with no cell halved."""
+    scene, bodies, _ = plug_in_its_seat()
     tracker, statuses = scene.tracker(bodies[1].point(0, 0, 15)), Counter()
     for k in range(cases(40, 400)):
         step = tracker.step((0.01 * k, 0.0, 15.5 + 0.1 * k))
@@ -202,12 +208,7 @@ def test_a_plug_is_dragged_in_its_conical_seat(cases):
 
 def test_a_plug_leans_on_the_edge_of_its_seat(cases):
     """Turned by a hand beside its axis while it is lifted a little: what of it is in the seat is a cone in a sleeve."""
-    slope = np.tan(np.pi / 6.0)
-    plug = asm.shapes.revolution(asm.curves.polygon([(0, 5), (5 * slope, 5), (20 * slope, 20), (0, 20)]))
-    seat = asm.shapes.revolution(asm.curves.polygon([(3 * slope, 3), (30, 3), (30, 18), (18 * slope, 18)]))
-    bodies = [asm.Body("seat", seat, fixed=True), asm.Body("plug", plug, position=(0, 0, 0.5))]
-    scene = asm.Assembly(bodies)
-    scene.constrain(asm.Clearance())
+    scene, bodies, slope = plug_in_its_seat()
     tracker, statuses, leans = scene.tracker(bodies[1].point(0, 0, 15)), Counter(), 0.0
     around = np.linspace(0.0, 2.0 * np.pi, 361)
     for way in 0.05 * np.arange(cases(40, 200)):

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly.constraints.program import records as layout
 from assembly.proximity.features.solid_contact import TRACK
 
 if TYPE_CHECKING:
@@ -74,9 +73,7 @@ def with_numbers_of(packed: Packed, earlier: Packed, state: Array) -> Array:
 
 def is_alike(one: Packed, packed: Packed) -> bool:
     """Whether two scenes have the same unknowns, rows and tracked values, whatever the numbers in them."""
-    unknowns = [
-        each.rows_table[each.rows_table[layout.UNKNOWN_BLOCKS] :][: each.count].tolist() for each in (one, packed)
-    ]
+    unknowns = [each.unknown_blocks.tolist() for each in (one, packed)]
     counts = [(each.tracked - each.pair_rows, len(each._angles), each.is_implicit) for each in (one, packed)]
     return (
         one.count == packed.count and counts[0] == counts[1] and unknowns[0] == unknowns[1] and one.has_rows_of(packed)

@@ -163,6 +163,11 @@ class Packed(WrittenScene):
         # Without a factor, to copy what a solution keeps takes longer than to evaluate it anew.
         self._state_size = self.kept_at + (self.kept_size if kept_unknowns(self.rows_table) > 0 else 0)
 
+    @property
+    def unknown_blocks(self) -> Table:
+        """Of every body the number of its block of six unknowns; negative for fixed ones."""
+        return self.rows_table[self.rows_table[layout.UNKNOWN_BLOCKS] :][: self.count]
+
     def is_crowded(self, state: Array) -> bool:
         """Whether contacts of clearances were near that found no place."""
         return self.clearance_rows > 0 and state[self.memory_at + manager_records.CROWDED] == 1.0

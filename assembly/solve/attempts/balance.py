@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from assembly._record import rows_of as records_in
 from assembly.constraints.packing.scene import Packed
-from assembly.constraints.program.records import TAPE_FIELDS, TAPE_RECORD, TAPE_TABLE, TAPES, UNKNOWN_BLOCKS
+from assembly.constraints.program.records import TAPE_FIELDS, TAPE_RECORD, TAPE_TABLE, TAPES
 from assembly.errors import InputError
 from assembly.solve.attempts.fit import Run
 from assembly.solve.dense.jacobian import moving_columns, rows_of
@@ -89,8 +89,7 @@ def _is_least(packed: Packed, state: Array) -> bool:
         rows = rows_of(packed, state)
     except InputError:
         return False
-    unknown_blocks = packed.table[packed.table[UNKNOWN_BLOCKS] :][: packed.count]
-    moving = moving_columns(np.flatnonzero(unknown_blocks >= 0).tolist())
+    moving = moving_columns(np.flatnonzero(packed.unknown_blocks >= 0).tolist())
     off = np.where(rows.one_sided, np.minimum(rows.residual, 0.0), rows.residual)
     parts = off[:, None] * rows.jacobian[:, moving]
     left, whole = np.abs(parts.sum(axis=0)), np.abs(parts).sum(axis=0)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program.contact import TOUCHING
 from assembly.constraints.program.primitives import AZIMUTH, TURN
-from assembly.constraints.program.records import IMPLICIT, UNKNOWN_BLOCKS
+from assembly.constraints.program.records import IMPLICIT
 from assembly.errors import InputError
 from assembly.solve.dense.jacobian import Rows, moving_columns, rows_of
 from assembly.solve.dense.rank import centered
@@ -135,8 +135,7 @@ def _disagreement(packed: Packed, state: Array) -> Array | None:
         return None
     if _nears_pole(packed, rows):
         return None
-    unknown_blocks = packed.table[packed.table[UNKNOWN_BLOCKS] :][: packed.count]
-    columns = moving_columns(np.flatnonzero(unknown_blocks >= 0).tolist())
+    columns = moving_columns(np.flatnonzero(packed.unknown_blocks >= 0).tolist())
     jacobian = centered(rows.jacobian[:, columns])[0]
     movable = np.isin(rows.program_rows, packed.value_rows) & ~rows.one_sided
     counted = ~rows.one_sided | (rows.residual < TOUCHING)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from assembly.constraints.packing.corners import body_of
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program.contact import contact_rows
-from assembly.constraints.program.records import CONTACTS, EXTRA, FREE_COLUMN
-from assembly.proximity.extrema.rates import ARM_F, GAP, NORMAL
+from assembly.constraints.program.records import FREE_COLUMN, header_at
+from assembly.proximity.extrema.rates import derivatives_at
 from assembly.proximity.features.solid_contact import CONTACT_RECORD, FEATURE_F, FEATURE_G, IDLE, TRACK
 from assembly.proximity.manager.records import MEMORY_HEADER, PAIR_MEMORY, PLACE_MEMORY, PLACE_PAIR
 
@@ -88,9 +88,9 @@ def meeting(packed: Packed, state: Array, row: int) -> Meeting:
     found = _evaluated(packed, state, np.array([row]))
     if found is None:
         return Meeting(names, NOBODY.place)
-    record = found[1][row]
+    record = derivatives_at(found[1], row)
     first = state[7 * packed.body_places[bodies[0]] :][:3]
-    place = first + packed.scale * (record[ARM_F : ARM_F + 3] - 0.5 * record[GAP] * record[NORMAL : NORMAL + 3])
+    place = first + packed.scale * (record.arm_f - 0.5 * record.gap * record.normal)
     return Meeting(names, place)
 
 
@@ -123,14 +123,15 @@ def copy_slots(earlier: Packed, before: Array, packed: Packed, state: Array) -> 
 def _evaluated(packed: Packed, state: Array, rows: NDArray[np.int64]) -> tuple[Array, Array, Array] | None:
     """Residuals, records and tracked pairs of some rows of contacts at a state's poses; None where one has no pair."""
     table = packed.table_at(state)
-    count, q = int(table[CONTACTS]), state[: packed.contacts_at].reshape(-1, 7).copy()
+    header = header_at(table, 0)
+    count, q = int(header.contacts), state[: packed.contacts_at].reshape(-1, 7).copy()
     q[:, :3] = (q[:, :3] - packed.reference) / packed.scale
     free = np.zeros(count, dtype=np.int64)
     free[rows] = -1
     start = state[packed.contacts_at :][: TRACK * count].reshape(-1, TRACK).copy()
     records, residual = np.zeros((count, CONTACT_RECORD)), np.zeros(count)
     tracked = start.copy()
-    work = q, tracked, records, residual, np.zeros((count, FREE_COLUMN + 4 + int(table[EXTRA])))
+    work = q, tracked, records, residual, np.zeros((count, FREE_COLUMN + 4 + int(header.extra)))
     lost = contact_rows((table, packed.pool), start, np.inf, free, work) >= 0
     return None if lost else (residual, records, tracked)
 

@@ -12,20 +12,10 @@ import assembly as asm
 from assembly.errors import InputError
 from assembly.kinematics.pose import rotation_matrix
 from benchmarks.planar_four_bars import FourBar
+from tests.studies.scenes import lifted_block, swinging_arm
 
 CRANK_ROCKER = (1.0, 3.0, 2.5, 3.2)
 HALF_WIDTH, RADIUS = 0.1, 0.15
-
-
-def swinging_arm():
-    """An arm of half width 0.05 about z, a post of radius 0.1 that it meets at a right angle less asin(0.15)."""
-    base = asm.Body("base", fixed=True)
-    post = asm.Body("post", asm.shapes.solid_cylinder(0.1, 1.0), position=(0.0, 1.0, 0.0), fixed=True)
-    arm = asm.Body("arm", asm.shapes.box(1.4, 0.1, 0.2), position=(0.6, 0.0, 0.0))
-    drive = asm.Revolute(base.frame(), arm.frame(at=(-0.6, 0.0, 0.0)), "drive", angle=0.0)
-    scene = asm.Assembly([base, post, arm])
-    scene.constrain(drive, asm.Clearance())
-    return scene, drive
 
 
 MEETS_POST = 0.5 * pi - asin(0.15)
@@ -159,15 +149,8 @@ def test_a_slider_comes_to_rest_on_a_plate_and_leaves_it(height, kind):
 
 
 def test_a_cam_and_its_follower_part_and_meet():
-    """An eccentric lifts a block that a spring holds at a height of 1.1: it does where 1 - 0.4 sin(angle) is more."""
-    ground, cam = asm.Body("ground", fixed=True), asm.Body("cam", asm.shapes.sphere(1.0))
-    block = asm.Body("block", asm.shapes.box(4, 0.5, 4), position=(0, 1.9, 0))
-    shaft = asm.Revolute(ground.frame(at=(0.4, 0, 0)), cam.frame(at=(0.4, 0, 0)), "shaft", angle=0.3)
-    up = {"z": (0, 1, 0), "x": (1, 0, 0)}
-    lift = asm.Prismatic(ground.frame(**up), block.frame(at=(0, -0.25, 0), **up), "lift")
-    scene = asm.Assembly([ground, cam, block])
-    scene.constrain(shaft, lift, asm.Clearance())
-    scene.minimize(asm.PointDistance(block.point(0, -0.25, 0), (0, 1.1, 0)))
+    """The eccentric lifts the block where 1 - 0.4 sin(angle) is above 1.1."""
+    scene, shaft, lift = lifted_block(1.1)
     branch = asm.follow(scene, asm.Parameter(shaft, "angle"), -4.0, 4.0, of=asm.Measure(lift))
     meets = asin(-0.25)
     # Kinds are as seen from the start, at 0.3.

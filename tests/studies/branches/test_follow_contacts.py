@@ -9,6 +9,7 @@ import pytest
 
 import assembly as asm
 from assembly.derivatives.probed import ProbedScene
+from tests.studies.scenes import lifted_block
 
 ALONG_X = {"z": (1, 0, 0), "x": (0, 1, 0)}
 
@@ -76,14 +77,7 @@ def test_contacts_that_come_and_go_within_a_step_are_seen(height):
 
     At 0.600001 they part for 0.0045 rad, much less than a step, and at 1.39999 they meet for 0.014 rad.
     """
-    ground, cam = asm.Body("ground", fixed=True), asm.Body("cam", asm.shapes.sphere(1.0))
-    block = asm.Body("block", asm.shapes.box(4, 0.5, 4), position=(0, 1.9, 0))
-    shaft = asm.Revolute(ground.frame(at=(0.4, 0, 0)), cam.frame(at=(0.4, 0, 0)), "shaft", angle=0.3)
-    up = {"z": (0, 1, 0), "x": (1, 0, 0)}
-    lift = asm.Prismatic(ground.frame(**up), block.frame(at=(0, -0.25, 0), **up), "lift")
-    scene = asm.Assembly([ground, cam, block])
-    scene.constrain(shaft, lift, asm.Clearance())
-    scene.minimize(asm.PointDistance(block.point(0, -0.25, 0), (0, height, 0)))
+    scene, shaft, lift = lifted_block(height)
     branch = asm.follow(scene, asm.Parameter(shaft, "angle"), -2.2, 2.2, of=asm.Measure(lift))
     first = asin((1.0 - height) / 0.4) if height < 1.0 else -pi - asin((1.0 - height) / 0.4)
     last = pi - first if height < 1.0 else -pi - first

@@ -9,16 +9,12 @@ import pytest
 
 import assembly as asm
 from assembly.errors import InputError
+from tests.studies.scenes import swinging_arm
 
 
 def past_a_post():
     """An arm about z and a post that it meets at `MEETS`: scene, drive, measure."""
-    base = asm.Body("base", fixed=True)
-    post = asm.Body("post", asm.shapes.solid_cylinder(0.1, 1.0), position=(0.0, 1.0, 0.0), fixed=True)
-    arm = asm.Body("arm", asm.shapes.box(1.4, 0.1, 0.2), position=(0.6, 0.0, 0.0))
-    drive = asm.Revolute(base.frame(), arm.frame(at=(-0.6, 0.0, 0.0)), "drive", angle=0.0)
-    scene = asm.Assembly([base, post, arm])
-    scene.constrain(drive, asm.Clearance())
+    scene, drive = swinging_arm()
     return scene, asm.Parameter(drive, "angle", name="angle"), asm.Measure(drive, name="turned")
 
 
