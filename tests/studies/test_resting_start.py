@@ -128,6 +128,20 @@ def test_a_jaw_that_is_drawn_off_is_not_pressed():
     assert solution.success and solution.objective == pytest.approx(4.0, rel=1e-9)
 
 
+def test_a_roller_that_may_roll_off_is_not_pressed():
+    """Its top is drawn down: the line that it touches along balances that, and whichever way it rolls is downhill."""
+    floor = asm.Body("floor", asm.shapes.box(80, 60, 10), fixed=True)
+    lying = asm.Pose((0, 0, 10), (np.sqrt(0.5), 0, np.sqrt(0.5), 0))
+    roller = asm.Body("roller", asm.shapes.solid_cylinder(5, 30), pose=lying)
+    scene = asm.Assembly([floor, roller])
+    scene.constrain(asm.Clearance())
+    tops = (-5.0, 0.0, -14.0), (-5.0, 0.0, 14.0)
+    scene.minimize(
+        *(asm.PointDistance(roller.point(*top), lying.apply(np.array(top)) - (0.0, 0.0, 1.0)) for top in tops)
+    )
+    assert asked(scene) is None
+
+
 def test_an_end_that_fails_tells_the_objective_of_the_pose_that_it_returns():
     """Driven into a block, the box stops at it; beside the last pose that held others had been tried."""
     floor = asm.Body("floor", asm.shapes.box(10, 10, 2), fixed=True)
