@@ -29,6 +29,7 @@ from assembly.proximity.clearance.holder_first import holds_first
 from assembly.proximity.clearance.hulls.scene import answers_by_hulls, crossings_by_hulls, told_by_hulls
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof, stayed_answers
 from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
+from assembly.proximity.clearance.wire_cells import is_of_wires
 from assembly.solve.interruption import CTRL_C, Interruption
 from assembly.solve.loop.settings import ANY_POSE, FEASIBILITY
 from assembly.solve.near_contacts import NEAR, near_contacts, opening_move
@@ -133,35 +134,33 @@ def lent_proof(packed: Packed, bodies: Sequence[Body]) -> Iterator[ClearanceProo
         packed.proofs.append(proof)
 
 
-def proven_by_hulls(
-    packed: Packed, bodies: Sequence[Body], proof: ClearanceProof | None, q: Array, touching: float
-) -> list[Answer] | None:
+def proven_by_hulls(packed: Packed, bodies: Sequence[Body], q: Array, touching: float) -> list[Answer] | None:
     """That all pairs are clear or touch at poses, by hulls of faces; None where these do not tell it.
 
     Of faces that lie on each other they tell more than looks, in less time; of wires that touch nothing.
     """
-    if proof is not None and proof.has_wires:
-        return None
-    return answers_by_hulls(*proven_pairs(packed, bodies), q, touching)
+    shapes, pairs, minimum = proven_pairs(packed, bodies)
+    return None if _has_wires(shapes, pairs) else answers_by_hulls(shapes, pairs, minimum, q, touching)
 
 
-def crosses_by_hulls(
-    packed: Packed, bodies: Sequence[Body], proof: ClearanceProof | None, q: Array, touching: float
-) -> bool:
+def _has_wires(shapes: Sequence[tuple[Face, ...]], pairs: Sequence[tuple[int, int]]) -> bool:
+    """Whether both bodies of any pair are of wires: of these hulls are not asked, whatever was solved before."""
+    return any(is_of_wires(shapes[a]) and is_of_wires(shapes[b]) for a, b in pairs)
+
+
+def crosses_by_hulls(packed: Packed, bodies: Sequence[Body], q: Array, touching: float) -> bool:
     """Whether hulls of faces prove that any pair crosses at poses: that needs no cells, which take longer to make."""
-    if proof is not None and proof.has_wires:
-        return False
     shapes, pairs, _ = proven_pairs(packed, bodies)
+    if _has_wires(shapes, pairs):
+        return False
     return any(answer is not None for answer in crossings_by_hulls(shapes, pairs, q, touching))
 
 
-def stood_by_hulls(
-    packed: Packed, bodies: Sequence[Body], proof: ClearanceProof | None, q: Array, touching: float
-) -> list[Answer] | None:
+def stood_by_hulls(packed: Packed, bodies: Sequence[Body], q: Array, touching: float) -> list[Answer] | None:
     """What all pairs are at poses, those that cross as well, by hulls of faces; None where these do not tell it."""
-    if proof is not None and proof.has_wires:
-        return None
     shapes, pairs, minimum = proven_pairs(packed, bodies)
+    if _has_wires(shapes, pairs):
+        return None
     found = []
     for pair, answer in zip(pairs, told_by_hulls(shapes, pairs, minimum, q, touching), strict=True):
         answer = answer or next(crossings_by_hulls(shapes, [pair], q, touching))

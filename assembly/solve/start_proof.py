@@ -68,13 +68,12 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
     if stood is not None and stood[:2] == (asked, touching):
         return stood[2]
     # Hulls of faces prove most of it before there are cells, and of faces that lie on each other in less time.
-    known = packed.proofs[-1] if packed.proofs else None
-    hulled = proven_by_hulls(packed, bodies, known, q, touching * packed.scale)
+    hulled = proven_by_hulls(packed, bodies, q, touching * packed.scale)
     if hulled is not None:
         found = named_answers(packed, hulled)
         packed.stood = asked, touching, found
         return found
-    if crosses_by_hulls(packed, bodies, known, q, touching * packed.scale):
+    if crosses_by_hulls(packed, bodies, q, touching * packed.scale):
         packed.stood = asked, touching, None
         return None
     with lent_proof(packed, bodies) as proof:

@@ -79,9 +79,8 @@ def fitting(scene: Assembly, poses: Array, touching: float) -> Fitting:
     known = scene._fitted.get(key)
     if known is not None:
         return known
-    proof = packed.proofs[-1] if packed.proofs else None
-    told = proven_by_hulls(packed, scene.bodies, proof, poses, touching * packed.scale)
-    answers = told or stood_by_hulls(packed, scene.bodies, proof, poses, touching * packed.scale)
+    told = proven_by_hulls(packed, scene.bodies, poses, touching * packed.scale)
+    answers = told or stood_by_hulls(packed, scene.bodies, poses, touching * packed.scale)
     if answers is None:
         with lent_proof(packed, scene.bodies) as proof:
             answers = proof.as_they_stand(poses, touching * packed.scale)

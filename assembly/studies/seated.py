@@ -101,7 +101,7 @@ def seated(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     packed = scene.packed()
     if not can_prove(packed):
         return None
-    answers = stood_by_hulls(packed, scene.bodies, packed.proofs[-1] if packed.proofs else None, q, touching)
+    answers = stood_by_hulls(packed, scene.bodies, q, touching)
     if answers is None:
         with lent_proof(packed, scene.bodies) as proof:
             answers = proof.as_they_stand(q, touching)

@@ -7,6 +7,7 @@ its radius and s of that. Halving a piece is exact, and a quarter of the s; a st
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.shapes.centerline import SAME, spine_of
 from assembly.proximity.clearance.records import WIRE
 
-__all__ = ["WireCells", "wire_cells"]
+__all__ = ["WireCells", "is_of_wires", "wire_cells"]
 
 Array = NDArray[np.float64]
 # The largest angle of a first piece [rad].
@@ -73,3 +74,9 @@ def wire_cells(face: Face, size: float) -> WireCells | None:
         np.column_stack([bend, np.full(len(bend), spine.radius)]),
         np.full(len(corner), pad),
     )
+
+
+@lru_cache(maxsize=256)
+def is_of_wires(faces: tuple[Face, ...]) -> bool:
+    """Whether all faces of a body are whole round wires of lines and arcs."""
+    return all(spine_of(face) is not None for face in faces)
