@@ -67,6 +67,7 @@ class Assembly(Solving):
         Without an objective the least move is sought; if it is not found, any pose at which all constraints hold is
         returned. A start at which they hold is not moved. If constraints do not hold near the start, other starts are
         tried, the same in every run; the solution with the least objective is returned, and its `restarted` is True.
+        Threads that solve one scene take turns; `solve_many` solves from many starts at once.
 
         Parameters
         ----------
@@ -96,28 +97,29 @@ class Assembly(Solving):
         Solution
             Check `success`; if it is False, the status and the message say what happened.
         """
-        is_plain = starts is None and time_limit is None and callback is None and swept is False and not options
-        # Where a body or a constraint was set since, it may be one of this scene: `packed` looks.
-        if is_plain and type(q0) is Solution and (self._seen is changes() or self._follows_numbers()):
-            straight = straight_from(q0, self._scene, self._packed, bool(self._objectives))
-            if straight is not None:
-                return straight
-        interruption = CTRL_C if time_limit is None and callback is None else Interruption(time_limit, callback)
-        if swept is not False and not isinstance(swept, (bool, np.bool_)):
-            raise InputError(f"swept is {swept!r}; expected True or False")
-        if swept:
-            from assembly.studies.swept_solve import swept_solve
+        with self._turn.lock:
+            is_plain = starts is None and time_limit is None and callback is None and swept is False and not options
+            # Where a body or a constraint was set since, it may be one of this scene: `packed` looks.
+            if is_plain and type(q0) is Solution and (self._seen is changes() or self._follows_numbers()):
+                straight = straight_from(q0, self._scene, self._packed, bool(self._objectives))
+                if straight is not None:
+                    return straight
+            interruption = CTRL_C if time_limit is None and callback is None else Interruption(time_limit, callback)
+            if swept is not False and not isinstance(swept, (bool, np.bool_)):
+                raise InputError(f"swept is {swept!r}; expected True or False")
+            if swept:
+                from assembly.studies.swept_solve import swept_solve
 
-            solution = swept_solve(self, q0, starts, options, interruption)
-        else:
-            solution = self._from_start(q0, starts, options, interruption)
-        if not solution.success:
-            solution = self._tried_otherwise(solution, q0, starts, swept, options, interruption)
-        if options and Options.of(options).verbose:
-            print(solution.iteration_table())
-        if _LOG.isEnabledFor(logging.DEBUG):
-            _LOG.debug("%s, %d iterations, %.6f s", solution.status.name, solution.iterations, solution.seconds)
-        return solution
+                solution = swept_solve(self, q0, starts, options, interruption)
+            else:
+                solution = self._from_start(q0, starts, options, interruption)
+            if not solution.success:
+                solution = self._tried_otherwise(solution, q0, starts, swept, options, interruption)
+            if options and Options.of(options).verbose:
+                print(solution.iteration_table())
+            if _LOG.isEnabledFor(logging.DEBUG):
+                _LOG.debug("%s, %d iterations, %.6f s", solution.status.name, solution.iterations, solution.seconds)
+            return solution
 
     def solve_all(
         self,

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._turn import Turn
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint, Coordinate, structure_changes
 from assembly.constraints.model.contact import Contact, lone_surfaces
@@ -52,8 +53,15 @@ class PackedContents(Contents):
         self._asked_for: list[bool] = []  # of every body whether it is fixed, of every constraint whether it counts
         self._turns_near: Mapping[Coordinate, float] = {}  # where angles are, of solves that begin at poses
         self._crowding = 1  # how many times as many places as clearances ask for
+        # A solve writes where it begins and what it asks for into what is packed, and may pack it anew.
+        self._turn = Turn()
         self._has_changed()
         super().__init__(bodies)
+
+    def __copy__(self) -> Self:
+        other = super().__copy__()
+        other._turn = Turn()
+        return other
 
     def _has_changed(self) -> None:
         # Packed anew: of copies what a solve of the one has changed there the other does not know.

@@ -1,0 +1,72 @@
+"""Threads that solve one scene take turns: every solve is measured from its own start, to the bit."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import assembly as asm
+
+RNG = np.random.default_rng(11)
+STARTS = 24
+
+
+def ball_on_a_plane(asks_for_posture):
+    """Whose least move is straight down from wherever it starts, so that a start of another solve would show."""
+    floor = asm.Body("floor", asm.shapes.plane(20.0, 20.0), fixed=True)
+    ball = asm.Body("ball", asm.shapes.sphere(0.5), position=(0.0, 0.0, 1.0))
+    scene = asm.Assembly([floor, ball])
+    scene.constrain(asm.Contact(floor, ball))
+    if asks_for_posture:
+        scene.minimize(asm.Posture())
+    return scene
+
+
+def starts_of(scene):
+    for _ in range(STARTS):
+        q = scene.q.copy()
+        q[1, :3] = RNG.uniform((-5.0, -5.0, 0.4), (5.0, 5.0, 3.0))
+        yield q
+
+
+def in_two_threads(work, items):
+    with ThreadPoolExecutor(2) as pool:
+        return list(pool.map(work, items))
+
+
+@pytest.mark.parametrize("asks_for_posture", [False, True], ids=["least move", "posture"])
+def test_each_solve_is_measured_from_its_own_start(asks_for_posture):
+    scene = ball_on_a_plane(asks_for_posture)
+    starts = list(starts_of(scene))
+    alone = [scene.solve(q) for q in starts]
+    together = in_two_threads(scene.solve, starts * 4)
+    for k, solution in enumerate(together):
+        here = alone[k % STARTS]
+        assert solution.success and (solution.q == here.q).all()
+        assert solution.objective == here.objective
+    # The least move of a ball is straight down: what the law above compares depends on the start.
+    assert np.abs(alone[0].q[1, :2] - starts[0][1, :2]).max() < 1e-9
+    assert np.abs(alone[0].q[1, :2] - alone[1].q[1, :2]).max() > 1e-3
+
+
+def test_warm_solves_of_two_threads_are_those_of_one():
+    scene = ball_on_a_plane(False)
+    begun = [scene.solve(q) for q in starts_of(scene)]
+    alone = [scene.solve(solution).q for solution in begun]
+    assert all(
+        (q == alone[k % STARTS]).all() for k, q in enumerate(in_two_threads(lambda s: scene.solve(s).q, begun * 4))
+    )
+
+
+def test_copies_have_turns_of_their_own():
+    scene = ball_on_a_plane(False)
+    others = [copy.copy(scene), copy.deepcopy(scene), pickle.loads(pickle.dumps(scene))]
+    with scene._turn.lock:
+        # A copy that shared the lock would wait for this thread, which waits for the copy.
+        for other in others:
+            with ThreadPoolExecutor(1) as pool:
+                assert pool.submit(other.solve).result(timeout=60.0).success
