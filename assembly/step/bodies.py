@@ -119,6 +119,20 @@ def read_shape(
     return made
 
 
+def _outward(shape: Any, made: Shape) -> Shape:
+    """What was read of a shape, turned inside out where OCCT has turned it.
+
+    OCCT judges which side of a shell is outside by the faces as it reads them, and those with poles may be wrong.
+    """
+    o = occt()
+    if made.missing or shape.ShapeType() != o.TopAbs_SOLID or not any(face.surface._pole_bits for face in made.faces):
+        return made
+    if len(parts(shape, o.TopAbs_SHELL)) == 1 and sum(face.volume_integral() for face in made.faces) < 0.0:
+        for face in made.faces:
+            face.reversed = not face.reversed
+    return made
+
+
 def _is_slit(face: Any) -> bool:
     """Whether a face is nowhere wider than its edges are exact: it has no area, and nothing is missing without it."""
     o = occt()
@@ -169,7 +183,9 @@ def bodies_in(source: Source, scale: float, strict: bool) -> tuple[list[Body], l
                 if key not in read:
                     original = Part(leaf.label)
                     images = (image_of(shape, original.said, factor) for shape in solids_in(original.shape))
-                    read[key] = [read_shape(shape, told, original.color, scale) for shape, told in images]
+                    read[key] = [
+                        _outward(shape, read_shape(shape, told, original.color, scale)) for shape, told in images
+                    ]
                     # Areas of a loop that crosses itself cancel: a face with none is judged with repairs, which cut it.
                     if not source.repairs and any(shape.missing or shape.slits for shape in read[key]):
                         raise Unrepaired(f"{leaf.name!r} has a face that cannot be read")

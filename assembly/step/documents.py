@@ -25,7 +25,7 @@ _BESIDE = (
 
 
 # What OCCT looks for in each two edges of a wire, and in each two wires of a face.
-_REPAIRS = ("FixSelfIntersectionMode", "FixIntersectingWiresMode")
+_REPAIRS = ("FixSelfIntersectionMode", "FixIntersectingWiresMode", "FixOrientationMode")
 
 
 class StepError(InputError):

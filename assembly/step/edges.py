@@ -14,6 +14,7 @@ import numpy as np
 
 from assembly.errors import AssemblyError, InputError
 from assembly.step.occt import occt, parts
+from assembly.step.pole_wires import polar
 from assembly.step.profiles import Unreadable, point
 from assembly.step.projected import Side, Space, is_loose, space_of
 from assembly.step.surfaces import Patch, patch
@@ -180,7 +181,8 @@ def _outlined(face: Any) -> _Outline:
     if surface is None:
         raise Unreadable("it has no surface")
     wires = wires_of(face, surface)
-    box = bounds(wires, surface, face)
+    drawn = polar(wires, surface, face)
+    wires, box = drawn or (wires, bounds(wires, surface, face))
     if not all(isfinite(x) and abs(x) < _FAR for x in box):
         raise Unreadable("it has no boundary, and its surface is unbounded")
     return _Outline(surface, wires, box)

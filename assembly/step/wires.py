@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from assembly.step.occt import occt, parts
 
-__all__ = ["Box", "Traced", "Wire", "bounds", "outermost", "wires_of"]
+__all__ = ["Box", "Pair", "Traced", "Wire", "bounds", "outermost", "wires_of"]
 
 Pair = tuple[float, float]
 # u_min, u_max, v_min, v_max.
@@ -58,6 +58,8 @@ class Wire:
         Whether each begins where the one before ends.
     whole : bool
         Whether the wire has no others.
+    is_outer : bool, optional
+        Whether it is around the face, where that is known.
     """
 
     wire: Any
@@ -65,6 +67,7 @@ class Wire:
     edges: list[Traced]
     ordered: bool
     whole: bool
+    is_outer: bool | None = None
 
     @cached_property
     def box(self) -> Box:
@@ -141,9 +144,11 @@ def bounds(wires: list[Wire], surface: Any, face: Any) -> Box:
 def outermost(wires: list[Wire], surface: Any, face: Any) -> int:
     """Which of the wires is around the others: as OCCT has it, the last one with the box of the one before in its own.
 
-    None of one or no wire: 0.
+    None of one or no wire: 0. Where it is known that none is: -1.
     """
     o = occt()
+    if any(wire.is_outer is not None for wire in wires):
+        return next((k for k, wire in enumerate(wires) if wire.is_outer), -1)
     if len(wires) < 2:
         return 0
     if not isinstance(surface, (o.Geom_Plane, o.Geom_CylindricalSurface, o.Geom_ConicalSurface)):
