@@ -188,7 +188,8 @@ class PackedContents(Contents):
         before = self.packed()
         self._crowding *= MORE_PLACES
         packed = self._pack(before)
-        packed.origin, packed.proofs, packed.stood = before.origin, before.proofs, before.stood
+        packed.origin, packed.proofs = before.origin, before.proofs
+        packed.stood, packed.hulled = before.stood, before.hulled
         return packed
 
     def _packed_as(self, packed: Packed) -> Packed | None:

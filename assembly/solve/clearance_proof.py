@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from assembly.proximity.clearance.answers import Answer, Contacts, Verdict, is_p
 from assembly.proximity.clearance.conforming import conforms
 from assembly.proximity.clearance.deforming import smaller_answer
 from assembly.proximity.clearance.holder_first import holds_first
-from assembly.proximity.clearance.hulls.scene import answers_by_hulls, crossings_by_hulls, told_by_hulls
+from assembly.proximity.clearance.hulls.scene import HullAnswers
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof, stayed_answers
 from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
 from assembly.proximity.clearance.wire_cells import is_of_wires
@@ -43,8 +43,9 @@ __all__ = [
     "FEW",
     "TRIES",
     "PairAnswer",
+    "answers_at",
     "can_prove",
-    "crosses_by_hulls",
+    "hull_answers",
     "judge_end",
     "lent_proof",
     "named_answers",
@@ -53,9 +54,7 @@ __all__ = [
     "open_recognized",
     "owned_pairs",
     "prove_end",
-    "proven_by_hulls",
     "proven_pairs",
-    "stood_by_hulls",
 ]
 
 Array = NDArray[np.float64]
@@ -63,6 +62,8 @@ Array = NDArray[np.float64]
 TRIES = 3
 # Pairs of nodes that a look may take where bodies conform, or on the way from the last poses.
 FEW = 500
+# Poses at which it is kept what hulls tell.
+REMEMBERED = 4
 
 
 @dataclass(frozen=True)
@@ -134,50 +135,33 @@ def lent_proof(packed: Packed, bodies: Sequence[Body]) -> Iterator[ClearanceProo
         packed.proofs.append(proof)
 
 
-def proven_by_hulls(packed: Packed, bodies: Sequence[Body], q: Array, touching: float) -> list[Answer] | None:
-    """That all pairs are clear or touch at poses, by hulls of faces; None where these do not tell it.
+def hull_answers(packed: Packed, bodies: Sequence[Body], q: Array, touching: float) -> HullAnswers:
+    """What hulls of faces tell of all pairs at poses (n, 7): equal poses are asked once, and no pair before it matters.
 
-    Of faces that lie on each other they tell more than looks, in less time; of wires that touch nothing.
+    Of faces that lie on each other they tell more than looks, in less time, and before there are cells, which take
+    longer to make. Of wires that touch they tell nothing: where both bodies of any pair are of wires no pair is asked,
+    whatever was solved before.
     """
     shapes, pairs, minimum = proven_pairs(packed, bodies)
-    return None if _has_wires(shapes, pairs) else answers_by_hulls(shapes, pairs, minimum, q, touching)
-
-
-def _has_wires(shapes: Sequence[tuple[Face, ...]], pairs: Sequence[tuple[int, int]]) -> bool:
-    """Whether both bodies of any pair are of wires: of these hulls are not asked, whatever was solved before."""
-    return any(is_of_wires(shapes[a]) and is_of_wires(shapes[b]) for a, b in pairs)
-
-
-def crosses_by_hulls(packed: Packed, bodies: Sequence[Body], q: Array, touching: float) -> bool:
-    """Whether hulls of faces prove that any pair crosses at poses: that needs no cells, which take longer to make."""
-    shapes, pairs, _ = proven_pairs(packed, bodies)
-    if _has_wires(shapes, pairs):
-        return False
-    return any(answer is not None for answer in crossings_by_hulls(shapes, pairs, q, touching))
-
-
-def stood_by_hulls(packed: Packed, bodies: Sequence[Body], q: Array, touching: float) -> list[Answer] | None:
-    """What all pairs are at poses, those that cross as well, by hulls of faces; None where these do not tell it."""
-    shapes, pairs, minimum = proven_pairs(packed, bodies)
-    if _has_wires(shapes, pairs):
-        return None
-    found = []
-    for pair, answer in zip(pairs, told_by_hulls(shapes, pairs, minimum, q, touching), strict=True):
-        answer = answer or next(crossings_by_hulls(shapes, [pair], q, touching))
-        if answer is None:
-            return None
-        found.append(answer)
+    asked = q.tobytes() + np.array([touching, *minimum]).tobytes()
+    # Read once: other threads may solve the scene.
+    known = packed.hulled
+    for key, told in known:
+        if key == asked:
+            return cast(HullAnswers, told)
+    is_silent = any(is_of_wires(shapes[a]) and is_of_wires(shapes[b]) for a, b in pairs)
+    found = HullAnswers(shapes, pairs, minimum, q.copy(), touching, is_silent)
+    packed.hulled = ((asked, found), *known[: REMEMBERED - 1])
     return found
 
 
-def _told_by_hulls(
-    packed: Packed, bodies: Sequence[Body], proof: ClearanceProof, q: Array, touching: float
-) -> dict[int, Answer]:
-    """The same of the pairs of which hulls tell it, by their numbers."""
-    if proof.has_wires:
-        return {}
-    told = enumerate(told_by_hulls(*proven_pairs(packed, bodies), q, touching))
-    return {k: answer for k, answer in told if answer is not None}
+def answers_at(packed: Packed, bodies: Sequence[Body], q: Array, touching: float) -> list[Answer]:
+    """What all pairs are at poses (n, 7): by hulls of faces, and by looks at all pairs if these do not tell of each."""
+    told = hull_answers(packed, bodies, q, touching).all_told()
+    if told is not None:
+        return told
+    with lent_proof(packed, bodies) as proof:
+        return proof.as_they_stand(q, touching)
 
 
 def can_prove(packed: Packed) -> bool:
@@ -217,12 +201,17 @@ def prove_end(solution: Solution) -> Sequence[PairAnswer]:
             PairAnswer(item.name, (a.name, b.name), unknown, True, False) for item, (a, b), _ in owned_pairs(packed)
         ]
     touching = solution._touching * packed.scale
+    hulls = hull_answers(packed, scene.bodies, solution.q, touching)
+    # Where there are no cells yet, none are made for what hulls tell; else a way from the last poses may be shorter.
+    hulled = hulls.all_held() if not packed.proofs else None
+    if hulled is not None:
+        return named_answers(packed, hulled)
     with lent_proof(packed, scene.bodies) as proof:
         proof.make_slimmer(touching)
         stayed = _stayed_clear(packed, proof, solution.q, touching)
         if stayed is not None:
             return stayed
-        told = _told_by_hulls(packed, scene.bodies, proof, solution.q, touching)
+        told = hulls.told()
         if len(told) == len(proof.pairs):
             return named_answers(packed, list(told.values()))
         wedged = open_recognized(proof, solution.q, touching, told)

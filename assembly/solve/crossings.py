@@ -31,7 +31,7 @@ from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Answer, Verdict
 from assembly.proximity.clearance.body_cells import has_cells
 from assembly.proximity.clearance.deforming import smaller_answer
-from assembly.proximity.clearance.hulls.scene import told_by_hulls
+from assembly.proximity.clearance.hulls.scene import HullAnswers
 from assembly.proximity.clearance.proof import LEAST_SIZE, ClearanceProof
 from assembly.proximity.clearance.touching import filled_bore, left_open, off_contacts
 from assembly.solve.clearance_proof import FEW
@@ -280,14 +280,10 @@ def _left_by_hulls(
 
     Of faces that lie on each other they tell more than looks, in less time.
     """
-    told = told_by_hulls(shapes, list(rows.values()), [0.0] * len(rows), q, touching)
-    left = []
-    for k, answer in zip(rows, told, strict=True):
-        if answer is None:
-            left.append(k)
-        else:
-            answers[k] = answer
-    return left
+    told = HullAnswers(shapes, list(rows.values()), [0.0] * len(rows), q, touching).told()
+    for place, k in enumerate(rows):
+        answers[k] = told.get(place, answers[k])
+    return [k for place, k in enumerate(rows) if place not in told]
 
 
 def _proven(

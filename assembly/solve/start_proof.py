@@ -23,12 +23,11 @@ from assembly.solve.clearance_proof import (
     TRIES,
     PairAnswer,
     StayedClear,
-    crosses_by_hulls,
+    hull_answers,
     lent_proof,
     named_answers,
     nothing_known,
     owned_pairs,
-    proven_by_hulls,
 )
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.samples import PosedBodies, sampled
@@ -68,12 +67,13 @@ def prove_start(packed: Packed, bodies: Sequence[Body], state: Array, touching: 
     if stood is not None and stood[:2] == (asked, touching):
         return stood[2]
     # Hulls of faces prove most of it before there are cells, and of faces that lie on each other in less time.
-    hulled = proven_by_hulls(packed, bodies, q, touching * packed.scale)
+    hulls = hull_answers(packed, bodies, q, touching * packed.scale)
+    hulled = hulls.all_held()
     if hulled is not None:
         found = named_answers(packed, hulled)
         packed.stood = asked, touching, found
         return found
-    if crosses_by_hulls(packed, bodies, q, touching * packed.scale):
+    if hulls.any_crosses():
         packed.stood = asked, touching, None
         return None
     with lent_proof(packed, bodies) as proof:
@@ -129,12 +129,14 @@ def prove_way(
     if (q == last).all():
         # Nothing has moved: there is no way, and the poses were looked at before.
         return prove_start(packed, bodies, state, touching)
+    # A way begins where all are clear. Hulls tell at once of what touches; a look would spend its budget there.
+    if not may_jump and hull_answers(packed, bodies, last, length).any_touches():
+        return None
     with lent_proof(packed, bodies) as proof:
         proof.make_slimmer(length)
         if not may_jump:
             # What is found is not to depend on what was solved before.
             proof.begin_anew()
-            # A way begins where all are clear. Hulls tell at once of what touches; a look would spend its budget there.
             stood = enumerate(proof.as_they_stand(last, length))
             if any(answer.verdict is not Verdict.CLEAR and not proof.is_of_wires(k) for k, answer in stood):
                 return None

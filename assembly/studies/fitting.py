@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.constraint import Constraint
 from assembly.proximity.clearance.answers import Verdict
-from assembly.solve.clearance_proof import lent_proof, proven_by_hulls, proven_pairs, stood_by_hulls
+from assembly.solve.clearance_proof import answers_at, hull_answers, proven_pairs
 from assembly.studies.seated import NearFit, NotBelow, fits
 
 if TYPE_CHECKING:
@@ -79,11 +79,8 @@ def fitting(scene: Assembly, poses: Array, touching: float) -> Fitting:
     known = scene._fitted.get(key)
     if known is not None:
         return known
-    told = proven_by_hulls(packed, scene.bodies, poses, touching * packed.scale)
-    answers = told or stood_by_hulls(packed, scene.bodies, poses, touching * packed.scale)
-    if answers is None:
-        with lent_proof(packed, scene.bodies) as proof:
-            answers = proof.as_they_stand(poses, touching * packed.scale)
+    answers = answers_at(packed, scene.bodies, poses, touching * packed.scale)
+    is_told = hull_answers(packed, scene.bodies, poses, touching * packed.scale).all_held() is not None
     near = [pair for pair, answer in zip(pairs, answers, strict=True) if answer.verdict is not Verdict.CLEAR]
     others = [item for item in scene.constraints if not isinstance(item, Clearance)]
     taken = {item.name for item in others}
@@ -95,5 +92,5 @@ def fitting(scene: Assembly, poses: Array, touching: float) -> Fitting:
     }
     while len(scene._fitted) >= REMEMBERED:
         scene._fitted.pop(next(iter(scene._fitted)))
-    found = scene._fitted[key] = Fitting(others, sides, set(near), told is not None)
+    found = scene._fitted[key] = Fitting(others, sides, set(near), is_told)
     return found

@@ -17,10 +17,9 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.recognition.forms import Cone, Cylinder
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Verdict
-from assembly.proximity.clearance.proof import ClearanceProof
 from assembly.proximity.manifolds.closed_gaps import wall_manifolds, walls
 from assembly.solve.attempts.attempts import as_it_stands
-from assembly.solve.clearance_proof import can_prove, lent_proof
+from assembly.solve.clearance_proof import answers_at, can_prove, proven_pairs
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import ALLOWED_OVERLAP, SOLVED, STATIONARITY, UNSURE
 from assembly.solve.second_order.dense import LocalModel, null_space
@@ -55,24 +54,29 @@ def crosses_where_held(scene: Assembly, q: Array, settings: Array, interruption:
     fixed, blocks = np.zeros((6, free.shape[1])), rows.unknown_blocks.tolist()
     twists = {body: free[6 * block :][:6] if block >= 0 else fixed for body, block in enumerate(blocks)}
     touching = float(settings[ALLOWED_OVERLAP]) * packed.scale
-    with lent_proof(packed, scene.bodies) as proof:
-        answers = proof.as_they_stand(q, touching)
-        return any(
-            _is_held(proof, k, q, twists, (rows.scale, touching), is_stuck(answer, touching))
-            for k, answer in enumerate(answers)
-            if answer.verdict not in (Verdict.CLEAR, Verdict.TOUCHING)
-        )
+    answers = answers_at(packed, scene.bodies, q, touching)
+    shapes, pairs, _ = proven_pairs(packed, scene.bodies)
+    return any(
+        _is_held((shapes[a], shapes[b]), (a, b), q, twists, (rows.scale, touching), is_stuck(answer, touching))
+        for (a, b), answer in zip(pairs, answers, strict=True)
+        if answer.verdict not in (Verdict.CLEAR, Verdict.TOUCHING)
+    )
 
 
 def _is_held(
-    proof: ClearanceProof, k: int, q: Array, twists: dict[int, Array], lengths: tuple[float, float], crosses: bool
+    shapes: tuple[tuple[Face, ...], tuple[Face, ...]],
+    pair: tuple[int, int],
+    q: Array,
+    twists: dict[int, Array],
+    lengths: tuple[float, float],
+    crosses: bool,
 ) -> bool:
-    """Whether the free motions move the bodies of pair k against each other by no more than turns about its wall.
+    """Whether the free motions move the bodies of a pair against each other by no more than turns about its wall.
 
     The lengths are what unknowns are divided by, and what counts as touching. Where a look has not told that bodies
     cross, a shaft that is too thick for its bore does.
     """
-    (a, b), (scale, touching) = proof.pairs[k], lengths
+    (a, b), (scale, touching) = pair, lengths
 
     def velocity(point: Array) -> Array:
         """Of what of the second body is at a point, seen from the first, for every free motion: (3, motions)."""
@@ -85,8 +89,9 @@ def _is_held(
     spin = twists[b][3:] - twists[a][3:]
     if crosses and max(np.abs(spin).max(initial=0.0), np.abs(velocity(q[b, :3])).max(initial=0.0)) < STILL:
         return True
-    turn, shapes = rotation_matrix(q[a, 3:]), (proof.faces[a], proof.faces[b])
-    for form in _filled_walls(shapes, *proof.relative(k, q), touching):
+    turn = rotation_matrix(q[a, 3:])
+    seen = turn.T @ rotation_matrix(q[b, 3:]), (q[b, :3] - q[a, :3]) @ turn
+    for form in _filled_walls(shapes, *seen, touching):
         axis = turn @ form.axis
         point = turn @ (form.apex if isinstance(form, Cone) else form.point) + q[a, :3]
         beside = spin - np.outer(axis, axis @ spin)

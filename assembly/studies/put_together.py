@@ -25,7 +25,7 @@ from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.hulls.body_hulls import BodyHulls, hulls_of_body
 from assembly.proximity.clearance.hulls.planes import normal_between
 from assembly.proximity.clearance.proof import ClearanceProof
-from assembly.solve.clearance_proof import can_prove, lent_proof, open_recognized
+from assembly.solve.clearance_proof import answers_at, can_prove, lent_proof, open_recognized
 from assembly.solve.interruption import Interruption
 from assembly.solve.loop.settings import CONTACT_LOST, SOLVED
 from assembly.solve.options import Options
@@ -137,16 +137,17 @@ def put_together(
     is_asked = has_others and (alone.code == CONTACT_LOST or not float(alone.history[0, 1]) <= HELD)
     if not (is_asked or scene.objectives) or interruption.is_over():
         return None
-    with lent_proof(packed, scene.bodies) as proof:
-        touching = settings.touching * packed.scale
-        answers = proof.as_they_stand(q, touching)
-        open_yet = [k for k, answer in enumerate(answers) if answer.verdict is Verdict.UNDECIDED]
-        is_clear = not any(is_stuck(answer, touching) for answer in answers)
-        is_clear = is_clear and not any(_are_in_one_place(proof, k, q, touching) for k in open_yet)
-        # Of bodies that cross only those are asked for sides that an objective alone draws together.
-        sides: list[Array | None] = [None] * len(proof.pairs)
-        if is_clear or not is_asked:
-            sides = _sides(proof, q)
+    touching = settings.touching * packed.scale
+    answers = answers_at(packed, scene.bodies, q, touching)
+    is_clear = not any(is_stuck(answer, touching) for answer in answers)
+    # Of bodies that cross only those are asked for sides that an objective alone draws together.
+    sides: list[Array | None] = [None] * len(answers)
+    if is_clear or not is_asked:
+        with lent_proof(packed, scene.bodies) as proof:
+            open_yet = [k for k, answer in enumerate(answers) if answer.verdict is Verdict.UNDECIDED]
+            is_clear = is_clear and not any(_are_in_one_place(proof, k, q, touching) for k in open_yet)
+            if is_clear or not is_asked:
+                sides = _sides(proof, q)
 
     def solve() -> There | None:
         if alone.code == SOLVED:

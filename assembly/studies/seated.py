@@ -26,7 +26,7 @@ from assembly.kinematics.body import Body
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.manifolds.elementary_faces import ElementaryFace, elementary_faces
-from assembly.solve.clearance_proof import can_prove, lent_proof, proven_pairs, stood_by_hulls
+from assembly.solve.clearance_proof import answers_at, can_prove, proven_pairs
 from assembly.solve.interruption import Interruption
 from assembly.studies.parting import is_stuck
 
@@ -101,10 +101,7 @@ def seated(scene: Assembly, q: Array, touching: float, interruption: Interruptio
     packed = scene.packed()
     if not can_prove(packed):
         return None
-    answers = stood_by_hulls(packed, scene.bodies, q, touching)
-    if answers is None:
-        with lent_proof(packed, scene.bodies) as proof:
-            answers = proof.as_they_stand(q, touching)
+    answers = answers_at(packed, scene.bodies, q, touching)
     stuck = [
         pair
         for pair, answer in zip(proven_pairs(packed, scene.bodies)[1], answers, strict=True)

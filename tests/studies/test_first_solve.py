@@ -9,9 +9,10 @@ import pytest
 
 import assembly as asm
 from assembly.proximity.clearance.answers import Verdict
-from assembly.proximity.clearance.hulls.scene import told_by_hulls
+from assembly.proximity.clearance.hulls import scene as hull_scene
+from assembly.proximity.clearance.hulls.scene import HullAnswers
 from assembly.proximity.clearance.proof import SHORT
-from assembly.solve.clearance_proof import lent_proof
+from assembly.solve.clearance_proof import hull_answers, lent_proof
 from assembly.solve.start_proof import prove_way
 from benchmarks.center_lines import torus_wire
 from benchmarks.hands import TAUT, linked_rings
@@ -50,8 +51,11 @@ def test_from_what_touches_no_way_is_sought():
     q = np.array([[0, 0, 0, 1, 0, 0, 0], [5, 3, 10, 1, 0, 0, 0]], dtype=float)
     ahead = q + [[0.0] * 7, [0, 0, 0.5, 0, 0, 0, 0]]
     assert prove_way(scene.packed(), scene.bodies, q, ahead.ravel(), 1e-9, may_jump=False) is None
+    # Hulls tell that the bodies touch, so that no cells were made.
+    assert not scene.packed().proofs
     with lent_proof(scene.packed(), scene.bodies) as proof:
         # A look at what touches spent its whole budget.
+        proof.as_they_stand(q, 1e-9)
         assert 0 < proof.fronts.counts.sought.max() <= 2 * SHORT
     # From what is clear it is proven.
     q[1, 2] += 0.01
@@ -105,6 +109,47 @@ def test_hulls_tell_of_some_pairs():
     shapes = [tuple(asm.Body("shape", shape).faces) for shape in (plate, block, block)]
     shapes = [tuple(face.face for face in faces) for faces in shapes]
     q = np.array([[0.0, 0, 0, 1, 0, 0, 0], [-1.0, 0, 1.0, 1, 0, 0, 0], [1.0, 0, 0.8, 1, 0, 0, 0]])
-    touches, crosses, apart = told_by_hulls(shapes, [(0, 1), (0, 2), (1, 2)], [0.0, 0.0, 0.0], q, 1e-8)
+    answers = HullAnswers(shapes, [(0, 1), (0, 2), (1, 2)], [0.0, 0.0, 0.0], q, 1e-8)
+    touches, crosses, apart = map(answers.held, range(3))
     assert touches.verdict in (Verdict.TOUCHING, Verdict.CLEAR) and crosses is None
     assert apart.verdict is Verdict.CLEAR and 0.0 < apart.bound <= 1.0
+
+
+def overlapping_boxes(*constraints):
+    """A box that has sunk into another one by a part of its height, and is tilted."""
+    lower = asm.Body("lower", asm.shapes.box(20, 20, 4), fixed=True)
+    upper = asm.Body("upper", asm.shapes.box(8, 6, 4), (1.0, 0.5, 3.6), (0.9999, 0.01, 0.005, 0.0))
+    scene = asm.Assembly([lower, upper])
+    scene.constrain(asm.Clearance(), *(constraint(lower, upper) for constraint in constraints))
+    return scene
+
+
+@pytest.mark.parametrize(
+    "constraints",
+    [(), (lambda a, b: asm.Planar(a.frame((0, 0, 2)), b.frame((0, 0, -2))),)],
+    ids=["alone", "with joint"],
+)
+def test_where_hulls_tell_of_the_start_and_of_the_end_no_cells_are_made(constraints):
+    scene = overlapping_boxes(*constraints)
+    solution = scene.solve()
+    assert solution.success and solution.proved
+    assert not scene.packed().proofs
+
+
+def test_of_equal_poses_hulls_are_asked_once(monkeypatch):
+    asked = []
+
+    def counted(one, other, least, touching, told=hull_scene.answer_by_hulls):
+        asked.append(other.points.tobytes())
+        return told(one, other, least, touching)
+
+    monkeypatch.setattr(hull_scene, "answer_by_hulls", counted)
+    scene = overlapping_boxes()
+    assert scene.solve().success
+    assert len(asked) == len(set(asked)) > 1
+    # Another least gap is another question.
+    q, touching = np.array(scene.q), 1e-9
+    first = hull_answers(scene.packed(), scene.bodies, q, touching)
+    assert hull_answers(scene.packed(), scene.bodies, q.copy(), touching) is first
+    scene.constraints[0].minimum = 0.1
+    assert hull_answers(scene.packed(), scene.bodies, q, touching) is not first

@@ -42,6 +42,8 @@ OUTGROWN = 1e4
 # Bytes of a state, what touching is, and what was proven there.
 Stood = tuple[bytes, float, Sequence[Any] | None]
 OwnedPairs = list[Any]
+# By what each was asked, and what is told.
+Hulled = tuple[tuple[bytes, Any], ...]
 # How many times as many places as they ask for a solve gives to clearances.
 MORE_PLACES, MOST_CROWDING = 4, 16
 # Numbers of pools that are not as they were packed (0).
@@ -77,6 +79,8 @@ class Packed(WrittenScene):
         Of the pairs that clearances keep apart, of solves that have ended.
     stood : (bytes, float, list) or None
         Poses, with pairs of contacts, that were proven to hold as they stand; what touching was; what was proven.
+    hulled : tuple
+        What hulls of faces tell at the last poses that were asked for (`solve/clearance_proof.py`), the newest first.
     owned_pairs : list or None
         Clearances and the pairs of bodies that they keep apart (`solve/clearance_proof.py`), once asked.
     asked : Asked
@@ -147,6 +151,7 @@ class Packed(WrittenScene):
         self.workspaces: list[Workspace] = []
         self.proofs: list[ClearanceProof] = []
         self.stood: Stood | None = None
+        self.hulled: Hulled = ()
         self.owned_pairs: OwnedPairs | None = None
         self.number_places: NumberPlaces | None = None
         self.derivative_plans: dict[Any, Any] = {}
@@ -223,6 +228,7 @@ class Packed(WrittenScene):
             "workspaces": [],
             "proofs": [],
             "stood": None,
+            "hulled": (),
             "owned_pairs": None,
             "number_places": None,
             "derivative_plans": {},

@@ -11,7 +11,7 @@ from assembly._record import rows_of
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_of
 from assembly.proximity.clearance.answers import Answer, Verdict
-from assembly.proximity.clearance.hulls.scene import told_by_hulls
+from assembly.proximity.clearance.hulls.scene import HullAnswers
 from assembly.proximity.clearance.inside import UNCLEAR, winding_of
 from assembly.proximity.clearance.kept_looks import KeptLooks, run_through
 from assembly.proximity.clearance.pair_looks import BEGUN_ANEW, ON_WAY
@@ -75,11 +75,10 @@ class ClearanceProof(KeptLooks):
         left = [k for k, answer in enumerate(found) if answer.verdict is Verdict.UNDECIDED]
         by_hulls = [k for k in left if not self.is_of_wires(k)]
         least = self.minimum[by_hulls].tolist()
-        told = told_by_hulls(self.faces, [self.pairs[k] for k in by_hulls], least, q, touching)
-        for k, answer in zip(by_hulls, told, strict=True):
-            if answer is not None:
-                found[k] = answer
-                left.remove(k)
+        told = HullAnswers(self.faces, [self.pairs[k] for k in by_hulls], least, q, touching).told()
+        for place, answer in told.items():
+            found[by_hulls[place]] = answer
+            left.remove(by_hulls[place])
         for k, answer in zip(left, self.look(q, touching, which=left), strict=True):
             found[k] = answer
         self._remember(q, touching, found)

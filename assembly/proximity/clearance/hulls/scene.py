@@ -1,9 +1,10 @@
-"""Proofs by hulls of faces for all pairs of bodies of a scene, before anything else is made of them."""
+"""What hulls of faces tell of all pairs of bodies of a scene at poses, before anything else is made of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,39 +12,17 @@ from numpy.typing import NDArray
 from assembly.geometry.faces.face import Face
 from assembly.kinematics.pose import rotation_matrix
 from assembly.proximity.clearance.answers import Answer, Verdict
-from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body
+from assembly.proximity.clearance.hulls.body_hulls import BodyHulls, hulls_of_body
 from assembly.proximity.clearance.hulls.crossing import crossing_by_hulls
 from assembly.proximity.clearance.hulls.pair import ROUNDING, answer_by_hulls
 
-__all__ = ["answers_by_hulls", "crossings_by_hulls", "told_by_hulls"]
+__all__ = ["HullAnswers"]
 
 Array = NDArray[np.float64]
 
 
-def answers_by_hulls(
-    shapes: Sequence[tuple[Face, ...]],
-    pairs: Sequence[tuple[int, int]],
-    minimum: Sequence[float],
-    q: Array,
-    touching: float,
-) -> list[Answer] | None:
-    """That all pairs are clear or touch, or None at the first of which hulls do not tell it; see `told_by_hulls`."""
-    found = []
-    for answer in told_by_hulls(shapes, pairs, minimum, q, touching):
-        if answer is None:
-            return None
-        found.append(answer)
-    return found
-
-
-def told_by_hulls(
-    shapes: Sequence[tuple[Face, ...]],
-    pairs: Sequence[tuple[int, int]],
-    minimum: Sequence[float],
-    q: Array,
-    touching: float,
-) -> Iterator[Answer | None]:
-    """Of one pair after the other that it is clear or touches, or None where hulls do not tell it.
+class HullAnswers:
+    """What hulls of faces tell of pairs at poses; each pair is asked when its answer is first needed, and once.
 
     Parameters
     ----------
@@ -56,50 +35,110 @@ def told_by_hulls(
     q : (n, 7)
         One row per body.
     touching : float
-        How far a point of a body may be taken to have the gap so large.
+        How far a point of a body may be taken to have the gap so large; what crosses by no more is not told to cross.
+    is_silent : bool
+        Whether nothing is told of any pair.
     """
-    if not pairs:
-        return
-    hulls = {body: hulls_of_body(shapes[body]) for body in sorted({body for pair in pairs for body in pair})}
-    turns = {body: rotation_matrix(q[body, 3:]) for body in hulls}
-    middle, radius = np.zeros((len(q), 3)), np.zeros(len(q))
-    for body, made in hulls.items():
-        center, radius[body] = made.ball
-        middle[body] = turns[body] @ center + q[body, :3]
-    a, b = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    apart = np.linalg.norm(middle[b] - middle[a], axis=1) - radius[a] - radius[b]
-    apart -= ROUNDING * (float(np.abs(middle).max(initial=0.0)) + radius.max(initial=0.0))
-    for k, (one, other) in enumerate(pairs):
-        if apart[k] > minimum[k]:
-            yield Answer(Verdict.CLEAR, float(apart[k]))
-            continue
-        turn = turns[one].T @ turns[other]
-        shift = (q[other, :3] - q[one, :3]) @ turns[one]
-        yield answer_by_hulls(hulls[one], hulls[other].posed(turn, shift), float(minimum[k]), touching)
+
+    def __init__(
+        self,
+        shapes: Sequence[tuple[Face, ...]],
+        pairs: Sequence[tuple[int, int]],
+        minimum: Sequence[float],
+        q: Array,
+        touching: float,
+        is_silent: bool = False,
+    ) -> None:
+        self._shapes, self._pairs, self._minimum = shapes, pairs, minimum
+        self._q, self._touching, self._is_silent = q, touching, is_silent
+        self._held: dict[int, Answer | None] = {}
+        self._crossings: dict[int, Answer | None] = {}
+
+    def held(self, k: int) -> Answer | None:
+        """That a pair is clear or touches, or None where hulls do not tell it."""
+        if k not in self._held:
+            self._held[k] = self._ask_whether_it_holds(k)
+        return self._held[k]
+
+    def crossing(self, k: int) -> Answer | None:
+        """That a pair crosses, or None where hulls do not tell it."""
+        if k not in self._crossings:
+            self._crossings[k] = None if self.held(k) else self._ask_whether_it_crosses(k)
+        return self._crossings[k]
+
+    def all_held(self) -> list[Answer] | None:
+        """That all pairs are clear or touch, or None at the first of which hulls do not tell it."""
+        return _all(self.held(k) for k in range(len(self._pairs)))
+
+    def all_told(self) -> list[Answer] | None:
+        """What all pairs are, those that cross as well, or None at the first of which hulls do not tell it."""
+        return _all(self.held(k) or self.crossing(k) for k in range(len(self._pairs)))
+
+    def told(self) -> dict[int, Answer]:
+        """The pairs that are told to be clear or to touch, by their numbers."""
+        answers = ((k, self.held(k)) for k in range(len(self._pairs)))
+        return {k: answer for k, answer in answers if answer is not None}
+
+    def any_touches(self) -> bool:
+        """Whether any pair is told to touch or to cross: then not all are clear."""
+        pairs = range(len(self._pairs))
+        held = (answer for k in pairs if (answer := self.held(k)) is not None)
+        return any(answer.verdict is not Verdict.CLEAR for answer in held) or self.any_crosses()
+
+    def any_crosses(self) -> bool:
+        """Whether any pair is told to cross."""
+        return any(self.crossing(k) is not None for k in range(len(self._pairs)))
+
+    @cached_property
+    def _hulls(self) -> dict[int, BodyHulls]:
+        """The hulls of the bodies of all pairs."""
+        bodies = sorted({body for pair in self._pairs for body in pair})
+        return {body: hulls_of_body(self._shapes[body]) for body in bodies}
+
+    @cached_property
+    def _turns(self) -> dict[int, Array]:
+        return {body: rotation_matrix(self._q[body, 3:]) for body in self._hulls}
+
+    @cached_property
+    def _apart(self) -> Array:
+        """Of every pair, how far balls around the bodies are from each other."""
+        middle, radius = np.zeros((len(self._q), 3)), np.zeros(len(self._q))
+        for body, made in self._hulls.items():
+            center, radius[body] = made.ball
+            middle[body] = self._turns[body] @ center + self._q[body, :3]
+        a, b = np.array(self._pairs, dtype=np.int64).reshape(-1, 2).T
+        apart = np.linalg.norm(middle[b] - middle[a], axis=1) - radius[a] - radius[b]
+        rounding = ROUNDING * (float(np.abs(middle).max(initial=0.0)) + radius.max(initial=0.0))
+        return np.asarray(apart - rounding)
+
+    def _relative(self, k: int) -> tuple[Array, Array]:
+        """Where the second body of a pair is in the axes of the first."""
+        one, other = self._pairs[k]
+        turn = self._turns[one]
+        return turn.T @ self._turns[other], (self._q[other, :3] - self._q[one, :3]) @ turn
+
+    def _ask_whether_it_holds(self, k: int) -> Answer | None:
+        if self._is_silent:
+            return None
+        (one, other), least = self._pairs[k], float(self._minimum[k])
+        if self._apart[k] > least:
+            return Answer(Verdict.CLEAR, float(self._apart[k]))
+        posed = self._hulls[other].posed(*self._relative(k))
+        return answer_by_hulls(self._hulls[one], posed, least, self._touching)
+
+    def _ask_whether_it_crosses(self, k: int) -> Answer | None:
+        one, other = self._pairs[k]
+        if self._is_silent or self._apart[k] > 0.0:
+            return None
+        found = crossing_by_hulls((self._shapes[one], self._shapes[other]), *self._relative(k), self._touching)
+        return found and replace(found, place=self._turns[one] @ found.place + self._q[one, :3])
 
 
-def crossings_by_hulls(
-    shapes: Sequence[tuple[Face, ...]], pairs: Sequence[tuple[int, int]], q: Array, touching: float
-) -> Iterator[Answer | None]:
-    """Of one pair after the other that it crosses by more than `touching`, or None where hulls do not tell it.
-
-    Parameters
-    ----------
-    shapes : sequence of tuple of Face
-        Of every body its faces.
-    pairs : sequence of (int, int)
-        Numbers of bodies.
-    q : (n, 7)
-        One row per body.
-    touching : float
-    """
-    for one, other in pairs:
-        turns = [rotation_matrix(q[body, 3:]) for body in (one, other)]
-        middles, radii = zip(*(hulls_of_body(shapes[body]).ball for body in (one, other)), strict=True)
-        places = [turn @ middle + q[k, :3] for turn, middle, k in zip(turns, middles, (one, other), strict=True)]
-        if float(np.linalg.norm(places[1] - places[0])) > sum(radii):
-            yield None
-            continue
-        shift = (q[other, :3] - q[one, :3]) @ turns[0]
-        found = crossing_by_hulls((shapes[one], shapes[other]), turns[0].T @ turns[1], shift, touching)
-        yield found and replace(found, place=turns[0] @ found.place + q[one, :3])
+def _all(answers: Iterator[Answer | None]) -> list[Answer] | None:
+    """The answers, or None at the first that is none."""
+    found = []
+    for answer in answers:
+        if answer is None:
+            return None
+        found.append(answer)
+    return found

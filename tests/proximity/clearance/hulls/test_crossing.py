@@ -12,7 +12,7 @@ from assembly.proximity.clearance import proof
 from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.hulls import crossing
 from assembly.proximity.clearance.hulls.crossing import crossing_by_hulls, marked
-from assembly.proximity.clearance.hulls.scene import crossings_by_hulls
+from assembly.proximity.clearance.hulls.scene import HullAnswers
 from tests.proximity.clearance.hulls.test_pair import FITS, NEAR, PARTS
 from tests.proximity.clearance.scenes import at, faces_of, start_of
 from tests.validation import exact_solids as exact
@@ -98,7 +98,8 @@ def test_places_are_in_the_world():
     box = faces_of(asm.shapes.box(2, 2, 2))
     turn = Rotation.from_rotvec([0.3, -0.2, 0.9])
     q = np.array([np.r_[5.0, 6, 7, turn.as_quat(scalar_first=True)], np.r_[5.5, 6.5, 8.5, 1, 0, 0, 0], at(90, 0, 0)])
-    first, second = crossings_by_hulls([box] * 3, [(0, 1), (1, 2)], q, 1e-7)
+    answers = HullAnswers([box] * 3, [(0, 1), (1, 2)], [0.0, 0.0], q, 1e-7)
+    first, second = answers.crossing(0), answers.crossing(1)
     assert first is not None and first.verdict is Verdict.CROSSING and second is None
     cube = exact.box(2, 2, 2)
     ones = [float(cube.distance(Motion.of(row).back(first.place[None]))[0]) for row in q[:2]]

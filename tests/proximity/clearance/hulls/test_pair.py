@@ -12,7 +12,7 @@ from assembly.proximity.clearance.answers import Verdict
 from assembly.proximity.clearance.hulls import outside, pair
 from assembly.proximity.clearance.hulls.body_hulls import hulls_of_body
 from assembly.proximity.clearance.hulls.pair import answer_by_hulls
-from assembly.proximity.clearance.hulls.scene import answers_by_hulls
+from assembly.proximity.clearance.hulls.scene import HullAnswers
 from tests.proximity.clearance.hulls.test_face_hulls import GROOVE, polygon, square_hole
 from tests.proximity.clearance.scenes import at, faces_of, poses, proof_of, start_of
 from tests.studies.machined import bolt, socket, turned_part
@@ -191,12 +191,12 @@ def test_balls_beside_rings_are_judged():
 def test_of_a_scene_all_pairs_or_none():
     q = np.array([at(0, 0, 0), at(5, 3, 10), at(0, 0, 90)])
     shapes, pairs = [faces_of(PLATE)] * 3, [(0, 1), (0, 2), (1, 2)]
-    found = answers_by_hulls(shapes, pairs, [0.0, 0.0, 0.0], q, TOUCHING)
+    found = HullAnswers(shapes, pairs, [0.0, 0.0, 0.0], q, TOUCHING).all_held()
     assert found is not None
     assert [answer.verdict for answer in found] == [Verdict.TOUCHING, Verdict.CLEAR, Verdict.CLEAR]
     assert found[1].bound <= 80 and found[2].bound <= 70
-    assert answers_by_hulls(shapes, pairs, [0.0, 0.0, 75.0], q, TOUCHING) is None
-    assert answers_by_hulls(shapes, [], [], q, TOUCHING) == []
+    assert HullAnswers(shapes, pairs, [0.0, 0.0, 75.0], q, TOUCHING).all_held() is None
+    assert HullAnswers(shapes, [], [], q, TOUCHING).all_held() == []
 
 
 @pytest.mark.parametrize("room", [outside, pair])
