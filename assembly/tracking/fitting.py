@@ -23,8 +23,6 @@ __all__ = ["Fit", "fits_of"]
 Array = NDArray[np.float64]
 # The thinnest shaft, or ball, that fits a bore, in parts of its radius, and what rounding may do to equal ones.
 THINNEST, ROUNDED = 0.9, 1e-9
-# The cosine of the angle by which a shaft leans in a bore, at most.
-UPRIGHT = 0.98
 
 
 class _Wall(NamedTuple):
@@ -68,8 +66,6 @@ class Fit(NamedTuple):
             return float(np.linalg.norm(off)) <= most
         axis, along = one @ self.bore.axis, other @ self.shaft.axis
         cosine = float(axis @ along)
-        if abs(cosine) < UPRIGHT:
-            return False
         low, high = self.bore.heights
         place = other @ self.shaft.point + q[self.bodies[1], :3] - one @ self.bore.point - q[self.bodies[0], :3]
         ends = sorted(float(place @ axis) + cosine * height for height in self.shaft.heights)

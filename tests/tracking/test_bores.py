@@ -195,6 +195,16 @@ def plug_in_its_seat():
     return scene, bodies, slope
 
 
+def seat_depth(pose, slope):
+    """By how much circles of the plug are in the seat's cone where they are between its ends, at most."""
+    around, depth = np.linspace(0.0, 2.0 * np.pi, 361), -np.inf
+    for radius, height in ((slope * z, z) for z in np.linspace(5, 20, 61)):
+        ring = pose.apply(np.column_stack([radius * np.cos(around), radius * np.sin(around), 0 * around + height]))
+        level = np.hypot(ring[:, 0], ring[:, 1]) - slope * ring[:, 2]
+        depth = max(depth, level[(ring[:, 2] > 3.0) & (ring[:, 2] < 18.0)].max(initial=-1.0))
+    return depth
+
+
 def test_a_plug_is_dragged_in_its_conical_seat(cases):
     """Lifted and moved aside: a cone in a cone is clear where the levels of its circles say so, with no cell halved."""
     scene, bodies, _ = plug_in_its_seat()
@@ -210,18 +220,46 @@ def test_a_plug_leans_on_the_edge_of_its_seat(cases):
     """Turned by a hand beside its axis while it is lifted a little: what of it is in the seat is a cone in a sleeve."""
     scene, bodies, slope = plug_in_its_seat()
     tracker, statuses, leans = scene.tracker(bodies[1].point(0, 0, 15)), Counter(), 0.0
-    around = np.linspace(0.0, 2.0 * np.pi, 361)
     for way in 0.05 * np.arange(cases(40, 200)):
         step = tracker.step((2.0 * np.sin(way), np.sin(2.0 * way), 16.0 + 1.5 * np.sin(0.7 * way)))
         statuses[step.status] += 1
         assert step.proved
         pose = asm.Pose(step.q[1, :3], step.q[1, 3:])
         leans = max(leans, np.hypot(*(pose.apply((0, 0, 1)) - pose.position)[:2]))
-        # Circles of the plug are within the seat's cone, where they are between its ends; the seat's upper edge is
-        # outside of the plug.
-        for radius, height in ((slope * z, z) for z in np.linspace(5, 20, 61)):
-            ring = pose.apply(np.column_stack([radius * np.cos(around), radius * np.sin(around), 0 * around + height]))
-            level = np.hypot(ring[:, 0], ring[:, 1]) - slope * ring[:, 2]
-            assert level[(ring[:, 2] > 3.0) & (ring[:, 2] < 18.0)].max(initial=-1.0) <= 1e-6
+        assert seat_depth(pose, slope) <= 1e-6
     assert set(statuses) <= {TrackStatus.FOLLOWED, TrackStatus.APPROACHING}
     assert leans > 0.01
+
+
+def test_a_plug_leans_far_in_its_seat(cases):
+    """Turned by a hand while it is lifted, to 25 degrees: no lean is one at which the part in the seat is not known."""
+    scene, bodies, slope = plug_in_its_seat()
+    count, statuses = cases(50, 400), Counter()
+    tracker = scene.tracker(bodies[1])
+    for way in np.linspace(0.0, 1.0, count):
+        half = np.radians(12.5) * way
+        step = tracker.step(asm.Pose((0, 0, 0.5 + 12.5 * way), (np.cos(half), 0, np.sin(half), 0)))
+        statuses[step.status] += 1
+        assert step.proved
+        assert seat_depth(asm.Pose(step.q[1, :3], step.q[1, 3:]), slope) <= 1e-6
+    assert set(statuses) <= {TrackStatus.FOLLOWED, TrackStatus.APPROACHING}
+    assert step.q[1, 5] == pytest.approx(np.sin(half), abs=1e-6)
+
+
+def test_a_pin_leans_in_a_thin_plate_until_both_rims_hold_it():
+    """Drawn aside at its top: 15.5 degrees, by the closed form of both sections, and no tick is HELD on the way."""
+    height, radius, bore = 1.0, 9.5, 10.0
+    bodies = [
+        asm.Body("plate", asm.shapes.plate(50, 50, height, [(0, 0, bore)]), fixed=True),
+        asm.Body("pin", asm.shapes.solid_cylinder(radius, 40.0)),
+    ]
+    scene = asm.Assembly(bodies)
+    scene.constrain(asm.Clearance())
+    path = [(0.5 * k, 0.0, 20.0) for k in range(1, 60)]
+    step, _ = dragged(
+        scene, bodies[1].point(0, 0, 20), path, lambda q: shaft_depth(q[1], 40.0, bore, radius, height), 50
+    )
+    axis = asm.Pose(step.q[1, :3], step.q[1, 3:]).apply((0, 0, 1)) - step.q[1, :3]
+    tilt = np.arctan2(np.hypot(*axis[:2]), axis[2])
+    assert 0.5 * height * np.tan(tilt) + radius / np.cos(tilt) == pytest.approx(bore, abs=1e-4)
+    assert np.degrees(tilt) > 15.0

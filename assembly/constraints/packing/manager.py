@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._columns import Columns
 from assembly._record import rows_of
 from assembly.constraints.model.clearance import Clearance
 from assembly.constraints.model.contact import Contact, side_faces
@@ -148,13 +149,16 @@ def table_with_clearances(table: Table, placed: Sequence[Sequence[int]]) -> Tabl
     table = table.copy()
     first = table[layout.ROW_TABLE] + layout.ROW * table[layout.FIRST_CLEARANCE_ROW]
     rows = table[first:][: layout.ROW * len(placed)].reshape(-1, layout.ROW)
-    for row, (place, number, given) in zip(rows, placed, strict=True):
-        if place >= 0:
-            pair = manager_records.pair_in(table, table[layout.MANAGER_RECORD], place)
-            row[[layout.BODY_F, layout.BODY_G]] = pair.body_f, pair.body_g
-            row[layout.SURFACE_F : layout.SHELL_G + 1] = pair.surface_f, pair.surface_g, pair.shell_f, pair.shell_g
-            row[layout.MINIMUM] = pair.minimum + manager_records.IN_PLACE * given
-            row[layout.CLEARANCE_ROW_NUMBER] = number
+    listed = np.array(placed, dtype=np.int64).reshape(-1, 3)
+    which = np.flatnonzero(listed[:, 0] >= 0)
+    manager = manager_records.manager_at(table, table[layout.MANAGER_RECORD])
+    pairs = table[manager.pair_table :][: manager_records.PAIR_RECORD * manager.pairs]
+    pair = Columns(manager_records.PAIR_DTYPE, pairs.reshape(-1, manager_records.PAIR_RECORD)[listed[which, 0]])
+    rows[which, layout.BODY_F], rows[which, layout.BODY_G] = pair.body_f, pair.body_g
+    rows[which, layout.SURFACE_F], rows[which, layout.SURFACE_G] = pair.surface_f, pair.surface_g
+    rows[which, layout.SHELL_F], rows[which, layout.SHELL_G] = pair.shell_f, pair.shell_g
+    rows[which, layout.MINIMUM] = pair.minimum + manager_records.IN_PLACE * listed[which, 2]
+    rows[which, layout.CLEARANCE_ROW_NUMBER] = listed[which, 1]
     return table
 
 

@@ -35,14 +35,11 @@ from assembly.proximity.clearance.separation import (
     separation,
 )
 
-__all__ = ["best_bore", "gap_of"]
+__all__ = ["LEAST_COSINE", "best_bore", "cosine_of_rulings", "gap_of", "slope_of"]
 
-# The least cosine of the angle by which a shaft leans at a pose, and on a way from there (`sleeve_sag` in `way.py`).
-UPRIGHT, LEAST_COSINE = 0.98, 0.96
-LARGEST_SINE = 0.28
-# The largest sine of a bore's angle, and slope of what leans in it: bounds of `sleeve_sag` rest on these. Countersinks
-# of 90 degrees have slopes of 1, as they are rounded.
-MOST_SLANT, MOST_SLOPE = 0.74, 1.0001
+# The least cosine of the angle of a ruling to the bore's axis. Next to a right angle a section has no end, and digits
+# are lost by the square of the inverse.
+LEAST_COSINE = 0.1
 # A section near the apex of a cone is not asked: where its radius is below this part of the widest one.
 NARROWEST = 0.05
 
@@ -51,6 +48,13 @@ NARROWEST = 0.05
 def slope_of(node):
     """By how much a cylinder or cone gets wider for each unit along its first axis."""
     return 0.5 * (node.less[1] - node.less[0]) / node.half[0]
+
+
+@kernel(inline=True)
+def cosine_of_rulings(cosine, steep):
+    """The cosine of the largest angle of a ruling to the bore's axis, of a cone with a slope whose axis has another."""
+    sine = math.sqrt(max(1.0 - cosine * cosine, 0.0))
+    return (abs(cosine) - steep * sine) / math.sqrt(1.0 + steep * steep)
 
 
 @kernel(inner=True)
@@ -75,7 +79,9 @@ def sleeve_room(forest, wall, k, pose, how):
     u, spine = vector(bore.ruling), vector(bore.spine)
     a = matvec(pose.rotation, vector(node.axes[0]))
     cosine = dot(a, u)
-    if not abs(cosine) >= UPRIGHT:
+    slope = slope_of(node)
+    upright = cosine_of_rulings(cosine, abs(slope))
+    if not upright >= LEAST_COSINE:
         return -math.inf
     center = sub(placed(pose, vector(node.center)), spine)
     height = dot(center, u)
@@ -84,7 +90,7 @@ def sleeve_room(forest, wall, k, pose, how):
     top, bottom = highest(forest, wall, u) - dot(spine, u), -highest(forest, wall, neg(u)) - dot(spine, u)
     # Where the end along the axis is, and where the other one.
     ahead, behind = (top, bottom) if cosine > 0.0 else (bottom, top)
-    slope, middle = slope_of(node), node.disc - 0.5 * (node.less[0] + node.less[1])
+    middle = node.disc - 0.5 * (node.less[0] + node.less[1])
     upwards = slope if cosine > 0.0 else -slope
     if how - BY_SLEEVE != 1:
         radius = middle + slope * (ahead - height) / cosine
@@ -102,8 +108,7 @@ def sleeve_room(forest, wall, k, pose, how):
         other = level_of_section(bore, section, upwards, behind)
     else:
         other = most_in_bore(bore, sub(center, scale(node.half[0], a)), a, node.disc - node.less[1])
-    steep = abs(slope)
-    return (LEAST_COSINE - LARGEST_SINE * steep) / math.sqrt(1.0 + steep * steep) * (bore.bore - max(most, other))
+    return upright * (bore.bore - max(most, other))
 
 
 @kernel(inner=True)
@@ -111,9 +116,9 @@ def best_sleeve(forest, a, b, pose):
     """Which sleeve of node a leaves node b, a cylinder or cone, the most room, and that room; BY_PLANE for none."""
     one, other = node_at(forest.nodes, a), node_at(forest.nodes, b)
     axis = vector(one.ruling)
-    if not one.bore > 0.0 or one.slant > MOST_SLANT or dot(axis, axis) == 0.0 or not is_round(forest, b):
+    if not one.bore > 0.0 or dot(axis, axis) == 0.0 or not is_round(forest, b):
         return BY_PLANE, -math.inf
-    if other.rho > 0.0 or not other.half[0] > 0.0 or abs(slope_of(other)) > MOST_SLOPE:
+    if other.rho > 0.0 or not other.half[0] > 0.0:
         return BY_PLANE, -math.inf
     how, best = BY_PLANE, -math.inf
     for i in range(3):

@@ -21,6 +21,8 @@ from assembly.kinematics.motion import RelativePose
 from assembly.proximity.clearance.halve import corner_of, vector
 from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, BY_SLEEVE, node_at
 from assembly.proximity.clearance.separation import across, highest, is_round, is_wire, placed, room_in_bore
+from assembly.proximity.clearance.sleeve_bends import axis_bends, disc_bend, section_bends
+from assembly.proximity.clearance.sleeves import LEAST_COSINE, cosine_of_rulings, slope_of
 
 # swept: whether the way is looked at, or its end alone. moved: a bound of the travel of points of b. sag: of any point;
 # factor: of a point at distance 1 from the axis of rotation. axis, middle: of that, in axes of b (zero: it is not
@@ -31,10 +33,10 @@ ROUNDED_UP = 1.0 + 1e-12
 LEAST_SINE, LARGEST_ANGLE = 1e-9, 3.0
 # What the axis may be off, as a part of distances; the sag of so small angles is far below that.
 AXIS_OFF = 1e-6
-# How far what leans in a sleeve may turn on a way [rad]: bounds of `sleeve_sag` rest on it.
-MOST_TURN = 0.05
 # A section of a cone in a sleeve is no narrower than this part of its widest disc (`sleeves.NARROWEST`).
 NARROWED = 0.05
+# The largest angle [rad] of what leans in a sleeve to the bore's axis, and of an end of it to the bore's wall.
+MOST_LEAN = 1.5
 # The largest sine of an angle between a wall's normal and a plane across a shaft (`sag_of_disc`).
 STEEPEST = 0.99
 # The rounding error of the rotation's skew part, whose direction is the axis: that of two matrices and their product.
@@ -153,17 +155,18 @@ def part_along(way, n):
 
 
 @kernel(inner=True)
-def sleeve_sag(way, forest, a, b):
+def sleeve_sag(way, forest, a, b, how):
     """How far the room of node b in a sleeve of node a may fall, on the way, below the chord of its values at the ends.
 
-    With w the angle of the way, w1 the part of it by which b's axis turns, primes for derivatives along the way, and
-    angles below 0.28 rad: |s'| <= 1.1 w1, |s''| <= 2 w w1, |e''| <= 1.3 |c''| + z |s''| + 2 |c'| |s'| for the center c
-    of b at a height z from the plane. The radius r + S z / cos in the plane has derivatives up to S (1.05 |c'| + 0.31 z
-    w1) and S (1.05 |c''| + 0.61 |c'| w1 + 1.27 z w w1), and the factor of it, sqrt(1 + (v.s)^2) of a cylinder, has a
-    second derivative up to 1.8 w w1; of a cone it is below 1.48 with derivatives up to 3.5 w1 and 22 w w1.
-    (`docs/derivations.md`, "Cones in sleeves").
-    An end of b instead of a section beyond it, at half the length h along the axis u, has the support N.(c + h u) + r
-    sqrt(1 - (N.u)^2), whose second derivative is less: up to |c''| + h w w1 + 1.5 r w w1; in a cone 14.2 for the 1.5.
+    With w the angle of the way, w1 the part of it by which b's axis turns, primes for derivatives along the way, and t
+    and T the tangent and the secant of the largest lean, a plane at a height z from b's center c cuts b's axis at e,
+    where it has the radius r + S z sec:
+
+        |e''| <= T |c''| + 2 |c'| |s'| + z |s''|,
+        |(z sec)'| <= T |c'| + z |sec'|,    |(z sec)''| <= T |c''| + 2 |c'| |sec'| + z |sec''|,
+
+    with |s'|, |sec'| and the factor of the radius by `sleeve_bends.py`. An end of b, at half the length h along the
+    axis u, has the support N.(c + h u) + r sqrt(1 - (N.u)^2).
     """
     wall, node = node_at(forest.nodes, a), node_at(forest.nodes, b)
     u, axis = vector(wall.ruling), vector(node.axes[0])
@@ -171,7 +174,12 @@ def sleeve_sag(way, forest, a, b):
     turned = angle
     if dot(way.axis, way.axis) > 0.0:
         turned *= min(across(way.axis, axis) + way.lean, 1.0)
-    if turned > MOST_TURN:
+    before, after = matvec(way.before.rotation, axis), matvec(way.after.rotation, axis)
+    # No axis of the way is farther from that at one of both ends.
+    lean = max(math.atan2(across(before, u), abs(dot(before, u))), math.atan2(across(after, u), abs(dot(after, u))))
+    lean += 0.5 * turned
+    slope = abs(slope_of(node))
+    if not (lean < MOST_LEAN and cosine_of_rulings(math.cos(lean), slope) >= 0.5 * LEAST_COSINE):
         return math.inf
     center = vector(node.center)
     start, end = placed(way.before, way.middle), placed(way.after, way.middle)
@@ -179,14 +187,24 @@ def sleeve_sag(way, forest, a, b):
     off = off_axis(way, center)
     bent, pace = angle * angle * off, math.sqrt(dot(d, d)) + angle * off
     top, bottom = highest(forest, a, u), -highest(forest, a, neg(u))
-    before, after = dot(placed(way.before, center), u), dot(placed(way.after, center), u)
-    far = max(max(top, bottom, before, after) - min(top, bottom, before, after), node.half[0]) + bent
-    slope = 0.5 * abs(node.less[1] - node.less[0]) / node.half[0]
-    widest = node.disc + 1.05 * slope * far
-    bend = 1.8 if slope == 0.0 and wall.slant == 0.0 else 22.0
-    second = (1.3 + 1.54 * slope) * bent + (2.2 + 8.2 * slope) * pace * turned
-    second += ((2.0 + 4.0 * slope) * far + bend * widest) * angle * turned
-    sag = 0.125 * second
+    low, high = dot(placed(way.before, center), u), dot(placed(way.after, center), u)
+    far = max(max(top, bottom, low, high) - min(top, bottom, low, high), node.half[0]) + bent
+    t = math.tan(lean)
+    secant = math.sqrt(1.0 + t * t)
+    s_first, s_second, secant_first, secant_second = axis_bends(t)
+    factor, factor_first, factor_second = section_bends(t, slope)
+    widest = node.disc + slope * far * secant
+    radius_first = slope * (secant * pace + far * secant_first * turned)
+    radius_second = slope * (secant * bent + (2.0 * pace * secant_first + far * secant_second * angle) * turned)
+    second = secant * bent + (2.0 * pace * s_first + far * s_second * angle) * turned
+    second += radius_second * factor + (2.0 * radius_first * factor_first + widest * factor_second * angle) * turned
+    if how != BY_SLEEVE:
+        tilted = math.asin(wall.slant) + lean
+        if not tilted < MOST_LEAN:
+            return math.inf
+        ends = bent + (node.half[0] + node.disc * disc_bend(math.sin(tilted))) * angle * turned
+        second = max(second, ends)
+    sag = 0.125 * second * ROUNDED_UP
     # What a section's radius may lose must not bring it to the apex.
     return math.inf if slope > 0.0 and sag > NARROWED * node.disc else sag
 
@@ -206,7 +224,7 @@ def stays_apart(forest, nodes, way, n, gaps):
         sag = sag_backward(way, forest, nodes.a)
         return after > sag and before > sag
     if nodes.how >= BY_SLEEVE:
-        sag = sleeve_sag(way, forest, nodes.a, nodes.b)
+        sag = sleeve_sag(way, forest, nodes.a, nodes.b, nodes.how)
         return after > sag and before > sag
     if nodes.how == BY_BORE_A and is_round(forest, nodes.b):
         sag = sag_of(way, forest, nodes.b) + sag_of_disc(way, forest, nodes.a, nodes.b)

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 import assembly as asm
 from assembly._record import Store
 from assembly.kinematics.motion import RelativePose
-from assembly.proximity.clearance.records import BY_SLEEVE, NONE, Forest
+from assembly.proximity.clearance.records import BY_SLEEVE, NONE, Forest, node_at
 from assembly.proximity.clearance.separation import farthest_of_section
-from assembly.proximity.clearance.sleeves import LEAST_COSINE, best_sleeve, sleeve_room
+from assembly.proximity.clearance.sleeves import best_sleeve, cosine_of_rulings, sleeve_room, slope_of
 from assembly.proximity.clearance.way import pose_at, sleeve_sag, way_of
 from tests.proximity.clearance.nodes import forest_of, tree_of
 from tests.proximity.clearance.scenes import direction, faces_of
@@ -95,7 +95,7 @@ def test_an_end_that_just_fits_has_room(cases):
         shift = end + 1.5 * turn.apply((0.0, 0.0, 1.0))
         for opened in (0.0, 1e-9):
             how, room = best_sleeve(forest, plate, wall, relative(turn, shift + opened * way))
-            assert how >= BY_SLEEVE and room == pytest.approx(LEAST_COSINE * opened, abs=1e-13)
+            assert how >= BY_SLEEVE and room == pytest.approx(np.cos(lean) * opened, abs=1e-13)
 
 
 @pytest.mark.parametrize("length", [6.0, 2.4])
@@ -135,7 +135,7 @@ def test_no_way_takes_more_of_the_room_than_told(cases):
         poses = relative(*before), relative(*after)
         way = way_of(*poses, (0.0, 0.0, 0.3 * rng.normal()), 4.0, True)
         for how in range(BY_SLEEVE, BY_SLEEVE + 3):
-            sag = sleeve_sag(way, forest, plate, wall)
+            sag = sleeve_sag(way, forest, plate, wall, how)
             ends = min(sleeve_room(forest, plate, wall, pose, how) for pose in poses)
             rooms = [sleeve_room(forest, plate, wall, pose_at(way, s), how) for s in np.linspace(0.0, 1.0, 9)]
             assert min(rooms) >= ends - sag - 1e-13
@@ -154,11 +154,19 @@ TAPERED = {
     "head in a countersink": ((0.5, 2.5), (0.1, 2.9), 2.8),
     "pin in a steep seat": ((1.03, 3.13), (1.0, 1.0), 5.0),
 }
+# What leans far, and by how much [rad].
+LOOSE = {
+    "pin in a wide bore": ((1.5, 1.5), (0.3, 0.3), 8.0, 0.9),
+    "plug in a wide seat": ((0.9, 2.1), (0.2, 0.8), 4.0, 0.6),
+    "pin in a funnel": ((0.5, 3.5), (0.3, 0.3), 6.0, 0.3),
+    "head in a wide countersink": ((0.4, 3.8), (0.1, 3.1), 1.8, 0.1),
+    "plug that ends in a wide seat": ((0.9, 2.1), (0.4, 0.8), 1.5, 0.9),
+}
 
 
 def tapered_scene(name):
     """The packed trees of a seat and of what is in it, the root of one and the node of the other's wall."""
-    (low, high), (narrow, wide), length = TAPERED[name]
+    (low, high), (narrow, wide), length = (TAPERED | LOOSE)[name][:3]
     profile = [(low, -1), (4, -1), (4, 1), (high, 1)], [(0, -length / 2), (narrow, -length / 2), (wide, length / 2)]
     seat, plug = asm.curves.polygon(profile[0]), asm.curves.polygon([*profile[1], (0, length / 2)])
     forest = forest_of(*(faces_of(asm.shapes.revolution(each)) for each in (seat, plug)))
@@ -172,7 +180,7 @@ def tapered_scene(name):
 
 def distance_from_plug(points, name):
     """Of points from a plug about the z axis, negative inside of its wall."""
-    _, (narrow, wide), length = TAPERED[name]
+    _, (narrow, wide), length = (TAPERED | LOOSE)[name][:3]
     off, slope = np.hypot(points[:, 0], points[:, 1]), (wide - narrow) / length
     beyond = off - (0.5 * (narrow + wide) + slope * points[:, 2])
     wall = beyond / np.hypot(1.0, slope)
@@ -243,7 +251,7 @@ def test_no_way_takes_more_of_a_tapered_room_than_told(name, cases):
         after = leaning(rng, 0.04 * size) * before[0] * spin, before[1] + size * rng.normal(scale=(0.05, 0.05, 0.3))
         poses = relative(*before), relative(*after)
         way = way_of(*poses, (0.0, 0.0, 0.3 * rng.normal()), 4.0, True)
-        sag = sleeve_sag(way, forest, seat, wall)
+        sag = sleeve_sag(way, forest, seat, wall, BY_SLEEVE + 1)
         for how in range(BY_SLEEVE, BY_SLEEVE + 3):
             ends = min(sleeve_room(forest, seat, wall, pose, how) for pose in poses)
             if sag == np.inf or ends == -np.inf:
@@ -252,3 +260,61 @@ def test_no_way_takes_more_of_a_tapered_room_than_told(name, cases):
             assert min(rooms) >= ends - sag - 1e-13
             told += 1
     assert told > 5
+
+
+@pytest.mark.parametrize("name", LOOSE)
+def test_the_room_of_what_leans_far_is_less_than_the_distance(name, cases):
+    """By samples, at leans up to where rulings all but lie across the bore; and it is told of what is in the seat."""
+    rng, roomy, farthest = np.random.default_rng(7), 0, 0.0
+    forest, seat, wall = tapered_scene(name)
+    (low, high), _, _, lean = LOOSE[name]
+    angle, z = rng.uniform(0.0, 2.0 * np.pi, 8000), np.clip(rng.uniform(-1.3, 1.3, 8000), -1.0, 1.0)
+    radius = 0.5 * (low + high) + 0.5 * z * (high - low)
+    of_bore = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
+    for _ in range(cases(100, 3000)):
+        turn = leaning(rng, lean)
+        shift = np.array([*rng.normal(scale=0.1, size=2), rng.uniform(-0.2, 0.4)])
+        how, room = best_sleeve(forest, seat, wall, relative(turn, shift))
+        if room > 0.0:
+            least = distance_from_plug(turn.inv().apply(of_bore - shift), name).min()
+            assert how >= BY_SLEEVE and room <= least + 1e-12
+            roomy += 1
+            farthest = max(farthest, turn.apply((0.0, 0.0, 1.0)) @ (0.0, 0.0, -1.0) + 1.0)
+    assert roomy > 3 and farthest > 0.5 * (1.0 - np.cos(lean))
+
+
+@pytest.mark.parametrize("name", LOOSE)
+def test_no_way_takes_more_of_the_room_of_what_leans_far_than_told(name, cases):
+    """The room over the cosine by which it is multiplied, along ways of any length."""
+    rng, told, closest = np.random.default_rng(8), 0, 0.0
+    forest, seat, wall = tapered_scene(name)
+    node = node_at(forest.nodes, wall)
+    axis, slope = np.array(node.axes[0]), abs(slope_of(node))
+
+    def spare(pose, how):
+        cosine = np.array(pose.rotation).reshape(3, 3)[2] @ axis
+        return sleeve_room(forest, seat, wall, pose, how) / cosine_of_rulings(cosine, slope)
+
+    for k in range(cases(40, 600)):
+        size = 10.0 ** -rng.uniform(0.5, 3)
+        before = leaning(rng, LOOSE[name][3]), np.array([*rng.normal(scale=0.1, size=2), rng.uniform(-0.3, 0.3)])
+        spin = Rotation.from_rotvec((0.0, 0.0, size * rng.normal() * (k % 2)))
+        after = (
+            Rotation.from_rotvec(size * direction(rng)) * before[0] * spin,
+            before[1] + size * rng.normal(scale=(0.1, 0.1, 0.3)),
+        )
+        poses = relative(*before), relative(*after)
+        way = way_of(*poses, (0.0, 0.0, 0.3 * rng.normal()), 4.0, True)
+        for how in range(BY_SLEEVE, BY_SLEEVE + 3):
+            sag = sleeve_sag(way, forest, seat, wall, how)
+            if sag == np.inf or min(sleeve_room(forest, seat, wall, pose, how) for pose in poses) == -np.inf:
+                continue
+            # Not only the lesser of both ends, but their chord.
+            start, end = (spare(pose, how) for pose in poses)
+            parts = np.linspace(0.0, 1.0, 9)
+            below = max((1.0 - s) * start + s * end - spare(pose_at(way, s), how) for s in parts)
+            assert below <= sag + 1e-12
+            closest = max(closest, below / sag)
+            told += 1
+    # Not a bound that nothing comes near; of what is as steep as its countersink, it is one of products of bounds.
+    assert told > 5 and (closest > 0.01 or "countersink" in name)
