@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -134,25 +135,32 @@ def _counted(reader: Any) -> tuple[int, int, int]:
 
     OCCT does not read those of style if it is told to make no colors.
     """
-    model = reader.Reader().WS().Model()
-    everything = range(1, model.NbEntities() + 1)
-    values = list(map(model.Value, everything))
-    classes = list(map(type, values))
-    # Thousands of entities are of some dozens of kinds.
-    kinds = {each: each.__name__ for each in set(classes)}
-    broken = [kinds[classes[k - 1]] for k in filter(model.IsErrorEntity, everything)]
-    broken = [kind for kind in broken if not _is_beside(kind)]
+    o, model = occt(), reader.Reader().WS().Model()
+    broken: list[str] = []
+    if model.Reports().NbEntities():
+        everything = range(1, model.NbEntities() + 1)
+        broken = [type(model.Value(k)).__name__ for k in filter(model.IsErrorEntity, everything)]
+        broken = [kind for kind in broken if not _is_beside(kind)]
     styles = sum(kind.startswith("StepVisual_") for kind in broken)
-    chosen: dict[str, list[Any]] = {"StepGeom_Axis2Placement3d": [], "StepGeom_Pcurve": []}
-    wanted = {each: chosen[kind] for each, kind in kinds.items() if kind in chosen}
-    for value, each in zip(values, classes, strict=True):
-        if each in wanted:
-            wanted[each].append(value)
-    flat = sum(map(_is_flat, chosen["StepGeom_Axis2Placement3d"]))
-    bare = sum(map(_is_bare, chosen["StepGeom_Pcurve"]))
-    sided = {each for each, kind in kinds.items() if kind in ("StepShape_AdvancedFace", "StepShape_FaceSurface")}
-    faces = sum(each in sided for each in classes)
+    flat = sum(map(_is_flat, _entities(_of_kind(model, o.StepGeom_Axis2Placement3d))))
+    bare = sum(map(_is_bare, _entities(_of_kind(model, o.StepGeom_Pcurve))))
+    faces = _of_kind(model, o.StepShape_FaceSurface).NbEntities()
     return len(broken) - styles + flat + bare, styles, faces
+
+
+def _of_kind(model: Any, kind: Any) -> Any:
+    """OCCT's list of the entities of a kind; it chooses among thousands without an object of Python for each."""
+    chosen = model.Entities()
+    chosen.SelectType(kind.get_type_descriptor_s(), True)
+    return chosen
+
+
+def _entities(chosen: Any) -> Iterator[Any]:
+    """The entities of a list of OCCT."""
+    chosen.Start()
+    while chosen.More():
+        yield chosen.Value()
+        chosen.Next()
 
 
 def _is_flat(placement: Any) -> bool:

@@ -32,6 +32,7 @@ _MODULES = (
     "STEPCAFControl",
     "STEPControl",
     "StepGeom",
+    "StepShape",
     "TCollection",
     "TDF",
     "TDataStd",

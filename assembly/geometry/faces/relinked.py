@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import floor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,15 +54,28 @@ class _Corners:
     def __init__(self, periods: Array, reach: float) -> None:
         self.periods, self.reach = periods, reach
         self.points: list[Array] = []
+        # Numbers of the places in each cell of a grid: what is within reach of a place lies in four cells at most.
+        self._cells: dict[tuple[int, int], list[int]] = {}
         self._places: list[tuple[float, float]] = []
         self._lengths: tuple[float, float] = (float(periods[0]), float(periods[1]))
+        self._counts = tuple(max(int(length / (4.0 * reach)), 1) for length in self._lengths)
+
+    def _cell(self, u: float, v: float) -> tuple[int, int]:
+        """The cell of a place: a whole part of a period, or four times the reach wide."""
+        at = [
+            floor(x / length * count) % count if length > 0.0 else floor(x / (4.0 * self.reach))
+            for x, length, count in zip((u, v), self._lengths, self._counts, strict=True)
+        ]
+        return at[0], at[1]
 
     def number(self, point: Array) -> int:
-        """Of a place; a new one if it is none yet."""
-        # Plain floats: each place is compared with all that there are.
+        """Of a place, the first one that is within reach; a new one if there is none yet."""
         u, v = point.tolist()
         period_u, period_v = self._lengths
-        for k, (x, y) in enumerate(self._places):
+        near = 1.5 * self.reach
+        cells = {self._cell(u + a, v + b) for a in (-near, near) for b in (-near, near)}
+        for k in sorted(k for cell in cells for k in self._cells.get(cell, ())):
+            x, y = self._places[k]
             off_u, off_v = u - x, v - y
             if period_u > 0.0:
                 off_u -= round(off_u / period_u) * period_u
@@ -69,6 +83,7 @@ class _Corners:
                 off_v -= round(off_v / period_v) * period_v
             if abs(off_u) <= self.reach and abs(off_v) <= self.reach:
                 return k
+        self._cells.setdefault(self._cell(u, v), []).append(len(self.points))
         self.points.append(point)
         self._places.append((u, v))
         return len(self.points) - 1
