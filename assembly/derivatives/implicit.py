@@ -147,6 +147,8 @@ def _checked(scene: Assembly, solution: Solution) -> tuple[Packed, Array]:
         raise InputError(
             "solution was solved with other values or targets than the scene has now; expected one solved with these"
         )
+    if solution._begun is not None:
+        packed.measure_from(solution._begun)
     return packed, state
 
 

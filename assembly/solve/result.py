@@ -71,6 +71,8 @@ class Result(ReadOnlyArrays):
     # What the objective asked for, where `_asked` does not tell; flat contacts alone need it again, for the center of
     # their pressure.
     _targets: bytes | None = None
+    # Where the solve began, if postures are measured from there.
+    _begun: Array | None = None
 
     def __init__(
         self,
@@ -98,11 +100,13 @@ class Result(ReadOnlyArrays):
         self._asked = packed.asked
         if scene.contacts:
             self._targets = scene.targets_in(packed)
+        if packed.follows_start:
+            self._begun = packed.begun_at()
 
     @classmethod
     def _arrived(cls, scene: Scene, packed: Packed, state: Array, seconds: float, history: Array | bytes) -> Self:
         """The end of a solve at which the loop arrived at once, of what `packed` is asked for now; soon made."""
-        if scene.contacts and not packed.is_asked_whole:
+        if not packed.is_asked_whole and (scene.contacts or packed.follows_start):
             return cls(scene, packed, state, Status.SOLVED, seconds, history)
         self = _new(cls)
         self._scene = scene

@@ -127,7 +127,12 @@ class Solution(Result):
 
             self._order = SecondOrder.NO_OBJECTIVE
             if self._packed.table[IMPLICIT] == 0:
-                verdict, model = judge(self._packed, self._state, sample=False)
+                packed = self._packed
+                if self._begun is not None:
+                    # Other solves of the scene may have begun elsewhere since.
+                    packed = packed.twin()
+                    packed.measure_from(self._begun)
+                verdict, model = judge(packed, self._state, sample=False)
                 # Targets may be others by now.
                 judged = model is not None and model.is_stationary
                 self._order = verdict.kind if judged else SecondOrder.UNDECIDED

@@ -70,3 +70,25 @@ def test_copies_have_turns_of_their_own():
         for other in others:
             with ThreadPoolExecutor(1) as pool:
                 assert pool.submit(other.solve).result(timeout=60.0).success
+
+
+def test_an_earlier_solution_is_measured_from_its_own_start():
+    floor = asm.Body("floor", asm.shapes.plane(20.0, 20.0), fixed=True)
+    ball = asm.Body("ball", asm.shapes.ellipsoid(0.5, 0.7, 0.9), position=(0.0, 0.0, 2.0))
+    scene = asm.Assembly([floor, ball])
+    scene.constrain(asm.Contact(floor, ball, minimum=0.1))
+    scene.minimize(asm.Posture())
+    gap, height = asm.Parameter(scene.constraints[0], "minimum"), asm.Measure(ball.point(0.1, 0.2, 0.0), "z")
+
+    def told(solution):
+        return asm.sensitivity(scene, solution, [height], [gap]).matrix
+
+    near, far = scene.q.copy(), scene.q.copy()
+    near[1, 3:] = np.array([0.9, 0.3, -0.2, 0.1]) / np.linalg.norm([0.9, 0.3, -0.2, 0.1])
+    far[1] = [4.0, 3.0, 5.0, *np.array([0.1, 0.5, 0.7, -0.4]) / np.linalg.norm([0.1, 0.5, 0.7, -0.4])]
+    expected = told(scene.solve(near))
+    earlier = scene.solve(near)
+    later = scene.solve(far)
+    assert earlier.second_order is asm.SecondOrder.MINIMUM
+    np.testing.assert_array_equal(told(earlier), expected)
+    assert np.abs(told(later) - expected).max() > 1e-3

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from assembly._record import place_of
 from assembly.constraints.model.constraint import Constraint, RowConstraint, structure_changes
 from assembly.constraints.model.objectives import Objective, Posture
 from assembly.constraints.packing import manager as manager_packing
@@ -18,6 +20,7 @@ from assembly.constraints.packing.written_scene import WrittenScene
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.coordinates_at import coordinates_at
 from assembly.constraints.program.kept import kept_size, kept_unknowns
+from assembly.constraints.program.objective_terms import POSTURE, POSTURE_FIELDS, TERM
 from assembly.constraints.program.primitives import RECORD as JOINT_FRAMES
 from assembly.errors import FARTHEST
 from assembly.kinematics.body import Body
@@ -163,6 +166,8 @@ class Packed(WrittenScene):
         self.is_asked_whole = not self._coordinates and not any(
             isinstance(term, Posture) for _, term in objectives or [(1.0, Posture())]
         )
+        # The least move of a scene without an objective is no part of what its solutions are.
+        self.follows_start = any(isinstance(term, Posture) and term.reference is None for _, term in objectives)
         may_need_more = self._has_no_extent or self.keeps_apart or self.clearance_rows > 0 or bool(self.corners)
         self.is_loop_alone = not may_need_more
         # Without a factor, to copy what a solution keeps takes longer than to evaluate it anew.
@@ -172,6 +177,27 @@ class Packed(WrittenScene):
     def unknown_blocks(self) -> Table:
         """Of every body the number of its block of six unknowns; negative for fixed ones."""
         return self.rows_table[self.rows_table[layout.UNKNOWN_BLOCKS] :][: self.count]
+
+    @cached_property
+    def _following(self) -> Table:
+        """Where the pool has the poses that postures without a reference are measured from."""
+        table = self.rows_table
+        terms = table[table[layout.TERM_TABLE] :][: TERM * table[layout.TERMS]].reshape(-1, TERM).tolist()
+        first = [
+            at + place_of(POSTURE_FIELDS, "position")
+            for kind, _, at, _, follows, *_ in terms
+            if kind == POSTURE and follows
+        ]
+        return np.add.outer(np.array(first, dtype=np.int64), np.arange(7)).ravel()
+
+    def begun_at(self) -> Array:
+        """The poses that postures without a reference are measured from: where the last solve began."""
+        begun: Array = self.rows_pool[self._following]
+        return begun
+
+    def measure_from(self, begun: Array) -> None:
+        """Measure postures without a reference from where another solve began, until the next solve begins."""
+        self.rows_pool[self._following] = begun
 
     def is_crowded(self, state: Array) -> bool:
         """Whether contacts of clearances were near that found no place."""
