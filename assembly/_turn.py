@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from threading import RLock
 
 __all__ = ["Turn"]
@@ -13,12 +15,23 @@ class Turn:
     Attributes
     ----------
     lock : RLock
+    is_busy : bool
+        Whether whoever has the turn is amid something that none of its own callbacks may begin again.
     """
 
-    __slots__ = ("lock",)
+    __slots__ = ("is_busy", "lock")
 
     def __init__(self) -> None:
-        self.lock = RLock()
+        self.lock, self.is_busy = RLock(), False
 
     def __reduce__(self) -> tuple[type[Turn], tuple[()]]:
         return Turn, ()
+
+    @contextmanager
+    def busy(self) -> Iterator[None]:
+        """Be amid that; for who holds `lock`."""
+        try:
+            self.is_busy = True
+            yield
+        finally:
+            self.is_busy = False

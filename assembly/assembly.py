@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -67,7 +68,8 @@ class Assembly(Solving):
         Without an objective the least move is sought; if it is not found, any pose at which all constraints hold is
         returned. A start at which they hold is not moved. If constraints do not hold near the start, other starts are
         tried, the same in every run; the solution with the least objective is returned, and its `restarted` is True.
-        Threads that solve one scene take turns; `solve_many` solves from many starts at once.
+        Threads that solve one scene take turns; `solve_many` solves from many starts at once. A callback may solve the
+        scene from elsewhere meanwhile: it is given what a copy of the scene is solved to.
 
         Parameters
         ----------
@@ -79,6 +81,7 @@ class Assembly(Solving):
             pair.
         time_limit : float, optional
             Seconds after which the solve ends with `Status.TIME_LIMIT`, at the last pose that held if there was one.
+            They begin with the thread's turn.
         callback : callable, optional
             Called with the iteration, the objective and the feasibility (in the scene's unit; nan and inf before they
             are known) every 50 ms, or after a step that takes longer. If it returns True the solve ends with
@@ -98,6 +101,10 @@ class Assembly(Solving):
             Check `success`; if it is False, the status and the message say what happened.
         """
         with self._turn.lock:
+            if self._turn.is_busy:
+                # A callback of a solve of this scene, which reads what it wrote into the packed one until it ends.
+                again = copy(self)
+                return again.solve(q0, starts=starts, time_limit=time_limit, callback=callback, swept=swept, **options)
             is_plain = starts is None and time_limit is None and callback is None and swept is False and not options
             # Where a body or a constraint was set since, it may be one of this scene: `packed` looks.
             if is_plain and type(q0) is Solution and (self._seen is changes() or self._follows_numbers()):
@@ -105,21 +112,33 @@ class Assembly(Solving):
                 if straight is not None:
                     return straight
             interruption = CTRL_C if time_limit is None and callback is None else Interruption(time_limit, callback)
-            if swept is not False and not isinstance(swept, (bool, np.bool_)):
-                raise InputError(f"swept is {swept!r}; expected True or False")
-            if swept:
-                from assembly.studies.swept_solve import swept_solve
+            with self._turn.busy():
+                return self._solved_in_turn(q0, starts, swept, options, interruption)
 
-                solution = swept_solve(self, q0, starts, options, interruption)
-            else:
-                solution = self._from_start(q0, starts, options, interruption)
-            if not solution.success:
-                solution = self._tried_otherwise(solution, q0, starts, swept, options, interruption)
-            if options and Options.of(options).verbose:
-                print(solution.iteration_table())
-            if _LOG.isEnabledFor(logging.DEBUG):
-                _LOG.debug("%s, %d iterations, %.6f s", solution.status.name, solution.iterations, solution.seconds)
-            return solution
+    def _solved_in_turn(
+        self,
+        q0: ArrayLike | Solution | None,
+        starts: Mapping[str, ArrayLike] | None,
+        swept: bool,
+        options: dict[str, Any],
+        interruption: Interruption,
+    ) -> Solution:
+        """A solve with everything that it may need."""
+        if swept is not False and not isinstance(swept, (bool, np.bool_)):
+            raise InputError(f"swept is {swept!r}; expected True or False")
+        if swept:
+            from assembly.studies.swept_solve import swept_solve
+
+            solution = swept_solve(self, q0, starts, options, interruption)
+        else:
+            solution = self._from_start(q0, starts, options, interruption)
+        if not solution.success:
+            solution = self._tried_otherwise(solution, q0, starts, swept, options, interruption)
+        if options and Options.of(options).verbose:
+            print(solution.iteration_table())
+        if _LOG.isEnabledFor(logging.DEBUG):
+            _LOG.debug("%s, %d iterations, %.6f s", solution.status.name, solution.iterations, solution.seconds)
+        return solution
 
     def solve_all(
         self,
@@ -166,7 +185,10 @@ class Assembly(Solving):
         """
         from assembly.studies.multistart import solve_all
 
-        return solve_all(self, starts, seed, Interruption(time_limit), options, executor, progress)
+        with self._turn.lock:
+            scene = copy(self) if self._turn.is_busy else self
+            with scene._turn.busy():
+                return solve_all(scene, starts, seed, Interruption(time_limit), options, executor, progress)
 
     def solve_many(
         self,
@@ -216,7 +238,9 @@ class Assembly(Solving):
         """
         from assembly.studies.batches.solving import solve_many
 
-        return solve_many(self, q0s, parameters, of, threads, retry, options)
+        with self._turn.lock:
+            scene = copy(self) if self._turn.is_busy else self
+            return solve_many(scene, q0s, parameters, of, threads, retry, options)
 
     def at(self, values: Mapping[str, float]) -> Array:
         """Poses (n, 7) at which joint coordinates have given values, by the names in `Solution.values`: a start `q0`.

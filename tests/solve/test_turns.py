@@ -92,3 +92,51 @@ def test_an_earlier_solution_is_measured_from_its_own_start():
     assert earlier.second_order is asm.SecondOrder.MINIMUM
     np.testing.assert_array_equal(told(earlier), expected)
     assert np.abs(told(later) - expected).max() > 1e-3
+
+
+@pytest.mark.parametrize("asks_for_posture", [False, True], ids=["least move", "posture"])
+def test_solves_beside_one_from_all_starts_are_measured_from_their_own(asks_for_posture):
+    scene = ball_on_a_plane(asks_for_posture)
+    starts = list(starts_of(scene))
+    alone = [scene.solve(q).q for q in starts]
+    ends = [solution.q for solution in scene.solve_all(starts=4)]
+    with ThreadPoolExecutor(1) as pool:
+        searches = [pool.submit(scene.solve_all, starts=4) for _ in range(4)]
+        beside = [scene.solve(q).q for q in starts * 2]
+    assert all((q == alone[k % STARTS]).all() for k, q in enumerate(beside))
+    for search in searches:
+        np.testing.assert_array_equal([solution.q for solution in search.result()], ends)
+
+
+def test_a_solve_within_one_from_all_starts_is_measured_from_its_own():
+    scene = ball_on_a_plane(False)
+    start = next(starts_of(scene))
+    alone, found = scene.solve(start).q, []
+    ends = [solution.q for solution in scene.solve_all(starts=4)]
+    again = scene.solve_all(starts=4, progress=lambda *_: found.append(scene.solve(start)))
+    assert len(found) > 1 and all((solution.q == alone).all() for solution in found)
+    np.testing.assert_array_equal([solution.q for solution in again], ends)
+    # It is a solution of this scene like any other.
+    assert scene.solve(found[0]).success and scene.mobility(found[0]).dof == scene.mobility(scene.solve(start)).dof
+
+
+def test_a_callback_that_solves_the_scene_from_elsewhere_changes_nothing():
+    """The objective is measured from where the solve begins, which the solve in the callback does elsewhere."""
+    links = 400
+    bodies = [asm.Body("ground", fixed=True), *(asm.Body(f"link {k}", position=(k, 0, 0)) for k in range(links))]
+    scene = asm.Assembly(bodies)
+    for k, (a, b) in enumerate(zip(bodies, bodies[1:], strict=False)):
+        scene.constrain(asm.Revolute(a.frame(at=(float(k > 0), 0, 0)), b.frame(), f"hinge {k}"))
+    drawn = asm.PointDistance(bodies[-1].point(1, 0, 0), target=(-0.3 * links, 0.5 * links, 0.0))
+    scene.minimize(drawn, asm.Posture())
+    alone, away, within = scene.solve(), np.array(scene.q), []
+    away[1:, 1] += 40.0
+
+    def solve_elsewhere(*_):
+        if len(within) < 2:
+            within.append(scene.solve(away, max_iterations=1))
+
+    beside = scene.solve(callback=solve_elsewhere)
+    assert within, "the solve was too short for a callback"
+    np.testing.assert_array_equal(beside.q, alone.q)
+    assert beside.objective == alone.objective and beside.iterations == alone.iterations
