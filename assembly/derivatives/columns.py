@@ -18,7 +18,6 @@ from assembly.constraints.model.objectives import Objective
 from assembly.constraints.packing.earlier import stretch
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program import records as layout
-from assembly.constraints.program.objective_terms import POSTURE, TERM
 from assembly.derivatives.nets import gap_rates
 from assembly.derivatives.numbers import (
     ControlPoint,
@@ -331,12 +330,8 @@ def evaluated_now(problem: Problem) -> tuple[Evaluated, float]:
     crowding, corners = packed.crowding, bool(packed.corners)
     other = Packed(problem.bodies, problem.constraints, problem.objectives, crowding, corners, packed.scale)
     other.refresh()
-    table = packed.table
-    records = table[table[layout.TERM_TABLE] :][: TERM * table[layout.TERMS]].reshape(-1, TERM)
-    for kind, _, at, _, follows in records[:, :5].tolist():
-        if kind == POSTURE and follows:
-            # What a posture without a reference is measured from is where the solve began.
-            other.pool[at + 1 : at + 8] = packed.pool[at + 1 : at + 8]
+    # What a posture without a reference is measured from is where the solve began.
+    other.measure_from(packed.begun_at())
     state = problem.state.copy()
     stretch(packed, other, state)
     return ProbedScene(other, state, problem.bodies).evaluate(problem.forces), other.unit / packed.unit

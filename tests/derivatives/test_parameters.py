@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import assembly as asm
-from assembly.constraints.packing.renumbered import REFERENCE, _following_postures
+from assembly.constraints.packing.scene import REFERENCE
 from assembly.constraints.program.records import VERSION
 from tests.derivatives.sensitivity_scenes import CASES
 
@@ -83,9 +83,8 @@ def test_the_size_may_change_with_every_frame():
         packed.refresh()
         built.refresh()
         # Neither versions, nor where the last solve began.
-        began = [np.arange(at + 1, at + 1 + REFERENCE) for at in _following_postures(packed)]
-        told = np.concatenate([[VERSION], *began])
-        assert len(began) == 5
+        told = np.concatenate([[VERSION], packed.following])
+        assert len(packed.following) == 5 * REFERENCE
         assert np.array_equal(np.delete(packed.rows_pool, told), np.delete(built.rows_pool, told))
         assert packed.asked_units == built.asked_units and packed._reads == [
             (*mine[:1], *each[1:]) for mine, each in zip(packed._reads, built._reads, strict=True)

@@ -147,18 +147,20 @@ def table_with_clearances(table: Table, placed: Sequence[Sequence[int]]) -> Tabl
     one.
     """
     table = table.copy()
-    first = table[layout.ROW_TABLE] + layout.ROW * table[layout.FIRST_CLEARANCE_ROW]
-    rows = table[first:][: layout.ROW * len(placed)].reshape(-1, layout.ROW)
+    header = layout.header_at(table, 0)
+    first = header.row_table + layout.ROW * header.first_clearance_row
     listed = np.array(placed, dtype=np.int64).reshape(-1, 3)
     which = np.flatnonzero(listed[:, 0] >= 0)
-    manager = manager_records.manager_at(table, table[layout.MANAGER_RECORD])
+    place, number, given = listed[which].T
+    manager = manager_records.manager_at(table, header.manager_record)
     pairs = table[manager.pair_table :][: manager_records.PAIR_RECORD * manager.pairs]
-    pair = Columns(manager_records.PAIR_DTYPE, pairs.reshape(-1, manager_records.PAIR_RECORD)[listed[which, 0]])
-    rows[which, layout.BODY_F], rows[which, layout.BODY_G] = pair.body_f, pair.body_g
-    rows[which, layout.SURFACE_F], rows[which, layout.SURFACE_G] = pair.surface_f, pair.surface_g
-    rows[which, layout.SHELL_F], rows[which, layout.SHELL_G] = pair.shell_f, pair.shell_g
-    rows[which, layout.MINIMUM] = pair.minimum + manager_records.IN_PLACE * listed[which, 2]
-    rows[which, layout.CLEARANCE_ROW_NUMBER] = listed[which, 1]
+    pair = Columns(manager_records.PAIR_DTYPE, pairs.reshape(-1, manager_records.PAIR_RECORD))
+    row = Columns(layout.CONTACT_ROW_RECORD, table[first:][: layout.ROW * len(listed)].reshape(-1, layout.ROW))
+    row.body_f[which], row.body_g[which] = pair.body_f[place], pair.body_g[place]
+    row.surface_f[which], row.surface_g[which] = pair.surface_f[place], pair.surface_g[place]
+    row.shell_f[which], row.shell_g[which] = pair.shell_f[place], pair.shell_g[place]
+    row.minimum[which] = pair.minimum[place] + manager_records.IN_PLACE * given
+    row.clearance_number[which] = number
     return table
 
 

@@ -23,7 +23,6 @@ from assembly.constraints.packing.scene_size import size_and_extent
 from assembly.constraints.packing.scene_writer import SceneWriter
 from assembly.constraints.packing.terms import TermPacking
 from assembly.constraints.program import records as layout
-from assembly.constraints.program.objective_terms import POSTURE, POSTURE_PARAMETERS, TERM
 from assembly.kinematics.body import Body
 from assembly.kinematics.changes import numbers_set, set_since
 
@@ -33,8 +32,6 @@ if TYPE_CHECKING:
 __all__ = ["have_same_numbers", "numbers_told", "renumbered"]
 
 Array = NDArray[np.float64]
-# The numbers of a posture's reference, behind its weight and before its lever.
-REFERENCE = POSTURE_PARAMETERS - 2
 
 
 class _PoolWriter:
@@ -123,9 +120,7 @@ def _compared(
     for spot, start in packed.placed:
         numbers = place_numbers(spot, 0.0, scale)
         pool[start : start + len(numbers)] = numbers
-    for at in _following_postures(packed):
-        # Where the last solve began, until the next one begins.
-        pool[at + 1 : at + 1 + REFERENCE] = packed.rows_pool[at + 1 : at + 1 + REFERENCE]
+    other.measure_from(packed.begun_at())
     if have_same_numbers(packed, other):
         packed.numbers = numbers_set()
         return packed
@@ -142,8 +137,7 @@ def have_same_numbers(one: Packed, other: Packed) -> bool:
         each.refresh()
     apart = one.pool != other.pool
     apart[layout.VERSION] = False
-    for at in _following_postures(one):
-        apart[at + 1 : at + 1 + REFERENCE] = False
+    apart[one.following] = False
     return not apart.any()
 
 
@@ -161,10 +155,3 @@ def numbers_told(packed: Packed, bodies: Sequence[Body], constraints: Sequence[C
     places = [place.target for place, _ in packed.placed]
     drawn = [(place.target, place.weight) for place in packed.drawn]
     return [asked, frames, gaps, faces, places, drawn]
-
-
-def _following_postures(packed: Packed) -> list[int]:
-    """Where the numbers are of postures that are measured from where each solve begins."""
-    table = packed.rows_table
-    terms = table[table[layout.TERM_TABLE] :][: TERM * table[layout.TERMS]].reshape(-1, TERM).tolist()
-    return [at for kind, _, at, _, follows, *_ in terms if kind == POSTURE and follows]

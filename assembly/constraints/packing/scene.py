@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assembly._record import place_of
+from assembly._record import place_of, rows_of
 from assembly.constraints.model.constraint import Constraint, RowConstraint, structure_changes
 from assembly.constraints.model.objectives import Objective, Posture
 from assembly.constraints.packing import manager as manager_packing
@@ -20,7 +20,7 @@ from assembly.constraints.packing.written_scene import WrittenScene
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.coordinates_at import coordinates_at
 from assembly.constraints.program.kept import kept_size, kept_unknowns
-from assembly.constraints.program.objective_terms import POSTURE, POSTURE_FIELDS, TERM
+from assembly.constraints.program.objective_terms import POSTURE, POSTURE_FIELDS, TERM, TERM_RECORD
 from assembly.constraints.program.primitives import RECORD as JOINT_FRAMES
 from assembly.errors import FARTHEST
 from assembly.kinematics.body import Body
@@ -49,6 +49,8 @@ OwnedPairs = list[Any]
 Hulled = tuple[tuple[bytes, Any], ...]
 # How many times as many places as they ask for a solve gives to clearances.
 MORE_PLACES, MOST_CROWDING = 4, 16
+# Numbers of the pose that a posture is measured from.
+REFERENCE = 7
 # Numbers of pools that are not as they were packed (0).
 _versions = itertools.count(1)
 
@@ -179,25 +181,21 @@ class Packed(WrittenScene):
         return self.rows_table[self.rows_table[layout.UNKNOWN_BLOCKS] :][: self.count]
 
     @cached_property
-    def _following(self) -> Table:
-        """Where the pool has the poses that postures without a reference are measured from."""
+    def following(self) -> Table:
+        """Where the pool has the poses that postures without a reference are measured from, seven numbers of each."""
         table = self.rows_table
-        terms = table[table[layout.TERM_TABLE] :][: TERM * table[layout.TERMS]].reshape(-1, TERM).tolist()
-        first = [
-            at + place_of(POSTURE_FIELDS, "position")
-            for kind, _, at, _, follows, *_ in terms
-            if kind == POSTURE and follows
-        ]
-        return np.add.outer(np.array(first, dtype=np.int64), np.arange(7)).ravel()
+        terms = rows_of(TERM_RECORD, table[table[layout.TERM_TABLE] :][: TERM * table[layout.TERMS]].reshape(-1, TERM))
+        first = terms.parameters[(terms.kind == POSTURE) & (terms.follows == 1)] + place_of(POSTURE_FIELDS, "position")
+        return np.asarray(np.add.outer(first, np.arange(REFERENCE)).ravel())
 
     def begun_at(self) -> Array:
         """The poses that postures without a reference are measured from: where the last solve began."""
-        begun: Array = self.rows_pool[self._following]
+        begun: Array = self.rows_pool[self.following]
         return begun
 
     def measure_from(self, begun: Array) -> None:
         """Measure postures without a reference from where another solve began, until the next solve begins."""
-        self.rows_pool[self._following] = begun
+        self.rows_pool[self.following] = begun
 
     def is_crowded(self, state: Array) -> bool:
         """Whether contacts of clearances were near that found no place."""
