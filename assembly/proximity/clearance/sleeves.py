@@ -35,7 +35,7 @@ from assembly.proximity.clearance.separation import (
     separation,
 )
 
-__all__ = ["LEAST_COSINE", "best_bore", "cosine_of_rulings", "gap_of", "slope_of"]
+__all__ = ["LEAST_COSINE", "best_bore", "cosine_of_rulings", "gap_of", "sleeve_room", "slope_of"]
 
 # The least cosine of the angle of a ruling to the bore's axis. Next to a right angle a section has no end, and digits
 # are lost by the square of the inverse.

@@ -22,7 +22,7 @@ from assembly.proximity.clearance.halve import corner_of, vector
 from assembly.proximity.clearance.records import BY_BORE_A, BY_BORE_B, BY_SLEEVE, node_at
 from assembly.proximity.clearance.separation import across, highest, is_round, is_wire, placed, room_in_bore
 from assembly.proximity.clearance.sleeve_bends import axis_bends, disc_bend, section_bends
-from assembly.proximity.clearance.sleeves import LEAST_COSINE, cosine_of_rulings, slope_of
+from assembly.proximity.clearance.sleeves import LEAST_COSINE, cosine_of_rulings, sleeve_room, slope_of
 
 # swept: whether the way is looked at, or its end alone. moved: a bound of the travel of points of b. sag: of any point;
 # factor: of a point at distance 1 from the axis of rotation. axis, middle: of that, in axes of b (zero: it is not
@@ -156,7 +156,10 @@ def part_along(way, n):
 
 @kernel(inner=True)
 def sleeve_sag(way, forest, a, b, how):
-    """How far the room of node b in a sleeve of node a may fall, on the way, below the chord of its values at the ends.
+    """What the way may take of the room of node b in a sleeve of node a, which is room across the bore times a cosine.
+
+    Returns how far the room across the bore may fall below the chord of its values at the ends, and by what part the
+    cosine at an end may be above the least one.
 
     With w the angle of the way, w1 the part of it by which b's axis turns, primes for derivatives along the way, and t
     and T the tangent and the secant of the largest lean, a plane at a height z from b's center c cuts b's axis at e,
@@ -176,11 +179,13 @@ def sleeve_sag(way, forest, a, b, how):
         turned *= min(across(way.axis, axis) + way.lean, 1.0)
     before, after = matvec(way.before.rotation, axis), matvec(way.after.rotation, axis)
     # No axis of the way is farther from that at one of both ends.
-    lean = max(math.atan2(across(before, u), abs(dot(before, u))), math.atan2(across(after, u), abs(dot(after, u))))
-    lean += 0.5 * turned
+    leans = math.atan2(across(before, u), abs(dot(before, u))), math.atan2(across(after, u), abs(dot(after, u)))
+    lean = max(leans[0], leans[1]) + 0.5 * turned
     slope = abs(slope_of(node))
-    if not (lean < MOST_LEAN and cosine_of_rulings(math.cos(lean), slope) >= 0.5 * LEAST_COSINE):
-        return math.inf
+    upright = cosine_of_rulings(math.cos(lean), slope)
+    if not (lean < MOST_LEAN and upright >= 0.5 * LEAST_COSINE):
+        return math.inf, 0.0
+    fall = cosine_of_rulings(math.cos(min(leans[0], leans[1])), slope) / upright * ROUNDED_UP - 1.0
     center = vector(node.center)
     start, end = placed(way.before, way.middle), placed(way.after, way.middle)
     d = sub(end, start)
@@ -201,12 +206,28 @@ def sleeve_sag(way, forest, a, b, how):
     if how != BY_SLEEVE:
         tilted = math.asin(wall.slant) + lean
         if not tilted < MOST_LEAN:
-            return math.inf
+            return math.inf, 0.0
         ends = bent + (node.half[0] + node.disc * disc_bend(math.sin(tilted))) * angle * turned
         second = max(second, ends)
     sag = 0.125 * second * ROUNDED_UP
     # What a section's radius may lose must not bring it to the apex.
-    return math.inf if slope > 0.0 and sag > NARROWED * node.disc else sag
+    return (math.inf if slope > 0.0 and sag > NARROWED * node.disc else sag), fall
+
+
+@kernel(inner=True)
+def keeps_room(way, forest, nodes, gaps):
+    """Whether a sleeve keeps two nodes apart all the way, by gaps before and after: the room less the least gap g.
+
+    The room is c x, a cosine times the room across the bore. If c x - g > s + f g at both ends, with s how far x may
+    fall and f by what part c may, then x > s + g / (the least c) there and x > g / (the least c) all the way.
+    """
+    before, after = gaps
+    sag, fall = sleeve_sag(way, forest, nodes.a, nodes.b, nodes.how)
+    if not (after > sag and before > sag):
+        return False
+    least_gap = max(sleeve_room(forest, nodes.a, nodes.b, way.after, nodes.how) - after, 0.0)
+    sag += fall * least_gap
+    return after > sag and before > sag
 
 
 @kernel(inner=True)
@@ -224,8 +245,7 @@ def stays_apart(forest, nodes, way, n, gaps):
         sag = sag_backward(way, forest, nodes.a)
         return after > sag and before > sag
     if nodes.how >= BY_SLEEVE:
-        sag = sleeve_sag(way, forest, nodes.a, nodes.b, nodes.how)
-        return after > sag and before > sag
+        return keeps_room(way, forest, nodes, gaps)
     if nodes.how == BY_BORE_A and is_round(forest, nodes.b):
         sag = sag_of(way, forest, nodes.b) + sag_of_disc(way, forest, nodes.a, nodes.b)
         if after > sag and before > sag:
