@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -255,3 +257,25 @@ def test_least_distances_choose_the_rows_that_trying_all_would():
                 if choice is not None:
                     steps = solve_system(system, choice).steps[:, k]
                     assert np.abs(found.steps[:, k] - steps).max() < 1e-9 * max(1.0, np.abs(steps).max())
+
+
+def test_a_posture_without_a_reference_is_derived_from_where_the_solve_began():
+    """The weight of turns is that of the body's size, so that a radius changes what they are measured by."""
+    floor = asm.Body("floor", asm.shapes.plane(20.0, 20.0), fixed=True)
+    shape = asm.Parametric(asm.shapes.ellipsoid, a=0.5, b=0.7, c=0.9)
+    egg = asm.Body("egg", shape, position=(0.0, 0.0, 2.0))
+    scene = asm.Assembly([floor, egg])
+    scene.constrain(asm.Contact(floor, egg))
+    scene.minimize(asm.Posture(), asm.PointDistance(egg.point(0.4, 0.2, 0.1), (0.5, 1.0, 0.3)))
+    begun = np.array(
+        [floor.q, [0.3, -0.2, 1.4, *np.array([0.9, 0.3, -0.2, 0.1]) / np.linalg.norm([0.9, 0.3, -0.2, 0.1])]]
+    )
+    of, radius = [asm.Measure(egg.point(0.1, 0.2, 0.0), axis) for axis in "xyz"], asm.Parameter(shape, "c")
+    case = SimpleNamespace(of=of, solved=lambda _: scene.solve(begun))
+    solution = scene.solve(begun)
+    found = differences(case, solution, radius, 1e-3)
+    solution = scene.solve(begun)
+    scene.solve(scene.q)
+    told = asm.sensitivity(scene, solution, of, [radius]).matrix[:, 0]
+    # As of the other scenes: what solves leave over the step.
+    assert np.abs(told).max() > 0.1 and np.abs(found - told).max() < 1e-8

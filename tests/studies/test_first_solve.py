@@ -147,9 +147,10 @@ def test_of_equal_poses_hulls_are_asked_once(monkeypatch):
     scene = overlapping_boxes()
     assert scene.solve().success
     assert len(asked) == len(set(asked)) > 1
-    # Another least gap is another question.
+    # Another tolerance, or least gap, is another question.
     q, touching = np.array(scene.q), 1e-9
     first = hull_answers(scene.packed(), scene.bodies, q, touching)
     assert hull_answers(scene.packed(), scene.bodies, q.copy(), touching) is first
+    assert hull_answers(scene.packed(), scene.bodies, q, 2.0 * touching) is not first
     scene.constraints[0].minimum = 0.1
     assert hull_answers(scene.packed(), scene.bodies, q, touching) is not first
