@@ -176,6 +176,15 @@ def test_both_ways(name, tmp_path):
         assert agrees(read(path), wanted)
 
 
+@pytest.mark.parametrize("seed", [61, 138])
+def test_domes_whose_boundary_crosses_the_seam_at_the_pole(seed, tmp_path):
+    """No stretch of the seam is left there: one of no length had two sides that run the same way."""
+    shape = by_random(seed)
+    bodies = asm.read_step(written(shape, tmp_path / "given.step"))
+    asm.write_step(tmp_path / "ours.step", bodies)
+    assert agrees(asm.read_step(tmp_path / "ours.step"), measured(shape))
+
+
 def test_random_shapes(tmp_path, cases):
     # None is wrong; some are refused, which is told.
     read = refused = 0

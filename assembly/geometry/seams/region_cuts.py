@@ -239,6 +239,14 @@ def _cut(chains: list[list[Piece]], axis: _Axis) -> list[list[Piece]]:
             _moved(piece, axis, number)
         pieces += row
     for start, end, bottom, top in _stretches(crossings, axis, inside):
+        if top - bottom <= NEAR * (axis.top - axis.bottom) and (start is None) != (end is None):
+            # The boundary crosses the seam at the pole itself.
+            crossing, has_pole = (start, axis.poles[1]) if end is None else (end, axis.poles[0])
+            if has_pole:
+                cap = Piece(segment(crossing.before.ends[1], crossing.after.ends[0]), POLE)
+                crossing.before.next, cap.next = cap, crossing.after
+                pieces.append(cap)
+                continue
         up = Piece(segment(axis.point(axis.high, bottom), axis.point(axis.high, top)), SEAM)
         down = Piece(segment(axis.point(axis.low, top), axis.point(axis.low, bottom)), SEAM)
         pieces += [up, down]
