@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from threading import RLock
 
 __all__ = ["Turn"]
@@ -16,7 +14,8 @@ class Turn:
     ----------
     lock : RLock
     is_busy : bool
-        Whether whoever has the turn is amid something that none of its own callbacks may begin again.
+        Set by who has the turn while it is amid something that none of its own callbacks may begin again. A context
+        manager for that would take as long as a fortieth of a small scene's solve.
     """
 
     __slots__ = ("is_busy", "lock")
@@ -26,12 +25,3 @@ class Turn:
 
     def __reduce__(self) -> tuple[type[Turn], tuple[()]]:
         return Turn, ()
-
-    @contextmanager
-    def busy(self) -> Iterator[None]:
-        """Be amid that; for who holds `lock`."""
-        try:
-            self.is_busy = True
-            yield
-        finally:
-            self.is_busy = False

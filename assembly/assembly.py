@@ -112,8 +112,11 @@ class Assembly(Solving):
                 if straight is not None:
                     return straight
             interruption = CTRL_C if time_limit is None and callback is None else Interruption(time_limit, callback)
-            with self._turn.busy():
+            self._turn.is_busy = True
+            try:
                 return self._solved_in_turn(q0, starts, swept, options, interruption)
+            finally:
+                self._turn.is_busy = False
 
     def _solved_in_turn(
         self,
@@ -187,8 +190,11 @@ class Assembly(Solving):
 
         with self._turn.lock:
             scene = copy(self) if self._turn.is_busy else self
-            with scene._turn.busy():
+            scene._turn.is_busy = True
+            try:
                 return solve_all(scene, starts, seed, Interruption(time_limit), options, executor, progress)
+            finally:
+                scene._turn.is_busy = False
 
     def solve_many(
         self,
