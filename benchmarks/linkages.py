@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import assembly as asm
 from assembly.constraints.model.constraint import Constraint
-from assembly.kinematics.body import Point
+from assembly.kinematics.frame import Point
 
 __all__ = [
     "CONTRADICTIONS",

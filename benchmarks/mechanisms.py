@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 import assembly as asm
 from assembly.constraints.model.dexterity import MEASURES
-from assembly.kinematics.body import Point
+from assembly.kinematics.frame import Point
 from benchmarks import linkages
 from benchmarks.figures import figure
 from benchmarks.laws import OFFSETS, SLOPE, deviation

@@ -17,7 +17,7 @@ import assembly as asm
 from assembly import scene_file
 from assembly.constraints.model.joint import Joint
 from assembly.errors import InputError
-from assembly.kinematics.body import Frame
+from assembly.kinematics.frame import Frame
 from assembly.scene_file.kinds import CONSTRAINTS, OBJECTIVES
 
 THIRD = 1.0 / 3.0

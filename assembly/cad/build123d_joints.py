@@ -31,7 +31,8 @@ from assembly.constraints.model.constraint import Bounds
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.joints import Cylindrical, Fixed, Prismatic, Revolute, Spherical
 from assembly.errors import InputError, number, vector
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
 
 __all__ = ["Tie", "kind_of"]

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame
 from assembly.kinematics.pose import Pose
 from assembly.step.occt import occt
 

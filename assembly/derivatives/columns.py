@@ -32,8 +32,9 @@ from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.probed import Evaluated, ProbedScene
 from assembly.derivatives.size import by_size, size_rate
 from assembly.errors import InputError
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
 from assembly.kinematics.changes import tried_numbers
+from assembly.kinematics.frame import Frame
 from assembly.kinematics.pose import skew
 
 __all__ = ["Columns", "Frames", "Problem", "by_frames", "columns_of", "differences"]

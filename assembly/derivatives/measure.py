@@ -14,7 +14,8 @@ from assembly.constraints.model.contact_place import ContactPlace
 from assembly.constraints.model.joint import Joint
 from assembly.derivatives.touching_place import COMPONENTS, place_value
 from assembly.errors import InputError, text
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame, Point
 from assembly.solve.solution import Solution
 
 __all__ = ["Measure"]

@@ -16,8 +16,9 @@ from assembly.constraints.model.objectives import FrameDistance, PointDistance
 from assembly.errors import FARTHEST, InputError, check_coordinates
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.kinematics.body import BodyFace, Frame
+from assembly.kinematics.body import BodyFace
 from assembly.kinematics.changes import count_number
+from assembly.kinematics.frame import Frame
 from assembly.kinematics.parametric import Parametric
 from assembly.kinematics.pose import Pose, skew
 

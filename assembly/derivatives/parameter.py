@@ -27,7 +27,8 @@ from assembly.derivatives.numbers import (
     TargetNumber,
 )
 from assembly.errors import InputError, KnownSettings, number, positive, text
-from assembly.kinematics.body import Body, BodyFace, Frame
+from assembly.kinematics.body import Body, BodyFace
+from assembly.kinematics.frame import Frame
 from assembly.kinematics.parametric import Parametric
 
 __all__ = ["Parameter"]

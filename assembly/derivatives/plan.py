@@ -33,7 +33,8 @@ from assembly.derivatives.numbers import FrameOrigin, FrameTurn, LeastGap, RowNu
 from assembly.derivatives.parameter import Parameter
 from assembly.derivatives.probed import ProbedScene
 from assembly.derivatives.result import Layout, Least, Moved, Sensitivity
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame
 from assembly.solve.second_order.curvature import curvature_at
 from assembly.solve.second_order.dense import PUSHING, UNBALANCED
 from assembly.solve.solution import Solution

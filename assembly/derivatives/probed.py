@@ -21,7 +21,8 @@ from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.objective_terms import POINT_DISTANCE_FIELDS, POSTURE_QUATERNION, TERM
 from assembly.errors import InputError
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame
 from assembly.solve.second_order.curvature import curvature_at
 
 __all__ = ["Evaluated", "ProbedScene"]

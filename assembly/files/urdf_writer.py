@@ -23,7 +23,8 @@ from assembly.errors import InputError, positive
 from assembly.files.primitives import Primitive, primitives_of
 from assembly.files.robot import Inertial, Robot, UrdfError
 from assembly.files.stl import stl_bytes
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame
 from assembly.step.documents import checked_unit
 
 __all__ = ["write_urdf"]

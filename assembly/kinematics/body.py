@@ -1,23 +1,22 @@
-"""Body: a rigid thing with a name, a pose and faces; points and frames on it."""
+"""Body: a rigid thing with a name, a pose and faces."""
 
 from __future__ import annotations
 
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._html import Table, as_html
-from assembly._read_only import ReadOnlyArrays
-from assembly.errors import InputError, check_coordinates, checked_color, positive, text, vector
+from assembly.errors import InputError, check_coordinates, checked_color, positive, text
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body_face import BodyFace
 from assembly.kinematics.changes import count_edit, count_number
+from assembly.kinematics.frame import Frame, Point, frozen, checked_place
 from assembly.kinematics.parametric import Parametric
 from assembly.kinematics.picture_mesh import PictureMesh
 from assembly.kinematics.pose import Pose, direction, length
@@ -28,17 +27,10 @@ if TYPE_CHECKING:
     from assembly.selection.faces import Faces
     from assembly.selection.vertices import Vertices
 
-__all__ = ["Body", "BodyFace", "Frame", "OpposedFrame", "Point", "Shape"]
+__all__ = ["Body", "BodyFace", "Shape"]
 
 Array = NDArray[np.float64]
 Shape = NurbsSurface | Face | Iterable[NurbsSurface | Face] | Parametric
-
-
-def _place(name: str, value: ArrayLike) -> Array:
-    """Coordinates of a point, read-only."""
-    place = vector(name, value)
-    check_coordinates(name, place.tolist())
-    return _frozen(place)
 
 
 def _given_pose(position: ArrayLike, quaternion: ArrayLike, pose: Pose | None) -> Pose:
@@ -61,87 +53,6 @@ def _flag(name: str, value: Any) -> bool:
     if not isinstance(value, (bool, np.bool_)):
         raise InputError(f"{name} is {value!r}; expected True or False")
     return bool(value)
-
-
-def _frozen(array: Array) -> Array:
-    array.flags.writeable = False
-    return array
-
-
-@dataclass(frozen=True, eq=False)
-class Point(ReadOnlyArrays):
-    """A point of a body, in body coordinates (3,)."""
-
-    body: Body
-    coordinates: Array
-
-    def __repr__(self) -> str:
-        x, y, z = self.coordinates
-        return f"{self.body.name}.point({x:g}, {y:g}, {z:g})"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Frame(ReadOnlyArrays):
-    """A frame on a body: origin (3,) and axes (3, 3), the columns x, y, z, in body coordinates."""
-
-    body: Body
-    origin: Array
-    axes: Array
-
-    def __repr__(self) -> str:
-        rows = (row + 0.0 for row in (self.origin, *self.axes.T))  # no minus zeros
-        at, x, _, z = ("({:g}, {:g}, {:g})".format(*row) for row in rows)
-        return f"{self.body.name}.frame({at}, z={z}, x={x})"
-
-    def place(self, at: ArrayLike | None = None, z: ArrayLike | None = None, x: ArrayLike | None = None) -> None:
-        """Set the frame anew on its body: its origin, its axes, or both, as `Body.frame` takes them.
-
-        Whatever has the frame, joints, terms and scenes, has it in its new place from then on.
-        """
-        if z is None:
-            if x is not None:
-                raise InputError("x is given without z; expected both, or neither to keep the axes")
-            self._stand(self.origin if at is None else _place("at", at), self.axes)
-            return
-        other = self.body.frame(self.origin if at is None else at, z, x)
-        self._stand(other.origin, other.axes)
-        self.__dict__.pop("_turned", None)
-
-    def _move(self, origin: Array) -> None:
-        """Have another origin, an array of its own, and the same axes."""
-        self.__dict__["origin"] = _frozen(origin)
-        count_number(self)
-
-    def _stand(self, origin: Array, axes: Array) -> None:
-        """Have another origin and other axes, orthonormal ones."""
-        self.__dict__.update(origin=_frozen(origin.copy()), axes=_frozen(axes.copy()))
-        count_number(self)
-
-
-class OpposedFrame(Frame):
-    """A frame turned by pi about the x axis of another one, wherever that stands."""
-
-    def __init__(self, frame: Frame) -> None:
-        self.__dict__.update(body=frame.body, _frame=frame)
-
-    @property
-    def origin(self) -> Array:
-        """That of the other frame."""
-        return self.base.origin
-
-    @property
-    def axes(self) -> Array:
-        """Those of the other frame, y and z reversed."""
-        return _frozen(self.base.axes * np.array([1.0, -1.0, -1.0]))
-
-    @property
-    def base(self) -> Frame:
-        """The frame that it is turned from."""
-        frame: Frame = self.__dict__["_frame"]
-        return frame
-
-    def _stand(self, origin: Array, axes: Array) -> None:
-        self.base._stand(origin, axes * np.array([1.0, -1.0, -1.0]))
 
 
 class Body(Weighed):
@@ -385,7 +296,7 @@ class Body(Weighed):
 
     def point(self, x: float, y: float, z: float) -> Point:
         """The point (x, y, z) of the body, in body coordinates."""
-        return Point(self, _place("point", (x, y, z)))
+        return Point(self, checked_place("point", (x, y, z)))
 
     def frame(
         self, at: ArrayLike = (0.0, 0.0, 0.0), z: ArrayLike = (0.0, 0.0, 1.0), x: ArrayLike | None = None
@@ -395,7 +306,7 @@ class Body(Weighed):
         Without `x`, the x axis is the coordinate axis farthest from `z`, made orthogonal to it; a given `x` is made
         orthogonal to `z` too and must not be parallel to it.
         """
-        origin, axis = _place("at", at), direction("z", z)
+        origin, axis = checked_place("at", at), direction("z", z)
         side = np.eye(3)[np.argmin(np.abs(axis))] if x is None else direction("x", x)
         across = side - (side @ axis) * axis
         if not np.linalg.norm(across) > 1e-9:
@@ -404,4 +315,4 @@ class Body(Weighed):
         across = direction("x", across)
         across = direction("x", across - (across @ axis) * axis)
         axes = np.column_stack([across, np.cross(axis, across), axis])
-        return Frame(self, origin, _frozen(axes))
+        return Frame(self, origin, frozen(axes))

@@ -15,7 +15,8 @@ from assembly.geometry.recognition.forms import Cone, Cylinder, Form, Plane, Sph
 from assembly.kinematics.face_forms import FaceKind, axis_of, center_of, form_of, kind_of
 
 if TYPE_CHECKING:
-    from assembly.kinematics.body import Body, Frame
+    from assembly.kinematics.body import Body
+    from assembly.kinematics.frame import Frame
 
 __all__ = ["BodyFace"]
 

@@ -13,7 +13,8 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.faces.loop import Loop
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame
 from assembly.kinematics.picture_mesh import PictureMesh
 from assembly.kinematics.pose import Pose
 from assembly.scene_file.fields import each, flag, number, or_null, table, text, vector, whole

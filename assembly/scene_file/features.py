@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from assembly.errors import InputError
-from assembly.kinematics.body import BodyFace, Frame, Point
+from assembly.kinematics.body import BodyFace
+from assembly.kinematics.frame import Frame, Point
 from assembly.scene_file.fields import at, bad, members, text, vector, whole
 from assembly.scene_file.records import Form, Parts
 from assembly.scene_file.references import BODY_NAME

@@ -34,7 +34,8 @@ from assembly.constraints.model.tangent import ContactTangent, SurfaceTangent, T
 from assembly.constraints.model.trim_contact import TrimContact, single_face
 from assembly.errors import InputError
 from assembly.geometry.faces.loop import Loop
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame, Point
 from assembly.scene_file.body_kinds import FRAME, LOOP, NAME, NUMBER, NUMBERS, POSE, VECTOR
 from assembly.scene_file.features import Feature
 from assembly.scene_file.fields import bad, each, flag, number, or_null, table, text, whole

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._read_only import read_only
 from assembly.errors import InputError, positive
 from assembly.geometry.faces.smooth_faces import has_creases, smooth_faces
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
 from assembly.kinematics.body_face import BodyFace
+from assembly.kinematics.frame import Frame
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.topology import Edge, Topology
 from assembly.selection.edge_forms import EdgeForm, form_of_points

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly.errors import InputError, check_coordinates, vector
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame
 from assembly.kinematics.pose import direction
 from assembly.selection.selector_strings import Seen, parsed
 

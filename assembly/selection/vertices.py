@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from assembly._read_only import read_only
-from assembly.kinematics.body import Body, Point
+from assembly.kinematics.body import Body
 from assembly.kinematics.body_face import BodyFace
+from assembly.kinematics.frame import Point
 from assembly.proximity.brep.topology import Vertex
 from assembly.selection.edges import BodyEdge, owners_of, topology_of_body
 from assembly.selection.selection import Selection, checked_place

@@ -13,7 +13,8 @@ from assembly.constraints.model.constraint import Freedom
 from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance
 from assembly.constraints.packing.scene import Packed
 from assembly.errors import FARTHEST, InputError
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, rotation_matrix
 from assembly.tracking.trace import Trace
 

@@ -11,7 +11,8 @@ from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import Freedom
 from assembly.constraints.model.coordinate_distance import checked_coordinate
 from assembly.errors import InputError, positive
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame, Point
 from assembly.tracking.coordinate_hand import CoordinateHand
 from assembly.tracking.hands import Followable, Hand, Hands, SeveralHands
 

@@ -14,8 +14,9 @@ from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import Freedom, structure_changes
 from assembly.constraints.program.records import CLOCK_AT
 from assembly.errors import InputError, integer, number, positive
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body
 from assembly.kinematics.changes import changes
+from assembly.kinematics.frame import Frame, Point
 from assembly.kinematics.pose import Pose, pose_rows
 from assembly.solve.loop.parameters import ROUNDING
 from assembly.solve.loop.settings import (

@@ -10,7 +10,7 @@ import numpy as np
 import assembly as asm
 from assembly.constraints.model.constraint import Freedom
 from assembly.constraints.model.joint import Joint
-from assembly.kinematics.body import Frame
+from assembly.kinematics.frame import Frame
 from tests.solve.mechanisms import chain, planar_four_bar
 
 

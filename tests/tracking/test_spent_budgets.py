@@ -11,7 +11,7 @@ import assembly as asm
 from assembly._kernel import kernel
 from assembly._record import place_of
 from assembly.constraints.program.records import MANAGER_RECORD, RESULTS
-from assembly.kinematics.body import Point
+from assembly.kinematics.frame import Point
 from assembly.proximity.manager.events import EventKind
 from assembly.proximity.manager.records import (
     DEADLINE,

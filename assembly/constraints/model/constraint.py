@@ -16,8 +16,9 @@ import numpy as np
 
 from assembly.constraints.program.primitives import ANGLE, COINCIDENT, DISTANCE, RADIUS, SLIDE
 from assembly.errors import FARTHEST, InputError, KnownSettings, number, text
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
 from assembly.kinematics.changes import count_edit
+from assembly.kinematics.frame import Frame
 
 if TYPE_CHECKING:
     from assembly.constraints.model.joint import Joint

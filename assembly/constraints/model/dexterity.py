@@ -13,7 +13,8 @@ from assembly.constraints.model.constraint import Constraint, Freedom
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.objectives import Objective
 from assembly.errors import InputError, items, positive, real_array
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame, Point
 
 __all__ = ["MEASURES", "TASKS", "Axes", "Dexterity", "Measure", "Task", "TipTask"]
 

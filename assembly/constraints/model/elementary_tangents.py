@@ -27,7 +27,8 @@ from assembly.constraints.model.joints import ALONG, Z_DOT_Z
 from assembly.constraints.program.primitives import DISTANCE, RADIUS
 from assembly.errors import InputError
 from assembly.geometry.recognition.forms import Cone
-from assembly.kinematics.body import BodyFace, Frame
+from assembly.kinematics.body import BodyFace
+from assembly.kinematics.frame import Frame
 from assembly.selection.selection import EQUAL
 
 __all__ = ["ELEMENTARY", "TangentRow", "TangentRows", "check_fit", "touching_rows"]

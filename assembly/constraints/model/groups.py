@@ -22,7 +22,8 @@ from assembly.constraints.model.mate_features import (
 )
 from assembly.constraints.program.primitives import SLIDE
 from assembly.errors import InputError, items
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame
 from assembly.kinematics.pose import Pose, rotation_matrix
 
 __all__ = ["Group", "Symmetric"]

@@ -30,7 +30,8 @@ from assembly.constraints.model.constraint import (
 from assembly.constraints.model.mate_features import CenterLike, one_feature, point_frame
 from assembly.constraints.program.primitives import COINCIDENT, SLIDE, SWING
 from assembly.errors import InputError, bounded
-from assembly.kinematics.body import Body, BodyFace, Frame, OpposedFrame, Point
+from assembly.kinematics.body import Body, BodyFace
+from assembly.kinematics.frame import Frame, OpposedFrame, Point
 from assembly.kinematics.pose import rotation_matrix
 from assembly.selection.edges import BodyEdge
 from assembly.selection.vertices import BodyVertex

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from assembly.constraints.model.constraint import RowConstraint
 from assembly.errors import InputError
 from assembly.geometry.recognition.forms import Cone
-from assembly.kinematics.body import BodyFace, Frame, Point
+from assembly.kinematics.body import BodyFace
+from assembly.kinematics.frame import Frame, Point
 from assembly.selection.edges import BodyEdge, Edges
 from assembly.selection.faces import Faces
 from assembly.selection.selection import Selection

@@ -29,7 +29,8 @@ from assembly.constraints.model.mate_features import (
     plane_frame,
 )
 from assembly.errors import InputError
-from assembly.kinematics.body import BodyFace, Frame
+from assembly.kinematics.body import BodyFace
+from assembly.kinematics.frame import Frame
 from assembly.selection.edges import BodyEdge, Edges
 from assembly.selection.faces import Faces
 from assembly.selection.selection import Selection, are_parallel

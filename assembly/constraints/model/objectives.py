@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._read_only import read_only
 from assembly.errors import InputError, KnownSettings, check_coordinates, extent, items, positive, vector
 from assembly.geometry.faces.face import Face
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame, Point
 from assembly.kinematics.pose import Pose, axes_quaternion, multiply, pose_rows
 from assembly.kinematics.pose import direction as unit_direction
 

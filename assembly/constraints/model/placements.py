@@ -11,7 +11,8 @@ from assembly.constraints.model.joints import ALONG, Number, Range
 from assembly.constraints.model.mate_features import AxisLike, PlaneLike, axis_frame, one_feature, plane_frame
 from assembly.constraints.program.primitives import ANGLE, DISTANCE, RADIUS, SLIDE
 from assembly.errors import InputError, number
-from assembly.kinematics.body import BodyFace, Frame
+from assembly.kinematics.body import BodyFace
+from assembly.kinematics.frame import Frame
 from assembly.selection.edges import BodyEdge
 
 __all__ = ["Angle", "Distance", "PointOnLine", "PointOnPlane"]

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from assembly.constraints.model.constraint import Constraint
 from assembly.constraints.packing.scene_size import LEAST, MOST, Objectives, equations_of, marks_of
 from assembly.errors import FARTHEST
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame
 
 __all__ = ["MeasuredSize", "base_of"]
 

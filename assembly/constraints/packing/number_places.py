@@ -20,8 +20,9 @@ from assembly.constraints.model.objectives import FrameDistance, Objective
 from assembly.constraints.packing.measured_size import MeasuredSize, base_of
 from assembly.constraints.packing.rescaled import FRAME, RescaledNumbers
 from assembly.constraints.program import records as layout
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
 from assembly.kinematics.changes import numbers_set
+from assembly.kinematics.frame import Frame
 from assembly.proximity.manager import records as manager_records
 
 if TYPE_CHECKING:

@@ -18,7 +18,8 @@ from assembly.constraints.packing.scene_size import check_reach
 from assembly.constraints.packing.terms import natural_unit
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.objective_terms import POSTURE_PARAMETERS
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame
 
 if TYPE_CHECKING:
     from assembly.constraints.packing.scene import Packed

@@ -11,7 +11,8 @@ from assembly.constraints.model.constraint import Constraint, Equation
 from assembly.constraints.model.dexterity import Dexterity
 from assembly.constraints.model.objectives import FrameDistance, Objective, PointDistance, Posture, Weight
 from assembly.errors import FARTHEST, InputError
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame
 from assembly.kinematics.pose import length
 
 __all__ = ["LEAST", "MOST", "Objectives", "check_reach", "equations_of", "marks_of", "scene_size", "size_and_extent"]

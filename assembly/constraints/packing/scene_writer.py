@@ -17,7 +17,8 @@ from assembly.geometry.expression import tape
 from assembly.geometry.faces.equal_shapes import first_equal
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import OFFSETS, SURFACE_RECORD
-from assembly.kinematics.body import Body, Frame
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame
 from assembly.proximity.brep.packing import pack_shell
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.brep.writer import Writer

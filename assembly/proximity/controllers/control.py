@@ -18,7 +18,8 @@ from assembly.errors import InputError, integer, number, positive, real_array, v
 from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import BREAKS_U, BREAKS_V, CELLS, COEFFICIENTS, SURFACE_RECORD
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.kinematics.body import BodyFace, Point
+from assembly.kinematics.body import BodyFace
+from assembly.kinematics.frame import Point
 from assembly.kinematics.pose import IDENTITY_ROW, check_quaternion
 from assembly.proximity.controllers.laws import (
     DISTANCE,

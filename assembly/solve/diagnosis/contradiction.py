@@ -14,7 +14,7 @@ import numpy as np
 from assembly.constraints.model.constraint import Coordinate
 from assembly.constraints.packing.scene import Packed
 from assembly.constraints.program.primitives import AZIMUTH, TURN
-from assembly.kinematics.body import Frame
+from assembly.kinematics.frame import Frame
 from assembly.solve.dense.rank import HELD
 
 __all__ = ["is_certain"]

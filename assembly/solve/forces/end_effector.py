@@ -22,8 +22,9 @@ from assembly.constraints.program import objective_terms as terms
 from assembly.constraints.program import records as layout
 from assembly.constraints.program.primitives import FRAMES
 from assembly.errors import InputError, positive
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body
 from assembly.kinematics.ellipsoid import Ellipsoid
+from assembly.kinematics.frame import Frame, Point
 from assembly.kinematics.pose import pose_rows, rotation_matrix
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.dense.jacobian import rows_of

@@ -29,7 +29,8 @@ from assembly.constraints.model.joint import Joint
 from assembly.constraints.model.joints import Cylindrical, Prismatic, Revolute, Screw
 from assembly.constraints.program.primitives import TURN
 from assembly.errors import InputError, vector
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame, Point
 from assembly.kinematics.pose import angular_velocity_map, pose_rows, quaternion_rate_map, rotation_matrix
 from assembly.solve.dense.jacobian import rows_of
 from assembly.solve.dense.row_table import gradient_at

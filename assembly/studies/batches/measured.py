@@ -15,7 +15,8 @@ from assembly.constraints.program.primitives import RECORD as JOINT_FRAMES
 from assembly.derivatives.measure import Measure, place_of
 from assembly.derivatives.numbers import FrameOrigin
 from assembly.derivatives.parameter import Parameter
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame, Point
 from assembly.proximity.features.solid_contact import TRACK
 from assembly.solve.loop.settings import OBJECTIVE
 from assembly.studies.batches.rows import Writes

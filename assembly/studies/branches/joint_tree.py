@@ -31,7 +31,7 @@ from assembly.studies.branches.joint_newton import (
 
 if TYPE_CHECKING:
     from assembly.assembly import Assembly
-    from assembly.kinematics.body import Frame
+    from assembly.kinematics.frame import Frame
 
 __all__ = ["JointTree"]
 

@@ -18,7 +18,8 @@ from assembly.constraints.model.objectives import PointDistance
 from assembly.constraints.model.placements import PointOnPlane
 from assembly.constraints.packing.scene import Packed
 from assembly.derivatives.parameter import Parameter
-from assembly.kinematics.body import Body, Point
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Point
 from assembly.kinematics.pose import axes_quaternion
 from assembly.solve.interruption import CTRL_C
 from assembly.solve.loop.settings import OBJECTIVE, SCATTER, SOLVED, UNSURE

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assembly.errors import InputError
-from assembly.kinematics.body import Frame
+from assembly.kinematics.frame import Frame
 
 __all__ = ["Cell", "Grid", "grid_of"]
 

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from assembly._progress import Progress, checked_progress, watched
 from assembly.assembly import Assembly
 from assembly.errors import InputError, integer, items, positive, vector
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame, Point
 from assembly.kinematics.pose import pose_rows
 from assembly.solve.solution import Solution
 from assembly.studies.reachable.content import content

@@ -15,7 +15,8 @@ from assembly.assembly import Assembly
 from assembly.constraints.model.constraint import Freedom
 from assembly.constraints.model.joint import Joint
 from assembly.constraints.program.primitives import SLIDE, TURN
-from assembly.kinematics.body import Body, Frame, Point
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Frame, Point
 from assembly.kinematics.pose import Pose
 from assembly.view.dragging.pointer import Pointer
 from assembly.view.motion import rotations

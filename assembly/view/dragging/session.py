@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from assembly.assembly import Assembly
 from assembly.errors import AssemblyError, InputError, number, positive
-from assembly.kinematics.body import Body, Point
+from assembly.kinematics.body import Body
+from assembly.kinematics.frame import Point
 from assembly.kinematics.pose import Pose
 from assembly.solve.solution import Solution
 from assembly.tracking.tick import Step, TrackStatus
