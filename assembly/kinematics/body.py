@@ -16,7 +16,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body_face import BodyFace
 from assembly.kinematics.changes import count_edit, count_number
-from assembly.kinematics.frame import Frame, Point, frozen, checked_place
+from assembly.kinematics.frame import Frame, Point, checked_place, frozen
 from assembly.kinematics.parametric import Parametric
 from assembly.kinematics.picture_mesh import PictureMesh
 from assembly.kinematics.pose import Pose, direction, length
