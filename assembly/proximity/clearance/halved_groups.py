@@ -6,7 +6,7 @@ the median of their centers along the principal axis of these.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import copysign, hypot, sqrt
 
 import numpy as np
 
@@ -43,8 +43,8 @@ def _write_longest(scatter, turn, way):
             for q in range(p + 1, 3):
                 if scatter[p, q] == 0.0:
                     continue
-                ratio = 0.5 * (scatter[q, q] - scatter[p, p]) / scatter[p, q]
-                t = (1.0 if ratio >= 0.0 else -1.0) / (abs(ratio) + sqrt(1.0 + ratio * ratio))
+                apart, twice = scatter[q, q] - scatter[p, p], 2.0 * scatter[p, q]
+                t = twice / (apart + copysign(hypot(apart, twice), apart))
                 c = 1.0 / sqrt(1.0 + t * t)
                 s = t * c
                 for k in range(3):
