@@ -21,8 +21,9 @@ from assembly.errors import InputError, integer, number, real_array
 from assembly.geometry.splines import bezier
 from assembly.geometry.splines.cells import surface_cells
 from assembly.geometry.splines.creases import crease_lines
-from assembly.geometry.splines.curve import COINCIDENT, checked_name, checked_weights, flat, parameters, similarity
+from assembly.geometry.splines.curve import checked_name, checked_weights, flat, parameters, similarity
 from assembly.geometry.splines.evaluate import CELL_COUNT, CELLS, SURFACE_RECORD, evaluate_surface
+from assembly.geometry.splines.surface_ends import closed_directions, pole_bits, surely_apart
 
 __all__ = ["NurbsSurface"]
 
@@ -124,35 +125,12 @@ class NurbsSurface(FoundAgain, ReadOnlyArrays):
     @cached_property
     def closed(self) -> tuple[bool, bool]:
         """Whether u and v come back to the edge they start from."""
-        apart_u, apart_v = self._apart
-        if apart_v and not apart_u and self._is_same_row:
-            return True, False
-        u = not apart_u and self._same_edge(self._pieces[0, :, 0], self._pieces[-1, :, -1])
-        v = not apart_v and self._same_edge(self._pieces[:, 0, :, 0], self._pieces[:, -1, :, -1])
-        return u, v
+        return closed_directions(self)
 
     @cached_property
     def _apart(self) -> tuple[bool, bool]:
-        """Whether ends in u, and in v, are surely at two points, so that neither edge is the other, nor one point.
-
-        Corners that are nearer to each other are left to a look along the whole edges.
-        """
-        if not self._is_clamped:
-            return False, False
-        net, least = self.control_points, 10.0 * COINCIDENT * self.size
-        corners = net[[0, -1, 0, -1], [0, 0, -1, -1]]
-        a, b, c, d = corners.tolist()
-
-        def apart(p: list[float], q: list[float]) -> bool:
-            return max(abs(p[0] - q[0]), abs(p[1] - q[1]), abs(p[2] - q[2])) > least
-
-        return apart(a, b) and apart(c, d), apart(a, c) and apart(b, d)
-
-    @property
-    def _is_same_row(self) -> bool:
-        """Whether the edges at both ends of u have the same control points and weights."""
-        net, weights = self.control_points, self.weights
-        return bool((net[0] == net[-1]).all() and (weights[0] == weights[-1]).all())
+        """Whether ends in u, and in v, are surely at two points."""
+        return surely_apart(self)
 
     @cached_property
     def _periods(self) -> tuple[float, float]:
@@ -160,41 +138,10 @@ class NurbsSurface(FoundAgain, ReadOnlyArrays):
         (a, b), (c, d) = self.domain
         return (b - a if self.closed[0] else 0.0, d - c if self.closed[1] else 0.0)
 
-    def _same_edge(self, first: Array, last: Array) -> bool:
-        """Whether two edges (spans, degree + 1, 4), homogeneous, are one curve and not one point."""
-        tolerance = COINCIDENT * self.size
-        start, other = first[0, 0, :3] / first[0, 0, 3], last[0, 0, :3] / last[0, 0, 3]
-        if float(np.linalg.norm(start - other)) > 2.0 * tolerance:
-            return False
-        # Two rational pieces of degree q that agree at 2 q + 1 points are equal.
-        degree = first.shape[1] - 1
-        basis = bezier.bernstein(degree, np.linspace(0.0, 1.0, 2 * degree + 1))
-        a, b = basis @ first, basis @ last
-        a, b = a[..., :3] / a[..., 3:], b[..., :3] / b[..., 3:]
-        is_point = float(np.ptp(a, axis=(0, 1)).max()) <= tolerance
-        return not is_point and float(np.linalg.norm(a - b, axis=-1).max()) <= tolerance
-
     @cached_property
     def _pole_bits(self) -> int:
         """Bits 1, 2, 4, 8: whether the edge at the low and high end of u, then of v, is one point."""
-        if all(self._apart):
-            return 0
-        if self._is_clamped:
-            # Control points of an edge that is one point are that point; others are clearly apart, or looked at below.
-            ends, least = self.control_points[[0, -1]], 1e3 * COINCIDENT * self.size
-            sides = (ends.max(axis=1) - ends.min(axis=1)).max(axis=1).tolist()
-            ends = self.control_points[:, [0, -1]]
-            sides += (ends.max(axis=0) - ends.min(axis=0)).max(axis=1).tolist()
-            if all(side == 0.0 or side > least for side in sides):
-                return sum(bit for bit, side in zip((1, 2, 4, 8), sides, strict=True) if side == 0.0)
-        pieces = self._pieces
-        edges = (pieces[0, :, 0], pieces[-1, :, -1], pieces[:, 0, :, 0], pieces[:, -1, :, -1])
-        points = (edge[..., :3] / edge[..., 3:] for edge in edges)
-        return sum(
-            bit
-            for bit, edge in zip((1, 2, 4, 8), points, strict=True)
-            if float(np.ptp(edge, axis=(0, 1)).max()) <= COINCIDENT * self.size
-        )
+        return pole_bits(self)
 
     @cached_property
     def is_parallelogram(self) -> bool:
