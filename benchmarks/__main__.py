@@ -38,6 +38,7 @@ BENCHMARKS = (
     "proximity_paper",
     "features",
     "facets",
+    "manifolds",
     "wires",
     "contact_errors",
     "tracking",

@@ -23,6 +23,8 @@ from assembly.proximity.extrema.feature_pair import two_face_frame
 from assembly.proximity.extrema.feature_query import feature_derivatives
 from assembly.proximity.extrema.pair_matrix import pair_matrix
 from assembly.proximity.extrema.rates import RATES, ZED, feature_record, into_quaternions
+from assembly.proximity.manifolds.flat_pair import flat_rows
+from assembly.proximity.manifolds.round_pair import round_rows
 
 
 @kernel
@@ -134,4 +136,25 @@ def facing_bodies(table, pool, trees, q, reach, stack, out):
             if count < 0 or count > out.shape[0] - total:
                 return -1
             total += count
+    return total
+
+
+@kernel
+def flat_manifolds_along(faces, turns, shifts, tolerance, rows):
+    """Rows of two plane faces, (frame, segments) each, at many poses of the second: turns (n, 9), shifts (n, 3)."""
+    (frame, segments), (other, others) = faces
+    total = 0.0
+    for i in range(len(turns)):
+        count, bound = flat_rows(frame, segments, other, others, turns[i], shifts[i], tolerance, rows)
+        total += count + bound
+    return total
+
+
+@kernel
+def round_manifolds_along(hollow, full, turns, shifts, rows):
+    """Rows of a shaft in its bore at many poses of the shaft: turns (n, 9), shifts (n, 3)."""
+    total = 0.0
+    for i in range(len(turns)):
+        count, bound = round_rows(hollow, full, turns[i], shifts[i], rows)
+        total += count + bound
     return total

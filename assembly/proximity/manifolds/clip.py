@@ -2,17 +2,48 @@
 
 from __future__ import annotations
 
-from math import hypot, sqrt
+from math import sqrt
 
 from assembly._kernel import kernel
 from assembly.proximity.manifolds.records import segment_at
 
 
 @kernel(inline=True)
+def length_of(x, y):
+    """The length of a vector; coordinates whose squares are numbers are expected, which `hypot` takes long to spare."""
+    return sqrt(x * x + y * y)
+
+
+@kernel(inline=True)
+def write_box(s):
+    """Write the box around a segment. A point of an arc is no farther from its chord than its middle is."""
+    dx, dy = s.end[0] - s.begin[0], s.end[1] - s.begin[1]
+    out = 0.0
+    if s.radius > 0.0:
+        # Rounding is 1e-16 of the radius, as the chord of a quarter is far from a diameter.
+        out = s.radius * (1.0 + 1e-14) - sqrt(max(s.radius * s.radius - 0.25 * (dx * dx + dy * dy), 0.0))
+    for d in range(2):
+        s.low[d] = min(s.begin[d], s.end[d]) - out
+        s.high[d] = max(s.begin[d], s.end[d]) + out
+
+
+@kernel(signatures="(f8[:, ::1],)")
+def write_boxes(segments):
+    """Write the boxes of segments (n, SEGMENT_SIZE) of which all else is known."""
+    for k in range(len(segments)):
+        write_box(segment_at(segments, k))
+
+
+@kernel(inline=True)
+def side_of(s, x, y):
+    """Positive for a point on the left of a segment's chord: its distance times the length of the chord."""
+    return (s.end[0] - s.begin[0]) * (y - s.begin[1]) - (s.end[1] - s.begin[1]) * (x - s.begin[0])
+
+
+@kernel(inline=True)
 def beside_chord(s, x, y):
     """How far a point is on the left of a segment's chord."""
-    dx, dy = s.end[0] - s.begin[0], s.end[1] - s.begin[1]
-    return (dx * (y - s.begin[1]) - dy * (x - s.begin[0])) / hypot(dx, dy)
+    return side_of(s, x, y) / length_of(s.end[0] - s.begin[0], s.end[1] - s.begin[1])
 
 
 @kernel(inner=True)
@@ -26,10 +57,10 @@ def is_on_arc(s, x, y, tolerance):
 def is_on_segment(s, x, y, tolerance):
     """Whether a point is no farther than a tolerance from a segment."""
     if s.radius > 0.0:
-        far = hypot(x - s.center[0], y - s.center[1])
+        far = length_of(x - s.center[0], y - s.center[1])
         return abs(far - s.radius) <= tolerance and is_on_arc(s, x, y, tolerance)
     dx, dy = s.end[0] - s.begin[0], s.end[1] - s.begin[1]
-    length = hypot(dx, dy)
+    length = length_of(dx, dy)
     along = (dx * (x - s.begin[0]) + dy * (y - s.begin[1])) / length
     return abs(beside_chord(s, x, y)) <= tolerance and -tolerance <= along <= length + tolerance
 
@@ -38,18 +69,25 @@ def is_on_segment(s, x, y, tolerance):
 def is_within(segments, x, y, tolerance):
     """Whether a point is in a region, or no farther than a tolerance from its borders.
 
-    By how often a ray crosses the chords; between an arc and its chord the answer is reversed.
+    By how often a ray along x crosses the chords; between an arc and its chord the answer is reversed. Boxes tell of
+    most segments that the point is not on them, and on which side of their chords it is.
     """
     inside = False
     for k in range(len(segments)):
         s = segment_at(segments, k)
+        if y < s.low[1] - tolerance or y > s.high[1] + tolerance or x > s.high[0] + tolerance:
+            continue
+        is_between = (s.begin[1] > y) != (s.end[1] > y)
+        if x < s.low[0] - tolerance:
+            inside = inside != is_between
+            continue
         if is_on_segment(s, x, y, tolerance):
             return True
-        beside = beside_chord(s, x, y)
-        if (s.begin[1] > y) != (s.end[1] > y) and (beside >= 0.0) == (s.end[1] > s.begin[1]):
+        left = side_of(s, x, y)
+        if is_between and (left >= 0.0) == (s.end[1] > s.begin[1]):
             inside = not inside
-        if s.radius > 0.0 and hypot(x - s.center[0], y - s.center[1]) < s.radius:
-            if (beside < 0.0) if s.sweep > 0.0 else (beside >= 0.0):
+        if s.radius > 0.0 and length_of(x - s.center[0], y - s.center[1]) < s.radius:
+            if (left < 0.0) if s.sweep > 0.0 else (left >= 0.0):
                 inside = not inside
     return inside
 
@@ -70,7 +108,7 @@ def cross_lines(s, t, tolerance, points):
     ax, ay = s.end[0] - s.begin[0], s.end[1] - s.begin[1]
     bx, by = t.end[0] - t.begin[0], t.end[1] - t.begin[1]
     det = ax * by - ay * bx
-    if abs(det) <= 1e-12 * hypot(ax, ay) * hypot(bx, by):
+    if abs(det) <= 1e-12 * length_of(ax, ay) * length_of(bx, by):
         return 0
     part = ((t.begin[0] - s.begin[0]) * by - (t.begin[1] - s.begin[1]) * bx) / det
     x, y = s.begin[0] + part * ax, s.begin[1] + part * ay
@@ -81,7 +119,7 @@ def cross_lines(s, t, tolerance, points):
 def cross_line_arc(line, arc, tolerance, points):
     """Where a straight segment crosses an arc, or comes as near to it as a tolerance."""
     dx, dy = line.end[0] - line.begin[0], line.end[1] - line.begin[1]
-    length = hypot(dx, dy)
+    length = length_of(dx, dy)
     dx /= length
     dy /= length
     ex, ey = arc.center[0] - line.begin[0], arc.center[1] - line.begin[1]
@@ -102,7 +140,7 @@ def cross_line_arc(line, arc, tolerance, points):
 def cross_arcs(s, t, tolerance, points):
     """Where two arcs cross, or come as near to each other as a tolerance, not those of one circle."""
     dx, dy = t.center[0] - s.center[0], t.center[1] - s.center[1]
-    apart = hypot(dx, dy)
+    apart = length_of(dx, dy)
     if apart <= tolerance or apart > s.radius + t.radius + tolerance:
         return 0
     if apart < abs(s.radius - t.radius) - tolerance:
@@ -134,15 +172,8 @@ def cross_segments(s, t, tolerance, points):
 @kernel(inline=True)
 def are_beside(s, t, tolerance):
     """Whether the bounding boxes of two segments are apart."""
-    r, q = s.radius, t.radius
     for d in range(2):
-        low_s, high_s = min(s.begin[d], s.end[d]), max(s.begin[d], s.end[d])
-        low_t, high_t = min(t.begin[d], t.end[d]), max(t.begin[d], t.end[d])
-        if r > 0.0:
-            low_s, high_s = min(low_s, s.center[d] - r), max(high_s, s.center[d] + r)
-        if q > 0.0:
-            low_t, high_t = min(low_t, t.center[d] - q), max(high_t, t.center[d] + q)
-        if low_s > high_t + tolerance or low_t > high_s + tolerance:
+        if s.low[d] > t.high[d] + tolerance or t.low[d] > s.high[d] + tolerance:
             return True
     return False
 
@@ -183,4 +214,4 @@ def is_left_turn(points, a, b, c, tolerance):
     """Whether a, b, c turn left: b is on the right of the line from a to c by more than a tolerance."""
     dx, dy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
     ex, ey = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
-    return dx * ey - dy * ex < -tolerance * hypot(dx, dy)
+    return dx * ey - dy * ex < -tolerance * length_of(dx, dy)

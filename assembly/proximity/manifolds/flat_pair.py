@@ -10,13 +10,21 @@ lowest point of an arc: over a circle of radius R about c that is h(c) - R |grad
 
 from __future__ import annotations
 
-from math import hypot, sqrt
+from math import sqrt
 
 import numpy as np
 
 from assembly._kernel import kernel
 from assembly.geometry.vec import add, cross, dot, matvec, scale, sub
-from assembly.proximity.manifolds.clip import are_beside, convex_corners, cross_segments, is_on_arc, is_within
+from assembly.proximity.manifolds.clip import (
+    are_beside,
+    convex_corners,
+    cross_segments,
+    is_on_arc,
+    is_within,
+    length_of,
+    write_box,
+)
 from assembly.proximity.manifolds.records import (
     CORNER_A,
     CROSSING,
@@ -66,6 +74,7 @@ def write_seen(frame, other, segments, seen):
         t.center[0], t.center[1] = flat(a, above(b, s.center[0], s.center[1]))
         t.radius = s.radius
         t.sweep = -s.sweep if mirrored else s.sweep
+        write_box(t)
 
 
 @kernel(inline=True)
@@ -135,7 +144,7 @@ def put_corners(regions, frame, lift, tolerance, found, points):
                 x, y = s.begin[0], s.begin[1]
                 if half == 1:
                     x, y = 0.5 * (s.begin[0] + s.end[0]) - s.center[0], 0.5 * (s.begin[1] + s.end[1]) - s.center[1]
-                    out = s.radius / hypot(x, y)
+                    out = s.radius / length_of(x, y)
                     x, y = s.center[0] + out * x, s.center[1] + out * y
                 if is_within(other, x, y, tolerance):
                     if count == len(found):
@@ -174,7 +183,7 @@ def put_lowest(regions, frame, lift, tolerance, found, points, count):
     a = frame_at(frame, 0)
     n = triple(a.normal)
     u, v = -dot(lift[0], triple(a.right)), -dot(lift[0], triple(a.up))
-    steep = hypot(u, v)
+    steep = length_of(u, v)
     if steep == 0.0:
         return count
     for turn in range(2):

@@ -12,6 +12,8 @@ SEGMENT = record_dtype(
     center=2,  # of an arc
     radius=1,  # 0: a straight piece
     sweep=1,  # by how much an arc turns, at most a quarter; counterclockwise where positive [rad]
+    low=2,  # corners of a box around it
+    high=2,
 )
 segment_at = record_view(SEGMENT)
 SEGMENT_SIZE = size_of(SEGMENT)

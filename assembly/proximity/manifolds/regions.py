@@ -20,13 +20,16 @@ from assembly.geometry.recognition.forms import Plane
 from assembly.geometry.splines import bezier
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.surface import NurbsSurface
+from assembly.proximity.manifolds.clip import write_boxes
 from assembly.proximity.manifolds.elementary_faces import NEARLY, nearly_elementary
 from assembly.proximity.manifolds.flat_map import flat_map
-from assembly.proximity.manifolds.records import FRAME, FRAME_SIZE, SEGMENT_SIZE
+from assembly.proximity.manifolds.records import FRAME, FRAME_SIZE, SEGMENT, SEGMENT_SIZE
 
 __all__ = ["PlaneRegion", "plane_of", "plane_region"]
 
 Array = NDArray[np.float64]
+# Of a segment: begin, end and center (2,), radius, sweep.
+_Piece = tuple[list[float], list[float], list[float], float, float]
 # Arcs are cut into pieces that turn by no more, so that each is on one side of its chord.
 QUARTER = 0.5 * pi
 THIRDS = np.linspace(0.0, 1.0, 4)
@@ -73,7 +76,8 @@ def plane_region(face: Face) -> PlaneRegion | None:
     right = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
     right /= np.linalg.norm(right)
     axes = np.array([right, np.cross(normal, right)])
-    size, parts = face.surface.size, []
+    size = face.surface.size
+    parts: list[_Piece] = []
     off = form.deviation
     for curve in face.boundary:
         found = _forms(face.surface, curve)
@@ -82,7 +86,10 @@ def plane_region(face: Face) -> PlaneRegion | None:
         for shape, ends in found:
             off = max(off, shape.deviation)
             parts += _pieces(shape, (ends - form.point) @ axes.T, form.point, axes)
-    segments = np.array(parts, dtype=float).reshape(-1, SEGMENT_SIZE)
+    segments = np.zeros((len(parts), SEGMENT_SIZE))
+    rows = rows_of(SEGMENT, segments)
+    rows.begin, rows.end, rows.center, rows.radius, rows.sweep = zip(*parts, strict=True)
+    write_boxes(segments)
     frame = np.zeros(FRAME_SIZE)
     record = rows_of(FRAME, frame[None])
     record.origin, record.right, record.up, record.normal = form.point, *axes, normal
@@ -129,11 +136,11 @@ def _isoline(surface: NurbsSurface, d: int, value: float) -> Array:
     return np.asarray(np.einsum("k,pkjc->pjc", weights, strip))
 
 
-def _pieces(found: Line | Circle, ends: Array, point: Array, axes: Array) -> list[list[float]]:
-    """Segments of a curve with these places (4, 2) in the plane."""
+def _pieces(found: Line | Circle, ends: Array, point: Array, axes: Array) -> list[_Piece]:
+    """The segments of a curve with these places (4, 2) in the plane, but for their boxes."""
     begin, end = ends[0].tolist(), ends[-1].tolist()
     if isinstance(found, Line):
-        return [[*begin, *end, 0.0, 0.0, 0.0, 0.0]]
+        return [(begin, end, [0.0, 0.0], 0.0, 0.0)]
     center = axes @ (found.center - point)
     angles = [atan2(y, x) for x, y in (ends - center).tolist()]
     # By thirds, each of less than half a turn.
@@ -143,4 +150,5 @@ def _pieces(found: Line | Circle, ends: Array, point: Array, axes: Array) -> lis
     turns = angles[0] + sweep * np.arange(count + 1) / count
     places = center + found.radius * np.column_stack([np.cos(turns), np.sin(turns)])
     places[0], places[-1] = begin, end
-    return [[*places[k], *places[k + 1], *center, found.radius, sweep / count] for k in range(count)]
+    turn, corners, middle = sweep / count, places.tolist(), center.tolist()
+    return [(corners[k], corners[k + 1], middle, found.radius, turn) for k in range(count)]

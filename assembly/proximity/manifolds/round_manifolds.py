@@ -15,7 +15,7 @@ from assembly.proximity.manifolds.manifold import Manifold
 from assembly.proximity.manifolds.records import ROUND, ROUND_SIZE, ROW_SIZE
 from assembly.proximity.manifolds.round_pair import ROWS_OF_RING, round_rows
 
-__all__ = ["round_manifold", "round_manifolds"]
+__all__ = ["round_manifold", "round_manifolds", "round_record"]
 
 Array = NDArray[np.float64]
 Faces = tuple[ElementaryFace, ...]
@@ -24,7 +24,7 @@ SAME_ANGLE = 1e-6
 
 
 @lru_cache(maxsize=256)
-def _record(form: Cylinder | Cone) -> Array:
+def round_record(form: Cylinder | Cone) -> Array:
     """The ROUND record of a surface, kept."""
     record = np.zeros(ROUND_SIZE)
     one = rows_of(ROUND, record[None])[0]
@@ -45,7 +45,7 @@ def round_manifold(hollow: Cylinder | Cone, full: Cylinder | Cone, turn: Array, 
     """
     rows = np.zeros((2 * ROWS_OF_RING, ROW_SIZE))
     rotation, place = np.ascontiguousarray(turn, dtype=float).ravel(), np.array(shift, dtype=float)
-    count, bound = round_rows(_record(hollow), _record(full), rotation, place, rows)
+    count, bound = round_rows(round_record(hollow), round_record(full), rotation, place, rows)
     if count == 0:
         return None
     return Manifold.of_rows(rows[:count], float(bound) - hollow.deviation - full.deviation)

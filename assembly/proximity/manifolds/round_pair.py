@@ -25,8 +25,11 @@ from assembly.proximity.manifolds.records import NEAREST_RIM, NEAREST_RING, RIM,
 # Rows of a ring: in so many directions fixed on the wall, and in the direction in which the ring is nearest.
 HELD = 4
 ROWS_OF_RING = HELD + 1
-# Directions from which the nearest one is sought, and steps of Newton's method.
+# Directions about an axis, (cosine, sine), from which the nearest one is sought: every other one is held. Steps of
+# Newton's method from there.
 TRIED, STEPS = 8, 8
+HALF = sqrt(0.5)
+WAYS = np.array([[1, 0], [HALF, HALF], [0, 1], [-HALF, HALF], [-1, 0], [-HALF, -HALF], [0, -1], [HALF, -HALF]])
 
 
 @kernel(inline=True)
@@ -56,34 +59,48 @@ def radius_at(one, height):
 
 
 @kernel(inline=True)
-def direction(sides, turn):
-    """The unit vector at an angle about an axis, of two directions across it."""
-    return add(scale(cos(turn), sides[0]), scale(sin(turn), sides[1]))
+def direction(sides, way):
+    """The unit vector about an axis whose angle has a cosine and a sine, of two directions across it."""
+    return add(scale(way[0], sides[0]), scale(way[1], sides[1]))
+
+
+@kernel(inline=True)
+def ahead(way):
+    """The cosine and sine of an angle that is a quarter of a turn greater."""
+    return -way[1], way[0]
+
+
+@kernel(inline=True)
+def lean_of(one):
+    """The cosine and sine of a cone's half angle."""
+    return (cos(one.half_angle), sin(one.half_angle)) if one.half_angle > 0.0 else (1.0, 0.0)
 
 
 @kernel(inner=True)
-def plane_reach(hollow, sides, ring, turn):
+def plane_reach(wall, sides, ring, way):
     """How far a ring (center from o, axis, radius) goes beyond the plane through o with the normal N(u), u at an angle.
 
-    And its first and second derivatives by the angle.
+    And its first and second derivatives by the angle. wall: the axis of what is hollow, and `lean_of` it.
     """
     c, b, rho = ring
-    ca, sa = cos(hollow.half_angle), sin(hollow.half_angle)
-    u, du = direction(sides, turn), direction(sides, turn + 0.5 * pi)
-    s, ds, dds = ca * dot(b, u) - sa * dot(b, triple(hollow.axis)), ca * dot(b, du), -ca * dot(b, u)
+    a, (ca, sa) = wall
+    u, du = direction(sides, way), direction(sides, ahead(way))
+    s, ds, dds = ca * dot(b, u) - sa * dot(b, a), ca * dot(b, du), -ca * dot(b, u)
     q = sqrt(max(1.0 - s * s, 1e-300))
-    value = ca * dot(c, u) - sa * dot(c, triple(hollow.axis)) + rho * q
+    value = ca * dot(c, u) - sa * dot(c, a) + rho * q
     first = ca * dot(c, du) - rho * s * ds / q
     second = -ca * dot(c, u) - rho * ((ds * ds + s * dds) / q + s * s * ds * ds / (q * q * q))
     return value, first, second
 
 
 @kernel(inner=True)
-def rim_reach(full, sides, ring, turn):
-    """How far a point of a rim (center from the full one's origin, ., radius) is beyond what is full; derivatives."""
-    c, b, rho = ring
-    ca, sa = cos(full.half_angle), sin(full.half_angle)
-    u, du = direction(sides, turn), direction(sides, turn + 0.5 * pi)
+def rim_reach(lean, sides, ring, way):
+    """How far a point of a rim (center from the full one's origin, ., radius) is beyond what is full; derivatives.
+
+    By the angle of its way. lean: `lean_of` what is full, whose axis is the ring's.
+    """
+    (c, b, rho), (ca, sa) = ring, lean
+    u, du = direction(sides, way), direction(sides, ahead(way))
     x = add(c, scale(rho, u))
     flat, d = sub(x, scale(dot(x, b), b)), scale(rho, sub(du, scale(dot(du, b), b)))
     r = sqrt(dot(flat, flat))
@@ -96,53 +113,56 @@ def rim_reach(full, sides, ring, turn):
 
 
 @kernel(inner=True)
-def nearest_turn(one, sides, ring, of_full):
-    """The angle at which a ring goes farthest out, or a rim is nearest."""
+def nearest_way(wall, sides, ring, of_full):
+    """The cosine and sine of the angle at which a ring goes farthest out, or a rim is nearest."""
     sign = 1.0 if of_full else -1.0
-    best, at = -np.inf, 0.0
-    for k in range(TRIED):
-        turn = 2.0 * pi * k / TRIED
-        value = (plane_reach(one, sides, ring, turn) if of_full else rim_reach(one, sides, ring, turn))[0]
+    best, k = -np.inf, 0
+    for i in range(TRIED):
+        tried = (WAYS[i, 0], WAYS[i, 1])
+        value = (plane_reach(wall, sides, ring, tried) if of_full else rim_reach(wall[1], sides, ring, tried))[0]
         if sign * value > best:
-            best, at = sign * value, turn
+            best, k = sign * value, i
+    way, at = (WAYS[k, 0], WAYS[k, 1]), 2.0 * pi * k / TRIED
     for _ in range(STEPS):
-        _, first, second = plane_reach(one, sides, ring, at) if of_full else rim_reach(one, sides, ring, at)
+        _, first, second = plane_reach(wall, sides, ring, way) if of_full else rim_reach(wall[1], sides, ring, way)
         if sign * second >= 0.0:
             break
         step = first / second
         if abs(step) > pi / TRIED:
             break
         at -= step
+        way = (cos(at), sin(at))
         if abs(step) < 1e-12:
             break
-    return at
+    return way
 
 
 @kernel(inner=True)
-def put_ring_row(hollow, sides, ring, turn, rows, count):
+def put_ring_row(hollow, sides, ring, way, rows, count):
     """Write the row of a ring of what is full and the tangent plane of the wall at an angle."""
     c, b, rho = ring
     row = row_at(rows, count)
-    value, _, _ = plane_reach(hollow, sides, ring, turn)
-    u, axis = direction(sides, turn), triple(hollow.axis)
-    n = sub(scale(cos(hollow.half_angle), u), scale(sin(hollow.half_angle), axis))
+    axis, lean = triple(hollow.axis), lean_of(hollow)
+    value, _, _ = plane_reach((axis, lean), sides, ring, way)
+    n = sub(scale(lean[0], direction(sides, way)), scale(lean[1], axis))
     # The ring's point that is farthest along n.
-    way = sub(n, scale(dot(n, b), b))
-    x = add(triple(hollow.origin), add(c, scale(rho / sqrt(dot(way, way)), way)))
+    out = sub(n, scale(dot(n, b), b))
+    x = add(triple(hollow.origin), add(c, scale(rho / sqrt(dot(out, out)), out)))
     row.gap = hollow.radius - value
     for i in range(3):
         row.normal[i], row.place[i] = -n[i], x[i]
 
 
 @kernel(inner=True)
-def put_rim_row(full, origin, sides, ring, turn, rows, count):
+def put_rim_row(full, origin, sides, ring, way, rows, count):
     """Write the row of a point of the wall's end and what is full, whose axis goes through an origin."""
     c, b, rho = ring
     row = row_at(rows, count)
-    value, _, _ = rim_reach(full, sides, ring, turn)
-    x = add(c, scale(rho, direction(sides, turn)))
+    lean = lean_of(full)
+    value, _, _ = rim_reach(lean, sides, ring, way)
+    x = add(c, scale(rho, direction(sides, way)))
     flat = sub(x, scale(dot(x, b), b))
-    n = sub(scale(cos(full.half_angle) / sqrt(dot(flat, flat)), flat), scale(sin(full.half_angle), b))
+    n = sub(scale(lean[0] / sqrt(dot(flat, flat)), flat), scale(lean[1], b))
     row.gap = value - full.radius
     for i in range(3):
         row.normal[i], row.place[i] = -n[i], origin[i] + x[i]
@@ -228,13 +248,13 @@ def round_rows(hollow_wall, full_wall, turn, shift, rows):
             ring = (sub(p, o), b, radius_at(full, own))
         else:
             ring = (sub(add(o, scale(height, a)), origin), b, radius_at(hollow, height))
-        near = nearest_turn(hollow if of_full else full, sides, ring, of_full)
+        near = nearest_way((a, lean_of(hollow if of_full else full)), sides, ring, of_full)
         for i in range(ROWS_OF_RING):
-            angle = near if i == HELD else 2.0 * pi * i / HELD
+            way = near if i == HELD else (WAYS[2 * i, 0], WAYS[2 * i, 1])
             if of_full:
-                put_ring_row(hollow, sides, ring, angle, rows, count)
+                put_ring_row(hollow, sides, ring, way, rows, count)
             else:
-                put_rim_row(full, origin, sides, ring, angle, rows, count)
+                put_rim_row(full, origin, sides, ring, way, rows, count)
             row, is_near = row_at(rows, count), i == HELD
             if of_full:
                 row.kind = NEAREST_RING if is_near else RING
