@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import hypot, pi, sqrt
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +23,7 @@ from assembly.errors import InputError, check_coordinates, number, real_array, v
 
 __all__ = [
     "Pose",
+    "PoseLike",
     "angular_velocity_map",
     "axes_quaternion",
     "deg",
@@ -38,6 +40,8 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
+# A pose, or its row x y z qw qx qy qz.
+PoseLike: TypeAlias = "Pose | ArrayLike"
 # A degree in radians: `90 * deg` is a right angle.
 deg = pi / 180.0
 # A body's place where none is given: x y z qw qx qy qz.
@@ -71,9 +75,9 @@ def check_quaternion(name: str, e: list[float]) -> None:
         raise InputError(f"{name} is {e}; expected a quaternion (w, x, y, z) of a length other than zero")
 
 
-def pose_row(name: str, value: ArrayLike) -> Array:
-    """One pose row x y z qw qx qy qz, (7,), its quaternion of any length but zero, as it came."""
-    row = vector(name, value, 7)
+def pose_row(name: str, value: PoseLike) -> Array:
+    """One pose row x y z qw qx qy qz, (7,), its quaternion of any length but zero, as it came; or that of a pose."""
+    row = vector(name, value.q if isinstance(value, Pose) else value, 7)
     check_quaternion(f"{name}[3:]", row.tolist()[3:])
     return row
 

@@ -22,7 +22,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.curve import NurbsCurve
 from assembly.geometry.splines.evaluate import CURVE_BREAKS, CURVE_COEFFICIENTS, OFFSETS, SURFACE_RECORD
 from assembly.geometry.splines.surface import NurbsSurface
-from assembly.kinematics.pose import pose_row
+from assembly.kinematics.pose import PoseLike, pose_row
 from assembly.proximity.brep.records import EDGE, EDGE_RECORD, FACE
 from assembly.proximity.brep.writer import edge_over
 from assembly.proximity.extrema.feature_query import PAIR, feature_derivatives, find_features
@@ -134,9 +134,9 @@ class _Query:
 
 def _query(
     surface: Side,
-    q_s: ArrayLike,
+    q_s: PoseLike,
     curve: NurbsCurve,
-    q_c: ArrayLike,
+    q_c: PoseLike,
     name: str,
     value: ArrayLike,
     embedded_in: Side | None,
@@ -167,9 +167,9 @@ def _query(
 
 def extremal_curve_pair(
     surface: Side,
-    q_s: ArrayLike,
+    q_s: PoseLike,
     curve: NurbsCurve,
-    q_c: ArrayLike,
+    q_c: PoseLike,
     start: ArrayLike,
     embedded_in: Side | None = None,
 ) -> CurvePair:
@@ -179,7 +179,7 @@ def extremal_curve_pair(
     ----------
     surface : NurbsSurface, Face or BodyFace
         The whole surface; a face's loops are not looked at.
-    q_s, q_c : (7,)
+    q_s, q_c : Pose or (7,)
         Poses of the bodies of the surface and of the curve.
     curve : NurbsCurve
         In space (body coordinates), or plane: then (u, v) of `embedded_in`, which may run round its closed directions.
@@ -210,9 +210,9 @@ def extremal_curve_pair(
 
 def _derivatives(
     surface: Side,
-    q_s: ArrayLike,
+    q_s: PoseLike,
     curve: NurbsCurve,
-    q_c: ArrayLike,
+    q_c: PoseLike,
     parameters: ArrayLike,
     embedded_in: Side | None,
 ) -> tuple[Array, Array, Array]:
@@ -238,9 +238,9 @@ def _derivatives(
 
 def curve_contact_jacobian(
     surface: Side,
-    q_s: ArrayLike,
+    q_s: PoseLike,
     curve: NurbsCurve,
-    q_c: ArrayLike,
+    q_c: PoseLike,
     parameters: ArrayLike,
     embedded_in: Side | None = None,
 ) -> Array:
@@ -267,9 +267,9 @@ def curve_contact_jacobian(
 
 def curve_gap_gradient(
     surface: Side,
-    q_s: ArrayLike,
+    q_s: PoseLike,
     curve: NurbsCurve,
-    q_c: ArrayLike,
+    q_c: PoseLike,
     parameters: ArrayLike,
     embedded_in: Side | None = None,
 ) -> Array:
@@ -279,9 +279,9 @@ def curve_gap_gradient(
 
 def curve_gap_hessian(
     surface: Side,
-    q_s: ArrayLike,
+    q_s: PoseLike,
     curve: NurbsCurve,
-    q_c: ArrayLike,
+    q_c: PoseLike,
     parameters: ArrayLike,
     embedded_in: Side | None = None,
 ) -> Array:

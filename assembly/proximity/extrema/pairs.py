@@ -20,7 +20,7 @@ from assembly.geometry.faces.face import Face
 from assembly.geometry.splines.evaluate import OFFSETS, SURFACE_RECORD
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import BodyFace
-from assembly.kinematics.pose import pose_row
+from assembly.kinematics.pose import PoseLike, pose_row
 from assembly.proximity.brep.records import FACE
 from assembly.proximity.extrema.feature_query import PLACED, PLACED_PAIR, feature_derivatives, find_descent, find_pair
 from assembly.proximity.extrema.feedback import CROSSED
@@ -105,7 +105,7 @@ def _packed(f: tuple[NurbsSurface, bool], g: tuple[NurbsSurface, bool]) -> tuple
     return np.concatenate([record_f, record_g]), np.concatenate([pool_f, pool_g]), max(f[0].size, g[0].size)
 
 
-def _configuration(q_f: ArrayLike, q_g: ArrayLike) -> Array:
+def _configuration(q_f: PoseLike, q_g: PoseLike) -> Array:
     q = np.empty((2, 7))
     for k, (name, value) in enumerate((("q_f", q_f), ("q_g", q_g))):
         q[k] = pose_row(name, value)
@@ -127,14 +127,14 @@ def inside(name: str, parameters: Array, surfaces: tuple[NurbsSurface, NurbsSurf
 
 
 def extremal_pair(
-    surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, start: ArrayLike | None = None
+    surface_f: Side, q_f: PoseLike, surface_g: Side, q_g: PoseLike, start: ArrayLike | None = None
 ) -> ContactPair:
     """The extremal pair of two surfaces: closest when apart, through touching and interpenetration.
 
     Parameters
     ----------
     surface_f, surface_g : NurbsSurface, Face or BodyFace
-    q_f, q_g : (7,)
+    q_f, q_g : Pose or (7,)
         Their bodies' poses.
     start : (4,), optional
         Parameters near the pair: Newton's method goes to the extremum near them. Without a start, bounding cells of
@@ -168,7 +168,7 @@ def extremal_pair(
 
 
 def descend(
-    surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, start: ArrayLike, steps: int = 200
+    surface_f: Side, q_f: PoseLike, surface_g: Side, q_g: PoseLike, start: ArrayLike, steps: int = 200
 ) -> ContactPair:
     """The nearest pair of two patches that a descent from any start leads to: points that never move apart.
 
@@ -179,7 +179,7 @@ def descend(
     ----------
     surface_f, surface_g : NurbsSurface, Face or BodyFace
         The whole patches; trims are not seen.
-    q_f, q_g : (7,)
+    q_f, q_g : Pose or (7,)
         Their bodies' poses.
     start : (4,)
         Parameters u_f, v_f, u_g, v_g.
@@ -217,7 +217,7 @@ def placed_pair(out: Array) -> tuple[Array, Array, Array, float]:
 
 
 def _derivatives(
-    surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, parameters: ArrayLike
+    surface_f: Side, q_f: PoseLike, surface_g: Side, q_g: PoseLike, parameters: ArrayLike
 ) -> tuple[Array, Array, Array]:
     f, g = as_face("surface_f", surface_f), as_face("surface_g", surface_g)
     q = _configuration(q_f, q_g)
@@ -235,7 +235,7 @@ def _derivatives(
     return first[:4], first[4], hessian
 
 
-def contact_jacobian(surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, parameters: ArrayLike) -> Array:
+def contact_jacobian(surface_f: Side, q_f: PoseLike, surface_g: Side, q_g: PoseLike, parameters: ArrayLike) -> Array:
     """d(u_f, v_f, u_g, v_g) / d(q_f, q_g), (4, 14), by the contact velocity formulation.
 
     For any regular parameterization; at an extremum that is not isolated, the damped least-norm rates.
@@ -253,7 +253,7 @@ def contact_jacobian(surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: Arra
     return jacobian
 
 
-def gap_gradient(surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, parameters: ArrayLike) -> Array:
+def gap_gradient(surface_f: Side, q_f: PoseLike, surface_g: Side, q_g: PoseLike, parameters: ArrayLike) -> Array:
     """d gap / d(q_f, q_g), (14,): the contact wrench, in quaternion coordinates.
 
     In twists it is [-n, -(f - x_f) x n, n, (g - x_g) x n]: no parameter rates enter (envelope theorem).
@@ -261,7 +261,7 @@ def gap_gradient(surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLik
     return _derivatives(surface_f, q_f, surface_g, q_g, parameters)[1]
 
 
-def gap_hessian(surface_f: Side, q_f: ArrayLike, surface_g: Side, q_g: ArrayLike, parameters: ArrayLike) -> Array:
+def gap_hessian(surface_f: Side, q_f: PoseLike, surface_g: Side, q_g: PoseLike, parameters: ArrayLike) -> Array:
     """Second derivative of the gap, (12, 12), in the twists of f, then g.
 
     Symmetric; along x + t dx, exp(t dw) e with constant twists the gap's second derivative is twist^T hessian twist.

@@ -8,14 +8,14 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from assembly._read_only import ReadOnlyArrays, read_only
 from assembly.distance.bodies.query import Nearest, bodies_apart
 from assembly.distance.piece_search import SPENT
 from assembly.errors import InputError, integer, positive
 from assembly.geometry.faces.face import Face
-from assembly.kinematics.pose import rotation_matrix
+from assembly.kinematics.pose import PoseLike, rotation_matrix
 from assembly.proximity.features.features import Feature, Shape, faces_of, pose_of
 from assembly.proximity.features.parting import are_balls, parting_translation
 from assembly.proximity.features.places import body_tree, feature_at, is_behind, is_closed, normals_at, shells_of
@@ -120,7 +120,7 @@ def distance(
     a: Shape,
     b: Shape,
     *,
-    poses: tuple[ArrayLike | None, ArrayLike | None] = (None, None),
+    poses: tuple[PoseLike | None, PoseLike | None] = (None, None),
     tolerance: float = 1e-10,
     budget: int | None = None,
 ) -> BodyDistance:
@@ -131,7 +131,7 @@ def distance(
     a, b : Body, Face, NurbsSurface, or several faces
         Faces given together share their edges and vertices.
     poses : (q_a, q_b), optional
-        (7,) each; a body's own by default, else the identity.
+        A `Pose` or a row (7,) each; a body's own by default, else the identity.
     tolerance : float
         How far the two bounds may be apart, in the units of the shapes.
     budget : int, optional

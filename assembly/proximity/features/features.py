@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from assembly._copies import OwnState
 from assembly._read_only import ReadOnlyArrays
@@ -20,7 +20,7 @@ from assembly.errors import InputError, check_coordinates, number
 from assembly.geometry.faces.face import Face, whole_face
 from assembly.geometry.splines.surface import NurbsSurface
 from assembly.kinematics.body import Body, BodyFace
-from assembly.kinematics.pose import IDENTITY_ROW, pose_row
+from assembly.kinematics.pose import IDENTITY_ROW, PoseLike, pose_row
 from assembly.proximity.brep.packing import pack_shell
 from assembly.proximity.brep.solid import solid_of
 from assembly.proximity.features.nearest_query import (
@@ -144,7 +144,7 @@ def faces_of(name: str, shape: Shape) -> Faces:
     return tuple(faces)
 
 
-def pose_of(name: str, shape: Shape, q: ArrayLike | None) -> Array:
+def pose_of(name: str, shape: Shape, q: PoseLike | None) -> Array:
     """The pose of a shape (7,), an argument of this name: the body's own, or none, where it is not given."""
     if q is None:
         if isinstance(shape, BodyFace):
@@ -215,7 +215,7 @@ def _pair(
 
 
 def closest_features(
-    a: Shape, b: Shape, q_a: ArrayLike | None = None, q_b: ArrayLike | None = None, *, touching: float = 1e-9
+    a: Shape, b: Shape, q_a: PoseLike | None = None, q_b: PoseLike | None = None, *, touching: float = 1e-9
 ) -> FeaturePair:
     """The closest points of two bodies over all their faces, edges and vertices.
 
@@ -223,7 +223,7 @@ def closest_features(
     ----------
     a, b : Body, Face, NurbsSurface, or several faces
         Faces given together share their edges and vertices.
-    q_a, q_b : (7,), optional
+    q_a, q_b : Pose or (7,), optional
         Poses; a body's own by default, else the identity.
     touching : float
         How much the bodies may overlap and still count as touching, in parts of the larger one's size. The same holds
@@ -320,8 +320,8 @@ class FeatureTracker(OwnState):
         """How often a feature took over from another one since the start."""
         return int(self._out[SWITCHES])
 
-    def step(self, q_a: ArrayLike | None = None, q_b: ArrayLike | None = None) -> FeaturePair:
-        """The pair at new poses, (7,) each; a body's own by default, else the identity.
+    def step(self, q_a: PoseLike | None = None, q_b: PoseLike | None = None) -> FeaturePair:
+        """The pair at new poses, a `Pose` or a row (7,) each; a body's own by default, else the identity.
 
         Raises
         ------

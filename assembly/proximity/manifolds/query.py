@@ -12,7 +12,7 @@ from assembly._read_only import ReadOnlyArrays
 from assembly.errors import InputError
 from assembly.geometry.recognition.forms import Cone, Cylinder, Sphere
 from assembly.kinematics.body import BodyFace
-from assembly.kinematics.pose import Pose, rotation_of
+from assembly.kinematics.pose import PoseLike, pose_row, rotation_of
 from assembly.proximity.manifolds.elementary_faces import ElementaryFace, elementary_faces
 from assembly.proximity.manifolds.flat_manifolds import flat_manifold
 from assembly.proximity.manifolds.line_manifolds import line_manifold
@@ -86,7 +86,9 @@ class ContactManifold(ReadOnlyArrays):
         return second.reshape(-1, 12, 12)
 
 
-def contact_manifold(a: BodyFace, b: BodyFace, *, poses: tuple[Pose, Pose] | None = None) -> ContactManifold | None:
+def contact_manifold(
+    a: BodyFace, b: BodyFace, *, poses: tuple[PoseLike, PoseLike] | None = None
+) -> ContactManifold | None:
     """The contact manifold of two faces that conform, or nearly (docs/certified.md).
 
     Plane on plane: corners of what both trimmed faces have in common, and places on arcs. A cylinder in a bore, a cone
@@ -97,8 +99,8 @@ def contact_manifold(a: BodyFace, b: BodyFace, *, poses: tuple[Pose, Pose] | Non
     ----------
     a, b : BodyFace
         `body.face("top")`, of two bodies.
-    poses : (Pose, Pose), optional
-        Of their bodies; where these stand by default.
+    poses : (q_a, q_b), optional
+        Of their bodies, a `Pose` or a row (7,) each; where these stand by default.
 
     Returns
     -------
@@ -115,11 +117,10 @@ def contact_manifold(a: BodyFace, b: BodyFace, *, poses: tuple[Pose, Pose] | Non
             raise TypeError(f"{name} is {face!r}; expected a face of a body, body.face(...)")
     if a.body is b.body:
         raise InputError(f"a and b are {a!r} and {b!r}, of one body; expected faces of two bodies")
-    one, other = (a.body.pose, b.body.pose) if poses is None else _checked(poses)
+    q = _rows((a.body.pose, b.body.pose) if poses is None else poses)
     sides = _side(a), _side(b)
     k = int(_is_exchanged((a, b), sides))
-    origins = np.array([one.position, other.position])
-    turns = np.array([rotation_of(one.quaternion), rotation_of(other.quaternion)])
+    origins, turns = q[:, :3].copy(), np.array([rotation_of(row) for row in q[:, 3:]])
     first = turns[k].T
     found = _find(k, (sides[k], sides[1 - k]), first @ turns[1 - k], first @ (origins[1 - k] - origins[k]))
     if found is None:
@@ -129,10 +130,11 @@ def contact_manifold(a: BodyFace, b: BodyFace, *, poses: tuple[Pose, Pose] | Non
     return ContactManifold(places @ first + origins[k], normals, gaps, found.bound, origins, turns, found)
 
 
-def _checked(poses: tuple[Pose, Pose]) -> tuple[Pose, Pose]:
-    if not isinstance(poses, (tuple, list)) or len(poses) != 2 or not all(isinstance(p, Pose) for p in poses):
-        raise TypeError(f"poses is {poses!r}; expected two poses")
-    return poses[0], poses[1]
+def _rows(poses: tuple[PoseLike, PoseLike]) -> Array:
+    """Two poses as rows, (2, 7)."""
+    if not isinstance(poses, (tuple, list, np.ndarray)) or len(poses) != 2:
+        raise InputError(f"poses is {poses!r}; expected a pair, one pose for a and one for b")
+    return np.array([pose_row(f"poses[{k}]", pose) for k, pose in enumerate(poses)])
 
 
 def _side(face: BodyFace) -> Side | None:

@@ -131,5 +131,5 @@ def test_bad_input():
         contact_manifold(lid.face("top"), lid.face("bottom"))
     with pytest.raises(InputError, match="a plane and a torus; expected planes with edges of lines and arcs"):
         contact_manifold(lid.face("top"), ring.faces[0])
-    with pytest.raises(TypeError, match="poses is 3; expected two poses"):
+    with pytest.raises(InputError, match="poses is 3; expected a pair, one pose for a and one for b"):
         contact_manifold(lid.face("top"), base.faces[0], poses=3)
