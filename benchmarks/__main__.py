@@ -35,6 +35,7 @@ BENCHMARKS = (
     "controllers",
     "curves",
     "curve_errors",
+    "distances",
     "proximity_paper",
     "features",
     "facets",

@@ -31,6 +31,7 @@ def slope(what):
         "curves",
         "proximity_paper",
         "facets",
+        "distances",
         "manifolds",
         "wires",
         "tracking",
