@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from assembly._turn import in_turn
 from assembly.constraints.model.constraint import Constraint, Freedom
 from assembly.constraints.model.dexterity import MEASURES, Axes, Dexterity, Task
 from assembly.constraints.model.joint import Joint
@@ -43,6 +44,7 @@ Array = NDArray[np.float64]
 TOUCHING = 1e-8
 
 
+@in_turn
 def tip_jacobian(
     scene: Assembly,
     tip: Point | Frame | Body,
@@ -104,6 +106,7 @@ def tip_jacobian(
     return _evaluated(scene, options, q, active)[0]
 
 
+@in_turn
 def dexterity_value(
     scene: Assembly, objective: Dexterity, q: ArrayLike | Solution | None = None, *, active: bool = False
 ) -> float:
@@ -131,6 +134,7 @@ def dexterity_value(
     return value
 
 
+@in_turn
 def dexterity_ellipsoid(
     scene: Assembly,
     tip: Point | Frame | Body,
