@@ -88,6 +88,9 @@ class _Entry:
         self._is_mine = False
 
     def __enter__(self) -> bool:
+        if self._lock.acquire(blocking=False):
+            self._is_mine = True
+            return True
         me = get_ident()
         with _waits_lock:
             if self._closes_circle(me):

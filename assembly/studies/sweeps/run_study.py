@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from contextlib import closing, nullcontext
+from functools import partial
 from os import PathLike
 from typing import Any, NamedTuple
 
@@ -14,12 +15,13 @@ from assembly._progress import Advance, Progress, checked_progress, watched
 from assembly._turn import in_turn
 from assembly.assembly import Assembly
 from assembly.derivatives.implicit import check_is_of, the_scene
+from assembly.derivatives.measure import Measure
 from assembly.derivatives.numbers import RowNumber, TargetNumber
 from assembly.derivatives.response import values_set
 from assembly.errors import InputError, positive
 from assembly.studies.sweeps.folder import Folder
 from assembly.studies.sweeps.identity import manifest_of
-from assembly.studies.sweeps.measuring import columns_of
+from assembly.studies.sweeps.measuring import Column, columns_of
 from assembly.studies.sweeps.plans import Plan, as_plan
 from assembly.studies.sweeps.result import Study, new_study
 from assembly.studies.sweeps.scheduling import Executor, StudyError, Take, in_process, on_executor, sent
@@ -87,9 +89,11 @@ def study(
         raise TypeError(f"executor is {executor!r}; expected an Executor with submit, or a client of Dask")
     checked_progress(progress)
     seconds = positive("chunk_seconds", chunk_seconds)
+    columns = columns_of(of)
     if executor is None:
-        return _here(scene, (plan, of, folder, swept), progress, seconds)
-    asked = _asked(scene, plan, of, folder, swept)
+        calls_back = callable(progress) or not all(isinstance(column.of, Measure) for column in columns)
+        return in_turn(_here, calls_back)(scene, (plan, columns, folder, swept), progress, seconds)
+    asked = _asked(scene, plan, columns, folder, swept)
 
     def on_workers(take: Take, _: Advance) -> None:
         # Workers have scenes of their own, and other threads the turn of this one.
@@ -107,10 +111,9 @@ class _Asked(NamedTuple):
     kept: Folder | None
 
 
-@in_turn
-def _here(scene: Assembly, given: tuple[Any, Any, Any, bool], progress: Progress, seconds: float) -> Study:
+def _here(scene: Assembly, given: tuple[Any, ...], progress: Progress, seconds: float) -> Study:
     """A study in this process, which has the scene's turn until it ends: its numbers are those of rows meanwhile."""
-    asked = _asked(scene, *given)
+    asked: _Asked = _asked(scene, *given)
     parameters = asked.designs.parameters
 
     def in_this_process(take: Take, say: Advance) -> None:
@@ -120,13 +123,14 @@ def _here(scene: Assembly, given: tuple[Any, Any, Any, bool], progress: Progress
         return _found(asked, in_this_process, progress, is_told=False)
 
 
-@in_turn
-def _asked(scene: Assembly, plan: Any, of: Any, folder: str | PathLike[str] | None, swept: bool) -> _Asked:
+@partial(in_turn, calls_back=False)
+def _asked(
+    scene: Assembly, plan: Any, columns: tuple[Column, ...], folder: str | PathLike[str] | None, swept: bool
+) -> _Asked:
     """What the arguments of `study` ask for."""
     designs = as_plan(plan)
     for parameter in designs.parameters:
         check_is_of("plan", scene, parameter)
-    columns = columns_of(of)
     names = [*OWN, *designs.names]
     for column in columns:
         if column.name in names:

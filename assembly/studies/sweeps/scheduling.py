@@ -76,7 +76,8 @@ class Waiting:
     def chunk(self) -> list[int]:
         """The next runs: for so many seconds, or less near the end, down to a tenth of them."""
         a_row = self._spent / self._solved if self._solved else FIRST_GUESS
-        share = a_row * self._left / (SHARES * self._workers)
+        # A single worker has nobody to end together with.
+        share = a_row * self._left / (SHARES * self._workers if self._workers > 1 else 1)
         least = LEAST_PART * self._seconds
         most = max(min(self._seconds, share), least) / a_row
         if self._at_hand < self._left:
